@@ -13,7 +13,7 @@
 namespace sonar {
 namespace {
 
-/// Like stop_limit, while files are written. It is less than TimeoutStopSec of the systemd unit.
+/// The limit instead of stop_limit while files are being written. It is less than TimeoutStopSec of the systemd unit.
 constexpr std::chrono::milliseconds files_limit{8000};
 
 }  // namespace
@@ -87,12 +87,12 @@ void App::log_new_notes() {
   for (const Note& note : plausibility_.use(config_, *changes_.scene())) log_.warning(text_of(note));
 }
 
-/// Control opens last, so that no request comes to a daemon whose sonars cannot be opened.
+/// Control opens last, so that no request arrives before all sonars are open.
 Result<void> App::open() {
-  if (options_.handle_signals) {  // before a program can read that sonard is ready
+  if (options_.handle_signals) {  // before the message that sonard is ready
     signals_.add(SIGINT);
     signals_.add(SIGTERM);
-    signals_.add(SIGHUP);  // by default it ends the process in the middle of messages
+    signals_.add(SIGHUP);  // its default action would end the process in the middle of messages
   }
   if (!config_.faults.journal.empty())
     if (auto r = fault_log_.open(config_.faults.journal); !r) return r;
@@ -132,14 +132,14 @@ void App::wait_for_signal() {
   signals_.async_wait([this](const error_code& ec, int signal) {
     if (ec) return;
     if (signal == SIGHUP && stopping_) {
-      on_change();  // look() may have cancelled before we wait again
+      on_change();  // look() may have cancelled before this coroutine waits again
     } else if (signal == SIGHUP) {
       reload_.request();
     } else {
       if (stopping_) ::_exit(128 + signal);
       stop(signal == SIGINT ? "interrupted" : "terminated");
     }
-    wait_for_signal();  // cancelled in look() when all is done
+    wait_for_signal();  // look() cancels it when all is done
   });
 }
 
@@ -161,12 +161,12 @@ void App::stop(const std::string& why) {
   changes_.stop();
   fleet_.stop();
   recordings_.finish();
-  // Clients are finished by then. A long ping, for example, is not waited for.
+  // By then all clients are finished; a long computation, for example, is abandoned.
   stop_timer_.expires_after(stop_limit);
   stop_timer_.async_wait([this](const error_code& ec) {
     if (ec) return;
     if (files_are_written()) return io_.stop();
-    stop_timer_.expires_after(files_limit - stop_limit);  // pings that still wait for their file
+    stop_timer_.expires_after(files_limit - stop_limit);  // recorded pings still wait to be written
     stop_timer_.async_wait([this](const error_code& again) {
       if (!again) io_.stop();
     });
@@ -174,7 +174,7 @@ void App::stop(const std::string& why) {
   on_change();
 }
 
-/// Many changes in one turn of the event loop cause one look().
+/// Many changes in one turn of the event loop cause only one look().
 void App::on_change() {
   if (std::exchange(look_posted_, true)) return;
   asio::post(io_, [this] {
@@ -213,7 +213,7 @@ void App::take_over(Config next) {
   const bool other_water = !(config_.water == next.water);
   std::swap(config_, next);  // devices read it through their context
   const Config& before = next;
-  // The World before the fleet: sonars that move or open look up their vehicle in it.
+  // The World comes before the fleet, because moved and new sonars look up their vehicle in it.
   world_.use_rules(pose_rules(config_));
   world_.use_vehicles(vehicles_of(config_), clock_.now());
   world_.use_objects(bodies_of(scene(), config_), clock_.now());

@@ -35,23 +35,24 @@
 namespace sonar {
 
 struct AppOptions {
-  std::uint64_t exit_after_pings = 0;  // served, over all sonars; 0 = never
+  std::uint64_t exit_after_pings = 0;  // stop after this many served pings of all sonars; 0 = never
   bool digest = false;                 // SHA-256 of every client's stream
   bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP reads the configuration again
   /// Reads the configuration again and applies the command line's options to it; may be called on any thread. Empty if there is
   /// no configuration file (the demo).
   std::function<Result<Config>()> read_config;
   LoadScene load_scene;
-  NotifyTarget service_manager;  // gets messages that the daemon is ready, stops, and, at intervals, is alive
+  NotifyTarget service_manager;  // is notified that the daemon is ready, stops and, periodically, is alive
 };
 
 class App {
  public:
-  /// run() returns at most this long after stop(), even if a ping or a scene is still being computed; files that are being
-  /// written get longer. The rest of the documented 2 s is a margin for a busy machine.
+  /// run() returns within this time after stop(), even if a ping or a scene is still being computed; only files that are being
+  /// written may take longer. The rest of the documented 2 s is a margin for a busy machine.
   static constexpr std::chrono::milliseconds stop_limit{1100};
 
-  /// `make_engine` is copied, and makes the engines of later scenes on another thread. What it refers to must outlive the App.
+  /// `make_engine` is copied, and also makes the engines of later scenes, on another thread. Objects to which it refers must
+  /// outlive the App.
   App(Config config, ScenePointer scene, const EngineFactory& make_engine, AppOptions options, Log& log);
 
   /// Opens every listener; errors name the address and the next step.
@@ -60,13 +61,13 @@ class App {
   int run();
   /// May be called from any thread.
   void request_stop();
-  /// May be called from any thread: `work` is done on the I/O thread.
+  /// Runs `work` on the I/O thread. May be called from any thread.
   void post(std::function<void()> work) { asio::post(io_, std::move(work)); }
 
   const Config& config() const { return config_; }
   const Scene& scene() const { return *changes_.scene(); }
   const std::string& engine_description() const { return simulator_.engine_description(); }
-  /// Call it after run(). True if the destructor would wait for a scene or a ping that is not needed any more, or for files.
+  /// Call it after run(). True if the destructor would wait: for a scene or a ping that is no longer needed, or for files.
   bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0 || !files_are_written(); }
   const PoseServer& poses() const { return pose_server_; }
   const MavlinkServer& mavlink() const { return mavlink_server_; }
@@ -83,14 +84,14 @@ class App {
  private:
   void stop(const std::string& why);
   void on_change();
-  void look();  // after a change: ends, or takes the next step of stepped time
+  void look();  // called after a change: ends the daemon, or takes the next step of stepped time
   bool enough_served() const;
   bool files_are_written() const { return recordings_.idle() && writer_.idle(); }
   void log_new_notes();
   void run_range_finders();
   void wait_for_signal();
   Reload::Steps reload_steps();
-  void take_over(Config next);  // takes over a reloaded configuration
+  void take_over(Config next);  // applies a reloaded configuration
   std::string status_line() const;
   asio::awaitable<void> housekeeping();
 

@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// At most one reload in each `pause`. A request within it waits for its end, and further requests join that one.
+/// At most one reload begins per `pause`. A request within the pause waits for its end; further requests join it.
 void Reload::request() {
   if (waits_) return;
   const auto now = std::chrono::steady_clock::now();
@@ -28,12 +28,11 @@ void Reload::stop() {
   timer_.cancel();
 }
 
-/// The file is read on the scene thread, as a change of the scene, so that the new configuration and its scene come into use
-/// together.
+/// Reads the file on the scene thread, as a change of the scene, so that configuration and scene take effect together.
 void Reload::begin() {
   if (!steps_.read_config || !steps_.load_scene) return log_.info("reload: there is no configuration file; nothing changed");
   if (changes_.is_full()) return log_.warning("reload: too many changes of the scene wait already; nothing changed");
-  if (under_way_ == 2) return;  // one reload is under way; the next one waits, and reads the file when it begins
+  if (under_way_ == 2) return;  // one reload runs, and the next one waits; it will read the file when it begins
   ++under_way_;
   steps_.begin();
   auto next = std::make_shared<Config>();

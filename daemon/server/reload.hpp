@@ -28,7 +28,7 @@ class Reload {
   Reload(asio::io_context& io, SceneChanges& changes, Log& log, Steps steps)
       : changes_(changes), log_(log), steps_(std::move(steps)), timer_(io) {}
 
-  /// Begins a reload now, or after the pause. All requests before the end of the pause cause one reload.
+  /// Begins a reload, now or after the pause. All requests until then cause only one reload.
   void request();
   void stop();
 
@@ -40,7 +40,7 @@ class Reload {
   Steps steps_;
   asio::steady_timer timer_;
   int under_way_ = 0;   // number of reloads that run or wait for the running one
-  bool waits_ = false;  // for the end of the pause
+  bool waits_ = false;  // waits for the end of the pause
   bool stopped_ = false;
   std::chrono::steady_clock::time_point not_before_{};
 };

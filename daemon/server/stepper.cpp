@@ -9,7 +9,7 @@ bool is_first(std::optional<Time> t, std::optional<Time> of) { return t && (!of 
 
 }  // namespace
 
-/// The earliest ping, request and dialogue tick of all sonars. Of equal times the first sonar of the configuration counts.
+/// The earliest ping, request and dialogue tick of all sonars; for equal times, that of the first sonar of the configuration.
 Stepper::Due Stepper::next_due() {
   Due due;
   for (Device& d : fleet_.devices()) {
@@ -20,9 +20,9 @@ Stepper::Due Stepper::next_due() {
   return due;
 }
 
-// A step of simulated time: if every client has taken what it was sent, time advances to the next event (a tick of a dialogue or
-// a ping) that the clock allows, and that event happens. Returns true if the daemon may end: enough is served and every request
-// that may still be answered has its answer.
+// A step of simulated time: once every client has received everything, time advances to the next event (a tick of a dialogue or
+// a ping) that the clock allows, and that event happens. Returns true if the daemon may end: enough pings are served, and all
+// requests that can be answered are answered.
 bool Stepper::step(const std::function<bool()>& enough_served) {
   skip();
   if (time_.end_left()) on_change_();
@@ -30,26 +30,25 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   if (!std::all_of(devices.begin(), devices.end(), [](const Device& d) { return d.sonar().settled(); })) return false;
   const Due due = next_due();
   const SteppedTime::Bound bound = time_.bound(is_first(due.request, due.ping) ? due.request : due.ping);
-  // If a dialogue's tick and a ping are due at the same moment, the dialogue comes first.
+  // If a dialogue's tick and a ping are due at the same time, the dialogue comes first.
   const bool converses = is_first(due.conversation, due.ping) || due.conversation == due.ping;
   const std::optional<Time> next = converses ? due.conversation : due.ping;
-  // A dialogue's tick that is due now may run although no time may pass.
+  // A dialogue's tick that is due now may run even if time must not advance.
   const bool may_come = next && (*next <= bound.last_tick || (converses && *next <= clock_.now()));
   if (!may_come && bound.then && (*bound.then > clock_.now() || is_overdue())) advance(*bound.then);
   const bool answered = time_.answer(next);
-  if (answered) on_change_();  // first the answers, in separate turns of the event loop
+  if (answered) on_change_();  // answers come first, in separate turns of the event loop
   if (enough_served()) return !answered;
   if (!may_come) return false;
   advance(time_.tick_at(*next));
   if (converses)
-    on_change_();  // replies and requests that the tick caused may come before the next ping
+    on_change_();  // the tick's replies and requests come before the next ping
   else
     due.pings->step();
   return false;
 }
 
-/// Returns whether a sonar has something to do at the present time, pings excepted. Each call of advance() is followed by another
-/// step().
+/// Whether a sonar has something due at the present time, apart from pings.
 bool Stepper::is_overdue() {
   return std::any_of(fleet_.devices().begin(), fleet_.devices().end(), [this](const Device& d) {
     const auto next = d.sonar().next_tick_of_conversations();
@@ -57,13 +56,13 @@ bool Stepper::is_overdue() {
   });
 }
 
-/// The sonars act on the new time at once: dialogues, faults and pings that are held back.
+/// Advances time; dialogues, faults and held pings that are due then act at once.
 void Stepper::advance(Time to) {
   clock_.advance_to(to);
   for (Device& d : fleet_.devices()) d.tick_sessions();
 }
 
-/// With clock: follow, time jumps to the first stamp, and ahead with the stamps of a single vehicle.
+/// With `clock: follow`, time jumps to the first stamp, and with jumps of the stamps if there is only one vehicle.
 void Stepper::skip() {
   const auto skipped = world_.take_skipped();
   if (skipped.count() == 0) return;

@@ -1,4 +1,4 @@
-// Advances stepped time to the next ping or event of a conversation, as far as SteppedTime allows. App owns it and calls step()
+// Advances stepped time to the next ping or tick of a conversation, as far as SteppedTime allows. App owns it and calls step()
 // after every change; I/O thread only.
 #pragma once
 
@@ -19,8 +19,8 @@ class Stepper {
   Stepper(Clock& clock, World& world, SteppedTime& time, Fleet& fleet, Log& log, std::function<void()> on_change)
       : clock_(clock), world_(world), time_(time), fleet_(fleet), log_(log), on_change_(std::move(on_change)) {}
 
-  /// Handles the next event if everything before it is done. Returns true if `enough_served` returns true and no request is
-  /// left to answer: the daemon may then end.
+  /// Handles the next event if everything before it is done. Returns true if the daemon may end: `enough_served` returns true,
+  /// and all requests are answered.
   bool step(const std::function<bool()>& enough_served);
 
  private:

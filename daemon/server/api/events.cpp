@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// A listener is removed when its token is gone; no call is needed.
+/// A listener is removed when its token is destroyed.
 Events::Token Events::listen(Listener listener) {
   remove_expired();
   auto kept = std::make_shared<Listener>(std::move(listener));
@@ -21,7 +21,7 @@ void Events::remove_expired() {
 void Events::publish(const v1::Event& event) {
   remove_expired();
   for (const std::weak_ptr<Listener>& l : listeners_)
-    // lock() is empty if a listener that was called before has ended this one.
+    // lock() is empty if an earlier listener has just ended this one.
     if (const auto listener = l.lock()) (*listener)(event);
 }
 
@@ -52,7 +52,7 @@ void Events::publish_scene(const std::string& scene, const std::string& text) {
   publish(event);
 }
 
-/// The count of dropped events travels with the next event that finds room.
+/// The next event that is queued carries the count of dropped events.
 bool EventQueue::offer(const v1::Event& event) {
   if (!subscribes_to(event)) return false;
   if (waiting_.size() == deepest) {

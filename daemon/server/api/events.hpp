@@ -20,12 +20,12 @@ class Event;
 class Events {
  public:
   using Listener = std::function<void(const v1::Event&)>;
-  using Token = std::shared_ptr<void>;  // the listener is called as long as its token lives
+  using Token = std::shared_ptr<void>;  // the listener is called while its token exists
   [[nodiscard]] Token listen(Listener listener);
-  bool has_listeners() const { return !listeners_.empty(); }  // if false, no event needs to be made
+  bool has_listeners() const { return !listeners_.empty(); }  // false: events need not be made
 
   void publish(const v1::Event& event);
-  // These make the event only if there are listeners, and publish it.
+  // These make and publish an event, only if there are listeners.
   void publish_client(const std::string& sonar, const std::string& client, bool connected, const std::string& why);
   void publish_pose(const std::string& vehicle, bool stale, const std::string& text);
   void publish_scene(const std::string& scene, const std::string& text);
@@ -44,7 +44,7 @@ class EventQueue {
 
   void subscribe(const control::Subscribe& wanted) { wanted_ = wanted; }
   bool subscribes_any() const { return wanted_.pings || wanted_.clients || wanted_.poses || wanted_.scene || wanted_.faults; }
-  /// Queues an event that is subscribed. Returns true if it was queued.
+  /// Queues the event if it is subscribed. Returns true if it was queued.
   bool offer(const v1::Event& event);
   /// Returns the next event, or null.
   std::shared_ptr<v1::Event> next();

@@ -18,12 +18,12 @@ class Stepped;
 }  // namespace v1
 
 struct OperationResult {
-  enum class Code { done, refused, failed };  // refused: the request is wrong; failed: it is right but cannot be done
+  enum class Code { done, refused, failed };  // refused: an invalid request; failed: a valid request that cannot be carried out
   Code code = Code::done;
-  std::string text = {};                                // one sentence when it was not done
-  std::shared_ptr<const v1::DaemonStatus> status = {};  // answer of a GetStatus that was done
-  std::shared_ptr<const v1::Stepped> stepped = {};      // answer of Step
-  std::shared_ptr<const v1::FaultReport> faults = {};   // answer of GetFaults
+  std::string text = {};                                // one sentence if it was not done
+  std::shared_ptr<const v1::DaemonStatus> status = {};  // answer to GetStatus
+  std::shared_ptr<const v1::Stepped> stepped = {};      // answer to Step
+  std::shared_ptr<const v1::FaultReport> faults = {};   // answer to GetFaults
 };
 
 class Operations {

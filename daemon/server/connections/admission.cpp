@@ -11,8 +11,8 @@
 namespace sonar {
 namespace {
 
-constexpr auto accept_pause = std::chrono::milliseconds(100);  // after an accept that failed
-constexpr auto spell = std::chrono::seconds(60);               // without a refusal; then the next refusal is logged again
+constexpr auto accept_pause = std::chrono::milliseconds(100);  // after a failed accept
+constexpr auto spell = std::chrono::seconds(60);               // after this time without a refusal, the next one is logged again
 
 constexpr std::uint64_t most_kept_for_drivers = 64;
 
@@ -53,7 +53,7 @@ void raise_descriptor_limit() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur == limit.rlim_max) return;
   limit.rlim_cur = limit.rlim_max;
-  setrlimit(RLIMIT_NOFILE, &limit);  // refused: then there are fewer, and clients are refused sooner
+  setrlimit(RLIMIT_NOFILE, &limit);  // on failure the limit stays lower, and clients are refused sooner
 }
 
 void close_politely(tcp::socket& socket) {
@@ -88,20 +88,20 @@ void Admission::say(Steady::time_point& last, const char* what) {
 }
 
 bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
-  // All numbers below that of a new socket are in use: its number is the count of descriptors in use.
+  // All descriptors below that of a new socket are in use, so its number is the count of used descriptors.
   if (number_of(socket) < first_spare(limits_, purpose)) return true;
   ++for_descriptors_;
   say(descriptors_said_, "file descriptors run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
   return false;
 }
 
-/// The descriptors just below the spare ones are for drivers. A socket whose number is one of them uses one of the drivers.
+/// The descriptors just below the reserved ones are for drivers.
 bool Admission::is_drivers(const tcp::socket& socket) const {
   const std::uint64_t for_drivers = std::min(most_kept_for_drivers, most_descriptors() / 8);
   return number_of(socket) >= first_spare(limits_, Purpose::client) - for_drivers;
 }
 
-/// The place counts as long as a copy of it lives, also after this object is gone.
+/// The slot counts while a copy of it exists, even after the end of this object.
 Admission::Place Admission::enter(const tcp::socket& socket) {
   if (!leaves_spare(socket, Purpose::client)) return {};
   if (*count_ >= static_cast<std::uint64_t>(limits_.clients)) {

@@ -1,11 +1,11 @@
 // Limits the number of connected clients of all sonars, and handles a shortage of file descriptors. App owns it; every listener
 // calls it for each socket that it accepts. I/O thread only.
 //
-// The last descriptors below the limit of the process are not for clients of sonars, so that the daemon can always open a log or
-// a scene. Half of them are for control only, so that users can query the cause. Some descriptors before them are for drivers:
-// pose senders and control get one of these only if one of their connections is closed for it. If descriptors run out
-// nevertheless, a reserved one is used to accept connections and close them. Otherwise they would stay in the queue of the
-// listener, which would report them again and again.
+// The highest descriptor numbers of the process are not used for clients of sonars, so that the daemon can always open a log or
+// a scene; half of them are only for control, so that users can query the cause. Some numbers below these are for drivers: pose
+// senders and control get one only if one of their own connections is closed for it. If descriptors run out nevertheless, a
+// reserved one is used to accept and close connections, which would otherwise stay in the listener's queue and wake it again
+// and again.
 #pragma once
 
 #include <chrono>
@@ -25,7 +25,8 @@ void raise_descriptor_limit();
 
 class Admission {
  public:
-  /// The slot of a client. The owner of the socket holds it; it is free when the last copy is destroyed. Empty = no slot.
+  /// The slot of a client. The owner of the socket holds it; the slot becomes free when the last copy is destroyed. Empty = no
+  /// slot.
   using Place = std::shared_ptr<const void>;
 
   Admission(const LimitConfig& limits, Log& log);
@@ -35,18 +36,18 @@ class Admission {
 
   enum class Purpose { client, control };
 
-  /// Gives a slot to a socket that was just accepted. If the slot is empty, close the socket; the first refusal of a series is
-  /// logged.
+  /// Requests a slot for a socket that was just accepted. If the result is empty, close the socket; the first refusal of a
+  /// series is logged.
   Place enter(const tcp::socket& socket);
-  /// Returns whether the socket, which is not a driver's, has one of the descriptors for drivers or one beyond. A connection of
-  /// the same listener must then be closed for it.
+  /// Whether a socket that is not a driver's has a descriptor reserved for drivers, or a higher one. A connection of the same
+  /// listener must then be closed.
   bool is_drivers(const tcp::socket& socket) const;
-  /// Accepts the next connection of a listener, whatever its descriptor. nullopt: the listener is closed.
+  /// Accepts the next connection of a listener, with any descriptor. nullopt: the listener is closed.
   asio::awaitable<std::optional<tcp::socket>> accept(tcp::acceptor& acceptor);
   /// Accepts the next connection of a listener without slots here, with a descriptor outside the reserve. nullopt: as accept().
   asio::awaitable<std::optional<tcp::socket>> next_visitor(tcp::acceptor& acceptor, Purpose purpose);
 
-  /// Limits of addresses at the ports of all sonars.
+  /// The limits per address at the ports of all sonars.
   PortGuard& guard() { return guard_; }
 
   /// The number of clients: connected, waiting and being refused.
@@ -57,25 +58,25 @@ class Admission {
  private:
   using Steady = std::chrono::steady_clock;
   void say(Steady::time_point& last, const char* what);
-  /// Returns false, and logs a line, if the descriptor is one of the spare ones.
+  /// Returns false, and logs a line, if the descriptor is a reserved one.
   bool leaves_spare(const tcp::socket& socket, Purpose purpose);
-  /// Call it when accept() failed with `why`. Returns true if descriptors had run out and one waiting client was closed: accept
-  /// again.
+  /// Call it when accept() failed with `why`. Returns true if descriptors had run out and a waiting client was accepted and
+  /// closed; then accept again.
   bool send_away(tcp::acceptor& acceptor, const error_code& why);
 
   const LimitConfig& limits_;
   Log& log_;
   PortGuard guard_;
   std::shared_ptr<std::uint64_t> count_ =
-      std::make_shared<std::uint64_t>(0);  // shared, because places of sessions may outlive this object
+      std::make_shared<std::uint64_t>(0);  // shared, because slots of sessions may outlive this object
   std::uint64_t for_places_ = 0, for_descriptors_ = 0;
   Steady::time_point places_said_{}, descriptors_said_{};
   int reserve_ = -1;
 };
 
-/// Closes with FIN. Reads what the client has sent before, because with unread bytes the kernel would send RST.
+/// Closes with FIN. First reads the received bytes, because with unread bytes the kernel would send RST.
 void close_politely(tcp::socket& socket);
-/// Closes with RST, whatever was not sent.
+/// Closes with RST; unsent bytes are lost.
 void close_by_reset(tcp::socket& socket);
 
 }  // namespace sonar

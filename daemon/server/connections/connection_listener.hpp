@@ -1,7 +1,7 @@
-// A listener whose connections hold a slot each, for both control servers and the HTTP of sonars. If all slots are taken, a
-// connection is closed for the new one (connection_slots.hpp says which).
-// Where a token is required, clients that have not shown it yet share slots of their own, so that they can only evict each
-// other, first those of the address with most connections. The Connection class reads and writes the socket.
+// A listener whose connections each hold a slot; used by both control servers and the HTTP of sonars. If all slots are taken, a
+// connection is closed for the new one (connection_slots.hpp selects it). If a token is required, clients that have not sent it
+// yet have separate slots, so that they can only evict each other, first those of the address with most connections. The
+// Connection class reads and writes the socket.
 #pragma once
 
 #include <functional>
@@ -21,7 +21,7 @@ class ConnectionListener {
  public:
   using Make = std::function<std::shared_ptr<Connection>(tcp::socket, Sender)>;
 
-  /// `protocol` is its name in the log: "protobuf", "http". `services` outlive the listener.
+  /// `protocol` is its name in the log: "protobuf", "http". `services` must outlive the listener.
   ConnectionListener(ConnectionServices& services, std::string protocol, Make make)
       : services_(services),
         protocol_(std::move(protocol)),
@@ -84,7 +84,7 @@ class ConnectionListener {
     log_limited(services_.log, services_.notices, LogLevel::info,
                 services_.server + " connection closed: longest idle, and its slot was needed", {{"from", evicted.sender().id}});
   }
-  /// Moves a client that has shown the token to the slots of such clients. Returns false if no slot is free.
+  /// Moves a client that has sent the token to the slots for such clients. Returns false if no slot is free.
   bool claim_slot(const std::shared_ptr<Connection>& connection) {
     if (!make_room(slots_, connection->sender())) return false;
     untrusted_.remove(connection);

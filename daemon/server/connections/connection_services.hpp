@@ -15,7 +15,7 @@
 
 namespace sonar {
 
-/// Services of one server; outlive its connections.
+/// Services of one server. They must outlive its connections.
 struct ConnectionServices {
   asio::io_context& io;
   const LimitConfig& limits;
@@ -23,23 +23,23 @@ struct ConnectionServices {
   Log& log;
   std::string server;  // for the log: "control", "sonar NAME"
   Admission::Purpose purpose = Admission::Purpose::control;
-  Token token = {};  // without one every client is trusted
+  Token token = {};  // without a token every client is trusted
   LogLimiter refusals = {}, notices = {}, faults = {};
   WorkRate work = {};
 
-  /// Returns how long a client must wait after so much work.
+  /// The time that a client must wait after this much work.
   WorkRate::Steady::duration pause_after(const Sender& of, std::size_t amount);
 };
 
-inline constexpr std::chrono::seconds greeting_limit{10};    // for the Hello, or a whole HTTP request once it has begun
+inline constexpr std::chrono::seconds greeting_limit{10};    // for the Hello, or to complete an HTTP request that has begun
 inline constexpr std::chrono::seconds keep_alive_limit{60};  // between two HTTP requests
-inline constexpr std::chrono::minutes operation_limit{5};    // for a scene to load; HTTP stops waiting then
+inline constexpr std::chrono::minutes operation_limit{5};    // after which HTTP stops waiting for a scene to load
 
 /// Logs a refusal at a limited rate, because any client can cause it.
 void log_refusal(ConnectionServices& services, const std::string& why, const std::string& from);
 void log_fault(ConnectionServices& services, const std::string& fault, const std::string& at);
 
-/// Closes a socket after a time limit. One limit at a time; the next replaces the last.
+/// Closes a socket after a time limit. A new limit replaces the previous one.
 class Deadline : public std::enable_shared_from_this<Deadline> {
  public:
   using Steady = std::chrono::steady_clock;
@@ -63,7 +63,7 @@ class Deadline : public std::enable_shared_from_this<Deadline> {
   bool passed_ = false;
 };
 
-/// Writes all bytes, which must stay valid until then. Returns false if the client closed, or read no byte for limits.stall.
+/// Writes all bytes, which must stay valid meanwhile. Returns false if the client closed, or read no byte for limits.stall.
 asio::awaitable<bool> write_whole(ConnectionServices& services, tcp::socket& socket, Deadline& stall, const Sender& to,
                                   asio::const_buffer bytes);
 

@@ -13,8 +13,8 @@
 
 namespace sonar {
 
-/// A Connection has `active_at` (steady clock: when it came, or when it was last of use), `proved` (it has been of use: a whole
-/// request, a pose) and close(), after which its coroutines return.
+/// A Connection has `active_at` (steady clock: arrival, or last useful activity), `proved` (it has sent something useful: a
+/// whole request, a pose) and close(), after which its coroutines return.
 template <class Connection>
 class ConnectionSlots {
  public:
@@ -23,7 +23,7 @@ class ConnectionSlots {
 
   using Owner = std::function<std::string(const Connection&)>;
 
-  /// A connection that was of use within `busy` is evicted only for an owner that has fewer connections.
+  /// A connection with useful activity within `busy` is evicted only for an owner that has fewer connections.
   explicit ConnectionSlots(std::size_t most, Silence busy = std::chrono::seconds(1), Owner owner = {})
       : most_(most), busy_(busy), owner_(std::move(owner)) {}
   /// Returns true if a slot is free for a connection of `owner`. Evicts a connection if necessary, after calling `evicted` with

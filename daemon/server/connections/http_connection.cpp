@@ -13,7 +13,7 @@ namespace sonar {
 namespace {
 
 namespace http = boost::beast::http;
-constexpr std::chrono::seconds drain_limit{2};  // for discarding what the client still sends after our last answer
+constexpr std::chrono::seconds drain_limit{2};  // for discarding input after our last answer
 
 const HttpRefusal too_many{503, "too many connections are open"};
 
@@ -41,7 +41,7 @@ std::string bytes_of(const http::response<Body>& response, Part part) {
       bytes += boost::beast::buffers_to_string(buffers);
       serializer.consume(boost::beast::buffer_bytes(buffers));
     });
-    if (ec) break;  // never: the body is in memory
+    if (ec) break;  // cannot happen: the body is in memory
   }
   return bytes;
 }
@@ -110,10 +110,10 @@ void HttpConnection::reject() {
 
 // ---- requests
 
-// Two coroutines: read() fills the parser and hands one request over; write() answers it and calls next_request(). While a
-// request is answered (busy_), nothing is read, so pipelined requests wait in the parser and in the kernel, and are answered in
-// order (RFC 9112, 9.3.2). Time limits: greeting_limit for a request to be complete, keep_alive_limit between requests, none
-// while an answer is made.
+// Two coroutines: read() fills the parser and passes on one request; write() answers it and calls next_request(). While a
+// request is being answered (busy_), nothing is read: pipelined requests wait in the parser and in the kernel, and are answered
+// in order (RFC 9112, 9.3.2). Time limits: greeting_limit to complete a request, keep_alive_limit between requests, none while
+// an answer is made.
 asio::awaitable<void> HttpConnection::read() {
   std::vector<std::byte> buffer(16384);
   request_limit_->within(greeting_limit);
@@ -124,7 +124,7 @@ asio::awaitable<void> HttpConnection::read() {
       co_await takeover_->read();
       break;
     }
-    if (busy_ && !discards_) {  // one request after the other; later bytes wait in the kernel
+    if (busy_ && !discards_) {  // one request at a time; later bytes wait in the kernel
       co_await wake_reader_.async_wait(into(ec));
       continue;
     }
@@ -171,8 +171,8 @@ void HttpConnection::hand_over() {
   wake_writer_.cancel();
 }
 
-/// Call it when an answer is sent. A request that has been received already is answered at once; otherwise the client has the
-/// time of keep-alive.
+/// Call it when an answer is sent. A request that has already been received is answered at once; otherwise keep_alive_limit
+/// begins.
 void HttpConnection::next_request() {
   busy_ = false;
   request_limit_->within(reader_.begun() ? std::chrono::seconds(greeting_limit) : std::chrono::seconds(keep_alive_limit));
@@ -180,7 +180,8 @@ void HttpConnection::next_request() {
   wake_reader_.cancel();
 }
 
-/// Closing while the client still sends would destroy our last answer (RST). So its input is discarded for a moment first.
+/// Closing while the client still sends would cause an RST, which may destroy our last answer; so input is discarded for a
+/// moment first.
 void HttpConnection::finish_sending() {
   all_sent_ = true;
   if (peer_closed_ || over()) return close();
@@ -193,7 +194,7 @@ void HttpConnection::finish_sending() {
 
 // ---- answers
 
-/// read() and write() take turns: read() sets `request_` or `refusal_` and waits while `busy_`; write() answers and wakes read().
+/// read() sets `request_` or `refusal_` and waits while `busy_`; write() answers and wakes read().
 asio::awaitable<void> HttpConnection::write() {
   while (!over() && !all_sent_) {
     if (std::exchange(continue_asked_, false)) {
@@ -215,12 +216,12 @@ asio::awaitable<void> HttpConnection::write() {
   finish_sending();
 }
 
-/// Returns false if the request shows the token but no slot of authenticated clients is free.
+/// Returns false if the request has the token but no slot for authenticated clients is free.
 bool HttpConnection::has_slot(const HttpRequest& request) {
   return !services_.token.matches(bearer_token(request.authorization)) || claim_slot();
 }
 
-/// Three kinds of answers: a stream until the client disconnects, a takeover by another protocol, and a document.
+/// There are three kinds of answers: a stream until the client disconnects, a takeover by another protocol, a document.
 asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!has_slot(request)) {
     refusal_ = too_many;
@@ -253,7 +254,7 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!over()) next_request();
 }
 
-/// HTTP/1.1 gets chunks. HTTP/1.0 has none (RFC 9112, 6.1): there the end of the connection ends the body.
+/// HTTP/1.1 clients get chunks. HTTP/1.0 has no chunks (RFC 9112, 6.1): the end of the connection ends the body.
 asio::awaitable<void> HttpConnection::write_stream(HttpStream stream, Head head) {
   discards_ = true;  // reading continues, to notice that the client disconnects
   wake_reader_.cancel();

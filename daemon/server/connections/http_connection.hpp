@@ -17,7 +17,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
   using Steady = std::chrono::steady_clock;
 
-  /// `services` and `service` outlive it.
+  /// `services` and `service` must outlive it.
   HttpConnection(ConnectionServices& services, HttpService& service, tcp::socket socket, const Sender& sender);
 
   asio::awaitable<void> read();
@@ -26,29 +26,28 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   bool over() const { return !socket_.is_open(); }
   /// Call it before read() if no slot is free. Answers 503 and discards input for a moment.
   void reject();
-  /// Call it before read(). The client is untrusted until it shows the token; `claim_slot` is then called, and is false when no
-  /// slot is free.
+  /// Call it before read(). The client is untrusted until it sends the token; then `claim_slot` is called, which returns false
+  /// if no slot is free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
   /// Our end of the connection.
   Endpoint reached() const { return reached_; }
   /// The address of the other end.
   Ipv4 peer() const { return peer_; }
-  /// Claims a slot for a client that has shown the token in a way that only the service can check. Returns false if no slot is
-  /// free.
+  /// Claims a slot for a client whose token the service has checked itself. Returns false if no slot is free.
   bool claim_slot() { return !claim_slot_ || std::exchange(claim_slot_, nullptr)(); }
-  /// The socket, for a takeover.
+  /// The socket, for an HttpTakeover.
   tcp::socket& socket() { return socket_; }
   /// A timer for the service while it makes an answer.
   asio::steady_timer& wait_timer() { return wake_operation_; }
 
-  /// Counts work that the size of the answer does not show.
+  /// Counts work in addition to the size of the answer.
   void charge(std::size_t work) { services_.pause_after(sender_, work); }
-  /// Returns how long a takeover must wait after so much work.
+  /// The time that an HttpTakeover must wait after this much work.
   Steady::duration pause_after(std::size_t work) { return services_.pause_after(sender_, work); }
 
-  Steady::time_point active_at = Steady::now();  // a whole request, or an answer
-  bool proved = false;                           // there was a whole request
+  Steady::time_point active_at = Steady::now();  // time of the last whole request or answer
+  bool proved = false;                           // a whole request has arrived
 
  private:
   struct Head {  // head of the answer to a request
@@ -67,7 +66,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   ConnectionServices& services_;
   HttpService& service_;
   tcp::socket socket_;
-  Sender sender_;  // the address without the port, because each connection of a program has another port
+  Sender sender_;  // the address without the port, which differs for each connection of a program
   Endpoint reached_;
   Ipv4 peer_{};
   std::shared_ptr<Deadline> request_limit_, stall_;
@@ -75,9 +74,9 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   HttpReader reader_;
   std::optional<HttpRequest> request_;  // read, not yet answered
   std::optional<HttpRefusal> refusal_;  // refusal of a request that cannot be parsed
-  std::function<bool()> claim_slot_;    // empty: trusted
+  std::function<bool()> claim_slot_;    // empty: the client is trusted
   std::shared_ptr<HttpTakeover> takeover_;
-  std::size_t unsettled_ = 0;    // work: of the answer
+  std::size_t unsettled_ = 0;    // work of the answer, not counted yet
   bool continue_asked_ = false;  // send "100 Continue"
   bool busy_ = false;            // a request is being answered
   bool discards_ = false;        // input is discarded

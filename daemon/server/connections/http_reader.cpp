@@ -11,7 +11,7 @@ namespace {
 
 namespace http = boost::beast::http;
 constexpr std::size_t shortest_last_chunk = 5;     // "0", twice the end of a line
-constexpr std::size_t longest_unread = 64u << 10;  // chunk headers and trailers have no limit of Beast's
+constexpr std::size_t longest_unread = 64u << 10;  // Beast does not limit chunk headers and trailers
 
 std::string text_of(boost::beast::string_view view) { return {view.data(), view.size()}; }
 
@@ -35,7 +35,8 @@ std::string joined(const http::request<http::string_body>& message, http::field 
   return all;
 }
 
-/// A body whose end another reader would see elsewhere must not be taken as a request (RFC 9112, 6.1).
+/// Detects a Transfer-Encoding for which other parsers could find another end of the body; such a request is refused (RFC 9112,
+/// 6.1).
 bool has_other_coding(const http::request<http::string_body>& head) {
   return head.count(http::field::transfer_encoding) > 0 &&
          !boost::beast::iequals(joined(head, http::field::transfer_encoding), "chunked");
@@ -88,12 +89,12 @@ void HttpReader::feed(std::span<const std::byte> received) {
 
 bool HttpReader::begun() const { return !buffer_.empty() || parser_->beast.got_some(); }
 
-/// Feeds Beast until a request is complete or bytes are missing. A new parser begins each request, because limits and state
-/// belong to one.
+/// Feeds Beast until a request is complete or more bytes are needed. Each request has a new parser, because limits and state
+/// are per request.
 tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
   auto& beast = parser_->beast;
   while (!buffer_.empty() && !beast.is_done()) {
-    // Beast 1.74 assumes that a last chunk which it parses again has five bytes by then. Every complete one has.
+    // Beast 1.74 assumes five bytes when it parses a last chunk again. A complete last chunk has at least five.
     if (beast.is_header_done() && beast.chunked() && buffer_.size() < shortest_last_chunk) break;
     boost::beast::error_code ec;
     const std::size_t used = beast.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), ec);

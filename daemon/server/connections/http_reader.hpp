@@ -1,5 +1,5 @@
-// Parses HTTP requests from a byte stream, with limits on all sizes. Beast's parser without I/O: any split of the stream gives
-// the same requests.
+// Parses HTTP requests from a byte stream, with limits on all sizes. It wraps Beast's parser without I/O; the stream may arrive
+// in any pieces.
 #pragma once
 
 #include <cstddef>
@@ -14,10 +14,10 @@ namespace sonar {
 
 struct HttpRequest {
   std::string method, target, host, origin, authorization, content_type, body;
-  // Values of headers as they were received; several headers of a name are joined by ", ".
+  // Values of headers as received; several headers with the same name are joined by ", ".
   std::string upgrade, connection, accept, accept_encoding, if_none_match;
   std::string socket_key, socket_version, socket_protocols;  // Sec-WebSocket-...
-  bool bytes_behind = false;                                 // more had been received when it was whole
+  bool bytes_behind = false;                                 // bytes after the request had already arrived
   bool http_1_0 = false, keep_alive = true;
   bool has_host = false, has_origin = false;
 };
@@ -34,11 +34,11 @@ class HttpReader {
   explicit HttpReader(std::size_t most_body = longest_body);
   ~HttpReader();
   void feed(std::span<const std::byte> received);
-  /// The next whole request; nullopt = more bytes are needed; a refusal is final.
+  /// The next whole request; nullopt if more bytes are needed. After a refusal there are no more.
   tl::expected<std::optional<HttpRequest>, HttpRefusal> next();
-  /// True once per request, when its header asks for "100 Continue" before the body is sent.
+  /// True once per request, if its header asks for "100 Continue" before the body is sent.
   bool asks_to_continue();
-  /// A request has been received in part.
+  /// True if a part of a request has been received.
   bool begun() const;
 
  private:

@@ -1,5 +1,5 @@
-// Interface between HttpConnection, which moves requests and answers, and the control server or an emulated sonar, which
-// interpret them.
+// Interface between HttpConnection, which transports requests and answers, and the service that answers: the control server or
+// an emulated sonar.
 #pragma once
 
 #include <functional>
@@ -17,12 +17,12 @@ namespace sonar {
 /// An endless answer, written in pieces until the client disconnects.
 struct HttpStream {
   std::string type;
-  /// Subscribes; `wake` is called when there is a next piece. The subscription lasts as long as the returned object.
+  /// Subscribes; `wake` is called when a piece is available. The subscription ends with the returned object.
   std::function<std::shared_ptr<void>(std::function<void()> wake)> subscribe;
   std::function<std::optional<std::string>()> next;  // nullopt: wait for `wake`
 };
 
-/// Takes the connection over: an upgrade to another protocol, with coroutines of its own in place of the connection's.
+/// An upgrade to another protocol, whose coroutines replace those of the connection.
 class HttpTakeover {
  public:
   virtual ~HttpTakeover() = default;
@@ -42,7 +42,7 @@ class HttpConnection;
 class HttpService {
  public:
   virtual ~HttpService() = default;
-  /// `from` outlives the call. May wait on from.wait_timer(), which ends when the connection does.
+  /// `from` outlives the call. It may wait on from.wait_timer(), which ends with the connection.
   virtual asio::awaitable<HttpOutcome> answer(const HttpRequest& request, HttpConnection& from) = 0;
   /// Returns the answer to a request that cannot be parsed, or for which no slot is free.
   virtual HttpAnswer refusal(const HttpRefusal& refusal) const = 0;

@@ -1,5 +1,5 @@
-// Limits how fast one client is read: a bucket of bytes that fills at the allowed rate. Pure arithmetic. After each read the
-// Session gets the pause before the next one, so that the bytes of a client that sends too much wait in its own kernel.
+// Limits the rate at which one client's bytes are read: a token bucket. Pure arithmetic. After each read the Session waits for
+// the returned pause, so that the excess bytes of a client wait in its own kernel.
 #pragma once
 
 #include <algorithm>
@@ -12,12 +12,12 @@ namespace sonar {
 class InputRate {
  public:
   using Steady = std::chrono::steady_clock;
-  /// Allows a second's worth of bytes at once after a pause. 0 bytes a second: no limit.
+  /// Allows the bytes of one second at once after a pause. 0 bytes a second: no limit.
   explicit InputRate(std::size_t bytes_per_s) : rate_(static_cast<double>(bytes_per_s)), tokens_(rate_) {}
   /// Changes the rate from now on.
   void use(std::size_t bytes_per_s) { rate_ = static_cast<double>(bytes_per_s); }
 
-  /// Forgets bytes beyond the limit, so that the next pause is at most `longest`.
+  /// Reduces the excess, so that the next pause is at most `longest`.
   void forgive_beyond(Steady::duration longest) {
     tokens_ = std::max(tokens_, -rate_ * std::chrono::duration<double>(longest).count());
   }

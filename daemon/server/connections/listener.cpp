@@ -40,7 +40,7 @@ void Listener::stop() {
   reopen_timer_.cancel();
 }
 
-/// Closing the socket makes the kernel refuse connections. The accept loop then waits in reopen().
+/// Closes the socket, so that the kernel refuses connections. The accept loop then waits in reopen().
 void Listener::pause() {
   if (at_.port == 0 || stopping_) return;
   paused_ = true;
@@ -64,7 +64,7 @@ void Listener::try_to_open() {
   if (const Fault taken = std::exchange(taken_, nullptr)) taken(opened.error().text);
 }
 
-/// The one accept loop waits here while the port is closed.
+/// The accept loop waits here while the port is closed.
 asio::awaitable<void> Listener::reopen() {
   while (!stopping_ && !acceptor_.is_open()) {
     if (paused_)

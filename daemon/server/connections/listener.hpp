@@ -17,21 +17,21 @@ class Listener {
   using Take = std::function<void(tcp::socket)>;
   using Fault = std::function<void(const std::string&)>;
 
-  /// `purpose` selects the spare descriptors that may be used. If it is nullopt, the caller asks `admission` for a slot itself.
-  /// `admission` must outlive the listener.
+  /// `purpose` selects the reserved descriptors that may be used. If it is nullopt, the caller requests a slot of `admission`
+  /// itself. `admission` must outlive the listener.
   Listener(asio::io_context& io, Admission& admission, std::optional<Admission::Purpose> purpose)
       : admission_(admission), purpose_(purpose), acceptor_(io), reopen_timer_(io) {}
 
   /// With port 0 the system chooses a port. After an error the object does not listen.
   Result<void> open(Endpoint at);
   /// Passes each connection to `take`, and the text of an exception to `fault`. Does nothing if the listener is not open. The
-  /// object must exist for 100 ms after stop(), because Admission may pause so long.
+  /// object must exist for 100 ms after stop(), the longest pause in Admission.
   void start(Take take, Fault fault);
   void stop();
-  /// Closes the socket, so that connections are refused as at a port where no program listens.
+  /// Closes the socket, so that connections are refused as at a port without a listener.
   void pause();
-  /// Accepts connections again, at the same address and port. It retries while another program has that port, and
-  /// then passes the reason to `taken`, once.
+  /// Accepts connections again, at the same address and port. While another program uses that port it retries, and passes the
+  /// reason to `taken` once.
   void resume(Fault taken);
   /// Returns true also while paused.
   bool is_open() const { return acceptor_.is_open() || paused_; }

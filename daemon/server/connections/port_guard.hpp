@@ -1,4 +1,4 @@
-// Limits the connections and datagrams of each IP address at the ports of all sonars, beside the limits of a session. A
+// Limits the connections and datagrams of each IP address at the ports of all sonars, in addition to the limits of a session. A
 // connection beyond the limit waits, a datagram is dropped; other addresses are not affected. Pure arithmetic.
 #pragma once
 
@@ -9,11 +9,11 @@ namespace sonar {
 class PortGuard {
  public:
   using Steady = WorkRate::Steady;
-  /// Number of connections of one address that are served each second, all of them perhaps at once: 100 at the default `per_s`,
-  /// which is limits.input_bytes_per_s. Drivers that reconnect need a few.
+  /// Connections per second that one address may make, also all at once: 100 at the default of `per_s`
+  /// (limits.input_bytes_per_s). Drivers that reconnect need a few.
   static constexpr std::size_t connections_per_s(std::size_t per_s) { return std::max<std::size_t>(10, per_s / 10240); }
 
-  /// Returns how long a connection of the address must wait before it is served, perhaps 0.
+  /// The time that a connection of the address must wait before it is served; may be 0.
   Steady::duration pause_before_connection(const std::string& address, std::size_t per_s, Steady::time_point now) {
     return connections_.pause_after(address, 1, connections_per_s(per_s), now);
   }
@@ -30,11 +30,12 @@ class PortGuard {
   WorkRate connections_, datagrams_;
 };
 
-/// Limits how many datagrams a second are read from one socket, all senders together; more wait in the kernel, or are lost there.
+/// Limits the datagrams per second that are read from one socket, for all senders together; others wait or are lost in the
+/// kernel.
 class DatagramRate {
  public:
   using Steady = InputRate::Steady;
-  /// `most_per_s`: datagrams that are accepted each second. A dropped one uses the part `of_dropped` / `all` of a second.
+  /// `most_per_s`: accepted datagrams per second. A dropped one uses the fraction `of_dropped` / `all` of a second.
   explicit DatagramRate(std::size_t most_per_s) : of_taken_(all / most_per_s) {}
   /// Returns the pause before the next read; 0 = none.
   Steady::duration pause_after(bool taken, Steady::time_point now) {

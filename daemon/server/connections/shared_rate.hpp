@@ -1,5 +1,5 @@
-// Limits how fast several clients are read together: a bucket of bytes for all of them. A client within its fair share of the
-// rate does not wait for the bucket, so that only those who send more wait when it is empty. Pure arithmetic, as InputRate.
+// Limits the rate at which the bytes of several clients are read: one token bucket for all. A client within its fair share of
+// the rate never waits; when the bucket is empty, only the others wait. Pure arithmetic, like InputRate.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace sonar {
 class SharedRate {
  public:
   using Steady = InputRate::Steady;
-  /// The part of one client. The client counts as long as it lives; it may outlive the rate.
+  /// The share of one client, which counts while this object exists. It may outlive the SharedRate.
   class Part {
     friend class SharedRate;
     explicit Part(std::shared_ptr<const char> counted) : counted_(std::move(counted)) {}
@@ -21,7 +21,7 @@ class SharedRate {
   };
 
   explicit SharedRate(std::size_t bytes_per_s) : bytes_per_s_(bytes_per_s), together_(bytes_per_s) {}
-  /// Adds a client; the rate is this one from now on.
+  /// Adds a client, and sets the rate.
   Part join(std::size_t bytes_per_s) {
     bytes_per_s_ = bytes_per_s;
     together_.use(bytes_per_s);
@@ -46,7 +46,7 @@ class SharedRate {
   }
 
  private:
-  static constexpr std::size_t at_once = 4096;  // limit for a new sender; a larger one would reward connecting again and again
+  static constexpr std::size_t at_once = 4096;  // limit for a new sender; a larger one would reward repeated connecting
   std::size_t bytes_per_s_;
   InputRate together_;
   std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // shared with each Part, which it counts

@@ -25,7 +25,7 @@ tl::unexpected<Error> unusable(const std::filesystem::path& file, const std::str
 
 }  // namespace
 
-/// A token that is too short, or has blanks inside, is refused: it would be guessed, or cut in a header.
+/// Refuses tokens that are too short, because they can be guessed, and tokens with blanks, which a header would cut.
 Result<Token> Token::read(const std::filesystem::path& file, std::string& warning) {
   const auto read = read_regular(file, 2 * longest);
   if (!read) return unusable(file, "cannot be read; make one: (umask 077; openssl rand -hex 24 > " + file.string() + ")");
@@ -43,7 +43,7 @@ Result<Token> Token::read(const std::filesystem::path& file, std::string& warnin
   return Token(std::move(text));
 }
 
-/// Compares digests: their length is fixed, and their differences reveal nothing about the secret.
+/// Compares digests: they have equal lengths, and the time of the comparison reveals nothing about the secret.
 bool Token::matches(std::string_view shown) const {
   if (!needed()) return true;
   const std::string ours = digest_of(secret_), theirs = digest_of(shown);

@@ -14,7 +14,7 @@ class Token {
  public:
   static constexpr std::size_t shortest = 16, longest = 1024;
 
-  Token() = default;  // none: all clients are authorized
+  Token() = default;  // no token: all clients are authorized
   explicit Token(std::string secret) : secret_(std::move(secret)) {}
   /// Reads the text of the file without surrounding blanks. Sets `warning` if other users can read the file.
   static Result<Token> read(const std::filesystem::path& file, std::string& warning);

@@ -1,6 +1,6 @@
-// Limit of the work that clients of one address cause: a bucket for each address, so that connecting again and again gains
-// nothing and a flood from one address delays no other. Work is counted in bytes: those that come, those of an answer, and a
-// fixed number for what costs time beside its bytes. Pure arithmetic, as InputRate.
+// Limits the work that the clients of one address cause: a token bucket per address, so that repeated connecting gains nothing
+// and a flood from one address delays no other. The unit of work is a byte: received bytes, bytes of answers, and fixed numbers
+// for work that does not depend on bytes. Pure arithmetic, like InputRate.
 #pragma once
 
 #include <algorithm>
@@ -11,24 +11,23 @@
 
 namespace sonar {
 
-/// Work is counted in bytes; measured: a byte may cost 50 ns of the I/O thread, which leaves it 95 % of its time at the default
-/// rate.
+/// Work in bytes. Measured: a byte costs at most 50 ns of the I/O thread, so the default rate uses at most 5 % of its time.
 namespace work {
 inline constexpr std::size_t of_connection = 1024, of_request = 512, of_upgrade = 32768;  // HTTP
 inline constexpr std::size_t of_frame = 64, of_control_frame = 512;                       // WebSocket
 inline constexpr std::size_t of_message = 128;                                            // control stream, with an answer
-inline constexpr std::size_t of_datagram = 256;  // datagram at a port of a sonar, perhaps of another host than the last one
-inline constexpr std::size_t of_reaction = 256;  // answer of a sonar, or request that it carries out
+inline constexpr std::size_t of_datagram = 256;                                           // datagram at a port of a sonar
+inline constexpr std::size_t of_reaction = 256;  // reply of a sonar, or request that it carries out
 }  // namespace work
 
 class WorkRate {
  public:
   using Steady = InputRate::Steady;
   static constexpr std::size_t most_addresses = 256;
-  /// Upper limit of a pause, however much work an address has caused: /healthz answers within it.
+  /// Upper limit of a pause, whatever the work, so that /healthz answers within it.
   static constexpr std::chrono::seconds longest_pause{1};
 
-  /// Counts work done for, or received from, the address. Returns how long it must wait, perhaps 0. `per_s`: the present limit.
+  /// Counts work of the address. Returns the time that it must wait; may be 0. `per_s`: the present limit.
   Steady::duration pause_after(const std::string& address, std::size_t amount, std::size_t per_s, Steady::time_point now) {
     if (!addresses_.contains(address) && addresses_.size() >= most_addresses) forget_one();
     auto& [rate, used_at] = addresses_.try_emplace(address, InputRate(per_s), now).first->second;
@@ -38,7 +37,7 @@ class WorkRate {
     rate.forgive_beyond(longest_pause);
     return std::min(pause, Steady::duration(longest_pause));
   }
-  /// Counts the work as pause_after() does. False: the address has no work left, so that this is to be dropped.
+  /// Counts the work like pause_after(). False: the address is over its limit, so drop the input.
   bool takes(const std::string& address, std::size_t amount, std::size_t per_s, Steady::time_point now) {
     return pause_after(address, amount, per_s, now).count() == 0;
   }

@@ -14,7 +14,7 @@ using control::StatusCode;
 
 }  // namespace
 
-/// Each branch is a kind of action that the router chose; help is the rest.
+/// Each branch is a kind of action that the router can choose; the last one is help.
 asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
   RoutedRequest routed = route_request(request, {services_.token, from.reached().ip, config_.hosts});
   if (!routed.pose_refusal.empty()) targets_.poses.refuse(routed.pose_refusal, from.sender());
@@ -35,7 +35,7 @@ asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, Htt
   co_return help;
 }
 
-/// The checks are in this order: is there a live view, may this client open it, is there such a recording, is a slot free.
+/// Order of the checks: a live view exists, this client may open it, the recording exists, a slot is free.
 HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAction& asked, HttpConnection& from) {
   if (view_ == nullptr) return answer_of(404, StatusCode::unsupported, "there is no live view");
   auto opened = open_view(request, asked.query, {services_.token, view_->secrets(), from.reached().ip, config_},
@@ -85,7 +85,7 @@ asio::awaitable<HttpAnswer> ControlHttp::perform(control::Operation operation, H
   targets_.operations.perform(operation, from.sender(), done, has_left);
   asio::steady_timer& timer = from.wait_timer();
   timer.expires_after(operation_limit);
-  while (!*result && !from.over() && timer.expiry() > HttpConnection::Steady::now()) {  // cancelled when the result arrives
+  while (!*result && !from.over() && timer.expiry() > HttpConnection::Steady::now()) {  // the result cancels the wait
     error_code ec;
     co_await timer.async_wait(into(ec));
   }

@@ -12,7 +12,7 @@ class ViewFeed;
 
 class ControlHttp final : public HttpService {
  public:
-  /// The arguments outlive the service. Without `view` there is no live view.
+  /// The arguments must outlive the service. Without `view` there is no live view.
   ControlHttp(ConnectionServices& services, const ControlConfig& config, ControlTargets& targets, ViewFeed* view)
       : services_(services), config_(config), targets_(targets), view_(view) {}
 

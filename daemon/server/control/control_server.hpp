@@ -12,11 +12,12 @@ namespace sonar {
 
 class ControlServer {
  public:
-  /// The arguments outlive the server.
+  /// The arguments must outlive the server.
   ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
                 Operations& operations, Events& events, PoseIntake& poses, Log& log, ViewFeed* view = nullptr);
 
-  /// Reads the token and opens both listeners. A default address in use is a warning; one from the file is an error.
+  /// Reads the token and opens both listeners. If an address is in use: a warning for a default address, an error for an
+  /// address from the configuration.
   Result<void> open();
   void start();
   void stop();

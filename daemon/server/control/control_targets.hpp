@@ -1,4 +1,4 @@
-// Parts of the daemon that requests of control act on, by stream or HTTP.
+// The parts of the daemon on which requests of control act.
 #pragma once
 
 #include "daemon/server/api/events.hpp"

@@ -22,7 +22,7 @@ std::string escaped(std::string_view text, bool label) {
   return out;
 }
 
-/// Counters are written as whole numbers up to 2^53, above which a double does not hold each of them.
+/// Whole numbers up to 2^53, the largest range that a double represents exactly, are written without an exponent.
 std::string number(double value) {
   std::array<char, 32> text{};
   // Counters are whole numbers, and stay exact up to 2^53.
@@ -56,7 +56,7 @@ void PrometheusText::line(std::string_view suffix, const Labels& labels, const s
 
 void PrometheusText::sample(const Labels& labels, double value) { line("", labels, number(value)); }
 
-// Buckets of this format are cumulative: "le" counts all values up to its bound.
+// Buckets of the format are cumulative: "le" counts all values up to its bound.
 void PrometheusText::sample(const Labels& labels, const Histogram& histogram) {
   std::uint64_t up_to = 0;
   for (std::size_t i = 0; i <= Histogram::bounds_s.size(); ++i) {

@@ -14,14 +14,14 @@
 
 namespace sonar {
 
-/// Writes families one after the other; all samples of a family directly after its head.
+/// Writes families in sequence: the head of a family, then all its samples.
 class PrometheusText {
  public:
   using Labels = std::vector<std::pair<std::string_view, std::string_view>>;
   enum class Type { counter, gauge, histogram };
 
   void family(std::string_view name, Type type, std::string_view help);
-  /// Writes a sample of the family begun last. Whole numbers keep all their digits up to 2^53.
+  /// Writes a sample of the current family. Whole numbers up to 2^53 keep all digits.
   void sample(const Labels& labels, double value);
   void sample(const Labels& labels, const Histogram& histogram);
   std::string take() { return std::move(text_); }

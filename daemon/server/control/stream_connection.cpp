@@ -12,11 +12,11 @@ namespace {
 using control::response_of;
 using control::StatusCode;
 
-constexpr std::size_t longest_before_hello = 4096;  // less than a message may have later
-constexpr std::size_t work_of_a_turn = 4096;        // bytes; then other connections have their turn
-constexpr std::size_t least_work = 64;              // cost of a message beside its bytes
-constexpr std::size_t skipping_is_cheaper = 16;     // times: than accepting a pose
-constexpr int receive_buffer = 256 << 10;           // bytes; poses that wait would only be older
+constexpr std::size_t longest_before_hello = 4096;  // smaller than the limit after Hello
+constexpr std::size_t work_of_a_turn = 4096;        // bytes, after which other connections have their turn
+constexpr std::size_t least_work = 64;              // cost of a message in addition to its bytes
+constexpr std::size_t skipping_is_cheaper = 16;     // factor by which skipping a pose costs less than accepting it
+constexpr int receive_buffer = 256 << 10;           // bytes; in a larger buffer, waiting poses would only become older
 constexpr std::chrono::milliseconds between_looks{10};
 
 StatusCode code_of(OperationResult::Code code) {
@@ -25,7 +25,7 @@ StatusCode code_of(OperationResult::Code code) {
                                                   : StatusCode::failed;
 }
 
-/// A pose without an answer.
+/// Whether a request is a pose without an id, which gets no answer.
 bool is_unasked(std::uint64_t id, const auto& operation) {
   return id == 0 && std::holds_alternative<control::PoseSample>(operation);
 }
@@ -76,8 +76,8 @@ void StreamConnection::close() {
 
 // ---- requests
 
-/// Requests are read in turns of bounded size. A pose beyond the rate is kept in `newest_pose_` until the rate allows it,
-/// another request comes, or a newer pose replaces it.
+/// Requests are read in turns of bounded size. A pose above the rate limit waits in `newest_pose_` until the rate allows it,
+/// another request arrives, or a newer pose replaces it.
 asio::awaitable<void> StreamConnection::read() {
   std::vector<std::byte> buffer(work_of_a_turn);
   std::size_t received = 0;
@@ -115,7 +115,7 @@ asio::awaitable<void> StreamConnection::read() {
       }
       if (const auto pose = std::exchange(newest_pose_, std::nullopt)) accept(*pose, work);
       ending_ = !accept(**message, work);
-      // A client that does not read its answers is not read further, so the answers that wait are bounded.
+      // While a client does not read its answers, its requests are not read, so the number of waiting answers is bounded.
       while (!over() && answers_.size() + in_progress_ >= most_open_requests) co_await wake_reader_.async_wait(into(ec));
     }
     if (!greeted_ && received > longest_before_hello) ending_ = true;
@@ -125,13 +125,14 @@ asio::awaitable<void> StreamConnection::read() {
   wake_writer_.cancel();  // it writes the remaining answers, then closes
 }
 
-/// Poses beyond the client's share are skipped, except the newest. So no pose acts long after it was sent.
+/// Whether a pose is above the client's share of the rate. Such poses are skipped, except the newest, so that no pose acts
+/// late.
 bool StreamConnection::is_beyond_pose_rate() {
   if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
   return targets_.pose_rate.left(*pose_rate_, Steady::now()) == 0;
 }
 
-/// Accepts the pose that was kept once the rate allows it, or at once if the client has hung up.
+/// Accepts the waiting pose when the rate allows it, or at once if the client has disconnected.
 asio::awaitable<void> StreamConnection::take_newest_pose() {
   if (is_beyond_pose_rate() && !has_left(socket_)) {
     error_code ec;
@@ -144,7 +145,7 @@ asio::awaitable<void> StreamConnection::take_newest_pose() {
   co_await limit_rate(work);
 }
 
-/// Input beyond the limits waits in the kernel, as do requests while answers to others of the address have cost too much.
+/// Waits while the client is over its limits, or its address over the limit of work; input then waits in the kernel.
 asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
   const auto now = Steady::now();
   auto pause = rate_.pause_after(work.bytes, now);
@@ -173,7 +174,7 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
   if (!greeted_) return refuse_and_end(request->id, StatusCode::refused, "the first message must be a Hello");
-  // Poses without an answer have a rate of their own; all else counts as work of the address.
+  // Poses without an answer have their own rate limit; everything else counts as work of the address.
   if (is_unasked(request->id, request->op))
     work.pose_bytes += message.size() + least_work;
   else
@@ -181,8 +182,7 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   return accept_greeted(*request);
 }
 
-/// The Hello decides everything: version, token, and then a slot among the authenticated clients. After it the time limit for
-/// greetings ends.
+/// Checks the Hello: version, token, and a free slot for authenticated clients. Then the time limit for the greeting ends.
 bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
   if (hello.protocol_version != control::protocol_version) {
     answer(greeting(id, StatusCode::refused, "protocol_version must be " + std::to_string(control::protocol_version)));
@@ -211,7 +211,7 @@ bool StreamConnection::refuse_and_end(std::uint64_t id, StatusCode code, const s
   return false;
 }
 
-/// True, because no request of a client that was greeted ends the connection.
+/// Always true, because no request after the greeting ends the connection.
 bool StreamConnection::accept_greeted(const control::Request& request) {
   std::visit(
       [&](const auto& op) {
@@ -229,7 +229,7 @@ bool StreamConnection::accept_greeted(const control::Request& request) {
   return true;
 }
 
-/// The result may arrive after those of later requests, and after this connection is closed.
+/// The result may arrive after results of later requests, or after the end of this connection.
 void StreamConnection::perform(std::uint64_t id, const control::Operation& operation) {
   const bool unasked = is_unasked(id, operation);
   if (!unasked) ++in_progress_;

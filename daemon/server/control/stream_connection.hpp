@@ -1,6 +1,5 @@
 // One client of the control stream: requests in, answers and events out. One coroutine reads, one writes; answers are sent as
-// operations finish, in any order. The listener's slots and its own
-// coroutines own it.
+// operations finish, in any order. Owned by the listener's slots and by its own coroutines.
 #pragma once
 
 #include <deque>
@@ -21,7 +20,7 @@ namespace sonar {
 class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
  public:
   using Steady = std::chrono::steady_clock;
-  /// Requests in progress, or answered but not yet read by the client; at this limit reading pauses.
+  /// Limit for requests in progress or with unread answers, at which reading pauses.
   static constexpr std::size_t most_open_requests = 64;
 
   /// `services` and `targets` must outlive it.
@@ -33,12 +32,12 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   bool over() const { return !socket_.is_open(); }
   /// Call it before read() if no slot is free.
   void reject() { ending_ = true; }
-  /// Call it before read(). The client is untrusted until it shows the token; `claim_slot` is then called, and
-  /// returns false if no slot is free.
+  /// Call it before read(). The client is untrusted until it sends the token; then `claim_slot` is called, which returns false
+  /// if no slot is free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
 
-  Steady::time_point active_at = Steady::now();  // time of the last whole message, received or sent (subscribers only read)
+  Steady::time_point active_at = Steady::now();  // time of the last whole message received or sent (subscribers send nothing)
   bool proved = false;                           // the client has sent Hello
 
  private:
@@ -68,13 +67,13 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   std::optional<SharedRate::Part> pose_rate_;  // set with the first pose without an answer
   std::optional<control::Bytes> newest_pose_;  // newest of the poses beyond the rate
   std::deque<control::Bytes> answers_;         // framed
-  std::size_t unsettled_ = 0;                  // bytes of answers and work of requests for which no pause was made yet
+  std::size_t unsettled_ = 0;                  // bytes of answers and work of requests, not counted yet
   std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet
   EventQueue events_;
   Events::Token subscription_;
   HttpDetector http_;
   std::function<bool()> claim_slot_;       // empty if the client is trusted
-  bool greeted_ = false, ending_ = false;  // ending: the last answer is being written
+  bool greeted_ = false, ending_ = false;  // ending_: the last answer is being written
 };
 
 }  // namespace sonar

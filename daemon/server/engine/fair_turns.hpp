@@ -1,5 +1,5 @@
-// Chooses the next ping if several sonars share one engine: that of the sonar that has used the least time. Decides whether a
-// ping may start before the present one is finished. Pure: times are passed in. The Simulator owns it.
+// Chooses the next ping if several sonars share one engine: that of the sonar with the least used computing time. Also decides
+// whether a ping may start before the present one is finished. Pure: times are passed in.
 #pragma once
 
 #include <algorithm>
@@ -15,9 +15,9 @@ class FairTurns {
     Account& a = accounts_[sonar];
     a.used_s = std::max(a.used_s, floor_s_);
   }
-  /// Call it when a ping of that sonar begins.
+  /// Call it when a ping of the sonar begins.
   void begin(std::uint32_t sonar) { floor_s_ = std::max(floor_s_, accounts_[sonar].used_s); }
-  /// Call it when a ping of that sonar is finished; it took `seconds` of the engine's time.
+  /// Call it when a ping of the sonar is finished. `seconds`: the engine's time for it.
   void end(std::uint32_t sonar, double seconds) {
     Account& a = accounts_[sonar];
     a.used_s += seconds;
@@ -30,8 +30,8 @@ class FairTurns {
   }
   bool several() const { return accounts_.size() > 1; }
 
-  /// Returns whether a ping of `other` should be computed before the rest of a ping of `running`, which has taken `elapsed_s` so
-  /// far: `other` has used less time, and its ping takes less time than that rest.
+  /// Whether to compute a ping of `other` before the rest of a ping of `running`, which has taken `elapsed_s` so far: true if
+  /// `other` has used less time and its ping takes less time than that rest.
   bool goes_first(std::uint32_t other, std::uint32_t running, double elapsed_s) const {
     const auto a = accounts_.find(other), b = accounts_.find(running);
     if (a == accounts_.end() || b == accounts_.end() || a->second.pings == 0 || b->second.pings == 0) return false;

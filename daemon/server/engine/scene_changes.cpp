@@ -19,13 +19,13 @@ SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePoin
       on_change_(std::move(on_change)),
       pause_(io) {
   asio::post(thread_, [nice_by] {
-    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // a failure costs only smoothness
+    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // a failure only makes other threads less smooth
   });
 }
 
 SceneChanges::~SceneChanges() { thread_.join(); }
 
-/// A build that is under way continues; finish() then drops its result.
+/// A running build continues; finish() then drops its result.
 void SceneChanges::stop() {
   stopped_ = true;
   waiting_.clear();
@@ -36,7 +36,7 @@ std::chrono::steady_clock::duration SceneChanges::building_for() const {
   return building_ ? std::chrono::steady_clock::now() - building_since_ : std::chrono::steady_clock::duration{};
 }
 
-/// Changes are done in the order in which they were submitted.
+/// Changes take effect in the order of submission.
 void SceneChanges::submit(Change change) {
   if (stopped_) return;
   if (!change.make && !busy()) return change.done({});
@@ -64,7 +64,7 @@ std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
   return std::max(due - now, std::chrono::steady_clock::duration{});
 }
 
-/// The first waiting change, and all directly behind it that may share its engine.
+/// The first waiting change, and the changes directly after it that may share its engine.
 std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
   std::vector<Make> makes;
   for (const Change& change : waiting_) {
@@ -77,7 +77,7 @@ std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
 void SceneChanges::build_next() {
   building_ = true;
   building_since_ = std::chrono::steady_clock::now();
-  // `done` is not passed on, because an object that it holds (a connection) must not be destroyed on another thread.
+  // `done` stays on this thread, because objects that it owns (a connection) must not be destroyed on another thread.
   asio::post(thread_, [this, makes = next_makes(), now = scene_] {
     auto built = std::make_shared<Built>(build(makes, now));
     asio::post(io_, [this, built] { finish(std::move(*built)); });
@@ -100,8 +100,7 @@ auto caught(const Work& work) -> decltype(work()) {
 
 }  // namespace
 
-/// Runs on the scene thread. Each change starts from the scene that the one before it made; a change that fails leaves that
-/// scene as it is.
+/// Runs on the scene thread. Each change is applied to the result of the previous one; a failed change has no effect.
 SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const ScenePointer& now) const {
   Built built{now, nullptr, {}};
   for (const Make& make : makes) {
@@ -115,7 +114,7 @@ SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const Sc
     built.engine = std::make_shared<std::unique_ptr<PingEngine>>(*std::move(engine));
     return built;
   }
-  // One change may need too much memory; the others must not fail with it. So the first is tried alone.
+  // One change may need too much memory, which must not make the others fail; so the first is tried alone.
   if (makes.size() > 1) return build({makes.front()}, now);
   return {now, nullptr, {tl::make_unexpected(engine.error())}};
 }
@@ -128,7 +127,7 @@ void SceneChanges::finish(Built built) {
   if (built.engine) {
     scene_ = built.scene;
     simulator_.use(std::move(*built.engine), [this](std::shared_ptr<PingEngine> before) {
-      // Its cells may be a hundred megabytes. They are freed on this thread, not on the I/O thread.
+      // The old engine's cells may have a hundred megabytes, which are freed on the scene thread to keep the I/O thread fast.
       if (!stopped_) asio::post(thread_, [before = std::move(before)]() mutable { before.reset(); });
     });
     in_use_(scene_);
@@ -137,7 +136,7 @@ void SceneChanges::finish(Built built) {
     const auto done = std::move(waiting_.front().done);
     waiting_.pop_front();
     done(outcome);
-    if (stopped_) break;  // nothing waits any more
+    if (stopped_) break;  // no request waits for the result
   }
   under_way_ = false;
   if (!stopped_ && !waiting_.empty()) begin();

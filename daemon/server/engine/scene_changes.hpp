@@ -1,10 +1,10 @@
-// Loads and changes the scene while pings continue. Changes are made one after the other: a separate thread makes the new scene
-// and builds an engine for it; then the new engine replaces the old one. Edits that wait together share one engine. App owns it;
-// everything here is called on the I/O thread, except for Change::make.
+// Loads and changes the scene while pings continue. Changes are made in sequence: a separate thread makes the new scene and
+// builds an engine for it, which then replaces the old one. Waiting edits share one engine. App owns this object; all functions
+// except Change::make are called on the I/O thread.
 //
-// Pings are made with the old scene until the new one is ready. Then the simulator gets the new engine and the world the new
-// moving bodies before anything else happens, so that a request's bodies are always those of the scene with which it is computed.
-// In stepped time that moment lies before the next step, which waits for it.
+// Pings use the old scene until the new one is ready. Then the simulator gets the new engine and the world gets the new moving
+// bodies in one step, so that the bodies of a request always belong to the scene with which it is computed. Stepped time waits
+// for the new scene before its next step.
 #pragma once
 
 #include <chrono>
@@ -26,18 +26,18 @@ using LoadScene = std::function<Result<ScenePointer>(const SceneFile&)>;
 
 class SceneChanges {
  public:
-  /// Called on the separate thread with the present scene; returns the new one, or the present one if it stays.
+  /// Called on the separate thread with the present scene; returns the new scene, or the present one for no change.
   using Make = std::function<Result<ScenePointer>(const ScenePointer& now)>;
   struct Change {
-    Make make;  // empty: the change makes nothing and only waits for those before it
+    Make make;  // empty: the change only waits for those before it
     /// Called on the I/O thread when the new scene is in use, or if nothing was changed. Never called after stop().
     std::function<void(const Result<void>& outcome)> done;
-    bool shares_engine = false;  // with other such changes; `done` is then called with the scene of all of them
+    bool shares_engine = false;  // shares an engine with other such changes; `done` is then called when all are in use
   };
   /// Called when a new scene is in use, before its Change is done.
   using InUse = std::function<void(const ScenePointer& scene)>;
   static constexpr std::size_t most_waiting = 64;
-  /// Limits while drivers are served, because each new engine costs a driver at 40 Hz one or two pings.
+  /// Limits while drivers are served, because with each new engine a driver at 40 Hz loses one or two pings.
   static constexpr int most_at_once = 2;
   static constexpr std::chrono::milliseconds between_engines{1500};
 
@@ -51,13 +51,13 @@ class SceneChanges {
 
   /// Call it before the first change. The function returns whether drivers are served now, in real time.
   void pace_while(std::function<bool()> drivers_wait) { drivers_wait_ = std::move(drivers_wait); }
-  /// Submits a change. If it makes nothing and no change waits, it is done before this returns.
+  /// Submits a change. If its `make` is empty and no change waits, it is done before this call returns.
   void submit(Change change);
   bool busy() const { return under_way_ || !waiting_.empty(); }
   bool is_full() const { return waiting_.size() >= most_waiting; }
-  /// True while the thread works, perhaps for a change that is not needed any more; the destructor would wait for it.
+  /// True while the thread works, even for a change that is no longer needed; the destructor would wait for it.
   bool is_building() const { return building_; }
-  /// How long the present change has been under way; 0 = none.
+  /// Duration of the present change so far; 0 = none.
   std::chrono::steady_clock::duration building_for() const;
   void stop();
 
@@ -67,7 +67,7 @@ class SceneChanges {
   struct Built {
     ScenePointer scene;
     std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
-    std::vector<Result<void>> outcomes;                   // outcome of each Change that was made
+    std::vector<Result<void>> outcomes;                   // outcome of each change
   };
   void begin();
   void build_next();
@@ -83,8 +83,8 @@ class SceneChanges {
   EngineFactory make_engine_;
   InUse in_use_;
   std::function<void()> on_change_;
-  std::deque<Change> waiting_;  // the first ones are under way
-  bool under_way_ = false;      // true until its `done` has returned, which may submit another
+  std::deque<Change> waiting_;  // the first ones are being made
+  bool under_way_ = false;      // until `done` has returned, which may submit another change
   bool stopped_ = false, building_ = false;
   std::chrono::steady_clock::time_point building_since_{}, engine_due_{};
   std::function<bool()> drivers_wait_;

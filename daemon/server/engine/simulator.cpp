@@ -14,7 +14,7 @@ using Steady = std::chrono::steady_clock;
 
 double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
 
-/// The ping with its findings. They are made here to keep this work off the I/O thread.
+/// The ping with its findings, which are made here to keep this work off the I/O thread.
 std::shared_ptr<const Ping> looked_at(Ping ping) {
   look_at(ping);
   return std::make_shared<const Ping>(std::move(ping));
@@ -26,7 +26,7 @@ Simulator::Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, i
     : io_(io), description_(engine->description()), engine_(std::move(engine)) {
   engine_->set_interruption(this);
   thread_ = std::thread([this, nice_by] {
-    // On Linux niceness belongs to the thread. If it is refused, pings may delay the I/O thread, which costs only smoothness.
+    // On Linux, niceness belongs to the thread. If setting it fails, pings may delay the I/O thread slightly.
     if (nice_by != 0 && ::nice(nice_by) == -1) {
     }
     queue_.run();
@@ -47,7 +47,7 @@ void Simulator::submit(PingRequest request, Done done) {
   });
 }
 
-/// The change of the engine waits in the same queue as pings: those submitted before it are computed by the engine before.
+/// The change of the engine waits in the same queue as pings, so that the old engine computes the pings submitted before it.
 void Simulator::use(std::unique_ptr<PingEngine> engine, Retired retired) {
   description_ = engine->description();
   asio::post(queue_, [this, job = Job{{}, {}, std::move(engine), std::move(retired), asio::make_work_guard(io_)}]() mutable {
@@ -61,14 +61,14 @@ std::chrono::nanoseconds Simulator::under_way_for() const {
 
 // ---- the simulation thread
 
-// Called from the queue, also within run_other() and work_off(), which poll it: then working_ is set and the job only waits.
+// Called from the queue. run_other() and work_off() poll the queue: then working_ is set, and the job only waits.
 void Simulator::arrive(Job job) {
   if (!job.engine) turns_.ask(job.request.sonar_id);
   waiting_.push_back(std::move(job));
   if (!working_) work_off();
 }
 
-/// `working_` prevents a second loop: queue_.poll() below, and run_other(), may call arrive() while this one runs.
+/// `working_` prevents a second loop, because queue_.poll() below and run_other() may call arrive() while this loop runs.
 void Simulator::work_off() {
   working_ = true;
   while (!waiting_.empty()) {
@@ -84,7 +84,7 @@ void Simulator::work_off() {
   working_ = false;
 }
 
-/// The next job and those that the engine can compute together with it. No job waits for others to arrive.
+/// The next job, and waiting jobs that the engine can compute together with it.
 std::vector<Simulator::Job> Simulator::take_together() {
   std::vector<Job> jobs;
   while (!waiting_.empty() && !waiting_.front().engine) {
@@ -96,7 +96,7 @@ std::vector<Simulator::Job> Simulator::take_together() {
   return jobs;
 }
 
-/// The job whose sonar has used least time of the present engine; among equals the one that has waited longest.
+/// The job whose sonar has used the least time of the present engine; among equals, the one that has waited longest.
 std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   auto best = waiting_.begin();
   for (auto it = waiting_.begin(); it != waiting_.end() && !it->engine; ++it)
@@ -104,8 +104,8 @@ std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   return best;
 }
 
-/// Called by the engine between two parts of a ping: runs a ping of another sonar first if that sonar had less time and its ping
-/// is done sooner than the rest of this one.
+/// Called by the engine between two parts of a ping: first runs a ping of another sonar if that sonar has used less time and
+/// its ping takes less time than the rest of this one.
 void Simulator::run_other() {
   queue_.poll();
   if (under_way_ > 1 || waiting_.empty() || waiting_.front().engine) return;
@@ -119,13 +119,13 @@ void Simulator::run_other() {
   const std::uint32_t running = running_;
   const double let_in_s = let_in_s_;
   simulate(std::move(job));
-  // The call above replaced the account of the ping that is under way; its time does not include the ping that was let in.
+  // The call above has changed the account of the interrupted ping; its time must not include the inner ping.
   running_ = running;
   running_since_ = since;
   let_in_s_ = let_in_s + seconds_since(begin);
 }
 
-/// Several jobs only with an engine that computes them together: each sonar is charged an equal share of the time.
+/// Computes one job, or several if the engine computes them together; each sonar is charged an equal share of the time.
 void Simulator::simulate(std::vector<Job> jobs) {
   for (const Job& job : jobs) turns_.begin(job.request.sonar_id);
   running_ = jobs.front().request.sonar_id;
@@ -157,13 +157,13 @@ std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
     std::vector<Ping> pings = engine_->run(requests);
     for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i].ping = looked_at(std::move(pings.at(i)));
     return outcomes;
-  } catch (const std::exception&) {  // one of them failed: computed alone, the others succeed and that one gets its reason
+  } catch (const std::exception&) {  // one of them failed: all are computed again one by one, so that only that one fails
   }
   for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i] = run(requests[i]);
   return outcomes;
 }
 
-/// Only the ping is refused if its request is invalid or memory is short. Any other exception means that the engine has failed.
+/// An invalid request or too little memory fails only this ping. Any other exception means that the engine has failed.
 Simulator::Outcome Simulator::run(const PingRequest& request) {
   Outcome outcome;
   try {

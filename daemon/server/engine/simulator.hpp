@@ -1,6 +1,6 @@
-// The simulation thread owns the ping engine and computes requests. Several sonars take turns by the time that they use, or are
-// computed together if the engine is faster so (PingEngine::most_together). Requests are passed by value, and finished pings come
-// back on the I/O thread; nothing else is shared.
+// The simulation thread owns the ping engine and computes requests. Several sonars take turns by used time (FairTurns), or are
+// computed together if that is faster (PingEngine::most_together). Requests are passed by value, and finished pings come back
+// on the I/O thread; nothing else is shared.
 #pragma once
 
 #include <chrono>
@@ -34,11 +34,11 @@ class Simulator : private Interruption {
 
   /// I/O thread. `done` is called there; the I/O thread stays alive until it was.
   void submit(PingRequest request, Done done);
-  /// I/O thread. Requests submitted from now on go to `engine`; the one before comes back through `retired`, called on the I/O
-  /// thread, when it has answered those before.
+  /// I/O thread. Requests submitted from now on go to `engine`. The previous engine is passed to `retired`, on the I/O thread,
+  /// after it has answered the earlier requests.
   void use(std::unique_ptr<PingEngine> engine, Retired retired);
   const std::string& engine_description() const { return description_; }
-  /// I/O thread. How long the engine has worked on its present ping; 0 = it waits for work.
+  /// I/O thread. Duration of the engine's present ping so far; 0 = it waits for work.
   std::chrono::nanoseconds under_way_for() const;
 
  private:
@@ -63,17 +63,17 @@ class Simulator : private Interruption {
 
   asio::io_context& io_;
   std::string description_;
-  std::size_t unanswered_ = 0;                     // requests without an answer; I/O thread, as the next
-  std::chrono::steady_clock::time_point begun_{};  // when the engine took up the oldest of them
+  std::size_t unanswered_ = 0;                     // requests without an answer; this and the next are the I/O thread's
+  std::chrono::steady_clock::time_point begun_{};  // time at which the engine began the oldest of them
 
-  // The simulation thread's.
+  // The following are the simulation thread's.
   std::shared_ptr<PingEngine> engine_;
   std::list<Job> waiting_;
   FairTurns turns_;
   bool working_ = false;
-  int under_way_ = 0;          // pings, one let in by another included
-  double let_in_s_ = 0;        // time of pings let in by the one under way
-  std::uint32_t running_ = 0;  // sonar whose ping is under way
+  int under_way_ = 0;          // pings being computed, including one inside another
+  double let_in_s_ = 0;        // time of pings that were computed within the present one
+  std::uint32_t running_ = 0;  // sonar of the present ping
   std::chrono::steady_clock::time_point running_since_{};
 
   asio::io_context queue_{1};

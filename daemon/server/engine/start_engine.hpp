@@ -1,5 +1,5 @@
-// Builds the ping engine. A ray tracer that does not work on this computer or with this scene throws here. `sonard run` and
-// `sonard_bench` use this, so that such a failure is one sentence and not "a bug".
+// Builds the ping engine, and converts the exceptions of a ray tracer that does not work on this computer or with this scene to
+// an error in one sentence.
 #pragma once
 
 #include <functional>
@@ -12,7 +12,8 @@ namespace sonar {
 
 using EngineFactory = std::function<std::unique_ptr<PingEngine>(std::shared_ptr<const Scene>)>;
 
-/// Unavailable (69): not enough memory, a processor the ray tracer cannot use. Mistakes of ours (std::logic_error) pass through.
+/// Error unavailable: not enough memory, or a processor that the ray tracer does not support. Mistakes in sonard
+/// (std::logic_error) are not caught.
 Result<std::unique_ptr<PingEngine>> start_engine(const EngineFactory& make, std::shared_ptr<const Scene> scene);
 
 }  // namespace sonar

@@ -27,7 +27,7 @@ void FaultLog::append(const std::string& json) {
   if (!writing_) write_pending();
 }
 
-/// One batch is written at a time; entries that arrive meanwhile form the next.
+/// Writes one batch at a time; entries that arrive meanwhile form the next batch.
 void FaultLog::write_pending() {
   writing_ = true;
   const std::uint64_t entries = std::exchange(pending_entries_, 0);
@@ -48,7 +48,7 @@ void FaultLog::write_pending() {
       });
 }
 
-/// One line in the log when losing begins, and one when it ends, however many entries are lost.
+/// Logs one line when losses begin and one when they end, however many entries are lost.
 void FaultLog::lose(std::uint64_t entries, const std::string& why) {
   lost_ += entries;
   why_lost_ = why;
@@ -65,7 +65,7 @@ std::vector<Note> FaultLog::notes() const {
                " entries: sonarctl fault journal --json"}};
 }
 
-/// One entry goes to all places: counters, file, recording, events, and the list of the latest.
+/// Passes an entry to counters, file, recordings, events, and the list of latest entries.
 void FaultLog::write(const FaultEntry& entry) {
   using std::chrono::steady_clock, std::chrono::system_clock;
   auto message = std::make_shared<v1::FaultEntry>();

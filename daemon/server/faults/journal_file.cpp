@@ -24,7 +24,7 @@ bool is_missing(const std::filesystem::path& file) {
   return std::filesystem::status(file, ec).type() == std::filesystem::file_type::not_found;
 }
 
-/// The reason if the name cannot be that of a journal, whether its file is there or is to be made; else an empty text.
+/// The reason if the file, existing or new, cannot be a journal; else an empty text.
 std::string why_no_journal(const std::filesystem::path& file) {
   std::error_code ec;
   if (std::filesystem::is_block_file(file, ec)) return "is a disk, not a file";
@@ -55,7 +55,7 @@ Result<std::shared_ptr<JournalFile>> JournalFile::open(const std::filesystem::pa
   return std::shared_ptr<JournalFile>(new JournalFile(*descriptor));
 }
 
-/// Opens as open() does, without making a file.
+/// Like open(), but without creating a file.
 Result<void> JournalFile::check(const std::filesystem::path& file) {
   const auto descriptor = open_for_appending(file, 0);
   if (descriptor) ::close(*descriptor);
@@ -65,7 +65,7 @@ Result<void> JournalFile::check(const std::filesystem::path& file) {
 
 JournalFile::~JournalFile() { ::close(descriptor_); }
 
-/// The caller learns how many lines are in the file, and counts the rest as lost.
+/// Returns the number of written lines; the caller counts the others as lost.
 JournalFile::Written JournalFile::append(std::string_view lines) {
   Written written;
   while (!lines.empty()) {
@@ -78,7 +78,7 @@ JournalFile::Written JournalFile::append(std::string_view lines) {
   return written;
 }
 
-/// Writes a line. Returns why it could not; empty if it is written.
+/// Writes a line. Returns the reason of a failure, or an empty text.
 std::string JournalFile::write_line(std::string_view line) {
   const std::string text = (std::exchange(cut_, false) ? "\n" : "") + std::string(line);
   std::size_t done = 0;
@@ -92,7 +92,7 @@ std::string JournalFile::write_line(std::string_view line) {
   const std::string why = errno == EAGAIN ? "its reader is too slow" : std::strerror(errno);
   struct stat status {};
   const auto part = static_cast<off_t>(done);
-  // A part of a line is removed from a regular file; from a FIFO it cannot be. Then the next line begins with a newline.
+  // An incomplete line is removed from a regular file. In a FIFO that is impossible, so the next line begins with a newline.
   const bool taken_back = done == 0 || (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode) && status.st_size >= part &&
                                         ::ftruncate(descriptor_, status.st_size - part) == 0);
   cut_ = !taken_back;

@@ -1,4 +1,5 @@
-// The file of the journal of faults: lines are appended whole, or not at all. Opening and writing never wait for a reader.
+// The file of the journal of faults. Lines are appended completely or not at all. Opening and writing never wait for the reader
+// of a FIFO.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@ class JournalFile {
  public:
   /// Opens or creates the file. A FIFO must have a reader. Errors: io.
   static Result<std::shared_ptr<JournalFile>> open(const std::filesystem::path& file);
-  /// Returns the error that open() would, without creating the file.
+  /// Returns the error that open() would return, without creating the file.
   static Result<void> check(const std::filesystem::path& file);
   ~JournalFile();
   JournalFile(const JournalFile&) = delete;
@@ -23,7 +24,7 @@ class JournalFile {
 
   struct Written {
     std::uint64_t lines = 0;
-    std::string why;  // why entries are missing; empty = all are there
+    std::string why;  // why entries are missing; empty = none is missing
   };
   /// Appends lines. Stops at the first line that fails; a later call tries again.
   Written append(std::string_view lines);
@@ -33,7 +34,7 @@ class JournalFile {
   std::string write_line(std::string_view line);
 
   int descriptor_;
-  bool cut_ = false;  // the end of the file is part of a line
+  bool cut_ = false;  // the file ends with an incomplete line
 };
 
 }  // namespace sonar

@@ -16,14 +16,14 @@ using control::StatusCode;
 constexpr std::array<std::string_view, 2> protocols = {"foxglove.websocket.v1", "foxglove.sdk.v1"};
 
 HttpAnswer socket_refusal(unsigned status, const std::string& text) { return answer_of(status, StatusCode::refused, text); }
-/// `cure` is for the log only: the key of the configuration that would allow it.
+/// `cure`: the key of the configuration that would allow it, for the log only.
 HttpAnswer socket_refusal(unsigned status, const std::string& text, const std::string& cure) {
   HttpAnswer answer = socket_refusal(status, text);
   answer.why = text + "; " + cure;
   return answer;
 }
 
-/// 16 bytes in base64.
+/// Whether a text is 16 bytes in base64.
 bool is_key(std::string_view key) {
   constexpr std::size_t length = 24;
   return key.size() == length && key.ends_with("==") && std::all_of(key.begin(), key.end() - 2, [](char c) {
@@ -56,7 +56,7 @@ std::optional<HttpAnswer> wrong_handshake(const HttpRequest& request) {
   return std::nullopt;
 }
 
-/// A ticket is good for one connection. Beside it the token is accepted or, without a token, the key of this run.
+/// Accepted secrets: a ticket, for one connection; the token; if no token is configured, the key of this run.
 bool shows_secret(const HttpRequest& request, const std::vector<std::pair<std::string, std::string>>& query, const ViewDoor& door,
                   ViewSecrets::Steady::time_point now) {
   if (const std::string ticket = value_of(query, "ticket"); !ticket.empty() && door.secrets.take_ticket(ticket, now)) return true;
@@ -85,8 +85,8 @@ bool ViewSecrets::take_ticket(std::string_view shown, Steady::time_point now) {
   return true;
 }
 
-/// The order: handshake, protocol, query, secret, origin. A client that shows a secret may come from any page. Without a secret
-/// it is refused if a token is configured; otherwise the origin decides.
+/// Order of the checks: handshake, protocol, query, secret, origin. With a secret, any page is allowed. Without one, the client
+/// is refused if a token is configured; otherwise the origin decides.
 std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
                                                 const std::vector<std::pair<std::string, std::string>>& query,
                                                 const ViewDoor& door, ViewSecrets::Steady::time_point now) {

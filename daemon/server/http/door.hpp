@@ -16,7 +16,7 @@
 
 namespace sonar {
 
-/// The secrets of one run beside the token.
+/// The secrets of one run, besides the token.
 class ViewSecrets {
  public:
   using Steady = std::chrono::steady_clock;
@@ -26,7 +26,8 @@ class ViewSecrets {
   /// The key: 32 hexadecimal digits, new at every start; empty = none.
   const std::string& key() const { return key_; }
   void make_key();
-  /// Makes a ticket, which admits one connection within ticket_lasts. Beyond most_tickets the oldest is removed.
+  /// Makes a ticket, which admits one connection within ticket_lasts. If there are more than most_tickets, the oldest is
+  /// removed.
   std::string new_ticket(Steady::time_point now);
   bool take_ticket(std::string_view shown, Steady::time_point now);
 
@@ -35,22 +36,22 @@ class ViewSecrets {
   std::deque<std::pair<std::string, Steady::time_point>> tickets_;
 };
 
-/// A handshake that is accepted.
+/// An accepted handshake.
 struct ViewWelcome {
   std::string protocol;  // the protocol that both sides support
   bool may_steer = false;
-  double most_hz = 0;     // limit for the rate of pictures that the viewer set; 0 = none
-  std::string playback;   // the requested vehicle whose trajectory it looks at; empty = none
-  std::string recording;  // the requested file that it looks at; empty = the sonars
+  double most_hz = 0;     // rate limit for pictures, set by the viewer; 0 = none
+  std::string playback;   // vehicle whose trajectory the viewer requested; empty = none
+  std::string recording;  // recording that the viewer requested; empty = the running sonars
 };
 struct ViewDoor {
   const Token& token;
   ViewSecrets& secrets;
-  Ipv4 reached;  // our end of the connection
+  Ipv4 reached;  // our address of the connection
   const ControlConfig& config;
 };
-/// Decides about a handshake whose Host has been checked. `query` is that of the target. A refusal is one sentence; its `why`
-/// names the configuration that would allow the client.
+/// Decides about a handshake whose Host was checked. `query`: of the target. A refusal is one sentence; its `why` names the
+/// configuration that would allow the client.
 std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
                                                 const std::vector<std::pair<std::string, std::string>>& query,
                                                 const ViewDoor& door, ViewSecrets::Steady::time_point now);

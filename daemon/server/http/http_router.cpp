@@ -19,7 +19,7 @@ HttpAnswer wrong_method(const Route& route) {
   return answer;
 }
 
-/// Parses the body. A name in the path replaces that in the message.
+/// Parses the body. A name in the path replaces the message's name.
 RoutedRequest operation_of(const Route& route, const std::string& body) {
   const bool pose = route.op == "pose" || route.op == "object";
   auto request = control::request_from_json(route.op, body, route.name);
@@ -58,7 +58,7 @@ HttpAnswer answer_of(unsigned status, StatusCode code, const std::string& text) 
 
 bool wants_socket(const HttpRequest& request) { return request.method == "GET" && header_names(request.upgrade, "websocket"); }
 
-/// The order of the rules is a matter of safety: host, WebSocket, origin, page, token, route, method, body.
+/// The order of the rules matters for security: host, WebSocket, origin, page, token, route, method, body.
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy) {
   if (auto answer = reject_host(request, policy)) return {*std::move(answer)};
   const auto target = parse_target(request.target);
@@ -71,8 +71,8 @@ RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy
       return {*std::move(page)};
   }
   const Route route = route_of(*target, request.method);
-  // The token is checked before the path, so a client without it does not learn which paths exist. Health is reported without a
-  // token, but without the reason.
+  // The token is checked before the path, so that clients without it do not learn which paths exist. Without a token, health is
+  // reported without a reason.
   const bool authorised = policy.token.matches(bearer_token(request.authorization));
   if (!authorised && route.kind != Kind::health)
     return {refused(401, "token required: send Authorization: Bearer TOKEN, with the token of control.token_file")};

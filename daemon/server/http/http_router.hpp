@@ -14,7 +14,7 @@
 
 namespace sonar {
 
-/// {"code", "text"}: the body of every answer without a document.
+/// An answer with the body {"code", "text"}, which every answer without a document has.
 HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);
 
 /// GET with "Upgrade: websocket".
@@ -22,30 +22,30 @@ bool wants_socket(const HttpRequest& request);
 
 struct HttpPolicy {
   const Token& token;
-  Ipv4 reached;  // our end of the connection
+  Ipv4 reached;  // our address of the connection
   const std::vector<std::string>& hosts;
 };
 
 struct HelpAction {};
 struct HealthAction {
-  bool with_text = false;  // also the reason, for authorized clients
+  bool with_text = false;  // true: the answer includes the reason, for authorized clients
 };
 struct MetricsAction {};
 struct OperationAction {
   control::Operation operation;
 };
-/// A WebSocket of the live view: daemon/server/http/door.hpp decides, by rules of its own for Origin and secrets.
+/// A WebSocket of the live view: daemon/server/http/door.hpp decides, with its own rules for Origin and secrets.
 struct SocketAction {
   std::vector<std::pair<std::string, std::string>> query;
 };
 struct TicketAction {};
-/// Action of an HTTP request. A Subscribe = a stream of events.
+/// The action of an HTTP request. Subscribe: a stream of events.
 using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAction, OperationAction, control::Subscribe,
                                 SocketAction, TicketAction>;
 
 struct RoutedRequest {
   HttpAction action;
-  std::string pose_refusal = {};  // why a malformed pose is refused; it is counted
+  std::string pose_refusal = {};  // reason for refusing a malformed pose, which is counted
 };
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy);
 

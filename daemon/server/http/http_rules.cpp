@@ -14,7 +14,7 @@ int hex_value(char c) {
   return l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
 }
 
-/// Decodes %xx. Control characters are refused, also encoded ones, so that they reach no log or answer.
+/// Decodes %xx. Control characters, plain or encoded, are refused, so that they reach no log or answer.
 std::optional<std::string> decoded(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -66,8 +66,7 @@ std::optional<Target> parse_target(std::string_view text) {
   return target;
 }
 
-/// A web page of another site reaches this server by a name of its own (DNS rebinding); that name is not among the allowed
-/// ones.
+/// With DNS rebinding, a page of another site reaches this server by the site's own name, which is not an allowed name.
 bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::string>& names) {
   std::string_view port = host;
   const std::string_view name = cut(port, ':');
@@ -84,7 +83,7 @@ bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std
   for (const std::string_view scheme : {"http://", "https://"})
     if (origin.size() > scheme.size() && same_letters(origin.substr(0, scheme.size()), scheme))
       return host_allowed(origin.substr(scheme.size()), reached, names);
-  return false;  // "null", and other schemes
+  return false;  // "null" and other schemes
 }
 
 bool begins_http_request(std::string_view bytes) {
@@ -93,7 +92,7 @@ bool begins_http_request(std::string_view bytes) {
   return std::any_of(methods.begin(), methods.end(), [bytes](std::string_view method) { return bytes.starts_with(method); });
 }
 
-/// A request may come in pieces, so the first bytes are collected.
+/// The first bytes are collected, because a request may arrive in pieces.
 bool HttpDetector::speaks_http(std::span<const std::byte> received) {
   for (std::size_t i = 0; i < received.size() && first_bytes_.size() < longest_http_method; ++i)
     first_bytes_ += static_cast<char>(received[i]);

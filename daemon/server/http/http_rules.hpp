@@ -15,7 +15,7 @@
 
 namespace sonar {
 
-/// "/api/v1/sonars/front%20left?pings=1", split and decoded.
+/// A target such as "/api/v1/sonars/front%20left?pings=1", split and decoded.
 struct Target {
   std::vector<std::string> segments;
   std::vector<std::pair<std::string, std::string>> query;
@@ -31,20 +31,20 @@ bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std
 
 /// Splits a header that is a list into its words.
 std::vector<std::string> words_of_header(std::string_view list);
-/// Returns whether a header that is a list has the word, in capital or small letters. `wanted` has small letters.
+/// Whether a list header contains the word, ignoring case. `wanted` must be in small letters.
 bool header_names(std::string_view list, std::string_view wanted);
 
-/// Returns whether the type is "application/json", with any parameters.
+/// Whether the type is "application/json", with or without parameters.
 bool is_json(std::string_view content_type);
 
-/// Needs the first longest_http_method bytes of a stream.
+/// Whether a stream begins with an HTTP request. Needs the first longest_http_method bytes.
 bool begins_http_request(std::string_view bytes);
 inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
 
-/// Detects HTTP requests on ports of other protocols: any web page can make a browser send one.
+/// Detects HTTP requests on ports of other protocols, which any web page can make a browser send.
 class HttpDetector {
  public:
-  /// Takes the next bytes. Returns whether the stream begins as an HTTP request.
+  /// Returns, after the next bytes, whether the stream begins with an HTTP request.
   bool speaks_http(std::span<const std::byte> received);
 
  private:
@@ -54,9 +54,9 @@ class HttpDetector {
 struct Route {
   enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault, ticket };
   Kind kind = Kind::unknown;
-  std::string_view method;  // the allowed one
+  std::string_view method;  // the allowed method
   std::string op;           // operation: the member of Request.op; for faults "faults", "kinds" or "journal"
-  std::string name = {};    // name of the sonar, object or fault, if the path has it
+  std::string name = {};    // name of the sonar, object or fault in the path
 };
 Route route_of(const Target& target, std::string_view method);
 

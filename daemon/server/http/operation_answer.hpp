@@ -1,4 +1,4 @@
-// The result of an operation as the answer to an HTTP request.
+// Converts the result of an operation to an answer to an HTTP request.
 #pragma once
 
 #include "daemon/server/api/operations.hpp"
@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// Returns the answer with the body for the result.
+/// The answer, including its body.
 HttpAnswer answer_from(const OperationResult& result);
 
 }  // namespace sonar

@@ -31,7 +31,7 @@ bool any_of_list(std::string_view list, Take take) {
   return false;
 }
 
-/// "q=0" and "q=0.000": not wanted at all.
+/// True for "q=0" and "q=0.000", which mean: not acceptable.
 bool excluded(std::string_view parameters) {
   return parameters.starts_with("q=0") && parameters.find_first_not_of("0.", 3) == std::string_view::npos;
 }

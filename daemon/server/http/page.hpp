@@ -1,5 +1,4 @@
-// The page of the live view: which file answers a request, with which headers. Pure. The page holds no data, so it needs no
-// token.
+// Answers requests for the page of the live view with its files. Pure. The page contains no data, so it needs no token.
 #pragma once
 
 #include <optional>
@@ -16,8 +15,8 @@ struct PageRequest {
   std::string_view accept, accept_encoding, if_none_match;
 };
 
-/// Answers GET and HEAD: 304 if the client has this version, 406 for clients without gzip. Returns nullopt if the path is not one
-/// of the page, and for "/" if `accept` does not name text/html, because the help text is then the answer.
+/// Answers GET and HEAD: 304 if the client has this version, 406 for clients without gzip. Returns nullopt if the page has no
+/// such path, and for "/" if `accept` does not name text/html, because the answer is then the help text.
 std::optional<HttpAnswer> page_answer(const PageRequest& request, std::span<const PageFile> files = page_files());
 
 }  // namespace sonar

@@ -1,5 +1,4 @@
-// The files of the page, compressed, as the build embeds them (clients/web/bundle.py). There are none if it was built without the
-// page.
+// The compressed files of the page, which the build embeds (clients/web/bundle.py); none if sonard was built without the page.
 #pragma once
 
 #include <span>
@@ -8,7 +7,7 @@
 namespace sonar {
 
 struct PageFile {
-  std::string_view path, type, hash;     // "/", "text/html; ...", of the content
+  std::string_view path, type, hash;     // "/"; "text/html; ..."; hash of the content
   std::span<const unsigned char> bytes;  // gzip
 };
 std::span<const PageFile> page_files();

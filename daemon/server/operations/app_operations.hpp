@@ -1,5 +1,5 @@
-// Carries out the requests of the control protocol (operations.hpp): hands each to the class that is responsible for it. Owned by
-// App, as they are.
+// Carries out the requests of the control protocol (operations.hpp) by passing each to the responsible class. Owned by App,
+// like these classes.
 #pragma once
 
 #include "daemon/server/api/operations.hpp"

@@ -40,7 +40,7 @@ void fill(v1::FaultKind& out, const FaultKind& kind) {
       (*out.mutable_without_effect())[std::string(vendor->name())] = why;
 }
 
-/// The event that a fault waits for when it was requested without a trigger of its own; empty = nothing.
+/// The event for which a fault waits if it was requested without a trigger; empty = none.
 std::string awaited(const Fault& fault) {
   constexpr std::array<const char*, occasion_names.size()> words = {"a connection", "new settings", "a status message",
                                                                     "the end of a connection"};
@@ -101,7 +101,7 @@ OperationResult FaultOperations::add(const control::AddFault& asked, const Sende
   return result;
 }
 
-/// All sonars are checked first, so that nothing is applied to some of them only.
+/// All sonars are checked first, so that a fault is never applied to only some of them.
 OperationResult FaultOperations::add(const control::FaultRecord& record, bool manual, const Device* only) {
   const auto faults = check_fault(record, manual);
   if (!faults) return result_of(faults.error());
@@ -116,7 +116,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
     if (!why_not)
       takers.push_back(&device);
     else if (record.sonar.empty() && why_not->code == FaultRefusal::Code::no_effect)
-      // A request for all sonars leaves out those on which the fault has no effect. Any other refusal ends the request.
+      // A request for all sonars skips those on which the fault has no effect. Any other refusal ends the request.
       why = std::move(why_not->text);
     else
       return refused(std::move(why_not->text));
@@ -151,12 +151,12 @@ OperationResult FaultOperations::report(const control::GetFaults& asked) const {
   return result;
 }
 
-/// The new failure is checked before the previous one is ended. Only a conflict with another fault is noticed later.
+/// The new failure is checked before the previous one is ended, except for conflicts with other faults.
 mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
   using enum mavlink::MavResult;
   if (unit != mavlink::distance_sensor) return unsupported;
   if (!config_.faults.armed || instance > fleet_.devices().size()) return denied;
-  if (!config_.control.token_file.empty()) {  // HTTP requires the token, and MAVLink has no field for it
+  if (!config_.control.token_file.empty()) {  // requests need the token, for which MAVLink has no field
     log_.warning("failure refused: a command of MAVLink cannot show the token of control.token_file",
                  {{"client", name_by_mavlink}});
     return denied;
@@ -186,7 +186,7 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   return accepted;
 }
 
-/// A record that a sonar refuses is logged; the others of the plan begin nevertheless.
+/// A refused record is logged; the other records of the plan begin nevertheless.
 void FaultOperations::begin_plan(const Device* only) {
   for (const control::FaultRecord& record : config_.faults.plan)
     if (only != nullptr && !record.sonar.empty() && record.sonar != only->config().name)

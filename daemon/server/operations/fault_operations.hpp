@@ -1,4 +1,4 @@
-// Requests for faults: adding, ending, listing them; the plan of the configuration; MAVLink's failure injection.
+// Carries out requests for faults (add, end, list), the fault plan of the configuration, and MAVLink's failure injection.
 #pragma once
 
 #include "daemon/server/api/operations.hpp"
@@ -12,7 +12,7 @@ namespace sonar {
 namespace v1 {
 class FaultStatus;
 }
-/// Statuses of the faults of all sonars; `over_too`: the last that have ended as well.
+/// The states of the faults of all sonars. `over_too`: including the last ended ones.
 std::vector<v1::FaultStatus> fault_statuses(const Fleet& fleet, Time now, bool over_too);
 
 class FaultOperations {
@@ -23,11 +23,11 @@ class FaultOperations {
   OperationResult add(const control::AddFault& asked, const Sender& sender);
   OperationResult end(const control::EndFaults& asked, const Sender& sender);
   OperationResult report(const control::GetFaults& asked) const;
-  /// MAVLink's command to inject a failure, on the sonars as distance sensors 1, 2, ... of the configuration; 0 = all. A failure
-  /// replaces the one before and ends after longest_manual_fault at the latest. unsupported: another unit, or without effect;
+  /// MAVLink's command to inject a failure. The sonars of the configuration are the distance sensors 1, 2, ...; 0 = all. A
+  /// failure replaces the previous one and ends after at most longest_manual_fault. unsupported: another unit, or no effect;
   /// denied: not armed, no such sonar, or a conflict with another fault.
   mavlink::MavResult inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance);
-  /// The plan of the configuration, which has been checked.
+  /// Starts the fault plan of the configuration, which has been checked.
   void begin_plan(const Device* only = nullptr);  // null: on all sonars
 
  private:

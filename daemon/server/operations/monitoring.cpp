@@ -7,7 +7,7 @@
 namespace sonar {
 namespace {
 
-constexpr auto longest_ping = std::chrono::seconds(30);  // beyond: the simulation is stuck
+constexpr auto longest_ping = std::chrono::seconds(30);  // if it takes longer, the simulation is stuck
 
 std::string whole_seconds(std::chrono::nanoseconds t) {
   return std::to_string(std::chrono::duration_cast<std::chrono::seconds>(t).count()) + " s";
@@ -40,7 +40,7 @@ void add_vehicles(v1::DaemonStatus& out, const Config& config, const World& worl
 void add_objects(v1::DaemonStatus& out, const Scene& scene, const World& world, Time now) {
   const std::vector<Pose> bodies = world.objects_at(now);
   for (const Object& o : scene.objects) {
-    if (o.name.empty()) continue;  // the index of a removed object
+    if (o.name.empty()) continue;  // a removed object
     v1::ObjectStatus& object = *out.add_objects();
     object.set_name(o.name);
     object.set_moving(body_named(scene, o.name) >= 0);
@@ -112,7 +112,7 @@ std::shared_ptr<const v1::DaemonStatus> Monitoring::status() const {
   s.set_seed(of_.config.seed);
   s.set_uptime_s(uptime_s());
   s.set_resident_mb(static_cast<double>(figures_of_this_process().resident_bytes) / 1e6);
-  // All parts have the state of the same time, `now`, because nothing else runs on this thread meanwhile.
+  // All parts describe the same time, `now`, because nothing else runs on this thread meanwhile.
   for (const Device& d : of_.fleet.devices()) *s.add_sonars() = d.status(now);
   add_vehicles(s, of_.config, of_.world, now);
   add_objects(s, *of_.changes.scene(), of_.world, now);
@@ -150,7 +150,7 @@ std::string Monitoring::metrics() const {
   return metrics_text(f);
 }
 
-/// The first of these: the simulation hangs, a scene takes too long, a sonar does not listen.
+/// Reports the first of these: the simulation hangs, a scene takes too long, a sonar does not listen.
 std::string Monitoring::problem() const {
   const auto under_way = of_.simulator.under_way_for();
   if (under_way > longest_ping) return "the simulation has been at one ping for " + whole_seconds(under_way);

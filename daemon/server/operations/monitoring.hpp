@@ -21,7 +21,7 @@
 
 namespace sonar {
 
-/// The parts of the daemon that are reported on; they outlive Monitoring.
+/// The parts of the daemon on which Monitoring reports. They must outlive it.
 struct Monitored {
   const Config& config;
   const Clock& clock;
@@ -43,7 +43,7 @@ class Monitoring {
   explicit Monitoring(const Monitored& parts) : of_(parts) {}
 
   std::shared_ptr<const v1::DaemonStatus> status() const;
-  /// The answers of the functions of Operations with these names.
+  /// See the functions of Operations with these names.
   std::string metrics() const;
   std::string problem() const;
   /// Returns a sentence if a change of the scene takes longer than limits.load_s; else empty.

@@ -1,4 +1,4 @@
-// Answers to operations, from sentences and errors.
+// Converts sentences and errors to results of operations.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ inline OperationResult refused(std::string text) { return {OperationResult::Code
 inline OperationResult failed(std::string text) { return {OperationResult::Code::failed, std::move(text)}; }
 /// `why` is empty if the operation was done.
 inline OperationResult done_or_refused(std::string why) { return why.empty() ? OperationResult{} : refused(std::move(why)); }
-/// A mistake in the request is a refusal; any other error is a failure.
+/// Errors in the request are refusals; all others are failures.
 inline OperationResult result_of(const Error& error) {
   const bool is_request_wrong = error.kind == ErrorKind::usage || error.kind == ErrorKind::config;
   return is_request_wrong ? refused(error.text) : failed(error.text);

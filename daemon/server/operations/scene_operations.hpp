@@ -1,4 +1,4 @@
-// Requests that change the scene: another one, objects added, removed, moved and hidden.
+// Carries out requests that load another scene, or add, remove, move or hide objects.
 #pragma once
 
 #include <functional>
@@ -26,7 +26,7 @@ class SceneOperations {
  private:
   using Edit = std::function<Result<ScenePointer>(const Scene&)>;
 
-  /// Edits the scene that the previous changes make. `what` is for the log: "object crate added".
+  /// Edits the scene that results from the previous changes. `what` is for the log: "object crate added".
   void edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done);
   OperationResult without_details(const Error& error, const SceneFile& file, const Sender& sender);
   void log_change(const std::string& what, const Sender& sender);

@@ -24,7 +24,7 @@ OperationResult SonarOperations::set(const control::SetSonar& asked, const Sende
   return device ? result_of((*device)->ask(asked, sender.id)) : result_of(device.error());
 }
 
-/// Values that are not given stay. All sonars are in the same water.
+/// Unset values stay. All sonars are in the same water.
 OperationResult SonarOperations::set(const control::SetEnvironment& asked, const Sender& sender) {
   Water water = config_.water;
   water.temperature_c = asked.temperature_c.value_or(water.temperature_c);

@@ -1,4 +1,4 @@
-// Requests to the sonars: settings, the water around them, and recordings of them.
+// Carries out requests for sonars: settings, water, and recordings.
 #pragma once
 
 #include "daemon/server/api/operations.hpp"
@@ -9,7 +9,7 @@ namespace sonar {
 
 class SonarOperations {
  public:
-  /// `config` receives changed water.
+  /// Changed water is written to `config`.
   SonarOperations(Config& config, Fleet& fleet, Recordings& recordings, Log& log)
       : config_(config), fleet_(fleet), recordings_(recordings), log_(log) {}
 

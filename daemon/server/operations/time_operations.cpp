@@ -9,8 +9,8 @@
 
 namespace sonar {
 
-/// If time follows the poses, the answer to a pose comes when the pings that this pose made possible have been sent. So a client
-/// that waits for the answer runs in step with the sonars.
+/// If time follows the poses, a pose is answered after the pings that it made possible have been sent. So a client that waits
+/// for answers runs in step with the sonars.
 void TimeOperations::take(const control::PoseSample& sample, const Sender& sender, Operations::Done done) {
   std::string refusal = poses_.take(sample, sender);
   if (!refusal.empty()) return done(refused(std::move(refusal)));

@@ -1,4 +1,4 @@
-// Requests that move bodies or let time pass: poses, steps of lockstep time, and the playing of trajectories.
+// Carries out requests that move bodies or advance time: poses, steps of lockstep time, playback of trajectories.
 #pragma once
 
 #include <functional>
@@ -27,7 +27,7 @@ class TimeOperations {
   PoseIntake& poses_;
   const Fleet& fleet_;
   std::function<void()> on_change_;
-  std::uint64_t pings_reported_ = 0;  // in answers to steps
+  std::uint64_t pings_reported_ = 0;  // pings counted in answers to steps so far
 };
 
 }  // namespace sonar

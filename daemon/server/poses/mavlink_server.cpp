@@ -10,7 +10,7 @@ namespace {
 constexpr auto tick_period = std::chrono::milliseconds(250);
 constexpr std::size_t work_of_datagram = 64, work_of_byte = 4;
 
-/// Heartbeats and silence are measured in real time, also if the daemon's time is stepped.
+/// Heartbeats and silence are measured in real time, even if the daemon's time is stepped.
 Time wire_time() { return Time(std::chrono::steady_clock::now().time_since_epoch()); }
 
 mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
@@ -54,12 +54,13 @@ Result<void> MavlinkServer::open() {
       link.config.at.port = link.socket.local_endpoint().port();
     link.name = std::string("mavlink ").append(text_of(link.config));
     error_code ec;
-    link.socket.non_blocking(true, ec);  // bytes that do not fit into a full buffer are lost, as datagrams may be
+    link.socket.non_blocking(true, ec);  // datagrams that do not fit into the buffer are lost
   }
   return {};
 }
 
-// Each link has two coroutines that never end before stop(): receive() and tick(). A fault in one is logged, and it starts again.
+// Each link has two coroutines that never end before stop(): receive() and tick(). After an exception, which is logged, a
+// coroutine starts again.
 void MavlinkServer::start() {
   for (Link& l : links_) {
     look_at_wants(l);
@@ -109,7 +110,7 @@ Endpoint MavlinkServer::listens_at(std::size_t link) const {
   return link < links_.size() ? std::next(links_.begin(), static_cast<std::ptrdiff_t>(link))->config.at : Endpoint{};
 }
 
-/// Accepts answers of the dialled peer, and unsolicited packets only from addresses that the configuration permits.
+/// Accepts datagrams of the dialled peer, and others only from addresses that the configuration allows.
 bool MavlinkServer::is_allowed(const Link& link, const asio::ip::address& from) const {
   if (link.config.dials) return from == address_of(link.config.at.ip);
   return is_admitted(config_.poses.allow_from, from);
@@ -125,7 +126,7 @@ asio::awaitable<void> MavlinkServer::receive(Link& link) {
     if (stopping_) co_return;
     if (ec) continue;  // an ICMP answer: the port is not open yet
     const auto now = std::chrono::steady_clock::now();
-    const std::size_t work = work_of_datagram + work_of_byte * n;  // a frame, which may be a pose, has 12 bytes or more
+    const std::size_t work = work_of_datagram + work_of_byte * n;  // a frame has at least 12 bytes
     const bool taken = link.of_address.takes(from.address().to_string(), work, config_.limits.input_bytes_per_s, now);
     if (taken)
       on_datagram(link, mavlink::BytesView(buffer).first(n), from);
@@ -147,7 +148,7 @@ void MavlinkServer::on_datagram(Link& link, mavlink::BytesView bytes, const udp:
   const mavlink::Reaction reaction = link.poses.on_datagram(bytes, wire_time());
   if (reaction.from_vehicle && !link.config.dials) link.peer = from;
   act_on(link, reaction, sender, from);
-  look_at_wants(link);  // it may have held a command
+  look_at_wants(link);  // the datagram may have contained a command
 }
 
 // ---- distances
@@ -157,8 +158,8 @@ bool MavlinkServer::wants_distances(const std::string& vehicle) const {
                      [&](const Link& l) { return l.config.vehicle == vehicle && l.poses.wants_distances(); });
 }
 
-/// Reports when the vehicle of this link starts or stops requesting distances, because its sonars then start or stop to ping by
-/// themselves.
+/// Reports when the vehicle of this link starts or stops requesting distances, because its range finders then start or stop
+/// pinging by themselves.
 void MavlinkServer::look_at_wants(Link& link) {
   const bool wants = link.poses.wants_distances();
   if (std::exchange(link.distances_wanted, wants) != wants && distances_wanted_) distances_wanted_();
@@ -217,12 +218,13 @@ asio::awaitable<void> MavlinkServer::tick(Link& link) {
   }
 }
 
-/// A reaction has refusals, poses, notices and replies; replies go to `to`, if it is known.
+/// Handles refusals, poses, notices and replies; replies are sent to `to`, if it is known.
 void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const std::string& from,
                            const std::optional<udp::endpoint>& to) {
   for (const std::string& why : reaction.refusals) intake_.refuse(why, {from, from});
   for (const mavlink::SourcedPose& pose : reaction.poses) {
-    const std::string source = link.name + " " + pose.source;  // a router may send from any port: the link is the sender
+    const std::string source =
+        link.name + " " + pose.source;  // a router may send from any port, so the link counts as the sender
     intake_.take(pose.sample, {source, source});
   }
   for (const std::string& notice : reaction.notices) log_limited(log_, link.notices, LogLevel::info, link.name + ": " + notice);

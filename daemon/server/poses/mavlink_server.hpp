@@ -1,5 +1,5 @@
-// The sockets of poses by MAVLink: one for each link, listening (udpin) or sending first (udpout), with a MavlinkPoses each.
-// Owned by App, as PoseServer is; poses go into the same PoseIntake.
+// The sockets for poses by MAVLink. Each link has one, listening (udpin) or sending first (udpout), and a MavlinkPoses. Poses
+// go to the same PoseIntake as those of PoseServer. Owned by App.
 #pragma once
 
 #include <cstdint>
@@ -23,18 +23,18 @@ namespace sonar {
 
 class MavlinkServer {
  public:
-  /// Links and origin are those of the present `config`; the addresses that may send follow later changes of it.
-  /// `began`: the daemon's time from which messages count the time since boot.
+  /// Links and origin are read from `config` now; the allowed addresses follow later changes of it. `began`: the daemon's time
+  /// that counts as boot time in messages.
   MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log, Time began);
 
-  /// Call it before open(). Sets what the command to inject a failure does, on every link. Without it the command is answered as
-  /// unsupported.
+  /// Call it before open(). Sets the function for the command to inject a failure, on every link. Without it the command is
+  /// answered as unsupported.
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
   /// Call it before open(). `tell` is called when wants_distances() of a vehicle has changed.
   void on_distances_wanted(std::function<void()> tell) { distances_wanted_ = std::move(tell); }
   /// True if a link of that vehicle sends the distances of its range finders.
   bool wants_distances(const std::string& vehicle) const;
-  /// Sends the distance of a ping to the vehicle of the sonar, a range finder.
+  /// Sends the distance of a range finder's ping to the autopilot of its vehicle.
   void on_distance(const SonarConfig& sonar, const PingQueued& ping);
   Result<void> open();
   void start();
@@ -44,13 +44,13 @@ class MavlinkServer {
   std::vector<std::string> endpoints() const;
   /// Counts of the distances of each link, in the order of the configuration.
   std::vector<LinkFigures> figures() const;
-  /// Notes on links that bring no poses: their missing messages.
+  /// Notes on links without poses: the missing messages.
   std::vector<Note> notes() const;
   /// Address of a listening link, in the order of the configuration.
   Endpoint listens_at(std::size_t link) const;
 
  private:
-  static constexpr std::size_t most_datagrams_per_s = 4096;  // autopilots send some hundred
+  static constexpr std::size_t most_datagrams_per_s = 4096;  // autopilots send a few hundred
 
   struct Link {
     MavlinkConfig config;

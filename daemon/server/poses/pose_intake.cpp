@@ -16,8 +16,8 @@ void PoseIntake::refuse(const std::string& why, const Sender& sender) {
   log_refusal(why, sender);
 }
 
-/// WALL stamps follow the computer's clock, which may be set while sonard runs; the time of the World never jumps. The shift
-/// between both is kept while it is right to a millisecond, so that equal stamps stay equal.
+/// WALL stamps follow the computer's clock, which may be set while sonard runs; the time of the World never jumps. The
+/// difference of both is kept while it is correct to a millisecond, so that equal stamps stay equal.
 void PoseIntake::map_wall(control::Stamp& stamp) {
   if (stamp.domain != control::ClockDomain::wall || clock_.stepped()) return;
   const auto shift = clock_.ahead_of_wall();

@@ -1,6 +1,5 @@
-// Receives everything that moves bodies, from PoseServer and the control servers: poses, and requests to place objects and to
-// steer trajectories. It converts wall time to the daemon's time, passes poses to the world, which accepts or refuses them, and
-// logs refusals.
+// Receives poses, and requests to place objects and to control trajectories, from PoseServer and the control servers. It
+// converts wall time to the daemon's time, passes poses to the world, which accepts or refuses them, and logs refusals.
 #pragma once
 
 #include <chrono>
@@ -21,11 +20,11 @@ class PoseIntake {
              Plausibility* plausibility = nullptr)
       : world_(world), clock_(clock), log_(log), on_pose_(std::move(on_pose)), events_(events), plausibility_(plausibility) {}
 
-  /// Accepts or refuses a pose. Returns the sentence of a refusal, or an empty text.
+  /// Accepts or refuses a pose. Returns one sentence if it is refused, else an empty text.
   std::string take(control::PoseSample sample, const Sender& sender);
-  /// Places, shows or hides a moving object of the scene, body `body` of the world. Returns as take().
+  /// Places, shows or hides the moving object `body` of the world. Returns like take().
   std::string place(const control::SetObject& asked, std::size_t body, const Sender& sender);
-  /// Pauses, seeks or plays a trajectory. Returns as take().
+  /// Pauses, seeks or plays a trajectory. Returns like take().
   std::string steer(const control::SetTrajectory& asked, const Sender& sender);
   /// Counts and logs an invalid pose message.
   void refuse(const std::string& why, const Sender& sender);

@@ -16,10 +16,10 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
-constexpr std::size_t work_of_a_turn = 4096;            // bytes processed before yielding
-constexpr std::size_t least_work = 64;                  // bytes: cost of a read or of a line, beside its own bytes
-constexpr int most_not_json = 8;                        // lines in a row that are too long or not JSON; then the connection ends
-constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes: 32 floods hold 0.1 to 1 GB in the kernel
+constexpr std::size_t work_of_a_turn = 4096;  // bytes processed before yielding
+constexpr std::size_t least_work = 64;        // bytes: cost of a read or of a line, in addition to its own bytes
+constexpr int most_not_json = 8;  // limit of successive lines that are too long or not JSON, after which the connection ends
+constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes; 32 floods keep 0.1 to 1 GB in the kernel
 constexpr std::chrono::milliseconds between_looks{10};  // pause before the next look for new input
 constexpr std::chrono::milliseconds longest_wait{100};  // limit for poses that wait in the kernel
 constexpr const char* no_json = "not JSON: this port accepts poses as lines of JSON";
@@ -52,7 +52,7 @@ PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, const Lim
 Result<Endpoint> PoseServer::open(Port& port, Endpoint at) {
   if (port.encoding == Encoding::json) {
     if (auto r = port.lines.open(at); !r) return tl::make_unexpected(r.error());
-    at = port.lines.at();  // for port 0: the same number for both
+    at = port.lines.at();  // if port 0 was configured: both get the same number
   }
   if (auto r = bind_udp(port.datagrams, at, false); !r) return tl::make_unexpected(r.error());
   at.port = port.datagrams.local_endpoint().port();
@@ -104,7 +104,7 @@ void PoseServer::stop() {
 
 // ---- what arrives
 
-/// Passes a line on as a pose. Lines that are too long, or no JSON object, count against the connection.
+/// Passes a line on as a pose. Lines that are too long or not JSON objects count against the connection.
 PoseServer::LineKind PoseServer::on_line(const control::LineParser::Line& line, const Sender& sender) {
   if (line.too_long) {
     intake_.refuse("line is longer than 4096 bytes", sender);
@@ -118,7 +118,7 @@ PoseServer::LineKind PoseServer::on_line(const control::LineParser::Line& line, 
 
 void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes, const udp::endpoint& from) {
   const Sender sender = sender_of(encoding == Encoding::json, "udp", from.address(), from.port());
-  if (encoding == Encoding::json) {  // a datagram holds whole lines; the last may lack its newline
+  if (encoding == Encoding::json) {  // a datagram contains whole lines; the last newline may be missing
     control::LineParser lines;
     lines.feed(bytes);
     lines.feed(std::array{std::byte{'\n'}});
@@ -134,7 +134,7 @@ void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes
     intake_.refuse(sample.error().text, sender);
 }
 
-/// A datagram costs its bytes and as much again as a line by TCP for each pose that it may hold.
+/// The work of a datagram: its bytes and, for each pose that it may contain, the cost of a line.
 std::size_t PoseServer::work_of(Encoding encoding, std::span<const std::byte> datagram) {
   const auto lines = encoding == Encoding::json ? std::count(datagram.begin(), datagram.end(), std::byte{'\n'}) : 0;
   return datagram.size() + (1 + std::min<std::size_t>(static_cast<std::size_t>(lines), most_lines_of_a_datagram)) * least_work;
@@ -170,8 +170,8 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
 
 // ---- JSON lines by TCP
 
-/// The order of the checks: is the address allowed, are there descriptors to spare, is a slot free or can one be taken from a
-/// sender that does not use it well.
+/// Order of the checks: the address is allowed, descriptors are available, a slot is free or can be taken from a less active
+/// sender.
 void PoseServer::admit(tcp::socket socket) {
   error_code ec;
   const auto peer = socket.remote_endpoint(ec);
@@ -201,8 +201,8 @@ void PoseServer::admit(tcp::socket socket) {
       });
 }
 
-/// Each turn reads at most work_of_a_turn bytes and then lets others proceed. A sender that has left with more than its limits
-/// allow has only its last pose applied.
+/// Each turn reads at most work_of_a_turn bytes and then lets others proceed. If a sender has disconnected with more waiting
+/// input than its limits allow, only its last pose is applied.
 asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
   Connection& c = *connection;
   std::array<std::byte, work_of_a_turn> buffer;
@@ -243,7 +243,7 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// Lets other connections proceed. The pause is longer if this one sent more than its limit or its share of all.
+/// Lets other connections proceed. The pause is longer if this connection is over its own limit or its share of the common one.
 asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));
@@ -266,21 +266,21 @@ asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& 
   co_return Rested::leaves_much;
 }
 
-/// Applies the last waiting pose of a closed connection, and none of the others, so that reconnecting gains nothing.
+/// Applies only the last waiting pose of a closed connection, so that reconnecting gains nothing.
 void PoseServer::take_newest(Connection& c) {
   std::optional<control::LineParser::Line> newest;
   std::array<std::byte, work_of_a_turn> buffer;
   error_code ec;
-  for (std::size_t n = 0; !ec; n = c.socket.read_some(asio::buffer(buffer), ec)) {  // up to the end, which has come
+  for (std::size_t n = 0; !ec; n = c.socket.read_some(asio::buffer(buffer), ec)) {  // until the end of the stream
     c.lines.feed(std::span(buffer).first(n));
     while (auto line = c.lines.next()) newest = std::move(line);
   }
   if (newest) on_line(*newest, c.sender);
 }
 
-/// Keeps the newest bytes that wait in the kernel: 0.1 s of the allowed rate, or two lines if the sender is paused for exceeding
-/// it, or if this computer has not kept up with it for 0.1 s. The kernel of such a sender holds megabytes more, even after the
-/// sender has closed; reading them all would let old poses act for seconds. True: the rest was dropped.
+/// Drops all but the newest bytes that wait in the kernel: 0.1 s of the allowed rate are kept, or two lines if the sender is
+/// over the limit or this computer has not kept up with it for 0.1 s. Otherwise old poses would act for seconds, because the
+/// sender's kernel may have megabytes more, even after it has closed. Returns true if bytes were dropped.
 bool PoseServer::drop_backlog(Connection& c, bool pauses) {
   const std::size_t waiting = waiting_bytes(c.socket);
   const auto now = std::chrono::steady_clock::now();

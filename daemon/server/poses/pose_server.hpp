@@ -1,7 +1,7 @@
-// Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. App owns it. The control stream is a server of its own
-// (daemon/server/control/). A malformed message is refused and counted, and from time to time logged; a connection that does not
-// speak JSON is closed. Connections are served in turns of bounded work, and no faster than the limits allow. Of the poses beyond
-// the limits only the newest is kept, so that no pose takes effect long after it was sent.
+// Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. App owns it. (The control stream has its own server,
+// daemon/server/control/.) Malformed messages are refused and counted, and logged at a limited rate; a connection that does not
+// send JSON is closed. Connections are served in turns of bounded work, no faster than the limits allow. Of the poses beyond
+// the limits only the newest is kept, so that no pose takes effect late.
 #pragma once
 
 #include <list>
@@ -48,8 +48,8 @@ class PoseServer {
     DatagramRate rate{most_datagrams_per_s};
     Listener lines;  // for JSON only
   };
-  /// One TCP sender. It is closed by stop(), or if its slot is needed and it has, for the longest time of all, sent no pose or
-  /// more than the limits. A sender that has disconnected has no slot.
+  /// One TCP sender. It is closed by stop(), or if its slot is needed and, of all senders, it has been idle or over its limits
+  /// for longest. A sender that has disconnected has no slot.
   struct Connection {
     Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
         : socket(std::move(s)),
@@ -66,7 +66,7 @@ class PoseServer {
     int not_json = 0;  // number of lines in succession that are not JSON
     std::chrono::steady_clock::time_point active_at =
         std::chrono::steady_clock::now();                          // time of its last pose within the limits
-    std::chrono::steady_clock::time_point kept_up_at = active_at;  // last time when little or nothing waited in the kernel
+    std::chrono::steady_clock::time_point kept_up_at = active_at;  // last time at which little or nothing waited in the kernel
     std::chrono::steady_clock::time_point behind_until{};
     bool proved = false;  // the last pose was within the limits
     void close() {
@@ -81,13 +81,13 @@ class PoseServer {
   void log_fault(const std::string& fault, const std::string& at);
   asio::awaitable<void> receive(Port& port);
   asio::awaitable<void> read_lines(ConnectionPointer connection);
-  enum class Turn { over, not_over, end };  // over: no whole line is left; end: the connection does not send JSON
+  enum class Turn { over, not_over, end };  // over: no whole line remains; end: the connection does not send JSON
   struct Work {
     std::size_t bytes = 0;
     bool has_pose = false;  // an accepted pose
   };
   Turn take_turn(Connection& connection, Work& work);
-  enum class Rested { goes_on, leaves_much };  // leaves_much: it disconnected, and had sent more than the limits allow
+  enum class Rested { goes_on, leaves_much };  // leaves_much: the sender disconnected after sending more than the limits allow
   asio::awaitable<Rested> rest(Connection& connection, const Work& work);
   void take_newest(Connection& connection);
   bool drop_backlog(Connection& connection, bool pauses);

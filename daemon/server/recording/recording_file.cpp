@@ -21,7 +21,7 @@ const protocol::Make& make_of(std::string_view vendor) {
   return found != nullptr ? *found : protocol::makes().front();
 }
 
-/// Returns whether a client of this make receives its pings as one stream of bytes, which a file can hold as it is.
+/// Whether clients of this make receive pings as one byte stream, which a file can contain unchanged.
 bool is_one_stream(const protocol::Make& make) {
   return make.codec.framing != nullptr && !make.each_ping_requested && make.device->pings_by() != protocol::PingsBy::datagrams;
 }
@@ -30,7 +30,7 @@ bool may_stand_in_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
 }
 
-/// Counts what reaches the file.
+/// Counts the bytes of the file.
 class CountedSink final : public recording::Sink {
  public:
   CountedSink(std::unique_ptr<recording::Sink> sink, std::shared_ptr<std::uint64_t> bytes)
@@ -99,8 +99,8 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
     return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
-  // MCAP holds pings of all sonars. Other kinds are tried in order: those for any single stream, those of this make, and those
-  // of other makes, which are refused with a reason.
+  // MCAP is possible for all sonars. Then follow the formats for any single stream, those of this make, and those of other
+  // makes, which are refused with a reason.
   if (name.ends_with(mcap.ending)) return &mcap;
   const protocol::Make& own = make_of(vendor);
   for (const Kind kind : {&pcap, &raw_dump}) {
@@ -135,7 +135,7 @@ RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, c
   }
 }
 
-/// The order in the file: a status message if one is due, the ping as a stream, its datagrams, and in MCAP the truth.
+/// Order in the file: a status message if one is due, the ping as a stream, its datagrams, and in MCAP the truth.
 Result<void> RecordingFile::write(const RecordedPing& ping) {
   const bool keeps_status = kind_ == &mcap || kind_ == &pcap;
   if (keeps_status && !ping.status.empty() && (!status_at_ || ping.at - *status_at_ >= status_period)) {
@@ -162,7 +162,7 @@ Result<void> RecordingFile::put(recording::RecordedMessage message) {
 
 Result<void> RecordingFile::put_truth(const RecordedPing& ping) {
   const PingRequest& request = ping.ping->request;
-  if (make_->codec.samples == nullptr)  // else the session reads them from the messages
+  if (make_->codec.samples == nullptr)  // otherwise the session reads the samples from the messages
     if (Result<void> written = mcap_->write_image(ping.at, ping.ping); !written) return written;
   if (Result<void> written = mcap_->write_pose(ping.at, request.fired_at, request.sonar_in_world); !written) return written;
   recording::mcap::PingTruth truth;

@@ -1,5 +1,5 @@
-// One file of a recording inside the daemon: the messages of a sonar, and in MCAP also pictures, true poses and the first hit of
-// each beam. The writer thread creates and writes it (recordings.hpp); it has no queue, no clock and no log.
+// One file that the daemon records: the messages of a sonar, and in MCAP also pictures, true poses and the first hit of each
+// beam. The writer thread creates and writes it (recordings.hpp). It has no queue, clock or log.
 #pragma once
 
 #include <cstdint>
@@ -24,16 +24,16 @@ using recording::mcap::SceneNames;
 struct RecordedPing {
   Time at{};  // when it was made
   std::shared_ptr<const Ping> ping;
-  std::shared_ptr<const protocol::Bytes> bytes;  // the vendor's, as clients get them; null = not sent over TCP
+  std::shared_ptr<const protocol::Bytes> bytes;  // the message that clients get; null = not sent over TCP
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream, as receivers get them
-  protocol::Bytes status;                   // status that the sonar announced then; empty = none
-  std::shared_ptr<const SceneNames> names;  // names of the scene in which it was made
+  protocol::Bytes status;                                                      // status message at that time; empty = none
+  std::shared_ptr<const SceneNames> names;                                     // names of objects and bodies in the ping's scene
 
-  /// Bytes that it keeps in memory while it waits.
+  /// Bytes of memory while it waits.
   std::size_t size() const;
 };
 
-/// A sonar as recordings name it.
+/// The properties of a sonar that a recording needs.
 struct RecordedSonar {
   std::string name, vendor;
   recording::PcapConversation ends;  // for the headers of a capture
@@ -46,13 +46,13 @@ class RecordingFile {
   using Kind = const recording::FileKind*;
   static const recording::FileKind mcap, pcap, raw_dump;
 
-  /// Returns whether it is a plain file name: at most 128 letters, digits, - _ and . , not beginning with a dot.
+  /// Whether `name` is a plain file name: at most 128 letters, digits, - _ and . , not beginning with a dot.
   static bool is_plain_name(std::string_view name);
-  /// Returns whether it is a plain file name with the ending of a recording.
+  /// Whether `name` is a plain file name with the extension of a recording.
   static bool is_recording(std::string_view name);
-  /// Returns whether the file lies in the folder after symbolic links have been followed.
+  /// Whether the file, after following symbolic links, lies in the folder.
   static bool is_inside(const std::filesystem::path& folder, const std::filesystem::path& file);
-  /// Returns the kind of a plain file name by its ending: .mcap, those of this vendor, and .pcap or .raw if its pings are a
+  /// The format of a plain file name, by its extension: .mcap, those of this vendor, and .pcap or .raw if pings are sent as a
   /// stream. Other names are errors.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
   /// Creates the file. `labels`: also write the labels of pings, in MCAP. Errors: io. An existing file is not changed.
@@ -64,11 +64,11 @@ class RecordingFile {
   /// Writes a ping, and before it a status message if the last one is a second old. After an error (io) only close() may be
   /// called.
   Result<void> write(const RecordedPing& ping);
-  /// Writes a FaultEntry of control.proto, in JSON, to an MCAP file; other files leave it out. Errors: io.
+  /// Writes a FaultEntry of control.proto, in JSON, to an MCAP file; other formats ignore it. Errors: io.
   Result<void> write_fault(Time at, const std::string& json) {
     return mcap_ == nullptr ? Result<void>{} : mcap_->write_fault(at, json);
   }
-  /// Finishes the file, as far as possible also after an error. Errors: io.
+  /// Finishes the file, after an error as far as possible. Errors: io.
   Result<void> close() { return writer_->close(); }
 
   struct Figures {
@@ -85,7 +85,7 @@ class RecordingFile {
   bool labels_;
   std::shared_ptr<std::uint64_t> bytes_ = std::make_shared<std::uint64_t>(0);
   std::unique_ptr<recording::RecordingWriter> writer_;
-  recording::McapSession* mcap_ = nullptr;  // the writer, when it is one
+  recording::McapSession* mcap_ = nullptr;  // writer_, if it is a McapSession
   std::optional<Time> status_at_;
   std::uint64_t pings_ = 0, messages_ = 0;
 };

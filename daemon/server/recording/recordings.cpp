@@ -25,8 +25,8 @@ std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& so
 
 }  // namespace
 
-/// A recording is opening until its file has been created, then running until end(), then ending until its file is closed. The
-/// I/O thread alone reads and writes it, except for `work`, which belongs to the writer thread.
+/// A recording is opening until its file is created, running until end(), then ending until its file is closed. Only the I/O
+/// thread uses this struct, except `work`, which belongs to the writer thread.
 struct Recordings::Recording {
   enum class State { opening, running, ending, ended } state = State::opening;
   std::string name;  // file name in the folder
@@ -35,7 +35,7 @@ struct Recordings::Recording {
   v1::RecordingStatus status;
   std::size_t waiting_bytes = 0;
   bool failed = false;    // it failed, and the failure was logged
-  std::string ends_with;  // reason, if the sonar stopped while the file was opened
+  std::string ends_with;  // reason, if the sonar stopped while the file was being opened
   std::vector<Done> at_end;
   std::shared_ptr<Work> work = std::make_shared<Work>();
 };
@@ -46,9 +46,8 @@ Recordings::Recordings(WriterThread& writer, const Config& config, Log& log, std
 
 Recordings::~Recordings() = default;
 
-// Runs `job` on the thread of the recording. `after` runs here, with the result and the size of the file.
-// States of a recording: opening (the file is made), running, ending (no more pings; what waits is written, the file is closed),
-// ended (only its status is kept). All changes of state happen on the I/O thread; the writer thread uses only Work.
+// Runs `job` on the writer thread, then `after` on this thread with the result and the size of the file. All changes of state
+// happen on this thread.
 template <class Job, class After>
 void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
   const auto figures = std::make_shared<RecordingFile::Figures>();
@@ -151,15 +150,15 @@ Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& ask
   return recording;
 }
 
-/// Makes room in the list of the recordings that the status shows.
+/// Removes the oldest ended recording from the list that the status shows.
 void Recordings::remove_oldest() {
   while (recordings_.size() >= most_remembered) {
     const auto ended = [](const Pointer& r) { return r->state == Recording::State::ended; };
-    recordings_.erase(std::find_if(recordings_.begin(), recordings_.end(), ended));  // there is one: few run at once
+    recordings_.erase(std::find_if(recordings_.begin(), recordings_.end(), ended));  // one exists, because few run at once
   }
 }
 
-/// Names the newest recording that could be meant, and why it has ended already; a full disk for example.
+/// A sentence that names the newest matching recording and the reason why it has already ended, for example a full disk.
 std::string Recordings::why_none_to_stop(const std::string& file) const {
   const auto last = std::find_if(recordings_.rbegin(), recordings_.rend(), [&](const Pointer& r) {
     return (file.empty() || r->name == file) && !r->status.why().empty() && r->status.why() != stop_requested;
@@ -169,7 +168,7 @@ std::string Recordings::why_none_to_stop(const std::string& file) const {
   return ended.empty() ? "no recording is called \"" + file.substr(0, 128) + "\"" : ended;
 }
 
-/// `done` is called once, when the last of the recordings has been closed, with the first error.
+/// `done` is called once, with the first error, when the last of the recordings is closed.
 void Recordings::stop(const control::StopRecording& asked, Done done) {
   std::vector<Pointer> meant;
   for (const Pointer& r : recordings_)
@@ -249,14 +248,14 @@ void Recordings::take_fault(const std::string& sonar, Time at, const std::string
       write(r, json.size(), [at, json](RecordingFile& file) { return file.write_fault(at, json); });
 }
 
-/// The bound is for all recordings together. If it is exceeded, the recording with the most data in memory ends, which may be
-/// another one.
+/// The limit applies to all recordings together. If it is exceeded, the recording with the most data in memory ends, which may
+/// be another one.
 bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
   const auto is_running = [](const Pointer& r) { return r->state == Recording::State::running; };
   std::size_t waiting = 0;
   Pointer most = recording;
   for (const Pointer& r : recordings_) {
-    waiting += r->waiting_bytes;  // a recording that ends counts too: its data are still in memory
+    waiting += r->waiting_bytes;  // includes recordings that are ending, because their data are still in memory
     if (is_running(r) && r->waiting_bytes > most->waiting_bytes) most = r;
   }
   if (waiting > 0 && waiting + bytes > most_waiting_bytes_)
@@ -282,7 +281,7 @@ void Recordings::write(const Pointer& recording, std::size_t size, Job job) {
 
 // ---- the end
 
-/// The first failure counts: it is logged and becomes the result. Later ones of the same recording are ignored.
+/// The first failure of a recording is logged and becomes its result; later ones are ignored.
 void Recordings::fail(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running && !(recording->state == Recording::State::ending && !recording->failed))
     return;
@@ -292,7 +291,7 @@ void Recordings::fail(const Pointer& recording, const std::string& why) {
   end(recording, why);
 }
 
-/// Messages that wait are written before the file is closed.
+/// Waiting messages are written before the file is closed.
 void Recordings::end(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running) return;
   recording->state = Recording::State::ending;

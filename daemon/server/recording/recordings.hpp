@@ -1,8 +1,8 @@
 // Recordings inside the daemon: control starts and stops them, devices pass the pings that they send, and the writer thread
 // writes the files. App owns the object. All functions are called on the I/O thread.
 //
-// Pinging never waits for a file: pings wait in memory up to a bound, and beyond it, or when a file fails, the recording ends
-// with one line in the log. What was written stays readable.
+// Pings never wait for a file: recorded pings wait in memory up to a limit. Beyond it, or if a file fails, the recording ends
+// with one log line; the file stays readable.
 #pragma once
 
 #include <functional>
@@ -29,7 +29,7 @@ class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
   static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // limit for all recordings together
-  /// Called once when the recording has begun or ended, perhaps before start() or stop() returns; never after finish().
+  /// Called once when the recording has begun or ended, possibly before start() or stop() returns; never after finish().
   using Done = std::function<void(const Result<void>&)>;
 
   /// `on_change` is called when a recording has ended.
@@ -39,7 +39,7 @@ class Recordings {
   Recordings(const Recordings&) = delete;
   Recordings& operator=(const Recordings&) = delete;
 
-  /// Lists the newest files that are in the folder already, as recordings that have ended.
+  /// Lists the newest existing files of the folder as ended recordings.
   void find_earlier();
   /// `who` is the requester's name for the log. Errors: usage (a bad file name, or recording is not configured), io, unavailable.
   void start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done);
@@ -51,7 +51,7 @@ class Recordings {
   void finish();
 
   bool takes(const std::string& sonar) const;
-  /// Returns whether a recording needs the first hits of beams. Only MCAP files hold them.
+  /// Whether a recording of the sonar needs the first hits of beams. Only MCAP files contain them.
   bool wants_truth(const std::string& sonar) const;
   bool wants_labels(const std::string& sonar) const;
   void take(const std::string& sonar, RecordedPing ping);
@@ -61,7 +61,7 @@ class Recordings {
 
   /// Call it before anything is recorded, and whenever another scene is used.
   void use_scene(const Scene& scene);
-  /// Returns the names of the objects of the scene in which pings are made from now on.
+  /// The names of objects and bodies in the present scene.
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
   /// Returns the open recordings and the last ones that have ended, oldest first.
@@ -84,7 +84,7 @@ class Recordings {
   template <class Job, class After>
   void on_thread(const std::shared_ptr<Work>& work, Job job, After after);
   std::size_t running() const;
-  /// Returns whether `bytes` more of this recording may wait. If there is no room, the recording with most waiting bytes ends.
+  /// Whether `bytes` more of this recording may wait. If not, the recording with most waiting bytes ends.
   bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
   /// Queues `job`, which writes `bytes` bytes, for the writer thread.

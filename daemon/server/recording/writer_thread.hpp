@@ -20,7 +20,7 @@ class WriterThread {
   /// `nice_by` is added to the niceness of the thread; `on_idle` is called after the last job, on the I/O thread.
   WriterThread(asio::io_context& io, int nice_by, std::function<void()> on_idle = {}) : io_(io), on_idle_(std::move(on_idle)) {
     asio::post(thread_, [nice_by] {
-      if (nice_by != 0 && ::nice(nice_by) == -1) return;  // costs only smoothness
+      if (nice_by != 0 && ::nice(nice_by) == -1) return;  // a failure only makes other threads less smooth
     });
   }
   /// Waits until all jobs are done.
@@ -28,7 +28,8 @@ class WriterThread {
   WriterThread(const WriterThread&) = delete;
   WriterThread& operator=(const WriterThread&) = delete;
 
-  /// `job` runs on the thread and returns a Result<void>; `after` takes that on the I/O thread, whose loop lives until then.
+  /// `job` runs on this thread and returns a Result<void>; `after` is called with it on the I/O thread, whose loop stays alive
+  /// until then.
   template <class Job, class After>
   void run(Job job, After after) {
     ++under_way_;

@@ -9,7 +9,7 @@ namespace sonar {
 Result<void> Beacon::open(const SonarConfig& sonar, const protocol::Port& port) {
   period_ = port.period;
   for (const Endpoint& to : sonar.status_to) to_.emplace_back(address_of(to.ip), to.port == 0 ? port.number : to.port);
-  // Takes an ephemeral port, but never the one on which drivers listen.
+  // Binds an ephemeral port, but never the one on which drivers listen.
   for (int attempt = 0; attempt < 8; ++attempt) {
     if (socket_.is_open()) socket_.close();
     if (auto r = bind_udp(socket_, {sonar.bind_ip, 0}, true); !r) return r;
@@ -43,7 +43,7 @@ void Beacon::stop() {
 
 asio::awaitable<void> Beacon::send() {
   while (!stopping_) {
-    timer_.expires_after(period_);  // set before the bytes are made, so that a send_now() during a write is not lost
+    timer_.expires_after(period_);  // set before making the bytes, so that a send_now() during the write is not lost
     sent_at_ = std::chrono::steady_clock::now();
     const std::vector<protocol::Bytes> datagrams = make_();
     for (const protocol::Bytes& status : datagrams)

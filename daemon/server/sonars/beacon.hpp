@@ -1,4 +1,4 @@
-// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent periodically from a port of its own. Owned by Device.
+// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent periodically from its own port. Owned by Device.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,8 @@ namespace sonar {
 
 class Beacon {
  public:
-  /// `make` returns the present datagrams, in order, or none; `fault` gets the text of an exception. `log` outlives the beacon.
+  /// `make` returns the present datagrams, in order; `fault` is called with the text of an exception. `log` must outlive the
+  /// beacon.
   Beacon(asio::io_context& io, Log& log, std::string sonar, std::function<std::vector<protocol::Bytes>()> make,
          std::function<void(const std::string&)> fault)
       : log_(log), sonar_(std::move(sonar)), make_(std::move(make)), fault_(std::move(fault)), socket_(io), timer_(io) {}

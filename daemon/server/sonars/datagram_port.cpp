@@ -12,7 +12,7 @@
 namespace sonar {
 namespace {
 
-/// Several sonars of one network receive the same broadcasts.
+/// Binds a broadcast address, which several sonars of a network share.
 bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   error_code ec;
   socket.open(udp::v4(), ec);
@@ -22,7 +22,7 @@ bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   return !ec;
 }
 
-/// The loopback network is 127.0.0.0/8 whatever the netmask is. There hosts of this machine broadcast to 127.255.255.255.
+/// On loopback, which is 127.0.0.0/8 whatever the netmask is, the broadcast address is 127.255.255.255.
 Ipv4 broadcast_of(const SonarConfig& sonar) {
   if (sonar.bind_ip[0] == 127) return {127, 255, 255, 255};
   Ipv4 address{};
@@ -31,7 +31,7 @@ Ipv4 broadcast_of(const SonarConfig& sonar) {
   return address;
 }
 
-/// Returns whether an error of a socket is the answer "port unreachable" of the computer to which a datagram was sent.
+/// Whether a socket error is the answer "port unreachable" of a datagram's destination.
 bool is_closed_port(msghdr& message) {
   for (const cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, const_cast<cmsghdr*>(c))) {
     if (c->cmsg_level != IPPROTO_IP || c->cmsg_type != IP_RECVERR) continue;
@@ -62,7 +62,7 @@ void DatagramPort::receive_broadcasts(const SonarConfig& sonar) {
   }
 }
 
-/// A port without functions for answers and errors only sends.
+/// Without functions for answers and errors, the port only sends.
 void DatagramPort::start() {
   if (!answer_ && !closed_) return;
   if (closed_) {
@@ -72,7 +72,7 @@ void DatagramPort::start() {
   for (Socket& socket : sockets_) receive(socket);
 }
 
-/// Reads the error queue of the socket: with IP_RECVERR, an ICMP answer names the host that it came from.
+/// Reads the error queue of the socket; with IP_RECVERR, an entry for an ICMP answer names the host.
 void DatagramPort::take_errors() {
   while (closed_ && !stopping_) {
     sockaddr_in host{};
@@ -100,8 +100,8 @@ void DatagramPort::stop() {
   }
 }
 
-/// Answers a datagram. The answer is sent from the sonar's own address, from which a host learns this address. A host that cannot
-/// be reached gets no answer. Returns false if the datagram was dropped.
+/// Answers a datagram. The answer is sent from the sonar's own address, so that hosts learn this address. An unreachable host
+/// gets no answer. Returns false if the datagram was dropped.
 bool DatagramPort::take(Socket& at, std::size_t size) {
   if (!answer_ || !at.from.address().is_v4()) return false;
   const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};

@@ -1,6 +1,5 @@
-// A UDP port of an emulated sonar. It answers the datagrams of hosts, also those sent to the broadcast address of its network
-// (Port::Kind::udp_answer), or passes them to a dialogue (Port::Kind::udp_dialogue). Pings are sent from it, too. Device owns it;
-// the vendor makes and reads the bytes.
+// A UDP port of an emulated sonar. It answers the datagrams of hosts, including broadcasts (Port::Kind::udp_answer), or passes
+// them to a dialogue (Port::Kind::udp_dialogue). Pings are also sent from it. Owned by Device.
 #pragma once
 
 #include <array>
@@ -18,7 +17,7 @@ namespace sonar {
 
 class DatagramPort {
  public:
-  /// Returns the datagrams to send back; nullopt: the datagram was dropped, because its host sends too many.
+  /// Returns the datagrams to send back; nullopt: the datagram was dropped because of the limits.
   using Answer = std::function<std::optional<std::vector<protocol::Bytes>>(Endpoint from, protocol::BytesView datagram)>;
 
   explicit DatagramPort(asio::io_context& io) : io_(io) {}
@@ -31,11 +30,11 @@ class DatagramPort {
   /// Sets the function that is called with the address of a host when its computer answers a datagram with "port unreachable"
   /// (ICMP). Call this before start().
   void on_port_unreachable(std::function<void(Endpoint host)> tell) { closed_ = std::move(tell); }
-  /// Receives broadcasts, too. An address that cannot be bound is left out.
+  /// Also receives broadcasts. Addresses that cannot be bound are ignored.
   void receive_broadcasts(const SonarConfig& sonar);
   void start();
   void stop();
-  /// Socket of the sonar's own address, to send from.
+  /// The socket of the sonar's own address, for sending.
   udp::socket& socket() { return sockets_.front().socket; }
   std::uint16_t number() const { return number_; }
 
@@ -47,7 +46,7 @@ class DatagramPort {
     udp::endpoint from;
     std::array<std::byte, 1500> datagram{};
   };
-  static constexpr std::size_t most_per_s = 2048;  // hosts request some tens of pings a second
+  static constexpr std::size_t most_per_s = 2048;  // hosts request a few dozen pings a second
 
   void receive(Socket& at);
   bool take(Socket& at, std::size_t size);

@@ -29,7 +29,7 @@ asio::awaitable<void> DatagramStream::send() {
   const auto self = shared_from_this();
   while (true) {
     if (const Outbox::Message message = parent_.next_message(id_)) {
-      auto receivers = parent_.receivers(id_);  // one list for the whole message
+      auto receivers = parent_.receivers(id_);  // the same list for the whole message
       if (receivers.empty()) {
         parent_.on_not_sent(id_);
         continue;
@@ -50,8 +50,8 @@ void DatagramStream::send_nothing_to(const Endpoint& to) {
   socket_.send_to(asio::const_buffer(), {address_of(to.ip), to.port}, 0, ignored);
 }
 
-/// Waits for the next message. A silent host is looked for four times in the second half of the permitted time, since an answer
-/// can be lost, and then given up. After a delay of the daemon it is looked for before it is given up, too.
+/// Waits for the next message. In the second half of the permitted silence, the host is probed four times, because an answer
+/// can be lost; then the stream ends. After a delay of the daemon, the host is probed before the stream ends.
 asio::awaitable<void> DatagramStream::wait() {
   constexpr int most_looks = 4;
   const auto longest = parent_.longest_silence(id_);
@@ -70,7 +70,7 @@ asio::awaitable<void> DatagramStream::wait() {
   parent_.look_for_host(id_);
 }
 
-/// False: the socket was closed before the message was whole. A receiver that is removed in the meantime gets no more parts.
+/// False: the socket was closed before the whole message was sent. A receiver that is removed meanwhile gets no more parts.
 asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& message, std::vector<Endpoint> receivers) {
   if (message.datagrams == nullptr) co_return co_await send_datagram(*message.bytes, receivers);
   for (std::size_t i = 0; i < message.datagrams->size(); ++i) {
@@ -94,7 +94,7 @@ asio::awaitable<bool> DatagramStream::send_datagram(const protocol::Bytes& datag
     error_code ec;
     const auto sent_to = udp::endpoint(address_of(to.ip), to.port);
     co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
-    // The error answers an earlier datagram, perhaps to another host; this one was not sent.
+    // The error belongs to an earlier datagram, maybe to another host; this datagram was not sent.
     if (ec == asio::error::connection_refused) co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
     if (!socket_.is_open()) co_return false;
     if (ec)

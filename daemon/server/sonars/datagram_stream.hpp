@@ -1,5 +1,6 @@
-// Sends the messages of an emulated sonar as datagrams: to all receivers of a port of kind udp_stream, or to the host at one of
-// kind udp_dialogue. It sends whole messages in order, not faster than the port allows. Its Device and its coroutine own it.
+// Sends the messages of an emulated sonar as datagrams: to all receivers of a port of kind udp_stream, or to the host of a port
+// of kind udp_dialogue. It sends whole messages in order, no faster than the port allows. Owned by its Device and its
+// coroutine.
 #pragma once
 
 #include <chrono>
@@ -12,22 +13,22 @@ namespace sonar {
 
 class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
  public:
-  /// `socket` and `parent` outlive it. `gap`: least time between two datagrams of a ping.
+  /// `socket` and `parent` must outlive it. `gap`: shortest time between two datagrams of a ping.
   DatagramStream(SessionParent& parent, udp::socket& socket, ConnectionId id, std::chrono::nanoseconds gap)
       : parent_(parent), socket_(socket), id_(id), gap_(gap), wake_(socket.get_executor()), pause_(socket.get_executor()) {}
 
   void start();
   /// Call it when there is something to send.
   void wake() { wake_.cancel(); }
-  /// Ends the stream after the ping that is being sent; closing the socket ends that too.
+  /// Ends the stream after the current ping, or at once when the socket is closed.
   void finish(std::string why, bool by_host = false);
   /// Sends an empty datagram.
   void send_nothing_to(const Endpoint& to);
-  /// Call it when a request of the host arrived, or another sign that the host is alive.
+  /// Call it when a request of the host, or another sign of life, has arrived.
   void heard() {
     heard_at_ = std::chrono::steady_clock::now();
     looks_ = 0;
-    wake_.cancel();  // the request may have set another limit of silence
+    wake_.cancel();  // the request may have changed the limit of silence
   }
   std::chrono::nanoseconds connected_for() const { return std::chrono::steady_clock::now() - began_at_; }
   std::chrono::nanoseconds silent_for() const { return std::chrono::steady_clock::now() - heard_at_; }

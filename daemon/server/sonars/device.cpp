@@ -90,12 +90,12 @@ Result<void> Device::open(const protocol::Port& port) {
   return {};
 }
 
-/// One socket for the ports of one number.
+/// The socket of a port number; several ports can share it.
 Result<DatagramPort*> Device::datagram_port(std::uint16_t number) {
   for (DatagramPort& port : datagram_ports_)
     if (number != 0 && port.number() == number) return &port;
   DatagramPort& port = datagram_ports_.emplace_back(network_.io);
-  // Hosts bind the port of discovery too, so it is shared. A sonar that is started twice is noticed at its other ports.
+  // The port of discovery is shared, because hosts bind it too. A sonar that is started twice is detected by its other ports.
   const auto ports = sonar_.vendor().ports();
   const bool shared = std::any_of(ports.begin(), ports.end(), [&](const protocol::Port& p) {
     return p.kind == protocol::Port::Kind::udp_answer && p.number == number;
@@ -144,13 +144,13 @@ void Device::stop(const std::string& why) {
   timer_.cancel();
   for (SonarHttp& http : http_) http.stop();
   visits_.end();
-  if (started_) parent_.on_stop(*this, why);  // a device that was never started may have the name of a running one
+  if (started_) parent_.on_stop(*this, why);  // a device that was never started may have the name of a running device
   perform(sonar_.stop(why));
   for (DatagramPort& port : datagram_ports_) port.stop();
   if (!started_) streams_.clear();
 }
 
-/// True when nothing of the device uses a socket any more, so that it may be destroyed.
+/// True if nothing of the device uses a socket any more, so that it can be destroyed.
 bool Device::gone() const {
   return sessions_.empty() && streams_.empty() && refusing_ == 0 && waiting_ == 0 && !sonar_.busy() &&
          std::all_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return http.gone(); });
@@ -188,7 +188,7 @@ std::optional<std::chrono::milliseconds> Device::longest_silence(ConnectionId of
   return connection == nullptr || !connection->dialogue ? std::nullopt : connection->dialogue->longest_silence();
 }
 
-/// This is a mistake in sonard, not of a client. It may end the connection of that client, but not others.
+/// Reports a mistake in sonard (not of a client). It may end the connection of that client, but no other.
 void Device::on_fault(const std::string& what) { log_fault(network_.log, faults_, what, {"sonar", config().name}); }
 
 void Device::on_send_error(const Endpoint& to, const std::string& why) {
@@ -203,14 +203,14 @@ void Device::on_over(ConnectionId id, const std::string& why, bool by_client) {
     digests_.push_back({connection->number, session->digest().size(), session->digest().hex()});
   sessions_.remove(session);
   streams_.remove_if([id](const StreamPointer& s) { return s->id() == id; });
-  // The freed slot goes to the client that has waited longest: not to one that has hung up.
+  // Before the free slot is assigned, because a waiting client may have disconnected.
   forget_who_left();
   perform(sonar_.on_closed(id, why, network_.clock.now(), by_client));
 }
 
 // ---- actions
 
-/// Actions are carried out in order: later ones may name the session that a Serve among them makes.
+/// Actions are carried out in order, because later ones may refer to the session that a Serve creates.
 void Device::perform(Actions actions) {
   for (Action& action : actions) std::visit([this](auto& a) { carry_out(a); }, action);
   arm();

@@ -1,5 +1,5 @@
-// The network side of one emulated sonar: the ports of its vendor, its observers' port, its timer. Bytes go to the Sonar, whose
-// Actions it carries out. Owned by Fleet. I/O thread only.
+// The network side of one emulated sonar: the vendor's ports, the port for observers, a timer. It passes bytes to the Sonar and
+// carries out the returned Actions. Owned by Fleet. I/O thread only.
 #pragma once
 
 #include <array>
@@ -38,23 +38,23 @@ class SonarStatus;
 
 class Device;
 
-/// The interface of a device to the daemon, besides DeviceNetwork. It outlives the device.
+/// The functions of the daemon that a device calls. It must outlive the device.
 class DeviceParent {
  public:
   virtual ~DeviceParent() = default;
-  /// `done` is called once, later, on the I/O thread.
+  /// Computes a ping. `done` is called once, later, on the I/O thread.
   virtual void compute(const Device& of, PingRequest request, Simulator::Done done) = 0;
   virtual void on_ping_queued(const Device& of, const PingQueued& ping) = 0;
   virtual void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) = 0;
   /// Called when the device has stopped.
   virtual void on_stop(const Device& of, const std::string& why) = 0;
-  /// Called after a change for which stepped time or the shutdown may wait.
+  /// Called after a change that stepped time or the shutdown may wait for.
   virtual void on_change() = 0;
   /// Called when the daemon must end.
   virtual void on_engine_failure(const Error& why) = 0;
 };
 
-/// The network that all devices share; outlives them.
+/// Objects that all devices share. They must outlive the devices.
 struct DeviceNetwork {
   asio::io_context& io;
   Clock& clock;
@@ -81,10 +81,10 @@ class Device final : public SessionParent {
          DeviceParent& parent);
   ~Device() override;
 
-  /// Opens the ports of the vendor, then that of the observers. Errors name the address and the next step.
+  /// Opens the vendor's ports, then the port for observers. Errors name the address and the next step.
   Result<void> open();
   void start();
-  /// Accepts no more clients, makes no more pings, and ends every connection after its present message, with FIN.
+  /// Stops accepting clients and making pings, and ends every connection with FIN after its current message.
   void stop(const std::string& why = "sonard stops");
 
   // For stepped time:
@@ -92,7 +92,7 @@ class Device final : public SessionParent {
   void tick_sessions() { perform(sonar_.tick_conversations(network_.clock.now())); }
   void skip(std::chrono::nanoseconds by) { sonar_.skip(by); }
 
-  /// Carries out the sonar's requests, in order.
+  /// Carries out the sonar's actions, in order.
   void perform(Actions actions);
 
   bool gone() const;  // after stop(): no connection and no ping is left
@@ -114,9 +114,9 @@ class Device final : public SessionParent {
   RecordedSonar recorded() const;
   /// Returns a sentence about a problem, or an empty text.
   std::string problem() const;
-  /// Changes settings as another client would. A refusal says what the product can do, and nothing is changed.
+  /// Changes settings as a client would. An error states what the product can do; the settings then stay.
   Result<void> ask(const control::SetSonar& asked, const std::string& who);
-  /// Uses vehicle and mount of a configuration that is otherwise the same.
+  /// Takes vehicle and mount from `config`, which is otherwise equal to the present one.
   void use_place(const SonarConfig& config) { sonar_.move(config, network_.clock.now()); }
   void use_water(const Water& water);
   /// See Sonar::run_itself.
@@ -127,10 +127,10 @@ class Device final : public SessionParent {
   void add_faults(const std::vector<Fault>& faults, bool manual) {
     perform(sonar_.add_faults(faults, manual, network_.clock.now()));
   }
-  /// Ends the faults of that name, or all if it is empty. Returns false if there is none.
+  /// Ends the faults with this name, or all if it is empty. Returns false if there is none.
   bool end_faults(const std::string& name);
-  /// Closes connections whose peer hung up. Called periodically and before a client is admitted or refused: the
-  /// listener may be ready before the reader of the closed connection.
+  /// Closes connections whose peer has disconnected. Called periodically, and before a client is admitted or refused, because
+  /// the listener may run before the reader of the closed connection.
   void forget_who_left();
 
   std::size_t on_bytes(ConnectionId from, protocol::BytesView bytes) override;
@@ -200,7 +200,7 @@ class Device final : public SessionParent {
   DeviceNetwork& network_;
   DeviceParent& parent_;
   const LimitConfig& limits_;
-  const std::vector<std::string>& hosts_;  // names by which HTTP may be called
+  const std::vector<std::string>& hosts_;  // host names that HTTP requests may use
   Sonar sonar_;
   Preview preview_;
   RecentRate made_;
@@ -216,14 +216,15 @@ class Device final : public SessionParent {
   std::map<ConnectionId, Arrived> arrived_;  // connections that wait for a decision or a slot
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
-  std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>> closed_;  // receivers, and when they are tried again
-  int refusing_ = 0, waiting_ = 0;                                                // connections
-  std::optional<Visit> refused_, gone_, searched_;                                // the last ones
+  std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>>
+      closed_;                                      // receivers that were unreachable, with the time of the next attempt
+  int refusing_ = 0, waiting_ = 0;                  // connections
+  std::optional<Visit> refused_, gone_, searched_;  // the last ones
   std::string silenced_by_;
 
   bool started_ = false, stopping_ = false;
   std::array<LogLimiter, static_cast<std::size_t>(Report::Topic::topics)> limiters_;
-  std::size_t datagram_work_ = 0;  // work for the present datagram, beyond its bytes
+  std::size_t datagram_work_ = 0;  // work for the present datagram, besides its bytes
   LogLimiter faults_, observer_visits_, send_errors_, storms_;
   VisitLog visits_;
   std::vector<StreamDigest> digests_;

@@ -1,4 +1,4 @@
-// The part of Device for the control protocol: the status that it reports, and the requests that it accepts while it runs.
+// The part of Device for the control protocol: its status, and the requests that it accepts while running.
 #include <algorithm>
 
 #include "core/sonar/range_image.hpp"

@@ -1,4 +1,5 @@
-// The hosts that a Device sends datagrams to: hosts of dialogues (ports of kind udp_dialogue), receivers of streams (udp_stream).
+// The hosts to which a Device sends datagrams: hosts of dialogues (ports of kind udp_dialogue) and receivers of streams
+// (udp_stream).
 #include <algorithm>
 
 #include "daemon/config/receiver_rules.hpp"
@@ -8,13 +9,13 @@
 namespace sonar {
 namespace {
 
-constexpr std::chrono::seconds closed_for{2};  // then a receiver whose port was closed gets one more ping
-constexpr std::uint16_t discard = 9;           // a port that programs leave closed (RFC 863)
+constexpr std::chrono::seconds closed_for{2};  // after this, a receiver whose port was closed is tried with one ping
+constexpr std::uint16_t discard = 9;           // a port that is usually closed (RFC 863)
 constexpr std::size_t most_closed = 64;
 
 }  // namespace
 
-/// Receivers that clients requested. Left out are group addresses that neither the product nor the configuration names, and
+/// The receivers that clients requested, except group addresses that neither the product nor the configuration names, and
 /// receivers whose port is closed.
 std::vector<Endpoint> Device::receivers(ConnectionId stream) {
   const Connection* const connection = sonar_.connections().find(stream);
@@ -38,8 +39,7 @@ void Device::on_receiver_closed(const Endpoint& receiver) {
   if (!known && closed_.size() < most_closed) closed_.emplace_back(receiver, std::chrono::steady_clock::now() + closed_for);
 }
 
-/// A silent host may still run. Its computer answers a datagram to a closed port (ICMP), and that answer counts as a sign of the
-/// host.
+/// Probes a silent host: its computer answers a datagram to a closed port (ICMP), which counts as a sign of life.
 void Device::look_for_host(ConnectionId stream) {
   const Connection* const host = sonar_.connections().find(stream);
   const StreamPointer dialogue = stream_of(stream);
@@ -47,7 +47,7 @@ void Device::look_for_host(ConnectionId stream) {
   dialogue->send_nothing_to({host->peer.ip, discard});
 }
 
-/// Drops datagrams of an address whose requests cost too much. nullopt: dropped.
+/// Handles a datagram. nullopt: dropped, because the requests of the address cost too much.
 std::optional<std::vector<protocol::Bytes>> Device::on_limited_datagram(
     const Endpoint& from, protocol::BytesView datagram, const std::function<std::vector<protocol::Bytes>()>& act) {
   PortGuard& guard = network_.admission.guard();
@@ -64,7 +64,7 @@ std::optional<std::vector<protocol::Bytes>> Device::on_limited_datagram(
   return answers;
 }
 
-/// The host that sent last has the dialogue, because there is no connection whose end would end the dialogue.
+/// The dialogue belongs to the last sender, because without connections the end of a host is not visible.
 void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram) {
   if (stopping_ || !sonar_.vendor().is_request(port, datagram)) return;
   const Peer host{text_of(from), from.ip, from.port};
@@ -78,8 +78,8 @@ void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, cons
   datagram_work_ = on_bytes(dialogue->id(), datagram);
 }
 
-/// The computer of a host has answered that a port is closed. For the host's port this is the only sign of its end, because UDP
-/// has no connection; for the port of look_for_host() it is a sign of life.
+/// Called when a host's computer has answered that a port is closed. For the host's own port this is the only sign of its end,
+/// because UDP has no connection; for the port of look_for_host() it is a sign of life.
 void Device::on_host_closed(const protocol::Port& port, const Endpoint& host) {
   const StreamPointer dialogue = host_of(port);
   if (!dialogue) return;
@@ -99,7 +99,7 @@ Device::StreamPointer Device::host_of(const protocol::Port& port) const {
   return nullptr;
 }
 
-/// Null: no slot is free. A datagram does not wait for one.
+/// Null: no slot is free. Datagrams do not wait for a slot.
 Device::StreamPointer Device::begin_dialogue(DatagramPort& at, const protocol::Port& port, Peer host) {
   const ConnectionId id = ++last_connection_;
   perform(sonar_.on_connect(id, Role::client, host, network_.clock.now(), &port));

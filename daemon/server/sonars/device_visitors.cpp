@@ -1,4 +1,4 @@
-// The connections that come to the TCP ports of a Device, until the sonar decides about them.
+// New connections at the TCP ports of a Device, until the sonar has decided about them.
 #include <array>
 
 #include "daemon/server/sonars/device.hpp"
@@ -6,8 +6,8 @@
 
 namespace sonar {
 
-/// A host that connects too often waits before it costs time, as one that opens and closes without a pause must not fail. Only
-/// few wait; the others of the address are refused.
+/// A host that connects too often must wait (a driver that reconnects at once must not fail). Only a few of an address wait;
+/// the others are refused.
 void Device::admit(tcp::socket socket, OnAdmitted serve) {
   constexpr int most_waiting = 8;
   error_code ec;
@@ -51,7 +51,7 @@ void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
 }
 
 void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port) {
-  // A slot whose client has hung up must be free before this one is judged.
+  // Frees slots of clients that have disconnected before deciding about this one.
   forget_who_left();
   const ConnectionId id = ++last_connection_;
   Peer peer = peer_of(socket);
@@ -59,7 +59,7 @@ void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, c
   perform(sonar_.on_connect(id, role, std::move(peer), network_.clock.now(), port));
 }
 
-/// Sends FIN and no byte. Bytes that the client has sent are read first, or else the kernel would answer them with RST.
+/// Sends FIN and no bytes. First reads what the client has sent, because with unread bytes the kernel would send RST.
 asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place) {
   error_code ec;
   socket.shutdown(tcp::socket::shutdown_send, ec);
@@ -67,15 +67,15 @@ asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place)
   asio::steady_timer deadline(network_.io, std::chrono::seconds(1));
   deadline.async_wait([&socket, &late](const error_code& e) {
     if (e) return;
-    late = true;  // a read that has just ended cannot be cancelled, and another would never end
+    late = true;  // a read that has just ended cannot be cancelled, and the next one would never end
     socket.cancel();
   });
   std::array<std::byte, 1024> discarded;
   for (int reads = 0; !ec && !late && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(discarded), into(ec));
   deadline.cancel();
-  // The handler above must be done with `socket` before this frame goes.
+  // The handler above must finish with `socket` before this coroutine frame is destroyed.
   co_await asio::post(network_.io, asio::use_awaitable);
-  socket.close(ec);  // before its place is free
+  socket.close(ec);  // before its slot is free
   place.reset();
 }
 

@@ -56,7 +56,7 @@ std::string Fleet::problem() const {
   return {};
 }
 
-/// The sonar's position in the configuration, or the first free index if a sonar that continues or will be opened has that one.
+/// The sonar's position in the configuration; if another sonar has that index, the first free one.
 std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& given) const {
   const auto taken = [&](std::uint32_t index) {
     return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) { return d.sonar().index() == index; }) ||
@@ -68,15 +68,15 @@ std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& 
   return index;
 }
 
-/// Stops a device and keeps it until its connections and handlers are done (sweep).
+/// Stops a device and keeps it until its connections and handlers have ended (sweep).
 void Fleet::retire(std::list<Device>::iterator device) {
   device->stop("the configuration changed");
   retired_.emplace_back();
   retired_.back().device.splice(retired_.back().device.end(), devices_, device);
 }
 
-/// Handlers that stop() cancelled still refer to the device. When the device is gone they are all queued, and a few turns of the
-/// event loop run them. So a device is erased only after several sweeps in a row that find it gone.
+/// Cancelled handlers still refer to the device and need a few turns of the event loop. So a device is erased only after
+/// several successive sweeps have found it gone.
 void Fleet::sweep() {
   for (auto it = retired_.begin(); it != retired_.end();) {
     const Device& device = it->device.front();
@@ -99,11 +99,11 @@ bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, Change& change) {
     return true;
   }
   change.errors.push_back("sonar " + sonar.name + ": " + opened.error().text);
-  retire(std::prev(devices_.end()));  // what it had begun may still be under way
+  retire(std::prev(devices_.end()));  // operations that it began may still run
   return false;
 }
 
-/// A sonar at 0.0.0.0 holds every address.
+/// Whether a sonar uses this address. A sonar at 0.0.0.0 uses every address.
 bool Fleet::is_held(Ipv4 ip) const {
   return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) {
     const Ipv4 held = d.config().bind_ip;
@@ -111,7 +111,7 @@ bool Fleet::is_held(Ipv4 ip) const {
   });
 }
 
-/// Sonars that continue get the mount and vehicle of the new configuration; those to be opened are returned.
+/// Gives continuing sonars the mount and vehicle of the new configuration; returns the sonars to open.
 std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& next, Outcomes& outcomes) {
   std::vector<Opening> openings;
   for (auto it = devices_.begin(); it != devices_.end();) {
@@ -134,7 +134,7 @@ std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& nex
   return openings;
 }
 
-/// When the changed sonar cannot be opened: the previous one continues if its vehicle is in the new configuration, else it ends.
+/// Called if the changed sonar cannot be opened: the previous one continues if its vehicle still exists, else it ends.
 void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Config& next) {
   SonarConfig is = device->config();
   const auto vehicle = std::find_if(next.vehicles.begin(), next.vehicles.end(),
@@ -144,16 +144,15 @@ void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Co
   device->use_place(is);
 }
 
-/// Changes the sonars to those of the new configuration. A sonar that cannot be opened is an error in the result and does not
-/// stop the others.
+/// Replaces the sonars by those of the new configuration. A sonar that cannot be opened is an error in the result; the others
+/// are opened nevertheless.
 Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   Change change;
   Outcomes outcomes;
   std::vector<Opening> openings = sort_out(now, next, outcomes);
-  std::vector<Opening> after;  // opened after the sonars that hold their addresses have been stopped
-  // Three passes, so that sonars can swap addresses and none is stopped needlessly. First, sonars at free addresses are opened,
-  // while the previous ones still serve. Then the sonars whose addresses are needed are stopped. Then the others are opened
-  // there.
+  std::vector<Opening> after;  // to be opened after the sonars that use their addresses are stopped
+  // Three passes, so that sonars can swap addresses and none is stopped needlessly: open sonars at free addresses, while the
+  // previous ones still serve; stop the sonars whose addresses are needed; open the rest.
   for (const Opening& o : openings) {
     const bool changed = o.before != devices_.end();
     outcomes[o.sonar->name] = changed ? "changed" : "added";
@@ -185,8 +184,8 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
 
 // ---- pings and clients, passed on to the simulator, recordings and events
 
-/// The request contains what recordings and viewers need beside the samples. The scene's names are stored for the ping, because
-/// another scene may be in use when it is done.
+/// Adds what recordings and viewers need besides samples. The scene's names are stored for the ping, because another scene may
+/// be in use when it is finished.
 void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
   const std::string& name = of.config().name;
   request.switches.keep_truth = recordings_.wants_truth(name) || (tap_wants_truth_ && tap_wants_truth_(name));

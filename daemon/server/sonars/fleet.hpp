@@ -1,6 +1,6 @@
-// The daemon's sonars: a Device for each, and the Devices that are closing after the configuration was read again. Owned by App.
-// A sonar that a new configuration does not change continues with its clients; it keeps its index, which keys its noise.
-// Requests, pings and events of the sonars go from here to the simulator, to recordings and to subscribers.
+// The daemon's sonars: a Device for each, and the Devices that are closing after a reload. Owned by App. A sonar that a reload
+// does not change continues with its clients and keeps its index, which is part of the key of its noise. The fleet passes
+// requests, pings and events of the sonars to the simulator, recordings and subscribers.
 #pragma once
 
 #include <functional>
@@ -19,12 +19,12 @@ namespace sonar {
 class Fleet final : public DeviceParent {
  public:
   struct Handlers {
-    std::function<void()> on_change;  // a change for which stepped time, or the end of the daemon, may wait
+    std::function<void()> on_change;  // called after a change that stepped time or the shutdown may wait for
     std::function<void(const Error& why)> on_engine_failure;  // the daemon must end
-    /// A ping of a range finder; its distance is absent when a fault withholds it.
+    /// Called for each ping of a range finder; its distance is absent if a fault withholds it.
     std::function<void(const SonarConfig& of, const PingQueued& ping)> on_distance = {};
   };
-  /// The arguments outlive the fleet.
+  /// The arguments must outlive the fleet.
   Fleet(DeviceNetwork network, const Config& config, const World& world, Simulator& simulator, Recordings& recordings,
         Events& events, FaultJournal& faults, Handlers handlers)
       : network_(network),
@@ -42,19 +42,19 @@ class Fleet final : public DeviceParent {
   struct Change {
     std::string summary;  // "front untouched, left changed, right added"
     std::vector<const Device*> opened;
-    std::vector<std::string> errors;  // sonars that could not be opened; the previous one stays if it can
+    std::vector<std::string> errors;  // sonars that could not be opened; the previous sonar stays if possible
   };
-  /// Stops, starts and keeps sonars by the configuration `next`. The World must already have its vehicles.
+  /// Stops, starts and keeps sonars according to the configuration `next`. The World must already have its vehicles.
   Change take_over(const Config& now, const Config& next);
 
-  /// Call it periodically: it erases stopped sonars that have no work in progress.
+  /// Erases stopped sonars without work in progress. Call it periodically.
   void sweep();
 
   const std::list<Device>& devices() const { return devices_; }
   std::list<Device>& devices() { return devices_; }
   Device* find(const std::string& name);
   const Device* find(const std::string& name) const { return const_cast<Fleet*>(this)->find(name); }
-  /// `tap` gets each ping when it is queued to clients, as recordings do; empty = none.
+  /// `tap` is called with each ping that is queued for clients; empty = none.
   using PingTap = std::function<void(const Device& of, const PingQueued& ping)>;
   /// `wants_truth` returns whether the tap needs the ground truth of a sonar's next ping.
   using WantsTruth = std::function<bool(const std::string& sonar)>;
@@ -62,7 +62,7 @@ class Fleet final : public DeviceParent {
     tap_ = std::move(tap);
     tap_wants_truth_ = std::move(wants_truth);
   }
-  /// Computes a ping of a Preview: drivers and recordings get none of it.
+  /// Computes a ping of a Preview, which drivers and recordings do not get.
   void compute_preview(PingRequest request, Simulator::Done done) { simulator_.submit(std::move(request), std::move(done)); }
   bool gone() const;  // after stop(): no device has work left
   std::uint64_t served() const;
@@ -78,7 +78,7 @@ class Fleet final : public DeviceParent {
   struct Opening {
     const SonarConfig* sonar = nullptr;
     std::uint32_t index = 0;
-    std::list<Device>::iterator before;  // the one it replaces, or end()
+    std::list<Device>::iterator before;  // the device that it replaces, or end()
   };
   /// By name of the sonar: the word in the summary for the effect of the reload on it.
   using Outcomes = std::map<std::string, std::string>;
@@ -109,7 +109,7 @@ class Fleet final : public DeviceParent {
   std::list<Device> devices_;  // in the configuration's order
   std::list<Retired> retired_;
   std::uint64_t served_before_ = 0;   // pings served by erased devices
-  std::vector<std::string> missing_;  // errors of sonars that should be there
+  std::vector<std::string> missing_;  // errors of sonars that could not be opened
 };
 
 }  // namespace sonar

@@ -12,9 +12,9 @@
 namespace sonar {
 namespace {
 
-// Bytes the kernel may hold that are not yet on the wire. More would only make a slow client's picture older.
+// Limit of bytes in the kernel that are not yet on the wire. A larger one would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
-constexpr std::size_t piece_bytes = 256;  // bytes of a client that are passed on at a time
+constexpr std::size_t piece_bytes = 256;  // bytes of a client that are processed at a time
 constexpr auto idle_watch = std::chrono::seconds(1);
 constexpr auto delivery_watch = std::chrono::milliseconds(1), fin_watch = std::chrono::milliseconds(50);
 
@@ -23,13 +23,13 @@ std::string reason(const error_code& ec) {
   return ec == asio::error::timed_out ? "connection timed out: the peer stopped reading and answering" : ec.message();
 }
 
-/// Small messages are sent at once, and little waits in the kernel: pings that wait in the outbox can still be replaced.
+/// Sends small messages at once, and lets few bytes wait in the kernel, because pings in the outbox can still be replaced.
 void prepare(tcp::socket& socket, const LimitConfig& limits) {
-  error_code ec;  // a refused option costs smoothness, not correctness
+  error_code ec;  // if an option fails, only smoothness suffers
   socket.set_option(tcp::no_delay(true), ec);
   using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
   socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
-  end_when_silent(socket, limits.dead_peer);  // notices a peer that vanished without a FIN while it is sent little or nothing
+  end_when_silent(socket, limits.dead_peer);  // detects a peer that vanished without a FIN while little or nothing is sent
 }
 
 }  // namespace
@@ -55,9 +55,9 @@ Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
   input_rate_.pause_after(per_s - std::min(per_s, at_once), connected_at_);
 }
 
-// Three coroutines on the I/O thread: read() passes bytes to the sonar, write() takes messages from the outbox, watch() ends the
-// session of a client that takes nothing or is silent. A session goes from serving to finishing_ (the last message, then FIN) to
-// over_ (the socket is closed); each coroutine tests over_ after every wait, because any of them may have ended the session.
+// Three coroutines on the I/O thread: read() passes bytes to the sonar, write() takes messages from the outbox, watch() ends
+// the session of a client that reads nothing or is silent. States: serving, finishing_ (the last message, then FIN), over_ (the
+// socket is closed). Each coroutine tests over_ after every wait, because any of them may have ended the session.
 void Session::start() {
   spawn(&Session::read);
   spawn(&Session::write);
@@ -86,17 +86,17 @@ asio::awaitable<void> Session::read() {
       over_after(ec);
       co_return;
     }
-    // A fault may stop the reading: these bytes wait here, later ones in the kernel.
+    // A fault may stop reading: these bytes wait here, later ones in the kernel.
     while (!reading_ && !finishing_ && !over_) co_await rest(never);
     if (over_) co_return;
     received_at_ = Steady::now();
-    // Its bytes must not act, and it must not hold a driver's slot.
+    // Its bytes must have no effect, and it must not occupy a driver's slot.
     if (http_.speaks_http(std::span(received_).first(n))) co_return over("it speaks HTTP");
     co_await pass_on(std::span(received_).first(n));
   }
 }
 
-/// Passes bytes to the sonar in small pieces, so that a client whose requests cost too much waits before the next ones act.
+/// Passes bytes to the sonar in small pieces, so that a client over its limit of work waits before its next requests act.
 asio::awaitable<void> Session::pass_on(protocol::BytesView bytes) {
   while (!bytes.empty() && !over_) {
     const auto piece = bytes.first(std::min(bytes.size(), piece_bytes));
@@ -107,7 +107,7 @@ asio::awaitable<void> Session::pass_on(protocol::BytesView bytes) {
   }
 }
 
-/// A client that sends too much waits; its FIN is read only after the wait. finish() and over() end the pause.
+/// Pauses reading from a client that sends too much; its FIN, too, is read only afterwards. finish() and over() end the pause.
 asio::awaitable<void> Session::rest(Steady::time_point until) {
   wake_reader_.expires_at(until);
   error_code ec;
@@ -136,7 +136,7 @@ asio::awaitable<bool> Session::write_whole(const Outbox::Message& message) {
   co_return true;
 }
 
-/// The bytes must live until it is done.
+/// The bytes must stay valid until it returns.
 asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
   std::size_t done = 0;
   while (done < bytes.size()) {
@@ -155,11 +155,11 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
   co_return true;
 }
 
-/// Writes a message in parts, with a pause before each place that a fault or the port names. Before a reset it waits until the
+/// Writes a message in parts, with pauses at the positions that a fault or the port defines. Before a reset it waits until the
 /// client has the bytes.
 asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape) {
   for (std::size_t done = 0; const Outbox::Shape::Pause& pause : shape.pauses) {
-    // Places of pauses count from the start of the message; `bytes` is what is left of it.
+    // Positions of pauses count from the start of the message; `bytes` is the rest of it.
     const std::size_t count = std::clamp(pause.before, done, done + bytes.size()) - done;
     if (!co_await write_bytes(bytes.first(count)) || !co_await pause_writing(pause.length)) co_return false;
     bytes = bytes.subspan(count);
@@ -169,7 +169,7 @@ asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Out
   co_return shape.end != Outbox::Shape::End::reset || co_await deliver();
 }
 
-/// A pause does not count as a stall: until its end `progress_at_` lies ahead. finish() and over() end the pause.
+/// A pause does not count as a stall, because `progress_at_` is set to its end. finish() and over() end the pause.
 asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
   if (length.count() > 0 && !finishing_ && !hurries_) {
     progress_at_ = Steady::now() + length;
@@ -182,24 +182,24 @@ asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
 }
 
 void Session::end_pauses() {
-  // Only the message that is being written is sent without pauses; the next one has pauses of its own.
+  // Only the current message is sent without pauses; the next one has its own.
   hurries_ = writing_;
   pause_.cancel();
 }
 
-/// Bytes that the kernel holds because the client has not acknowledged them. 0 if the kernel does not report them.
+/// Bytes in the kernel that the client has not acknowledged. 0 if the kernel does not report them.
 int Session::unconfirmed_bytes() {
   int bytes = 0;
   return ::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) == 0 ? bytes : 0;
 }
 
-/// How long the message being written has made no progress.
+/// The time since the last progress of the current message.
 std::chrono::steady_clock::duration Session::stands_for() const {
   return writing_ ? std::max(Steady::duration{}, Steady::now() - progress_at_) : Steady::duration{};
 }
 
-/// A reset discards bytes that the kernel of the client has not confirmed. The watch ends the session of a client that takes
-/// nothing.
+/// Waits until the client has acknowledged everything, because a reset discards the rest. watch() ends the session of a client
+/// that reads nothing.
 asio::awaitable<bool> Session::deliver() {
   while (!over_ && unconfirmed_bytes() > 0) {
     pause_.expires_after(delivery_watch);
@@ -209,7 +209,7 @@ asio::awaitable<bool> Session::deliver() {
   co_return !over_;
 }
 
-/// A fault ends the connection after the message that it shaped. The time limit is then that of faults.
+/// Ends the connection after a message that a fault has shaped, with the time limit for faults.
 void Session::end_by(Outbox::Shape::End end) {
   if (end == Outbox::Shape::End::reset) return reset("a fault reset the connection");
   finish("a fault ended the stream");
@@ -218,7 +218,7 @@ void Session::end_by(Outbox::Shape::End end) {
   send_fin();
 }
 
-/// The reader waits for the client's own FIN, the watch for the deadline.
+/// Afterwards read() waits for the client's FIN, and watch() for the deadline.
 void Session::send_fin() {
   error_code ec;
   socket_.shutdown(tcp::socket::shutdown_send, ec);
@@ -227,7 +227,7 @@ void Session::send_fin() {
   wake_watch_.cancel();
 }
 
-/// Writes one whole message at a time. Without one it waits for wake(); when finishing_, it sends FIN in place of the next
+/// Writes whole messages one by one. If none waits, it waits for wake(); when finishing_, it sends FIN instead of the next
 /// message.
 asio::awaitable<void> Session::write() {
   const auto self = shared_from_this();
@@ -250,16 +250,16 @@ asio::awaitable<void> Session::write() {
   }
 }
 
-/// The time of the next check: after a second, or earlier if a deadline comes first.
+/// The time of the next check: in a second, or at an earlier deadline.
 Session::Steady::time_point Session::watch_until() const {
   auto until = Steady::now() + idle_watch;
   if (finishing_) until = std::min(until, finish_by_);
-  // After our FIN the kernel is asked often whether the client has confirmed all bytes.
+  // After our FIN, checks often whether the client has acknowledged all bytes.
   if (sent_fin_ && !fin_by_fault_) until = std::min(until, std::max(fin_at_ + fin_limit, Steady::now() + fin_watch));
   return until;
 }
 
-/// True when the client has confirmed all bytes after our FIN, and has had time to send its own.
+/// True if the client has acknowledged all bytes after our FIN and has had time to send its own FIN.
 bool Session::has_all(Steady::time_point now) {
   return sent_fin_ && !fin_by_fault_ && now >= fin_at_ + fin_limit && unconfirmed_bytes() <= 0;
 }
@@ -283,15 +283,15 @@ asio::awaitable<void> Session::watch() {
   }
 }
 
-/// A client with unread bytes is not silent: this process may have been stopped for a while.
+/// A client with unread bytes is not silent, because this process may have been suspended for a while.
 bool Session::is_silent(Steady::time_point now) const {
   const auto longest = parent_.longest_silence(setup_.id);
   error_code ec;
   return longest && reading_ && now - received_at_ > *longest && socket_.available(ec) == 0;
 }
 
-/// Begins an orderly end: the message being written is completed, FIN is sent, and the client may still close first. All four
-/// waits are ended, so that each coroutine looks at `finishing_`.
+/// Begins an orderly end: the current message is completed, then FIN is sent; the client may still close first. All four waits
+/// are cancelled, so that each coroutine checks `finishing_`.
 void Session::finish(std::string why) {
   if (over_ || finishing_) return;
   finishing_ = true;
@@ -304,7 +304,7 @@ void Session::finish(std::string why) {
   pause_.cancel();
 }
 
-// With linger 0, close() sends RST and discards what was not sent.
+// With linger 0, close() sends RST and discards unsent bytes.
 void Session::reset(std::string why) {
   if (over_) return;
   error_code ec;
@@ -314,7 +314,7 @@ void Session::reset(std::string why) {
 
 void Session::end_if_closed() {
   error_code ec;
-  // Unread bytes of a client that has hung up are still read and act; the reader then comes to its FIN.
+  // Unread bytes of a client that has disconnected are still processed; then read() reaches its FIN.
   if (over_ || !has_left(socket_) || socket_.available(ec) > 0) return;
   int fault = 0;
   socklen_t size = sizeof fault;
@@ -323,7 +323,7 @@ void Session::end_if_closed() {
   over_after(ec);
 }
 
-/// If the peer closes the connection after finish() was called, the reason of finish() is kept.
+/// If the peer closes after finish() was called, the reason stays that of finish().
 void Session::over_after(const error_code& ec) {
   const bool left = ec == asio::error::eof || ec == asio::error::connection_reset || ec == asio::error::broken_pipe;
   if (finishing_)
@@ -332,7 +332,7 @@ void Session::over_after(const error_code& ec) {
     over(reason(ec), left);
 }
 
-/// The one end of a session: closes the socket, wakes the coroutines so that they end, and reports the end.
+/// Ends the session: closes the socket, wakes the coroutines so that they return, and reports the end.
 void Session::over(std::string why, bool by_client) {
   if (std::exchange(over_, true)) return;
   error_code ec;

@@ -1,6 +1,6 @@
-// One connection of a sonar: its socket, two coroutines that read and write it, and a third that detects peers that hang. The
-// emulated sonar (daemon/emulator/sonar) interprets the bytes and holds the messages that wait. The Device and the coroutines own
-// the session; it reports its end once to the Device.
+// One connection of a sonar: its socket, two coroutines that read and write it, and a third that detects unresponsive peers.
+// The emulated sonar (daemon/emulator/sonar) interprets the bytes and has the outbox. Owned by the Device and the coroutines;
+// it reports its end once to the Device.
 #pragma once
 
 #include <array>
@@ -21,26 +21,26 @@
 
 namespace sonar {
 
-/// Interface of a session or a stream of datagrams to its parent, which outlives it.
+/// The parent of a session or a stream of datagrams. It must outlive them.
 class SessionParent {
  public:
   virtual ~SessionParent() = default;
-  /// Returns the work that the bytes caused beside their number, counted in bytes (connections/work_rate.hpp).
+  /// Handles received bytes. Returns the additional work that they caused (connections/work_rate.hpp).
   virtual std::size_t on_bytes(ConnectionId from, protocol::BytesView bytes) = 0;
   /// Returns the next message to write; empty if there is none.
   virtual Outbox::Message next_message(ConnectionId to) = 0;
   /// Returns the destinations of the messages of a stream.
   virtual std::vector<Endpoint> receivers(ConnectionId stream) = 0;
   virtual void on_sent(ConnectionId to, std::size_t bytes) = 0;
-  /// Reports that a message has been passed to the kernel whole.
+  /// Reports that the kernel has the whole message.
   virtual void on_written(ConnectionId to, const Outbox::Message& message) = 0;
-  /// Reports that the last message of a stream had no receiver left.
+  /// Reports that the last message of a stream had no receiver.
   virtual void on_not_sent(ConnectionId stream) = 0;
   /// Returns the silence after which a peer is disconnected; nullopt = no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
-  /// Called when the host of a stream has been silent for half of that time: the parent may check whether it is alive.
+  /// Called when the host of a stream has been silent for half of that time, so that the parent can check whether it is alive.
   virtual void look_for_host(ConnectionId stream) = 0;
-  /// Reports that the session ends after the message being written.
+  /// Reports that the session will end after the current message.
   virtual void on_finish(ConnectionId session) = 0;
   /// Reports that an exception ended a coroutine; on_over follows.
   virtual void on_fault(const std::string& what) = 0;
@@ -56,14 +56,14 @@ class Session : public std::enable_shared_from_this<Session> {
     ConnectionId id = 0;
     bool digest = false;                // compute the SHA-256 of the sent bytes
     LimitConfig limits;                 // limits for one client
-    std::shared_ptr<const void> place;  // kept as long as the session lives
+    std::shared_ptr<const void> place;  // slot of the session
   };
-  /// Limit for a client to take its last message after finish(); then it is reset. If its computer has acknowledged everything,
-  /// the limit for its own FIN is `fin_limit`.
+  /// Limit for a client to receive its last message after finish(), after which it is reset. Once its computer has acknowledged
+  /// everything, the limit for the client's FIN is `fin_limit`.
   static constexpr std::chrono::milliseconds finish_limit{800}, fin_limit{400};
-  /// Work of a new client that is done at once. More would reward connecting again and again.
+  /// Work that a new client may cause at once. A larger value would reward repeated connecting.
   static constexpr std::size_t at_once = 4096;
-  /// Limit after a fault ended the stream; it is longer, so that a client that ignores the end can be observed.
+  /// The same limit after a fault has ended the stream; longer, so that a client that ignores the end can be observed.
   static constexpr std::chrono::milliseconds fault_fin_limit{1500};
 
   Session(SessionParent& parent, tcp::socket socket, const Setup& setup);
@@ -71,13 +71,11 @@ class Session : public std::enable_shared_from_this<Session> {
   void start();
   /// Call it when there is something to write.
   void wake();
-  /// Completes the message being written without its pauses, sends no other, then FIN. Resets a client that does not take it in
-  /// time.
+  /// Completes the current message without pauses, then sends FIN. Resets a client that does not receive it in time.
   void finish(std::string why);
   /// Ends the connection at once with RST.
   void reset(std::string why);
-  /// `on` false: bytes of the client stay in the kernels, until these are full.
-  /// Writes the rest of the present message without pauses.
+  /// `on` false: the client's bytes stay in the kernels' buffers. Writes the rest of the current message without pauses.
   void end_pauses();
   void read_from_client(bool on);
   /// Ends the session if the peer has closed and every byte from it has been read.
@@ -86,9 +84,9 @@ class Session : public std::enable_shared_from_this<Session> {
   ConnectionId id() const { return setup_.id; }
   const Sha256& digest() const { return digest_; }
   std::chrono::steady_clock::duration connected_for() const { return Steady::now() - connected_at_; }
-  /// The time since a byte of the present message was sent; 0 if none is being written, and in a pause of a fault.
+  /// The time since the last sent byte of the current message; 0 if none is being written, and in a pause of a fault.
   std::chrono::steady_clock::duration stands_for() const;
-  /// Number of the ping being written; 0 = none.
+  /// Number of the ping that is being written; 0 = none.
   std::uint32_t writes_ping() const { return writing_ ? ping_ : 0; }
   /// The number of bytes in the kernel that the client's computer has not acknowledged.
   int unconfirmed_bytes();
@@ -125,9 +123,9 @@ class Session : public std::enable_shared_from_this<Session> {
   HttpDetector http_;
   const Steady::time_point connected_at_ = Steady::now();
   Steady::time_point received_at_ = connected_at_;  // time of the last received byte
-  Steady::time_point progress_at_{};                // time of the last sent byte while writing; in a pause its end
+  Steady::time_point progress_at_{};  // time of the last sent byte of the current message, or the end of the present pause
   Steady::time_point finish_by_{}, fin_at_{};
-  std::uint32_t ping_ = 0;  // number of the ping that is or was written last; 0 = a reply
+  std::uint32_t ping_ = 0;  // number of the current or last ping; 0 = a reply
   bool reading_ = true, writing_ = false, hurries_ = false, finishing_ = false, sent_fin_ = false, over_ = false;
   bool fin_by_fault_ = false;
   std::string why_;

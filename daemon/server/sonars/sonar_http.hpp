@@ -1,4 +1,4 @@
-// The HTTP side of an emulated sonar (Port::Kind::http): requests go to its vendor, except for those of web pages, which are
+// The HTTP side of an emulated sonar (Port::Kind::http): passes requests to its vendor, and refuses those of web pages,
 // recognised by Host and Origin. Owned by Device.
 #pragma once
 
@@ -16,10 +16,10 @@ class SonarHttp final : public HttpService {
  public:
   using Answer = std::function<protocol::ResourceReply(const protocol::ResourceRequest&)>;
 
-  /// The names by which it may be called at present, beside its own address.
+  /// The host names that requests may use, besides the sonar's address.
   using Names = std::function<std::vector<std::string>()>;
 
-  /// `limits`, `admission` and `log` outlive it. `sonar`: its name, for the log.
+  /// `limits`, `admission` and `log` must outlive it. `sonar`: its name, for the log.
   SonarHttp(asio::io_context& io, const LimitConfig& limits, Admission& admission, Log& log, const std::string& sonar,
             Names names, Answer answer);
 

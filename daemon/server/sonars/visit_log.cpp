@@ -8,7 +8,7 @@ namespace sonar {
 VisitLog::VisitLog(asio::io_context& io, Log& log, std::string sonar, std::chrono::milliseconds spell)
     : log_(log), sonar_(std::move(sonar)), spell_(spell), timer_(io) {}
 
-/// In a spell of time the first few visits have a line each; the rest is counted, and one line sums them up.
+/// The first few visits of a spell are logged individually; the others are counted and summarised in one line.
 void VisitLog::say(Kind kind, const std::string& what, std::vector<LogField> fields) {
   if (!ended_ && !in_spell_) begin_spell();
   ++visits_;
@@ -20,7 +20,7 @@ void VisitLog::say(Kind kind, const std::string& what, std::vector<LogField> fie
   last_unsaid_ = what;
 }
 
-/// After a crowded spell the next one begins at once, and its visits are only counted.
+/// After a crowded spell the next one begins at once, in which visits are only counted.
 void VisitLog::begin_spell() {
   in_spell_ = true;
   visits_ = 0;

@@ -19,7 +19,7 @@ using boost::system::error_code;
 /// co_await socket.async_...(..., into(ec)): no exceptions in coroutines.
 inline auto into(error_code& ec) { return asio::redirect_error(asio::use_awaitable, ec); }
 
-/// Expiry of a timer that waits for an event only.
+/// Expiry of a timer that only waits for an event.
 inline constexpr auto never = std::chrono::steady_clock::time_point::max();
 
 /// Returns the text of an exception that ended a coroutine.

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-/// The kernel takes ports of outgoing connections from this range, Linux default 32768-60999.
+/// The range of ports of outgoing connections; Linux default 32768-60999.
 std::pair<int, int> ephemeral_range() {
   std::pair<int, int> range{32768, 60999};
   std::ifstream file("/proc/sys/net/ipv4/ip_local_port_range");
@@ -49,7 +49,7 @@ asio::ip::address_v4 address_of(Ipv4 ip) { return asio::ip::address_v4(ip); }
 Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at) {
   error_code ec;
   acceptor.open(tcp::v4(), ec);
-  if (!ec) acceptor.set_option(asio::socket_base::reuse_address(true), ec);  // only against connections in TIME_WAIT
+  if (!ec) acceptor.set_option(asio::socket_base::reuse_address(true), ec);  // needed only for connections in TIME_WAIT
   if (!ec) acceptor.bind({address_of(at.ip), at.port}, ec);
   if (!ec) acceptor.listen(asio::socket_base::max_listen_connections, ec);
   if (ec) return tl::make_unexpected(explain(ec, at));
@@ -58,10 +58,10 @@ Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at) {
 
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
   namespace option = asio::detail::socket_option;
-  // Three probes, the last with a second to spare where there is one: kernel timers are late rather than early.
+  // Three probes, the last a second before the limit if possible, because kernel timers tend to be late.
   const auto probe_s =
       static_cast<int>(std::max(std::chrono::floor<std::chrono::seconds>(limit).count() - 1, std::int64_t{3}) / 3);
-  error_code ec;  // if the option is refused, the time-out of the kernel stays: a quarter of an hour or more
+  error_code ec;  // on failure the kernel's time-out stays: a quarter of an hour or more
   socket.set_option(asio::socket_base::keep_alive(true), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(probe_s), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(probe_s), ec);
@@ -70,7 +70,7 @@ void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
 }
 
 bool has_left(tcp::socket& socket) {
-  // POLLRDHUP is reported when the peer has closed its end, even while data that was not read yet is waiting.
+  // POLLRDHUP means that the peer has closed its end, even if unread data is waiting.
   pollfd asked{socket.native_handle(), POLLRDHUP, 0};
   return ::poll(&asked, 1, 0) > 0;
 }
@@ -86,7 +86,7 @@ Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast, bool sha
 }
 
 void send_multicast_from(udp::socket& socket, Ipv4 ip) {
-  error_code ec;  // a refused option leaves the system's choice
+  error_code ec;  // on failure the system chooses
   if (ip != Ipv4{}) socket.set_option(asio::ip::multicast::outbound_interface(address_of(ip)), ec);
 }
 

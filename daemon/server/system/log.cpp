@@ -14,9 +14,9 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t longest_line = 3900;  // a pipe takes 4096 bytes at once
+constexpr std::size_t longest_line = 3900;  // writes to a pipe are atomic up to 4096 bytes
 
-/// Names of files may hold any bytes. Bytes that are not UTF-8 are replaced.
+/// A JSON string. Bytes that are not UTF-8, which file names may contain, are replaced.
 std::string json_string(std::string_view text) {
   return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
@@ -59,7 +59,7 @@ spdlog::level::level_enum spdlog_level(LogLevel level) {
 
 struct Log::Sink {
   spdlog::logger logger{"sonard", std::make_shared<spdlog::sinks::stderr_color_sink_st>()};
-  std::uint64_t lost = 0;  // lines dropped because the output was blocked; reported with the next line that is written
+  std::uint64_t lost = 0;  // lines dropped because the output was blocked; the next written line reports their number
 };
 
 Log::Log(LogOptions options) : options_(std::move(options)) {
@@ -94,7 +94,7 @@ void Log::emit(LogLevel level, std::string_view phrase, const std::vector<LogFie
     options_.sink(level, text_line(phrase, fields));
     return;
   }
-  // A reader of the log must not delay the clients.
+  // A slow reader of the log must not delay clients.
   if (sink_->lost > 0 && !standard_error_is_blocked()) {
     const std::uint64_t lost = std::exchange(sink_->lost, 0);
     emit(LogLevel::warning, "log lines dropped: output blocked", {{"lines", lost}});
@@ -103,14 +103,14 @@ void Log::emit(LogLevel level, std::string_view phrase, const std::vector<LogFie
     ++sink_->lost;
     return;
   }
-  // A text line is cut, so that the pipe takes it in one piece. A JSON line is not cut, because the rest would not be JSON.
+  // A text line is truncated, so that the write to a pipe is atomic. A JSON line is not, because the result would not be JSON.
   std::string line = options_.json ? json_members(phrase, fields) : text_line(phrase, fields);
   if (!options_.json && line.size() > longest_line) line.replace(longest_line, std::string::npos, "...");
   sink_->logger.log(spdlog_level(level), spdlog::string_view_t(line));
 }
 
 bool LogLimiter::allows(Clock::time_point now, std::uint64_t& unsaid) {
-  // A token bucket: it gains one token a second, holds at most five, and each line takes one.
+  // A token bucket: one token per second, at most five; each line needs one.
   if (last_ != Clock::time_point{}) tokens_ = std::min(5.0, tokens_ + std::chrono::duration<double>(now - last_).count());
   last_ = now;
   if (tokens_ < 1) {

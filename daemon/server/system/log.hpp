@@ -1,4 +1,4 @@
-// One line per event: a short phrase, then key=value, or an object of JSON. The daemon reports only through it; it uses spdlog.
+// The daemon's log, by spdlog: one line per event, either a short phrase and key=value pairs, or a JSON object.
 #pragma once
 
 #include <chrono>
@@ -21,9 +21,9 @@ class Log {
   void warning(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::warning, phrase, fields); }
   void error(std::string_view phrase, const std::vector<LogField>& fields = {}) { write(LogLevel::error, phrase, fields); }
   void write(LogLevel level, std::string_view phrase, const std::vector<LogField>& fields);
-  /// Writes banner or summary, whatever the level: unchanged in the text format, one message for each line in JSON.
+  /// Writes banner or summary at any log level: unchanged in the text format, one message per line in JSON.
   void announce(std::string_view lines);
-  /// Sets a function that gets each line of level info or above, whatever the level of the log; empty = none.
+  /// Sets a function that is called with each line of level info or above, at any log level; empty = none.
   using Listener = std::function<void(LogLevel level, const std::string& line, const std::vector<LogField>& fields)>;
   void listen(Listener listener) { listener_ = std::move(listener); }
 
@@ -39,7 +39,7 @@ class Log {
 class LogLimiter {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Returns true if the line should be written. `unsaid` receives the number of suppressed lines since the last one.
+  /// Returns true if the line should be written. `unsaid` is set to the number of suppressed lines since the last one.
   bool allows(Clock::time_point now, std::uint64_t& unsaid);
 
  private:
@@ -48,7 +48,7 @@ class LogLimiter {
   std::uint64_t swallowed_ = 0;
 };
 
-/// Writes a line if its limiter allows it. A line after suppressed ones has their number.
+/// Writes a line if its limiter allows it. The first line after suppressed ones states their number.
 void log_limited(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields = {});
 /// Reports a mistake in sonard; `where`: the sonar, listener or connection.
 void log_fault(Log& log, LogLimiter& limiter, const std::string& what, const LogField& where);

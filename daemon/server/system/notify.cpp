@@ -20,7 +20,7 @@ std::string from_environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-/// The value is one line, because the protocol ends a value with its line.
+/// Replaces line breaks, because in the protocol a value is one line.
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
@@ -41,7 +41,7 @@ Notify::Notify(asio::io_context& io, NotifyTarget target, std::function<std::chr
     : target_(std::move(target)), ping_under_way_(std::move(ping_under_way)), log_(log), timer_(io) {
   if (target_.socket.empty()) return;
   socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  // A service manager that does not read must not delay sonard for longer than a client would notice.
+  // A service manager that does not read must not delay sonard noticeably.
   const timeval patience{0, 200000};
   if (socket_ >= 0) ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
 }
@@ -51,8 +51,7 @@ Notify::~Notify() {
 }
 
 void Notify::ready(const std::string& status) {
-  // This is also sent when a reload is done, because systemd waits for READY after RELOADING. Watchdog messages begin with the
-  // first READY.
+  // Also sent after a reload, because systemd waits for READY after RELOADING. Watchdog messages begin with the first READY.
   send("READY=1\nSTATUS=" + one_line(status), 0);
   if (target_.socket.empty() || target_.watchdog.count() == 0 || stopping_ || std::exchange(keeping_, true)) return;
   keep_alive();
@@ -70,7 +69,7 @@ void Notify::stopping() {
   timer_.cancel();
 }
 
-/// Reports twice per watchdog period. If a ping takes longer than that period, sonard does not report, and the manager acts.
+/// Reports twice per watchdog period, except while a ping takes longer than that period; then the manager acts.
 void Notify::keep_alive() {
   const bool stuck = ping_under_way_() > target_.watchdog;
   if (stuck && !stuck_)
@@ -93,8 +92,8 @@ void Notify::send(const std::string& message, int flags) {
     why = "not the address of a local socket";
   } else {
     std::copy(target_.socket.begin(), target_.socket.end(), at.sun_path);
-    if (at.sun_path[0] == '@') at.sun_path[0] = '\0';  // the abstract namespace, whose names have no end mark
-    // The length of an address in the file system includes the zero at its end, that of an abstract one does not.
+    if (at.sun_path[0] == '@') at.sun_path[0] = '\0';  // the abstract namespace
+    // The length of a file-system address includes the terminating zero; that of an abstract address does not.
     const bool abstract = at.sun_path[0] == '\0';
     const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + target_.socket.size() + (abstract ? 0 : 1));
     const auto* address = static_cast<const sockaddr*>(static_cast<const void*>(&at));

@@ -1,9 +1,9 @@
-// Informs a service manager (by systemd's sd_notify protocol, implemented here) that the daemon serves, reloads, stops, or is
+// Informs a service manager (by systemd's sd_notify protocol, implemented here) that the daemon is ready, reloads, stops, or is
 // alive. Owned by App; without a manager every call does nothing. I/O thread only.
 //
-// Alive means two things: the I/O loop turns, because the message is sent by a timer of that loop; and the simulation thread is
-// not stuck, because no ping has been under way for longer than the watchdog's period. A daemon without clients computes no
-// ping and is alive. A single failure (a refused ping, a client) is not a reason for a restart.
+// Alive means: the I/O loop runs, because a timer of that loop sends the message; and the simulation thread is not stuck, that
+// is, the present ping has taken less than the watchdog's period. A daemon without clients, which computes no pings, is alive.
+// A single failure (a refused ping, a client) is not a reason for a restart.
 #pragma once
 
 #include <chrono>
@@ -25,7 +25,7 @@ NotifyTarget notify_target_from_environment();
 
 class Notify {
  public:
-  /// `ping_under_way` answers for how long the simulation thread has been at its present ping; 0 = it waits for work.
+  /// `ping_under_way` returns the duration of the present ping so far; 0 = the simulation thread waits for work.
   Notify(asio::io_context& io, NotifyTarget target, std::function<std::chrono::nanoseconds()> ping_under_way, Log& log);
   ~Notify();
   Notify(const Notify&) = delete;
@@ -46,7 +46,7 @@ class Notify {
   std::function<std::chrono::nanoseconds()> ping_under_way_;
   Log& log_;
   asio::steady_timer timer_;
-  int socket_ = -1;  // kept open, so that a message never fails for lack of a descriptor
+  int socket_ = -1;  // stays open, so that a lack of descriptors never prevents a message
   bool stopping_ = false, keeping_ = false, complained_ = false, stuck_ = false;
 };
 

@@ -9,7 +9,7 @@ struct ProcessFigures {
   std::uint64_t resident_bytes = 0, open_descriptors = 0, descriptor_limit = 0, threads = 0;
   double processor_s = 0;
 };
-/// Read from /proc; what cannot be read is 0.
+/// Reads /proc; unreadable values are 0.
 ProcessFigures figures_of_this_process();
 
 }  // namespace sonar

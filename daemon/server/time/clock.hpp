@@ -1,5 +1,5 @@
-// The daemon's time: real (UNIX time that never jumps) or stepped (moved only by daemon/server/time/stepped_time.hpp).
-// I/O thread only.
+// The daemon's time: real (UNIX time that never jumps) or stepped (advanced only by daemon/server/time/stepped_time.hpp). I/O
+// thread only.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace sonar {
 
 class Clock {
  public:
-  /// The time of the computer's wall clock. If it is set, by NTP for example, now() does not change.
+  /// Reads the computer's wall clock. If that is set, for example by NTP, now() does not change.
   using Wall = Time (*)();
   static Time system_wall() { return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()); }
   explicit Clock(bool stepped, Wall wall = system_wall)
@@ -20,7 +20,7 @@ class Clock {
   bool stepped() const { return stepped_; }
   /// Stepped time begins at the epoch, so that two runs send the same packets.
   Time now() const { return stepped_ ? origin_ : origin_ + (std::chrono::steady_clock::now() - started_); }
-  /// How far now() is ahead of the wall clock at this moment: 0 until that clock is set. Real time only.
+  /// By how much now() is ahead of the wall clock: 0 until that clock is set. Real time only.
   std::chrono::nanoseconds ahead_of_wall() const { return now() - wall_(); }
   /// The time at which a timer must expire for `t`. Real time only.
   std::chrono::steady_clock::time_point timer_at(Time t) const { return started_ + (t - origin_); }

@@ -15,10 +15,11 @@ SteppedTime::Bound SteppedTime::bound(std::optional<Time> for_pings) const {
 
 Time SteppedTime::tick_at(Time due) const {
   const Bound now = bound();
-  if (mode_ != ClockMode::follow || !now.then) return due;  // before the first pose there is no lead
+  if (mode_ != ClockMode::follow || !now.then) return due;  // before the first pose nothing can be ahead
   const bool is_waited_for =
       std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.until.last_tick >= due; });
-  // A ping that no request waits for lags at most most_lead behind the stamps; then time advances and ticks are skipped.
+  // Without a waiting request, a ping may lag behind the stamps by at most most_lead; beyond that, time advances and ticks are
+  // skipped.
   return is_waited_for ? due : std::max(due, now.last_tick - most_lead);
 }
 
@@ -32,7 +33,7 @@ std::string SteppedTime::step(double dt_s) {
   if (dt.count() == 0) return "dt_s is less than a nanosecond";
   if (seconds(asked_ + dt - clock_.now()) > longest_step_s)
     return "steps that wait to be done would take more than " + std::to_string(static_cast<int>(longest_step_s)) + " seconds";
-  // From here pings up to the new end are computed; the clock itself advances with them.
+  // From now on pings up to the new end are computed; the clock advances with them.
   asked_ += dt;
   return {};
 }
@@ -60,8 +61,8 @@ bool SteppedTime::end_left() {
 }
 
 bool SteppedTime::answer(std::optional<Time> next) {
-  // The bound becomes smaller when a vehicle that is behind joins those that are followed. A request that waits for a later time
-  // is answered then, or sender and sonard would wait for each other. An answered request may add another.
+  // The bound decreases when a vehicle that lags joins the followed ones. Requests that wait for a later time are then
+  // answered, or the sender and sonard would wait for each other. Answering a request may add another.
   bool any = false;
   while (!waiting_.empty() && (!next || *next > std::min(waiting_.front().until.last_tick, bound().last_tick))) {
     // The request is removed before the call, because the call may add another.

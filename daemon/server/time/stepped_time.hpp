@@ -1,6 +1,5 @@
-// Computes how far stepped time may advance, and keeps the requests that wait for it. The limit is set by nothing (stepped), by
-// control requests (lockstep), or by the stamps of the vehicles' poses (follow). Stepper and control requests use it; I/O thread
-// only.
+// Computes how far stepped time may advance, and stores the requests that wait for it. Control requests (lockstep) or the
+// stamps of the vehicles' poses (follow) set the limit; with `stepped` there is none. I/O thread only.
 #pragma once
 
 #include <functional>
@@ -19,8 +18,8 @@ class SteppedTime {
   /// Limits for one request and for all that wait.
   static constexpr double longest_step_s = 3600;
   static constexpr std::size_t most_waiting = 4096;
-  /// If a simulator does not wait for pings, its poses may be ahead of time by at most this. Earlier ticks are skipped, as in
-  /// real time, unless a request waits for them.
+  /// By how much poses of a simulator that does not wait for pings may be ahead of time. Earlier ticks are skipped, as in real
+  /// time, unless a request waits for them.
   static constexpr std::chrono::nanoseconds most_lead = std::chrono::seconds(1);
 
   SteppedTime(ClockMode mode, const Clock& clock, const World& world) : mode_(mode), clock_(clock), world_(world) {}
@@ -30,12 +29,13 @@ class SteppedTime {
     Time last_tick = Time::max();
     std::optional<Time> then = {};
   };
-  /// `for_pings`: the time at which the next ping is due or will be requested. Time that steps by itself may advance to it.
+  /// `for_pings`: the time at which the next ping is due or will be requested. Without a limit, time may advance to it.
   Bound bound(std::optional<Time> for_pings = {}) const;
   /// Returns the time at which an event that was due at `due` happens.
   Time tick_at(Time due) const;
 
-  /// Adds a step of `dt_s` after all previous steps; ticks at its end belong to the next step. Returns an empty text, or why not.
+  /// Adds a step of `dt_s` after all previous steps; ticks at its end belong to the next step. Returns the reason if it cannot,
+  /// else an empty text.
   std::string step(double dt_s);
 
   /// `is_whole`: every ping that bound() allowed when the wait began has been served. False: the client has left before.

@@ -1,5 +1,5 @@
-// Counts the WebSocket frames that a viewer sends, because each frame costs time in addition to its bytes. The library does not
-// report empty fragments and control frames (RFC 6455, 5.2). FrameWork parses only the headers of frames; bytes may come in
+// Counts the WebSocket frames of a viewer, because each frame costs time in addition to its bytes. The library does not report
+// empty fragments and control frames (RFC 6455, 5.2). FrameWork parses only the headers of frames; bytes may arrive in any
 // pieces.
 #pragma once
 

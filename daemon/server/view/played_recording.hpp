@@ -1,4 +1,4 @@
-// Opens a recording for a viewer. Reading it ends when the viewer leaves.
+// Opens a recording for a viewer; reading stops when the viewer leaves.
 #pragma once
 
 #include <atomic>
@@ -14,17 +14,17 @@ namespace sonar {
 /// The recording that is played.
 struct PlayedRecording {
   std::filesystem::path file;
-  std::string sonar = {};             // one of several in it, as --sonar of `sonard replay`
+  std::string sonar = {};             // selects one of several sonars, like --sonar of `sonard replay`
   double rate_hz = 10;                // rate of files that store no times
-  std::filesystem::path within = {};  // folder that the file must be in, wherever symbolic links lead; empty = any
+  std::filesystem::path within = {};  // folder that must contain the file, after following symbolic links; empty = any
 };
 
 /// Set when the viewer has left; another thread reads the recording.
 using ViewerLeft = std::shared_ptr<std::atomic<bool>>;
 
 /// Errors as of open_recording(), with the file's name; missing_file for a symbolic link out of the folder. After `left` is set,
-/// this call and the pings throw: the search for the next ping may read gigabytes, such as the zeros behind the last one that a
-/// power cut leaves.
+/// this call and the pings throw: the search for the next ping could read gigabytes, such as zeros that a power cut left at the
+/// end.
 Result<recording::RecordedPings> open_pings(const PlayedRecording& wanted, const ViewerLeft& left);
 
 }  // namespace sonar

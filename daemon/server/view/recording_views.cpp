@@ -139,7 +139,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   std::weak_ptr<ViewConnection> connection_;
   std::map<std::uint32_t, ViewChannel> channels_;
   std::shared_ptr<Work> work_ = std::make_shared<Work>();
-  std::optional<motion::Playback> playback_;  // once the length is known
+  std::optional<motion::Playback> playback_;  // set when the length is known
   // Results of the last job:
   std::string failure_;
   std::shared_ptr<const SonarModel> model_;  // null: no message names it
@@ -154,7 +154,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   bool busy_ = false, behind_ = false, wanted_ = false;
 };
 
-/// One slice of the work: measures the recording, or finds the ping at this moment and draws it.
+/// Does one slice of the work: measures the recording, or finds the ping at the present time and draws it.
 void RecordingViews::Seen::go_on(Work& work, RecordingPlayer::Ns at) {
   if (!work.player) return;
   RecordingPlayer& player = *work.player;
@@ -228,7 +228,7 @@ void RecordingViews::Seen::arm() {
   });
 }
 
-/// Begins a slice if one is due; take() or the timer leads here again.
+/// Begins a slice if one is due. take() and the timer call it again.
 void RecordingViews::Seen::tick() {
   const auto connection = connection_.lock();
   if (!connection || connection->over()) return;
@@ -269,7 +269,7 @@ std::string RecordingViews::Seen::server_info() const {
   return foxglove::text_of(info);
 }
 
-/// The page has a time line for a vehicle on a trajectory. Here the trajectory is the recording.
+/// The status for the page's time line, in which the recording takes the role of a vehicle's trajectory.
 ViewPayloadPointer RecordingViews::Seen::status() const {
   v1::DaemonStatus status;
   status.set_version(SONARD_VERSION);
@@ -377,7 +377,7 @@ std::shared_ptr<HttpTakeover> RecordingViews::open(ConnectionServices& services,
                                                    ViewWelcome welcome, const PlayedRecording& wanted) {
   welcome.may_steer = true;  // only its own time line can be steered
   const auto seen = std::make_shared<Seen>(io_, thread_, wanted);
-  // The connection owns the function below, and with it this: the end of the connection is the end of the work.
+  // The connection owns the function below and thereby this object, so the work ends with the connection.
   const std::shared_ptr<void> connected(nullptr, [left = seen->left()](void*) { *left = true; });
   return std::make_shared<ViewConnection>(
       services, from, *seen, request, welcome, [this, seen, wanted, connected](const std::shared_ptr<ViewConnection>& viewer) {

@@ -1,6 +1,6 @@
-// Recordings on the page. A viewer requests one by ?recording=NAME and gets its pictures, with a time line for this viewer. One
-// thread for all such viewers reads files and draws pictures in short slices, so that neither drivers nor other viewers wait. I/O
-// thread only. ViewFeed and `sonard replay` own it.
+// Recordings on the page. A viewer requests one by ?recording=NAME and gets its pictures; each viewer has its own time line.
+// One thread reads files and draws pictures for all such viewers, in short slices, so that neither drivers nor other viewers
+// wait. All functions: I/O thread only. Owned by ViewFeed or `sonard replay`.
 #pragma once
 
 #include <memory>

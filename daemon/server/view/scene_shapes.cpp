@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-/// It is left out, because from above it would hide everything else.
+/// Not shown, because seen from above it would hide everything else.
 constexpr std::string_view not_shown = "sea surface";
 
 bool is_shown(const Object& object) { return !object.name.empty() && object.name != not_shown && object.mesh != nullptr; }
@@ -19,8 +19,8 @@ ViewBytes shared(wire::Bytes bytes) { return std::make_shared<const wire::Bytes>
 
 using Colour = std::array<double, 3>;
 
-/// Materials have no colours: that of the first word found in the name ("rusty pipe", "quay_stone"), else a muted colour of its
-/// own.
+/// The colour of a material, by the first known word in its name ("rusty pipe", "quay_stone"); for other names a muted colour
+/// that depends on the name.
 Colour colour_of(const std::string& material) {
   struct Row {
     std::string_view word;
@@ -89,8 +89,8 @@ std::vector<SceneShapes::Made> SceneShapes::make(const Job& job) {
   return all;
 }
 
-/// Compares the scene with what viewers show: new and changed objects go into the job, hidden and removed ones are deleted at
-/// once. While a job is under way nothing is compared.
+/// Compares the scene with the shown objects: new and changed objects are added to the job, hidden and removed ones are deleted
+/// at once. While a job runs, nothing is compared.
 std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const Scene>& scene, const World& world, Time now,
                                                     Job& job) {
   if (under_way_) return {};
@@ -107,7 +107,7 @@ std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const 
       left.erase(before);
     }
     const bool was_visible = std::exchange(shown.visible, visible);
-    shown.object.visible = object.visible;  // no reason to make its mesh again
+    shown.object.visible = object.visible;  // its mesh need not be made again
     if (shown.bytes == nullptr || !(shown.object == object)) job.objects.push_back(i);
     if (shown.bytes != nullptr && visible != was_visible)
       pieces.push_back({object.name, visible ? shown.bytes : shared(foxglove::scene_deletion(now, object.name))});
@@ -119,7 +119,7 @@ std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const 
   return pieces;
 }
 
-/// Objects that were removed while their mesh was made are left out.
+/// Ignores objects that were removed while their mesh was made.
 std::vector<ViewPayload::Piece> SceneShapes::take(std::vector<Made> made) {
   under_way_ = false;
   std::vector<ViewPayload::Piece> pieces;

@@ -1,5 +1,5 @@
-// The objects of the scene as viewers get them, each with its mesh: made once on the thread of the live view, again when an
-// object changes. Called on the I/O thread, except for make().
+// Makes the messages of the scene's objects, with their meshes, for viewers: once, on the thread of the live view, and again
+// when an object changes. All functions except make() are called on the I/O thread.
 #pragma once
 
 #include <map>
@@ -14,11 +14,11 @@ namespace sonar {
 
 class SceneShapes {
  public:
-  static constexpr std::size_t most_triangles = 2000000;  // beyond it an object is its bounding box
+  static constexpr std::size_t most_triangles = 2000000;  // larger objects are shown as their bounding box
 
   struct Job {
     std::shared_ptr<const Scene> scene;
-    std::vector<std::size_t> objects;  // objects of the scene that are still to be made
+    std::vector<std::size_t> objects;  // objects to make
     Time at{};
   };
   struct Made {
@@ -26,15 +26,15 @@ class SceneShapes {
     Object object;
     ViewBytes bytes;
   };
-  /// Takes long; any thread.
+  /// Slow; any thread.
   static std::vector<Made> make(const Job& job);
 
-  /// Compares the scene with the last call: returns the pieces to offer, and in `job` what must be made, empty while a job is
-  /// under way.
+  /// Compares the scene with that of the last call. Returns the pieces to offer, and sets `job` to the objects to make (empty
+  /// while a job runs).
   std::vector<ViewPayload::Piece> update(const std::shared_ptr<const Scene>& scene, const World& world, Time now, Job& job);
   /// Pieces to offer.
   std::vector<ViewPayload::Piece> take(std::vector<Made> made);
-  /// Everything that is shown, for a new subscriber.
+  /// All pieces, for a new subscriber.
   std::vector<ViewPayload::Piece> all() const;
   void clear() { shown_.clear(); }
 

@@ -25,12 +25,12 @@ namespace websocket = beast::websocket;
 
 // A WebSocket ping is sent after half of silence_limit without traffic.
 constexpr std::chrono::seconds handshake_limit{10}, silence_limit{30};
-// Old pictures wait in this program, where newer ones replace them, and not in the kernel.
+// Pictures should wait in this program, where newer ones replace them, not in the kernel.
 constexpr int most_unsent = 128 << 10;
 
 }  // namespace
 
-/// A socket that reports when bytes leave it, and that is read at the allowed rate. Beast finds the friend functions below by
+/// A socket that reports sent bytes and limits the rate of reading. Beast finds the friend functions below by
 /// argument-dependent lookup.
 struct ViewConnection::Watched {
   HttpConnection& from;
@@ -61,7 +61,7 @@ struct ViewConnection::Watched {
     watched.from.socket().close(ec);
   }
 
-  /// Reads bytes. If they exceed the allowed rate, waits until the rate permits them; only then Beast gets them.
+  /// Reads bytes and, if they exceed the allowed rate, waits before passing them to Beast.
   template <class Buffers>
   struct Read {
     Watched& watched;
@@ -71,7 +71,7 @@ struct ViewConnection::Watched {
     template <class Self>
     void operator()(Self& self) {
       auto& socket = watched.from.socket();
-      const Buffers own = buffers;  // a copy, as the member belongs to `self`, which is moved
+      const Buffers own = buffers;  // a copy, because the member belongs to `self`, which is moved
       socket.async_read_some(own, std::move(self));
     }
     template <class Self>
@@ -84,7 +84,7 @@ struct ViewConnection::Watched {
       rest.expires_after(pause);
       rest.async_wait(std::move(self));
     }
-    /// The pause, or the connection, is over.
+    /// Called at the end of the pause or of the connection.
     template <class Self>
     void operator()(Self& self, const error_code&) {
       self.complete(watched.from.over() ? error_code(asio::error::operation_aborted) : error_code(), size);
@@ -126,7 +126,7 @@ ViewConnection::ViewConnection(ConnectionServices& services, HttpConnection& fro
 }
 ViewConnection::~ViewConnection() = default;
 
-// HttpConnection has read the request already, so it is made again for Beast, which checks the key and answers (RFC 6455, 4.2).
+// Answers the handshake (RFC 6455, 4.2) by Beast, which also checks the key.
 asio::awaitable<bool> ViewConnection::begin() {
   auto& stream = socket_->stream;
   stream.auto_fragment(false);  // a picture is one frame
@@ -138,7 +138,7 @@ asio::awaitable<bool> ViewConnection::begin() {
   }));
   const int unsent = most_unsent;
   ::setsockopt(from_.socket().native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
-  // HttpConnection has read the request already, so the headers that the handshake needs are copied into a request for Beast.
+  // HttpConnection has already read the request, so the headers of the handshake are copied into a request for Beast.
   beast::http::request<beast::http::empty_body> request(beast::http::verb::get, "/", 11);
   request.set(beast::http::field::host, request_.host);
   request.set(beast::http::field::connection, request_.connection);
@@ -230,12 +230,12 @@ asio::awaitable<void> ViewConnection::say_goodbye(std::uint16_t code, const char
   co_await socket_->stream.async_close(reason, into(ec));
 }
 
-/// A close frame may be sent only between two frames, and a message is one frame. Within a message the connection just ends.
+/// Sends a close frame, unless a message (which is one frame) is being written; then the connection just ends.
 void ViewConnection::on_closing() {
   wake_.cancel();
   stall_.cancel();
   rest_.cancel();
-  // While a message is being written, a frame must not be put between its bytes.
+  // A frame must not be inserted into a message that is being written.
   if (!std::exchange(over_, true) && !writing_) {
     const std::array<std::uint8_t, 4> going_away{0x88, 2, 1001 >> 8, 1001 & 0xFF};  // a frame of RFC 6455, 5.5.1
     if (::send(from_.socket().native_handle(), going_away.data(), going_away.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) return;

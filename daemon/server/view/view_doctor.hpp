@@ -1,6 +1,5 @@
 // The channel `/doctor` of the live view: the causes that keep drivers from getting pings (protocol/doctor/judge.hpp). They are
-// checked and sent every two seconds while a viewer has subscribed: their age is that of the check. Owned by ViewFeed. I/O thread
-// only.
+// checked and sent every two seconds while a viewer has subscribed. Owned by ViewFeed. I/O thread only.
 #pragma once
 
 #include <chrono>
@@ -20,27 +19,26 @@ class ViewDoctor {
  public:
   static constexpr std::chrono::milliseconds period{2000};
 
-  /// Both outlive it.
+  /// Both arguments must outlive it.
   ViewDoctor(Operations& operations, const Clock& clock) : operations_(operations), clock_(clock) {}
 
   /// The findings for a new subscriber, no older than the period. Null: there is no status.
   ViewPayloadPointer newest();
-  /// The same; null if all subscribers have it.
+  /// New findings; null if all subscribers have the newest.
   ViewPayloadPointer news();
 
  private:
   using Steady = std::chrono::steady_clock;
   void look();
-  /// Signs of a driver on a wrong address.
+  /// Signs of a driver with a wrong address.
   doctor::Elsewhere look_elsewhere();
 
   Operations& operations_;
   const Clock& clock_;
   Steady::time_point looked_at_{};
   std::shared_ptr<const v1::DaemonStatus> last_;
-  std::deque<std::pair<Steady::time_point, std::uint64_t>>
-      failed_;                        // failed connections of this computer at the time of each look
-  ViewPayloadPointer newest_, said_;  // said_: sent to all subscribers
+  std::deque<std::pair<Steady::time_point, std::uint64_t>> failed_;  // failed connections of this computer at each check
+  ViewPayloadPointer newest_, said_;                                 // said_: sent to all subscribers
 };
 
 }  // namespace sonar

@@ -80,7 +80,7 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   arm();
 }
 
-/// Sends the time at once if the viewer's time is not the time of arrival.
+/// Sends the time, if the viewer's time is not simply the time of arrival.
 void ViewFeed::say_time(Viewer& viewer) const {
   const Time now = of_.clock.now();
   if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())
@@ -211,7 +211,7 @@ void ViewFeed::SonarView::be_of(const Device& device) {
   if (std::exchange(make, &now) != &now) forget();
 }
 
-/// Sonars come and go with the configuration.
+/// Adapts channels and views to the present sonars, which a reload may change.
 void ViewFeed::sync_sonars() {
   const auto& devices = of_.fleet.devices();
   for (auto sonar = sonars_.begin(); sonar != sonars_.end();) {
@@ -359,7 +359,7 @@ void ViewFeed::offer_status() {
   if (wanted(tf_) && status_at_ - ping_at_ >= status_period) offer(tf_, places());
 }
 
-/// The faults that wait, act, or are over.
+/// The waiting, active and ended faults.
 ViewPayloadPointer ViewFeed::faults() const {
   ViewPayloadPointer payload;
   const control::GetFaults without_journal{.journal_after = std::numeric_limits<std::uint64_t>::max()};

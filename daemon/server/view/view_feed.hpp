@@ -1,6 +1,6 @@
-// The live view inside the daemon: its viewers, its channels, and the messages on them (docs/live-view.md). It gets pings at the
-// same place as recordings, and none without viewers. Slow work is done on a thread of its own, and skipped when that thread is
-// busy. No driver waits for a viewer. I/O thread only. Owned by App.
+// The live view inside the daemon: its viewers, its channels, and the messages on them (docs/live-view.md). It gets the same
+// pings as recordings, but none without viewers. Slow work runs on a separate thread, and is skipped while that thread is busy.
+// No driver waits for a viewer. I/O thread only. Owned by App.
 #pragma once
 
 #include <deque>
@@ -29,7 +29,7 @@
 
 namespace sonar {
 
-/// The parts of the daemon that the feed reads; they outlive it.
+/// The parts of the daemon that the feed reads. They must outlive it.
 struct Viewed {
   asio::io_context& io;
   const Config& config;
@@ -44,10 +44,10 @@ struct Viewed {
 class ViewFeed final : public ViewerHost {
  public:
   static constexpr std::size_t lines_kept = 100;
-  static constexpr double usual_threshold = 0.35;  // default threshold of a cloud, as a share of the full scale
+  static constexpr double usual_threshold = 0.35;  // default threshold of a cloud, as a fraction of full scale
 
   explicit ViewFeed(const Viewed& of);
-  /// Waits until the picture being made is done.
+  /// Waits for the picture that is being made.
   ~ViewFeed() override;
   ViewFeed(const ViewFeed&) = delete;
   ViewFeed& operator=(const ViewFeed&) = delete;
@@ -59,7 +59,7 @@ class ViewFeed final : public ViewerHost {
   bool is_full() const;
   std::vector<ViewerFigures> viewers() const;
   ViewSecrets& secrets() { return secrets_; }
-  /// Viewers of files.
+  /// The viewers of recordings.
   RecordingViews& recordings() { return recordings_; }
   const std::filesystem::path& folder_of_recordings() const { return of_.config.recording.folder; }
   const ViewSecrets& secrets() const { return secrets_; }
@@ -78,7 +78,7 @@ class ViewFeed final : public ViewerHost {
   /// A payload that the thread makes from the newest ping, the same for all its channels. It may be a few pings old.
   struct Slow {
     std::vector<std::uint32_t> channels{};
-    std::string threshold = {};  // the parameter that it depends on; empty = on none
+    std::string threshold = {};  // parameter on which it depends; empty = none
     bool under_way = false;
     Steady::time_point begun_at{};
     Time of{Time::min()};                                                   // time of its ping
@@ -87,20 +87,20 @@ class ViewFeed final : public ViewerHost {
   struct SonarView {
     std::string name;
     std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0, truth = 0, cloud = 0;
-    std::uint32_t fan = 0, about = 0;  // about: sonar.v1.Picture of the fan
+    std::uint32_t fan = 0, about = 0;  // channels; about: sonar.v1.Picture of the fan
     Slow drawn{}, points{};            // fan and about; cloud
     const protocol::Make* make = nullptr;
     std::shared_ptr<const Ping> last = nullptr;
     ViewPayloadPointer picture = nullptr;               // picture of `last`, once it was requested
     wire::Bytes shape = {};                             // shape of `last`, without its number
     std::string volume = {};                            // the settings on which the swath depends
-    std::shared_ptr<PicturePainter> painter = nullptr;  // for the view thread alone
+    std::shared_ptr<PicturePainter> painter = nullptr;  // used only by the view thread
     std::unique_ptr<DriverPicture> driver = nullptr;
     DriverPicture::Drawing drawing = nullptr;  // drawing of `last`
 
-    /// Clears everything that pings have left.
+    /// Clears all data of earlier pings.
     void forget();
-    /// Pings of another make are forgotten: a reload may give a sonar another profile.
+    /// Clears the data if the make has changed, because a reload may change a sonar's profile.
     void be_of(const Device& device);
   };
 
@@ -144,7 +144,7 @@ class ViewFeed final : public ViewerHost {
   std::string begin_playback(Viewer& viewer, const std::string& vehicle);
   void watch_playback(const Viewer* but = nullptr);
   ViewPayloadPointer in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const;
-  /// Returns an empty text, or why not; nullopt if it is not a parameter of the view itself.
+  /// Returns the reason if it was not set, else an empty text; nullopt if it is not a parameter of the view itself.
   std::optional<std::string> set_own(Viewer& viewer, const foxglove::Parameter& wanted);
   template <class Visit>
   void each(Visit visit) const {
@@ -159,7 +159,7 @@ class ViewFeed final : public ViewerHost {
   std::map<std::uint32_t, ViewChannel> channels_;
   std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0, doctor_channel_ = 0;
   std::list<SonarView> sonars_;
-  std::map<std::string, PlaybackWatch> watches_;                     // by vehicle that viewers look at
+  std::map<std::string, PlaybackWatch> watches_;                     // by vehicle
   std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // the viewer that requested the preview, by sonar
   std::set<std::string> no_preview_;                                 // sonars whose preview a viewer has switched off
   std::map<std::string, Steady::time_point> preview_failed_at_;      // by sonar

@@ -1,4 +1,4 @@
-// Messages of control.proto as viewers get them.
+// Encodes messages of control.proto for viewers.
 #pragma once
 
 #include "daemon/emulator/view/ping_payloads.hpp"

@@ -19,7 +19,7 @@ tl::unexpected<Error> no_such_parameter() { return refused("there is no such par
 std::string fault_name(std::string_view trouble, const std::string& sonar) {
   return "view." + sonar + "." + std::string(trouble);
 }
-/// "/faults/thin_tether", and with several sonars "/faults/front/thin_tether".
+/// The parameter of a trouble: "/faults/thin_tether"; with several sonars "/faults/front/thin_tether".
 std::string fault_parameter(std::string_view trouble, const std::string& sonar, const Fleet& fleet) {
   std::string name = fleet.devices().size() > 1 ? "/faults/" + sonar + "/" : "/faults/";
   for (const char c : trouble) name += c == '-' ? '_' : c;
@@ -35,7 +35,7 @@ double seconds_left(const Device& device, const std::string& fault, Time now) {
   return std::ceil(left * 10) / 10;
 }
 
-/// Whether the product takes a value of this setting. Products that set their rate or gain themselves refuse every value.
+/// Whether the product accepts any value of this setting. Products that set their rate or gain themselves accept none.
 template <class Value>
 bool takes(const Device& device, std::optional<Value> protocol::SettingsOverride::*setting, Value value) {
   protocol::SettingsOverride wanted;
@@ -46,7 +46,7 @@ bool takes(const Device& device, std::optional<Value> protocol::SettingsOverride
 void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_preview) {
   const PingSettings& s = device.sonar().settings();
   const std::string at = "/" + device.config().name + "/";
-  // A product whose head scans may be previewed with a longer range than that with which it starts.
+  // A product with a turning head may be previewed with a longer range than its initial one.
   const protocol::Vendor& vendor = *device.config().profile.vendor;
   const auto step = device.preview().on() ? vendor.scan_step(1, device.sonar().state()) : std::nullopt;
   all.push_back({at + "range_m", step ? step->settings.range_m : s.range_m});
@@ -128,8 +128,7 @@ Result<control::Operation> set_trajectory(control::PoseSample::Of of, const std:
   return no_such_parameter();
 }
 
-/// A trouble is a parameter whose value is the time in seconds for which it acts; 0 ends it. GetFaults stands for "nothing to
-/// do".
+/// The value of a trouble's parameter is its duration in seconds; 0 ends it. The result GetFaults means "nothing to do".
 Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSource& of) {
   if (wanted.name == "/faults/armed") return refused("cannot be set: start sonard with --faults");
   if (!of.config.faults.armed) return refused("start sonard with --faults");

@@ -1,5 +1,5 @@
-// Parameters of the Foxglove protocol, through which viewers read and set values of a running daemon: a write becomes an
-// operation, as if it came by HTTP. Their names are listed in docs/live-view.md.
+// Parameters of the Foxglove protocol, by which viewers read and set values of a running daemon: a write becomes an operation,
+// like one over HTTP. docs/live-view.md lists the names.
 #pragma once
 
 #include <optional>
@@ -24,7 +24,7 @@ struct ParameterSource {
 
 /// Returns the number of a parameter; nullopt if it is not a finite number.
 std::optional<double> number_of(const foxglove::Value& value);
-/// Returns all parameters; those without a value are unset.
+/// All parameters; those without a value are unset.
 std::vector<foxglove::Parameter> parameters_of(const ParameterSource& of);
 /// Returns the operation that a write requests, or an error of kind usage.
 Result<control::Operation> operation_of(const foxglove::Parameter& wanted, const ParameterSource& of);

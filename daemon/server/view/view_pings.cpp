@@ -1,4 +1,4 @@
-// Pings of the live view: payloads that are offered when a ping comes, payloads that are made on the view's thread, and frame
+// Pings of the live view: payloads that are offered when a ping arrives, payloads that the view's thread makes, and frame
 // transforms.
 #include <algorithm>
 #include <new>
@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-/// Only payloads that a viewer subscribes to are made; the slow ones are made on the view's thread.
+/// Makes only payloads with subscribers; the view's thread makes the slow ones.
 void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   SonarView* const sonar = find(of.config().name);
   if (sonar == nullptr) return;
@@ -43,7 +43,7 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   if (of_.clock.stepped()) arm();
 }
 
-/// Called for each ping and at each tick, because a payload may become due, or wanted, between pings.
+/// Called for each ping and at each tick, because a payload may become due, or get a subscriber, between pings.
 void ViewFeed::begin_slow_ones(SonarView& sonar) {
   if (sonar.last == nullptr) return;
   const Time at = sonar.last->request.fired_at;
@@ -60,7 +60,7 @@ void ViewFeed::begin_slow_ones(SonarView& sonar) {
   });
 }
 
-/// Only the last of the pings that arrive in the meantime is kept, and is made when this one is done. Once for each threshold.
+/// Makes a payload, once per threshold. Of the pings that arrive meanwhile only the last is kept, which is next.
 void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make) {
   Slow& slow = sonar.*which;
   const auto now = Steady::now();
@@ -74,13 +74,13 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   });
   const auto is_there = [&slow](const auto& one) { return slow.made.contains(one.first); };
   if (made.empty() || (slow.of == at && std::all_of(made.begin(), made.end(), is_there))) return;
-  // From here the thread owns copies only; the result is dropped if the sonar has another make by then.
+  // From here on the thread owns only copies. If the sonar's make has changed meanwhile, the result is dropped.
   slow.under_way = true;
   slow.begun_at = now;
   asio::post(thread_, [this, name = sonar.name, of = sonar.make, which, at, make = std::move(make), made]() mutable {
     try {
       for (auto& [key, payload] : made) payload = make(key.first, key.second);
-    } catch (const std::bad_alloc&) {  // there will be other pings
+    } catch (const std::bad_alloc&) {  // skipped: more pings will follow
     }
     asio::post(of_.io, [this, name, of, which, at, made = std::move(made)] {
       SonarView* const found = find(name);
@@ -98,7 +98,7 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   });
 }
 
-/// Poses of vehicles, sonars and moving objects: those of the last pings, else those of now.
+/// Poses of vehicles, sonars and moving objects: at the last pings or, without pings, now.
 ViewPayloadPointer ViewFeed::places() const {
   const Time now = of_.clock.now();
   std::vector<foxglove::Transform> all;

@@ -1,5 +1,5 @@
-// Viewers that look at the trajectory of a vehicle as at a recording (?playback=NAME): their stamps are the trajectory's time,
-// and they may play, pause and seek it.
+// Viewers of a vehicle's trajectory (?playback=NAME), which they see like a recording: stamps are the trajectory's time, and
+// viewers may play, pause and seek.
 #include <algorithm>
 
 #include "daemon/server/view/view_feed.hpp"
@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// null = it follows no playback
+/// null: the vehicle does not follow a trajectory
 const motion::Playback* ViewFeed::playback_of(const std::string& vehicle) const {
   const auto& vehicles = of_.config.vehicles;
   const auto found = std::find_if(vehicles.begin(), vehicles.end(), [&](const VehicleConfig& v) { return v.name == vehicle; });
@@ -16,7 +16,7 @@ const motion::Playback* ViewFeed::playback_of(const std::string& vehicle) const 
   return played ? &played->playback : nullptr;
 }
 
-/// Begins the playback that the URL of the viewer requests. Empty, or why not.
+/// Begins the playback that the viewer's URL requests. Returns the reason if that fails, else an empty text.
 std::string ViewFeed::begin_playback(Viewer& viewer, const std::string& vehicle) {
   if (vehicle.empty()) return {};
   const motion::Playback* const playback = playback_of(vehicle);
@@ -27,7 +27,7 @@ std::string ViewFeed::begin_playback(Viewer& viewer, const std::string& vehicle)
   return {};
 }
 
-/// Sends the changed state to all viewers but one.
+/// Sends the changed state to all viewers except `but`.
 void ViewFeed::watch_playback(const Viewer* but) {
   const Time now = of_.clock.now();
   for (auto it = watches_.begin(); it != watches_.end();) {
@@ -47,7 +47,7 @@ void ViewFeed::watch_playback(const Viewer* but) {
   }
 }
 
-/// The request becomes an operation of control, and its refusal a status for the viewer.
+/// Converts the request to an operation of control; a refusal becomes a status for the viewer.
 bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) {
   auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return false;
@@ -63,7 +63,7 @@ bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& a
   }
   if (!why.empty()) viewer.say_status(foxglove::StatusLevel::error, why);
   watch_playback(&viewer);
-  watch = watches_.find(viewer.playback());  // one that no viewer looks at is gone
+  watch = watches_.find(viewer.playback());  // watches without viewers have been removed
   if (watch == watches_.end()) return false;
   foxglove::PlaybackState state = watch->second.state(of_.clock.now());
   state.did_seek = asked.seeks && why.empty();
@@ -72,7 +72,7 @@ bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& a
   return true;
 }
 
-/// The payload with the time stamps of the trajectory that the viewer looks at.
+/// The payload with stamps in the time of the viewer's trajectory.
 ViewPayloadPointer ViewFeed::in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const {
   const auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return payload;

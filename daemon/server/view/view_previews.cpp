@@ -1,4 +1,4 @@
-// Previews: pings for viewers alone, while no driver is connected (daemon/emulator/view/preview.hpp).
+// Previews: pings only for viewers, while no driver is connected (daemon/emulator/view/preview.hpp).
 #include "daemon/server/view/view_feed.hpp"
 
 namespace sonar {
@@ -9,7 +9,7 @@ constexpr std::chrono::seconds page_starts_within{5};   // from the request of t
 
 }  // namespace
 
-/// A viewer switches the preview of a sonar on or off. Empty, or why not.
+/// Switches the preview of a sonar on or off for a viewer. Returns the reason if that fails, else an empty text.
 std::string ViewFeed::set_preview(Viewer& viewer, Device& device, bool on) {
   const std::string& name = device.config().name;
   Preview& preview = device.preview();
@@ -43,7 +43,7 @@ void ViewFeed::expect_viewer() {
   arm();
 }
 
-/// In the demo: while a viewer looks at its pings, or is expected, and no driver is connected.
+/// True in the demo while a viewer looks at the sonar's pings, or is expected, and no driver is connected.
 bool ViewFeed::previews_by_itself(const Device& device) {
   const std::string& name = device.config().name;
   if (!of_.config.previews || of_.clock.stepped() || no_preview_.contains(name)) return false;
@@ -57,7 +57,7 @@ bool ViewFeed::previews_by_itself(const Device& device) {
          !device.sonar().connections().has_audience();
 }
 
-/// Begins what is due, and ends what must end.
+/// Begins due previews, and ends previews that must end.
 void ViewFeed::drive_previews() {
   const Time now = of_.clock.now();
   for (Device& device : of_.fleet.devices()) {
@@ -78,7 +78,7 @@ void ViewFeed::drive_previews() {
   }
 }
 
-/// A driver that connected meanwhile has taken over: its pings are shown.
+/// If a driver has connected meanwhile, its pings are shown instead.
 void ViewFeed::on_preview(const std::string& sonar, const PingOutcome& outcome) {
   Device* const device = of_.fleet.find(sonar);
   if (stopping_ || device == nullptr) return;

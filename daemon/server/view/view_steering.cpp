@@ -1,4 +1,4 @@
-// Requests of viewers: parameters and services, carried out as requests of control.
+// Requests of viewers (parameters and services), carried out as requests of control.
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -13,7 +13,7 @@ namespace {
 /// The name of the viewer in the log.
 Sender sender_of(const Viewer& viewer) { return {"live view " + viewer.who(), viewer.who()}; }
 
-/// Every POST of the HTTP API: the name there, in Request.op, and the message. Their ids count from 1.
+/// A row for every POST of the HTTP API: its name there, its name in Request.op, and the message. Ids count from 1.
 struct ServiceRow {
   const char *name, *op, *type;
 };
@@ -79,8 +79,8 @@ std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer& viewer, cons
   return all;
 }
 
-/// Sets a parameter of the live view itself, not of control. nullopt: it is not such a parameter; else empty, or why it was not
-/// set.
+/// Sets a parameter of the live view itself, not of control. nullopt: it is not such a parameter; else the reason if it was not
+/// set, or an empty text.
 std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Parameter& wanted) {
   for (SonarView& sonar : sonars_) {
     if (wanted.name != sonar.points.threshold) continue;
@@ -106,7 +106,7 @@ std::string ViewFeed::set_parameter(Viewer& viewer, const foxglove::Parameter& w
   return perform_at_once(*operation, viewer);
 }
 
-/// Returns an empty text, or why the operation was not done.
+/// Returns the reason if the operation was not done, else an empty text.
 std::string ViewFeed::perform_at_once(const control::Operation& operation, const Viewer& viewer) {
   const auto why = std::make_shared<std::string>();
   of_.operations.perform(operation, sender_of(viewer), [why](const OperationResult& result) {
@@ -133,7 +133,7 @@ void ViewFeed::push_parameters() {
   });
 }
 
-/// The answer may come later, and the viewer may have left by then; so only a weak pointer is kept.
+/// The answer may arrive after the viewer has left, so only a weak pointer is kept.
 void ViewFeed::call(Viewer& viewer, const foxglove::ServiceCall& call) {
   if (call.service == 0 || call.service > service_table.size()) return viewer.fail(call, "there is no such service");
   auto request = control::request_from_json(service_table[call.service - 1].op, call.payload);
