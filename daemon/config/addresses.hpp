@@ -1,4 +1,4 @@
-// IPv4 addresses, endpoints and ranges as they stand in configurations, on command lines and in log lines.
+// Reads and prints IPv4 addresses, endpoints and ranges in configurations, command lines and log lines.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct AddressRange {  // 10.0.0.0/8
 std::string text_of(Ipv4 ip);
 std::string text_of(Endpoint endpoint);
 bool is_loopback(Ipv4 ip);
-/// config: a sentence that says what an address looks like.
+/// Error config: a sentence that shows a valid address.
 Result<Ipv4> parse_ipv4(std::string_view text);
 
 }  // namespace sonar

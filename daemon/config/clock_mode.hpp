@@ -1,4 +1,4 @@
-// The ways in which the daemon's time may pass, and their names in configurations, on command lines and in the status.
+// The modes of the daemon's time, and their names in configurations, on command lines and in the status.
 #pragma once
 
 #include <array>
@@ -8,9 +8,9 @@ namespace sonar {
 
 enum class ClockMode {
   realtime,  // UNIX time that never jumps
-  stepped,   // by itself: the next tick comes when every client has received the last ping
-  lockstep,  // the same, but only as far as control requests (Step) let it
-  follow,    // the same, but only as far as the stamps of the vehicles' poses let it
+  stepped,   // simulated: advances to the next tick when every client has received the last ping
+  lockstep,  // like stepped, but only as far as control requests (Step) allow
+  follow,    // like stepped, but only as far as the stamps of the vehicles' poses allow
 };
 inline constexpr std::array<std::string_view, 4> clock_modes = {"realtime", "stepped", "lockstep", "follow"};
 inline constexpr std::string_view name_of(ClockMode mode) { return clock_modes[static_cast<std::size_t>(mode)]; }

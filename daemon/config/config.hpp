@@ -1,5 +1,5 @@
-// The configuration file as one struct tree with defaults, read and validated once at start; docs/configuration.md is its manual.
-// No other part of the daemon reads settings.
+// The configuration file as a tree of structs with defaults, read and validated once (docs/configuration.md). No other part of
+// the daemon reads settings.
 #pragma once
 
 #include <array>
@@ -40,13 +40,13 @@ struct VehicleConfig {
   Pose initial_pose;  // pose in the world
   bool orbits = false;
   motion::Plan plan{};            // its trajectory, if it does not orbit
-  bool has_initial_pose = false;  // from the file, not the default
+  bool has_initial_pose = false;  // true: the file states it
 };
 /// A moving object of the scene that follows a trajectory.
 struct ObjectConfig {
   std::string name;
   motion::Plan plan;
-  std::string place;  // file:line:col: key.path, for errors found with the scene
+  std::string place;  // "file:line:col: key.path", for errors that are found with the scene
 };
 struct SonarConfig {
   std::string name;
@@ -55,26 +55,26 @@ struct SonarConfig {
   Pose mount;               // sonar in vehicle, FLU
   Ipv4 bind_ip{}, advertise_ip{}, netmask{};
   std::vector<Endpoint> status_to;                          // port 0 = the vendor's own
-  bool has_own_netmask = false, has_own_status_to = false;  // from the file, not derived from advertise_ip
+  bool has_own_netmask = false, has_own_status_to = false;  // true: the file states it; false: derived from advertise_ip
   std::uint16_t device_id = 0;
   std::vector<Ipv4> groups;  // broadcast and multicast addresses that clients may name as receivers
   int max_clients = 1;
   WhenClientsFull when_full = WhenClientsFull::close_new;
-  int max_observers = 4;            // connections that only receive; 0 = none
+  int max_observers = 4;            // limit of connections that only receive; 0 = none
   std::uint16_t observer_port = 0;  // 0 = any free port
   OutboxRules outbox;
   Overload overload = Overload::slow;
   Bearings bearings = Bearings::are_true;
-  protocol::OptionValues options;  // complete
+  protocol::OptionValues options;  // including defaults
 };
 struct PoseListener {
   bool enabled = true;
   Endpoint at;
   bool operator==(const PoseListener&) const = default;
 };
-/// A MAVLink link that poses come by (docs/poses.md, "MAVLink").
+/// A MAVLink link for poses (docs/poses.md, "MAVLink").
 struct MavlinkConfig {
-  bool dials = false;  // udpout: we send first, and accept that address only
+  bool dials = false;  // udpout: we send first, and accept only that address
   Endpoint at;
   std::string vehicle;
   std::uint8_t system_id = 0, component_id = 0;  // 0 = that of the first message
@@ -92,10 +92,10 @@ struct PoseConfig {
   OnStale on_stale = OnStale::hold;
   double max_jump_m = 50;
 };
-/// A site whose pages may open the live view (docs/live-view.md), exactly as browsers name it: "https://example.com".
+/// A site whose pages may open the live view (docs/live-view.md), as in the Origin header: "https://example.com".
 struct ViewOrigin {
   std::string origin;
-  bool steer = false;  // if false, its pages may only look
+  bool steer = false;  // false: its pages may only look
   bool operator==(const ViewOrigin&) const = default;
 };
 /// The control interfaces (docs/control.md).
@@ -103,36 +103,36 @@ struct ControlConfig {
   PoseListener stream{true, {{127, 0, 0, 1}, 14770}};  // TCP: the control stream
   PoseListener http{true, {{127, 0, 0, 1}, 8088}};
   bool stream_given = false,
-       http_given = false;           // by the file: then an address in use is an error; for a default it is a warning
-  std::filesystem::path token_file;  // empty = none; needed when a listener is not on loopback
-  std::vector<std::string> hosts;    // allowed names in HTTP's Host and Origin, beside addresses and localhost
+       http_given = false;           // true: the file states it; then an address in use is an error, for a default only a warning
+  std::filesystem::path token_file;  // empty = none; required if a listener is not on loopback
+  std::vector<std::string> hosts;    // allowed names in HTTP's Host and Origin, besides addresses and localhost
   std::vector<ViewOrigin> view_origins;
   bool operator==(const ControlConfig&) const = default;
 };
 /// Resource limits for clients.
 struct LimitConfig {
-  int clients = 256;                         // limit for all sonars together; that of one sonar is SonarConfig::max_clients (16)
-  int control_clients = 32;                  // limit for the stream, and for HTTP
-  int viewers = 8;                           // limit for the viewers of the live view among the clients of HTTP
-  std::size_t input_bytes_per_s = 1u << 20;  // limit for one client; above it reading slows down
-  std::size_t pose_bytes_per_s = 2u << 20;   // limit for all pose connections together
+  int clients = 256;         // limit for all sonars together; SonarConfig::max_clients (16) is the limit for one sonar
+  int control_clients = 32;  // limit for the stream, and for HTTP
+  int viewers = 8;           // limit for the viewers of the live view among the clients of HTTP
+  std::size_t input_bytes_per_s = 1u << 20;      // limit for one client; above it reading slows down
+  std::size_t pose_bytes_per_s = 2u << 20;       // limit for all pose connections together
   std::size_t control_message_bytes = 1u << 20;  // limit for one message of the stream or one body of HTTP
-  std::chrono::milliseconds stall{10000};        // a client that reads no byte for so long is reset
+  std::chrono::milliseconds stall{10000};        // a client that reads no byte for this time is reset
   std::chrono::milliseconds dead_peer{15000};    // a client whose computer does not answer is reset
   int spare_descriptors = 32;                    // file descriptors reserved for the daemon
   std::chrono::milliseconds load{120000};        // a scene that takes longer to load makes the daemon unhealthy
 };
 /// Recordings by control requests (docs/recording.md).
 struct RecordingConfig {
-  std::filesystem::path folder;  // an existing one; empty = recording is off
+  std::filesystem::path folder;  // must exist; empty = recording is off
   bool is_made = false;          // true in the demo: created when the first recording begins
 };
-/// Faults on purpose (docs/faults.md).
+/// Injected faults (docs/faults.md).
 struct FaultConfig {
-  bool armed = false;             // if false, every request for a fault is refused
+  bool armed = false;             // false: every request for a fault is refused
   std::filesystem::path journal;  // JSON lines are appended to it; empty = none
   std::vector<FaultRecord> plan;  // checked
-  std::string plan_place;         // file:line:col: faults.plan, for errors found with the command line
+  std::string plan_place;         // "file:line:col: faults.plan", for errors that are found with the command line
   bool operator==(const FaultConfig&) const = default;
 };
 inline constexpr int most_fixed_rays = 100000;  // a column
@@ -140,8 +140,8 @@ inline constexpr int most_fixed_rays = 100000;  // a column
 enum class EngineDevice { cpu, cuda, automatic };
 inline constexpr std::array<std::string_view, 3> engine_device_names = {"cpu", "cuda", "auto"};
 
-/// Parts of the model that a product has: the canonical model, with the side lobes of its elevation pattern. A sonar without a
-/// profile has those of Switches, so that a closed form of its main lobe holds.
+/// The switches of products: the canonical model with the side lobes of the elevation pattern. A sonar without a profile has
+/// the defaults of Switches, for which closed forms of the main lobe hold.
 inline constexpr Switches product_switches = [] {
   Switches s;
   s.side_lobes = true;
@@ -158,7 +158,7 @@ struct EngineConfig {
 
 struct Config {
   std::string source;  // the file, or "demo"
-  SceneFile scene;     // as found
+  SceneFile scene;     // as find_scene() resolved it
   std::uint64_t seed = 1;
   std::optional<Geodetic> origin;  // origin of latitudes and longitudes
   Water water;
@@ -174,7 +174,7 @@ struct Config {
   EngineConfig engine;
   ClockMode clock = ClockMode::realtime;
   std::string clock_place;  // file:line:col: clock, for errors found with the command line
-  bool previews = false;    // in the demo a viewer sees pings while no driver is connected (docs/live-view.md)
+  bool previews = false;    // demo only: viewers see pings while no driver is connected (docs/live-view.md)
   LogOptions log;
 };
 
@@ -183,7 +183,7 @@ std::vector<std::string> range_finders_of(const Config& config, const std::strin
 
 /// Fills netmask and status_to from advertise_ip, unless the file gives them.
 void derive_addresses(SonarConfig& sonar);
-/// Moves the first sonar to another address, with all that is derived from it. Errors are sentences for the command line.
+/// Moves the first sonar to another address, and changes all derived values. Errors are sentences for the command line.
 Result<void> rebind(Config& config, std::string_view address);
 
 }  // namespace sonar

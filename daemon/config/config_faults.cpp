@@ -1,4 +1,4 @@
-// Faults on purpose, from the configuration: faults.armed, faults.journal and the plan (docs/faults.md).
+// Reads the keys for faults from the configuration: faults.armed, faults.journal and the plan (docs/faults.md).
 #include <algorithm>
 
 #include "core/text/nearest.hpp"
@@ -54,7 +54,7 @@ FaultRecord read_record(const Node& node) {
   return record;
 }
 
-/// Empty if at least one sonar can have the fault.
+/// The reason if no sonar can have the fault; empty if at least one can.
 std::string why_not(const std::vector<Fault>& faults, const std::vector<SonarConfig>& sonars) {
   const std::string& name = faults.front().sonar;
   std::vector<std::string_view> names;
@@ -74,7 +74,7 @@ std::string why_not(const std::vector<Fault>& faults, const std::vector<SonarCon
 
 }  // namespace
 
-/// Each record is checked as a request would be, and all together: no two faults may have one name or write the same part.
+/// Each record is checked like a request; in addition, no two faults may have the same name or change the same part.
 FaultConfig read_faults(const Node& node, const std::vector<SonarConfig>& sonars, const std::filesystem::path& directory) {
   FaultConfig config;
   if (!node.present()) return config;
@@ -87,7 +87,7 @@ FaultConfig read_faults(const Node& node, const std::vector<SonarConfig>& sonars
   if (plan.present()) config.plan_place = plan.location() + ": " + plan.path();
   for (const Node& item : plan.items(0, most_faults)) {
     FaultRecord record = read_record(item);
-    // Records without a name get a number, so that each can be ended by its name.
+    // Records without a name get a number, so that each can be ended by name.
     if (record.name.empty()) record.name = "plan-" + std::to_string(config.plan.size() + 1);
     const auto faults = check_fault(record, false);
     if (!faults) {

@@ -1,4 +1,4 @@
-// Reads from the configuration where the daemon listens and which clients may steer it.
+// Reads the control listeners from the configuration, and the rules for their clients.
 #include "core/text/decimal.hpp"
 #include "daemon/config/config_parts.hpp"
 
@@ -25,7 +25,7 @@ Endpoint read_endpoint(const Node& node, bool port_needed) {
 
 namespace {
 
-/// `given`: the file names the address, so it must be free. The default address may be in use, which is a warning.
+/// `given` is set if the file names the address, which must then be free. A default address in use is only a warning.
 void read_control_listener(const Node& node, bool has_token, PoseListener& listener, bool& given) {
   if (!node.present()) return;
   given = true;
@@ -38,7 +38,7 @@ void read_control_listener(const Node& node, bool has_token, PoseListener& liste
     node.fail("can be reached from other computers: that needs control.token_file, the file of a secret that clients must show");
 }
 
-/// The forms: the origin as a text, or a map with `origin` and `steer`.
+/// Forms: the origin as a text, or a map with `origin` and `steer`.
 ViewOrigin read_view_origin(const Node& node) {
   ViewOrigin allowed;
   Node origin = node;
@@ -57,7 +57,7 @@ ViewOrigin read_view_origin(const Node& node) {
 
 }  // namespace
 
-/// token_file is read first, because a listener that other computers reach needs it.
+/// token_file is read first, because listeners that are not on loopback require it.
 ControlConfig read_control(const Node& node, const std::filesystem::path& directory) {
   ControlConfig control;
   if (!node.present()) return control;

@@ -30,7 +30,7 @@ void read_link(const Node& node, bool has_ranges, MavlinkConfig& link) {
 
 /// Each link belongs to one vehicle. The vehicle's name may be left out if there is only one vehicle.
 std::string read_vehicle(Map& map, const std::vector<VehicleConfig>& vehicles) {
-  if (vehicles.empty()) return {};  // reported elsewhere
+  if (vehicles.empty()) return {};  // already reported
   const Node node = vehicles.size() > 1 ? map.required("vehicle") : map.optional("vehicle");
   if (!node.present()) return vehicles.front().name;
   std::vector<std::string_view> names;
@@ -58,7 +58,7 @@ std::optional<Geodetic> read_origin(const Node& node) {
                   place.optional("alt").number_or(0, Range::between(-12000, 10000))};
 }
 
-/// The forms: `off`, one endpoint as a text, or a list of links.
+/// Forms: `off`, one endpoint as a text, or a list of links.
 std::vector<MavlinkConfig> read_mavlink(const Node& node, bool has_ranges, const Config& config) {
   const std::vector<VehicleConfig>& vehicles = config.vehicles;
   std::vector<MavlinkConfig> links;

@@ -62,7 +62,7 @@ SceneFile read_scene_file(const Node& node, const std::filesystem::path& directo
   const std::string given = node.text();
   if (auto found = find_scene(given, directory)) return *std::move(found);
   std::error_code ec;
-  // A file that is there but cannot be read is reported as that, not as missing.
+  // A file that exists but is unreadable must not be reported as missing.
   if (const auto place = directory / given; !given.empty() && std::filesystem::exists(place, ec))
     if (const auto opened = open_regular(place); !opened) {
       node.fail(opened.error().text);
@@ -138,7 +138,7 @@ EngineConfig read_engine(const Node& node, const Switches& defaults) {
     bool& is_on = engine.switches.*part.is_on;
     const Node given = map.optional(part.name);
     is_on = given.choice_or<bool>(is_on, {{"on", true}, {"off", false}});
-    // A switch is refused if another one makes it ineffective. The mode and fixed_fan are read before, because they count too.
+    // A switch is refused if another one, or the mode or fixed_fan, which are read before, makes it ineffective.
     const std::string why = why_without_effect(engine.switches, part);
     if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave out one of them");
   }

@@ -1,5 +1,5 @@
-// Decides which parts of the model take effect. The comparison modes and the fixed fan leave some parts out even if their
-// switches are on (docs/acoustics.md, section 8). Used by every reader of switches, and by the JSON of a rendered ping.
+// Determines which parts of the model take effect: the comparison modes and the fixed fan leave out some parts even if their
+// switches are on (docs/acoustics.md, section 8).
 #pragma once
 
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace sonar {
 
-/// The switches without the parts that take no effect. Pings made with the result are the same.
+/// Switches off the parts that take no effect; the pings are the same.
 Switches effective_switches(Switches switches);
 
-/// Why a part has no effect although its switch is on; empty if it has one.
+/// The reason why a part has no effect although its switch is on; empty if it has an effect.
 std::string why_without_effect(const Switches& switches, const NamedSwitch& part);
 
-/// One sentence that names the parts whose switches are on but which have no effect; empty if there is none.
+/// One sentence that names the parts that are switched on but have no effect; empty if there are none.
 std::string note_of_parts_left_out(const Switches& switches);
 
 }  // namespace sonar

@@ -12,8 +12,8 @@ namespace {
 using E = FaultEffect;
 using S = FaultStage;
 
-/// Whether a kind acts on a sonar that sends its pings only as datagrams. Such a kind changes the first datagram, or no ping. In
-/// a dialogue by datagrams it may also hold pings back.
+/// Whether a kind acts on a sonar that sends pings only as datagrams: it changes the first datagram, or does not change pings.
+/// In a dialogue by datagrams it may also hold pings back.
 bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   if (kind.stage == S::stream) return false;
   if (kind.stage == S::framing)
@@ -36,7 +36,7 @@ bool has_integer(const protocol::Vendor& vendor, protocol::Part part, protocol::
       part, name, [](auto n) { return n; }, none);
 }
 
-/// Returns whether a model of the vendor accepts `enough` of the values from first to last.
+/// Whether a model of the vendor accepts `enough` of the values from first to last.
 template <class T>
 bool accepts(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
              std::uint32_t last, int enough) {
@@ -56,7 +56,7 @@ bool accepts(const protocol::Vendor& vendor, std::optional<T> protocol::Settings
   return false;
 }
 
-/// `what` is the name of a parameter of the kind. Vendor::apply_override refuses it whatever the value is.
+/// The reason if Vendor::apply_override refuses every value of the setting `what`, a parameter of the kind.
 std::string why_without_setting(std::string_view what, const protocol::Vendor& vendor) {
   using Wanted = protocol::SettingsOverride;
   const auto has_modes = [](const auto& model) { return model->modes.size() > 1; };

@@ -1,4 +1,4 @@
-// Which kinds of faults take effect on the sonars of a vendor.
+// Determines which kinds of faults take effect on the sonars of a vendor.
 #pragma once
 
 #include <string>
@@ -7,10 +7,10 @@
 
 namespace sonar {
 
-/// Empty when it takes effect on sonars of this vendor; else why not.
+/// The reason why the kind has no effect on sonars of this vendor; empty if it has.
 std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor);
 
-/// The table of kinds by vendors, as text: "takes effect" or why not.
+/// The table of kinds and vendors, as text: "takes effect" or the reason why not.
 std::string support_table();
 
 }  // namespace sonar

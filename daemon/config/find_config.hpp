@@ -1,4 +1,4 @@
-// Finds the configuration that `sonard run` uses: the file it was given, else the first in the usual places, else the demo.
+// Finds the configuration for `sonard run`: the given file, else the first one in the usual places, else the demo.
 #pragma once
 
 #include <filesystem>

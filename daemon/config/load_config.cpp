@@ -35,7 +35,7 @@ Ipv4 read_host_ip(const Node& node, Ipv4 fallback = {}) {
 Ipv4 read_netmask(const Node& node) {
   const Ipv4 mask = read_ip(node);
   const std::uint32_t zeros = ~text::number_from_ipv4(mask);
-  if (node.present() && (zeros & (zeros + 1)) != 0)  // some zero is left of a one
+  if (node.present() && (zeros & (zeros + 1)) != 0)  // not a netmask: some zero precedes a one
     node.fail(text_of(mask) + " is not a netmask: give ones followed by zeros, such as 255.255.255.0");
   return mask;
 }
@@ -59,7 +59,7 @@ void read_world(Map map, Config& config, const std::filesystem::path& directory)
   config.water = read_water(map.optional("water"), &config.allow_hot);
 }
 
-/// Names stand in lines of text and in paths of HTTP requests.
+/// Reads a name, which must fit into text lines and paths of HTTP requests.
 std::string read_name_text(const Node& node, std::size_t longest) {
   std::string name = node.text(longest);
   const bool fits = name.find('/') == std::string::npos && std::none_of(name.begin(), name.end(), [](char c) {
@@ -156,7 +156,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     Map observers = node.map();
     sonar.max_observers = static_cast<int>(observers.optional("max").integer_or(observers_of_product, 0, 16));
     sonar.observer_port = static_cast<std::uint16_t>(observers.optional("port").integer_or(0, 0, 65535));
-    // Such a product has several clients, or sends its pings by datagrams, so it has no port for observers.
+    // A product with several clients, or with pings by datagrams, has no port for observers.
     if (observers_of_product == 0) sonar.max_observers = 0;
   }
   if (Node node = map.optional("outbox")) {
@@ -174,7 +174,8 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     if (!tuned) options.fail(tuned.error().text);
     sonar.profile.model = tuned.value_or(profile->model);
   } else if (options.present()) {
-    // The product is unknown, and that is reported. Its options cannot be checked, and are not reported as unknown keys.
+    // The product is unknown, which is already reported. Its options cannot be checked; this call keeps them from being unknown
+    // keys.
     options.map().entries();
   }
   for (const SonarConfig& other : config.sonars) {  // a missing key is reported once, not also as a duplicate
@@ -236,7 +237,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   Config config;
   config.source = name;
   Map root = document.root();
-  // For files of other kinds the error names the kind, because errors about their keys would not help.
+  // For files of other kinds the error names the kind, which helps more than errors about keys.
   if (root.has("dataset") && !root.has("world"))
     return failure(ErrorKind::config, name + ": this is a data set's job, not a configuration: sonard dataset " + name +
                                           " --out DIR (docs/datasets.md)");
@@ -248,7 +249,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
                                           ": this looks like a scene, not a configuration, which names its scene: world: "
                                           "{scene: FILE} (docs/configuration.md)");
   read_world(root.required("world").map(), config, directory);
-  // The order matters: sonars refer to vehicles, MAVLink to vehicles as well, and faults to sonars.
+  // The order matters: sonars and MAVLink links refer to vehicles, faults to sonars.
   TrajectoryFiles files(directory);
   read_vehicles(root.required("vehicles"), files, config);
   read_objects(root.optional("objects"), files, config);
@@ -313,11 +314,11 @@ Result<Config> parse_config(std::string_view yaml, const std::string& name, cons
   return read(*document, name, directory);
 }
 
-/// The demo also accepts faults, shows previews, and may record into a folder that it makes.
+/// The demo also accepts faults, shows previews, and can record into a folder that it creates.
 Result<Config> demo_config() {
   auto config = parse_config(demo_yaml(), "demo", {});
   if (!config) return config;
-  config->scene = {"demo.yaml", true};  // the built-in scene, also where a file has that name
+  config->scene = {"demo.yaml", true};  // always the built-in scene, even if a file has that name
   config->previews = config->faults.armed = true;
   config->recording = {std::filesystem::absolute("sonard-recordings"), true};
   return config;

@@ -12,12 +12,12 @@ namespace sonar {
 
 /// Errors: file:line:col: key.path: what, and the nearest valid name.
 Result<Config> load_config(const std::filesystem::path& file);
-/// `directory` is where relative scene paths start; `name` stands in errors for the file.
+/// `directory`: start of relative scene paths; `name`: name of the file in errors.
 Result<Config> parse_config(std::string_view yaml, const std::string& name, const std::filesystem::path& directory);
-/// Checks that a lockstep or follow clock has a source that can advance it. Call after applying command-line options. Errors:
-/// config.
+/// Checks that something can advance a lockstep or follow clock. Call after applying command-line options. Errors: config.
 Result<void> check_time_can_pass(const Config& config);
-/// Configuration when no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. Needs no files.
+/// The configuration if no file is found: one Oculus M1200d on 127.0.0.2 that circles through the demo scene. It needs no
+/// files.
 Result<Config> demo_config();
 
 }  // namespace sonar

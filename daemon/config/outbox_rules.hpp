@@ -11,7 +11,7 @@ inline constexpr std::array<std::string_view, 2> when_full_names = {"replace_old
 
 struct OutboxRules {
   static constexpr int deepest = 3;
-  int depth = 1;  // waiting pings beside the message being written, 1..deepest
+  int depth = 1;  // waiting pings besides the current message, 1..deepest
   WhenFull when_full = WhenFull::replace_oldest;
   bool operator==(const OutboxRules&) const = default;
 };

@@ -43,7 +43,7 @@ std::vector<std::string> notes_of_options(const Config& config) {
   return notes;
 }
 
-/// Everything that depends on the product gets its default again: options, clients, observers, and the mount of the demo.
+/// Resets everything that depends on the product: options, clients, observers, and the mount of the demo.
 Result<void> use_product(Config& config, std::string_view profile) {
   auto found = protocol::find_profile(profile);
   if (!found) return failure(ErrorKind::usage, found.error().text + "; there are " + all_products());

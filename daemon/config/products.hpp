@@ -1,4 +1,4 @@
-// Properties of a sonar's product: the options that have an effect, and `sonard --profile`.
+// Properties of products: defaults, and notes on options without effect. Also applies `sonard --profile`.
 #pragma once
 
 #include <string>
@@ -13,14 +13,14 @@ namespace sonar {
 /// "Oculus", "BlueView", "ARIS": the first word of the vendor's product names.
 std::string title_of(const protocol::Vendor& vendor);
 
-/// Default number of observers: 0 for a product that accepts several clients or sends pings by datagrams alone.
+/// Default number of observers: 0 for a product that accepts several clients or sends pings only by datagrams.
 int default_max_observers(const protocol::Vendor& vendor);
 
-/// A sentence for each option that the configuration gives to a sonar of another vendor. Such options have no effect: a
-/// configuration stays valid when only its `profile` is changed.
+/// A sentence for each option that the configuration gives to a sonar of another vendor. Such options have no effect but are
+/// allowed, so that a configuration stays valid if only its `profile` is changed.
 std::vector<std::string> notes_of_options(const Config& config);
 
-/// Makes the first sonar that product, with the product's defaults of everything that depends on it. Errors list the products.
+/// Changes the first sonar to this product, with the product's defaults. Errors list the products.
 Result<void> use_product(Config& config, std::string_view profile);
 
 }  // namespace sonar

@@ -27,7 +27,7 @@ motion::ReadOptions options_of(const TrajectoryKeys& keys) {
   return options;
 }
 
-/// A word that cannot be the name of a file is probably a typing error.
+/// Whether a text is a word, not a file name; an unknown word is probably a typing error.
 bool is_word(const std::string& text) { return text.find_first_of("./") == std::string::npos; }
 
 }  // namespace
@@ -39,7 +39,7 @@ TrajectoryKeys::TrajectoryKeys(text::Map& map)
       rate_hz(map.optional("rate_hz")),
       body(map.optional("body")) {}
 
-/// A file that was read before with the same options is used again.
+/// Reuses a file that was read before with the same options.
 TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::ReadOptions& options) {
   const std::string name = file.text(1024);
   if (name.empty()) return {};  // reported
@@ -48,7 +48,7 @@ TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::Rea
     if (k.path == path && k.options == options) return k.named;
   std::error_code ec;
   if (!std::filesystem::exists(path, ec) || std::filesystem::is_directory(path, ec)) {
-    // An empty folder is the working directory, which has no other name here. For an absolute path no folder is named.
+    // An empty folder means the working directory. For an absolute path the error names no folder.
     const auto folder = std::filesystem::absolute(folder_.empty() ? "." : folder_, ec).lexically_normal();
     const bool is_whole = std::filesystem::path(name).is_absolute();
     file.fail("no such file: \"" + name + "\"" + (is_whole ? "" : "; looked in " + folder.string()));
@@ -88,7 +88,7 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   return plan;
 }
 
-/// A text with a dot or slash is the name of a file; any other must be one of the words.
+/// A text with a dot or slash is a file name; any other text must be one of the words.
 Plan TrajectoryFiles::read_words(const Node& node, const std::string& body, bool* orbits) {
   const std::string word = node.text(1024);
   if (word.empty() || !is_word(word)) return plan_of(node, read(node, {}), {}, body);
@@ -98,7 +98,7 @@ Plan TrajectoryFiles::read_words(const Node& node, const std::string& body, bool
   return {};
 }
 
-/// All keys are read before a missing file ends the function, so that errors in the others are reported too.
+/// Reads all keys before it returns for a missing file, so that errors in the others are reported too.
 Plan TrajectoryFiles::read_plan(const Node& node, const std::string& body, bool* orbits) {
   if (!node.present()) return {};
   if (!node.is_map()) return read_words(node, body, orbits);

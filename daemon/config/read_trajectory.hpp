@@ -1,5 +1,5 @@
-// The keys by which configurations and render files name trajectory files, and the files themselves.
-// Readers over strict_yaml cursors; errors, also of the files, are returned by the document's finish().
+// Reads the keys for trajectories in configurations and render files, and the files that they name. It uses strict_yaml
+// cursors; the document's finish() returns all errors, including those of the files.
 #pragma once
 
 #include <filesystem>
@@ -13,27 +13,27 @@
 
 namespace sonar {
 
-/// Asks for `file`, `format`, `frame`, `rate_hz` and `body`.
+/// Requests the keys `file`, `format`, `frame`, `rate_hz` and `body`.
 struct TrajectoryKeys {
   explicit TrajectoryKeys(text::Map& map);
   text::Node file, format, frame, rate_hz, body;
 };
 
-/// Reads each file once, however many bodies are in it.
+/// Reads each file once, even if several bodies use it.
 class TrajectoryFiles {
  public:
-  /// Relative files start in `folder`.
+  /// Relative file names start at `folder`.
   explicit TrajectoryFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   struct Named {
     std::string name;                                    // for errors
-    std::shared_ptr<const motion::TrajectoryFile> file;  // null after an error, which is reported
+    std::shared_ptr<const motion::TrajectoryFile> file;  // null after a reported error
   };
   Named read(const text::Node& file, const motion::ReadOptions& options);
   Named read(const TrajectoryKeys& keys);
 
   /// Reads a body's plan: `none`, a file, or a map of the keys above with `speed`, `loop` and `start_s`. `body`: the body to use
-  /// if the file has several and none is named. With `orbits`, the word `orbit` is permitted, and sets it.
+  /// if the file has several and none is named. If `orbits` is not null, the word `orbit` is allowed and sets it.
   motion::Plan read_plan(const text::Node& node, const std::string& body, bool* orbits = nullptr);
 
  private:

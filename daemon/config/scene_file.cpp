@@ -12,8 +12,8 @@
 namespace sonar {
 namespace {
 
-/// Looks first near the program, so that an unpacked or moved installation finds its own files. In a build folder, links lead to
-/// the tree (CMakeLists.txt), whose path is not built into the program.
+/// Folders near the program come first, so that an unpacked or moved installation finds its own files. A build folder has links
+/// to the source tree (CMakeLists.txt), because the program does not contain the tree's path.
 std::vector<std::filesystem::path> make_shipped_folders() {
   std::error_code ec;
   std::vector<std::filesystem::path> folders;
@@ -30,7 +30,7 @@ const std::vector<std::filesystem::path>& shipped_folders() {
   return folders;
 }
 
-/// Links are resolved. The root directory contains everything, so it never counts as a folder of scenes.
+/// Whether a file is below a folder, after resolving links. The root directory contains everything, so it never counts.
 bool is_below(const std::filesystem::path& file, const std::filesystem::path& folder) {
   std::error_code ec;
   const auto real = std::filesystem::canonical(file, ec);
@@ -40,9 +40,9 @@ bool is_below(const std::filesystem::path& file, const std::filesystem::path& fo
   return std::mismatch(top.begin(), top.end(), real.begin(), real.end()).first == top.end();
 }
 
-constexpr int most_looked_at = 256;  // files of a folder, which can be a home directory
+constexpr int most_looked_at = 256;  // limit, because the folder can be a home directory
 
-/// A scene is recognised by its first column, because configurations and libraries of materials lie beside scenes.
+/// Recognises a scene by its keys at the start of lines, because configurations and material libraries lie beside scenes.
 bool is_like_a_scene(const std::filesystem::path& file) {
   std::ifstream in(file);
   bool has_objects = false;
@@ -67,7 +67,7 @@ std::vector<std::string> scenes_in(const std::filesystem::path& folder) {
   return names;
 }
 
-/// The nearest of these names, whatever its ending.
+/// The nearest of these names, ignoring extensions.
 std::string nearest_of(const std::vector<std::string>& names, const std::filesystem::path& given) {
   std::vector<std::string> stems;
   for (const std::string& name : names) stems.push_back(std::filesystem::path(name).stem().string());

@@ -1,4 +1,4 @@
-// Resolves the name of a scene: a file on disk, else a scene built into the program. The one place that does so.
+// Resolves the name of a scene: a file on disk, else a scene built into the program. Only this file does so.
 #pragma once
 
 #include <filesystem>
@@ -19,17 +19,17 @@ struct SceneFile {
 
 /// Searches `directory`, then the shipped scenes on disk, then the built-in ones.
 std::optional<SceneFile> find_scene(const std::filesystem::path& given, const std::filesystem::path& directory);
-/// The folders that find_scene() looks in, for its caller's error: "., A and B".
+/// The folders that find_scene() searches, for error texts: "., A and B".
 std::string scene_folders(const std::filesystem::path& directory);
 
-/// For names from control clients: true when it ends in .yaml or .yml.
+/// True if the name ends in .yaml or .yml; for names from control clients.
 bool has_scene_name(const std::filesystem::path& given);
 /// Whether errors that quote the file may be sent to control clients: only for files in `directory` (the configuration's) and for
 /// the shipped scenes, after resolving links.
 bool may_be_quoted(const SceneFile& file, const std::filesystem::path& directory);
 
-/// `world_origin`: that of the configuration, for grids with latitudes and longitudes.
-/// Inline, so that the configuration alone does not need the scene loader and its libraries.
+/// `world_origin`: the configuration's origin, for grids with latitudes and longitudes. Inline, so that code without scenes
+/// does not need the scene loader and its libraries.
 inline Result<std::shared_ptr<const Scene>> load_scene(const SceneFile& file, const std::optional<Geodetic>& world_origin = {}) {
   return file.built_in ? load_built_in_scene(file.path.string()) : load_scene(file.path, world_origin);
 }

@@ -1,4 +1,4 @@
-// Addresses derived from a sonar's address, and moving one sonar or all listeners to other addresses.
+// Derives addresses from a sonar's address, and moves one sonar or all listeners to other addresses.
 #include "daemon/config/config.hpp"
 #include "daemon/config/move_addresses.hpp"
 
@@ -6,7 +6,7 @@ namespace sonar {
 
 void derive_addresses(SonarConfig& sonar) {
   if (!sonar.has_own_netmask) sonar.netmask = is_loopback(sonar.advertise_ip) ? Ipv4{255, 0, 0, 0} : Ipv4{255, 255, 255, 0};
-  // Without destinations of its own a sonar sends status messages to the broadcast address of its network.
+  // Unless destinations are configured, a sonar sends status messages to the broadcast address of its network.
   if (sonar.has_own_status_to) return;
   Endpoint broadcast;
   for (std::size_t i = 0; i < 4; ++i)
@@ -61,10 +61,10 @@ struct Listening {
   std::string key;
   Endpoint at;
   bool udp, tcp;
-  bool gives_way = false;  // a default, which is left out when its port is taken
-  bool is_shared = false;  // with others that share it
+  bool gives_way = false;  // a default, which is dropped if its port is in use
+  bool is_shared = false;  // may be shared with other listeners for which this is true
 };
-/// Returns whether two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
+/// Whether two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
 bool meet(const Listening& a, const Listening& b) {
   const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
   const bool same_kind = (a.udp && b.udp && !(a.is_shared && b.is_shared)) || (a.tcp && b.tcp);
@@ -83,7 +83,7 @@ std::vector<Listening> listening_of(const Config& c) {
   return all;
 }
 
-/// Adds the ports of a sonar. Sonars share the UDP ports at which hosts look for them (udp_answer).
+/// Adds the ports of a sonar. Sonars share the UDP ports of discovery (udp_answer).
 void add_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
   using Kind = protocol::Port::Kind;
   for (const protocol::Port& port : sonar.profile.vendor->ports()) {
@@ -131,7 +131,7 @@ Result<void> check_ports_apart(const Config& config) {
 Result<void> move_addresses(Config& config, int offset, bool first_too) {
   const Config unmoved = config;
   for (SonarConfig& sonar : config.sonars) {
-    // The device number is moved as well, because drivers distinguish sonars by it.
+    // The device id changes too, because drivers distinguish sonars by it.
     const int id = sonar.device_id + 100 * offset;
     if (id > 65535)
       return cannot_move("device_id " + std::to_string(sonar.device_id) + " would exceed 65535; give a smaller offset");

@@ -16,7 +16,7 @@ using std::chrono::nanoseconds;
 
 constexpr double longest_s = 86400;
 constexpr std::uint64_t most_pings = 1'000'000'000;
-constexpr double least_probability = 1e-9;  // below this probability it never acts, because no run has so many pings
+constexpr double least_probability = 1e-9;  // a fault with a smaller one would never act, because no run has enough pings
 
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
@@ -38,7 +38,7 @@ std::optional<double> number_from(std::string_view text) {
   return text::parse_decimal(text);
 }
 
-/// Checks one record: errors begin with its name.
+/// Checks one record. Errors begin with its name.
 class Check {
  public:
   Check(const FaultRecord& record, bool manual) : record_(record), manual_(manual) {}
@@ -63,7 +63,7 @@ class Check {
   }
 
  private:
-  // The first error counts; checks continue after it, with harmless values.
+  // Stores the first error; the checks continue with harmless values.
   void wrong(std::string text) {
     if (error_.empty()) error_ = std::move(text);
   }
@@ -96,7 +96,7 @@ class Check {
         given.emplace(pair.substr(0, sign), pair.substr(sign + 1));
       }
       all.push_back(of_kind(*find_fault_kind(part.code), given, trouble.default_s));
-      // `after` is a share of the trouble's time; a part that begins later ends with the others.
+      // `after` is a fraction of the trouble's duration; all parts end together.
       all.back().delay = nanoseconds(static_cast<std::int64_t>(part.after * static_cast<double>(all.back().span.time.count())));
       all.back().span.time -= all.back().delay;
       all.back().name = (record_.name.empty() ? std::string(trouble.name) : record_.name) + "." + std::to_string(all.size());
@@ -173,7 +173,7 @@ class Check {
     fault.on = static_cast<Occasion>(it - occasion_names.begin());
   }
 
-  // The forms: all, newest, oldest, an ordinal, an address, or a prefix.
+  // Forms: all, newest, oldest, an ordinal, an address, or a prefix.
   void read_client(const FaultKind& kind, Fault& fault) {
     const std::string& text = record_.client;
     using Kind = ClientChoice::Kind;
@@ -201,7 +201,7 @@ class Check {
     fault.client = {Kind::prefix, 0, *address, static_cast<int>(*bits)};
   }
 
-  // Decides how long the fault acts each time (a time or pings) and how often (count).
+  // Determines the duration of an occurrence (a time or pings) and the number of occurrences (count).
   void read_span(const FaultKind& kind, double default_s, Fault& fault) {
     const FaultRecord::For& lasts = record_.lasts;
     if (manual_ && lasts.seconds.value_or(0) > static_cast<double>(longest_manual_fault.count()))
@@ -214,14 +214,14 @@ class Check {
       return wrong("for: pings and count must be from 1 to 1000000000");
     if (lasts.pings && !kind.per_ping() && kind.stage != FaultStage::payload && kind.stage != FaultStage::framing)
       return wrong(std::string(kind.code) + " lasts for a time: give for: {seconds: ...}");
-    // A span is a time or a number of pings. If one is given, the other is 0.
+    // A span is either a time or a number of pings; the other value is 0.
     const double seconds = lasts.seconds.value_or(lasts.pings || kind.per_ping() ? 0 : default_s);
     fault.span.time = nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
     fault.span.pings = lasts.pings.value_or(seconds > 0 ? 0 : 1);
-    // A trigger that can occur again has no limit unless a count is given. Any other fault acts once.
+    // A fault whose trigger can recur has no limit unless a count is given. Any other fault acts once.
     const bool once = !record_.at.every && !record_.at.probability && record_.at.on.empty();
     fault.span.count = lasts.count.value_or(once ? 1 : 0);
-    // A record without a trigger and with a count acts on that many pings in a row.
+    // A record with a count but no trigger acts on that many successive pings.
     if (once && kind.per_ping() && lasts.count && !lasts.pings && !lasts.seconds) {
       fault.span.pings = *lasts.count;
       fault.span.count = 1;

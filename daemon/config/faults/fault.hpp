@@ -1,5 +1,5 @@
-// A fault: one way in which an emulated sonar misbehaves on purpose, when, for how long and towards whom. check_fault() makes it
-// from a user's record, or returns an error.
+// A fault: a way in which an emulated sonar misbehaves on purpose, with its trigger, duration and clients. check_fault() makes
+// it from a user's record, or returns an error.
 #pragma once
 
 #include <chrono>
@@ -23,14 +23,14 @@ inline constexpr std::array<std::string_view, 4> occasion_names = {"connect", "c
 
 using control::FaultRecord;
 
-/// How long a fault acts each time it begins, and how often it begins.
+/// The duration of each occurrence of a fault, and the number of occurrences.
 struct Span {
   std::chrono::nanoseconds time{0};  // 0 = not limited by time
   std::uint64_t pings = 0;           // 0 = not limited by pings
-  std::uint64_t count = 0;           // 0 = as often as its trigger says
+  std::uint64_t count = 0;           // 0 = at every trigger
 };
 
-/// Which clients of a sonar.
+/// Selects clients of a sonar.
 struct ClientChoice {
   enum class Kind { all, newest, oldest, number, prefix } kind = Kind::all;
   std::uint64_t number = 0;
@@ -38,7 +38,7 @@ struct ClientChoice {
   int prefix_bits = 32;
 };
 
-/// A record that has been checked: of one kind, all parameters present.
+/// A checked record of one kind, with all parameters.
 struct Fault {
   std::string name, what;  // as the user wrote it
   const FaultKind* kind = nullptr;
@@ -49,22 +49,22 @@ struct Fault {
   FaultRecord::At at;
   std::optional<Occasion> on;
   Span span;
-  std::chrono::nanoseconds delay{0};  // from the trigger to its beginning: of a later part of a trouble
+  std::chrono::nanoseconds delay{0};  // from the trigger to the beginning, for later parts of a trouble
 
   double number(const std::string& parameter) const;
   const std::string& word(const std::string& parameter) const;
-  /// "bytes 16, fill zero": as the journal shows them.
+  /// The parameters as in the journal: "bytes 16, fill zero".
   std::map<std::string, std::string> used() const;
 };
 
 inline constexpr std::chrono::seconds longest_manual_fault{600};
 inline constexpr std::size_t most_faults = 256;
 
-/// The faults that a record stands for: one, or the several of a trouble, their names then NAME.1, NAME.2, ..., where NAME is
-/// that of the record, else the trouble's. Errors (usage) name the record, the wrong part and what is possible. `manual`: given
-/// to a running daemon; it gets an end.
+/// Converts a record to faults: one, or several for a trouble, named NAME.1, NAME.2, ... (NAME: the record's name, else the
+/// trouble's). Errors (usage) name the record, the wrong part and the possible values. `manual`: requested of a running daemon;
+/// such faults always have an end.
 Result<std::vector<Fault>> check_fault(const FaultRecord& record, bool manual);
-/// Two faults that would write the same part of the same message: a sentence, or empty.
+/// A sentence if both faults would change the same part of a message, else empty.
 std::string conflict_of(const Fault& a, const Fault& b);
 
 }  // namespace sonar

@@ -18,7 +18,7 @@ constexpr P whole(std::string_view name, std::string_view value, double lowest, 
 constexpr P offset_part{"fraction", "0.5", 0, 1};
 constexpr P end_how{.name = "how", .value = "fin", .words = "fin reset"};
 
-// Durations straddle the watchdogs of drivers in use: 2, 4.5, 5, 10, 35, 90 s.
+// Durations lie on both sides of the watchdogs of known drivers: 2, 4.5, 5, 10, 35, 90 s.
 // clang-format off
 constexpr FaultKind table[] = {
     // ---- link

@@ -1,5 +1,5 @@
-// The catalogue of faults as one table: what each kind does, its parameters with limits and defaults, and the part of a vendor
-// that it needs. Codes and names are stable: users write them. Sources: public issue threads and measurements of open drivers.
+// The table of all kinds of faults: effect, parameters with limits and defaults, and the part of a vendor that a kind needs.
+// Codes and names are stable, because users write them. Sources: public issue threads and measurements of open drivers.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace sonar {
 
-/// The stage at which a fault acts; several active ones act in this order.
+/// The stage at which a fault acts; active faults act in this order.
 enum class FaultStage { payload, device, time, framing, stream, link, clients, status, datagrams };
 inline constexpr std::array<std::string_view, 9> fault_stage_names = {"payload", "device",  "time",   "framing",  "stream",
                                                                       "link",    "clients", "status", "datagrams"};
@@ -118,27 +118,27 @@ struct FaultKind {
   FaultStage stage{};
   FaultEffect effect{};
   std::string_view sentence;     // what the sonar does
-  std::string_view good_driver;  // what a correct driver does about it
-  double default_s = 0;          // how long it acts; 0 = per ping
+  std::string_view good_driver;  // what a correct driver does in response
+  double default_s = 0;          // default duration; 0 = per ping
   std::optional<protocol::FieldName> field = {};
   std::array<FaultParameter, 4> parameters = {};  // unused ones have no name
-  std::string_view touches = {};                  // the part of a message or device that it writes; two writers conflict
+  std::string_view touches = {};  // the part of a message or device that it changes; two faults with the same part conflict
 
-  /// Decided ping by ping; else it acts while it lasts.
+  /// True: it acts on single pings; false: during a time.
   bool per_ping() const { return default_s == 0; }
   std::span<const FaultParameter> given() const;
 };
 
 std::span<const FaultKind> fault_kinds();
-/// By code or name, upper or lower case; null.
+/// Finds a kind by code or name, ignoring case; null if there is none.
 const FaultKind* find_fault_kind(std::string_view code_or_name);
 
-/// A trouble: several kinds under the name by which people know it. `severity` (1 to 3) chooses the parameters.
+/// A trouble: several kinds under a common name. `severity` (1 to 3) selects the parameters.
 struct Trouble {
   struct Part {
     std::string_view code;
     std::array<std::string_view, 3> with;  // for each severity: "seconds=0.5 bytes=16"
-    double after = 0;                      // begins when this share of the duration has passed
+    double after = 0;                      // begins after this fraction of the duration
   };
   std::string_view name, sentence;
   double default_s = 10;
