@@ -17,7 +17,7 @@ TEST(FaultDocs, NamesEveryTroubleWithItsDuration) {
   std::ifstream file(std::filesystem::path(SONARD_SOURCE_DIR) / "docs/faults.md");
   std::string page{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   std::replace(page.begin(), page.end(), '\n', ' ');
-  const std::size_t begin = page.find("They last"), end = page.find("unless `for`", begin);
+  const std::size_t begin = page.find("Troubles last"), end = page.find("unless `for`", begin);
   ASSERT_LT(end, page.size());
   std::map<std::string, std::string> durations;  // "10 s (`a`, `b`)"
   static const std::regex group(R"re((\d+ s) \(([^)]*)\))re"), name("`([^`]+)`");
