@@ -1,4 +1,4 @@
-// Finds out whether a mesh is the closed surface of a body. If so, faces on its far side are not visible.
+// Determines whether a mesh is the closed surface of a body, whose far faces are then invisible.
 #pragma once
 
 #include "core/base/geometry.hpp"

@@ -1,4 +1,4 @@
-// Tracing with Embree; 3.x and 4.x differ in three places, all in the shim below and the include of embree_trees.hpp.
+// Tracing with Embree. Versions 3 and 4 differ only in the shim below and in the include of embree_trees.hpp.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -89,7 +89,7 @@ struct RayScene::Impl {
   std::vector<Pose> placed;      // the last poses of bodies
   std::vector<Rotation> turned;  // their rotations, for normals
   RTCScene traced = nullptr;
-  std::vector<std::unique_ptr<ChangingGroup>> changing;  // groups made by change(); the last used comes first
+  std::vector<std::unique_ptr<ChangingGroup>> changing;  // groups made by change(); most recently used first
 
   Impl(std::shared_ptr<const Scene> s, int threads)
       : scene(std::move(s)),
@@ -134,7 +134,7 @@ struct RayScene::Impl {
       wanted.push_back({object.mesh, std::move(vertices), static_cast<std::uint32_t>(i)});
       triangles += object.mesh->triangles.size();
     }
-    // Finds the structure that has most of these objects, if reuse is worth it.
+    // Finds the structure that already has most of these objects, if reusing it is worthwhile.
     auto best = changing.end();
     std::size_t there = 0;
     for (auto group = changing.begin(); group != changing.end(); ++group)
@@ -175,7 +175,7 @@ struct RayScene::Impl {
       device.check();
     }
   }
-  // The static group becomes an instance, too, so that a moved body only changes a few boxes.
+  // The static group becomes an instance, too, so that moving a body changes only a few boxes.
   void make_top() {
     top = SceneHandle(device);
     rtcSetSceneBuildQuality(top.handle, RTC_BUILD_QUALITY_LOW);

@@ -30,7 +30,7 @@ inline std::string device_settings(int threads) {
   if (std::find(std::begin(known), std::end(known), isa) == std::end(known))
     throw std::runtime_error(std::string("SONARD_EMBREE_ISA: unknown instruction set \"") + isa +
                              "\"; use sse2, sse4.2, avx, avx2 or avx512");
-  // avx512 needs no limit. Embree's name for it differs between versions, and an unknown name would mean SSE2.
+  // avx512 is passed as no limit, because Embree's name for it differs between versions, and an unknown name means SSE2.
   return isa == std::string_view("avx512") ? settings : settings + ",max_isa=" + isa;
 }
 
@@ -109,7 +109,7 @@ class ChangingGroup {
     for (const Standing& s : standing_) sum += s.mesh->triangles.size();
     return sum;
   }
-  /// Number of triangles of `wanted` that exist already.
+  /// Number of triangles of `wanted` that already exist.
   std::size_t there(const std::vector<Wanted>& wanted) const {
     std::size_t triangles = 0;
     for (const Wanted& w : wanted)
@@ -164,7 +164,7 @@ class ChangingGroup {
     device.check();
   }
 
-  std::vector<Standing> standing_;  // outlives the geometries, which read it
+  std::vector<Standing> standing_;  // must outlive the geometries, which read it
   SceneHandle scene_;
 };
 

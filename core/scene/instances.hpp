@@ -1,4 +1,4 @@
-// Instances of labels (core/sonar/ping_labels.hpp) by their names in the scene.
+// Names and classes of the instances in labels (core/sonar/ping_labels.hpp).
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// The world position to which float coordinates of rays are relative. It is separate from RayScene, so that code that changes a
-// scene can keep exactly the same floats for all objects that do not change.
+// The world position to which float coordinates of rays are relative. It is separate from RayScene, so that after a change of
+// the scene unchanged objects keep exactly the same floats.
 #pragma once
 
 #include <algorithm>

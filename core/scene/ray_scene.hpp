@@ -1,7 +1,7 @@
-// The scene for rays: its triangles behind a bounding-volume hierarchy (Embree, in embree_scene.cpp and nowhere else).
-// Static geometry is built once at high quality relative to `origin()`; moving bodies are instances, re-placed per ping. A
-// program can replace the tracer when it is linked: if it defines the members of RayScene, Embree's are not linked. Tests that
-// trace analytic primitives under the thread sanitizer do so (tests/core/pipeline/analytic_rays.cpp).
+// Traces rays through a scene, by a bounding-volume hierarchy (Embree, used only in embree_scene.cpp). Static geometry is built
+// once, relative to `origin()`; moving bodies are instances that are placed for each ping. A program can replace the tracer at
+// link time by defining the members of RayScene. Tests that trace analytic primitives under the thread sanitizer do so
+// (tests/core/pipeline/analytic_rays.cpp).
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,8 @@
 
 namespace sonar {
 
-/// Sixteen rays side by side. Set origin, direction and far; after trace(), `far` is the distance of the first hit.
+/// Sixteen rays, as a structure of arrays. Set origin, direction and far; after trace(), `far` is the distance of the first
+/// hit.
 struct alignas(64) RayPacket {
   static constexpr int size = 16;
   static constexpr std::uint32_t miss = 0xFFFFFFFFu;
@@ -34,22 +35,22 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Replaces the scene. Static objects with the same mesh at the same place keep their trees, also when scenes
-  /// alternate. The hits are those of a new RayScene.
+  /// Replaces the scene. Static objects with the same mesh at the same place keep their trees, even if scenes alternate. The
+  /// hits equal those of a new RayScene.
   void change(std::shared_ptr<const Scene> scene);
   const Scene& scene() const;
   Vec3d origin() const;  // world position to which float coordinates are relative
   /// Moves the bodies; called by the thread that owns the scene, before tracing. It takes no time if no body moved.
   void place(std::span<const Pose> bodies_in_world);
-  /// First hits of the active lanes (bit i of `active`). Inactive lanes may have any values; of them only `object` changes, to
+  /// Finds the first hits of the active lanes (bit i of `active`). Inactive lanes may have any values; their `object` becomes
   /// miss. An active ray without a hit keeps `far` and gets the normal 0. Thread-safe between calls of place().
   void trace(RayPacket& rays, std::uint32_t active, bool coherent) const;
   /// Number of rays that are traced together on this processor: 16 with AVX-512, 8 with AVX, otherwise 4.
   int rays_at_once() const;
   static std::string version();  // "Embree 3.13.5"
 
-  /// From this number of triangles on, the static part, and each body, is kept in a smaller form: indices instead of copies of
-  /// the corners, some 65 bytes per triangle less. The hits are the same.
+  /// From this number of triangles on, the static part and each body use a compact form: indices instead of copies of the
+  /// corners, which saves about 65 bytes per triangle. The hits are the same.
   static constexpr std::size_t compact_from_triangles = 2'000'000;
 
  private:
@@ -57,7 +58,7 @@ class RayScene {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether a surface lies between two places of the world; a surface at the far place does not count.
+/// Whether a surface lies between two points of the world; a surface at the far point does not count.
 bool is_occluded(const RayScene& scene, Vec3d from, Vec3d place);
 
 }  // namespace sonar

@@ -26,7 +26,7 @@ struct GsabLaw {
 
 /// Largest backscatter that conserves energy: a Lambert surface that scatters all it receives has mu = 1 / pi per steradian.
 inline constexpr double largest_lambert = 1 / pi;
-inline constexpr double largest_lambert_db = -4.97;  // 10 log10 of it, as scene files and messages give it
+inline constexpr double largest_lambert_db = -4.97;  // 10 log10 of largest_lambert, for scene files and messages
 
 /// Patches of stronger and weaker scattering, fixed to the surface: a Gamma field with mean 1. Makes K-distributed echoes.
 struct Texture {
@@ -42,10 +42,10 @@ struct Material {
   GsabLaw gsab = {};              // when law is gsab
   float trend_db_per_decade = 0;  // change of the scattering strength with frequency, re trend_reference_hz
   float trend_reference_hz = 1e6f;
-  float roughness_m = 1e-3f;  // rms; decides which part is reflected coherently and which is scattered
+  float roughness_m = 1e-3f;  // rms; divides the echo into coherent reflection and scattering
   float reflection = 0.5f;    // pressure reflection coefficient at normal incidence, water-referenced, -1..1
   Texture texture = {};
-  Texture grain = {};  // the same for shells and stones: patches smaller than a beam
+  Texture grain = {};  // a second texture for shells and stones: patches smaller than a beam
   std::uint32_t texture_seed = 0;
   std::string label = {};  // class of its surfaces in labels of samples; empty: its name
   bool operator==(const Material&) const = default;
@@ -69,7 +69,7 @@ struct Primitive {
   bool operator==(const Primitive&) const = default;
 };
 
-/// A mesh placed in the world. `id` is its index in Scene::objects and a key of its speckle.
+/// A mesh placed in the world. Its index in Scene::objects is part of the key of its speckle.
 struct Object {
   std::string name;
   std::shared_ptr<const Mesh> mesh;
@@ -94,7 +94,7 @@ struct PointTarget {
 struct SeaSurface {
   bool present = false;
   float lambert_db = -30;
-  float roughness_m = 0.01f;       // rms height; 0 = still water, which is a mirror
+  float roughness_m = 0.01f;       // rms height; 0 = still water, a mirror
   float bubble_layer_m = 0;        // thickness of the layer of bubbles under it
   float bubble_loss_db_per_m = 0;  // extra absorption in that layer, one way
   bool operator==(const SeaSurface&) const = default;
@@ -123,11 +123,11 @@ struct Scene {
   std::vector<Object> objects;
   std::vector<PointTarget> point_targets;
   std::vector<std::string> body_names;  // moving bodies, in the order of PingRequest::bodies_in_world
-  std::vector<Pose> bodies_in_world;    // where the scene file put them
+  std::vector<Pose> bodies_in_world;    // poses of the scene file
   SeaSurface sea_surface;               // its mesh, if present, is one of the objects
   WaterColumn water_column;
   std::vector<OtherSonar> other_sonars;
-  std::optional<Vec3d> ray_origin;  // the origin to be kept when a running scene is changed (core/scene/ray_origin.hpp)
+  std::optional<Vec3d> ray_origin;  // the origin to keep when a running scene is changed (core/scene/ray_origin.hpp)
   std::vector<std::string> notes;   // sentences about decisions of the loader that the user should know
 
   /// Pose of an object in its body; in the world for a static one.
@@ -135,7 +135,8 @@ struct Scene {
     if (object.body < 0) return object.in_world;
     return compose(inverse(bodies_in_world.at(static_cast<std::size_t>(object.body))), object.in_world);
   }
-  /// Pose of an object, or place of a point, with these poses of bodies. Bodies without one keep the pose of the scene file.
+  /// World pose of an object, or position of a point, for these poses of bodies. Bodies without one keep the pose of the scene
+  /// file.
   Pose in_world(const Object& object, std::span<const Pose> bodies) const {
     return is_attached(object.body, bodies) ? compose(bodies[static_cast<std::size_t>(object.body)], in_body(object))
                                             : object.in_world;

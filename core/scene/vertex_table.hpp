@@ -1,4 +1,4 @@
-// Numbers the vertices of a mesh, so that equal places are one vertex. Code that reads and prepares meshes uses it.
+// Numbers the vertices of a mesh, so that equal positions are one vertex.
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace sonar {
 
-/// A hash table of indices: 8 to 16 bytes per vertex. Places are compared by their bits, with -0 equal to 0. Neighbouring
-/// triangles have the same vertices, so that a small table, which fits in the processor's cache, has the last ones found.
+/// A hash table of indices: 8 to 16 bytes per vertex. Places are compared by their bits, with -0 equal to 0. Because
+/// neighbouring triangles share vertices, a small table, which fits in the processor's cache, has the last ones found.
 class VertexTable {
  public:
   /// New vertices are appended to `vertices`; only this table may do so. `expected` is their approximate number.

@@ -7,7 +7,7 @@
 #include "core/base/random.hpp"
 
 // The loops are compiled for three instruction sets, one of which is chosen when the program starts. This file is built without
-// fused operations, so that rounding is the same in all of them.
+// fused multiply-add, so that rounding is the same in all of them.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
 #define SONAR_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
@@ -101,7 +101,7 @@ T held(T x) {
 SONAR_CLONES void draw_points(const DrawKey& key, std::int32_t first_i, std::int32_t first_j, double cell_size_m, Points& to) {
   alignas(64) std::uint32_t i[block], j[block];
   Draws d, of_blocks;
-  for (int b = 0; b < blocks; ++b) {  // a tile has as many blocks as a block has cells
+  for (int b = 0; b < blocks; ++b) {  // a tile has as many blocks as a block has cells (16)
     i[b] = static_cast<std::uint32_t>(first_i / across + b % across);
     j[b] = static_cast<std::uint32_t>(first_j / across + b / across);
   }
@@ -131,7 +131,7 @@ SONAR_CLONES void draw_points(const DrawKey& key, std::int32_t first_i, std::int
 
 SONAR_CLONES bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners,
                             BlockHeights& found) {
-  const FacetTest t = test;  // a copy, which no store can change
+  const FacetTest t = test;  // a local copy: the compiler knows that no store changes it
   const auto& [e0, e1, e2] = t.edge;
   const double *at_u = in.u + which * block, *at_v = in.v + which * block;
   std::int64_t* owner = owners.facet + which * block;

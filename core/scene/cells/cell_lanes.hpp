@@ -1,6 +1,5 @@
-// Loops of the building of cells that process many lattice points at once. Every lane does the same correctly rounded operations
-// in the same order, so that the bytes do not depend on the instruction set. Points of a tile have the order of its cells:
-// 4 x 4 blocks one after the other, and the rows of a block one after the other.
+// The vector loops that build cells. Every lane does the same correctly rounded operations in the same order, so that the bytes
+// do not depend on the instruction set. The points of a tile are ordered by blocks of 4 x 4, and within a block by rows.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +8,7 @@
 
 namespace sonar::cell_lanes {
 
-constexpr int side = 16, points = side * side;  // points along a side of a tile, and in all
+constexpr int side = 16, points = side * side;  // points along a side of a tile; points of a tile
 constexpr int block = 16, blocks = points / block;
 
 /// Inputs of a tile's random draws, in addition to the indices of the cells along u and v.
@@ -17,7 +16,7 @@ struct DrawKey {
   std::uint32_t patch, level, lo, hi;
 };
 
-/// A tile's lattice points: places in the lattice plane [m], and the draws from which speckle is computed.
+/// A tile's lattice points: positions in the lattice plane [m], and the random draws of their speckle.
 struct Points {
   alignas(64) double u[points], v[points];
   alignas(64) std::uint32_t speckle_a[points], speckle_b[points];
@@ -25,8 +24,8 @@ struct Points {
 /// first_i, first_j: lattice indices of the tile's first cell.
 void draw_points(const DrawKey& key, std::int32_t first_i, std::int32_t first_j, double cell_size_m, Points& to);
 
-/// A facet in tests against the points of one cube. It owns a point that lies within the open box, on the inner side of the three
-/// edges (du (v - pv) - dv (u - pu) at least `least`), and at a height within [low_w, end_w).
+/// A facet, prepared for tests with the points of one cube. It owns a point that lies in the open box, on the inner side of the
+/// three edges (du (v - pv) - dv (u - pu) >= `least`), and at a height in [low_w, end_w).
 struct FacetTest {
   struct Edge {
     double pu, pv, du, dv, least;
@@ -40,17 +39,17 @@ struct Owners {
   alignas(64) std::int64_t facet[points];  // -1: no owner
   alignas(64) double w[points];
 };
-/// The points of a block that the facet owns, as bits, and their heights.
+/// The points of a block that the facet owns, as bit masks, and their heights.
 struct BlockHeights {
   alignas(64) double w[block];
   alignas(64) std::int64_t owned[block];  // all bits or none
 };
-/// Makes a facet the owner of its points in one block. If one of them has an owner already (another surface at the same height,
-/// or one that folds back), it returns false, fills `found` and changes no owner.
+/// Makes a facet the owner of its points in one block. If one of them already has an owner (another surface at the same height,
+/// or a surface that folds back), it fills `found`, changes nothing and returns false.
 bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners, BlockHeights& found);
 
 /// Circular complex Gaussians with E|z|^2 = 1 from pairs of draws (Box-Muller, as complex_normal), accurate to about 2e-7 of
-/// their magnitude, times a root; n must be a multiple of `block`. Returns the largest |re| or |im|.
+/// their magnitude, multiplied by `root`; n must be a multiple of `block`. Returns the largest |re| or |im|.
 float speckle(const std::uint32_t* a, const std::uint32_t* b, const double* root, int n, float* re, float* im);
 
 struct Extent {

@@ -1,5 +1,5 @@
-// The geometry of the surface cells: triangles projected along the dominant axis of their normals, the half-open test by which
-// every lattice point has exactly one owner, and the cubes of tiles.
+// The geometry of surface cells: triangles projected along the dominant axis of their normals, the half-open test that gives
+// every lattice point exactly one owner, and the cubes of tiles.
 #pragma once
 
 #include <array>
@@ -108,7 +108,8 @@ inline FacetBounds bounds_of(const Facet& f) {
   return b;
 }
 
-/// Whether a facet may own points inside the cube. It may be true for facets that own none, but is never false for one that does.
+/// Whether a facet may own points inside the cube. It can be true for a facet that owns none, but is never false for one that
+/// does.
 inline bool may_touch(const FacetBounds& f, double cu, double cv, double cw, double half) {
   const double slack = half * 1e-6 + 1e-9;
   const double h = half + slack;
@@ -122,7 +123,7 @@ inline bool may_touch(const FacetBounds& f, double cu, double cv, double cw, dou
   return true;
 }
 
-/// Size of a cell, 2^-level, and edge of the cube (and of the tile) that holds 16 along; |level| below 1000.
+/// Size of a cell, 2^-level; and the edge of a cube (and tile), 16 cells. |level| must be below 1000.
 inline double cell_size_m(int level) { return std::bit_cast<double>(static_cast<std::uint64_t>(1023 - level) << 52); }
 inline double tile_edge_m(int level) { return 16 * cell_size_m(level); }
 

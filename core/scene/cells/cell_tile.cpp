@@ -49,7 +49,7 @@ std::int16_t normal_counts(double value) {
   return static_cast<std::int16_t>(std::lround(std::clamp(value * 32767, -32767.0, 32767.0)));
 }
 
-/// lattice::owns and lattice::height, with everything computed in advance that does not depend on the point.
+/// The tests lattice::owns and lattice::height, with all point-independent values precomputed.
 cell_lanes::FacetTest test_of(const lattice::Facet& f, const TileAddress& a, CellRange cols, CellRange rows) {
   const double s = lattice::cell_size_m(a.level), edge = lattice::tile_edge_m(a.level), turn = f.nw > 0 ? 1.0 : -1.0;
   const auto border = [&](std::int32_t tile, int cell) { return (static_cast<double>(tile) * side + cell) * s; };
@@ -61,7 +61,7 @@ cell_lanes::FacetTest test_of(const lattice::Facet& f, const TileAddress& a, Cel
     const double sign = forward ? turn : -turn;
     const double du = turn * (f.u[j] - f.u[i]), dv = turn * (f.v[j] - f.v[i]);
     const bool with_its_points = dv < 0 || (dv == 0 && du > 0);
-    // Areas are zero or far above the least normal number, because coordinates are single precision.
+    // Areas are zero or far above the smallest normal number, because coordinates are single precision.
     t.edge[i] = {f.u[p], f.v[p], sign * (f.u[q] - f.u[p]), sign * (f.v[q] - f.v[p]),
                  with_its_points ? 0.0 : std::numeric_limits<double>::min()};
   }
@@ -139,7 +139,7 @@ CellList list_cells(Ownership& all) {
   auto again = all.again.cbegin();
   int n = 0;
   for (int p = 0; p < cell_lanes::points; ++p) {
-    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next one overwrites it if it has no owner
+    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next point overwrites it if it has no owner
     n += all.first.facet[p] >= 0;
     for (; again != all.again.cend() && again->point == p; ++again) cells.put(n++, all.points, p, again->facet, again->w);
   }

@@ -28,14 +28,15 @@ struct CellView {
   float max_sine = 1;             // |y / r| of the outermost column
   float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
-  // Fans with side lobes: half angle of the main part about the array axis, and angle at which the side lobes begin. There all
-  // cells of a cube have one level, which is at most `side_coarser` levels coarser than the coarsest of `levels`.
+  // For fans with side lobes: half angle of the main part about the array axis, and the angle at which side lobes begin. In
+  // side lobes all cells of a cube have one level, at most `side_coarser` levels coarser than the coarsest of `levels`.
   float main_elevation_rad = 2, side_from_rad = 2;
   float side_area_per_range_m = 0;  // cell area divided by range, at grazing incidence; cells are larger at steep incidence
   int side_coarser = 0;
-  bool exact_small = false;  // objects with few cells get finer ones, because no speckle hides the places of cells
-  /// If set, it replaces the bounds of the fan. It returns the distances at which a ball around a place in the sonar's axes is
-  /// visible, which mirrors can make larger than the true one; nothing if it is not visible.
+  bool exact_small =
+      false;  // objects with few cells get finer ones, because without speckle the positions of cells would be visible
+  /// If set, it replaces the bounds of the fan. For a ball around a point in the sonar's axes it returns the distances at which
+  /// the ball is visible (mirrors can make them larger than the true one); nullopt if it is not visible.
   std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;
 };
 

@@ -14,7 +14,7 @@
 namespace sonar {
 namespace {
 
-constexpr double fewest_cells = 3000;  // least number for an object, with CellView::exact_small
+constexpr double fewest_cells = 3000;  // smallest number for an object, with CellView::exact_small
 
 /// The level of tiles for side lobes, where all cells of a place are in one cube.
 constexpr CellLevel at_all_ranges{.full_to_m = 1e9f, .fade_out_to_m = 1e9f};
@@ -36,9 +36,9 @@ struct SurfaceCells::Known {
   std::map<const Mesh*, SkinOf> skins;
   struct Patch {
     std::unique_ptr<SurfacePatch> patch;
-    std::size_t bytes = 0;  // bytes of mesh and roots, which cached_bytes_ leaves out
+    std::size_t bytes = 0;  // bytes of mesh and roots, which cached_bytes_ does not include
   };
-  std::vector<Patch> patches;  // the last used come last
+  std::vector<Patch> patches;  // in order of use, the last used at the end
   std::size_t bytes = 0;
 };
 
@@ -153,7 +153,7 @@ SurfaceCells::~SurfaceCells() = default;
 void SurfaceCells::list(CellNode& node, bool of_side, const TileInView& seen, Found& found) {
   const bool built = of_side ? node.side_built : node.built;
   const Missing missing{&node, of_side};
-  // Listed only once, even if two levels need it.
+  // Lists a tile only once, even if two levels need it.
   if (!built && (found.missing.empty() || found.missing.back() != missing)) found.missing.push_back(missing);
   if (!built || seen.tile->count > 0) found.in_view.push_back(seen);
 }
@@ -205,7 +205,8 @@ void SurfaceCells::visit(SurfacePatch& patch, CellNode& node, const Look& look, 
     const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(CellNode) % dividing_.size()]);
     if (!node.divided.load(std::memory_order_relaxed)) found.new_bytes += patch.divide(node);
   }
-  for (const auto& child : node.children) {  // they are scattered in memory, so all are prefetched before the first
+  for (const auto& child :
+       node.children) {  // prefetches all children before visiting the first, because they are scattered in memory
     if (!child) continue;
     const auto* at = reinterpret_cast<const char*>(child.get());
     __builtin_prefetch(at);
@@ -304,7 +305,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   looks_.resize(views.size());
   found_.resize(views.size());
   pool.for_each(views.size(), [&](std::size_t v, int) {
-    found_[v].in_view.swap(found[v].tiles);  // as much room as it had the last time
+    found_[v].in_view.swap(found[v].tiles);  // reuses the memory of the last call
     prepare(views[v], first + v, looks_[v]);
     look_through(looks_[v], 0, roots_.size(), found_[v]);
     found[v].tiles.swap(found_[v].in_view);
@@ -327,7 +328,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   pool.for_each(missing.empty() ? 0 : views.size(), [&](std::size_t v, int) { std::erase_if(found[v].tiles, is_empty); });
 }
 
-/// Drops the tiles that were not used for the longest time. If they are needed again, the new ones are identical.
+/// Drops the least recently used tiles. Tiles that are built again are identical.
 void SurfaceCells::keep_within_budget() {
   if (cached_bytes_ > cache_bytes_) forget_known();
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {

@@ -1,6 +1,6 @@
-// Scatterers that belong to surfaces: a lattice of cells in object coordinates, made on demand from the triangles of meshes and
-// kept between pings (docs/architecture.md, "Surface cells"; Choi 2025 eq. 2 for the statistics of one scatterer).
-// `scatter` uses the tiles in view of a ping. The speckle of cells does not depend on rays or pings.
+// Scatterers fixed to surfaces: a lattice of cells in object coordinates, built on demand from the triangles of meshes and kept
+// between pings (docs/architecture.md, "Surface cells"; Choi 2025 eq. 2 for the statistics of one scatterer). `scatter` uses
+// the tiles in view of a ping. The speckle of cells does not depend on rays or pings.
 #pragma once
 
 #include <array>
@@ -24,21 +24,21 @@
 
 namespace sonar {
 
-/// A tile in view, and its place relative to the sonar.
+/// A tile in view, and its position relative to the sonar.
 struct TileInView {
   const CellTile* tile = nullptr;
   const CellLevel* level = nullptr;
   Vec3d from_sonar_object_m;  // tile centre minus sonar, object axes
   Vec3d from_sonar_m;         // the same in the sonar's axes
   int object = 0;
-  bool in_side_lobes = false;  // whether it is for side lobes, with weights of one magnitude; another tile is for the main part
+  bool in_side_lobes = false;  // true: a tile for side lobes, with weights of constant magnitude
 };
 
 /// Cells of a view. Valid until the next call of in_view() or in_views().
 struct CellsInView {
   std::vector<TileInView> tiles;
   std::vector<Rotation> sonar_from_object;  // rotations to the sonar's axes, per object
-  std::size_t built = 0;  // number of tiles built for it, including those that other views of the call need, too
+  std::size_t built = 0;                    // number of tiles built for this view, including shared ones
 };
 
 class SurfacePatch;
@@ -53,15 +53,14 @@ struct CellFields {
 class SurfaceCells {
  public:
   SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields = {});
-  /// Replaces the scene. Objects with the same mesh and materials at the same index keep their cells, also if scenes
-  /// alternate.
+  /// Replaces the scene. Objects with the same mesh and materials at the same index keep their cells, even if scenes alternate.
   void change(std::shared_ptr<const Scene> scene);
   ~SurfaceCells();
   SurfaceCells(const SurfaceCells&) = delete;
   SurfaceCells& operator=(const SurfaceCells&) = delete;
 
   Seed seed() const { return seed_; }
-  /// Whether these are the cells for this seed and these fields. Fields that no material has do not matter.
+  /// Whether the cells are valid for this seed and these fields, ignoring fields that no material has.
   bool serves(Seed seed, CellFields fields) const {
     return seed == seed_ && (fields.texture == fields_.texture || !there_.texture) &&
            (fields.grain == fields_.grain || !there_.grain);
@@ -69,17 +68,17 @@ class SurfaceCells {
   /// Tiles that may lie in the view, in an order that does not depend on the pool. Missing tiles are built first.
   /// Valid until the next call. `view` must outlive the result.
   const std::vector<TileInView>& in_view(const CellView& view, Parallel& pool);
-  /// The same for several views, with one thread per view, and with the same results. `found` has an element for each view.
+  /// Like in_view(), for several views in parallel, with the same results. `found` has an element for each view.
   void in_views(std::span<const CellView> views, Parallel& pool, std::span<CellsInView> found);
   /// Rotation from object to sonar axes of the last view of in_view(), per object.
   const Rotation& sonar_from_object(int object) const { return looked_.rotations[static_cast<std::size_t>(object)]; }
   std::span<const Rotation> sonar_from_objects() const { return looked_.rotations; }
   /// Skins of all objects' meshes; empty for objects that are not visible.
   std::span<const Skin> skins() const { return skins_; }
-  /// Number of views so far.
+  /// Number of the last view.
   std::uint64_t views() const { return now_; }
-  /// From now on, tiles of this view and of later ones are not dropped, so that other views can be requested while they are in
-  /// use. 0 = no such view.
+  /// Keeps the tiles of this view and of later ones until the next call, so that other views can be requested meanwhile. 0 =
+  /// keeps none.
   void keep_since(std::uint64_t view) { kept_since_ = view; }
   /// Bytes of the tiles and of the tree that leads to them.
   std::size_t cached_bytes() const { return cached_bytes_; }
@@ -129,7 +128,7 @@ class SurfaceCells {
   std::shared_ptr<const Scene> scene_;
   Seed seed_{};
   std::vector<Skin> skins_;                                             // per object
-  CellFields fields_, there_{false, false};                             // wanted fields; fields that a material has
+  CellFields fields_, there_{false, false};                             // requested fields; fields that some material has
   std::vector<std::unique_ptr<const TextureField>> textures_, grains_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
   std::uint64_t now_ = 0, kept_since_ = 0;  // number of views; tiles of this view and later ones are kept, 0 = none

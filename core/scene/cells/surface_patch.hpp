@@ -24,12 +24,13 @@ inline Cube cube_of(const TileAddress& a) {
 }
 inline bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
 
-/// A cube of the lattice: triangles that may own points in it, the tile of its level if it was needed, the eight cubes in it.
+/// A cube of the lattice: the triangles that may own points in it, the tile of its level once needed, and its eight child
+/// cubes.
 struct CellNode {
   // The fields that every visit reads come first, so that they are close in memory.
   TileAddress address;
-  std::atomic<bool> divided = false;                      // a thread that reads true may use `children`
-  bool built = false, side_built = false, alone = false;  // alone: made by SurfacePatch::raise(), without cubes in it
+  std::atomic<bool> divided = false;                      // true: other threads may use `children`
+  bool built = false, side_built = false, alone = false;  // alone: made by SurfacePatch::raise(), without children
   std::atomic<std::uint64_t> last_visited = 0;
   std::array<std::unique_ptr<CellNode>, 8> children;  // null if it has no triangles
   std::vector<std::uint32_t> triangles;
@@ -53,7 +54,7 @@ class SurfacePatch {
   bool negative_side = false;
   Texture texture, grain;  // texture and grain of the material, with its seed, for the tiles
   std::uint32_t texture_seed = 0;
-  int coarsest = 0;  // level with the fewest cells of an object, used with exact_small
+  int coarsest = 0;  // coarsest level that an object may have with exact_small
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<CellNode>> roots;
   std::size_t first_coarsest = 0;  // index of the first root with the coarsest level
@@ -67,14 +68,14 @@ class SurfacePatch {
 
   void plant(const std::vector<std::uint32_t>& triangles);
   static constexpr int finest_root = 4;  // level
-  /// Adds roots one level coarser than the coarsest, if these are finer than `level`. They have only tiles; finer cubes belong to
-  /// the first roots.
+  /// Adds roots one level coarser than the present coarsest ones, if those are finer than `level`. The new roots only have
+  /// tiles; finer cubes belong to the first roots.
   void raise(int level);
-  /// Makes the cubes in `node`. Returns the bytes that they take.
+  /// Makes the child cubes of `node`. Returns their size in bytes.
   std::size_t divide(CellNode& node) const;
-  /// Level that cells for side lobes in a cube should have, for a sonar at `sonar_m` in the object's axes.
+  /// The level of cells for side lobes in a cube, for a sonar at `sonar_m` in the object's axes.
   int side_level(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
-  /// Whether this cube has the cells for side lobes at its place: its level is fine enough, and that of no larger cube is.
+  /// Whether this cube provides the cells for side lobes: its level is fine enough, and that of no larger cube is.
   bool has_side_cells(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
   /// Drops the tiles and keeps the cubes. Returns the number of bytes freed.
   std::size_t forget_tiles();

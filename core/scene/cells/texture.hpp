@@ -1,4 +1,4 @@
-// Patches of stronger and weaker scattering that belong to a surface: a continuous Gamma field of mean 1 over object coordinates
+// Patches of stronger and weaker scattering, fixed to a surface: a continuous Gamma field of mean 1 over object coordinates
 // (docs/acoustics.md, section 3). build_tile multiplies the cells' speckle by its root, which makes their echoes K-distributed.
 #pragma once
 
@@ -32,7 +32,8 @@ class TextureField {
   std::vector<float> roots_;
 };
 
-/// A field near one place on one object. It stores the lattice points that neighbouring cells share. Only one thread may use it.
+/// Evaluates a field near one point of one object. It caches the lattice points that neighbouring cells share, so only one
+/// thread may use it.
 class TexturePatch {
  public:
   TexturePatch(const TextureField& field, int object);

@@ -17,9 +17,9 @@ struct BinaryStl {
   std::uint64_t bytes_behind = 0;  // bytes after the last triangle
 };
 
-/// nullopt: not a binary STL file, because it is too short for the triangles that its header counts. So is every text.
+/// nullopt: not a binary STL file, because it is too short for the number of triangles in its header (as every text is).
 std::optional<BinaryStl> binary_stl(std::FILE* file);
-/// Passes `count` triangles of the file to `take`, with material 0. False: they could not all be read.
+/// Passes `count` triangles of the file to `take`, with material 0. False: not all could be read.
 bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take);
 
 }  // namespace sonar

@@ -1,5 +1,4 @@
-// The shipped scenes that are part of the program, so that the demo and the benchmark need no files on disk.
-// CMake makes them from scenes/; the scene loader reads them.
+// The shipped scenes that CMake builds into the program from scenes/, so that the demo and the benchmark need no files on disk.
 #pragma once
 
 #include <algorithm>

@@ -16,10 +16,10 @@ using TriangleSink = std::function<void(std::span<const Vec3d, 3>, std::uint16_t
 /// A function that passes every triangle to the sink. Each call passes the same triangles in the same order.
 using TriangleSource = std::function<void(const TriangleSink&)>;
 
-/// Checks that vertices are finite and within 1e7 m, drops triangles without area, merges equal vertices, and moves the middle to
-/// the origin. It calls `source` twice, so that it needs no copy of the corners. Errors do not contain the file name.
+/// Checks that vertices are finite and within 1e7 m, drops triangles without area, merges equal vertices, and moves the mesh's
+/// middle to the origin. It calls `source` twice, to avoid a copy of the corners. Errors do not contain the file name.
 Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t most = max_mesh_triangles);
-/// The same for a list of corners, three for each triangle.
+/// Like clean_triangles(), for a list of corners, three per triangle.
 Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,
                                std::size_t most = max_mesh_triangles);
 

@@ -36,7 +36,7 @@ constexpr std::array<std::string_view, 16> modern_datums{"WGS84",    "WGS1984", 
                                                          "GDA94",    "GDA1994", "GDA2020", "SIRGAS2000", "SIRGAS", "RGF93",
                                                          "NZGD2000", "JGD2000", "JGD2011", "SWEREF99"};
 
-/// From names like "WGS 84 / UTM zone 33N", "NAD_1983_UTM_Zone_10N" and "GDA94 / MGA zone 55" in capitals.
+/// Reads names like "WGS 84 / UTM zone 33N", "NAD_1983_UTM_Zone_10N" and "GDA94 / MGA zone 55", converted to capitals.
 std::optional<UtmZone> utm_of_name(std::string name) {
   std::erase_if(name, [](char c) { return c == ' ' || c == '_' || c == '/'; });
   const bool modern = std::any_of(modern_datums.begin(), modern_datums.end(),
@@ -79,7 +79,7 @@ CoordinateSystem system_of_lines(const std::string& text) {
     if (key == "UNITS" && (value == "DS" || value == "DM")) system.unit_deg = value == "DS" ? 1.0 / 3600 : 1.0 / 60;
     if (key == "ZUNITS") system.height_unit_m = unit_of(value);
   }
-  if (is_utm)  // zones of the south have a sign
+  if (is_utm)  // southern zones are negative
     system.utm = utm_of_name(datum + " UTM ZONE " + (zone.starts_with('-') ? zone.substr(1) + "S" : zone + "N"));
   return system;
 }
@@ -121,7 +121,7 @@ class WktReader {
   struct Open {
     std::string word, name;
     unsigned commas = 0;
-    std::array<std::string, 2> values;  // its second and third
+    std::array<std::string, 2> values;  // its second and third value
   };
   static constexpr std::size_t deepest = 64;
 

@@ -1,4 +1,4 @@
-// The text of TIFF tag 42112, in which GDAL keeps the unit, the scale and the offset of a band.
+// Reads TIFF tag 42112, in which GDAL stores the unit, scale and offset of a band.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// Facts that the file states about its first band. A height is scale * value + offset.
+/// The metadata of the first band. A height is scale * value + offset.
 struct GdalMetadata {
   std::optional<std::uint16_t> height_unit = {};  // code of the unit of length; other units, as of a sensor, are ignored
   double scale = 1, offset = 0;                   // NaN if they are not finite numbers

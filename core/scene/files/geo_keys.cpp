@@ -62,7 +62,7 @@ std::optional<std::uint16_t> code_of(const GeoKeys& keys, std::uint16_t key) {
   return code == user_defined || code == 0 ? std::nullopt : code;
 }
 
-/// Degrees per unit of angle. nullopt for minutes with seconds and the like, which are not decimal numbers.
+/// Degrees per unit of angle. nullopt for units such as packed degrees, minutes and seconds, which are not decimal.
 std::optional<double> degrees_per_unit(const GeoKeys& keys) {
   constexpr std::uint16_t radian = 9101, degree = 9102, grad = 9105, gon = 9106, other_degree = 9122;
   const std::uint16_t unit = keys.value_of(angular_units).value_or(degree);
@@ -73,7 +73,7 @@ std::optional<double> degrees_per_unit(const GeoKeys& keys) {
   return size_rad && *size_rad > 1e-6 && *size_rad < 10 ? std::optional(deg_from_rad(*size_rad)) : std::nullopt;
 }
 
-/// Where longitudes begin, in degrees east of Greenwich. nullopt if the file names an unknown meridian.
+/// The prime meridian, in degrees east of Greenwich. nullopt if the file names an unknown meridian.
 std::optional<double> prime_meridian_of_keys(const GeoKeys& keys, double unit_deg) {
   if (const auto longitude = keys.number_of(prime_meridian_longitude); longitude && std::abs(*longitude * unit_deg) <= 360)
     return *longitude * unit_deg;
@@ -112,7 +112,7 @@ std::optional<bool> has_modern_datum(const GeoKeys& keys) {
   return axis && flattening ? std::optional(is_modern_ellipsoid(*axis, *flattening)) : std::nullopt;
 }
 
-/// The zone by the code of the system, else by that of its projection, else by its parameters.
+/// The zone from the code of the system, else from the code of its projection, else from its parameters.
 std::optional<UtmZone> utm_of_keys(const GeoKeys& keys) {
   if (const auto code = code_of(keys, projected_system)) return utm_of_epsg(*code);
   if (!has_modern_datum(keys).value_or(false)) return std::nullopt;
@@ -124,7 +124,7 @@ std::optional<UtmZone> utm_of_keys(const GeoKeys& keys) {
                             number(false_easting), number(false_northing)});
 }
 
-/// The system that ArcGIS, and GDAL for codes of ESRI, write as WKT into a citation if no code names it.
+/// The system in the citation, where ArcGIS (and GDAL for ESRI's codes) writes WKT if no code exists.
 std::optional<CoordinateSystem> system_of_citation(const GeoKeys& keys) {
   constexpr std::string_view before_wkt = "ESRI PE String = ";
   constexpr std::size_t longest_wkt = 8192;
@@ -201,7 +201,7 @@ Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::
   if (cited) return system;
   const auto of_lengths = length_unit(model == projected ? keys.value_of(linear_units) : std::nullopt);
   if (!of_lengths) return tl::make_unexpected(of_lengths.error());
-  if (*of_lengths != 1) system.utm.reset();  // its parameters, too, are in that unit
+  if (*of_lengths != 1) system.utm.reset();  // its parameters have that unit, too
   system.unit_m = *of_lengths;
   return system;
 }

@@ -23,7 +23,7 @@ class GeoKeys {
 
   std::optional<std::uint16_t> value_of(std::uint16_t key) const;
   std::optional<double> number_of(std::uint16_t key) const;
-  /// At most `longest` letters.
+  /// Returns at most `longest` letters.
   std::string text_of(std::uint16_t key, std::size_t longest = 80) const;
 
  private:
@@ -36,7 +36,7 @@ class GeoKeys {
   std::string texts_;
 };
 
-/// `height_unit`: the code of the unit that the file names elsewhere. Errors do not contain the file name.
+/// `height_unit`: the code of a unit that another part of the file states. Errors do not contain the file name.
 Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit);
 
 /// Codes of units of length.

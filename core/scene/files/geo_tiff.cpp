@@ -53,7 +53,7 @@ std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
   return values == nullptr ? std::vector<T>() : std::vector<T>(values, values + std::min<std::uint32_t>(count, 65536));
 }
 
-/// Place of the middle of the first cell, and steps; y usually falls.
+/// Coordinates of the middle of the first cell, and steps; y usually decreases.
 struct Georeference {
   double x = 0, y = 0, step_x = 0, step_y = 0;
 };
@@ -111,7 +111,7 @@ class GeoTiffReader {
  private:
   static tl::unexpected<Error> bad(const std::string& what) { return failure(ErrorKind::bad_data, what); }
 
-  /// Takes out the heights of the cells that are 0 in the mask, a picture of 1 or 8 bits.
+  /// Removes the heights of cells that are 0 in the mask, a picture of 1 or 8 bits.
   Result<void> apply_mask(std::uint16_t number) {
     TIFFSetDirectory(tiff_, number);
     const Picture mask = picture_at(tiff_);
@@ -174,7 +174,7 @@ class GeoTiffReader {
     return check_blocks(tiff_);
   }
 
-  /// Further bands are uncertainties and the like, except the one that says where there are heights.
+  /// Finds the band that marks cells with heights. Other bands (uncertainties, for example) are ignored.
   Result<void> find_alpha() {
     std::uint16_t count = 0;
     const std::uint16_t* kinds = nullptr;
@@ -254,7 +254,7 @@ class GeoTiffReader {
     return sign ? number_at<std::int32_t>(at) : number_at<std::uint32_t>(at);
   }
 
-  /// `width` heights of one row, from a block's bytes, to column and row of the grid.
+  /// Stores `width` heights of one row, from a block's bytes, at a column and row of the grid.
   Result<void> take(std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width) {
     const std::size_t size = picture_.value_bytes() * picture_.bands;
     if (bytes.empty()) return {};

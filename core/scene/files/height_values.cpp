@@ -19,7 +19,7 @@ constexpr float none = std::numeric_limits<float>::quiet_NaN();
 /// Usual fill values that could be heights.
 constexpr std::array<float, 14> usual_fills{-9999, -32768, -32767, 32767,  -99999,   99999,  -999999,
                                             65535, -999,   9999,   -10000, -9999999, 999999, 9999999};
-/// Limits of 32-bit integers, which no height reaches.
+/// Limits of 32-bit integers; no height is that large.
 constexpr std::array<double, 4> ends_of_32_bits{-2147483648.0, -2147483647.0, 2147483647.0, 4294967295.0};
 
 /// The value of one unit in the last digit of a number as it is written.
@@ -33,7 +33,7 @@ struct Span {
   float low = std::numeric_limits<float>::infinity(), high = -std::numeric_limits<float>::infinity();
 };
 
-/// Removes undeclared fill values. They lie far outside of all other heights, unlike heights that equal a usual fill value.
+/// Removes undeclared fill values: usual fill values that are far outside of all other heights.
 void take_out_fills(RawHeights& raw, std::vector<std::string>& notes) {
   const auto is_usual = [](float z) { return std::find(usual_fills.begin(), usual_fills.end(), z) != usual_fills.end(); };
   Span rest;
@@ -69,7 +69,8 @@ bool are_arc_seconds(double cell) {
   return is_whole(cell * ninths_in_a_degree) && !is_whole(cell * 1e5);
 }
 
-/// Whether the ground would be absurdly steep if coordinates were metres: in degrees, 1 m up in 100 m becomes 1000 to 1.
+/// Whether the ground would be absurdly steep if coordinates were metres: read from degrees, a slope of 1 in 100 becomes 1000
+/// to 1.
 bool shows_degrees(const RawHeights& raw) {
   const std::size_t columns = raw.x.size();
   const double cell = (raw.x.back() - raw.x.front()) / static_cast<double>(columns - 1);
@@ -82,7 +83,7 @@ bool shows_degrees(const RawHeights& raw) {
       const double step = std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1]));
       rise += step, ++steps, steep_steps += step > steep * cell;
     }
-  // Large cells are more likely metres: their steepness must not come from a few false heights.
+  // Large cells are more likely in metres, so a few wrong heights must not decide.
   if (cell >= small_cell_deg) return 2 * steep_steps > steps;
   const double slope = steps == 0 ? 0 : rise / static_cast<double>(steps) / cell;
   return slope > steep || (slope == 0 && cell < 0.005) || are_arc_seconds(cell);
@@ -99,7 +100,7 @@ void convert_web_mercator(RawHeights& raw, std::vector<std::string>& notes) {
                    1 / std::cos(rad_from_deg(0.5 * (raw.y.front() + raw.y.back())))));
 }
 
-/// Longitudes and latitudes in other units, or from another meridian than Greenwich.
+/// Converts longitudes and latitudes in other units, or relative to another meridian than Greenwich.
 void convert_to_degrees(RawHeights& raw, std::vector<std::string>& notes) {
   const double unit_deg = raw.system.unit_deg, meridian_deg = raw.system.prime_meridian_deg;
   if (unit_deg != 1) {
@@ -124,7 +125,7 @@ void convert_to_metres(RawHeights& raw, double z_scale, std::vector<std::string>
                        : ""));
 }
 
-/// German eastings are often written with the number of their zone before them: 32500000.
+/// Removes the zone number that often precedes German eastings: 32500000.
 void remove_zone_number(RawHeights& raw, UtmZone zone, std::vector<std::string>& notes) {
   constexpr double a_million_m = 1e6;
   const auto has_it = [&](double x) { return std::floor(x / a_million_m) == zone.number; };
@@ -146,7 +147,7 @@ std::string note_of_system(const CoordinateSystem& system) {
                    "longitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif";
 }
 
-/// Turns stored values into heights. Fill values are stored ones and must have become NaN before.
+/// Converts stored values to heights. Fill values must have been replaced by NaN before.
 void apply_scale(RawHeights& raw, std::vector<std::string>& notes) {
   if (raw.scale == 1 && raw.offset == 0) return;
   for (float& z : raw.z) z = static_cast<float>(raw.scale * static_cast<double>(z) + raw.offset);
@@ -154,7 +155,8 @@ void apply_scale(RawHeights& raw, std::vector<std::string>& notes) {
       text::format("its heights are %.9g times the stored values, plus %.9g, as the file says", raw.scale, raw.offset));
 }
 
-/// A note about a vertical system that counts downwards. Its values decide, because many files only copy the system's name.
+/// A note about a vertical system that counts downwards. The values decide, because many files have the system's name but
+/// heights.
 void note_depths(const RawHeights& raw, double z_scale, std::vector<std::string>& notes) {
   if (raw.system.depths.empty() || z_scale < 0) return;
   const auto positive = std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return z > 0; }),
@@ -168,7 +170,7 @@ std::string place_text(const Geodetic& place) {
   return text::format("latitude %.6f, longitude %.6f", deg_from_rad(place.latitude_rad), deg_from_rad(place.longitude_rad));
 }
 
-/// The origin as the scene or the configuration gives it; without both, the middle of the grid.
+/// Sets the origin from the scene or the configuration; without both, the middle of the grid.
 void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodetic& middle) {
   grid.origin = options.origin ? options.origin : options.world_origin;
   if (grid.origin && !options.origin) grid.notes.push_back("its place is relative to world.origin, " + place_text(*grid.origin));
@@ -193,8 +195,8 @@ void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodeti
                        "; set origin: {lat, lon} to place it otherwise");
 }
 
-/// Large cells with coordinates of a place on Earth may be degrees, even if the ground is flat. A local grid usually begins or
-/// has its middle at 0, 0.
+/// Adds a note if large cells may be in degrees although the ground is flat: the coordinates are possible on Earth, and the
+/// grid neither begins nor has its middle at 0, 0, as local grids usually do.
 void hint_at_degrees(HeightGrid& grid) {
   constexpr double least_cell = 0.05, all_around = 300;
   const double cell = grid.x[1] - grid.x[0], near = cell;
@@ -218,7 +220,7 @@ Result<void> set_origin_of_degrees(HeightGrid& grid, const HeightOptions& option
                      grid.x.front(), grid.y.front(), grid.x[1] - grid.x[0]));
   choose_origin(grid, options, {rad_from_deg(latitude), rad_from_deg(longitude), 0});
   const double from_longitude = deg_from_rad(grid.origin->longitude_rad), from_latitude = deg_from_rad(grid.origin->latitude_rad);
-  const double turns = std::round((from_longitude - longitude) / 360);  // 0 to 360 and -180 to 180 both name places
+  const double turns = std::round((from_longitude - longitude) / 360);  // files use 0 to 360 or -180 to 180
   for (double& x : grid.x) x += 360 * turns;
   const double far = std::max({std::abs(grid.x.front() - from_longitude), std::abs(grid.x.back() - from_longitude),
                                std::abs(grid.y.front() - from_latitude), std::abs(grid.y.back() - from_latitude)});

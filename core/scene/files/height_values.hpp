@@ -14,7 +14,7 @@ namespace sonar {
 /// Parses a number of a grid file, which may have leading zeros ("007") or be nan.
 std::optional<double> height_number(std::string_view word);
 bool is_nan_word(std::string_view word);
-/// A word that is not a number, made fit for an error text.
+/// A word that is not a number, made printable for an error text.
 std::string word_text(std::string_view word);
 /// The byte order mark that may precede the first word of a text in UTF-8.
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
@@ -22,9 +22,9 @@ constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 /// Recognises values that mean no data: nan, the declared value, and fill values beyond every height.
 class HeightValues {
  public:
-  /// `declared` is the value in the file's header, which may have fewer digits than in the grid.
+  /// `declared`: the no-data value in the file's header, which may have fewer digits than in the grid.
   explicit HeightValues(std::optional<std::string_view> declared);
-  /// NaN for no data; nothing for a number that is neither a height nor a usual fill value.
+  /// NaN for no data; nullopt for a number that is neither a height nor a usual fill value.
   std::optional<float> height_of(double value);
   std::size_t fill_values() const { return fill_values_; }
 
@@ -38,16 +38,16 @@ class HeightValues {
 struct CoordinateSystem {
   std::optional<bool> geographic = {};  // coordinates in degrees
   double unit_deg = 1;                  // unit of coordinates that are angles
-  double prime_meridian_deg = 0;        // where longitudes begin, east of Greenwich
+  double prime_meridian_deg = 0;        // longitude of the prime meridian, east of Greenwich
   double unit_m = 1;                    // unit of coordinates that are not degrees
   double height_unit_m = 1;
-  bool web_mercator = false;  // its metres are longer than metres on the ground
+  bool web_mercator = false;  // its metres are longer than true metres
   /// The zone, if the datum agrees with WGS 84 within 2 m.
   std::optional<UtmZone> utm = {};
   /// The name that the file gives it; empty for systems without a name, and for local coordinates.
   std::string name = {};
   std::string depths = {};   // the name of a vertical system that counts downwards; empty for all others
-  bool other_datum = false;  // degrees that may be some 100 m from those of WGS 84
+  bool other_datum = false;  // degrees that may differ from those of WGS 84 by about 100 m
 };
 
 /// The parameters of a transverse Mercator projection, in metres on an ellipsoid like that of WGS 84.
@@ -57,9 +57,9 @@ struct TransverseMercator {
 
 /// The values of a file, before finish_heights().
 struct RawHeights {
-  std::vector<double> x = {}, y = {};  // rising
+  std::vector<double> x = {}, y = {};  // increasing
   std::vector<float> z = {};           // [y][x], NaN: no data
-  std::size_t fill_values = 0;         // number of undeclared fill values beyond every height, which have become NaN
+  std::size_t fill_values = 0;         // number of undeclared fill values beyond every height, which were replaced by NaN
   CoordinateSystem system = {};
   double scale = 1, offset = 0;  // a height is scale * z + offset
   std::vector<std::string> notes = {};
@@ -75,9 +75,9 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 CoordinateSystem system_by_prj(const std::filesystem::path& heights);
 /// Parses WKT; units that it does not name are metres.
 CoordinateSystem system_of_wkt(std::string_view text);
-/// The meridian at which the longitudes of a geographic system of the EPSG data set begin, in degrees east of Greenwich.
+/// The prime meridian of a geographic system of the EPSG data set, in degrees east of Greenwich.
 double prime_meridian_of_epsg(std::uint32_t code);
-/// The same of a prime meridian of the EPSG data set; nothing for an unknown one.
+/// A prime meridian of the EPSG data set, in degrees east of Greenwich; nullopt for an unknown code.
 std::optional<double> degrees_of_prime_meridian(std::uint32_t code);
 /// The zone of a projected system of the EPSG data set; empty for other projections, and for older datums.
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
@@ -85,7 +85,7 @@ std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
 bool agrees_with_wgs84(std::uint32_t code);
 /// True for GRS 80 and the ellipsoid of WGS 84, which all datums since about 1980 have.
 bool is_modern_ellipsoid(double semi_major_m, double inverse_flattening);
-/// The zone; its false easting may begin with the number of the zone, as in 32500000.
+/// The zone with these parameters; the false easting may begin with the zone's number, as in 32500000.
 std::optional<UtmZone> utm_of_parameters(const TransverseMercator& by);
 
 }  // namespace sonar

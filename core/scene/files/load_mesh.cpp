@@ -116,7 +116,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
       if (mesh) mesh->lost = stl->bytes_behind / bytes_of_stl_triangle;
       return mesh;
     }
-    // A text has no zero bytes; binary files may begin with the word, too.
+    // Binary files may begin with that word, too, but texts have no zero bytes.
     const std::string more = read_regular(request.file, 512).value_or("");
     if (small_letters(begin).find("solid") == std::string::npos || more.find('\0') != std::string::npos)
       return bad_mesh(

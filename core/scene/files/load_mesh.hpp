@@ -1,4 +1,5 @@
-// Reads mesh files (OBJ, STL, PLY, glTF/GLB, DAE) into checked triangles about their own middle. Used by the scene loader only.
+// Reads mesh files (OBJ, STL, PLY, glTF/GLB, DAE) into checked triangles, relative to the mesh's middle. Only the scene loader
+// uses it.
 #pragma once
 
 #include "core/base/result.hpp"

@@ -1,4 +1,4 @@
-// Reads a scene file (YAML) and everything it names into a Scene, validated. The format is described in docs/scenes.md.
+// Reads and validates a scene file (YAML, docs/scenes.md) and the files that it names.
 #pragma once
 
 #include <filesystem>
@@ -21,7 +21,7 @@ class Map;
 /// grids in degrees and UTM that do not state an origin.
 Result<std::shared_ptr<const Scene>> load_scene(const std::filesystem::path& file,
                                                 const std::optional<Geodetic>& world_origin = {});
-/// The same for a text. Errors begin with `name`; paths in the scene are relative to `folder`.
+/// Parses the text of a scene. Errors begin with `name`; paths in the scene are relative to `folder`.
 Result<std::shared_ptr<const Scene>> parse_scene(std::string_view text, const std::string& name,
                                                  const std::filesystem::path& folder);
 /// One of built_in_scenes (core/scene/files/built_in_scenes.hpp); reads no files.

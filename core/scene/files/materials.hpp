@@ -1,4 +1,4 @@
-// Names of materials while a scene is read: first those of the scene, then the library for all scenes. Internal to the loader.
+// Finds materials by name while a scene is read: the scene's own first, then those of the library. Internal to the loader.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +17,13 @@ extern const char* const material_library_yaml;  // scenes/materials.yaml
 
 class MaterialTable {
  public:
-  /// Has the materials of the library at first.
+  /// Starts with the materials of the library.
   explicit MaterialTable(Scene& scene);
   /// Reads `materials: {name: {...}}`, which replace materials of the same name in the library.
   void read(text::Map materials);
-  /// Index into Scene::materials, where the material is put at its first use.
+  /// Index into Scene::materials; the first use of a material adds it there.
   std::optional<std::uint16_t> find(std::string_view name);
-  /// The same as find(), but an unknown name is an error at the node.
+  /// Like find(), but an unknown name is an error at the node.
   std::uint16_t named(const text::Node& node);
   std::uint16_t add(Material material);
 

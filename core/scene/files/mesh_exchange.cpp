@@ -62,7 +62,7 @@ Result<LoadedMesh> broken() {
   return failure(ErrorKind::bug, "the program that imports meshes gave an invalid answer (this is a bug, please report it)");
 }
 
-/// Returns whether the mesh is valid. Every user of a mesh relies on this.
+/// Whether the mesh is valid, as every user of a mesh assumes.
 bool is_sound(const LoadedMesh& mesh) {
   const Mesh& m = mesh.centred.mesh;
   return is_finite(mesh.centred.centre_m) &&

@@ -22,11 +22,11 @@ std::vector<std::string> arguments_of(const ImportRequest& request);
 /// The request; nullopt if it is of another version.
 std::optional<ImportRequest> request_from(const std::vector<std::string>& arguments);
 
-/// False if the file cannot hold it all. read_answer() returns an answer only when it is complete.
+/// False if the answer does not fit into the file. read_answer() returns only complete answers.
 bool write_answer(int descriptor, const Result<LoadedMesh>& mesh);
 /// Writes an error. It allocates no memory, so a signal handler may call it.
 bool write_refusal(int descriptor, ErrorKind kind, std::string_view text);
-/// The answer; nullopt if it is not complete.
+/// The answer; nullopt if it is incomplete.
 std::optional<Result<LoadedMesh>> read_answer(int descriptor);
 
 }  // namespace sonar

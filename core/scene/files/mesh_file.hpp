@@ -1,4 +1,4 @@
-// A mesh file as the scene names it, and what is read from it.
+// A mesh file named by a scene, and its contents.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +24,9 @@ struct MeshFile {
 
 struct LoadedMesh {
   CentredMesh centred;                      // Mesh::material indexes material_names
-  std::vector<std::string> material_names;  // as the file calls them; may be empty strings
-  std::uint64_t lost = 0;                   // triangles of faces that the file lists and the importer does not read
-  std::uint64_t hidden = 0;                 // triangles of parts that the scene in the file does not show
+  std::vector<std::string> material_names;  // names in the file; may be empty
+  std::uint64_t lost = 0;                   // triangles of faces that the importer could not read
+  std::uint64_t hidden = 0;                 // triangles of parts that are not in the file's shown scene
 };
 
 }  // namespace sonar

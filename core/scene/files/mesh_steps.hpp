@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // limit for a file and those that it refers to, together
+constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // limit for a file together with those to which it refers
 
 /// The extension in small letters, such as ".obj".
 std::string mesh_extension(const std::filesystem::path& file);

@@ -41,7 +41,7 @@ class ObjectsReader {
     std::vector<std::string_view> types = ShapeReader::types();
     types.push_back("point");
     const std::string_view type = types[type_node.choice_index(types)];
-    if (type_node.text() != type) return;  // there is an error already
+    if (type_node.text() != type) return;  // an error has been recorded already
     const std::string name = name_node.text_or(std::string(type) + " " + std::to_string(++unnamed_), 64);
     if (!names_.insert(name).second) name_node.fail("name is used twice; object names must be unique");
     if (moving && attached.present()) attached.fail("give moving: true or attached_to, not both");

@@ -10,7 +10,7 @@ inline constexpr std::size_t max_bodies = 256;
 
 /// `pose: {xyz_m: [..], rpy_deg: [..]}`; missing keys mean zero.
 Pose read_pose(const text::Node& node);
-/// Reads the list into the scene. Order of the file = order of the objects and of the bodies.
+/// Reads the list into the scene. Objects and bodies keep the order of the file.
 void read_objects(const text::Node& list, ShapeReader& shapes);
 /// `other_sonars: [{name, xyz_m, level_db, rate_hz, pulse_ms}]`.
 void read_other_sonars(const text::Node& list, Scene& scene);

@@ -1,5 +1,5 @@
-// Keeps meshes of shapes for code that reads many similar scenes. Equal shapes share one mesh, so that values computed from
-// meshes can be kept, too. Only one thread may use it at a time.
+// Keeps meshes of shapes for code that reads many similar scenes. Equal shapes share one mesh, so that values computed from it
+// can also be reused. Only one thread may use it at a time.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +24,7 @@ class ShapeCache {
   // While there are too many triangles, old shapes are removed, except those of the last `always_kept` calls of shape().
   static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;
 
-  /// Returns the shape of this key, and calls make() if it is not in the cache. A shape without a mesh is made again at each
-  /// call.
+  /// Returns the shape of this key, and calls make() if it is not in the cache. A shape without a mesh is not cached.
   template <class Make>
   Shape shape(const std::string& key, const Make& make) {
     Kept& kept = shapes_[key];

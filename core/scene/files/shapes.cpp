@@ -30,7 +30,7 @@ Shape with_material(Mesh mesh, std::uint16_t material, const Primitive& primitiv
   return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}, primitive};
 }
 
-/// A key that is equal for equal shapes; it has all digits of the numbers.
+/// A key that is equal for equal shapes; it contains all digits of the numbers.
 std::string shape_key(std::string_view type, std::uint16_t material, std::initializer_list<double> numbers) {
   std::string key(type);
   key += ' ' + std::to_string(material);
@@ -38,7 +38,7 @@ std::string shape_key(std::string_view type, std::uint16_t material, std::initia
   return key;
 }
 
-/// The usual extension of a grid by the first bytes of its file, which may have any name; empty if they are not of a grid.
+/// The usual extension of a grid, recognised by the first bytes of the file; empty if it is not a grid.
 std::string grid_by_content(const std::filesystem::path& file) {
   auto head = read_regular(file, 64);
   if (!head) return {};
@@ -51,7 +51,7 @@ std::string grid_by_content(const std::filesystem::path& file) {
                                                                 "xllcenter", "yllcenter", "cellsize",  "nodata_value"};
   if (std::find(header_words.begin(), header_words.end(), word) != header_words.end()) return ".asc";
   const bool is_number = !word.empty() && word.find_first_not_of("0123456789+-.,;e") == word.npos;
-  return is_number && mesh_extension(file) == ".asc" ? ".xyz" : "";  // points, as some programs name them
+  return is_number && mesh_extension(file) == ".asc" ? ".xyz" : "";  // points in a file that some program named .asc
 }
 
 constexpr std::uint64_t memory_of_a_height = 64;  // bytes, while a grid becomes a mesh
@@ -203,7 +203,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     const SeabedShape shape = read_seabed(keys);
     const Node size = keys.optional("size_m");
     if (shape.size_x_m <= 0 || shape.size_y_m <= 0 || shape.spacing_x_m <= 0 || shape.spacing_y_m <= 0)
-      return {};  // there is an error already
+      return {};  // an error has been recorded already
     if (seabed_triangles(shape) > max_mesh_triangles) {
       return size.fail("makes more than 20 million triangles; raise spacing_m or set fine_size_m"), Shape{};
     }

@@ -28,10 +28,10 @@ struct ShapeReader {
   ShapeCache* cache = nullptr;                    // shapes of earlier scenes
   std::optional<Geodetic> world_origin = {};      // for grids with latitudes and longitudes
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
-  std::set<std::string> noted = {};               // meshes whose lost triangles are in the scene's notes
+  std::set<std::string> noted = {};               // meshes whose lost triangles are already in the scene's notes
   std::map<std::string, Shape> files = {};        // meshes with materials; objects with equal keys share one
 
-  /// Values of `type` that are allowed here, except "point".
+  /// The allowed values of `type`, except "point".
   static const std::vector<std::string_view>& types();
   /// Reads the keys of this type, including `material`.
   Shape read(std::string_view type, text::Map& keys);

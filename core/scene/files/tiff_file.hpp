@@ -1,4 +1,4 @@
-// TIFF files: the pictures in a file, and their cells by strips or tiles. Internal to geo_tiff.cpp.
+// Reads TIFF files: the pictures in a file, and their cells, strip by strip or tile by tile. Internal to geo_tiff.cpp.
 #pragma once
 
 #include <cstddef>
@@ -27,19 +27,19 @@ Tiff open_tiff(const std::filesystem::path& file);
 /// libtiff's last error of this thread; "damaged" if it gave none.
 std::string last_tiff_error();
 
-/// The number of the picture that says where the first one has data; the file must be at the first one, and is afterwards.
+/// The number of the picture that is the mask of the first one. The file must be at the first picture, and is again afterwards.
 std::optional<std::uint16_t> mask_of(tiff* file);
 
 struct Picture {
   std::uint32_t columns = 0, rows = 0;
   std::uint16_t bits = 1, format = 1, samples = 1;  // format: unsigned integers
   std::uint16_t bands = 1;                          // values of a cell that lie side by side; the first is the height
-  std::optional<std::uint16_t> alpha;               // the one of them that is 0 where there is no data
+  std::optional<std::uint16_t> alpha;               // the band that is 0 for cells without data
   std::size_t value_bytes() const { return bits / 8u; }
   std::size_t bytes_of(std::uint32_t cells) const { return (std::size_t{bits} * bands * cells + 7) / 8; }
 };
 
-/// The description of the picture at which the file is.
+/// The description of the file's current picture.
 Picture picture_at(tiff* file);
 /// Fails if the picture is compressed in a way that is not read, or in blocks that are too large.
 Result<void> check_blocks(tiff* file);

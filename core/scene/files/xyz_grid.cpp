@@ -36,7 +36,7 @@ std::size_t split(std::string_view line, Line& words, std::string_view between =
   return count;
 }
 
-/// Uniform coordinates that contain all the given ones, of which some may be missing; empty if there are none.
+/// The uniform coordinates that contain all given ones, among which some may be missing; empty if there are none.
 std::vector<double> even_axis(std::vector<double> given) {
   std::sort(given.begin(), given.end());
   given.erase(std::unique(given.begin(), given.end()), given.end());
@@ -47,7 +47,7 @@ std::vector<double> even_axis(std::vector<double> given) {
   const std::size_t middle = (sorted.size() - 1) / 2;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(middle), sorted.end());
   const double usual = sorted[middle];
-  double sum = 0, count = 0;  // the mean is more accurate than one step, which is rounded
+  double sum = 0, count = 0;  // the mean step is more accurate than a single, rounded one
   for (const double step : steps)
     if (step < 1.5 * usual) sum += step, ++count;
   const double cells = std::round((given.back() - given.front()) / (sum / count));
@@ -90,7 +90,7 @@ struct Order {
   bool operator==(const Order&) const = default;
 };
 
-/// By names of columns, such as "lat lon depth" and "id,x,y,z"; the first three if they are other names.
+/// The order by column names, such as "lat lon depth" or "id,x,y,z"; the first three columns for other names.
 Order order_by(const Line& names, std::size_t count) {
   using Begins = std::initializer_list<std::string_view>;
   const auto column = [&](Begins begins, std::size_t otherwise, std::string_view whole = "z") {
@@ -169,7 +169,7 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
       continue;
     }
     if (points.empty() && !has_names && comment.first == count) order = comment.second;
-    if (points.empty()) first_count = count;  // another number of words can come of decimal commas
+    if (points.empty()) first_count = count;  // decimal commas can change the number of words
     if ((points.empty() || count != first_count) && has_decimal_commas(this_line))
       return bad("numbers have a decimal comma; write points");
     if (count <= order.last()) return bad("three numbers are needed, x y z" + way_out(points));

@@ -129,12 +129,12 @@ std::string_view json_of(std::string_view file) {
 std::uint64_t triangles_of(const GltfWalk& walk, const GltfWalk::Primitive& primitive) {
   const auto at = walk.accessors.find(primitive.indices.empty() ? primitive.positions : primitive.indices);
   const std::uint64_t corners = at == walk.accessors.end() ? 0 : at->second.count;
-  constexpr std::uint64_t triangles = 4, strip = 5, fan = 6;  // others are points and lines
+  constexpr std::uint64_t triangles = 4, strip = 5, fan = 6;  // other modes are points and lines
   if (primitive.mode == triangles) return corners / 3;
   return (primitive.mode == strip || primitive.mode == fan) && corners > 2 ? corners - 2 : 0;
 }
 
-/// Finds extensions that change surfaces, or the place of their numbers. The importer silently ignores these extensions.
+/// Finds extensions that change surfaces or the storage of their data, which the importer would silently ignore.
 MeshFault unread_extension(const GltfWalk& walk) {
   const auto unread = [](const std::string& name) {
     return "needs the extension " + name.substr(0, 64) + ", which is not read; export it without";

@@ -1,6 +1,6 @@
-// Cheap checks of mesh files before an importer reads them: numbers that the file cannot hold, and nodes that contain themselves,
-// are nested too deep or multiply. Each needs time linear in the text, and memory for the nodes. They reject files that would
-// take much time or memory; the importer finds other faults.
+// Fast checks before the importer reads a mesh file. They reject files that would need much time or memory: counts that exceed
+// the file's size, and nodes that contain themselves, are nested too deep or are repeated too often. Time is linear in the
+// text; memory is needed for the nodes. The importer finds other faults.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@ namespace sonar {
 /// The fault of a file, as a sentence without the file's name; nullopt: no fault was found.
 using MeshFault = std::optional<std::string>;
 
-/// Numbers of triangles by the text of a file with named parts.
+/// Numbers of triangles that the text of a file with named parts lists.
 struct ListedFaces {
-  std::uint64_t shown = 0;   // in the file's scene; parts count as often as the scene shows them
+  std::uint64_t shown = 0;   // triangles in the file's scene, counted as often as they are shown
   std::uint64_t hidden = 0;  // triangles of parts that the scene does not refer to
 };
 

@@ -33,10 +33,10 @@ MeshFault check_ply(std::string_view file_head, std::uint64_t file_bytes) {
   std::istringstream lines(head);
   bool ascii = false;
   std::string element;
-  std::uint64_t count = 0, least = 0, all = 0;  // bytes: `least` of one such element, `all` of the elements before it
+  std::uint64_t count = 0, least = 0, all = 0;  // in bytes: `least` for one such element, `all` for the elements before it
   const auto holds = [&] {
     all = std::min<std::uint64_t>(all + count * std::max<std::uint64_t>(least, 1), std::uint64_t{1} << 62);
-    return all <= file_bytes + 1;  // the last line may lack its end
+    return all <= file_bytes + 1;  // the last line end may be missing
   };
   const auto too_many = [&] {
     return "says that it has " + std::to_string(count) + " of \"" + element.substr(0, 32) + "\", which its " +

@@ -20,14 +20,14 @@ namespace {
 // Assimp 5.2 searches a list for each object and copies the list: 8,000 objects take 0.3 s, 50,000 take minutes.
 constexpr std::uint64_t most_objects = 10'000;
 
-bool begins_object(char c) { return c == 'o' || c == 'g'; }  // no other statements of OBJ files begin so
+bool begins_object(char c) { return c == 'o' || c == 'g'; }  // no other statements of OBJ files begin with these
 
 /// Reads the text of an OBJ file and finds the faces and the numbers of their vertices. Numbers of texture coordinates and
 /// normals, which are not needed, become blanks, so that invalid ones do not matter.
 class ObjText {
  public:
   struct Step {
-    char c;  // the character that the importer gets
+    char c;  // the character to pass to the importer
     bool begins_object = false, begins_vertex = false, begins_face = false, begins_corner = false;
     bool is_index = false;  // part of the number of a corner's vertex
   };
@@ -147,7 +147,7 @@ class ObjCounter {
   ObjCounts counts_;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> later_;  // faces, and the last vertex that they name
   std::uint64_t vertices_ = 0, face_ = 0, corners_ = 0, index_ = 0, furthest_ = 0;
-  std::size_t of_statement_ = 0;  // letters of a line that are those of the statement
+  std::size_t of_statement_ = 0;  // letters of the line that belong to the statement
   bool is_negative_ = false, is_number_ = false, is_bad_ = false;
 };
 
@@ -160,7 +160,7 @@ ObjCounts counts_of(std::FILE* file) {
 }
 
 /// An OBJ file whose faces have only vertices. Bad faces become comments and, if requested, lines that begin objects, too:
-/// surface and materials do not depend on them.
+/// surfaces and materials do not depend on these.
 class ObjStream final : public Assimp::IOStream {
  public:
   ObjStream(OpenFile file, std::size_t size, bool without_objects, const std::vector<std::uint64_t>& bad_faces)
@@ -207,7 +207,7 @@ class ObjStream final : public Assimp::IOStream {
   ObjText text_;
 };
 
-/// The text at the beginning of a file as the importer compares it: in small letters, without blank lines before it.
+/// The beginning of a file as the importer compares it: in small letters, without leading blank lines.
 struct PlainText {
   std::size_t blank_bytes = 0, text_bytes = 0;
 };
@@ -228,7 +228,7 @@ class PlainStream final : public Assimp::DefaultIOStream {
   PlainText text_;
 };
 
-/// The header of a PLY file, or all of a text STL file; binary STL files on disk do not get here.
+/// The header of a PLY file, or all of a text STL file; binary STL files on disk are read elsewhere.
 PlainText plain_text_of(const std::filesystem::path& file, std::uintmax_t bytes) {
   const std::string head = read_regular(file, ply_head_bytes).value_or("");
   if (mesh_extension(file) == ".ply") return {0, bytes_of_ply_head(head)};

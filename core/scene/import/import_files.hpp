@@ -1,4 +1,5 @@
-// The files that the importer may open: the mesh, and files that it names in its folder or the scene's. Only regular files.
+// The files that the importer may open: the mesh, and files that the mesh names, in its folder or the scene's. Regular files
+// only.
 #pragma once
 
 #include <assimp/DefaultIOSystem.h>

@@ -10,7 +10,7 @@
 
 #include "core/base/memory_left.hpp"
 
-// The shadow memory of sanitizers uses terabytes of addresses. With them, their runtime applies the limit (main.cpp).
+// Shadow memory of sanitizers uses terabytes of address space, so with sanitizers their runtime applies the limit (main.cpp).
 #ifdef SONAR_SANITIZED
 constexpr bool limits_addresses = false;
 #else
@@ -40,7 +40,7 @@ void limit(__rlimit_resource_t resource, rlim_t soft, rlim_t hard) {
   rlimit now{};
   if (::getrlimit(resource, &now) != 0) return;
   const rlimit wanted{std::min(soft, now.rlim_max), std::min(hard, now.rlim_max)};
-  if (::setrlimit(resource, &wanted) != 0) return;  // the other limits apply
+  if (::setrlimit(resource, &wanted) != 0) return;  // the other limits still apply
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Limits of the program that imports meshes. At each of them it ends with an error as its answer.
+// Limits of the program that imports meshes. If one is exceeded, the program ends with an error as its answer.
 #pragma once
 
 #include <cstdint>
@@ -13,9 +13,9 @@ constexpr std::uint64_t import_memory_bytes = std::uint64_t{512} << 20, import_m
 /// machines.
 constexpr std::uint64_t import_seconds = 30, import_seconds_of_a_million = 2;
 
-/// To be called once, before all else. Errors are written to `descriptor`.
+/// Call it once, first. Errors are written to `descriptor`.
 void begin_import_limits(const ImportRequest& request, int descriptor);
-/// Sets the limits for files of so many bytes. To be called at least once before they are read.
+/// Sets the limits for files of `bytes` bytes. Call it at least once before reading them.
 void limit_import(std::uintmax_t bytes);
 /// Lifts the limit of memory when the importer has finished, because our own code checks the memory that it needs.
 void release_import_memory();

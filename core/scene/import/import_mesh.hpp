@@ -1,4 +1,4 @@
-// The importer of mesh files. Its library does not check all that it reads, so that it runs in a separate program
+// The importer of mesh files. Its library does not check all of its input, so it runs in a separate program
 // (docs/decisions/0023-meshes-in-a-child.md). Fuzzers call it directly.
 #pragma once
 
@@ -11,7 +11,7 @@ namespace sonar {
 
 struct ImportHooks {
   std::function<void(std::uintmax_t bytes)> opened = [](std::uintmax_t) {};  // bytes of all files opened so far
-  std::function<void()> imported = [] {};                                    // called before code of ours continues
+  std::function<void()> imported = [] {};                                    // called when the library has finished
 };
 
 /// Errors begin with the file's name.

@@ -13,7 +13,7 @@ namespace sonar {
 class NodeGraph {
  public:
   static constexpr std::uint32_t deepest = 200;
-  /// Limit of repeated nodes: those that the file shows in addition to the nodes that it lists, by naming a node several times.
+  /// Limit of repetitions: a file that names a node several times shows it several times.
   static constexpr std::uint64_t most_repeated = 200'000;
 
   std::size_t add(std::string name) {
@@ -22,8 +22,8 @@ class NodeGraph {
   }
   void contains(std::size_t parent, std::size_t child) { nodes_[parent].children.push_back(child); }
 
-  /// The fault of the graph, as a sentence without the file's name: nodes within themselves, too deep, or too many of them
-  /// below the roots together. nullopt if there is no fault. Time: linear in the edges.
+  /// The fault of the graph, as a sentence without the file's name: nodes that contain themselves, are too deep, or are
+  /// repeated too often below the roots. nullopt if there is no fault. Time: linear in the edges.
   std::optional<std::string> fault(const std::vector<std::size_t>& roots) const;
 
   /// The roots and the nodes below them, each as often as it is shown. The graph must have no fault.

@@ -1,4 +1,4 @@
-// Places the vertices of meshes with bones, as a viewer shows them at rest.
+// Computes the rest positions of the vertices of meshes with bones.
 #pragma once
 
 #include <vector>

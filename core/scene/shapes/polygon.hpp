@@ -1,4 +1,4 @@
-// Cuts polygons of mesh files into triangles. The importer's own code is not used: its asserts end the program on odd files.
+// Cuts polygons of mesh files into triangles. The importer's own code is not used, because its asserts abort on unusual files.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// Ear clipping in the polygon's own plane, also of concave ones; keeps the polygon's direction. Fewer than 3 corners: no
+/// Ear clipping in the polygon's own plane, for concave polygons too; keeps the polygon's direction. Fewer than 3 corners: no
 /// triangles. Degenerate or self-crossing remainders, and polygons of more than 512 corners, are cut as a fan.
 std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vec3d> corners);
 

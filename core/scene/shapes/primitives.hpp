@@ -1,5 +1,5 @@
-// Solids and sheets as triangle meshes, fine enough that the chords stay within a millimetre of the true surface.
-// Object frame: axis of revolution along z, centred on the origin; outward normals, closed (sheets excepted), material 0.
+// Makes triangle meshes of solids and sheets, whose chords stay within a millimetre of the true surface. Object frame: axis of
+// revolution along z, centred on the origin; outward normals, closed (sheets excepted), material 0.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Smooth random fields for generated terrain and boulders. They use the generator Philox: the same seed gives the same terrain on
-// every machine. They are used when a scene is loaded; pings never call them.
+// Smooth random fields for generated terrain and boulders. They use Philox, so the same seed gives the same terrain on every
+// machine. Only the loading of scenes uses them.
 #pragma once
 
 #include <cmath>

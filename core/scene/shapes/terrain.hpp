@@ -1,5 +1,5 @@
 // Ground as heights over a rectangular grid, read from files (PNG, ESRI ASCII, XYZ, GeoTIFF) or generated from a seed.
-// Meshes are relative to their middle, whose coordinates, which may be large, are in the double precision of a pose.
+// Meshes are relative to their middle, whose coordinates may be large and are stored in double precision.
 #pragma once
 
 #include <array>
@@ -20,9 +20,10 @@ inline constexpr std::size_t max_mesh_triangles = 20'000'000;
 
 /// Heights over the product of two rising coordinate lists; NaN = no ground there.
 struct HeightGrid {
-  std::vector<double> x, y;  // rising, at least two each; metres, or with an origin but no zone degrees of longitude and latitude
-  std::vector<float> z_m;    // [y][x]
-  /// If set, x and y are converted to the plane that touches the ellipsoid here. Heights do not change: the sea is flat.
+  std::vector<double> x,
+      y;  // increasing, at least two each; metres, or degrees of longitude and latitude if an origin but no zone is set
+  std::vector<float> z_m;  // [y][x]
+  /// If set, x and y are converted to the plane tangent to the ellipsoid here. Heights do not change, as if the sea were flat.
   std::optional<Geodetic> origin = {};
   std::optional<UtmZone> zone = {};     // only with an origin: x and y are metres of this zone
   std::vector<std::string> notes = {};  // sentences about decisions of the reader that the scene's author should know
@@ -35,7 +36,7 @@ struct CentredMesh {
   std::size_t left_out = 0;  // triangles without area
 };
 
-/// Fails when no four neighbouring heights exist, or when it would exceed max_mesh_triangles.
+/// Error if no four neighbouring heights exist, or if the mesh would exceed max_mesh_triangles.
 Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
 
 /// Grey PNG of 8 or 16 bits, also stored as colours, over size_x by size_y metres about the origin; first row of the image =
@@ -51,7 +52,7 @@ struct HeightOptions {
   std::optional<Geodetic> origin = {};  // origin of a grid in degrees or UTM
   /// Used if `origin` is unset. Without both, degrees are relative to the middle of the grid, and UTM coordinates stay.
   std::optional<Geodetic> world_origin = {};
-  bool centred = false;  // the caller places the middle of the grid, so that its coordinates do not matter
+  bool centred = false;  // the caller places the middle of the grid, so its coordinates have no effect
 };
 /// ESRI ASCII grid (.asc).
 Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options);
@@ -75,11 +76,11 @@ struct SeabedShape {
   double relief_m = 0.1;    // amplitude of the longest octave
   double wavelength_m = 4;  // wavelength of the longest octave
   int octaves = 5;
-  double persistence = 0.5;  // amplitude ratio of one octave to the one before
+  double persistence = 0.5;  // amplitude ratio of successive octaves
   Ripples ripples = {};
   std::array<double, 2> slope{0, 0};  // rise per metre along x and y
 };
-/// Number of triangles of the shape, which the caller checks before it makes the mesh.
+/// Number of triangles of the shape, for a check before making the mesh.
 std::size_t seabed_triangles(const SeabedShape& shape);
 HeightGrid make_seabed(const SeabedShape& shape);
 

@@ -1,5 +1,5 @@
-// The flat faces of a scene, big enough to be mirrors for sound: sides of boxes and tanks, planes, the still sea surface.
-// Found once per scene from the triangles; the pipeline decides by frequency and material which of them are mirrors.
+// The flat faces of a scene that are large enough to be mirrors for sound: sides of boxes and tanks, planes, the still sea
+// surface. They are found once per scene; frequency and material decide in the pipeline which of them are mirrors.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Finds mirror points of triangle meshes. The mesh is prepared once: facets that meet at small angles form patches; a patch in
-// one plane becomes a face with an outline, any other a curved surface with normals and curvatures at its vertices.
+// Finds mirror points of triangle meshes. The mesh is prepared once: facets that meet at small angles form patches; a plane
+// patch becomes a face with an outline, any other patch a curved surface with normals and curvatures at its vertices.
 #pragma once
 
 #include <array>
@@ -44,14 +44,14 @@ class SpecularMesh {
     std::array<std::int32_t, 3> across{-1, -1, -1};  // the triangle across the edge opposite to each vertex; -1: the surface ends
     std::uint16_t material = 0;
   };
-  /// Node of a tree over the curved triangles, with a ball around their places and a cone around their normals.
+  /// Node of a tree over the curved triangles, with a bounding ball of the triangles and a cone of their normals.
   struct Node {
     Vec3 centre, axis;
     float radius = 0, angle_rad = 0;
     std::uint32_t first = 0, count = 0;  // triangles of a leaf
     std::uint32_t second_child = 0;      // the first child follows its parent; 0 in a leaf
   };
-  /// The place of a triangle whose interpolated normal passes through the sonar.
+  /// The point of a triangle whose interpolated normal passes through the sonar.
   struct Foot {
     std::array<double, 3> weight{};  // weights of the vertices; one is negative outside the triangle
     Vec3d normal;                    // on the side of the mesh's normals

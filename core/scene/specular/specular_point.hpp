@@ -1,6 +1,6 @@
-// Places on smooth surfaces that reflect sound straight back, because the surface's normal passes through the sonar, with the
-// curvatures and the extent of the surface. specular_primitives and specular_mesh find them; core/pipeline/specular makes echoes
-// of them.
+// Points on smooth surfaces that reflect sound straight back, because the surface's normal passes through the sonar, with the
+// surface's curvatures and extent. specular_primitives and specular_mesh find them; core/pipeline/specular makes echoes of
+// them.
 #pragma once
 
 #include <array>
@@ -34,7 +34,7 @@ struct SpecularPoint {
   std::vector<OutlineEdge> outline;  // closed, relative to the foot; empty = the rectangle of `from` and `to`
   std::uint16_t material = 0;
 
-  /// The place at these arc lengths along the principal directions, on arcs of the two curvatures.
+  /// The point at these arc lengths along the principal directions, on arcs of the two curvatures.
   Vec3d place(double x, double y) const {
     const auto arc = [](double s, double k) { return std::abs(k * s) > 1e-9 ? std::sin(k * s) / k : s; };
     const auto drop = [](double s, double k) { return std::abs(k * s) > 1e-4 ? (1 - std::cos(k * s)) / k : 0.5 * k * s * s; };
@@ -48,18 +48,19 @@ struct SpecularQuery {
   Vec3d sonar_m;  // in object coordinates
   double wavelength_m = 1e-3;
   double max_range_m = 0;
-  // Echoes from outside this cone are not needed; by default there is no cone.
+  // Only echoes from inside this cone are needed; by default there is no cone.
   Vec3d ahead{1, 0, 0};
   double widest_rad = 4;
 };
 
-/// Surfaces with an edge farther from the foot than so many Fresnel units sqrt(lambda rho) / 2 are left out: below -33 dB.
+/// Surfaces whose nearest edge is farther from the foot than this many Fresnel units sqrt(lambda rho) / 2 are ignored: below
+/// -33 dB.
 inline constexpr double farthest_edge_in_units = 10;
-/// Surfaces at more than about 30 degrees from the perpendicular are left out, too.
+/// Surfaces more than about 30 degrees from the perpendicular are ignored, too.
 inline constexpr double farthest_edge_in_ranges = 0.6;
 /// sqrt(lambda rho) / 2 along a direction: the unit of length of the Fresnel integral.
 double fresnel_unit_m(double wavelength_m, double range_m, double curvature_per_m);
-/// 1 + r / R, with a modulus of at least 0.05, because the sum of rays is infinite at a focus.
+/// 1 + r / R, limited to an absolute value of at least 0.05, because ray theory is infinite at a focus.
 double bending(double range_m, double curvature_per_m);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
 // Computes mirror points of spheres, cylinders, boxes and planes in closed form, from outside and, for tanks, from inside.
-// core/pipeline/specular thus has exact radii and extents, where a mesh has only facets.
+// So core/pipeline/specular gets exact radii and extents instead of facets.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,7 @@
 
 namespace sonar {
 
-/// Appends the mirror points of the primitive that may be audible; the caller tests occlusion. Nothing for
-/// Kind::none.
+/// Appends the mirror points of the primitive that may be audible; the caller tests occlusion. Kind::none has no mirror points.
 void find_specular_points(const Primitive& primitive, const SpecularQuery& query, std::vector<SpecularPoint>& out);
 
 }  // namespace sonar
