@@ -1,4 +1,4 @@
-// Options that several commands of sonarctl share, and checks of their values beside those of core/text/arguments.hpp.
+// Options that several commands of sonarctl share, and checks in addition to those of core/text/arguments.hpp.
 #pragma once
 
 #include <cstdint>

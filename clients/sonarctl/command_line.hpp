@@ -1,4 +1,4 @@
-// Command line of each command: adds its options to the parser and returns the function that executes it. run() lists them.
+// For each command, a function that adds its options to the parser and returns the function that executes it. run() lists them.
 #pragma once
 
 #include <functional>
@@ -29,7 +29,8 @@ Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
 Run add_recording(CLI::App& app);
 Run add_fault(CLI::App& app);
-/// `words`: all words after "sonarctl". They contain the command line of another program, so the parser does not read them.
+/// `words`: all words after "sonarctl", because the command line of another program, which the parser must not read, is among
+/// them.
 Run add_judge(CLI::App& app, const std::vector<std::string>& words);
 Run add_farm(CLI::App& app, const std::vector<std::string>& words);
 Run add_lab(CLI::App& app, const std::vector<std::string>& words);

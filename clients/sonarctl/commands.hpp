@@ -17,18 +17,19 @@
 
 namespace sonar::clients {
 
-/// Source of pings: a device or a recording.
+/// The source of pings: a device or a recording.
 struct SourceOptions {
-  Endpoint device{"127.0.0.2", 0};  // port 0: that of the make
+  Endpoint device{"127.0.0.2", 0};  // port 0: the make's port
   const Make* make = nullptr;       // null: the first make that answers at the host of `device`
   bool discover = false;            // take the device from its status broadcast
   std::filesystem::path recording;  // instead of a device
   std::string sonar;                // selects one of several in a recording
   Wanted wanted;
   double connect_patience_s = 2;
-  double silence_limit_s = 10;  // longest time without a byte
-  double return_limit_s = 60;   // longest wait for a new connection, in a run without a limit of time or pings
-  double picture_limit_s = 30;  // longest wait for a picture of many pings, from the first ping on; a Ping360 scans 180 degrees
+  double silence_limit_s = 10;  // limit of the time without a byte
+  double return_limit_s = 60;   // limit of the wait for a new connection, in runs without a limit of time or pings
+  double picture_limit_s =
+      30;  // limit of the wait for a picture of many pings, from the first ping on; enough for a Ping360 to scan 180 degrees
   bool observe = false;         // occupy no client slot, request nothing
   bool keeps_messages = false;  // fill PingStream::Item::messages
   std::string control;  // HOST:PORT of sonard's control stream, which reports the address for observers; empty = the default
@@ -40,7 +41,7 @@ struct ListenOptions {
   double seconds = 0;       // 0 = no limit
   std::uint64_t pings = 0;  // 0 = no limit
   bool json = false, quiet = false;
-  double started_at_unix_s = 0;  // if set, also report the time from then to the first ping
+  double started_at_unix_s = 0;  // if set, the time from then to the first ping is also reported
   std::filesystem::path png;     // draw the last ping
   std::filesystem::path record;  // raw bytes
   FanStyle style;
@@ -54,7 +55,7 @@ struct ViewOptions {
   bool live = false;                       // show each ping until interrupted, or until `pings` are shown
   std::uint64_t pings = 0;                 // 0 = no limit
   std::optional<TerminalColours> colours;  // nullopt = what the terminal supports
-  std::optional<std::size_t> ping;         // index of the ping in the recording, from 0; nullopt: the first whole picture
+  std::optional<std::size_t> ping;         // index of the ping in the recording, from 0; nullopt: the first complete picture
   FanStyle style;
 };
 Result<void> view(ViewOptions options);
@@ -74,9 +75,9 @@ struct PoseOptions {
   bool json = false;                               // JSON lines instead of protobuf
   bool confirm = false;                            // sends over the TCP control stream, where the daemon answers each pose
   std::filesystem::path token_file;                // for a control stream that requires one
-  control::Frame frame = control::Frame::enu_flu;  // frame of the positions and angles below, and of what is sent
-  std::string vehicle, object;                     // at most one; empty = the only vehicle. Objects use TCP
-  double rate_hz = 20, seconds = 0;                // 0 = one turn, or one line
+  control::Frame frame = control::Frame::enu_flu;  // frame of the positions and angles below, and of the sent poses
+  std::string vehicle, object;                     // at most one of them; both empty = the only vehicle. Objects use TCP
+  double rate_hz = 20, seconds = 0;                // seconds 0 = one turn, or one line
   std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // once
   std::vector<double> centre_m{0, 0, 0};                      // circle
   double radius_m = 5, period_s = 60;
@@ -87,7 +88,7 @@ struct PoseOptions {
 };
 Result<void> send_poses(const PoseOptions& options);
 
-/// Set by Ctrl-C. Commands then end as they do when their time limit is reached.
+/// Set by Ctrl-C. Commands then end as at their time limit.
 extern volatile int interrupted;
 
 }  // namespace sonar::clients

@@ -1,5 +1,4 @@
-// Client of a daemon's control stream: Hello, requests and their answers, events. Calls block, with a limit on every wait. Used
-// by pose, status, events, set, load, object and doctor.
+// A client of a daemon's control stream: Hello, requests and their answers, events. Calls block, with a time limit.
 #pragma once
 
 #include <deque>
@@ -31,17 +30,17 @@ class ControlClient {
   using Operation = decltype(control::Request::op);
   using Response = std::shared_ptr<const v1::Response>;
   static constexpr std::chrono::milliseconds usual_patience{10000};
-  /// sonard answers Hello at once even when busy. No answer within this time means that another service listens there.
+  /// sonard answers Hello at once, even if busy. No answer within this time means that another service listens there.
   static constexpr std::chrono::milliseconds greeting_patience{2000};
 
-  /// Connects and sends Hello. Fails when there is no connection, when another service answers, or when the token is missing or
-  /// wrong. `token_required` is set when sonard requires a token and no token file is given.
+  /// Connects and sends Hello. Error if there is no connection, another service answers, or the token is missing or wrong.
+  /// `token_required` is set if sonard requires a token but no token file is given.
   static Result<ControlClient> open(const ControlOptions& options, bool* token_required = nullptr);
 
   /// Sends a request and returns its answer; a refusal is an error with sonard's text. Events that arrive meanwhile are kept.
   Result<Response> request(Operation operation, std::chrono::milliseconds patience = usual_patience);
   Result<std::shared_ptr<const v1::DaemonStatus>> status(std::chrono::milliseconds patience = usual_patience);
-  /// Returns the next subscribed event; null when `patience` has passed or the process has received a signal.
+  /// Returns the next subscribed event; null after `patience`, or after a signal.
   Result<std::shared_ptr<const v1::Event>> next_event(std::chrono::milliseconds patience);
 
   const Endpoint& at() const { return at_; }

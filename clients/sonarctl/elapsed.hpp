@@ -1,4 +1,4 @@
-// Time that has passed since a moment of the steady clock.
+// The time since a point of the steady clock.
 #pragma once
 
 #include <chrono>

@@ -1,5 +1,5 @@
 // Statistics of the samples of an image: speckle correlation, shadow depth, noise floor over range.
-// Computed on the codes as sent; `sonarctl stats` prints them, tests check them.
+// Computed from the sent codes; `sonarctl stats` prints them.
 #pragma once
 
 #include <cstddef>
@@ -22,14 +22,14 @@ Result<Window> parse_window(const std::string& text, const PolarImage& image);
 double mean(const PolarImage& image, const Window& window);
 /// Pearson correlation of each sample of the window with the sample `rows` and `beams` further on; 0 if all are equal.
 double correlation(const PolarImage& image, const Window& window, std::size_t rows, std::size_t beams);
-/// Share of the window's samples at or above a code.
+/// Fraction of the window's samples at or above a code.
 double share_at_least(const PolarImage& image, const Window& window, float code);
-/// Codes below which the given shares (0..1) of the window lie.
+/// Codes below which the given fractions (0..1) of the window lie.
 std::vector<double> percentiles(const PolarImage& image, const Window& window, const std::vector<double>& shares);
 /// Mean of each block of `rows` rows, all beams; the last block may be shorter.
 std::vector<double> block_means(const PolarImage& image, std::size_t rows);
-/// First row whose median over the beams rises above `factor` times the median of all rows before it and above `code`:
-/// where the near field ends; image.rows if none does. Skips the first eight rows (transmit leak).
+/// The end of the near field: the first row whose median over the beams is above `code` and above `factor` times the median of
+/// all rows before it; image.rows if there is none. The first eight rows (transmit leak) are ignored.
 std::size_t first_echo_row(const PolarImage& image, double factor = 3, double code = 10);
 
 }  // namespace sonar::clients

@@ -164,7 +164,7 @@ Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chro
       polled < 0 ? -1
                  : ::recvfrom(socket.fd(), into.data(), into.size(), MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &length);
   if (size >= 0) return {Wait::data, static_cast<std::size_t>(size), from.sin_addr.s_addr, {}};
-  if (errno == EAGAIN) return {Wait::timed_out, 0, 0, {}};  // its checksum was wrong
+  if (errno == EAGAIN) return {Wait::timed_out, 0, 0, {}};  // the datagram's checksum was wrong
   if (errno == EINTR) return {Wait::interrupted, 0, 0, {}};
   return {Wait::closed, 0, 0, std::strerror(errno)};
 }

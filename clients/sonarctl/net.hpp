@@ -1,5 +1,4 @@
-// Blocking sockets with deadlines, for the client side. They use only IPv4, as the devices do. Used by listen (TCP in, UDP
-// discovery) and pose (UDP out).
+// Blocking sockets with deadlines, for the client side. Only IPv4, like the devices.
 #pragma once
 
 #include <chrono>
@@ -39,7 +38,7 @@ class Socket {
   int fd_ = -1;
 };
 
-/// Retries until `patience` is over, so that a daemon that is still starting is reached.
+/// Retries until `patience` is over, because the daemon may still be starting.
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience);
 /// Tries several addresses in turn. Returns the socket of the first that accepts, and its index.
 struct Connected {
@@ -56,7 +55,7 @@ enum class Wait { data, timed_out, interrupted, closed };
 struct Read {
   Wait what = Wait::timed_out;
   std::size_t size = 0;
-  std::string error;  // reason when the connection was not closed regularly
+  std::string error;  // reason, if the connection did not end regularly
 };
 Read read_some(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
 /// A datagram and its sender.
@@ -67,7 +66,7 @@ struct Datagram {
   std::string error;
 };
 Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
-/// Waits for the end of a connection without reading. Returns false if a byte is available, there or at one of the `others`, or
+/// Waits for the end of a connection without reading. Returns false if a byte arrives, there or at one of the `others`, or
 /// nothing happens within `patience`.
 bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);

@@ -1,5 +1,5 @@
-// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. It has no I/O: listen feeds
-// it, prints its lines and derives its exit code from it.
+// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. No I/O: `listen` feeds it,
+// prints its lines and derives the exit code from it.
 #pragma once
 
 #include <chrono>
@@ -20,7 +20,7 @@ using protocol::HostPing;
 
 struct PingSummary {
   std::uint64_t pings = 0, bytes = 0, identity_errors = 0;
-  std::optional<protocol::Host::Counts> of_wire;   // nullopt: messages are neither numbered nor judged
+  std::optional<protocol::Host::Counts> of_wire;   // nullopt: the protocol does not number messages
   std::optional<std::uint64_t> echo_satisfied_at;  // number of the first ping with the requested settings, from 1; nullopt =
                                                    // none, or nothing was requested
   std::uint64_t echo_lost = 0;                     // pings after that one whose echo differed
@@ -40,14 +40,14 @@ class PingLog {
   std::vector<Seconds> arrivals_;
 };
 
-/// Returns the value below which `share` (0..1) of the values lie; 0 if there are none.
+/// The value below which the fraction `share` (0..1) of the values lies; 0 if there are none.
 double percentile(std::vector<double> values, double share);
 
 /// Describes the faults of the stream that a driver would notice; empty = none.
 std::vector<std::string> complaints(const PingSummary& summary, bool asked);
 
 std::string line_from(const HostPing& ping);  // one line per ping
-/// `rate_unit`: of the make of the sonar.
+/// `rate_unit`: that of the sonar's make.
 std::string text_from(const PingSummary& summary, bool asked, std::string_view rate_unit);
 std::string json_from(const HostPing& ping, Seconds at);
 std::string json_from(const PingSummary& summary, bool asked);

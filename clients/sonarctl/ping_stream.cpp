@@ -22,7 +22,7 @@ using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
 using Kind = protocol::HostPort::Kind;
 
-constexpr auto probe_patience = 300ms;         // for each make, while the make is not known
+constexpr auto probe_patience = 300ms;         // for each make, while the make is unknown
 constexpr auto answer_patience = 3000ms;       // minimum once a sonar has answered, because it may be computing
 constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
 constexpr auto longest_pause = 160ms;          // between attempts
@@ -84,7 +84,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
     if (Result<void> opened = stream.start(std::move(connected), within); !opened) return tl::unexpected(opened.error());
     return stream;
   };
-  // A make that does not have the settings is tried without them. The refusal of the settings is reported only if it answers.
+  // A make without the requested settings is tried without them; the error about the settings is reported only if it answers.
   const auto searched = [&](const Candidate& at, milliseconds within) -> Result<PingStream> {
     auto host = at.first->host(wanted);
     if (host) return started(at, std::move(host), std::nullopt, within);
@@ -92,11 +92,11 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
     return tl::unexpected(is_over(stream) ? host.error() : stream.error());
   };
   if (make != nullptr)
-    if (auto host = make->host(wanted); !host) return tl::unexpected(host.error());  // before the sonar is disturbed
+    if (auto host = make->host(wanted); !host) return tl::unexpected(host.error());  // checked before connecting to the sonar
   Error failed;
   auto pause = 20ms;
   for (bool is_last = false;;
-       is_last = Clock::now() >= deadline) {  // tries the streams once more, because the other kinds may have taken long
+       is_last = Clock::now() >= deadline) {  // tries streams once more, because the other kinds may have needed much time
     if (!streams.empty()) {
       std::vector<Endpoint> places;
       for (const auto& [one, at] : streams) places.push_back(at);
@@ -118,7 +118,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
         within = std::max(patience, answer_patience);
       }
       auto stream = searched(candidate, within);
-      if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search another web server may be there
+      if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search, it may be another web server
       if (streams.empty()) failed = stream.error();
     }
     ::poll(nullptr, 0, static_cast<int>(pause.count()));  // no busy loop: a port that refuses answers at once
@@ -267,7 +267,7 @@ void PingStream::read_port(std::size_t port) {
   if (has_more && items_.size() == items) items_.push_back({Wait::data, {}, {}, std::exchange(kept_, {}), {}});
 }
 
-/// If messages are kept, the host gets them one by one, so that each comes before the ping that it completes.
+/// If messages are kept, the host gets them one by one, so that each is listed before the ping that it completes.
 void PingStream::take(std::size_t port, std::span<const std::byte> bytes) {
   const auto give = [&](std::span<const std::byte> message) {
     keep(port, recording::Origin::device, message);
@@ -276,7 +276,7 @@ void PingStream::take(std::size_t port, std::span<const std::byte> bytes) {
   const auto splitter = splitters_.find(port);
   if (splitter == splitters_.end()) return give(bytes);
   splitter->second.append({}, bytes);
-  carry_out(host_->on_bytes(port, {}, now()));  // the port is not silent, though no message may be whole yet
+  carry_out(host_->on_bytes(port, {}, now()));  // shows the host that the port is active, even if no message is complete yet
   while (const auto message = splitter->second.next()) give(message->bytes);
 }
 
@@ -329,7 +329,7 @@ PingStream::Item PingStream::next(milliseconds patience) {
 
 bool PingStream::is_rejected(milliseconds patience) const {
   if (make_->ports.front().kind != Kind::tcp || has_answered_) return false;
-  std::vector<int> others;  // some sonars send their pings there, and nothing at the first port
+  std::vector<int> others;  // some sonars send pings only there, and nothing at the first port
   for (std::size_t port = 1; port < sockets_.size(); ++port)
     if (sockets_[port]) others.push_back(sockets_[port]->fd());
   return ends_without_a_byte(*sockets_.front(), others, patience);
@@ -348,7 +348,7 @@ std::string PingStream::about() const { return text_from(device_) + ", " + host_
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (make_->ports.size() != 1 || make_->ports.front().kind != Kind::tcp)
     return failure(ErrorKind::usage, "only pings that come by TCP are recorded as raw bytes; this is " + about());
-  if (make_->each_ping_requested)  // a recording begins after the greeting, without which its pings mean nothing
+  if (make_->each_ping_requested)  // a recording would begin after the greeting, without which its pings are not readable
     return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
                                          ": sonarctl record keeps the messages of both ends");
   record_.open(file, std::ios::binary | std::ios::trunc);

@@ -1,5 +1,5 @@
-// Runs the host of a make of sonar over blocking sockets: pings of a device for listen, view, stats, record and doctor. And other
-// sources of pings: recordings, and the status datagrams that announce a device.
+// Runs the host of a make over blocking sockets to get the pings of a device. Also reads pings of recordings, and finds devices
+// by their status datagrams.
 #pragma once
 
 #include <chrono>
@@ -26,14 +26,14 @@ using protocol::Make;
 using protocol::PingFacts;
 using protocol::Wanted;
 
-/// The make that is usual at this port; null: none is.
+/// The make that usually uses this port, or null.
 const Make* make_at(std::uint16_t port);
 
 class PingStream {
  public:
   /// Connects and opens the conversation. `make`: null = the first that answers at its own port. `patience`: for the connection
-  /// and for answers. Errors: usage: settings that the sonar does not have; io: closed; unavailable: no answer; bad_data: another
-  /// service. `keeps_messages`: for Item::messages.
+  /// and for answers. Errors: usage (settings that the sonar does not have), io (closed), unavailable (no answer), bad_data
+  /// (another service). `keeps_messages`: for Item::messages.
   static Result<PingStream> open(const Endpoint& device, const Make* make, const Wanted& wanted,
                                  std::chrono::milliseconds patience, bool keeps_messages = false);
   PingStream(PingStream&&) = default;
@@ -41,16 +41,16 @@ class PingStream {
 
   struct Item {
     Wait what = Wait::timed_out;
-    std::optional<HostPing> ping;      // with Wait::data; without one: another message
-    std::vector<std::string> notices;  // notices that the host gave
-    /// All that was sent and received up to this ping, if that is kept.
+    std::optional<HostPing> ping;      // set only with Wait::data; unset: another message
+    std::vector<std::string> notices;  // notices of the host
+    /// All messages sent and received up to this ping, if they are kept.
     std::vector<recording::RecordedMessage> messages = {};
     std::string error;
     ErrorKind kind = ErrorKind::io;  // kind of the error
   };
-  /// The next ping or message, or the event that replaced it within `patience`. A sonar that sends pings on request is asked.
+  /// The next ping or message, or the event that occurred instead within `patience`. Requests a ping if the make requires that.
   Item next(std::chrono::milliseconds patience);
-  /// True when the sonar closes the connection before the first byte; waits for that byte, at most `patience`.
+  /// Waits at most `patience` for the first byte. True if the sonar closes the connection before it.
   bool is_rejected(std::chrono::milliseconds patience) const;
   /// Also writes every byte received by TCP to this file. Error usage: the sonar does not send its pings over TCP.
   Result<void> record_to(const std::filesystem::path& file);
@@ -58,7 +58,7 @@ class PingStream {
   const protocol::Host& host() const { return *host_; }
   const Make& make() const { return *make_; }
   const Endpoint& device() const { return device_; }
-  /// The ends of its connection and of its datagrams, for the headers of a capture.
+  /// Addresses and ports of its connection and datagrams, for the headers of a capture.
   recording::PcapConversation conversation() const;
   /// "127.0.0.1:41022", our address at the first port; empty for HTTP.
   std::string own() const;
@@ -89,24 +89,24 @@ class PingStream {
   std::vector<std::optional<Socket>> sockets_;  // by port; none of kind http
   std::uint32_t device_ip_ = 0;                 // in network order
   std::chrono::milliseconds answer_patience_{};
-  std::deque<Item> items_;                           // items to be handed out
-  std::optional<Error> ended_;                       // the conversation is over; empty text: the sonar closed it
+  std::deque<Item> items_;                           // items that next() has not returned yet
+  std::optional<Error> ended_;                       // set when the conversation has ended; empty text: the sonar closed it
   bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
   bool is_started_ = false;                          // the host must send what on_leave() returns
   std::ofstream record_;
   bool keeps_ = false;
   std::vector<recording::RecordedMessage> kept_;  // messages since the last item
-  // While messages are kept: splits the bytes of a port, so that messages of several ports do not come into each other.
+  // While messages are kept: a splitter per port, so that messages of different ports are not mixed.
   std::map<std::size_t, recording::MessageSplitter> splitters_;
   Time last_kept_{};  // UNIX time, which never decreases
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 
-/// Ping `number` of a recording of any kind, from 0; nullopt: the first that is whole, else the last. `sonar`: selects one of
-/// several. Error usage: there are fewer pings.
+/// Ping `number` (from 0) of a recording; nullopt: the first complete one, else the last. `sonar`: selects one of several.
+/// Error usage: there are fewer pings.
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
 
-/// Waits for the beacon of a device, of a make whose hosts connect to the address in it.
+/// The result of waiting for a device's beacon, of a make whose beacons contain the address for hosts.
 struct Discovered {
   Endpoint device;
   protocol::Announcement announced;

@@ -1,4 +1,4 @@
-// sonarctl record: writes the vendor's bytes of a sonar into files, as its client, or converts a recording.
+// `sonarctl record`: records the vendor's messages as a client of the sonar, or converts a recording.
 #pragma once
 
 #include "clients/sonarctl/record_options.hpp"
@@ -6,7 +6,7 @@
 
 namespace sonar::clients {
 
-/// Succeeds at its limits, on Ctrl-C and at the end of a recording. In every case the files hold what was recorded.
+/// Succeeds at its limits, on Ctrl-C and at the end of a recording. After an error, too, the files contain everything so far.
 Result<void> record(const RecordOptions& options);
 
 }  // namespace sonar::clients

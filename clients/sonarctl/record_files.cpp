@@ -34,7 +34,7 @@ Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make
       return failure(ErrorKind::usage, path.string() + ": such files do not hold the messages of " + std::string(make.title) +
                                            ": --mcap and --pcap hold those of every sonar");
   }
-  // The bytes of several connections in one stream have lost where they came from.
+  // In one file, the bytes of several connections could not be distinguished.
   const bool has_raw_dumps =
       make.codec.framing != nullptr ||
       std::any_of(kinds.begin(), kinds.end(), [](const recording::FileKind& kind) { return kind.is_raw_dump; });
@@ -77,7 +77,8 @@ Result<void> RecordFiles::write(const recording::RecordedMessage& message) {
 
 Result<void> RecordFiles::write_ping(Time at, const HostPing& ping) {
   ++pings_;
-  // The session makes images of messages with samples. For a scan, each of its lines would write the whole picture.
+  // The session itself makes images from messages with samples. For scans nothing is written, because each line would add a
+  // whole picture.
   if (mcap_ == nullptr || make_->codec.samples != nullptr || make_->scans) return {};
   const Result<PolarImage> image = ping.picture();
   return image ? mcap_->write_image(at, samples_of(*image, ping.facts.bits)) : Result<void>{};  // some pings make no picture

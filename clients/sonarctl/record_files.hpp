@@ -1,4 +1,4 @@
-// The files of one recording session, written side by side. Used by record.
+// The files of one recording session, written in parallel.
 #pragma once
 
 #include <memory>
@@ -12,7 +12,7 @@ namespace sonar::clients {
 
 class RecordFiles {
  public:
-  /// Creates all files that the options name. Errors: io; usage for a kind of file of another make.
+  /// Creates all files that the options name. Errors: io; usage for a format of another make.
   static Result<RecordFiles> create(const RecordOptions& options, const Make& make,
                                     const recording::PcapConversation& conversation, const std::string& sonar);
 
@@ -22,7 +22,7 @@ class RecordFiles {
   Result<void> write_ping(Time at, const HostPing& ping);
   /// Writes to the MCAP file, if any.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
-  /// Finishes every file, also after a failure. Returns the first error: io.
+  /// Finishes every file, even after a failure. Returns the first error: io.
   Result<void> close();
 
   std::uint64_t pings() const { return pings_; }

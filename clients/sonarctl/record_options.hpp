@@ -1,4 +1,4 @@
-// The recording that sonarctl record is to make: its source, its files and its limits.
+// The options of `sonarctl record`: source, files and limits.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ namespace sonar::clients {
 
 struct RecordOptions {
   SourceOptions source;                                     // a device; or source.recording, a recording of any kind
-  std::filesystem::path pcap, mcap, raw;                    // at least one, or of the next
+  std::filesystem::path pcap, mcap, raw;                    // at least one of these or of `files`
   std::map<std::string_view, std::filesystem::path> files;  // files of a make's own kinds, by FileKind::ending
   double seconds = 0;                                       // 0 = no limit
   std::uint64_t pings = 0;                                  // 0 = no limit
   bool status = true;                                       // also record the status datagrams of the device
-  std::string status_on;                  // where to listen for status: HOST:PORT; empty = 0.0.0.0 and the make's port
-  std::optional<ControlOptions> control;  // ask this sonard for the sonar's name and poses, for the MCAP file
+  std::string status_on;                  // address for receiving status: HOST:PORT; empty = 0.0.0.0 and the make's port
+  std::optional<ControlOptions> control;  // the sonard that reports the sonar's name and poses, for the MCAP file
 };
 
 }  // namespace sonar::clients

@@ -1,5 +1,5 @@
-// Options for the source of pings and the settings of the sonar. They are the same for every make and for every command that
-// shows or records pings.
+// Options for the source of pings and the settings of the sonar. All commands that show or record pings share them, for every
+// make.
 #pragma once
 
 #include <CLI/App.hpp>
@@ -13,7 +13,7 @@ namespace sonar::clients {
 
 struct SettingArguments {
   protocol::SettingsOverride settings;
-  std::map<std::string, std::string> more;  // options of few makes
+  std::map<std::string, std::string> more;  // options that only some makes have
 
   /// The command must outlive this.
   void add_to(CLI::App& app);
@@ -21,7 +21,7 @@ struct SettingArguments {
   protocol::Wanted wanted() const;
 };
 
-/// finish() turns the texts into a SourceOptions once the line is parsed.
+/// finish() converts the texts to a SourceOptions after parsing.
 struct SourceArguments {
   DeviceArguments device;
   bool as_it_is = false, observe = false;
@@ -29,8 +29,8 @@ struct SourceArguments {
   std::filesystem::path token_file, recording;
   SettingArguments settings;
 
-  /// `recordings`: adds --from, which reads a recording instead of a sonar. `control_help`: what --control's help says about the
-  /// daemon.
+  /// `recordings`: adds --from, which reads a recording instead of a sonar. `control_help`: text about the daemon in the help
+  /// of --control.
   void add_to(CLI::App& app, bool recordings, const std::string& control_help = "reports the address for observers");
   Result<SourceOptions> finish() const;
 };

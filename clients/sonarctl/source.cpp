@@ -15,7 +15,7 @@ volatile int interrupted = 0;
 
 namespace {
 
-/// So many pings with older settings may still arrive after ours were sent.
+/// This many pings with older settings may still arrive after ours were sent.
 constexpr int stale_pings = 4;
 constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
 

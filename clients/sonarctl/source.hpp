@@ -1,5 +1,4 @@
-// Resolves a user's source (address, discovery, recording, settings) to a device or to one decoded ping.
-// Shared by the commands.
+// Finds the device, or one decoded ping, for a user's source (address, discovery, recording, settings).
 #pragma once
 
 #include <algorithm>
@@ -13,7 +12,7 @@ namespace sonar::clients {
 
 std::chrono::milliseconds milliseconds_from(double s);
 
-/// Refuses an output file that is the recording which is read.
+/// Error if an output file is the recording that is being read.
 Result<void> check_output(const SourceOptions& source, const std::filesystem::path& output);
 
 /// Returns the given address, or that of a status broadcast; `say` prints the result.
@@ -25,19 +24,19 @@ struct OpenedStream {
   std::chrono::steady_clock::time_point connected_at;
   bool observes = false;  // no settings sent: pings as requested by the sonar's clients
 };
-/// Connects as an observer if source.observe is set, or when the sonar has no free client slot and its sonard reports an address
-/// for observers; then with a note on standard error.
+/// Connects as an observer if source.observe is set. Also, with a note on standard error, if the sonar has no free client slot
+/// and its sonard reports an address for observers.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
 /// find_device() and open_stream().
 Result<OpenedStream> connect(const SourceOptions& source, bool say);
 
-/// The time without pings. A connection without pings does not end it, because by UDP a connection can always be opened.
+/// A time without pings. A new connection alone does not end it, because over UDP a connection can always be opened.
 class Outage {
  public:
   using Clock = std::chrono::steady_clock;
 
-  void begins();  // no effect in an outage
+  void begins();  // no effect during an outage
   void ends() { since_.reset(); }
   double left_s(const SourceOptions& source) const;  // until source.return_limit_s is over
   /// When the next attempt may begin. A device that ends each connection at once is tried at most once a second.
@@ -49,20 +48,20 @@ class Outage {
 };
 
 /// Connects again after the stream was lost (`why`), within the remaining time of the outage; reports loss and return to `say`.
-/// The error is `why` after Ctrl-C; otherwise it says that the device did not come back.
+/// After Ctrl-C the error is `why`; otherwise it states that the device did not return.
 Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
                                 const std::function<void(const std::string&)>& say);
 
 /// Writes to standard error.
 void print_notices(const std::vector<std::string>& notices);
 
-/// Makes the error for `what` that did not arrive within source.silence_limit_s. `received`: some message of the make arrived.
+/// The error if `what` did not arrive within source.silence_limit_s. `received`: some message of the make arrived.
 Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint);
 
-/// Returns read_ping() of a recording, or the first ping of a device with the requested settings. If many pings make a picture,
-/// it waits until the picture is whole or source.picture_limit_s is over. With `of_samples` it does not wait if a single ping
-/// makes no picture.
+/// Returns read_ping() of a recording, or the first ping of a device with the requested settings. If a picture consists of many
+/// pings, it waits until the picture is complete or source.picture_limit_s is over; not with `of_samples`, if single pings have
+/// no picture.
 Result<HostPing> fetch_ping(const SourceOptions& source, std::optional<std::size_t> number, bool of_samples = false);
 
 }  // namespace sonar::clients

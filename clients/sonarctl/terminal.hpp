@@ -27,8 +27,8 @@ struct TerminalSize {
 /// COLUMNS and LINES of the environment, else the terminal's own, else 80 x 24.
 TerminalSize terminal_size();
 
-/// Alternate screen during its lifetime; the destructor restores the previous content and the cursor. No effect when output is
-/// not a terminal: pictures then follow each other.
+/// Uses the alternate screen during its lifetime; the destructor restores the previous content and the cursor. If output is not
+/// a terminal, pictures are printed one after the other.
 class LiveScreen {
  public:
   explicit LiveScreen(bool is_terminal);

@@ -1,4 +1,4 @@
-// Pose of a vehicle on a simple path over time: world ENU, body FLU. Sent by `sonarctl pose`.
+// Poses on simple paths for `sonarctl pose`: world ENU, body FLU.
 #pragma once
 
 #include "core/base/geometry.hpp"
@@ -13,7 +13,7 @@ struct Moment {
 struct Circle {
   Vec3d centre_m;
   double radius_m = 5, period_s = 60, pitch_rad = 0;  // pitch: bow up positive; negative period = clockwise
-  bool look_inwards = true;                           // if false: along the path
+  bool look_inwards = true;                           // false: looks along the path
 };
 /// Moves anticlockwise seen from above, starting east of the centre.
 Moment on_circle(const Circle& circle, double time_s);

@@ -82,8 +82,8 @@ class LiveView {
         painter_(options.style),
         figures_(stream_->make().rate_unit()) {}
 
-  /// Succeeds when interrupted, after the requested pings, or when the output was closed. A run without an end connects again
-  /// when the device has gone.
+  /// Succeeds when interrupted, after the requested pings, or when the output is closed. A run without limits connects again if
+  /// the device has disconnected.
   Result<void> run() {
     const bool has_screen = options_.terminal && terminal_facts().is_terminal;
     Result<void> ran;

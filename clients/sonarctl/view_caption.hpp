@@ -1,4 +1,4 @@
-// The line under a picture: ping number, geometry, rate and number of missed pings. Used by view; no I/O.
+// The line under a picture: ping number, geometry, rate and number of missed pings. No I/O.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@ namespace sonar::clients {
 
 class ViewCaption {
  public:
-  /// `rate_unit`: of the make of the sonar.
+  /// `rate_unit`: that of the sonar's make.
   explicit ViewCaption(std::string_view rate_unit) : rate_unit_(rate_unit) {}
   /// `of_wire`: counts of the host after the ping, if it has any.
   void add(const HostPing& ping, const std::optional<protocol::Host::Counts>& of_wire, Seconds at);
   std::uint64_t pings() const { return pings_; }
-  /// "ping 123  10.00 m  2.1 MHz  512 beams x 437 rows  10.0 Hz  no gaps"; the rate from the second ping on.
+  /// "ping 123 10.00 m 2.1 MHz 512 beams x 437 rows 10.0 Hz no gaps"; with the rate from the second ping on.
   std::string text() const;
 
  private:

@@ -1,4 +1,4 @@
-// Prints to standard error what a command waits for.
+// Prints to standard error the reason why a command waits.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@
 
 namespace sonar::clients {
 
-/// The wait for the first ping. If it is not very short, it prints a line.
+/// The wait for the first ping. Prints a line unless the wait is very short.
 class FirstPingWait {
  public:
   using Clock = std::chrono::steady_clock;
@@ -19,7 +19,7 @@ class FirstPingWait {
   FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, Clock::time_point now = Clock::now());
   /// Returns how long to wait: `most`, or less if the line is due before.
   std::chrono::milliseconds patience(std::chrono::milliseconds most, Clock::time_point now = Clock::now()) const;
-  /// Call it after each wait, with whether a ping came.
+  /// Call it after each wait. `has_ping`: a ping has arrived.
   void look(bool has_ping, Clock::time_point now = Clock::now());
 
  private:
@@ -35,7 +35,7 @@ class PictureProgress {
   explicit PictureProgress(double limit_s) : limit_s_(limit_s) {}
   /// A line to print: with the first ping, then every two seconds. `ping` is not whole.
   std::optional<std::string> line_at(const HostPing& ping, Clock::time_point now);
-  /// True if the wait for the whole picture is over.
+  /// True if the time for completing the picture is over.
   bool is_over(Clock::time_point now) const;
 
  private:

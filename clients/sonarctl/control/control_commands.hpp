@@ -1,5 +1,4 @@
-// Commands that query or control a running daemon over one connection to its control stream. The command line fills the options;
-// results go to standard output.
+// Commands that query or control a running daemon over one connection to its control stream. Results go to standard output.
 #pragma once
 
 #include <cstdint>

@@ -51,7 +51,7 @@ std::string text_from(const v1::FaultEntry& e) {
 std::string fault_list_text(const v1::FaultReport& report) {
   if (!report.armed()) return "faults are not armed: sonard run --faults, or faults: {armed: true}\n";
   if (report.faults().empty()) return "no faults\n";
-  std::vector<const v1::FaultStatus*> faults;  // in the order active, waiting, over
+  std::vector<const v1::FaultStatus*> faults;  // active ones first, then waiting ones, then ended ones
   int name_width = 16, asked_width = 16;
   for (const v1::FaultStatus& f : report.faults()) {
     faults.push_back(&f);
@@ -89,7 +89,7 @@ std::string fault_kinds_text(const v1::FaultReport& report) {
 }
 
 std::string fault_support_text(const v1::FaultReport& report) {
-  std::set<std::string> vendors;  // all vendors: faults that a daemon cannot inject name each of them
+  std::set<std::string> vendors;  // all vendors, taken from the faults that a daemon cannot inject, which name each of them
   for (const v1::FaultKind& k : report.kinds())
     for (const auto& [vendor, why] : k.without_effect()) vendors.insert(vendor);
   std::string text = "| code | name | tier |", rule = "|---|---|---|";

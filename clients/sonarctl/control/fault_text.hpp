@@ -1,5 +1,4 @@
-// Faults of a daemon as text, and the arguments of `fault add` as a record. This has no I/O; the commands fault and events print
-// it.
+// Converts a daemon's faults to text, and the arguments of `fault add` to a record. No I/O.
 #pragma once
 
 #include <string>

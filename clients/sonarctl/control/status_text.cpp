@@ -27,7 +27,7 @@ std::string duration_text(double seconds) {
 
 std::string line(const char* name, const std::string& text) { return format("%-9s ", name) + text + "\n"; }
 
-/// Returns the rate that is set, and the rate that is measured of the pings or of the preview.
+/// The requested rate, and the measured rate of pings or of the preview.
 std::string rate_text(const v1::SonarStatus& s) {
   std::string text = s.rate_hz() <= 0 ? "standby" : s.on_request() ? "on request" : format("%g Hz", s.rate_hz());
   const double made_hz = s.figures().made_hz();

@@ -1,4 +1,4 @@
-// Status and events of a daemon as text. This has no I/O; the commands status and events print it.
+// Converts status and events of a daemon to text. No I/O.
 #pragma once
 
 #include <string>

@@ -182,7 +182,7 @@ void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering
   });
 }
 
-/// `what` refers to the steering that contains it. It is moved out, so that the two do not keep each other alive.
+/// `what` refers to the Steering that contains it; it is moved out, to avoid a cycle of owners.
 Run run_of(const std::shared_ptr<Steering>& steering) {
   return [steering] { return std::exchange(steering->what, {})(); };
 }

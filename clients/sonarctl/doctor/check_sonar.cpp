@@ -37,7 +37,7 @@ const ReceivedStatus* status_from(const Facts& facts, const std::string& host) {
   return nullptr;
 }
 
-/// The findings of one sonar; `prefix_` names it when there are several.
+/// The findings of one sonar; `prefix_` names it if there are several.
 class SonarChecks {
  public:
   SonarChecks(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings)
@@ -68,7 +68,7 @@ class SonarChecks {
 
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
 
-  /// No client connects for images by UDP, so only the status of the daemon shows them.
+  /// Checks images by UDP, for which no client connects; only the daemon's status shows them.
   void check_images() {
     const std::string at = "http at " + sonar_.at.host;
     if (!sonar_.reported && is_replay(facts_.http))
@@ -175,7 +175,7 @@ class SonarChecks {
     const StreamFacts& s = sonar_.stream;
     const std::string waited = " within " + format("%.1f", s.waited_s) + " s";
     if (s.refuses) return add(Level::fail, "ping", s.error, "sonarctl status shows its settings; see sonard's log");
-    if (!s.error.empty())  // the greeting is not sonard's
+    if (!s.error.empty())  // the greeting was not sonard's
       return add(Level::fail, "ping", s.error, "another program has the port; stop it, or give the sonar's own address");
     if (s.junk_bytes > 0 && s.others == 0) {
       std::string who;
@@ -218,7 +218,7 @@ class SonarChecks {
   /// The clock mode that the daemon reports: "realtime", "stepped", ...; empty without a daemon.
   std::string clock() const { return facts_.control.status ? facts_.control.status->clock() : std::string(); }
 
-  /// Names an address where a sonar does listen.
+  /// Names an address at which a sonar listens.
   std::string where_else() const {
     if (facts_.daemons.empty() && is_replay(facts_.http))
       return "sonard replay shows this recording only on its page, http://" + text_from(facts_.http.at);
@@ -287,7 +287,7 @@ class SonarChecks {
         less_to_compute);
   }
 
-  /// Judges the connected drivers by the status of the daemon. One without a ping is a failure.
+  /// Checks the connected drivers by the daemon's status. A driver without pings is an error.
   void check_drivers() {
     if (!sonar_.reported) return;
     const v1::DaemonStatus now = without_us();
@@ -325,7 +325,7 @@ class SonarChecks {
     return found == in.sonars().end() ? nullptr : &*found;
   }
 
-  /// The latest status without our own connection. Clients that left or were refused are from the first status.
+  /// The latest status without our own connection; clients that left or were refused are taken from the first status.
   v1::DaemonStatus without_us() const {
     const v1::DaemonStatus& first = *facts_.control.status;
     v1::DaemonStatus now = facts_.control.latest ? *facts_.control.latest : first;

@@ -1,4 +1,4 @@
-// Observations of doctor, without interpretation. Gathered by gather.cpp from sockets and /proc, interpreted by checks.cpp.
+// The observations of doctor, which gather.cpp collects from sockets and /proc and checks.cpp interprets.
 #pragma once
 
 #include <cstdint>
@@ -27,35 +27,35 @@ struct PortHolder {
 
 struct ReceivedStatus {
   std::string from;        // source of the datagram
-  std::string advertised;  // the address inside, where drivers connect
+  std::string advertised;  // the address in the message, to which drivers connect
   std::string client;      // connected client according to the message; empty = none
   std::uint32_t device_id = 0;
   std::size_t size = 0;
-  std::vector<std::string> complaints;  // deviations that real drivers reject
+  std::vector<std::string> complaints;  // faults because of which real drivers reject the message
 };
 struct StatusFacts {
   Endpoint on{"0.0.0.0", 52102};
   std::string error;                     // why listening failed; empty = it succeeded
-  std::vector<PortHolder> holders;       // programs that have the port, if listening failed
-  std::vector<ReceivedStatus> received;  // one for each pair of `from` and `advertised`
+  std::vector<PortHolder> holders;       // programs that use the port, if listening failed
+  std::vector<ReceivedStatus> received;  // one per pair of `from` and `advertised`
   double waited_s = 0;
 };
 
 struct StreamFacts {
   enum class Outcome { not_tried, refused, unreachable, closed_without_a_byte, no_ping, pings } outcome = Outcome::not_tried;
   std::string error;                         // why the connection or the greeting failed
-  bool refuses = false;                      // `error` is the answer of the sonar to a request
+  bool refuses = false;                      // true: `error` is the sonar's answer to a request
   std::string own;                           // our end of the connection; empty = there was none
-  bool asked = false;                        // settings were sent, since no other client was connected
+  bool asked = false;                        // settings were sent, because no other client was connected
   std::uint64_t junk_bytes = 0, others = 0;  // others: messages that are not pings
   double first_ping_ms = 0, waited_s = 0;
   unsigned beams = 0, rows = 0, bits = 0;
   std::uint64_t pings = 0, missing = 0, broken = 0;
   std::string first_complaint;  // complaint about the first broken ping
   double asked_hz = 0, rate_hz = 0;
-  // Delay of the pings relative to the one with the smallest delay, by the time stamps in them.
+  // Delay of pings relative to the ping with the smallest delay, from their time stamps.
   std::optional<double> spread_p99_ms;
-  // Time from transmission to the last byte received, by the events of the control stream.
+  // Time from transmission to the last received byte, from events of the control stream.
   std::optional<double> latency_p50_ms, latency_p99_ms;
   std::optional<double> computing_ms;  // median time to compute a ping, from the same events
 };
@@ -63,24 +63,24 @@ struct SonarFacts {
   Endpoint at;
   const protocol::Make* make = &protocol::makes().front();
   std::string name;        // from the control stream; empty = not known
-  std::string unresolved;  // why its name has no address
+  std::string unresolved;  // why its host name has no address
   bool on_this_host = false;
   bool in_our_network = true;                       // an interface reaches its address without a router
-  bool out_of_time = false;                         // not examined, for lack of time
+  bool out_of_time = false;                         // not examined, because time ran out
   std::vector<std::string> clients;                 // clients that were connected before us
   std::vector<PortHolder> listeners;                // programs on this computer that listen on its port
-  std::shared_ptr<const v1::SonarStatus> reported;  // after the pings; null = the daemon has no such sonar
+  std::shared_ptr<const v1::SonarStatus> reported;  // status after the pings; null = the daemon has no such sonar
   StreamFacts stream;
 };
 
 struct ControlFacts {
   Endpoint at;
-  bool given = false;                              // given by the user; no answer is then an error
+  bool given = false;                              // the user gave the address; then a missing answer is an error
   std::string error;                               // why there is no status
-  bool token_required = false;                     // there is no status, because the daemon requires a token and got none
+  bool token_required = false;                     // there is no status, because the daemon requires a token
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none
-  std::shared_ptr<const v1::DaemonStatus> latest;  // after the pings; null = it was not asked again
-  std::optional<double> clock_ahead_s;             // how far the daemon's clock is ahead of ours; only if on another computer
+  std::shared_ptr<const v1::DaemonStatus> latest;  // status after the pings; null = not requested again
+  std::optional<double> clock_ahead_s;             // daemon's clock minus ours; only for another computer
 };
 struct HttpFacts {
   enum class Place {
@@ -102,20 +102,20 @@ struct FoundSonar {
 };
 /// Whether drivers control the sonar by HTTP and receive its images by UDP. Such a sonar has no client connections.
 inline bool is_by_http(const SonarFacts& sonar) { return sonar.make->ports.front().kind == protocol::HostPort::Kind::http; }
-/// Whether drivers find the sonar by status messages to the port that `status` is about.
+/// Whether drivers find the sonar by status messages to the port of `status`.
 inline bool sends_status(const SonarFacts& sonar, const StatusFacts& status) {
   const protocol::Port* const beacon = sonar.make->device->port(protocol::Port::Kind::udp_beacon);
   return beacon != nullptr && beacon->number == status.on.port;
 }
 
-/// sysctl values of the computer doctor runs on.
+/// sysctl values of this computer.
 struct KernelPorts {
   bool known = false;
   int low = 0, high = 0;  // ports of outgoing connections
   std::string reserved;   // "52100,52102" or with ranges
 };
 
-/// The kind of machine on which doctor runs. The networks of WSL2 and of containers pass no broadcasts to it.
+/// The kind of this machine. Broadcasts do not reach WSL2 and containers.
 enum class Machine { ordinary, wsl2, container };
 
 struct Facts {
@@ -127,7 +127,7 @@ struct Facts {
   HttpFacts http;
   KernelPorts kernel_ports;
   std::vector<FoundSonar> found;
-  std::vector<PortHolder> daemons;  // sonards of this computer, a line for each data port
+  std::vector<PortHolder> daemons;  // sonard processes of this computer, one element per data port
 };
 
 }  // namespace sonar::clients::doctor

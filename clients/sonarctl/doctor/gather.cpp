@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto status_patience = 2500ms;  // status messages come every second
-constexpr auto first_status = 1300ms;     // for the status that says which clients are connected
+constexpr auto first_status = 1300ms;     // for the status with the connected clients
 const Endpoint usual_http{"127.0.0.1", 8088};
 constexpr auto short_patience = 700ms, own_patience = 200ms;
 constexpr auto search_patience = 400ms, search_patience_here = 100ms;  // for an answer to discovery
@@ -147,7 +147,7 @@ class Gathering {
     return s.advertised() == host || s.listens().starts_with(host + ":");
   }
 
-  /// If no port is given, it is that of the sonar known at this address.
+  /// Without a port, uses that of the sonar known at this address.
   Endpoint with_port(const Endpoint& given) const {
     if (given.port != 0) return given;
     if (facts_.control.status)

@@ -1,5 +1,5 @@
-// Gathers the facts of doctor from the network and the kernel without disturbing clients: first it lists the connected clients,
-// then it connects to the sonars without one. checks.hpp interprets the facts.
+// Gathers the facts of doctor from the network and the kernel without disturbing clients: it first lists the connected clients,
+// then connects to sonars without clients. checks.hpp interprets the facts.
 #pragma once
 
 #include "clients/sonarctl/control_client.hpp"
@@ -8,7 +8,7 @@
 namespace sonar::clients::doctor {
 
 struct Questions {
-  std::string address;                   // HOST or HOST:PORT; empty = every sonar found, or the address of the demo
+  std::string address;                   // HOST or HOST:PORT; empty = all sonars found, else the demo's address
   Endpoint status_on{"0.0.0.0", 52102};  // address of the status messages
   std::string control, http;             // HOST:PORT; empty = the defaults
   std::filesystem::path token_file;
@@ -16,7 +16,7 @@ struct Questions {
   double within_s = 8;
 };
 
-/// Returns within about `within_s`. usage: an invalid address.
+/// Returns within about `within_s`. Error usage: an invalid address.
 Result<Facts> gather(const Questions& questions);
 
 }  // namespace sonar::clients::doctor

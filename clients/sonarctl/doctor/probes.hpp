@@ -1,4 +1,4 @@
-// Single queries to the network, each with a time limit. Used by gather, which orders them.
+// Single queries to the network, each with a time limit.
 #pragma once
 
 #include <optional>
@@ -21,10 +21,10 @@ bool is_on_this_host(const std::string& ipv4);
 bool is_in_our_network(const std::string& ipv4);
 Machine this_machine();
 
-/// Returns whether the computer refuses connections to this TCP port, because no program listens there.
+/// Whether connections to this TCP port are refused because no program listens there.
 bool refuses(const Endpoint& at);
 
-/// Receives status messages and sorts them, also those that arrive during other queries.
+/// Receives and sorts status messages, including those that arrive during other queries.
 class StatusListener {
  public:
   explicit StatusListener(const Endpoint& on);
@@ -42,8 +42,8 @@ class StatusListener {
   StatusFacts facts_;
 };
 
-/// Searches for sonars of every make that can be searched: on this computer and its networks, or at `hosts` alone (IPv4); answers
-/// are read by `receive_answers`.
+/// Searches for sonars of every make with a search message, on this computer and its networks, or only at `hosts` (IPv4).
+/// receive_answers() reads the answers.
 class DiscoveryQuestion {
  public:
   explicit DiscoveryQuestion(const std::vector<std::string>& hosts);

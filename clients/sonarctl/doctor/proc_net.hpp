@@ -1,5 +1,4 @@
-// The sockets of this computer from /proc/net, and their programs as far as /proc is readable. doctor names the program that
-// holds a port.
+// Lists the sockets of this computer from /proc/net, and their programs as far as /proc is readable.
 #pragma once
 
 #include <cstdint>
