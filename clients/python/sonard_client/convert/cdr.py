@@ -90,7 +90,7 @@ PACKAGES = ("nav_msgs", "geometry_msgs", "tf2_msgs", "tf")
 
 
 def is_path(schema: str) -> bool:
-    """Whether each message holds a whole track, so that only the last one counts."""
+    """Whether each message contains a whole track, so that only the last one is used."""
     return kind_of(schema) == "Path"
 
 

@@ -31,7 +31,7 @@ def _bounded(stream: Any, data: bytes, size: int) -> bytes:
 
 
 def _read(reader: Any, size: int) -> bytes:
-    """The same for a file-like object, which may return less than requested."""
+    """Like _bounded(), for a file-like object that may return less than requested."""
     out = b""
     while len(out) <= size:
         part = reader.read(size + 1 - len(out))
@@ -69,7 +69,7 @@ def unpack(kind: str, data: bytes, size: int) -> bytes:
 
 
 def unpack_at_most(kind: str, data: bytes, size: int) -> bytes:
-    """Returns the bytes, whose number is unknown, or raises Unreadable if there are more than `size`."""
+    """Returns the decompressed bytes, or raises Unreadable if there are more than `size`."""
     unpacker = _unpacker(kind)
     if unpacker is None:
         package = {"lz4": "python3-lz4", "zstd": "python3-zstandard"}[kind]

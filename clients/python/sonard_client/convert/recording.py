@@ -75,7 +75,7 @@ def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str, seen: M
 
 
 def _clock_reset(rows: Stream[Found]) -> str:
-    """Advice if the clock went back for good, after which all poses are omitted until it has caught up."""
+    """Advice if the clock jumped back, after which all poses are omitted until it has caught up."""
     back_s, number = max(((a[0] - b[0], i) for i, (a, b) in enumerate(zip(rows, rows[1:]), 1)), default=(0.0, 0))
     return "" if back_s < CLOCK_RESET_S else f"; the clock went back by {back_s:.1f} s at pose {number + 1}: split the recording there"
 

@@ -18,7 +18,7 @@ MAGIC = b"SQLite format 3\0"
 METADATA = "metadata.yaml"
 COLUMNS = {"topics": ("id", "name", "type", "serialization_format"), "messages": ("id", "topic_id", "timestamp", "data")}
 MOST_TOPICS = 500  # limit for topics that may hold poses
-ROW_BYTES = 8  # overhead: a stored message takes at least so much more than its data
+ROW_BYTES = 8  # minimum overhead of a stored message
 STEPS_PER_BYTE = 10  # instructions of SQLite; a scan takes about 20 a row
 _STEPS_AT_ONCE = 100_000
 _PARTS_NAMED = 20
@@ -26,13 +26,13 @@ _PART = re.compile(r"^[ \t]*-[ \t]+[\"']?([^\"'\s:]+\.(?:db3|mcap)(?:\.zstd)?)[\
 
 
 def _unmerged(path: pathlib.Path) -> Optional[pathlib.Path]:
-    """The file beside a database that holds its last changes, if its writer did not end as it should."""
+    """The file beside a database with its last changes, left if the writer did not end regularly."""
     beside = (path.with_name(path.name + end) for end in ("-wal", "-journal"))
     return next((p for p in beside if p.is_file() and p.stat().st_size), None)
 
 
 class _Base:
-    """A database that may be hostile: only stored tables are read, and no more of them than the file can hold."""
+    """A database that may be hostile: only stored tables are read, with no more rows than the file can contain."""
 
     def __init__(self, path: pathlib.Path, unmerged: Optional[pathlib.Path]) -> None:
         resolved = path.resolve()
@@ -135,7 +135,7 @@ def db3_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[R
 
 
 def _warn_of_missing(folder: pathlib.Path, there: List[pathlib.Path], listed: List[str], warn: Warn) -> None:
-    """Names the parts of a recording that are not read: absent, or compressed and not unpacked."""
+    """Names the parts of a recording that are not read, because they are missing or compressed."""
     names = {p.name for p in there}
     plain = dict.fromkeys(name[:-len(".zstd")] if name.endswith(".zstd") else name for name in listed)
     packed = [p.name for p in sorted(folder.glob("*.zstd")) if p.name[:-len(".zstd")] not in names]
@@ -168,7 +168,7 @@ def files_of(folder: pathlib.Path, warn: Warn = lambda text: None) -> List[pathl
 
 
 def recording_at(path: pathlib.Path) -> pathlib.Path:
-    """The recording that a path names; its metadata stands for the folder."""
+    """The recording that a path names; the path of its metadata file means its folder."""
     return path.parent if path.name == METADATA and path.is_file() else path
 
 

@@ -14,7 +14,7 @@ Value = TypeVar("Value")
 Stream = List[Tuple[float, Value]]  # times in s
 Place2 = Tuple[float, float]  # north, east [m]
 LONG_GAP_S = 1.0
-LONG_LACK_S = 3.0  # of positions or attitudes, while the other ones come
+LONG_LACK_S = 3.0  # without positions or attitudes while the others arrive
 
 
 class ConvertError(Exception):
@@ -159,7 +159,7 @@ def _warn_of_lack(rows: Sequence[Row], attitudes_s: Sequence[float], positions_s
 
 
 def dead_reckon(track: Track, speed_m_s: float) -> None:
-    """Moves a vehicle without horizontal position ahead at a constant speed, from where it is held."""
+    """Moves a vehicle without horizontal position ahead at a constant speed, starting at its fixed position."""
     north, east, rows = 0.0, 0.0, track.rows
     moved = rows[:1]
     for before, row in zip(rows, rows[1:]):
@@ -179,7 +179,7 @@ def depth_source(attitude: str, attitudes: Stream[Quaternion], depths: Stream[fl
 
 
 def _stays(positions: Stream[Vector3]) -> bool:
-    """Returns whether the position never changes, as filters report without a horizontal position."""
+    """Returns whether the position never changes, as in filters without a horizontal position."""
     first = positions[0][1]
     return len(positions) > 1 and all(math.hypot(p[0] - first[0], p[1] - first[1]) < 1e-3 for _, p in positions)
 

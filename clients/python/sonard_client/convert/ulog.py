@@ -25,7 +25,7 @@ WANTED = tuple(name + more for more in ("", TRUTH) for name in (ATTITUDE, LOCAL,
 LONGEST_FORMAT = 65535  # bytes of one message
 _FIELD = re.compile(r"([a-z0-9_]+)(?:\[([0-9]{1,5})\])? ([A-Za-z0-9_]+)")
 _REAL, _FLAG = ("float", "double"), ("bool", "uint8_t")
-# The fields that are read: their types, and how many values they have.
+# The fields that are read: their types and numbers of values.
 _READ: Dict[str, Tuple[Tuple[str, ...], int]] = {
     **dict.fromkeys(("timestamp", "timestamp_sample"), (("uint64_t",), 1)), "q": (_REAL, 4),
     **dict.fromkeys(("x", "y", "z", "lat", "lon", "alt", "ref_lat", "ref_lon", "ref_alt"), (_REAL, 1)),
@@ -37,11 +37,11 @@ Instance = Tuple[str, int]  # of a message: its name and number
 
 class Layout(NamedTuple):
     body: struct.Struct  # up to the last field that is read; the padding at a format's end is not logged
-    fields: Dict[str, Tuple[int, int]]  # by name: its first value and how many
+    fields: Dict[str, Tuple[int, int]]  # by name: index of the first value, number of values
 
 
 def _layout(text: str) -> Union[Layout, str]:
-    """The fields of _READ in a format such as "uint64_t timestamp;float[4] q;", or why it cannot be read."""
+    """The fields of _READ in a format such as "uint64_t timestamp;float[4] q;", or the reason why it cannot be read."""
     codes, fields, at, size, read = "<", {}, 0, 0, 1
     for part in filter(None, text.split(";")):
         match = _FIELD.fullmatch(part)

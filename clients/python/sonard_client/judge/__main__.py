@@ -110,7 +110,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 class TimeLeft:
-    """Estimates the time for the remaining cases: their expected time, scaled by how long the finished ones really took."""
+    """Estimates the time for the remaining cases: their expected time, scaled by the real duration of the finished ones."""
 
     def __init__(self, cases: Sequence[Case], jobs: int) -> None:
         self._waiting = {case.number: case for case in cases}
@@ -228,7 +228,7 @@ class Judge:
         self.kinds = {kind["code"]: kind for kind in result["kinds"].get("kinds", ())}
 
     def not_run(self, case: Case) -> str:
-        """Returns why a case cannot run here, or an empty text."""
+        """Returns the reason why a case cannot run here, or an empty text."""
         if case.kind == "N00":
             return ""
         if case.needs_lab:
@@ -243,7 +243,7 @@ class Judge:
         kind = self.kinds.get(case.kind)
         if kind is None:
             return f"this sonard has no fault {case.kind}"
-        product = self.options.profile.replace("-", "")  # it begins with the name of its make
+        product = self.options.profile.replace("-", "")  # the product begins with the name of its make
         why = next((why for make, why in kind.get("without_effect", {}).items() if product.startswith(make)), "")
         if why:
             return f"{case.kind} {why}"

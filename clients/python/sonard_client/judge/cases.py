@@ -3,7 +3,7 @@
 row(NUMBER, given, DURATION, SENTENCE, ...). NUMBER begins with the code of the kind of fault. DURATION is "2 s", "3 pings", "once"
 or "5 times".
 at      when the fault begins: "ping 6" (the default), "every 5 pings", "start" (before the driver connects)
-limit   seconds after the fault's end within which the driver must be back
+limit seconds after the fault's end within which the driver must have recovered
 must    limits of this case in addition to those of all cases (verdicts.judge): {"rss_mib": 64}
 given   parameters that `sonarctl fault kinds` lists; "byte" is an offset in the ping, which becomes a fraction of its size
 should  limits that replace those of verdicts.SHOULD; None removes one
@@ -104,7 +104,7 @@ class Case:
 
     @property
     def tail_s(self) -> float:
-        """How long the fault acts after its end in the journal: a pause is counted for the ping in which it begins."""
+        """How long the fault still acts after its end in the journal, which counts a pause at the ping in which it begins."""
         return float(self.given["seconds"]) if self.kind == "S06" else 0.0
 
     def record(self) -> Dict[str, Any]:

@@ -32,7 +32,7 @@ class State(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """What the driver's processes use at one moment, all together."""
+    """Resources that all of the driver's processes use at one moment."""
     mono: float
     resident_mib: float
     descriptors: int

@@ -24,10 +24,10 @@ from .scene import Journal, Scene, StatusWire, mono
 from .verdicts import BACK_PINGS, Observation, back_at, judge
 from .wire import Capture, DatagramFlow, Seen
 
-NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # a working driver takes so many pings in this time without a fault
+NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # without a fault, a working driver gets this many pings in this time
 _SETTLE_S = 0.52
 _STILL_S = 20.0          # after such a time without any activity the judge stops waiting for the fault
-_EARLY_S = 0.02          # the journal's entry may follow its ping by this time
+_EARLY_S = 0.02          # the journal's entry may be this much later than its ping
 _DEVICE_ID = 7001
 
 
@@ -165,7 +165,7 @@ def _kinds(control: Control) -> Dict[str, Any]:
 
 
 def explanation(scene: Scene) -> str:
-    """Explains to the developer of a driver why it takes no pings."""
+    """Explains to the developer of a driver why it gets no pings."""
     lines = []
     connections = scene.capture.connections if scene.capture else []
     taken = len(scene.capture.delivered()) if scene.capture and scene.reads_pings else len(scene.status.ping_times)
@@ -278,7 +278,7 @@ def _restart(scene: Scene) -> bool:
 
 
 def touched_pings(journal: Sequence[Dict[str, Any]], seen: Sequence[Seen], numbered: bool) -> List[int]:
-    """Numbers of the pings that the fault touched. Where the journal has other numbers than the pings: of the one that was sent next."""
+    """Numbers of the pings that the fault affected. If the journal numbers pings differently: of the next ping sent."""
     injected = [r for r in journal if int(r.get("ping", 0) or 0) > 0 and r.get("event") == "injected"]
     if numbered:
         return [int(r["ping"]) for r in injected]
@@ -290,7 +290,7 @@ def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until
     scene.driver.poll()
     published = list(scene.driver.published)
     if scene.capture:
-        scene.capture.catch_up()  # otherwise a ping whose packets are not read yet would be judged false
+        scene.capture.catch_up()  # otherwise a ping whose packets have not been read yet would count as false
     exited = scene.driver.exited
     connections: List[Tuple[float, Optional[float], str]] = list(scene.status.connections)
     if scene.capture:

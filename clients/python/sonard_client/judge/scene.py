@@ -1,4 +1,4 @@
-"""A running case: sonard, the driver, and what observes them (the capture of packets, the tap, the journal of faults)."""
+"""A running case: sonard, the driver, and their observers (packet capture, tap, journal of faults)."""
 from __future__ import annotations
 
 import contextlib
@@ -20,7 +20,7 @@ from .verdicts import sort_published
 from .wire import Capture
 
 _STEP_S = 0.05
-_MOST_MIB = 6144.0  # a driver that takes more memory is stopped before the computer runs out of it
+_MOST_MIB = 6144.0  # a driver that uses more memory is stopped before the computer runs out of it
 
 
 class StatusWire(threading.Thread):
@@ -137,7 +137,7 @@ class Scene:
         return sort_published(list(self.driver.published), self.capture.seen())[0]
 
     def ping_times(self) -> List[float]:
-        """Returns when the driver took pings: when it published them, or without a tap when it acknowledged them."""
+        """Returns the times at which the driver got pings: when it published them or, without a tap, acknowledged them."""
         if self.tapped:
             return [p.mono for p in self.good()]
         if self.capture is not None and self.reads_pings:
@@ -153,12 +153,12 @@ class Scene:
 
     def wait(self, until: Callable[[], bool], timeout_s: float, moves: Optional[Callable[[], object]] = None) -> bool:
         """Waits for a condition and returns whether it holds. Returns early if the driver or sonard ends or the driver takes too
-        much memory. Each change of moves() restarts the time-out, up to six times `timeout_s` in all, so that a slow computer
-        is not taken for a driver that does nothing."""
+        much memory. Each change of moves() restarts the time-out, up to six times `timeout_s` in all, so that a slow computer does not look
+        like an idle driver."""
         began = time.monotonic()
         deadline, before = began + timeout_s, moves() if moves else None
         while True:
-            looked = time.monotonic()  # before moves(), so that what happened during a stall of this computer counts
+            looked = time.monotonic()  # before moves(), so that activity during a stall of this computer counts
             if moves and (now := moves()) != before:
                 before, deadline = now, min(began + 6 * timeout_s, looked + timeout_s)
             self.journal.read()

@@ -1,4 +1,4 @@
-"""Finds the intact pings in what a sonar sends, whatever faults are in it; a driver may publish only these. Each make has a row
+"""Finds the intact pings in the bytes that a sonar sends, despite injected faults; a driver may publish only these. Each make has a row
 in makes/__init__.py and a file beside it."""
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class TruePing(NamedTuple):
     beams: int
     begin: int       # offset in the stream, or in all datagrams of a flow
     end: int
-    needed: bool = True  # a driver may leave other pings out
+    needed: bool = True  # False: a driver may omit the ping
 
 
 class Reader(Protocol):
@@ -32,21 +32,21 @@ class NoPings:
 
 class Make(NamedTuple):
     """The rules of a make of sonar that the judge needs."""
-    profiles: Tuple[str, ...]                    # what the names of its products begin with
+    profiles: Tuple[str, ...]                    # prefixes of its product names
     stream: Callable[[], Reader] = NoPings       # reads a TCP connection
     datagrams: Callable[[], Reader] = NoPings    # reads a flow of datagrams
     is_request: Callable[[bytes], bool] = bool   # whether bytes of a driver are settings or a request for pings
     needs_request: bool = True                   # False: the sonar pings as soon as a client connects
     is_pushed: Optional[Callable[[bytes], bool]] = None  # whether an unrequested datagram belongs to a ping
-    numbered: bool = True                        # False: its pings have other numbers than the journal, or none
-    sonar: Mapping[str, object] = {}             # keys of the sonar's configuration, beside the usual ones
+    numbered: bool = True                        # False: its pings have no numbers, or others than the journal
+    sonar: Mapping[str, object] = {}             # additional keys of the sonar's configuration
 
 
-LOOKS_DOWN = {"mount": {"frame": "FRD", "xyz_m": [0, 0, 0], "rpy_deg": [0, -90, 0]}}  # Make.sonar of those that see only a floor
+LOOKS_DOWN = {"mount": {"frame": "FRD", "xyz_m": [0, 0, 0], "rpy_deg": [0, -90, 0]}}  # Make.sonar of sonars that see only a floor
 
 
 class WholeMessages:
-    """Finds whole messages at any offset, whatever is between them. An incomplete message does not hide later ones.
+    """Finds whole messages at any offset, with any bytes between them. An incomplete message does not hide later ones.
 
     is_stream: False drops what a datagram leaves incomplete."""
     magic = b""
@@ -54,8 +54,8 @@ class WholeMessages:
     def __init__(self, is_stream: bool = True) -> None:
         self._data = bytearray()
         self._base = 0             # offset of _data[0] in the stream
-        self._open: List[int] = []  # where in _data messages begin that are not complete
-        self._looked = 0           # where in _data the search for further messages continues
+        self._open: List[int] = []  # offsets in _data at which incomplete messages begin
+        self._looked = 0           # offset in _data at which the search for further messages continues
         self._unnumbered = 0
         self._is_stream = is_stream
 
@@ -64,7 +64,7 @@ class WholeMessages:
         raise NotImplementedError
 
     def pings(self, message: bytes, begin: int) -> Iterator[TruePing]:
-        """What a whole message contains. begin: its offset in the stream."""
+        """The pings in a whole message. begin: its offset in the stream."""
         raise NotImplementedError
 
     def is_damaged(self, message: bytes) -> bool:
@@ -88,7 +88,7 @@ class WholeMessages:
             message = bytes(self._data[begin:begin + size])
             if not self.is_damaged(message):
                 found.extend(self.pings(message, self._base + begin))
-                still_open, done = [], begin + size  # those before lack bytes
+                still_open, done = [], begin + size  # earlier messages lack bytes
         looked = max(done, len(self._data) - len(self.magic) + 1)
         kept = still_open[0] if still_open else min(looked, len(self._data))
         if not self._is_stream:
@@ -99,7 +99,7 @@ class WholeMessages:
         return found
 
     def unnumbered(self) -> int:
-        """Pings without a number count down from -1: no driver prints such a number, and no two are one ping."""
+        """Pings without a number get numbers from -1 downwards, which no driver prints."""
         self._unnumbered -= 1
         return self._unnumbered
 

@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 from .driver import Published, Sample
 from .wire import Seen
 
-BACK_PINGS = 3          # a driver is back after so many consecutive pings
+BACK_PINGS = 3          # a driver has recovered after this many consecutive pings
 SHOULD = {"notice_s": 2.0, "recover_s": 3.0, "lost": 1.0, "rss_mib": 32.0, "log_lines_s": 10.0}
 WORDS = {"notice_s": "notices within {:g} s", "recover_s": "is back within {:g} s of the fault's end",
          "lost": "loses at most {:g} more ping", "rss_mib": "takes at most {:g} MiB more memory",

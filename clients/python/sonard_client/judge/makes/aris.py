@@ -1,5 +1,5 @@
-"""ARIS: frames in parts, as datagrams to the receiver that a command names. The samples are those of all parts in the order sent, or
-in the order of the picture: sample by sample, each from beam 0."""
+"""ARIS: frames in several datagrams, sent to the receiver that a command names. Accepted samples: those of all parts in the order of
+sending, or in the order of the picture (sample by sample, each from beam 0)."""
 from __future__ import annotations
 
 import zlib
@@ -33,7 +33,7 @@ def part_of(datagram: bytes) -> Optional[Part]:
 
 
 def picture_of(raw: bytes, samples: int) -> bytes:
-    """From the order of the digitiser (by ping, sample, channel) to that of the picture."""
+    """Converts samples from the order of the digitiser (by ping, sample, channel) to that of the picture."""
     beams = len(raw) // samples
     pings, picture = beams // _CHANNELS, bytearray(len(raw))
     for ping in range(pings):
@@ -51,9 +51,8 @@ class _Frame:
 
 
 class ArisReader:
-    """A driver may leave out frames between whose parts those of another one came, and may put them together, too.
-
-    frame_index begins again with each connection, so the same index may be that of another frame."""
+    """If the parts of two frames are interleaved, a driver may omit these frames or assemble them. frame_index begins again with each
+    connection, so different frames can have the same index."""
 
     def __init__(self) -> None:
         self._at = 0
@@ -72,7 +71,7 @@ class ArisReader:
         frame = self._frames.get(part.index)
         known = frame.parts.get(part.offset) if frame is not None else None
         if frame is not None and known == part:
-            return []  # it came twice
+            return []  # a repeated part
         if frame is None or frame.is_done or known is not None:
             self._frames.pop(part.index, None)
             frame = self._frames[part.index] = _Frame(begin)

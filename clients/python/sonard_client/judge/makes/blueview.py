@@ -1,4 +1,4 @@
-"""BlueView by sonard's own link (BVE1). The samples are 16 bits, little-endian, beam by beam as sent or row by row."""
+"""BlueView over sonard's own link (BVE1). Accepted samples: 16 bits, little-endian, beam by beam as sent, or row by row."""
 from __future__ import annotations
 
 import array
@@ -16,7 +16,7 @@ _NAVIGATION_BYTES = (8, 8, 8, 4, 4, 4, 4, 4, 4, 4)  # of each field; the next on
 
 
 def _samples(payload: bytes, navigation: int, is_deflated: int, size: int) -> Optional[bytes]:
-    """So many bytes of samples; None: there are more or fewer. The field that says how many there are may lie."""
+    """The samples, if their size is right; else None. The size field itself may be wrong."""
     at = _NAVIGATION_AT + sum(wide for bit, wide in enumerate(_NAVIGATION_BYTES) if navigation >> bit & 1)
     if navigation >> len(_NAVIGATION_BYTES) & 1:
         at += 2 + int.from_bytes(payload[at:at + 2], "little")
@@ -39,7 +39,7 @@ class BlueViewReader(WholeMessages):
         return _HEADER.size + size if size <= _LONGEST else 0
 
     def is_damaged(self, message: bytes) -> bool:
-        return message.find(self.magic, 1) > 0  # another frame inside: this one lacks bytes
+        return message.find(self.magic, 1) > 0  # another frame inside means that this one lacks bytes
 
     def pings(self, message: bytes, begin: int) -> Iterator[TruePing]:
         payload = message[_HEADER.size:]

@@ -13,7 +13,7 @@ _VALUES = ("vx", "vy", "vz", "altitude")
 
 
 def _velocity(line: str) -> Optional[Tuple[FrozenSet[int], bool]]:
-    """CRCs of the values, and whether they are valid; None for another line."""
+    """CRCs of the values, and whether the values are valid; None for any other line."""
     try:
         report = json.loads(line)
         if not isinstance(report, dict) or report.get("type") != "velocity":
@@ -25,7 +25,7 @@ def _velocity(line: str) -> Optional[Tuple[FrozenSet[int], bool]]:
 
 
 class DvlReader:
-    """A driver may leave out lines without a valid velocity, and lines that begin behind something else."""
+    """A driver may omit lines without a valid velocity, and lines that follow other bytes."""
 
     def __init__(self) -> None:
         self._rest, self._base, self._count = b"", 0, 0

@@ -17,7 +17,7 @@ def _u32(data: "bytes | bytearray", at: int) -> int:
 
 
 class M3Reader(WholeMessages):
-    """Numbers of samples and beams say how long a packet is; one of its two lengths must agree."""
+    """The numbers of samples and beams determine the length of a packet; at least one of its two length fields must agree."""
     magic = b"\x00\x80" * 4 + b"\x02\x10"
 
     def length(self, begin: int) -> int:

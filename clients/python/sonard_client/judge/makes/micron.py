@@ -22,8 +22,7 @@ def _size_by_bins(data: "bytes | bytearray", begin: int) -> int:
 
 
 class MicronReader(WholeMessages):
-    """Two of three must agree: the two lengths of a frame, and the number of bins. A driver may leave out a line in which one does
-    not."""
+    """Of the two lengths of a frame and the number of bins, two must agree. A driver may omit a line in which one differs."""
     magic = b"@"
 
     def length(self, begin: int) -> int:
@@ -41,7 +40,7 @@ class MicronReader(WholeMessages):
         at = 0
         while (at := message.find(self.magic, at + 1)) > 0:
             digits, length = _lengths(message, at)
-            if digits == length:  # another frame inside: this one lacks bytes
+            if digits == length:  # another frame inside means that this one lacks bytes
                 return True
         return not message.endswith(b"\n")
 

@@ -1,5 +1,5 @@
-"""Norbit: packets of bathymetry and of the water column, at a port each. The samples are the beams of a bathymetry as sent; a driver
-may also publish the pixels of the water column."""
+"""Norbit: packets of bathymetry and of the water column, each on its own port. Accepted samples: the beams of a bathymetry as sent; the
+pixels of the water column are optional."""
 from __future__ import annotations
 
 import zlib

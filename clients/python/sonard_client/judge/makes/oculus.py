@@ -1,5 +1,5 @@
-"""An Oculus' ping counts when the samples it announces are there: image, dimensions and one of the lengths agree, and no header of
-another message lies inside. So a driver may use any of the length fields, as long as what it publishes is what the sonar measured.
+"""Oculus. A ping counts if its samples are complete: the image agrees with the dimensions and with at least one length field, and contains
+no header of another message. So a driver may use any of the length fields.
 """
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FEWEST_SAMPLES, _MOST_SAMPLES = 4, 1 << 22  # limits for an image: no sonar has
 
 
 def sample_crcs(image: bytes, rows: int, row_bytes: int, has_gains: bool) -> FrozenSet[int]:
-    """CRC-32 of an image as it is sent; with row gains also of the samples alone."""
+    """CRC-32 of an image as sent; with row gains also of the samples without them."""
     found = {zlib.crc32(image)}
     if has_gains:
         crc, stride = 0, row_bytes + 4
@@ -68,7 +68,7 @@ class OculusReader:
         image_bytes = f.rows * (row_bytes + (4 if has_gains else 0))
         end = f.image_offset + image_bytes
         declared = {f.message_bytes, header.payload_bytes + layouts.HEADER_BYTES}
-        row_short = end - row_bytes - (4 if has_gains else 0)  # all lengths say one row fewer: may be accepted or refused
+        row_short = end - row_bytes - (4 if has_gains else 0)  # all lengths mean one row fewer: a driver may accept or refuse this
         if end not in declared and declared == {row_short}:
             end, image_bytes = row_short, row_short - f.image_offset
         elif end not in declared:
@@ -77,11 +77,11 @@ class OculusReader:
                 f.image_offset < head + 2 * f.beams:
             return 1
         if len(data) - at < end:
-            # A message that can never be complete must not hide those behind it.
+            # A message that can never be complete must not hide later ones.
             other = data.find(front[:6], at + 1)
             return other - at if 0 <= other < at + end else 0
         message = bytes(data[at:at + end])
-        other = message.find(front[:6], 1)  # magic and source of another message: this one lacks bytes
+        other = message.find(front[:6], 1)  # magic and source of another message mean that this one lacks bytes
         if other > 0:
             return other
         image = message[f.image_offset:]

@@ -7,9 +7,9 @@ from typing import Dict, Iterator, Mapping, Optional
 
 from ..truth import LOOKS_DOWN, Make, TruePing, WholeMessages
 
-# Messages that have what a driver publishes, and where in the payload a number of the ping stands.
+# The messages whose content a driver publishes, and the offset of the ping number in their payload.
 _NUMBER_AT: Dict[int, Optional[int]] = {1300: 8, 1308: 0, 1223: None, 2198: None, 2300: None, 2301: None, 3012: 20}
-_FRAME = struct.Struct("<2sHHBB")  # "BR", length of the payload, message, source, destination; behind the payload a sum of 16 bits
+_FRAME = struct.Struct("<2sHHBB")  # "BR", length of the payload, message, source, destination; a 16-bit sum follows the payload
 
 
 class PingReader(WholeMessages):
@@ -39,4 +39,4 @@ def _make(*profiles: str, numbered: bool, sonar: Mapping[str, object]) -> Make:
 
 NUMBERED = _make("ping1d", "s500", numbered=True, sonar={})
 UNNUMBERED = _make("ping360", "omniscan", numbered=False, sonar={})
-SURVEYOR = _make("surveyor", numbered=True, sonar=LOOKS_DOWN)  # its messages have the points of a floor
+SURVEYOR = _make("surveyor", numbered=True, sonar=LOOKS_DOWN)  # its messages contain points of a floor

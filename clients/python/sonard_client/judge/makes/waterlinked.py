@@ -39,7 +39,7 @@ def unpacked(block: bytes) -> bytes:
 
 
 def content_of(datagram: bytes) -> Optional[bytes]:
-    """The packet in a datagram; None: it is damaged, or something else."""
+    """The packet in a datagram; None if it is damaged or something else."""
     if datagram[:4] not in (b"RIP1", b"RIP2") or len(datagram) < 12 or int.from_bytes(datagram[4:8], "little") != len(datagram) or \
             zlib.crc32(datagram[:-4]) != int.from_bytes(datagram[-4:], "little"):
         return None
