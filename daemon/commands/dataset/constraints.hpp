@@ -14,7 +14,7 @@ namespace sonar::dataset {
 struct Constraints {
   // Names or labels of objects; above_bed also takes "sonar".
   std::vector<std::string> in_view, above_bed, no_overlap;
-  std::string bed;  // the object that above_bed is about
+  std::string bed;  // the bed of above_bed
   std::uint32_t tries = 100;
 };
 
@@ -31,9 +31,9 @@ struct Unmet {
   std::string sentence() const;
 };
 
-/// in_view: for each name, one visible object has the middle of its box in the fan. above_bed: the middles of all visible ones,
-/// and the sonar, are above the bed. no_overlap: the boxes of all visible ones, along the world's axes, are apart. Hidden objects
-/// satisfy every constraint.
+/// in_view: for each name, the box of some visible object has its middle in the fan. above_bed: the middles of all visible
+/// objects with the names, and the sonar, are above the bed. no_overlap: the boxes of these objects, along the world's axes, do
+/// not overlap. Hidden objects satisfy every constraint.
 bool meets(const Constraints& constraints, const PingRequest& request, const Scene& scene, Unmet& unmet);
 
 }  // namespace sonar::dataset

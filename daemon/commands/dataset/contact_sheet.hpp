@@ -1,4 +1,4 @@
-// The sheet of a data set that a reader looks at first: pings as an operator sees them, each beside its labels.
+// The contact sheet of a data set: pings as an operator sees them, each beside its labels.
 #pragma once
 
 #include <cstdint>

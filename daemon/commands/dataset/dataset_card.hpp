@@ -20,7 +20,7 @@ std::string card_head(const DatasetJob& job, const std::vector<FilesOfSplit>& fi
 
 struct Statistics {
   const nlohmann::json& pixels;                           // samples by class
-  const std::map<std::string, std::uint64_t>& instances;  // things seen, by class
+  const std::map<std::string, std::uint64_t>& instances;  // visible things, by class
   std::uint64_t negatives = 0;
   bool has_contact_sheet = false;
 };

@@ -1,4 +1,4 @@
-// `sonard dataset`: a labelled data set from one job file. docs/datasets.md is its manual.
+// `sonard dataset`: makes a labelled data set from one job file (docs/datasets.md).
 #pragma once
 
 #include "daemon/commands/options/command_line.hpp"

@@ -1,5 +1,5 @@
-// A data set's job: a render file (docs/render.md) that varies its values from ping to ping, and the ping that each number stands
-// for. A ping is a function of the job's text, the files it names and its number.
+// The job of a data set: a render file (docs/render.md) whose values vary from ping to ping. A ping is a function of its
+// number, the job's text and the files that the job names.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +24,11 @@ inline constexpr std::uint64_t most_pings = 100'000'000, most_shard_pings = 100'
 
 struct DatasetJob {
   std::string source, text;
-  std::filesystem::path folder;  // where the paths in it begin
+  std::filesystem::path folder;  // start of its relative paths
   std::string name, about, license;
   Seed seed{};
   std::uint64_t pings = 0, shard_pings = 1024;
-  double negatives = 0;              // share of the pings without targets
+  double negatives = 0;              // fraction of pings without targets
   std::vector<std::string> targets;  // names or labels
   bool fan = false;                  // also writes a picture of each ping
   std::vector<Variation> variations;
@@ -44,11 +44,11 @@ Result<DatasetJob> parse_job(std::string text, const std::string& name, const st
 
 /// A file that a job names.
 struct NamedFile {
-  std::string word;            // as it is named
-  std::filesystem::path file;  // below the folder of what names it
+  std::string word;            // as written in the job
+  std::filesystem::path file;  // path, relative to the file that names it
   std::string digest;          // SHA-256; "unreadable"
 };
-/// All files that a ping may draw, and those that YAML files among them name: every word of their text that is a file.
+/// All files that a ping may use, and those that YAML files among them name (every word of their text that is a file).
 std::vector<NamedFile> named_files(const DatasetJob& job);
 
 /// A ping that met the constraints.
@@ -58,11 +58,11 @@ struct DrawnPing {
   std::uint32_t attempt = 0;
   bool negative = false;
   std::string scene_key;                     // scenes of equal keys are equal
-  std::shared_ptr<const Scene> whole_scene;  // before counts and a negative hide some of its objects
+  std::shared_ptr<const Scene> whole_scene;  // with the objects that counts and negatives hide
 };
 
 /// Draws until the constraints are met. Errors: config if they never are, or if the filled file is wrong. `known`: the last
-/// scene, which is used again if it is the same, and all shapes read so far.
+/// scene, which is reused if it is equal, and all shapes read so far.
 struct KnownScene {
   std::string key = {};
   std::shared_ptr<const Scene> scene = {};

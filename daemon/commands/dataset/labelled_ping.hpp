@@ -30,7 +30,7 @@ struct LabelledPing {
   std::optional<Raster> cell;  // picture of a ping on the contact sheet
 };
 
-/// Makes pings one after the other on one thread; keeps the engine while the scene stays the same.
+/// Makes pings in sequence on one thread; reuses the engine while the scene is the same.
 class PingMaker {
  public:
   /// `simd` replaces that of the job.

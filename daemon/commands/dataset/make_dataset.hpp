@@ -17,8 +17,8 @@ namespace sonar::dataset {
 
 struct DatasetOptions {
   std::filesystem::path out;
-  std::uint64_t part = 0, parts = 1;   // the part has the shards whose number leaves `part` when divided by `parts`
-  int threads = 1;                     // pings side by side
+  std::uint64_t part = 0, parts = 1;   // the part has the shards whose number modulo `parts` is `part`
+  int threads = 1;                     // pings in parallel
   std::optional<SimdLevel> simd = {};  // instead of the job's
   // When it becomes true, the pings being made are finished, and those of the incomplete shard are kept for the next run.
   const std::atomic<bool>* stop = nullptr;
@@ -26,10 +26,10 @@ struct DatasetOptions {
 
 struct DatasetProgress {
   std::uint64_t shards = 0, all_shards = 0, kept_shards = 0;  // shards of this part
-  std::uint64_t pings = 0, all_pings = 0;                     // made by this run, to be made by it
+  std::uint64_t pings = 0, all_pings = 0;                     // pings made so far by this run; all pings of this run
   std::uint64_t bytes = 0;                                    // bytes of finished shards
   std::uint64_t set_aside = 0;                                // pings of an incomplete shard, when stopped
-  bool stopped = false;                                       // before all were made
+  bool stopped = false;                                       // stopped before all were made
   bool whole = false;                                         // the manifest has been written
   std::optional<std::uint64_t> missing = {};                  // the first shard that another part has not made yet
 };
@@ -42,18 +42,18 @@ class DatasetFolder {
   virtual ~DatasetFolder() = default;
   virtual const std::string& inputs() const = 0;           // digest of all that the bytes depend on
   virtual const std::string& instruction_set() const = 0;  // a name of simd_level_names
-  /// Returns whether the shard exists and is unchanged. Error bad_data: it differs from its digest.
+  /// Whether the shard exists and is unchanged. Error bad_data: it differs from its digest.
   virtual Result<bool> holds(std::uint64_t shard) = 0;
-  /// Makes the shard. One that another process has made meanwhile is kept; if its bytes differ, the error is bad_data. Other
-  /// errors: io; config as draw_ping().
+  /// Makes the shard. If another process has made it meanwhile, that one is kept; error bad_data if its bytes differ. Other
+  /// errors: io; config, as draw_ping().
   virtual Result<void> make(std::uint64_t shard) = 0;
   /// Whether the last error is that a shard's bytes differ: another program, or a damaged disk or memory.
   virtual bool differs() const = 0;
-  /// The manifest, the COCO file and the card, when no shard is missing: `whole`, else `missing`.
+  /// Writes the manifest, the COCO file and the card, if no shard is missing; sets `whole` or `missing`.
   virtual Result<DatasetProgress> conclude() = 0;
 };
 
-/// Makes the folder. `job` outlives it. Errors: io; usage when it holds another job's shards; config as draw_ping().
+/// Makes the folder. `job` must outlive it. Errors: io; usage if it contains another job's shards; config, as draw_ping().
 Result<std::unique_ptr<DatasetFolder>> open_dataset(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress);
 
 /// Makes all missing shards of this part, and the manifest if no shard is missing.

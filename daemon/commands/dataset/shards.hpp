@@ -32,11 +32,11 @@ class DurableFile {
   /// Fails with ErrorKind::io, for example when the disk is full.
   Result<void> write(std::span<const std::byte> bytes);
   Result<void> write(std::string_view text) { return write(std::as_bytes(std::span(text))); }
-  /// fsync and rename; a file of that name is replaced.
+  /// fsync and rename; an existing file is replaced.
   Result<void> commit();
-  /// Like commit(), but keeps a file of that name as it is and then returns false.
+  /// Like commit(), but keeps an existing file and then returns false.
   Result<bool> commit_new();
-  /// Does the same as commit(), but gives the file another name.
+  /// Like commit(), but with another name.
   Result<void> commit_as(std::filesystem::path file) { return file_ = std::move(file), commit(); }
   const std::filesystem::path& file() const { return file_; }
 
@@ -61,7 +61,7 @@ class ShardWriter {
   /// Continues an archive that was set aside. Returns false, with nothing written, if the archive is missing or has another
   /// digest.
   Result<bool> go_on(const std::filesystem::path& aside, const std::string& digest);
-  /// Keeps what has been added under another name. Returns the digest.
+  /// Stores the incomplete archive under another name. Returns the digest.
   Result<std::string> set_aside(const std::filesystem::path& aside);
   /// Writes the end of the archive and gives it its name, then writes `file`.sha256 as sha256sum reads it. Returns the digest. If
   /// another worker has committed an archive of that name, that one is kept. If its bytes differ, the error is
@@ -77,7 +77,7 @@ class ShardWriter {
   Sha256 hash_;
 };
 
-/// Called with the name and the contents of a file of an archive.
+/// Receives the name and the contents of a file of an archive.
 using ArchiveSink = std::function<Result<void>(const std::string&, std::span<const std::byte>)>;
 /// Reads the files of an archive that ShardWriter wrote, in order. Fails with ErrorKind::bad_data if the archive is damaged, and
 /// with the error that the sink returns.

@@ -1,5 +1,5 @@
-// Variations of a data set from ping to ping: named draws, each a function of (seed, ping, attempt, name) alone, so that a ping
-// is the same whether or not the others were made (docs/datasets.md).
+// Random variations between the pings of a data set: named draws that depend only on (seed, ping, attempt, name), so that a
+// ping does not depend on other pings (docs/datasets.md).
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct Variation {
   std::vector<std::string> words;  // choice, list: as written
 };
 
-/// Draws of one ping: words as they are put into the file, and those that are numbers for formulas.
+/// The draws of one ping: as words for the file and, if they are numbers, as values for formulas.
 struct Draws {
   std::map<std::string, std::string> words;
   render::Values numbers;
@@ -32,12 +32,12 @@ struct Draws {
 /// Reads `vary:` of a job; the finish() of the document returns its errors.
 std::vector<Variation> read_variations(const text::Node& node);
 
-/// Draws for a ping, from 1; attempts count from 0.
+/// The draws of a ping, counted from 1; attempts count from 0.
 Draws draw(const std::vector<Variation>& variations, Seed seed, std::uint64_t ping, std::uint32_t attempt);
-/// Returns a value in (0, 1), a function of the same arguments, for decisions with a name.
+/// A value in (0, 1) for a named decision, a function of the same arguments.
 double draw_uniform(Seed seed, std::uint64_t ping, std::uint32_t attempt, std::string_view name);
 
-/// The text with every $name of a word replaced; other references are left to the formulas.
+/// Replaces every $name of a draw by its word; formulas handle other references.
 std::string put_words(std::string_view text, const std::map<std::string, std::string>& words);
 
 }  // namespace sonar::dataset

@@ -1,4 +1,4 @@
-// The job of a data set as workers get it: a record, and the bytes of the job file and of every file that it names.
+// A data set's job for workers: a record, and the bytes of the job file and of all files that it names.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ struct FarmJob {
   std::uint64_t shards = 0, shard_pings = 0, pings = 0;
   std::chrono::milliseconds patience{60'000};
   double submitted_unix_s = 0;
-  bool in_bucket = false;  // the files, else in the shared folder alone
+  bool in_bucket = false;  // true: the files are in the queue; false: only in the shared folder
 
   /// "mines-0123456789ab", the job's folder below the farm's.
   std::string folder() const;
@@ -39,16 +39,16 @@ Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& inst
 /// the job's folder.
 Result<FarmJob> parse_farm_job(const std::string& id, const std::string& json);
 
-/// Copies the job's files to `files`, and into the queue when they are small enough, which the record states.
+/// Copies the job's files to `files`, and into the queue if they are small enough (`in_bucket`).
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const std::filesystem::path& files, Queue& queue);
 /// Fetches files from the queue that the folder `files` lacks. Returns the path of the job file. Error missing_file: a file is
 /// in neither.
 Result<std::filesystem::path> receive_files(const FarmJob& record, const std::filesystem::path& files, Queue& queue);
 
-/// The job in the file that receive_files() gave. bad_data: it is of another size than the record.
+/// Reads the job file of receive_files(). bad_data: its size differs from the record.
 Result<dataset::DatasetJob> load_files(const FarmJob& record, const std::filesystem::path& file);
 
-/// Empty when this program makes the same bytes as the one that submitted, else a sentence.
+/// A sentence if this program would make other bytes than the submitting one, else empty.
 std::string why_unfit(const FarmJob& record);
 
 }  // namespace sonar::farm

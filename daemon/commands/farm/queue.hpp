@@ -1,5 +1,5 @@
 // The farm's queue: NATS JetStream behind plain functions. The stream FARM (work queue, file store, subjects
-// farm.work.JOB.SHARD) holds the shards that are still to be made. Each job has one durable pull consumer. Tables hold keys and
+// farm.work.JOB.SHARD) has the shards that are not made yet. Each job has one durable pull consumer. Tables hold keys and
 // values. docs/decisions/0022-nats.md.
 #pragma once
 
@@ -36,13 +36,13 @@ class Task {
   virtual std::uint64_t shard() const = 0;
   virtual int delivery() const = 0;  // from 1
   virtual Result<void> in_progress() = 0;
-  /// Waits until the server confirms. Only then has the shard left the queue.
+  /// Waits until the server confirms that the shard has left the queue.
   virtual Result<void> done() = 0;
   /// Returns the shard to the queue, which delivers it again after `later`.
   virtual Result<void> again(std::chrono::milliseconds later) = 0;
   /// Removes the shard from the queue for good, and writes `why` into dead_table.
   virtual Result<void> bury(const std::string& why) = 0;
-  /// For a message that names no shard of the job: removes it from the queue and records nothing.
+  /// Removes a message that names no shard of the job, without a record.
   virtual Result<void> drop() = 0;
 };
 
@@ -62,7 +62,7 @@ class Queue {
 
   /// If a worker reports nothing about its shard for `patience`, the shard is given to another worker.
   virtual Result<void> open_job(const std::string& job, std::chrono::milliseconds patience) = 0;
-  /// False: it is in the queue already.
+  /// False: the shard is already in the queue.
   virtual Result<bool> publish(const std::string& job, std::uint64_t shard) = 0;
   virtual Result<Waiting> waiting(const std::string& job) = 0;
   /// The next task; empty if none came within `wait`. The task must not outlive the queue.

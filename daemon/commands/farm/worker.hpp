@@ -9,7 +9,7 @@ namespace sonar::farm {
 /// Waits for a server that does not answer yet. Returns the exit code. Errors: unavailable if the server refuses, or if all jobs
 /// are unfit for this program or processor; io if the folder cannot be written.
 Result<int> run_worker(const WorkerCommand& command);
-/// Works on a queue until a signal comes, or until the queue is empty if the command says so.
+/// Works on a queue until a signal or, if requested, until the queue is empty.
 Result<int> work_on(Queue& queue, const WorkerCommand& command);
 
 }  // namespace sonar::farm

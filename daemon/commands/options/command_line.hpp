@@ -18,7 +18,7 @@ namespace sonar {
 struct RunCommand {
   std::string config;  // empty = search
   bool demo = false;
-  std::string demo_of;  // whose sonar the demo has, as "blueview"; empty = its own
+  std::string demo_of;  // make of the demo's sonar, such as "blueview"; empty = the default
   std::string profile;  // profile of the demo's sonar; empty = the default
   std::uint64_t exit_after_pings = 0;
   bool digest = false;
@@ -34,7 +34,7 @@ struct RenderCommand {
   std::string config;  // may be empty for the coverage report
   std::string out;
   std::uint64_t first = 1;             // number of the first ping
-  std::optional<std::uint64_t> pings;  // nothing: one, or one for every line of a file of poses
+  std::optional<std::uint64_t> pings;  // nullopt: one, or one per line of a pose file
   std::vector<std::string> formats{"npy", "png"};
   std::optional<double> pose_rate_hz;  // rate of a KITTI file, which has no times
   std::string sonar, poses, pose_frame, report;

@@ -1,4 +1,4 @@
-// Lines about a load that takes long, for a console or the log.
+// Reports the progress of a long load, on a console or in the log.
 #pragma once
 
 #include <chrono>
@@ -13,7 +13,7 @@ namespace sonar {
 /// nothing if the load ends before the first report, or the scene is small.
 class LoadProgress {
  public:
-  using Say = std::function<void(const std::string& line)>;  // called on a thread of its own
+  using Say = std::function<void(const std::string& line)>;  // called on a separate thread
   explicit LoadProgress(Say say, std::chrono::milliseconds every = std::chrono::seconds(2));
   ~LoadProgress();
   LoadProgress(const LoadProgress&) = delete;

@@ -11,20 +11,21 @@
 namespace sonar::render {
 
 struct Coverage {
-  std::size_t bins = 0, good = 0;  // good: within 1 dB
+  std::size_t bins = 0, good = 0;  // bins; bins within 1 dB
   std::size_t empty = 0;           // 10 dB or more below the closed form
   double worst_db = 0;             // the largest deviation of a bin, signed
   double mean_db = 0;              // mean of the powers of all bins over their closed form
   double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
 };
 
-/// The job with only the parts that the closed form has: expected power, no noise, mirrors, texture, volume or motion. Expected
-/// power has smaller surface cells than a picture (0.4 of them each way): coverage measures those, not the picture's.
+/// The job with only the parts that the closed form has: expected power, no noise, mirrors, texture, volume or motion. In
+/// expected power surface cells are smaller (0.4 of the edge), so coverage does not measure the cells of pictures.
 RenderJob with_bed_only(RenderJob job);
 
-/// The ping must be of with_bed_only(job). Bins count whose whole footprint, two pulses and a beam to either side, lies on the
-/// bed where the two-way pattern is above -20 dB: the closed form assumes an even pattern over the footprint. Errors: no level
-/// plane below the sonar, a sonar that rolls, flat beams, the comparison modes, beams without a width.
+/// `ping` must be one of with_bed_only(job). It counts bins whose whole footprint, plus two pulses and a beam on either side,
+/// lies on the bed where the two-way pattern is above -20 dB, because the closed form assumes an even pattern over the
+/// footprint. Errors: no level plane below the sonar, a sonar that rolls, flat beams, the comparison modes, beams without a
+/// width.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 
 /// Returns the job of a product over a level bed: a fifth of the range above it, 0.25 rad nose down.

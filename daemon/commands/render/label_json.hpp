@@ -14,8 +14,8 @@ inline constexpr int cartesian_width_px = 1000;  // width of the fan to which `c
 /// By instance from 1: name, class, and whether it is a thing, which has boxes and polygons: an object with a label of its own.
 nlohmann::json instances_of(const Scene& scene);
 
-/// Every thing that is seen: `bbox`, `area` and `segmentation` in pixels of the samples, x = beam, y = row; the same under
-/// `cartesian` in pixels of the fan; `visible`, the share of its energy that is not blocked.
+/// Annotations of every visible thing: `bbox`, `area` and `segmentation` in pixels of the samples (x = beam, y = row), and
+/// under `cartesian` in pixels of the fan; `visible`, the unblocked fraction of its energy.
 nlohmann::json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& scene);
 
 /// Returns the scale and origin of the Cartesian picture, which is the fan of --image-rings off.

@@ -1,4 +1,4 @@
-// Arrays as NumPy reads them (.npy, format version 1.0): a short header, then the bytes, little-endian, last index fastest.
+// Writes NumPy arrays (.npy, format version 1.0): a short header, then the bytes, little-endian, last index fastest.
 #pragma once
 
 #include <cstddef>

@@ -17,9 +17,9 @@ struct OutputOptions {
   std::filesystem::path folder;
   bool npy = true, png = true, raw = false, complex = false, labels = false;
   bool rings = true;                   // in pictures
-  int batch = 1;                       // pings that are made before they are written, by all threads at once
+  int batch = 1;                       // pings that all threads make before they are written
   bool overwrite = false;              // pings of other inputs in the folder are removed
-  std::uint64_t first = 1;             // number of the first ping; those before it are left out
+  std::uint64_t first = 1;             // number of the first ping to make
   std::optional<std::uint64_t> pings;  // pings of each job; empty: one, or one for every pose of the file
   std::optional<double> rate_hz;       // nullopt: the rate of the settings, or one ping at every pose
 };

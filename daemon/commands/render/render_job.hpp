@@ -35,7 +35,7 @@ struct RenderJob {
   Time begins_at{};           // the time stamp at which trajectories begin
   bool snapshots = false;     // the vehicle's poses are unrelated: the sonar rests within each ping
   bool wants_motion = false;  // engine.motion: on is written in the file
-  Values values;              // what the sweep set, and what `let` made of it
+  Values values;              // values of the sweep and of `let`
 
   SonarConfig& sonar() { return config.sonars.at(sonar_index); }
   const SonarConfig& sonar() const { return config.sonars.at(sonar_index); }
@@ -48,11 +48,11 @@ struct RenderJob {
 struct RenderInput {
   std::string source;                   // the file
   std::vector<RenderJob> jobs;          // one, or one for every step of the sweep
-  std::string text;                     // all that the file and the scene's file say, for the digest of the inputs
+  std::string text;                     // text of the file and of the scene's file, for the digest of the inputs
   std::vector<std::string> notes = {};  // decisions about the input that users should see; written to render.json
 };
 
-/// A configuration (it has `world:`) or a render file. `sonar`: which of a configuration's several sonars.
+/// Reads a configuration (it has `world:`) or a render file. `sonar`: selects one of a configuration's sonars.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar = {});
 /// A render file from text; paths in it are relative to `folder`. `known`: shapes of files that were read before.
 Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder,
@@ -78,7 +78,7 @@ PingRequest make_request(const RenderJob& job, const World& world, PingNumber nu
 
 /// Depth of the sonar at time 0 [m], before there is a scene.
 double first_depth_m(const RenderJob& job);
-/// The settings that the sonar, which has a vendor, starts with at that depth.
+/// The initial settings, at that depth, of a sonar with a vendor.
 PingSettings device_settings(const RenderJob& job);
 
 }  // namespace sonar::render

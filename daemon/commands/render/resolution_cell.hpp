@@ -1,4 +1,4 @@
-// The area over which one sample of a beam sums, by the pattern of the beam and the pulse. A predicted level is the scattering
+// The area that contributes to one sample of a beam, from the beam's pattern and the pulse. A predicted level is the scattering
 // strength times this area (docs/acoustics.md, sections 3 and 4).
 #pragma once
 

@@ -14,8 +14,8 @@ namespace sonar::render {
 nlohmann::json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, const PingStatistics& count,
                        const std::string& digest);
 
-/// SHA-256 of what the pings depend on: the files' text, the scene as loaded, the sonar, switches, seed, poses and times.
-/// Threads and the number of pings do not count. `plain_pictures`: without rings.
+/// SHA-256 of everything that determines the pings: the files' text, the loaded scene, the sonar, switches, seed, poses and
+/// times; not threads and the number of pings. `plain_pictures`: without rings.
 std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictures = false);
 
 }  // namespace sonar::render

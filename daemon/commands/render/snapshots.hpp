@@ -1,5 +1,5 @@
-// Detects files of unrelated poses, as in a data set. Their poses are too far apart for the trajectory of a vehicle, so they
-// do not define the motion within a ping.
+// Detects files of unrelated poses, as in data sets. Such poses are too far apart for a trajectory, so they do not define the
+// motion within a ping.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace sonar::render {
 
-/// Highest speeds of a carrier of an imaging sonar: a fast boat, and a towfish that rolls. A file of poses with more than one
-/// faster step in `steps_to_one_too_far` is read as snapshots, not as a trajectory, unless it contains velocities.
+/// Highest speeds of a carrier of an imaging sonar: a fast boat, and a towfish that rolls. If more than one in
+/// `steps_to_one_too_far` steps is faster, the file contains snapshots, not a trajectory, unless it has velocities.
 inline constexpr double fastest_vehicle_mps = 15, fastest_vehicle_radps = 5;
 inline constexpr std::size_t steps_to_one_too_far = 10;
 /// Poses that are closer in time count as one step, because the jitter of a fast log is not motion.

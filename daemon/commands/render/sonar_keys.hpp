@@ -12,13 +12,13 @@ namespace sonar::render {
 
 void read_model(text::Map keys, FrequencyMode& mode);
 
-/// How rows and pulse that are not given follow from the range.
+/// How missing rows and pulse are derived from the range.
 enum class RowsOf {
   no_device,    // rows follow the pulse: their rate is 2 b (docs/acoustics.md, section 4)
   device,       // rows and pulse are proportional to the range
   range_image,  // rows are elevations and the pulse is the product's range cell: neither changes
 };
-/// Keys of a sonar with that model.
+/// Reads the keys of a sonar with this model.
 void read_ping(text::Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& settings);
 /// `mode:` of a ping, a name or a number from 1; `fallback` counts from 0.
 int read_mode(const text::Node& node, const SonarModel& model, int fallback);

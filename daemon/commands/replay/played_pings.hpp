@@ -1,4 +1,4 @@
-// The pings of a recording for a sonar whose hosts request them: one after another, or, of a mechanical scan, by direction.
+// The pings of a recording for a sonar whose hosts request them: in order or, for a mechanical scan, by direction.
 #pragma once
 
 #include <cstdint>
@@ -20,11 +20,11 @@ struct PlayedPing {
 
 class PlayedPings {
  public:
-  static constexpr std::size_t most_scan_bytes = 512u << 20;  // a scan is held in memory
+  static constexpr std::size_t most_scan_bytes = 512u << 20;  // limit, because a scan is kept in memory
 
-  /// `codec` has ping_part. Both outlive the object.
+  /// `codec` must have ping_part. Both must outlive the object.
   PlayedPings(recording::RecordingReader& reader, const recording::Codec& codec) : reader_(reader), codec_(codec) {}
-  /// Looks at the first ping, and reads all of a scan. bad_data: there is none, or a scan is too long; `file` is for the error.
+  /// Reads the first ping, or all of a scan. bad_data: there is no ping, or a scan is too long; `file` is for the error.
   Result<void> open(const std::string& file);
   /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all others.
   bool is_scan() const { return !lines_.empty(); }
@@ -34,8 +34,8 @@ class PlayedPings {
   /// True if next() has returned the last ping.
   bool at_end() const { return !ahead_; }
   void rewind();
-  /// The line whose direction is nearest to `head_rad`; of several equally near ones, the next after the line that was returned
-  /// last, cyclically.
+  /// The line whose direction is nearest to `head_rad`; among equally near ones, the next one after the last returned line,
+  /// cyclically.
   const PlayedPing& nearest(double head_rad);
 
  private:

@@ -1,4 +1,4 @@
-// Reads a recording in a thread of its own, a little ahead of its use, so that a slow disk does not delay the event loop.
+// Reads a recording ahead on a separate thread, so that a slow disk does not delay the event loop.
 #pragma once
 
 #include <deque>
@@ -9,14 +9,14 @@
 
 namespace sonar {
 
-/// One coroutine uses it. The reader must outlive it, and is not touched by others once next() was called.
+/// For one coroutine. The reader must outlive it, and only this object may use it after the first next().
 class ReadAhead {
  public:
   explicit ReadAhead(recording::RecordingReader& reader) : reader_(reader) {}
 
   /// nullopt at the end.
   asio::awaitable<std::optional<recording::RecordedMessage>> next();
-  /// The next message is the first one again.
+  /// Starts again at the first message.
   void rewind();
   /// The reader's damage(); valid after next() has returned nullopt.
   std::optional<Error> damage() const { return reader_.damage(); }
