@@ -1,4 +1,4 @@
-"""A controller of ARIS sonars in Python, written from docs/protocols/aris.md: nothing of it is shared with the C++ code."""
+"""A controller of ARIS sonars in Python, written from docs/protocols/aris.md; it shares nothing with the C++ code."""
 import socket
 import struct
 import time
@@ -36,7 +36,7 @@ def read_varint(data, at):
 
 
 def fields(data):
-    """{number: [values]} of a message; numbers that are not there are not zero."""
+    """{number: [values]} of a message, without the missing numbers."""
     found, at = {}, 0
     while at < len(data):
         key, at = read_varint(data, at)

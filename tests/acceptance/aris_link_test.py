@@ -1,4 +1,4 @@
-"""An emulated ARIS as a controller meets it: beacons, frames, cookies, one controller at a time; and under tshark."""
+"""Tests an emulated ARIS with a controller: beacons, frames, cookies, one controller at a time; and with tshark."""
 import math
 import pathlib
 import shutil
@@ -15,7 +15,7 @@ from pcap_writer import Capture
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, expect_quiet, run
 
 DISSECTOR = ROOT / "protocol/aris/aris.lua"
-STARBOARD, PORT = range(0, 64), range(64, 128)  # beam 0 is the right-most
+STARBOARD, PORT = range(0, 64), range(64, 128)  # beam 0 is farthest to starboard
 B, C = (3.9, 10), (6.9, -8)  # range m, bearing deg clockwise: points of scenes/l-targets.yaml
 
 
@@ -39,7 +39,7 @@ class ArisLink(unittest.TestCase):
         cls.daemon.__exit__()
 
     def controller(self, **options):
-        """The one before may not have been noticed to have left."""
+        """Retries, because the daemon may not have noticed yet that the previous controller has left."""
         for _ in range(50):
             link = Controller(self.daemon.address, **options)
             link.tcp.settimeout(0.1)
@@ -271,7 +271,7 @@ class Dissected(unittest.TestCase):
         capture = Capture(device_port=COMMANDS)
         capture.connect()
         whole = b"".join(sent)
-        for data in (whole[:7], whole[7:]):  # not at the edges of commands
+        for data in (whole[:7], whole[7:]):  # in pieces that do not end with a command
             capture.tcp("client", data)
         capture.udp(beacon, BEACONS)
         for datagram in datagrams:

@@ -1,4 +1,4 @@
-"""Tests --offset (two demos on one computer, each reached by sonarctl) and --clients."""
+"""Tests --offset (two demos on one computer, which sonarctl can both reach) and --clients."""
 import json
 import signal
 import socket

@@ -1,4 +1,4 @@
-"""A host on the BlueView link, written from docs/protocols/blueview-link.md alone: independent of the daemon's code."""
+"""A host on the BlueView link, written only from docs/protocols/blueview-link.md, independent of the daemon's code."""
 import array
 import socket
 import struct
@@ -94,7 +94,7 @@ class Host:
         return bytes(data)
 
     def receive(self):
-        """Type, request id, payload of the next frame that is no keep-alive."""
+        """Type, request id and payload of the next frame that is not a keep-alive."""
         while True:
             magic, kind, _, request, size = struct.unpack("<4sHHII", self.receive_exactly(16))
             assert magic == b"BVE1", magic

@@ -1,4 +1,4 @@
-"""The BlueView link as an independent program uses it: discovery, greeting, settings, pings with the L targets in place."""
+"""Tests the BlueView link with an independent program: discovery, greeting, settings, and the positions of the L targets in pings."""
 import struct
 import threading
 import time

@@ -1,5 +1,5 @@
-"""Time that programs advance. lockstep: a program sends a pose, requests a step, and has every ping due in it; follow: a simulator
-stamps its poses and waits for each answer. Both give the same bytes in every run, independent of the wall clock."""
+"""Tests clocks that programs advance. lockstep: a program sends a pose, requests a step, and receives every ping due in it. follow: a
+simulator stamps its poses and waits for each answer. Both give the same bytes in every run, independent of the wall clock."""
 import re
 import signal
 import socket
@@ -24,7 +24,7 @@ def pose_at(t):
 
 class Clocks(unittest.TestCase):
     def driven(self, clock, drive, pause_s=0.0):
-        """The depths that PINGS pings tell of, and the digest of the stream; drive(control, n) makes ping n happen."""
+        """The depths stated in PINGS pings, and the digest of the stream; drive(control, n) causes ping n."""
         with Sonard(arguments=["--clock", clock, "--digest", "--exit-after-pings", PINGS]) as daemon:
             with Client(daemon.address) as client:
                 client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))

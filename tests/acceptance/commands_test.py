@@ -1,4 +1,4 @@
-"""Errors of the command lines: one sentence with what, where and what to do, and the exit code of its class."""
+"""Tests errors of the command lines: one sentence that states what, where and what to do, and the exit code of its kind."""
 import os
 import pathlib
 import signal
@@ -177,7 +177,7 @@ class Mistakes(unittest.TestCase):
 
 
 class CheckAndRun(unittest.TestCase):
-    """What `sonard run` refuses before it opens a socket, `sonard check` refuses with the same code and the same sentence."""
+    """`sonard check` refuses what `sonard run` refuses before it opens a socket, with the same code and sentence."""
 
     def refused(self, text, code, *words, files=None):
         with tempfile.TemporaryDirectory() as name:

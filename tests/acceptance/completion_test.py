@@ -1,4 +1,4 @@
-"""Shell completion: made of --help as it is, sound, and helpful."""
+"""Tests shell completion: it is up to date with --help, valid, and offers the right words."""
 import shutil
 import subprocess
 import sys
@@ -10,7 +10,7 @@ FOLDER = ROOT / "clients/sonarctl/completion"
 
 
 def complete(program, *words):
-    """What bash offers for the last word."""
+    """The words that bash offers for the last word."""
     line = " ".join([program, *words])
     script = f"""
 source "{FOLDER / program}"

@@ -1,4 +1,4 @@
-"""Lints the container file by rules of our own, and with hadolint where it is found. The image itself is not built here."""
+"""Checks the container file by our own rules, and with hadolint if it is installed. Does not build the image."""
 import fnmatch
 import json
 import pathlib
@@ -13,7 +13,7 @@ TEXT = FILE.read_text(encoding="utf-8")
 
 
 def instructions():
-    """(word, rest) of each instruction, continued lines joined, comments left out."""
+    """(word, rest) of each instruction, with continued lines joined and without comments."""
     lines = [line for line in TEXT.splitlines() if not line.lstrip().startswith("#")]
     joined = re.sub(r"\\\n\s*", " ", "\n".join(lines))
     lines = [" ".join(line.split()) for line in joined.splitlines() if line.strip()]

@@ -1,4 +1,4 @@
-"""Control as a user meets it: every curl example of docs/control.md against a live daemon, the token, the listeners' rules."""
+"""Tests control: every curl example of docs/control.md with a running daemon, the token, the listeners' rules."""
 import http.client
 import json
 import pathlib
@@ -19,13 +19,13 @@ CURL = shutil.which("curl")
 
 
 def examples():
-    """The command lines of the page, in its order."""
+    """The command lines of the page, in order."""
     blocks = re.findall(r"^```sh\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)
     return [line for block in blocks for line in block.splitlines() if line.startswith("curl ")]
 
 
 def parse(example):
-    """(method, host, path, headers, body) of a curl command, by the few options that the page uses."""
+    """(method, host, path, headers, body) of a curl command with the options that the page uses."""
     words = shlex.split(example)[1:]
     method, url, headers, body = None, None, {}, None
     while words:
@@ -63,7 +63,7 @@ def post(host, path, message, headers=None):
 
 
 class Page(unittest.TestCase):
-    """The examples, all on one daemon, in the order in which they stand."""
+    """Runs the examples in order, on one daemon."""
 
     def run_examples(self, run_one):
         daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}",
@@ -112,7 +112,7 @@ class Page(unittest.TestCase):
             events = "/events" in example
             words = [CURL, "--max-time", "2" if events else "20", *shlex.split(example)[1:]]
             done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60, check=False)
-            self.assertEqual(done.returncode, 28 if events else 0, done.stderr)  # 28: it would have gone on
+            self.assertEqual(done.returncode, 28 if events else 0, done.stderr)  # 28: curl's time limit ended the endless stream
             if not events:
                 self.check(parse(example)[2], 200, done.stdout)
         self.run_examples(run_one)

@@ -1,4 +1,4 @@
-"""sonard dataset as a user runs it: killed and run again, on a full disk, read by the loader of docs/datasets.md, and learned from."""
+"""Tests `sonard dataset`: killed and run again, on a full disk, read by the loader of docs/datasets.md, and used for learning."""
 import hashlib
 import json
 import pathlib
@@ -35,7 +35,7 @@ def shipped_loader():
 
 
 def features(samples):
-    """Of each sample: its level, the level around it, and how far it is from that of its row."""
+    """Features of each sample: its level, the level around it, and its difference from the level of its row."""
     level = np.log1p(samples.astype(float))
     around = sum(np.roll(np.roll(level, dy, 0), dx, 1) for dy in range(-2, 3) for dx in range(-2, 3)) / 25
     row = level.mean(1, keepdims=True) + 0 * level
@@ -43,7 +43,7 @@ def features(samples):
 
 
 def learned(x, y):
-    """Logistic regression by Newton's method, things and the rest of equal weight: how much each feature speaks for a thing."""
+    """Logistic regression by Newton's method, with equal total weights of things and of the rest. Returns the weight of each feature."""
     x = np.column_stack([x, np.ones(len(x))])
     counts = np.where(y, 0.5 / y.mean(), 0.5 / (1 - y.mean()))
     weights = np.zeros(x.shape[1])
@@ -196,7 +196,7 @@ class Dataset(unittest.TestCase):
 
     @unittest.skipIf(np is None, "needs NumPy and Pillow")
     def test_the_loader_of_the_manual_reads_what_a_tiny_detector_learns(self):
-        """A smoke test of the labels, no more: they agree with the picture better than chance does."""
+        """Only a smoke test of the labels: they agree with the picture better than chance."""
         self.job.write_text(small_job(16, 8).replace("dataset: {", "dataset: {fan: true, "), encoding="utf-8")
         self.make("set", "--quiet")
         pings = shipped_loader()

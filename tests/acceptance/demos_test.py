@@ -1,5 +1,5 @@
-"""All demos at the same time: each previews while a viewer looks, stops for a driver and resumes after it, and shows echoes; the page
-has its picture, of the product's own kind, with nothing over it, and all its controls can be reached and used by keys.
+"""Tests all demos at the same time: each previews while a viewer looks, stops for a driver, resumes after it, and shows echoes. The page
+shows the product's kind of picture, with nothing over it, and all controls can be reached and used by keys.
 
 The page's part is skipped without browser or page. SONARD_SHOTS names a folder for pictures.
 """
@@ -21,15 +21,15 @@ from page_checks import LACKING_PX, WHY_NOT, WITHOUT_WEBGL, PageChecks, shown  #
 from running_sonard import ROOT, SONARCTL, SONARD, Daemon, eventually, run  # noqa: E402
 
 HTTP, SONAR = "127.0.0.1", "127.0.0.2"
-# Of the demo: its picture, the pings by which it is judged (a quarter of the circle of a sweep), and the port of its driver.
+# For each demo: its picture, the number of pings to examine (a quarter of the circle of a sweep), and the port of its driver.
 DEMOS = {"oculus": ("fan", 1, 52100), "blueview": ("fan", 1, 14750), "aris": ("fan", 1, 56888), "3d15": ("range image", 1, 80),
          "ping360": ("sweep", 100, 12345), "surveyor": ("points", 1, 62312), "omniscan": ("waterfall", 20, 51200),
          "ping1d": ("waterfall", 20, 9090), "s500": ("waterfall", 20, 51200), "dvl": ("waterfall", 20, 16171), "m3": ("fan", 1, 20001),
          "micron": ("sweep", 100, 4001), "norbit": ("points", 1, 2210)}
-MOST_NOISE = 0.95        # of samples that are noise lie below what counts as an echo
+MOST_NOISE = 0.95        # this fraction of the noise samples lies below the limit of an echo
 LEAST_ECHOES = 0.2
 
-# What the middle of the picture shows is the picture, and nothing lies over it.
+# True if nothing covers the middle of the picture.
 UNCOVERED = """(() => {
   const canvas = [...document.querySelectorAll('#fan, #drawn')].find((c) => c.offsetWidth);
   const box = canvas.getBoundingClientRect();
@@ -39,10 +39,10 @@ UNCOVERED = """(() => {
   }) && !document.querySelector('#notice').offsetWidth;
 })()"""
 NAME = "((e) => e.id || e.name || e.dataset.trouble || e.dataset.tab || e.className + e.textContent)"
-# Controls that can be used now, by how a test names them.
+# The names of the controls that are usable now.
 CONTROLS = f"""[...document.querySelectorAll('button, select, input, summary, [tabindex="0"]')]
   .filter((e) => e.offsetWidth && !e.disabled && e.tabIndex >= 0).map({NAME})"""
-# Notes those that get the focus from now on.
+# Records the controls that get the focus from now on.
 NOTE_FOCUSED = f"""window.reached = new Set(), document.activeElement.blur(),
   window.noteFocused ??= (addEventListener('focusin', (e) => window.reached.add({NAME}(e.target))), true)"""
 REACHED = "[...window.reached]"
@@ -53,7 +53,7 @@ def demo(maker):
 
 
 def rows_of(image):
-    """Of a RawImage, as lists of numbers."""
+    """The pixels of a RawImage, as lists of numbers."""
     size = {"mono8": 1, "mono16": 2, "32FC1": 4}[image["encoding"]]
     data, step = image["data"], image["step"]
     values = list(data) if size == 1 else [int.from_bytes(data[i:i + size], "little") for i in range(0, len(data), size)]
@@ -61,13 +61,13 @@ def rows_of(image):
 
 
 def echoes(rows, noise):
-    """Share of the samples that stand out of the noise of their own range."""
+    """Fraction of the samples that exceed the noise at their range."""
     loudest = [sorted(row)[int(MOST_NOISE * (len(row) - 1))] for row in noise]
     return sum(v > most for row, most in zip(rows, loudest) for v in row) / sum(len(row) for row in rows)
 
 
 def rows_seen(viewer, pings):
-    """Of so many pings that are fired from now on, those of one range together."""
+    """Samples of the next pings, grouped by range."""
     images, begin_ns = [], time.time_ns()
     while len(images) < pings:
         topic, ns, data = viewer.wait_for(lambda kind, _: kind == "message")
@@ -169,7 +169,7 @@ class EachDemo(PageChecks, unittest.TestCase):
             self.assertEqual(viewer.first_of("/front/picture", 120)["kind"], kind)
             seen = rows_seen(viewer, pings)
             if kind == "range image":
-                share = echoes(seen, [[0] for _ in seen])  # a pixel without an echo is 0
+                share = echoes(seen, [[0] for _ in seen])  # pixels without an echo are 0
             else:
                 transmit("off")
                 share = echoes(seen, rows_seen(viewer, pings))
@@ -224,7 +224,7 @@ class Pages(PageChecks, unittest.TestCase):
                 page.wait("!!document.querySelector('#setting-rows select')")
                 self.assertEqual(page.run("[...document.querySelectorAll('#setting-rows select')].map((s) => s.name.split('/').pop())"), choices)
                 self.assertEqual(set(page.run("[...document.querySelectorAll('#setting-rows [name$=mode] option')].map((o) => o.text)")), modes)
-                if maker == "ping360":  # whose host asks for each ping: no engine is as fast as its rate
+                if maker == "ping360":  # its host requests each ping, so the engine limits the rate
                     with subprocess.Popen([SONARCTL, "listen", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                         page.wait("document.querySelector('#rate-word').textContent === 'pinging'")
                         page.wait("parseFloat(document.querySelector('#rate').textContent) > 0")
@@ -243,7 +243,7 @@ class Pages(PageChecks, unittest.TestCase):
                 fans = {}
 
                 def of_one_ping():
-                    """Until the page holds a ping of which the viewer got the picture too."""
+                    """Waits until the page has a ping whose picture the viewer also got."""
                     page.run("sonardTest.fan.frozen = false")
                     _, ns, data = viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/fan")
                     fans[float(ns)] = data

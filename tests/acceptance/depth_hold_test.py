@@ -1,4 +1,4 @@
-"""An altimeter's distances reach an autopilot by MAVLink: a controller holds its altitude by them, and asks for them itself."""
+"""Tests the distances that an autopilot gets from an altimeter by MAVLink: a controller requests them, and holds its altitude by them."""
 import pathlib
 import re
 import socket
@@ -31,7 +31,7 @@ objects:
 
 
 class Autopilot:
-    """A UDP port that sonard dials, or that speaks first to `peer`, a listening link of sonard."""
+    """A UDP port that sonard dials, or that sends first to `peer`, a listening link of sonard."""
 
     def __init__(self, peer=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -48,7 +48,7 @@ class Autopilot:
                     return fields
 
     def arrived(self):
-        """The distances that lie in the socket."""
+        """The distances that have arrived."""
         self.socket.setblocking(False)
         try:
             while True:

@@ -1,4 +1,4 @@
-"""In stepped time a run is the same to the byte, however many threads compute it: one sonar, and a vehicle's suite of three makes."""
+"""Tests that runs in stepped time give equal bytes with any number of threads: for one sonar, and for a vehicle with three makes."""
 import hashlib
 import json
 import math
@@ -20,7 +20,7 @@ PATIENCE_S = 120
 
 
 def run(threads, seed=1):
-    """SHA-256 of what a client received, and what the daemon says it sent."""
+    """SHA-256 of the bytes that a client received, and the digest that the daemon printed."""
     with Sonard(trajectory="orbit", mount="{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}",
                 arguments=["--clock", "stepped", "--digest", "--exit-after-pings", PINGS, "--threads", threads, "--seed", seed]) as daemon:
         received, pings = hashlib.sha256(), 0
@@ -51,7 +51,7 @@ class Determinism(unittest.TestCase):
 
 
 def way():
-    """A dive round the middle of the harbour, facing it: CSV lines a fifth of a second apart."""
+    """A dive around the middle of the harbour, facing it: CSV lines every 0.2 s."""
     lines = ["# frame: ENU_FLU", "t_s,x_m,y_m,z_m,yaw_deg"]
     for step in range(11 + round(5 * STEPS * STEP_S)):
         turned = math.radians(4 * step / 5)
@@ -71,8 +71,8 @@ def read_all(link, to):
 
 
 class SuiteRun:
-    """What the example's three ports and its link sent along the way, and what sonard recorded of it. Status datagrams and MAVLink's
-    heartbeats go by the wall clock and are not compared."""
+    """Runs the example and compares the bytes of its three ports and its link, and sonard's recordings. Status datagrams and MAVLink's
+    heartbeats depend on the wall clock and are not compared."""
 
     PORTS = {"front": (("127.0.0.2", 52100), fire_message(version=2, rate_hz=10, range_=5)),
              "dvl": (("127.0.0.3", 16171), b'{"command":"get_config"}'),

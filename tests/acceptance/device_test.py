@@ -1,4 +1,4 @@
-"""sonard with a device, as a user runs it; the device is host loops behind the same module (tests/cuda/host_module.cpp)."""
+"""Tests sonard with a CUDA device, which is replaced by loops on the CPU behind the same module (tests/cuda/host_module.cpp)."""
 import json
 import os
 import pathlib

@@ -1,7 +1,7 @@
-"""The Wireshark dissector (protocol/oculus/oculus.lua) under tshark: three decoders in three languages must read the same.
+"""Tests the Wireshark dissector (protocol/oculus/oculus.lua) with tshark: three decoders in three languages must read the same values.
 
-Every field of every message is held against a reader in Python (oculus_fields) and against our own decoder (dump_oculus): on a
-run recorded from sonard, on the hand-made golden messages, on captured pings of a real device where SONARD_CAPTURES names them.
+Every field of every message is compared with a reader in Python (oculus_fields) and with our own decoder (dump_oculus): in a run recorded
+from sonard, in the hand-made golden messages, and in captured pings of a real device if SONARD_CAPTURES is set.
 """
 import json
 import os
@@ -46,14 +46,14 @@ def framed(kind, version, payload):
 
 
 def same(shown, value):
-    """What tshark prints beside a value: floating-point numbers have 15 digits there."""
+    """The text that tshark prints for a value, in which floating-point numbers have 15 digits."""
     if isinstance(value, float):
         return float(shown) == value or abs(float(shown) - value) <= 1e-14 * abs(value)
     return int(shown, 0) == value if isinstance(value, int) else shown == value
 
 
 def dumped_values(line):
-    """A line of dump_oculus under the dissector's names: {name: [values]}."""
+    """A line of dump_oculus with the dissector's names: {name: [values]}."""
     values, kind = {}, line["kind"]
     for name, value in line["fields"].items():
         part = {"header": "header", "fire": "fire", "extension": "fire", "sizes": "ping"}.get(name)
@@ -96,7 +96,7 @@ class Dissected(unittest.TestCase):
         return self.dissect(capture)
 
     def expect_as_python(self, found, message):
-        """Names, order, bytes and values; nothing more and nothing less."""
+        """Compares names, order, bytes and values, without missing or additional fields."""
         expected = fields_of(message)
         self.assertEqual([f[:2] for f in found.fields], [f[:2] for f in expected])
         for (name, _, shown), (_, _, value) in zip(found.fields, expected):
@@ -172,7 +172,7 @@ class RecordedRun(Dissected):
             turns += [("client", [standby]), ("device", self.until(client, 0xFF))]
             client.send(ASK_CONFIG)
             turns += [("client", [ASK_CONFIG]), ("device", self.until(client, 0x55))]
-            listener.recv(2000)  # may have waited since before the connection
+            listener.recv(2000)  # a datagram from before the connection may be waiting
             return turns, listener.recv(2000)
 
     def until(self, client, kind):
@@ -227,7 +227,7 @@ class RecordedRun(Dissected):
 
 class HandMade(Dissected):
     def test_every_golden_message(self):
-        """Their values are all different, so that no two fields can be mistaken for each other."""
+        """All values are different, so that exchanged fields are detected."""
         capture = Capture()
         capture.connect()
         capture.udp(golden("status"))
@@ -290,7 +290,7 @@ class HandMade(Dissected):
 
 
 class Malformed(Dissected):
-    """Nothing that comes over the wire makes the script fail (tshark() looks for that), and the stream is found again."""
+    """No bytes make the script fail (tshark() checks that), and it finds the stream again."""
 
     def test_every_length_of_every_message(self):
         stream = b""

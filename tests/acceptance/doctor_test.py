@@ -11,11 +11,11 @@ import urllib.request
 
 from running_sonard import SONARCTL, Sonard, eventually, run
 
-PATIENT = ("--within", "40")  # the machine may be busy; a healthy one takes 3 s
+PATIENT = ("--within", "40")  # for busy machines; a quiet one takes 3 s
 
 
 def doctor(address, *arguments, control_port=14770):
-    """Exit code and findings by check; whatever else runs on this machine is not looked at."""
+    """Exit code and findings by check, ignoring other programs on this machine."""
     result = run(SONARCTL, "doctor", address, "--json", "--status-on", address, "--control",
                  f"{address}:{control_port}", "--http", f"{address}:8088", *arguments)
     found = json.loads(result.stdout)
@@ -26,7 +26,7 @@ def doctor(address, *arguments, control_port=14770):
 
 
 def told_of_control(daemon, *arguments):
-    """As doctor(), but only the control stream is named: where HTTP is, the daemon says."""
+    """Like doctor(), but only the control stream is given; the daemon reports the address of HTTP."""
     result = run(SONARCTL, "doctor", daemon.address, "--json", "--status-on", daemon.address, "--control", f"{daemon.address}:14770",
                  *PATIENT, *arguments)
     found = json.loads(result.stdout)
@@ -96,7 +96,7 @@ class Doctor(unittest.TestCase):
     def test_a_port_that_another_program_has_is_said_to_be(self):
         address = "127.0.0.9"
         with socket.create_server((address, 52100)) as stream, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as datagrams:
-            datagrams.bind((address, 52102))  # as a driver does that shares no ports
+            datagrams.bind((address, 52102))  # like a driver without SO_REUSEADDR
             command = subprocess.Popen([str(SONARCTL), "doctor", address, "--json", "--status-on", address, "--control",
                                         f"{address}:14770", "--http", f"{address}:8088"], stdout=subprocess.PIPE,
                                        stderr=subprocess.DEVNULL, text=True)
@@ -113,20 +113,21 @@ class Doctor(unittest.TestCase):
     def test_a_busy_sonar_is_left_alone(self):
         with Sonard() as daemon, socket.create_connection((daemon.address, 52100), 10) as driver:
             driver.settimeout(10)
-            self.assertTrue(driver.recv(16))  # served: dummies come
+            self.assertTrue(driver.recv(16))  # dummies arrive, so the driver is served
             code, findings, _ = doctor(daemon.address, *PATIENT)
             self.expect(findings, "ping", "ok", "is busy", f":{driver.getsockname()[1]}", "not connecting")
-            # The same without the control stream: the kernel and the status message know.
+            # The same result without the control stream, from the kernel and the status message.
             _, findings, _ = doctor(daemon.address, *PATIENT, control_port=1)
             self.expect(findings, "ping", "ok", "is busy", "not connecting")
             self.assertNotIn("client refused", daemon.log())
-            # Connected all the same: this sonar has one place, and the driver keeps it.
+            # This sonar has one slot, which the driver keeps.
             _, findings, _ = doctor(daemon.address, "--take", *PATIENT)
             self.expect(findings, "ping", "warn", "closed the connection without a byte", "clients.max")
             self.assertTrue(driver.recv(16))
 
     def examine_driver(self, daemon, port, sent):
-        """Doctor beside a driver that sent these bytes, when the daemon has noticed: findings, and whether it was still connected."""
+        """Runs doctor beside a driver that has sent these bytes, after the daemon has handled them. Returns the findings, and whether the
+        driver was still connected."""
         with socket.create_connection((daemon.address, port), 10) as driver:
             driver.sendall(sent)
             own = f":{driver.getsockname()[1]}"
@@ -159,7 +160,7 @@ class Doctor(unittest.TestCase):
                     continue
                 self.expect(findings, "driver", "fail", "The connection of ", "before its first ping", remedy)
                 is_connected = False
-                while not is_connected:  # one that is silent for 10 s is disconnected: a busy machine takes longer to examine it
+                while not is_connected:  # a driver that is silent for 10 s is disconnected, and on a busy machine doctor may take longer
                     findings, is_connected = self.examine_driver(daemon, port, b"")
                 self.expect(findings, "driver", "fail", "is connected to front and has not asked for pings: it has sent nothing", remedy)
 
@@ -181,7 +182,7 @@ class Doctor(unittest.TestCase):
                 socket.create_connection((daemon.address, 52100), 10) as driver:
             driver.sendall(b"GOOD DAY, SONAR\r\n")
             eventually(lambda: float((daemon.status()["sonars"][0].get("clients") or [{}])[0].get("connected_s", 0)) > 1)
-            # The sonar waits for a request of the first driver: doctor too waits for a ping as long as it may.
+            # The sonar waits for a request of the first driver, so doctor waits for a ping until its time limit.
             code, findings, found = doctor(daemon.address, "--take", "--within", "10")
             self.assertEqual(code, 69, found)
             self.expect(findings, "driver", "fail", f":{driver.getsockname()[1]} is connected to front and has not asked for pings")
@@ -199,7 +200,7 @@ class Doctor(unittest.TestCase):
                     driver.terminate()
 
     def test_an_address_of_nowhere_is_explained(self):
-        alone = ["unshare", "--user", "--map-root-user", "--net"]  # a network of its own: no packet gets out
+        alone = ["unshare", "--user", "--map-root-user", "--net"]  # in a separate network, which no packet leaves
         try:
             subprocess.run([*alone, "true"], check=True, capture_output=True, timeout=30)
         except (OSError, subprocess.SubprocessError):

@@ -1,5 +1,5 @@
-// Prints what protocol/oculus reads in a file of raw bytes: a JSON line for each message, every field by the vendor's name.
-// Lets dissector_test.py hold our decoder beside tshark; usage: dump_oculus device|client|status FILE.
+// Prints the messages that protocol/oculus decodes from a file of raw bytes: a JSON line for each, with the vendor's names of
+// fields, so that dissector_test.py can compare our decoder with tshark. Usage: dump_oculus device|client|status FILE.
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -33,7 +33,7 @@ std::string hex_from(wire::BytesView bytes) {
   return text;
 }
 
-/// The decoder keeps both versions in the long form: what the short one lacks is left out.
+/// The decoder stores both versions in the long form; fields that the short one does not have are omitted.
 Json fields_of(const DecodedPing& ping) {
   Json object = json_of(ping.head.fixed);
   if (ping.head.fixed.header.version >= 2) return object;
@@ -78,7 +78,7 @@ void dump_client(const wire::Bytes& bytes) {
   }
 }
 
-/// Datagrams of 142 bytes, back to back.
+/// Reads successive datagrams of 142 bytes.
 void dump_status(const wire::Bytes& bytes) {
   for (std::size_t at = 0; at + status_size <= bytes.size(); at += status_size)
     if (const auto status = decode_status(wire::BytesView(bytes).subspan(at, status_size)))

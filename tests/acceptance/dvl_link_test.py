@@ -1,4 +1,4 @@
-"""An emulated DVL A50 as its drivers meet it: lines of JSON over TCP, and sentences on a serial line."""
+"""Tests an emulated DVL A50 with drivers: lines of JSON over TCP, and sentences on a serial line."""
 import json
 import math
 import socket
@@ -18,7 +18,7 @@ class Driver:
     def __init__(self, address):
         self.link = socket.create_connection((address, PORT), PATIENCE_S)
         self.lines = self.link.makefile("rb")
-        self.velocities = 0  # reports that came
+        self.velocities = 0  # received reports
 
     def close(self):
         self.lines.close()
@@ -59,7 +59,7 @@ def crc8(data):
 
 
 class SerialDriver:
-    """The fields of sentences, whose checksums must be right."""
+    """The fields of sentences; checksums must be right."""
 
     def __init__(self, line):
         self.line, self.waiting = line, b""
@@ -83,7 +83,7 @@ class SerialDriver:
 
 
 class Velocity(unittest.TestCase):
-    """A vehicle that circles through the harbour and faces its middle: it moves to its own starboard."""
+    """A vehicle circles through the harbour and faces its middle, so it moves to starboard."""
 
     @classmethod
     def setUpClass(cls):

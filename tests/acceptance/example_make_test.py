@@ -1,5 +1,5 @@
-"""The programs with one more make of sonar (tests/example_make): demo, listen, view, record, replay, doctor and faults work for it as
-for every other."""
+"""Tests the programs with an additional make of sonar (tests/example_make): demo, listen, view, record, replay, doctor and faults work as
+for other makes."""
 import json
 import pathlib
 import socket

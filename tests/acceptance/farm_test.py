@@ -1,4 +1,4 @@
-"""The farm as a user runs it, with a real NATS server on loopback: a worker and the server killed, a poison shard, an alarm."""
+"""Tests the farm with a real NATS server on loopback: a worker and the server are killed, a shard always fails, an alarm is raised."""
 import json
 import pathlib
 import re
@@ -131,7 +131,7 @@ class Farm(unittest.TestCase):
         record("farm-kill", "12 of 12, of 3 workers", "all, byte for byte those of one process", True, "python3 tests/acceptance/farm_test.py")
         self.assertIn("0 submitted, 0 in the queue already, 12 finished", self.submit(job)[0])
         (made / "shard-000003.tar").unlink()
-        self.assertIn("1 submitted", self.submit(job)[0])  # though its id is one that the server has just seen
+        self.assertIn("1 submitted", self.submit(job)[0])  # although the server has just seen its id
         self.wait_for(self.worker(None, "--until-empty"))
         self.assertIn("as they were written", self.farm("collect", made))
 
@@ -155,7 +155,7 @@ class Farm(unittest.TestCase):
 
     def test_a_worker_without_a_file_leaves_the_job_to_others(self):
         job = self.small_job(SMALL + "# more.obj\n")
-        (job.parent / "more.obj").write_text(TETRAHEDRON * ((9 << 20) // len(TETRAHEDRON)))  # not sent any more
+        (job.parent / "more.obj").write_text(TETRAHEDRON * ((9 << 20) // len(TETRAHEDRON)))  # too large to be sent
         self.submit(job)
         worker = self.worker(self.path / "own")
         self.assertEqual(worker.wait(timeout=120), 69, self.logs())

@@ -18,11 +18,11 @@ from running_sonard import BUILD, ROOT, Sonard, run
 
 SOURCE, PLACE = pathlib.Path(__file__).parent / "view/node", BUILD / "tests/acceptance/view-node"
 SCHEMAS = ROOT / "protocol/foxglove/schemas/foxglove.proto"
-OURS = ("EUSAGE", "EINTEGRITY", "EJSONPARSE")  # npm's codes for a package.json or a lock file that is wrong
+OURS = ("EUSAGE", "EINTEGRITY", "EJSONPARSE")  # npm's codes for a wrong package.json or lock file
 
 
 def install():
-    """Why the readers are not there; empty when they are."""
+    """The reason why the readers are missing; empty if they are installed."""
     for program in ("node", "npm"):
         if not shutil.which(program):
             return f"no {program}"
@@ -44,7 +44,7 @@ def install():
 
 
 WHY_NOT = install()
-if sys.argv[1:] == ["--install"]:  # by ctest, where there is a network
+if sys.argv[1:] == ["--install"]:  # run by ctest where a network is available
     sys.exit(print(WHY_NOT))
 
 
@@ -60,7 +60,7 @@ def url(daemon):
 
 
 class Driver:
-    """Takes pings until it is left."""
+    """Receives pings until the end of the block."""
 
     def __init__(self, daemon):
         self.messages, self._client = [], Client(daemon.address)

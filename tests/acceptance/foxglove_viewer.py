@@ -1,5 +1,5 @@
 """A strict viewer of the live view, written without libraries from the specifications of WebSocket (RFC 6455), Foxglove and protobuf.
-Shares nothing with the C++ code. Whatever is not as the texts demand is an AssertionError."""
+It shares nothing with the C++ code. Any deviation from the specifications is an AssertionError."""
 import base64
 import hashlib
 import json
@@ -34,7 +34,7 @@ class Viewer:
         self.socket.settimeout(patience_s)
         self.socket.connect((address, port))
         self.buffer = b""
-        self.frames = 0  # of data, received
+        self.frames = 0  # number of received data frames
         self.words, self.messages, self.times = [], [], []
         self.channels, self.subscriptions, self.info, self.schemas = {}, {}, None, {}
         key = base64.b64encode(os.urandom(16)).decode()
@@ -91,7 +91,7 @@ class Viewer:
         self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
 
     def frame(self):
-        """The next message: (is_text, payload). Each is one frame. Pings alone do not put the timeout off."""
+        """The next message: (is_text, payload). Each message must be one frame. WebSocket pings do not extend the timeout."""
         deadline = time.monotonic() + self.socket.gettimeout()
         while time.monotonic() < deadline:
             first, second = self._take(2)
@@ -120,7 +120,8 @@ class Viewer:
         self.send_frame(1, json.dumps(word).encode())
 
     def receive(self):
-        """Files the next message; ("word", dict), ("message", (topic, ns, bytes)), ("time", ns), ("playback", dict) or ("answer", ...)."""
+        """Stores and returns the next message: ("word", dict), ("message", (topic, ns, bytes)), ("time", ns), ("playback", dict) or
+        ("answer", ...)."""
         is_text, payload = self.frame()
         if is_text:
             word = json.loads(payload.decode())
@@ -154,7 +155,7 @@ class Viewer:
         return "answer", (service, call, payload[13:13 + length].decode(), payload[13 + length:])
 
     def wait_for(self, wanted, patience_s=60):
-        """The first thing received for which wanted(kind, value)."""
+        """The first received item for which wanted(kind, value) is true."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
             kind, value = self.receive()
@@ -178,18 +179,18 @@ class Viewer:
         self.say(op="subscribe", subscriptions=new)
 
     def subscribed(self, *topics):
-        """Subscribes, and waits until it is so."""
+        """Subscribes, and waits until the server has handled it."""
         self.subscribe(*topics)
-        self.parameters("subscribed", "/none")  # answered after it
+        self.parameters("subscribed", "/none")  # answered after the subscription
         return self
 
     def parameters(self, request="all", *names):
-        """Values by name, of all parameters where none is named."""
+        """Values by name; of all parameters if none is named."""
         self.say(op="getParameters", parameterNames=list(names), id=request)
         return {p["name"]: p.get("value") for p in self._values_for(request)}
 
     def set(self, name, value):
-        """Returns the value that holds afterwards; None if there is no such parameter."""
+        """Sets a parameter. Returns its value afterwards; None if there is no such parameter."""
         self.say(op="setParameters", parameters=[{"name": name, "value": value}], id="set " + name)
         values = self._values_for("set " + name)
         return values[0].get("value") if values else None
@@ -198,7 +199,7 @@ class Viewer:
         return self.wait_for(lambda kind, word: kind == "word" and word["op"] == "parameterValues" and word.get("id") == request)["parameters"]
 
     def call(self, name, payload, call=1):
-        """What a service answers or why it does not, and which of both it is."""
+        """The answer of a service or the reason of its failure, and which of both it is."""
         services = next(word for word in self.words if word["op"] == "advertiseServices")["services"]
         service = next(s["id"] for s in services if s["name"] == name)
         self.send_frame(2, struct.pack("<BIII", 2, service, call, 4) + b"json" + payload)
@@ -225,7 +226,7 @@ class Viewer:
         return self.schemas[channel["schema"]].decode(channel["schemaName"], payload)
 
     def status(self, part="", patience_s=60):
-        """The next status word with these words."""
+        """The next status message that contains this text."""
         return self.wait_for(lambda kind, value: kind == "word" and value["op"] == "status" and part in value["message"], patience_s)
 
 
@@ -258,7 +259,7 @@ def fields(data):
 
 
 class Schema:
-    """The messages of a FileDescriptorSet (google/protobuf/descriptor.proto), as far as is needed to read others by it."""
+    """The messages described by a FileDescriptorSet (google/protobuf/descriptor.proto), as far as needed for decoding."""
 
     def __init__(self, descriptor_set):
         self.messages = {}
@@ -279,7 +280,7 @@ class Schema:
                 self._add(name, value)
 
     def decode(self, name, data):
-        """Fields by name; those that are not there are left out, repeated ones are lists. Unknown fields are an error."""
+        """Fields by name, without missing ones; repeated fields are lists. Unknown fields are an error."""
         known = self.messages["." + name]
         out = {}
         for number, wire, value in fields(data):

@@ -1,4 +1,5 @@
-"""sonard run --log-format json: every line of the log stream is an object, from the banner to the last word; text stays as it was."""
+"""Tests `sonard run --log-format json`: every line of the log stream is an object, from the banner to the last line; the text format is
+unchanged."""
 import json
 import pathlib
 import subprocess

@@ -1,4 +1,5 @@
-"""The captured request of an M1200d (gain 50 %, gamma 127, gain assist) over a similar scene: as bright as the captured picture."""
+"""Tests that the captured request of an M1200d (gain 50 %, gamma 127, gain assist) over a similar scene gives a picture as bright as the
+captured one."""
 import pathlib
 import tempfile
 import textwrap
@@ -12,7 +13,7 @@ MEDIAN, LOUD = 43, 246             # captured: median, and 99th percentile of 25
 
 
 def scene_of_render_file(path, folder):
-    """The scene that stands inside a render file, as a file of its own."""
+    """Writes the scene inside a render file to a separate file."""
     text = path.read_text(encoding="utf-8")
     inside = text[text.index("\nscene:\n") + len("\nscene:\n"):text.index("\nsonar:\n")]
     scene = pathlib.Path(folder) / "scene.yaml"
@@ -22,7 +23,7 @@ def scene_of_render_file(path, folder):
 
 class Levels(unittest.TestCase):
     def percentiles(self, flags, pings, echoed):
-        """Median and 99th percentile after so many pings; the echo says `echoed` per cent."""
+        """Median and 99th percentile after several pings; their echo must state `echoed` per cent."""
         request = fire_message(rate_hz=15, flags=flags, range_=2.0, gain=50.0, sound_speed=1490.658551265436)
         with tempfile.TemporaryDirectory() as folder:
             scene = scene_of_render_file(ROOT / "tests/validation/scenes/like-the-capture.yaml", folder)

@@ -23,13 +23,13 @@ sys.path.insert(0, str(ROOT / "tests/reliability"))
 from record import record  # noqa: E402  the folder above
 
 COMMAND = "python3 tests/acceptance/life_cycle_test.py"
-ROOM = 5  # times a promised time, on a machine that does other things too
+ROOM = 5  # factor on promised times, for busy machines
 FOUR_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 4}"  # keys of the sonar, by way of its mount
 F_SETPIPE_SZ = 1031
 
 
 class Reader(threading.Thread):
-    """A client that reads to the end; `ending` says how it came: FIN, reset, or stray bytes."""
+    """A client that reads to the end; `ending` states how the connection ended: FIN, reset, or stray bytes."""
 
     def __init__(self, address, rate_hz=10):
         super().__init__(daemon=True)
@@ -62,12 +62,12 @@ class Reader(threading.Thread):
         assert len(self.pings) >= count, f"{len(self.pings)} of {count} pings; {self.ending}"
 
     def lost(self):
-        """Numbers that are missing between the first ping and the last."""
+        """The missing numbers between the first ping and the last."""
         return self.pings[-1] - self.pings[0] + 1 - len(self.pings)
 
 
 def deaf_client(address):
-    """Asks for pings and never reads; returned when the sonar can send it no more."""
+    """Requests pings and never reads; returns when the sonar cannot send more."""
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     deaf.connect((address, 52100))
@@ -76,7 +76,7 @@ def deaf_client(address):
 
 
 class Started:
-    """sonard with the standard streams of the test's choice."""
+    """sonard with standard streams chosen by the test."""
 
     def __init__(self, case, wrap=None, **streams):
         self.address = "127.0.0.9"
@@ -107,7 +107,7 @@ class Started:
 
 
 def worked_s(daemon):
-    """Seconds of a processor."""
+    """Used processor time [s]."""
     fields = pathlib.Path(f"/proc/{daemon.process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -119,7 +119,7 @@ class Stop(unittest.TestCase):
             for reader in readers:
                 reader.wait_for(3)
             deaf = deaf_client(daemon.address)
-            readers[0].wait_for(20)  # by now the deaf one's buffers are full
+            readers[0].wait_for(20)  # by now the buffers of the client that does not read are full
             code, seconds = daemon.stop()
             for reader in readers:
                 reader.join(20)
@@ -171,14 +171,14 @@ class Stop(unittest.TestCase):
             self.assertIn("run.oculus", daemon.log())
 
     def test_terminate_while_a_viewer_searches_a_recording(self):
-        """Behind the last ping are zeros, as after a power cut: more than can be read in the time."""
+        """After the last ping the file has zeros, as after a power cut: more than can be read in the time."""
         with tempfile.TemporaryDirectory() as folder, Sonard(more=f"recording: {{folder: {folder}}}") as daemon:
             file = pathlib.Path(folder, "cut.oculus")
             self.assertEqual(daemon.ctl("listen", "--record", file, "--pings", "3", "--seconds", "60", "--quiet").returncode, 0)
             os.truncate(file, 1 << 40)
             viewer = Viewer(daemon.address, path="/?recording=cut.oculus").greeted()
             before = worked_s(daemon)
-            eventually(lambda: worked_s(daemon) > before + 0.2)  # it searches; nothing else is to be done
+            eventually(lambda: worked_s(daemon) > before + 0.2)  # wait until it uses the processor, which only the search does
             code, seconds = daemon.stop(60)
             viewer.socket.close()
             self.assertEqual(code, 0, daemon.log())
@@ -215,7 +215,7 @@ class Stop(unittest.TestCase):
 
 
 class Undisturbed(unittest.TestCase):
-    """Whatever happens to its log, a client that reads loses no ping."""
+    """A client that reads loses no ping, whatever happens to the log."""
 
     def stream(self, daemon, pings=12):
         reader = Reader(daemon.address)
@@ -226,7 +226,7 @@ class Undisturbed(unittest.TestCase):
 
     @staticmethod
     def provoke_log_lines(address):
-        """A dozen clients too many are refused, with a line of the log each until its limit."""
+        """A dozen excess clients are refused, with a log line each up to the log's limit."""
         for _ in range(12):
             try:
                 with socket.create_connection((address, 52100), timeout=20) as visitor:
@@ -269,7 +269,7 @@ class Undisturbed(unittest.TestCase):
 
     def test_a_reader_of_the_log_that_stays_and_does_not_read(self):
         ours, theirs = os.pipe()
-        fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page: full with the banner
+        fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page, which the banner fills
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=theirs)
         os.close(theirs)
         reader = self.stream(daemon)
@@ -322,7 +322,7 @@ class Frozen(unittest.TestCase):
             daemon.stop()
             reader.join(20)
         burst = sum(1 for at in reader.arrived[before:] if at - go_on < 1)
-        # A second holds as many ticks as the rate says; one may have been under way, and one is due at once.
+        # A second has as many ticks as the rate; in addition, one may have been in progress, and one is due at once.
         good = burst <= rate_hz + 2 and reader.ending == "FIN"
         record("stop-continue", f"{burst} pings in the first second, ended by {reader.ending}", f"at most {rate_hz + 2}, whole", good, COMMAND)
         self.assertEqual(reader.ending, "FIN")
@@ -331,7 +331,7 @@ class Frozen(unittest.TestCase):
 
 
 class ExitCodes(unittest.TestCase):
-    """Class of mistake, command, and what the one sentence must name."""
+    """Kind of mistake, command, and the words that the sentence must contain."""
 
     def test_every_class(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -10,7 +10,7 @@ from running_sonard import Sonard
 
 
 class Doctor(unittest.TestCase):
-    """The cause that keeps a driver from its pings is named within 5 s."""
+    """Tests that the reason why a driver gets no pings is named within 5 s."""
 
     @contextlib.contextmanager
     def daemon_and_viewer(self, **options):
@@ -22,7 +22,7 @@ class Doctor(unittest.TestCase):
             yield daemon, viewer
 
     def named(self, viewer, check, *words):
-        """Returns the first finding of that check above level ok with these words."""
+        """Returns the first finding of the check, above level ok, that contains these words."""
         found = []
 
         def is_it(kind, value):
@@ -30,7 +30,7 @@ class Doctor(unittest.TestCase):
                 return False
             findings = viewer.decode("/doctor", value[2])["findings"]
             found[:] = [f for f in findings if f["check"] == check and f.get("level", 0) > 0 and all(w in f["text"] for w in words)]
-            return bool(found) and findings[0].get("level", 0) > 0  # the worst first
+            return bool(found) and findings[0].get("level", 0) > 0  # the worst come first
 
         viewer.wait_for(is_it)
         return found[0]

@@ -1,4 +1,5 @@
-"""What viewers of the live view change: settings, faults, previews, playback; and what they see when a configuration is reloaded."""
+"""Tests changes by viewers of the live view (settings, faults, previews, playback), and what viewers see when a configuration is
+reloaded."""
 import contextlib
 import json
 import pathlib
@@ -23,7 +24,7 @@ class Reload(unittest.TestCase):
             config = pathlib.Path(daemon.folder.name) / "sonard.yaml"
             text = config.read_text(encoding="utf-8")
             client.send(fire_message())
-            stack.enter_context(reading(client))  # else the step waits until the driver is given up
+            stack.enter_context(reading(client))  # otherwise the step waits until the driver's time limit
             kept = ["/scene", "/swath", "/front/geometry", "/front/image", "/faults", "/tf", "/status"]
             viewer.greeted().subscribe(*kept)
             viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "advertiseServices")
@@ -125,9 +126,9 @@ def is_ping(kind, value):
 class Preview(unittest.TestCase):
     @staticmethod
     def numbers(viewer, seconds):
-        """Of the pings shown meanwhile: (number, whether it is a preview)."""
+        """(number, whether it is a preview) of each ping shown meanwhile."""
         seen, deadline = [], time.monotonic() + seconds
-        while time.monotonic() < deadline:  # /status comes every second
+        while time.monotonic() < deadline:  # /status is sent every second
             kind, value = viewer.receive()
             if is_ping(kind, value):
                 event = viewer.decode(*value[::2])

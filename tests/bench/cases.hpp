@@ -1,4 +1,4 @@
-// Cases of `sonard_bench`: a model, its settings, and how the sonar moves over which scene.
+// The cases of `sonard_bench`: a model, its settings, a scene, and the sonar's motion over it.
 #pragma once
 
 #include <optional>
@@ -16,18 +16,18 @@ namespace sonar::bench {
 struct BenchCase {
   std::string name;           // "P3d"
   std::string description;    // for the table
-  protocol::Profile profile;  // vendor is null where no protocol frames this model yet
+  protocol::Profile profile;  // vendor is null if no protocol has this model
   PingSettings settings;
-  bool near_bottom = false;  // short ranges want the bed closer
+  bool near_bottom = false;  // for short ranges: fly closer to the bed
   Mode mode = Mode::canonical;
-  int fixed_fan = 0;  // rays a column, each a scatterer; 0 = surface cells
+  int fixed_fan = 0;  // rays per column, each a scatterer; 0 = surface cells
 };
 
-/// All of them, in the order of their names.
+/// All cases, in the order of their names.
 std::vector<BenchCase> bench_cases();
 std::optional<BenchCase> find_case(std::string_view name);
 
-/// Scenes the cases run over, and where a sonar flies in them.
+/// The scenes of the cases, and the path of the sonar in each.
 struct BenchScene {
   std::string name;  // scenes/NAME.yaml
   double bed_z_m = 0;
@@ -35,7 +35,7 @@ struct BenchScene {
 };
 std::span<const BenchScene> bench_scenes();
 
-/// A pose at a time of the run. The vehicle moves at most 1 m/s and turns at most 20 deg/s, as the goals assume.
+/// The pose at a time of the run. The vehicle moves at most 1 m/s and turns at most 20 deg/s, as the goals assume.
 Pose bench_pose(const BenchCase& c, const BenchScene& scene, double time_s);
 /// A pose with the height and tilt of the case at another position and heading.
 Pose bench_pose_at(const BenchCase& c, const BenchScene& scene, double x_m, double y_m, double yaw_rad);

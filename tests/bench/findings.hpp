@@ -1,5 +1,5 @@
-// Findings of the benchmark beside rates of warm pings: cold pings after a jump, moving objects, equal bytes, empty bins.
-// Each prints its line and returns what goes into the JSON.
+// Further measurements of the benchmark, in addition to rates of warm pings: cold pings after a jump, moving objects, equal
+// bytes, empty bins. Each function prints a line and returns its part of the JSON.
 #pragma once
 
 #include <memory>
@@ -12,19 +12,20 @@ namespace sonar::bench {
 
 using ScenePointer = std::shared_ptr<const Scene>;
 
-/// P3e: the first ping after a jump to a place without cells, everything else warm; P1 and P3d.
+/// P3e: the first ping after a jump to a place without cells, everything else warm; for P1 and P3d.
 nlohmann::json find_cold_pings(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
-/// P7: what 100 moving rigid objects add to a ping of P1 over the same objects at rest, and what placing them takes.
+/// P7: additional time of a ping of P1 if 100 rigid objects move instead of resting, and the time to place them.
 nlohmann::json find_cost_of_objects(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
-/// P15: processor time of pings with the elevation pattern's side lobes over the same pings without, in turns, one thread.
+/// P15: processor time of pings with the elevation pattern's side lobes divided by that without them, alternating, on one
+/// thread.
 nlohmann::json find_cost_of_side_lobes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
-/// P9: SHA-256 of the samples of P1, P3a and P3d, with 1, 2 and 4 threads, and again.
+/// P9: SHA-256 of the samples of P1, P3a and P3d with 1, 2 and 4 threads, each twice.
 nlohmann::json find_hashes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 /// P12: bins of a level bed 10 dB or more below their closed form, in expected power; cells, and one scatterer a ray.
 Result<nlohmann::json> find_empty_bins(const BenchOptions& options);
 
-/// P10 and P11: pings a second in batches on the device, of P1 and P3a, by the size of a batch; what of it is the processor's and
-/// what the device's; the ratio to the public reference code.
+/// P10 and P11: pings per second of P1 and P3a in batches on the device, by batch size; the shares of processor and device; the
+/// ratio to the public reference code.
 Result<nlohmann::json> find_device_rates(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 
 /// The growth of the time of a ping with rays, rows, triangles, beams and sonars.
@@ -34,17 +35,17 @@ nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, c
 /// its highest rate. From the moment of a ping's pose to its last byte at the driver, processor time of the daemon, ticks
 /// skipped.
 Result<nlohmann::json> find_demos(const BenchOptions& options);
-/// P5: from a pose and a trigger sent to the last byte received, of a whole daemon on loopback.
+/// P5: time from sending a pose and a trigger to the last received byte, for a whole daemon on loopback.
 Result<nlohmann::json> find_latency(const ScenePointer& scene, const BenchOptions& options);
-/// P14: from a changed setting sent to the first ping made with it, over a grid of settings. `holds`: no setting takes the
-/// processor much longer than a warm ping does.
+/// P14: time from sending a changed setting to the first ping with it, over a grid of settings. `holds`: no setting needs much
+/// more processor time than a warm ping.
 Result<nlohmann::json> find_first_pings(const ScenePointer& scene, const BenchOptions& options, bool& holds);
-/// P8: clients that take every ping of a whole daemon; dropped pings, and what sending takes of one processor.
+/// P8: a whole daemon with clients that receive every ping: dropped pings, and the processor time of sending.
 Result<nlohmann::json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options);
 /// P13: rates of P1, P3a and P3d with 1, 2 and 4 threads.
 nlohmann::json find_rates_of_threads(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
-/// P13: pings a second of so many P900-90 (2 to 10 m) in one daemon, each with a client that requests the next ping when it has
-/// the last: of all, of the slowest and of the fastest.
+/// P13: pings per second of several P900-90 (2 to 10 m) in one daemon, whose clients request the next ping when they have the
+/// last: in all, of the slowest and of the fastest.
 Result<nlohmann::json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double seconds, const BenchOptions& options);
 
 }  // namespace sonar::bench

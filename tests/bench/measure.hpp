@@ -1,5 +1,5 @@
-// Measures whole pings, from pose to framed bytes: median and best of many, in wall time and in processor time, which other
-// programs on the computer change less.
+// Measures whole pings, from pose to framed bytes: median and best of many, in wall time and in processor time, which depends
+// less on other programs.
 #pragma once
 
 #include <array>
@@ -16,12 +16,12 @@
 
 namespace sonar::bench {
 
-double now_s();           // steady
+double now_s();           // on the steady clock
 double processor_s();     // processor time of all threads of this process
 double this_thread_s();   // processor time of the calling thread
 std::string processor();  // its name and number
 
-/// Least, median, percentiles and largest of times.
+/// Minimum, median, percentiles and maximum of times.
 struct Times {
   explicit Times(std::vector<double> ms);
   double min = 0, median = 0, p90 = 0, p95 = 0, p99 = 0, max = 0;
@@ -42,25 +42,26 @@ struct BenchOptions {
   double reference_ms = 0;  // time of P11: a frame of the public reference code on this device; 0 = not measured
 };
 
-/// An engine with the pool it runs on.
+/// An engine with its thread pool.
 struct Bench {
   Parallel pool;
   std::unique_ptr<PingEngine> engine;
 
-  /// A device is timed step by step only where that is wanted: it takes time of its own.
+  /// Measuring the steps of a device is optional, because it takes time itself.
   Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions& options, bool device_steps = false);
 };
 
-/// Pings of one case, framed where its model has a vendor.
+/// Computes the pings of one case, and frames them if its model has a vendor.
 class Pinger {
  public:
   Pinger(const BenchCase& c, const BenchOptions& options);
 
   PingRequest request(int number, const Pose& sonar) const;
-  /// Seconds it took; `ping` gets the picture when it is wanted.
+  /// Computes a ping and returns the seconds. `ping` receives it if not null.
   double fire(PingEngine& engine, const PingRequest& request, Ping* ping = nullptr);
   double last_frame_s() const { return frame_s_; }
-  /// Seconds that all of them took, `a_call` submitted at a time and framed side by side while the engine is at the next ones.
+  /// Computes all pings and returns the seconds. `a_call` pings are submitted at a time, and framed in parallel while the
+  /// engine computes the next ones.
   double fire(PingEngine& engine, Parallel& pool, std::span<const PingRequest> requests, std::size_t a_call);
   const Switches& switches() const { return config_.engine.switches; }
   const SonarModel& model() const { return *model_; }
@@ -79,16 +80,16 @@ struct Figures {
   Switches switches;
   std::vector<std::string> parts_had;
   int threads = 0, pings = 0;
-  double cold_ms = 0, processor_ms = 0;  // time of the first ping; median of the others, all threads together
+  double cold_ms = 0, processor_ms = 0;  // time of the first ping; median processor time of the others, all threads together
   Times wall{{}};
-  std::array<double, static_cast<std::size_t>(Stage::stages)> stage_ms{};  // mean a ping, summed over threads
+  std::array<double, static_cast<std::size_t>(Stage::stages)> stage_ms{};  // mean per ping, summed over threads
   double frame_ms = 0;
   PingStatistics last;
   std::size_t scene_triangles = 0;
   double pings_per_second() const { return wall.median > 0 ? 1e3 / wall.median : 0; }
 };
 
-/// `options.pings` of them, after a tenth as many for warming up; the sonar moves as the case says.
+/// Measures `options.pings` pings, after a tenth as many for warming up; the sonar moves as in the case.
 Figures measure(const BenchCase& c, const BenchScene& where, const Scene& scene, PingEngine& engine, int threads,
                 const BenchOptions& options);
 void print(const Figures& figures);

@@ -11,10 +11,10 @@
 
 namespace sonar::bench {
 
-/// Names of the switched parts that can be given: texture, volume, crosstalk, leak.
+/// Names of the parts whose data can be added: texture, volume, crosstalk, leak.
 std::vector<std::string> parts_to_give();
 
-/// Only what is missing is added.
+/// Adds only missing data.
 std::shared_ptr<const Scene> with_parts(std::shared_ptr<const Scene> scene, const std::vector<std::string>& parts);
 std::shared_ptr<const SonarModel> with_parts(std::shared_ptr<const SonarModel> model, const std::vector<std::string>& parts);
 

@@ -1,5 +1,5 @@
-// Ratios of the hot loops to the plain ways of doing the same (specs: P6): both sides in one process, one thread, in turns, so
-// that they hold on a noisy machine. Best of several runs each.
+// Ratios of the hot loops' times to those of plain implementations (P6): both run in one process, on one thread, alternating,
+// so that other load changes the ratio little. Best of several runs each.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace sonar::bench {
 
-/// Least time of this thread in so many runs of `work`.
+/// Minimum time of this thread in several runs of `work`.
 template <class Work>
 double best_ms(int times, Work&& work) {
   double best = 1e9;
@@ -26,17 +26,17 @@ double best_ms(int times, Work&& work) {
 struct Ratio {
   std::string name;  // "synthesis: complex exponentials / pulses in time"
   double slow_ms = 0, fast_ms = 0;
-  double least = 0;           // what must hold; 0 = none
-  double share_measured = 1;  // share of the slow side that was measured; its time is scaled up
-  double difference = 0;      // relative, in the least squares, of the two results where they mean the same; 0 = not compared
+  double least = 0;           // required minimum; 0 = none
+  double share_measured = 1;  // measured fraction of the slow side, whose time is extrapolated
+  double difference = 0;      // relative rms difference of both results, if they are comparable; 0 = not compared
   double ratio() const { return fast_ms > 0 ? slow_ms / fast_ms : 0; }
   bool holds() const { return ratio() >= least; }
 };
 
-/// Over the case P1: its 512 beams, 300 echoes a beam, 394 rows.
+/// Synthesis in case P1: 512 beams, 300 echoes per beam, 394 rows.
 std::vector<Ratio> measure_sums(const BenchOptions& options);
 std::vector<Ratio> measure_beam_weights(const BenchOptions& options);
-/// Rays of P1 over the scene, packets and single; detection of its picture.
+/// Rays of P1 over the scene, in packets and single; detection of its picture.
 std::vector<Ratio> measure_rays(std::shared_ptr<const Scene> scene, const BenchScene& where, const BenchOptions& options);
 std::vector<Ratio> measure_detection(const BenchOptions& options);
 

@@ -1,4 +1,4 @@
-// A whole daemon in a thread of this process, as `sonard run` would run it, for cases with clients on loopback.
+// A whole daemon in a thread of this process, like that of `sonard run`, for cases with clients on loopback.
 #pragma once
 
 #include <pthread.h>
@@ -18,7 +18,7 @@
 
 namespace sonar::bench {
 
-/// In one of the networks 127.64..127.191, from the number of this process.
+/// An address in one of the networks 127.64..127.191, chosen by the process id.
 inline std::string own_address(int sonar = 0) {
   const auto process = static_cast<unsigned>(::getpid());
   return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + "." +
@@ -27,7 +27,7 @@ inline std::string own_address(int sonar = 0) {
 
 class Service {
  public:
-  /// `wrap` may put an engine of its own around the daemon's.
+  /// `wrap` may wrap the daemon's engine in another one.
   using Wrap = std::function<std::unique_ptr<PingEngine>(std::unique_ptr<PingEngine>)>;
   static Result<std::unique_ptr<Service>> start(Config config, ScenePointer scene, const BenchOptions& options, Wrap wrap = {}) {
     auto service = std::unique_ptr<Service>(new Service(std::move(config), std::move(scene), options, std::move(wrap)));
@@ -40,7 +40,7 @@ class Service {
     app_.request_stop();
     if (thread_.joinable()) thread_.join();
   }
-  /// Processor time of the thread that does all sending, while it runs.
+  /// Processor time of the thread that sends.
   double sender_s() {
     clockid_t clock{};
     timespec t{};
@@ -48,7 +48,7 @@ class Service {
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
   }
   App& app() { return app_; }
-  /// Figures of its first sonar, after stop().
+  /// Figures of the first sonar, after stop().
   DeviceFigures figures() const { return app_.devices().front().figures(); }
 
  private:
