@@ -1,5 +1,5 @@
-// The layer of bubbles that breaking waves leave under the surface: it adds absorption on the part of a path inside it
-// (docs/acoustics.md, section 3). Applied tile by tile to the echoes of surface cells.
+// The layer of bubbles that breaking waves leave under the surface. It adds absorption on the part of a path inside it
+// (docs/acoustics.md, section 3).
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// The CPU's engine for pings of many similar scenes, as in data sets.
+// The CPU engine for pings of many similar scenes, such as data sets.
 #pragma once
 
 #include <memory>
@@ -9,12 +9,12 @@ namespace sonar {
 
 class ChangingEngine : public PingEngine {
  public:
-  /// Replaces the scene. It keeps the tables of the settings, and the trees and cells of meshes that both scenes share (the same
-  /// object in memory, not an equal one). The next pings are the same as those of a new engine.
+  /// Replaces the scene. It keeps the tables of the settings, and the trees and cells of meshes that both scenes share (the
+  /// same object in memory, not only an equal one). The next pings equal those of a new engine.
   virtual void change_scene(const std::shared_ptr<const Scene>& scene) = 0;
 };
 
-/// The same as make_cpu_engine().
+/// Like make_cpu_engine().
 std::unique_ptr<ChangingEngine> make_changing_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
                                                      const EngineOptions& options = {});
 

@@ -1,4 +1,4 @@
-// Checks whether a request can be simulated. Every engine does so before a ping.
+// Checks whether a request can be simulated. Every engine calls it before a ping.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// A sentence with the reason why a request cannot be simulated; empty when it can.
+/// A sentence with the reason why a request cannot be simulated; empty if it can.
 std::string why_invalid(const PingRequest& request);
 
 }  // namespace sonar

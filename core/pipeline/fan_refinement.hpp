@@ -1,5 +1,6 @@
-// Refines fans of rays: an interval between two directions of a column is halved until its ends are on one surface that can be
-// interpolated, or until it is an edge. Direct views (trace_fan) and views via mirrors (multipath_trace) use the same rule.
+// Refines fans of rays: an interval between two directions of a column is halved until both ends are on a surface that can be
+// interpolated, or until the interval counts as an edge. Used for direct views (trace_fan) and views via mirrors
+// (multipath_trace).
 #pragma once
 
 #include <algorithm>
@@ -14,7 +15,7 @@
 
 namespace sonar {
 
-/// A ray's hit at one stage of its path. Ranges run along the whole path, unfolded where mirrors bend it.
+/// A ray's hit at one stage of its path. Ranges are measured along the whole path, across mirrors.
 struct SurfaceHit {
   std::uint32_t object = RayPacket::miss;
   float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = no hit
@@ -36,14 +37,14 @@ struct SurfaceHit {
   }
 };
 
-/// One direction of a column. Code that traces rays derives from it and adds the hits, one surface per stage.
+/// One direction of a column. Users derive from it and add the hits, one surface per stage.
 struct FanSample {
   float elevation_rad = 0, tangent = 0, forward = 0;  // forward: x of the unit direction
   std::int32_t next = -1;                             // the sample above in the same column, -1 = last
-  bool edge_above = false;                            // the interval up to `next` hides an edge: do not interpolate
+  bool edge_above = false;                            // the interval up to `next` contains an edge: do not interpolate
 };
 
-/// The interval between two samples of a column, whose middle is to be traced.
+/// An interval between two samples of a column whose middle must be traced.
 struct FanInterval {
   std::int32_t below, above;
   std::int32_t column;
@@ -55,8 +56,8 @@ struct FanInterval {
 template <class Sample>
 class FanRefinement {
  public:
-  /// The caller keeps the buffers from ping to ping. `first_column`: the plan's column from which the intervals count, so
-  /// that the hits of a column do not depend on the columns traced with it.
+  /// The caller keeps the buffers from ping to ping. `first_column`: number of the first column in the plan, so that the hits
+  /// of a column do not depend on the columns traced with it.
   FanRefinement(std::vector<Sample>& samples, std::vector<FanInterval>& open, std::vector<FanInterval>& halves,
                 float pulse_width_m, int first_column)
       : samples_(samples), open_(open), halves_(halves), tolerance_m_(pulse_width_m), first_column_(first_column) {
@@ -80,8 +81,8 @@ class FanRefinement {
       std::swap(open_, halves_);
     }
   }
-  /// The elevation at which an interval is halved: the middle if it has an edge. Within one surface it is a place near the middle
-  /// that differs between columns, because rays in equal steps may hit only the crests of ripples, which then look like a plain.
+  /// The elevation at which an interval is halved. If it contains an edge: the middle. Within one surface: near the middle, but
+  /// different between columns, because rays in equal steps could hit only the crests of ripples, which would then look flat.
   float middle_rad(const FanInterval& v) {
     const float below = at(v.below).elevation_rad, above = at(v.above).elevation_rad;
     if (!hit_the_same(at(v.below), at(v.above))) return 0.5f * (below + above);
@@ -91,11 +92,11 @@ class FanRefinement {
   }
 
  private:
-  // Edges are found to 1/16 of a base interval. A surface that cannot be interpolated even then hides itself.
+  // Edges are located to 1/16 of a base interval. A surface that cannot be interpolated even then counts as an edge.
   static constexpr int deepest = 4;
-  // A surface deviates from the straight line between two hits by about a quarter of what its slopes allow: half a pulse width.
-  // The middle may deviate by one pulse width more, which is within the 1.5 of PingPlan::depth_tolerance_m. With larger slopes a
-  // middle on the line proves nothing, because the rays may hit equal phases of ripples.
+  // A surface deviates from the straight line between two hits by about a quarter of the maximum that its slopes allow, here
+  // half a pulse width. The middle may deviate by one pulse width more: together the 1.5 of PingPlan::depth_tolerance_m. With
+  // larger slopes a middle on the line proves nothing, because the rays may hit equal phases of ripples.
   static constexpr float slope_tolerance_in_pulses = 2;
   static constexpr float golden_turn = 0.61803399f;  // its multiples fill a turn evenly
   static constexpr float widest_skew = 0.15f;        // fraction of an interval, to either side of its middle

@@ -13,9 +13,9 @@ namespace sonar {
 /// middle, from a point at a range and sine u. The parts are groups of channels, which overlap by half and whose w^2 add to 1 in
 /// every channel; the last part is all channels with equal weights.
 ///
-/// A half of a group is short, so that its sum, except for the delay of its middle, hardly changes with the sine. It is computed
-/// at a few Chebyshev points of a segment of beams and interpolated. The error is 1e-5 of the largest, like the rounding of the
-/// phases.
+/// Half a group is short, so its sum hardly changes with the sine, apart from the delay of its middle. Therefore the sum is
+/// computed at a few Chebyshev points of a segment of beams and interpolated. The error is 1e-5 of the largest value, like that
+/// of rounded phases.
 class FocusedArray {
  public:
   FocusedArray(const std::vector<double>& beam_sines, const SharedNoise& law);
@@ -51,7 +51,7 @@ class FocusedArray {
 /// Chebyshev's points of [from, to], and weights of polynomials through values at them: [points][places].
 std::vector<double> chebyshev_points(double from, double to, int count);
 std::vector<double> chebyshev_weights(const std::vector<double>& points, const std::vector<double>& places);
-/// Number of points with an error below some 5e-6 for a phase that changes by `radians` to either side of the middle.
+/// Number of points for an error below about 5e-6, if the phase changes by `radians` to either side of the middle.
 int chebyshev_count(double radians);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Stage four: beams from columns (docs/acoustics.md, section 6, eq. 9): s_j[n] = sum_k W_jk g_k[n]. Weights have signs and
-// are not normalised again. It works on a window of samples, so that its inputs and outputs stay in cache.
+// Stage four: beams from columns (docs/acoustics.md, section 6, eq. 9): s_j[n] = sum_k W_jk g_k[n]. Weights are signed and not
+// normalised. Works on a window of samples, so that inputs and outputs stay in cache.
 #pragma once
 
 #include <span>
@@ -20,7 +20,7 @@ struct BeamScratch {
 /// Fills the window of samples for which `out` has been shaped.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out);
-/// The same for some beams; the others are undefined. `heard`: columns_of() these beams; no other column is read.
+/// Forms only some beams; the others are undefined. `heard`: columns_of() these beams, the only columns that are read.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, BeamChoice wanted,
                 std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out);
 

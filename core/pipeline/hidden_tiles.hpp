@@ -1,5 +1,5 @@
-// Finds tiles of surface cells that a ping can skip, from boxes around their cells, before any cell is loaded. A tile is skipped
-// only where simd/cells.inl would drop each of its cells, so that no echo changes.
+// Finds tiles that a ping can skip, from the boxes around their cells, before any cell is loaded. A tile is skipped only if
+// simd/cells.inl would drop all of its cells, so no echo changes.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct PreparedTile {
   int first_column = 0, last_column = 0;  // half-open; empty if no cell is in view
   // First and last bin of the depth map with which its cells are compared.
   int first_bin = 0, last_bin = 0;
-  float nearest = 0;  // where the map's 1 / x is larger than this, it hides all cells [1/m]; infinity: unknown
+  float nearest = 0;  // if the map's 1 / x is larger than this, all cells are hidden [1/m]; infinity: unknown
 };
 
 /// Finds the columns and bins that the cells of a prepared tile can reach. `sonar_from_object`, `from_sonar_m`: the tile's centre
@@ -31,7 +31,7 @@ void find_reach(const PingContext& context, const Rotation& sonar_from_object, V
 class FarthestSeen {
  public:
   void shape(const DepthMap& map);
-  /// Keeps those of the wanted tiles that may have visible cells in the columns of the group, in order.
+  /// Keeps, in order, the requested tiles that may have visible cells in the columns of the group.
   void leave_out_hidden(const std::vector<PreparedTile>& tiles, std::span<const std::uint32_t> wanted,
                         const simd::GroupView& group, std::vector<std::uint32_t>& in_sight) const;
 

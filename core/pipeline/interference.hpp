@@ -1,6 +1,6 @@
 // Signals besides the ping's own echoes: leakage of the transmitter into the first rows, pulses of other sonars, and crosstalk
-// between the channels. They are three small stages of a ping, each of which does nothing without its data (docs/acoustics.md,
-// sections 5 and 6).
+// between the channels. Each is a small stage of a ping, which does nothing without its data (docs/acoustics.md, sections 5 and
+// 6).
 #pragma once
 
 #include <complex>
@@ -20,10 +20,10 @@ namespace sonar {
 /// ping. SharedNoiseTable adds the steady part of a leak that the channels share.
 class Leak {
  public:
-  /// The leak is left out after it has decayed by this much [dB]. A leak with a table ends at the table's last entry instead.
+  /// The leak ends after it has decayed by this much [dB]. A leak with a table ends at the table's last entry instead.
   static constexpr double most_leak_decay_db = 100;
-  /// unknown: chosen. Share of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two rows,
-  /// about a quarter in the next five.
+  /// unknown: chosen. Fraction of its power that is new in every ping; in the captured M1200d pings 0.2 % in the first two
+  /// rows, about a quarter in the next five.
   static constexpr double changing_share = 0.02;
   // Factors of its amplitude: sqrt(1 - changing_share), sqrt(changing_share).
   static constexpr double steady_part = 0.98994949366116653, changing_part = 0.14142135623730951;
@@ -31,7 +31,7 @@ class Leak {
   static_assert(changing_part * changing_part / changing_share > 1 - 1e-15 &&
                 changing_part * changing_part / changing_share < 1 + 1e-15);
 
-  /// Range at which it ends [m]; infinity if it does not decay, 0 without a leak.
+  /// Range at which the leak ends [m]; infinity if it does not decay, 0 without a leak.
   static double reach_m(const ReceiverModel& law);
 
   Leak() = default;
@@ -48,7 +48,7 @@ class Leak {
   float steady_ = 0;
 };
 
-/// A pulse of another sonar during reception: a tone through our receiver, at any place on the sample grid.
+/// A pulse of another sonar during reception: a tone after our receiver's filter.
 struct ReceivedPulse {
   double sine = 0;  // direction from which it comes, y / r at its arrival
   double from_sample = 0, to_sample = 0;
@@ -80,7 +80,7 @@ class Crosstalk {
 
  private:
   double amplitude_ = 0;
-  double share_ = 1;         // part of the sum over beams that one echo contributes once, because beams overlap
+  double share_ = 1;         // factor for the sum over beams, which counts an echo several times because beams overlap
   double own_in_power_ = 0;  // expected power: 2 sum W / sum W^2, from a beam and its own leakage
 };
 

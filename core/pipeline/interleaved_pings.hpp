@@ -1,6 +1,6 @@
 // Pictures whose neighbouring beams come from successive pings (docs/acoustics.md, section 6): the requests of these pings, the
-// beams that each of them forms, and the picture that they make. A beam receives columns far beyond its own, so that a ping can
-// leave out few of them: half, if its beams are eight apart, hardly any, if they are three apart.
+// beams that each of them forms, and the combined picture. A beam uses columns far beyond its own, so a ping can skip few
+// columns: half if its beams are eight apart, hardly any if they are three apart.
 #pragma once
 
 #include <span>
@@ -17,12 +17,12 @@ int pings_in(const PingRequest& picture);
 /// noise.
 std::vector<PingRequest> pings_of(const PingRequest& picture);
 
-/// Beams first, first + step, ..
+/// The beams first, first + step, ...
 struct BeamChoice {
   int first = 0, step = 1;
   bool is_all() const { return step == 1; }
   bool has(int beam) const { return next(beam) == beam; }
-  /// The first of them from `beam` on.
+  /// The first chosen beam from `beam` on.
   int next(int beam) const { return beam <= first ? first : first + (beam - first + step - 1) / step * step; }
 };
 /// The beams of ping `p` of a picture.
@@ -32,11 +32,11 @@ BeamChoice beams_of(const PingRequest& picture, std::size_t p);
 struct ColumnRange {
   int first = 0, last = 0;
 };
-/// The columns that have a weight in these beams, in rising order and apart. Where beams take part of each other's signals
-/// (crosstalk, mixed beams), or a transform forms them all, these are all columns.
+/// The columns that have a weight in these beams, as increasing, separate ranges. If beams contain parts of each other
+/// (crosstalk, mixed beams), or a transform forms all beams, these are all columns.
 std::vector<ColumnRange> columns_of(const PingPlan& plan, BeamChoice beams);
 
-/// The picture, with its own request; each beam is from its ping. `pings` are the results of pings_of(), in the same order.
+/// Combines the picture; each beam is taken from its ping. `pings`: the pings of pings_of(), in the same order.
 Ping interleaved(const PingRequest& picture, std::span<Ping> pings);
 
 }  // namespace sonar

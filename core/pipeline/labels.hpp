@@ -16,7 +16,7 @@
 
 namespace sonar {
 
-/// The reason why samples of such pings cannot have labels; empty = they can.
+/// The reason why samples of such pings cannot have labels; empty if they can.
 std::string why_unlabelled(const PingRequest& request, const Scene& scene);
 /// Labels of a ping that receives nothing.
 PingLabels no_labels(const PingRequest& request, const Scene& scene);
@@ -34,8 +34,7 @@ class LabelWork {
   /// Adds the energy of cells in the picture from Echoes::power, and clears the list of their tiles. It may be called several
   /// times for a group.
   void add_cells(const simd::GroupView& group, Echoes& echoes);
-  /// Adds the energy that the group's objects with a label would send if nothing hid them. To be called after the last
-  /// add_cells().
+  /// Adds the energy that the group's objects with a label would send if nothing hid them. Call it after the last add_cells().
   void finish_group(const simd::GroupView& group, Echoes& scratch);
   PingLabels finish(std::span<const PointEcho> points);
 
@@ -85,7 +84,7 @@ class LabelWork {
   };
   std::vector<Group> groups_;
   std::vector<std::vector<Gap>> gaps_;          // by column
-  std::vector<std::uint16_t> dark_;             // [columns][rows]: instance that casts a shadow where no echo is received
+  std::vector<std::uint16_t> dark_;             // [columns][rows]: instance that casts the shadow, for samples without an echo
   std::vector<float> nothing_;                  // a depth map in which nothing was hit
   std::vector<float> from_points_;              // [rows][beams] of echoes without surface, in main lobes; empty without any
   std::vector<double> noise_far_, noise_near_;  // by beam [uPa^2]

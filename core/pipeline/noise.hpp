@@ -1,6 +1,6 @@
 // Receiver noise: white complex Gaussian noise per column, shaped in range like the pulse. It is added before beamforming, so
-// that neighbouring beams share it as in a real array (docs/acoustics.md, section 5). It is read from a filtered table at hashed
-// places.
+// that neighbouring beams share it as in a real array (docs/acoustics.md, section 5). It is read from a filtered table at
+// hashed positions.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,7 @@ class NoiseTable {
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return *shaped_; }
-  /// Size of the table in memory. Leaves out memory in `counted`, which other tables share, and adds its own there.
+  /// Size of the table in memory, without memory in `counted`, which other tables share; adds its own to `counted`.
   std::size_t bytes(std::set<const void*>& counted) const;
 
  private:

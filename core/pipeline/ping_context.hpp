@@ -14,7 +14,8 @@
 
 namespace sonar {
 
-/// References that are valid until the ping is finished. The bodies in `rays` are at their poses; `cells` belong to its scene.
+/// References that are valid until the ping is finished. The bodies in `rays` must be at their poses; `cells` must belong to
+/// the same scene.
 struct PingContext {
   const RayScene& rays;
   SurfaceCells& cells;  // builds the tiles that come into view

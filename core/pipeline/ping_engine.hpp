@@ -47,9 +47,9 @@ inline void add(PingStatistics& to, const PingStatistics& more) {
 class Interruption {
  public:
   virtual ~Interruption() = default;
-  /// Whether such a ping is likely; the present one is then computed in smaller parts.
+  /// Whether another ping is likely to be requested; the present one is then computed in smaller parts.
   virtual bool expected() const = 0;
-  /// Called between two parts, on the thread of run(). It may call run() of the same engine; that run() does not call it.
+  /// Called between two parts, on the thread of run(). It may call run() of the same engine, which then does not call it again.
   virtual void run_other() = 0;
 };
 
@@ -74,12 +74,12 @@ class PingEngine {
     submitted_.pop_front();
     return run(requests);
   }
-  /// Largest number of requests like these two that one run() computes faster than several runs. 1: together is not faster, or
-  /// delays one of the two much.
+  /// Largest number of requests like these two that one run() computes faster than several runs. 1: one run is not faster, or
+  /// delays one of the two too much.
   virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
     return static_cast<void>(a), static_cast<void>(b), 1;
   }
-  /// Engines that cannot be interrupted ignore it. Null = none. Not to be called during a ping.
+  /// Sets the interruption; null = none. Engines that cannot be interrupted ignore it. Must not be called during a ping.
   virtual void set_interruption(Interruption* interruption) { static_cast<void>(interruption); }
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Statistics of the last ping.

@@ -1,5 +1,5 @@
 // All values of a ping that depend only on the model and the client's settings: columns, sample grid, pulse and beamforming
-// tables, noise filter, gains. They are made when settings change, and every stage uses them until settings change again.
+// tables, noise filter, gains. They are computed when settings change; all stages use them.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,8 @@ struct Fan {
   int bins = 0;
   std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from bottom to top
-  int side_elevations = 0;           // elevations at each end that lie in side lobes: not refined, shared by side_columns columns
+  int side_elevations =
+      0;  // number of elevations at each end that lie in side lobes; these are not refined, and side_columns columns share them
   bool is_side(int interval) const {
     return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
   }
@@ -46,10 +47,10 @@ struct BeamPanel {
   int first_column = 0, count = 0;
   std::size_t weights = 0;  // offset into BeamWeights::weights, count x 4 values
 };
-/// How beams are made of columns.
+/// Options of the sums of columns that form beams.
 struct BeamWeightOptions {
-  double dropped_energy = 1e-4;  // energy that is left outside the band: -40 dB
-  bool transform = true;         // use a transform in place of a band if the beams allow it and it costs less
+  double dropped_energy = 1e-4;  // fraction of energy outside the band: -40 dB
+  bool transform = true;         // use a transform instead of a band if the beams allow it and it is faster
 };
 struct BeamWeights {
   int half_band = 0;  // number of columns on either side that a beam sums
@@ -80,7 +81,7 @@ struct PingPlan {
   BeamWeights beam_weights;
   double bearing_scale = 1;                  // bearing_scale_of() the request
   std::vector<float> beam_azimuth_rad;       // reported
-  std::vector<double> beam_sine;             // true, as are all sines here except in tables by reported sine
+  std::vector<double> beam_sine;             // true sines; all sines here are true, except in tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
@@ -94,12 +95,12 @@ struct PingPlan {
   std::vector<float> pulse_rows;  // simd::PulseRows
   int taps = 8, pulse_steps = 256;
   double envelope_hz = 0;                           // b of the Gaussian of pulse_width_m
-  std::shared_ptr<const SpectralColumns> spectral;  // if set, it is used in place of pulse_rows
+  std::shared_ptr<const SpectralColumns> spectral;  // if set, used instead of pulse_rows
 
   std::vector<CellLevel> levels;    // coarsest first
   std::vector<float> elevation;     // polynomial of the two-way pattern in sin^2(angle)
   std::vector<float> pulse_filter;  // minimum-phase taps that give white noise the pulse's correlation on this grid
-  std::vector<float> noise_filter;  // the same for the receiver's noise, whose filter may be wider
+  std::vector<float> noise_filter;  // taps for the receiver's noise, whose filter may be wider
   double column_noise_upa = 0;      // rms of one column
   NoiseProfile noise_profile;
   SharedNoiseTable shared_noise;
@@ -114,7 +115,7 @@ struct PingPlan {
   }
   /// nullopt: the direction is outside the fan, or farther than half_angle_rad from its middle.
   std::optional<std::size_t> column_of(const ConicalDirection& direction, double half_angle_rad) const;
-  /// A cell is visible up to this distance behind the depth map, because the map is straight between rays.
+  /// A cell is visible up to this distance behind the depth map, because the map is interpolated linearly between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
   static constexpr float depth_tolerance_in_pulses = 1.5f;  // docs/acoustics.md, section 3
   /// Largest angle about the array's axis in a fan with this half angle. With flat beams it exceeds the half angle:
@@ -129,7 +130,7 @@ struct PingPlan {
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
 };
 
-/// Its result does not depend on the number of threads.
+/// Computes a plan. The result does not depend on the number of threads.
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, Parallel& pool,
                    double bearing_scale = 1);
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, double bearing_scale = 1);

@@ -7,8 +7,8 @@
 
 namespace sonar {
 
-/// Geometry of one echo of a moving sonar: the place scatters at half the echo's time of flight, when the pulse arrives there.
-/// The direction of the echo is measured in the sonar's axes at reception.
+/// Geometry of one echo for a moving sonar: the pulse reaches the target at half the echo's time of flight. The direction of
+/// the echo is measured in the sonar's axes at reception.
 struct EchoGeometry {
   Vec3d from_sonar_m;  // sonar axes at reception
   Vec3d moved_m;       // movement of the sonar until reception, in the axes of PingScalars::seen_from
@@ -36,7 +36,7 @@ struct PingScalars {
 
   /// Geometry of the echo of a place in the axes of `seen_from`.
   EchoGeometry echo_geometry(Vec3d from_sonar_m) const;
-  /// Largest number of columns between the column in which a place is traced and the one in which its echo is received.
+  /// Largest number of columns between the column in which a point is traced and that in which its echo is received.
   int columns_turned(const PingPlan& plan) const;
   /// The number of samples by which the Doppler shift of a sweep delays the echo from a place in the sonar's axes.
   double doppler_samples(Vec3d from_sonar_m) const;

@@ -1,5 +1,5 @@
-// Tables in a plan: for beamforming by a transform, for mixing beams, and for noise that channels share. The file of each step
-// makes and uses its table: beam_transform.cpp, beam_mix.cpp, shared_noise.cpp.
+// Tables in a plan: for beamforming by a transform, for mixing beams, and for noise that channels share. beam_transform.cpp,
+// beam_mix.cpp and shared_noise.cpp make and use them.
 #pragma once
 
 #include <cstddef>
@@ -87,7 +87,7 @@ class BeamMix {
 /// Weights of the beams for shared noise. They depend only on the plan.
 class SharedNoiseTable {
  public:
-  static constexpr std::size_t block_samples = 32;  // samples that are kept or left out together
+  static constexpr std::size_t block_samples = 32;  // samples that are stored or omitted together
   SharedNoiseTable() = default;
   /// Empty if the receiver has no shared noise. Needs the plan's columns and the level of their noise.
   SharedNoiseTable(const PingPlan& plan, Parallel& pool);
@@ -114,7 +114,7 @@ class SharedNoiseTable {
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;
 
  private:
-  /// [2][block_samples] of a part in a beam, or null if the block is left out.
+  /// [2][block_samples] of a part in a beam, or null if the block is omitted.
   const float* heard(std::size_t part, std::size_t beam, std::size_t block) const;
   struct Block;
   void gather(std::vector<Block>& blocks);

@@ -8,8 +8,8 @@
 
 namespace sonar {
 
-/// `wanted` belongs to the request; bodies must have been placed. The bytes do not depend on the number of threads.
-/// Not simulated: motion while the sound travels, mirrors (specular echoes, multipath), texture, volume, other sonars.
+/// `wanted` must belong to the request; RayScene::place() must have been called. The bytes do not depend on the number of
+/// threads. Not simulated: motion while the sound travels, mirrors (specular echoes, multipath), texture, volume, other sonars.
 Ping make_range_image(const RayScene& scene, const PingRequest& request, const RangeImageSettings& wanted, Parallel& pool);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// The hits of the rays of a range image (core/pipeline/range_image.hpp): one ray passes through the middle of each cell of the
-// beam grid and of a few cells around the grid; many rays pass through cells with objects thinner than a cell.
+// The returns of a range image (core/pipeline/range_image.hpp): one ray is traced through the middle of each cell of the beam
+// grid and of a few cells around it, and many rays through cells with objects thinner than a cell.
 #pragma once
 
 #include <cstddef>
@@ -22,11 +22,11 @@ struct RangeReturn {
   ComplexNormal speckle{1, 0};
   std::uint32_t draw = 0;  // draw for the speckle of its range cells, see RangeReturns::speckle_in()
   std::uint32_t object = BeamTruth::nothing;
-  // Power in the range cells `first` to `last`: of_first in the first, of_last in the last if it is another, of_each in the
+  // Power in the range cells `first` to `last`: of_first in the first, of_last in the last (if different), of_each in the
   // others.
   std::int32_t first = 0, last = 0;
   double of_first = 0, of_each = 0, of_last = 0;
-  // The patch of surface: cosine of the incidence, deviation of its ranges from range_m, number of the cell's rays that hit it.
+  // The patch of surface: cosine of the incidence, spread of its ranges about range_m, number of the cell's rays that hit it.
   double cosine = 0, spread_m = 0;
   int rays = 0;
 
@@ -69,7 +69,7 @@ class RangeReturns {
   struct Angle {
     double cosine, sine;
   };
-  /// A row of the grid: the returns of its cells, side by side.
+  /// The returns of a row of the grid, cell by cell.
   struct Row {
     std::vector<RangeReturn> returns;
     std::vector<std::size_t> begin;  // first return of each column, and the end

@@ -1,5 +1,5 @@
-// Stage two: makes an echo of each visible surface cell, with its place on the sample grid, column, amplitude and carrier phase.
-// The speckle is fixed to the surface. This file also has the scatterers of the fixed fan and the analytic point targets.
+// Stage two: computes the echo of each visible surface cell: position on the sample grid, column, amplitude and carrier phase.
+// The speckle is fixed to the surface. Also the scatterers of the fixed fan and the analytic point targets.
 #pragma once
 
 #include <complex>
@@ -28,7 +28,7 @@ std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const Pi
 std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skins, std::span<const Pose> bodies_in_world,
                                   Vec3d sonar_m);
 
-/// Prepares the tiles in view, in parallel; the order is kept. The tiles point into the laws, which must outlive them.
+/// Prepares the tiles in view, in parallel, keeping their order. The tiles point into the laws, which must outlive them.
 /// `sonar_from_object`: rotations of the view, per object.
 void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in_view,
                    std::span<const Rotation> sonar_from_object, std::vector<PreparedTile>& tiles);
@@ -36,7 +36,7 @@ void prepare_tiles(const PingContext& context, const std::vector<TileInView>& in
 /// View of columns [first, last); the map may have more columns.
 simd::GroupView make_group_view(const PingPlan& plan, const PingScalars& scalars, const DepthMap& seen, int first, int last);
 
-/// For each group of columns, the tiles that reach into it, in order. Groups are in rising order, without overlaps.
+/// For each group of columns, lists the tiles that reach into it, in order. Groups must be increasing and not overlap.
 void sort_tiles(const std::vector<PreparedTile>& tiles, std::span<const ColumnRange> groups,
                 std::vector<std::vector<std::uint32_t>>& by_group);
 

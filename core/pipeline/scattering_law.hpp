@@ -21,7 +21,8 @@ struct LawTable {
   float root_strength(float cosine) const;
 };
 
-/// A surface is smooth if its roughness k h [rad of phase] is below this: it reflects a part, and only the rest scatters.
+/// A surface is smooth if its roughness k h [rad of phase] is below this: it reflects a part of the energy and scatters the
+/// rest.
 inline constexpr double smooth_below_kh = 1.5;
 
 /// sigma_b [1/sr] of a material at a frequency, cosine in [0, 1]. `specular`: the reflected energy is subtracted from the diffuse

@@ -26,12 +26,12 @@ struct PreparedSettings {
 
 class SettingsCache {
  public:
-  /// Enough for some eight of the largest tables (M1200d with 512 beams), or for hundreds of small ones.
+  /// Enough for about eight of the largest tables (M1200d with 512 beams), or for hundreds of small ones.
   static constexpr std::size_t usual_bytes = std::size_t{64} << 20;
   explicit SettingsCache(std::size_t most_bytes = usual_bytes) : most_bytes_(most_bytes) {}
 
-  /// Returns the tables of a request, and makes them if needed. Drops the least recently used others until all fit. The result is
-  /// valid until the next call.
+  /// Returns the tables of a request, making them if needed. Drops least recently used ones until all fit. The result is valid
+  /// until the next call.
   PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool);
   /// Approximate size of all tables.
   std::size_t bytes() const;

@@ -1,5 +1,6 @@
-// Signals that receive channels share, with opposite signs in neighbours: noise, and in some receivers the transmitter's leak.
-// They appear as wide grains and fringes in pictures of an array that is focused at every range (docs/acoustics.md, section 5).
+// Signals that receive channels share, with opposite signs in neighbouring channels: noise, and in some receivers the
+// transmitter's leak. In pictures of an array that is focused at every range they appear as wide grains and fringes
+// (docs/acoustics.md, section 5).
 #pragma once
 
 #include <string>
@@ -8,9 +9,9 @@
 
 namespace sonar {
 
-/// Why the numbers of channels and of a group's channels are invalid; empty = they are valid.
+/// The reason why the numbers of channels and of a group's channels are invalid; empty if they are valid.
 std::string why_impossible(const SharedNoise& law);
-/// Why SharedNoiseTable would need too much memory or time; empty if it does not. Needs valid numbers of channels.
+/// The reason if SharedNoiseTable would need too much memory or time; else empty. Needs valid numbers of channels.
 std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
 
 }  // namespace sonar

@@ -27,7 +27,7 @@ struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
   bool has_upper_marks = false;
   std::vector<float> inverse_x;   // [columns][bins + 1], 0 = nothing was hit; its last bits are the surface_mark
-  std::vector<float> per_column;  // [columns][bins + 1]: its change from column to column along the facet that was hit
+  std::vector<float> per_column;  // [columns][bins + 1]: change of inverse_x from column to column along the hit facet
 
   /// Sets the size for columns [first, last).
   void shape(int first, int last, int bin_count) {

@@ -1,5 +1,5 @@
 // Mixes neighbouring beams: the blur of an array that is focused for broadside only, and a fitted fraction of the next beams
-// (docs/acoustics.md, section 6). C++17-clean, standard library only.
+// (docs/acoustics.md, section 6). Only C++17 and the standard library.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace sonar {
 
-/// Tables of BeamMix; null = that part is absent. Signals are complex [beams][stride / 2], interleaved; in expected power, re is
-/// a power and taps and shares are squared.
+/// The tables of BeamMix; a null table means that its part is off. Signals are complex [beams][stride / 2], interleaved; in
+/// expected power, re is a power, and taps and shares are squared.
 struct BeamMixView {
   const float* turn_m;                          // [beams]: phase error at the aperture's ends times range [rad m]
   const float* taps;                            // complex [sets][2 reach + 1], beams j - reach to j + reach
@@ -29,7 +29,7 @@ SONAR_HD inline std::int32_t focus_set(const BeamMixView& v, std::int32_t beam, 
 struct MixedSample {
   float re, im;
 };
-/// Sample at `from + 2 column` of beam `j` with the blur of a wrong focus; `set` is from focus_set().
+/// The sample at `from + 2 column` of beam `j`, blurred by the wrong focus; `set` is from focus_set().
 SONAR_HD inline MixedSample refocused(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
                                       std::int32_t column, std::int32_t set) {
   const std::int32_t reach = v.reach[set];
@@ -45,7 +45,7 @@ SONAR_HD inline MixedSample refocused(const BeamMixView& v, const float* from, s
   return sum;
 }
 
-/// The same sample with a fraction of both neighbours; the outermost beams have one neighbour.
+/// The sample with a fraction of both neighbouring beams; the outermost beams have one neighbour.
 SONAR_HD inline MixedSample blended(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
                                     std::int32_t column) {
   const float* s = from + j * stride + 2 * static_cast<std::int64_t>(column);

@@ -1,6 +1,5 @@
-// Directivity of the receive array in azimuth and of transmitter times receiver in elevation, as closed forms.
-// Used by the beamforming of columns to beams, by the cells' amplitudes, and for predicted levels.
-// C++17-clean, standard library only, because nvcc compiles it, too.
+// Closed forms of the directivity: of the receive array in azimuth, and of transmitter times receiver in elevation. Only C++17
+// and the standard library, because nvcc compiles it, too.
 #pragma once
 
 #include <cmath>
@@ -12,7 +11,7 @@
 
 namespace sonar {
 
-/// Number of terms of the aperture's cosine series that any of our tapers needs.
+/// Largest number of terms of a taper's cosine series.
 inline constexpr int taper_terms = 4;
 
 /// Aperture shading g(p) = 1 + 2 sum_m c[m] cos(2 pi m p), p = place on the aperture / its length; c[0] = 1.
@@ -90,7 +89,7 @@ SONAR_HD inline double directivity(Taper taper, double aperture_wavelengths, dou
   return beam_amplitude(taper, aperture_wavelengths * du);
 }
 
-/// directivity() with constants that are computed once, for loops.
+/// directivity() with precomputed constants, for loops.
 struct ReceivePattern {
   bool unit = false;
   TaperSeries series;
@@ -135,7 +134,7 @@ SONAR_HD inline double elevation_two_way(double elevation_aperture_wavelengths, 
   const double d = sinc(elevation_aperture_wavelengths * std::sin(psi_rad));
   return d * d;
 }
-/// The same from the data sheet's widths. It solves for the aperture; in loops, compute the aperture once.
+/// elevation_two_way() from the data sheet's widths. It solves for the aperture, so in loops compute the aperture once.
 SONAR_HD inline double elevation_two_way(const BeamPattern& pattern, double psi_rad) {
   if (pattern.elevation_taper == Taper::unit) return std::fabs(psi_rad) < 0.5 * pi ? 1 : 0;
   return elevation_two_way(elevation_aperture_in_wavelengths(pattern), psi_rad);
@@ -160,7 +159,7 @@ SONAR_HD inline ConicalDirection flat_from_sonar(Vec3d direction_in_sonar) {
   const double h = std::sqrt(direction_in_sonar.x * direction_in_sonar.x + direction_in_sonar.y * direction_in_sonar.y);
   return {direction_in_sonar.y / h, std::atan2(direction_in_sonar.z, h)};
 }
-/// Their inverses, unit vectors.
+/// The inverse functions, which return unit vectors.
 SONAR_HD inline Vec3d sonar_from_conical(const ConicalDirection& d) {
   const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
   return {across * std::cos(d.psi_rad), d.u, across * std::sin(d.psi_rad)};
@@ -169,7 +168,8 @@ SONAR_HD inline Vec3d sonar_from_flat(const ConicalDirection& d) {
   const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
   return {across * std::cos(d.psi_rad), d.u * std::cos(d.psi_rad), std::sin(d.psi_rad)};
 }
-/// The same in float from known sines and cosines: u, sqrt(1 - u^2), and those of psi. Rays use it, which decide shadows only.
+/// The direction in float, from u, sqrt(1 - u^2), and the sine and cosine of psi. Float is sufficient for rays, which only
+/// decide about shadows.
 SONAR_HD constexpr Vec3 ray_in_sonar(bool conical, float u, float across, float cosine, float sine) {
   return {across * cosine, conical ? u : u * cosine, conical ? across * sine : sine};
 }

@@ -1,5 +1,5 @@
-// Fresnel integrals C(x) and S(x), which give the part of a mirror's echo that comes from a part of its surface
-// (docs/acoustics.md, section 3). Used by specular.cpp. C++17-clean, standard library only.
+// Fresnel integrals C(x) and S(x), from which the echo of a limited mirror follows (docs/acoustics.md, section 3). Only C++17
+// and the standard library.
 #pragma once
 
 #include <cmath>

@@ -20,10 +20,10 @@ inline constexpr std::int32_t surface_marks = (1 << surface_mark_bits) - 1, uppe
 SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object & 0xFFFFu); }
 SONAR_HD constexpr std::int32_t upper_mark(std::int32_t mark) { return mark >> surface_mark_bits; }
 SONAR_HD constexpr bool has_upper_marks(std::size_t objects) { return objects > static_cast<std::size_t>(surface_marks) + 1; }
-/// A cell of another object is hidden if it lies farther behind the surface that was hit than contact_m [m] plus contact_share
-/// times the range.
+/// A cell of another object is hidden if it lies more than contact_m [m] + contact_share * range behind the hit surface.
 inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
-/// The axis of the depth map. Bins are uniform in the tangent: narrow between two edges, and wide in the side lobes beyond them.
+/// The axis of the depth map. Bins are uniform in the tangent: narrow ones between two edges, wide ones in the side lobes
+/// outside them.
 struct TangentAxis {
   float middle_bin, edge_tangent, bins_per_tangent, side_bins_per_tangent;
 };

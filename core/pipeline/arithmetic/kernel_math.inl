@@ -1,6 +1,6 @@
-// Formulas of the hot loops that scalar, device and vector code share. It is included inside a namespace, once per instruction
-// set, because the linker must not merge inline functions compiled for different sets. It uses bits_of and float_of of that
-// namespace, and with vectors its overloads of larger and smaller. V is a float or a vector of floats.
+// Formulas of the hot loops that scalar, device and vector code share. This file is included inside a namespace, once per
+// instruction set, because the linker must not merge inline functions compiled for different sets. The namespace must have
+// bits_of and float_of and, for vectors, larger and smaller. V is a float or a vector of floats.
 
 SONAR_HD inline float larger(float a, float b) { return a > b ? a : b; }
 SONAR_HD inline float smaller(float a, float b) { return a < b ? a : b; }
@@ -65,7 +65,7 @@ template <class V>
 SONAR_HD inline V cross_fade(V in, V out) {
   return larger(smaller(smaller(in, out), V{} + 1.0f), V{});
 }
-/// The same for a tile's level at range r.
+/// The weight of a tile's level at range r.
 template <class Tile, class V>
 SONAR_HD inline V level_weight(const Tile& t, V r) {
   return cross_fade<V>((r - t.fade_in_from_m) * t.fade_in_per_m, (t.fade_out_to_m - r) * t.fade_out_per_m);

@@ -1,5 +1,5 @@
-// Computes the place in the table of shaped noise where the noise of a column in a ping begins, and the quarter turns by which it
-// is rotated. Receiver noise, the leak and the grains of the water use it. C++17-clean, standard library only.
+// Computes the start of a column's noise in the table of shaped noise, and the quarter turns by which the noise is rotated.
+// Receiver noise, the leak and the volume reverberation use it. Only C++17 and the standard library.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@ namespace sonar {
 
 inline constexpr std::uint32_t noise_table_samples = 1u << 18;
 
-/// The leak has its own sonar numbers, and its own ping number for the part that is the same in every ping.
+/// The leak has separate sonar numbers, and one ping number for its part that is the same in every ping.
 SONAR_HD constexpr std::uint32_t leak_sonar(std::uint32_t sonar) { return sonar ^ static_cast<std::uint32_t>(Domain::leak); }
 inline constexpr std::uint32_t every_ping = 0xFFFFFFFFu;
-/// Column numbers of the grains of the water begin here; receiver noise has lower ones.
+/// First column number of the volume reverberation; receiver noise has lower numbers.
 inline constexpr std::uint32_t first_volume_column = 1u << 24;
-/// Column numbers of noise that groups of channels share begin here; there are fewer groups than numbers.
+/// First column number of the noise that groups of channels share.
 inline constexpr std::uint32_t first_shared_noise_column = first_volume_column - 4096;
 
 /// A random start and one of four quarter turns, so that patterns of the table do not repeat. `key`: Domain::noise_place.

@@ -1,5 +1,5 @@
 // Converts beam pressure to samples: thermal noise level, time-varied gain, row gains, quantisation (docs/acoustics.md, section
-// 7). Used by the last stage of a ping, and by vendors that state a gain per row. C++17-clean, standard library only.
+// 7). Only C++17 and the standard library.
 #pragma once
 
 #include <cmath>
@@ -46,7 +46,7 @@ SONAR_HD inline double full_scale_factor(const ReceiverModel& law, double gain_d
 }
 
 /// Power gain of a row in formats that send it: the power ratio of the row's TVG to the smallest TVG, rounded to an integer, at
-/// least 1. Exactly sqrt(row gain) is then applied to the amplitude, so that sample / sqrt(gain) undoes it.
+/// least 1. The amplitude is multiplied by exactly sqrt(row gain), so that sample / sqrt(gain) restores it.
 SONAR_HD inline std::uint32_t row_power_gain(double row_tvg_db, double smallest_tvg_db) {
   const double gain = std::floor(std::pow(10.0, 0.1 * (row_tvg_db - smallest_tvg_db)) + 0.5);
   if (!(gain > 1)) return 1;

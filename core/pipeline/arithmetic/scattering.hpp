@@ -1,5 +1,5 @@
 // Echo of a scatterer: Lambert cross-sections, spreading, absorption, carrier phase (docs/acoustics.md, section 3).
-// Used by cells, by the fixed fan and by point targets. C++17-clean, standard library only.
+// Only C++17 and the standard library.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@ namespace sonar {
 
 /// Lower limit of the cosine of incidence in a facet's area per solid angle, which is infinite at silhouettes.
 inline constexpr double cosine_floor = 1e-3;
-/// Range [m] below which there are no echoes: it lies inside the housing, and 1/r^2 has no meaning.
+/// Range [m] below which there are no echoes, because it is inside the housing, where 1/r^2 does not apply.
 inline constexpr double nearest_scatterer_m = 1e-2;
 
 /// mu [1/sr] from 10 log10 mu.
@@ -34,8 +34,8 @@ SONAR_HD inline double two_way_transmission(double range_m, double alpha_np_per_
   return std::exp(-2 * alpha_np_per_m * range_m) / (range_m * range_m);
 }
 
-/// A phase in turns, folded to [0, 1): an echo is multiplied by exp(-i 2 pi turns), turns = 2 f r / c.
-/// In double: a float range alone costs 1e-3 of the signal at 900 kHz (docs/acoustics.md, section 1).
+/// A phase in turns, modulo 1: an echo is multiplied by exp(-i 2 pi turns), turns = 2 f r / c. In double, because the rounding
+/// of a float range causes an error of 1e-3 of the signal at 900 kHz (docs/acoustics.md, section 1).
 SONAR_HD inline double fraction_of_turn(double turns) { return turns - std::floor(turns); }
 
 }  // namespace sonar

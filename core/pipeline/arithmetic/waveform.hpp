@@ -1,6 +1,5 @@
 // Formulas for pulses p(t) after the receiver's filter (Gaussian, rectangular tone, linear sweep), and for their widths.
-// Synthesis, shaped noise and level predictions use them (docs/acoustics.md, section 4). C++17-clean, standard library
-// only.
+// See docs/acoustics.md, section 4. Only C++17 and the standard library.
 #pragma once
 
 #include <cmath>
@@ -47,7 +46,7 @@ SONAR_HD inline double tone_envelope(double length_s, double time_s) {
   const double x = std::fabs(time_s) / length_s;
   return x < 1 ? 1 - x : 0;
 }
-/// Its spectrum, T sinc^2(nu T) [s].
+/// Spectrum of tone_envelope(): T sinc^2(nu T) [s].
 SONAR_HD inline double tone_envelope_spectrum_s(double length_s, double frequency_offset_hz) {
   const double d = sinc(frequency_offset_hz * length_s);
   return length_s * d * d;

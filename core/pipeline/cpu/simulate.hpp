@@ -1,5 +1,5 @@
-// Calls the stages of a ping, which make samples of a request and a scene. The result depends only on the arguments; values kept
-// between calls (Workspace, SurfaceCells) only save work.
+// Calls the stages of a ping, which compute samples from a request and a scene. The result depends only on the arguments; state
+// between calls (Workspace, SurfaceCells) only saves time.
 #pragma once
 
 #include <memory>
@@ -20,10 +20,10 @@ class Workspace {
   explicit Workspace(double (*now_s)() = nullptr);  // a clock for the statistics
   ~Workspace();
 
-  /// Sets the interruption that is tried between groups of columns; null = none. Must not be called during a ping.
+  /// Sets the interruption that is called between groups of columns; null = none. Must not be called during a ping.
   void set_between(Interruption* between);
   const PingStatistics& statistics() const;  // statistics of the last ping
-  /// To be called when the next ping has another scene.
+  /// Call it if the next ping has another scene.
   void change_scene();
 
  private:
@@ -32,9 +32,9 @@ class Workspace {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// `cells` must belong to the scene of `scene` and to the request's seed; bodies must have been placed. If `labels` is not
-/// null, it is filled; the ping does not depend on it. If `beams` are not all, the samples and the truth of the others are
-/// undefined, and labels must be null.
+/// `cells` must belong to the scene of `scene` and to the request's seed; RayScene::place() must have been called. If `labels`
+/// is not null, it is filled, which does not change the ping. If `beams` are not all beams, samples and truth of the others are
+/// undefined, and `labels` must be null.
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
               Workspace& work, Parallel& pool, PingLabels* labels = nullptr, BeamChoice beams = {});
 

@@ -1,5 +1,5 @@
-// Paths between the sonar and a place: straight, or via one or two flat mirrors (docs/acoustics.md, section 3). In the
-// image method a path is a straight line to the image of the place. So a path is stored as a reflection of the sonar's axes.
+// Paths between the sonar and a place: straight, or via one or two flat mirrors (docs/acoustics.md, section 3). In the image
+// method a path is a straight line to the image of the target, so a path is stored as a reflection of the sonar's axes.
 #pragma once
 
 #include <vector>
@@ -10,11 +10,11 @@
 
 namespace sonar {
 
-/// At most this many mirrors in a ping: the largest that can reflect.
+/// Largest number of mirrors in a ping; the largest faces are used.
 inline constexpr int most_mirrors = 16;
 /// A mirror that reflects less than this (pressure, at the angle of incidence) is ignored.
 inline constexpr double least_reflectance = 0.05;
-/// A point, or the sonar, nearer to a mirror than this counts as lying in it.
+/// Points (and the sonar) nearer to a mirror than this count as lying in it.
 inline constexpr double touching_m = 1e-3;
 
 /// A flat face in one ping, in the axes of PingScalars::seen_from: dot(normal, p) + height_m = 0 on its plane.
@@ -48,7 +48,7 @@ Path path_by(const std::vector<FlatMirror>& mirrors, int first, int second = -1)
 
 /// Product of the reflectances for a path that leaves in this unit direction.
 double reflectance_of(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d direction);
-/// Whether the path can reach a place from its last mirror: the place is on the lit side, and not on the mirror.
+/// Whether the path can reach a point from its last mirror: the point is on the lit side, and not in the mirror.
 bool is_lit(const Path& path, const std::vector<FlatMirror>& mirrors, Vec3d place);
 
 /// Pressure factor of a layer of bubbles over all legs of one path to a place.

@@ -1,5 +1,5 @@
 // Echoes via mirrors: every pair of paths, one out and one back, between the sonar and a cell or a point target. Pairs that
-// differ only in direction have the same delay and phase, and so add coherently (docs/acoustics.md, section 3).
+// differ only in direction have the same delay and phase, so they add coherently (docs/acoustics.md, section 3).
 #pragma once
 
 #include <span>
@@ -65,7 +65,7 @@ class MultipathScatterer {
   };
   struct Arrival {                      // one cell by one path
     float range_m, sample_shift, size;  // size: pressure per source, root of the scattering law included
-    std::complex<float> carried;        // the same with the carrier's phase
+    std::complex<float> carried;        // `size` with the carrier's phase
     float transmit, sine;
     int column;
     bool front;  // the side of the surface
@@ -95,8 +95,8 @@ class MultipathScatterer {
   OneWayPattern pattern_;
   float first_edge_sine_, columns_per_sine_, tolerance_m_, absorption_np_per_m_, half_turns_per_m_;
   const std::vector<float>& turned_away_;
-  float away_ = 0;     // that of the tile's object
-  Vec3d tile_middle_;  // one of its cells, in the axes of PingScalars::seen_from
+  float away_ = 0;     // TileSeen::turned_away of the tile's object
+  Vec3d tile_middle_;  // position of a cell of the tile, in the axes of PingScalars::seen_from
   std::vector<TilePath> tile_paths_;
   std::vector<Arrival> arrivals_;
   bool direct_ = false;  // whether arrivals_[0] is the direct path

@@ -1,5 +1,5 @@
 // Traces the view via mirrors: the rays of a fan are followed via up to two flat mirrors. Each direction has one
-// sequence of mirrors, so that one map is enough for all paths. In this map, multipath_scatter finds the places that each path
+// sequence of mirrors, so that one map is enough for all paths. multipath_scatter looks up in this map which points each path
 // reaches.
 #pragma once
 

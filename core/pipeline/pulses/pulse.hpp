@@ -44,11 +44,11 @@ class Pulse {
   Waveform::Shape shape_ = Waveform::Shape::gaussian;
   double scale_hz_ = 1;  // Gaussian b, 1 / the tone's length, the sweep's bandwidth, the sample rate
   double width_s_ = 1, reach_s_ = 1, band_hz_ = 1, energy_width_s_ = 1, noise_bandwidth_hz_ = 1;
-  std::vector<std::complex<double>> samples_;  // measured: the samples that matter; the peak is samples_[middle_]
+  std::vector<std::complex<double>> samples_;  // measured: the samples that are not negligible; the peak is samples_[middle_]
   int middle_ = 0;
 };
 
-/// The reason why such a pulse cannot be used with this sample time, as a sentence; empty = it can be used.
+/// A sentence with the reason why the pulse cannot be used with this sample time; empty if it can.
 std::string why_invalid(const Waveform& waveform, double sample_time_s);
 
 /// The sweep's bandwidth for a -3 dB width of the compressed pulse in delay.

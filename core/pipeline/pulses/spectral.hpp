@@ -1,6 +1,5 @@
-// Sums of delayed echoes at every frequency of a regular grid, by the definition and by a fast method. They are used for
-// pulses that have no formula, for the exact mode, and for the frequency sum of Choi 2025
-// (docs/acoustics.md, section 4).
+// Sums of delayed echoes at every frequency of a regular grid, by the definition and by a fast method. Used for measured
+// pulses, for the exact mode, and for the frequency sum of Choi 2025 (docs/acoustics.md, section 4).
 #pragma once
 
 #include <complex>
@@ -36,8 +35,8 @@ std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const Frequency
 
 /// Non-uniform Fourier transform, type 1: every echo is spread over `width` points of a grid twice as fine as needed with the
 /// kernel exp(2.3 width (sqrt(1 - x^2) - 1)) (docs/acoustics.md, eq. 26), the grid is transformed, and the result is divided by
-/// the transform of the kernel. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9. It is made once;
-/// many threads may then use it, each with its own grid.
+/// the transform of the kernel. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9. Several threads
+/// may use one object, each with its own grid.
 class FrequencySums {
  public:
   explicit FrequencySums(int count, int width = 6);

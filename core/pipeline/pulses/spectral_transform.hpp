@@ -9,14 +9,14 @@ namespace sonar::spectral {
 
 using Complex = std::complex<double>;
 
-/// Whether this build has a transform. If not, no Fft may be made.
+/// Whether this build has a transform. If not, Fft must not be constructed.
 extern const bool have_transform;
 /// The error for users in such a build: the reason and what to do.
 inline constexpr const char* no_transform =
     "this build has no Fourier transform: measured and exact pulses need one; install libfftw3-dev and build with SONAR_FFTW=ON";
 
-/// x[k] = sum_n x[n] e^{-+ i 2 pi k n / size}, in place, not scaled. Made once, then used by any number of threads at once; the
-/// result depends on the input alone (plans are estimated, never measured).
+/// x[k] = sum_n x[n] e^{-+ i 2 pi k n / size}, in place, not scaled. Any number of threads may use one object. The result
+/// depends only on the input (plans are estimated, never measured).
 class Fft {
  public:
   enum class Direction { forward, inverse };  // e^{-i ...}, e^{+i ...}

@@ -1,5 +1,5 @@
-// Converts the cells of a tile to echoes: their places, their visibility by the depth map, their amplitudes. Instruction sets
-// include it after kernels.inl. Every value is a vector of cells. Hidden cells are dropped before amplitudes are computed.
+// Converts the cells of a tile to echoes: positions, visibility by the depth map, amplitudes. Included once per instruction
+// set, after kernels.inl. Every value is a vector over cells. Hidden cells are dropped before amplitudes are computed.
 
 inline constexpr int chunk = 256;
 
@@ -25,7 +25,7 @@ inline Lanes area_of(const CellTile& t, int i, Lanes weight_re, Lanes weight_im)
   return choose(below(all(0), weight2), 1.0f / (magnitude(along) * CellTile::normal_unit), all(0));
 }
 
-/// Which values of visible cells are kept: weights, areas, or both.
+/// The values of visible cells to keep: weights, areas, or both.
 struct Wanted {
   bool weights, areas;
 };
@@ -37,8 +37,8 @@ inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i
   pack(c.weight_im + m, keep, im);
 }
 
-/// Whether cells of other objects than the one hit in their direction are hidden: behind its facet, which is extended from the
-/// ray's place in the column to the cell's. `at`: index of the map; `nearness`: 1 / x of cells with the tolerance for contact.
+/// Whether cells that belong to another object than the one hit in their direction are hidden, that is, behind the hit facet
+/// extended to the cell's direction. `at`: index of the map; `nearness`: 1 / x of the cells with the tolerance for contact.
 inline __attribute__((noinline)) LaneMask hidden(const GroupView& g, LaneNumbers at, Lanes seen, Lanes column, Lanes nearness) {
   const Lanes beside = column - as_floats(whole_part(column)) - 0.5f;
   return below(nearness, seen + beside * gather(g.depth_slope, at));
@@ -48,7 +48,7 @@ inline __attribute__((noinline)) LaneMask hidden(const GroupView& g, LaneNumbers
 inline LaneMask foreign_marks(std::int32_t mark, Lanes a, Lanes b) {
   return both(bits_differ(a, mark, surface_marks), bits_differ(b, mark, surface_marks));
 }
-/// The same if an object's number does not fit in the marks of 1 / x.
+/// Like foreign_marks(), if object numbers do not fit into the marks of 1 / x.
 inline __attribute__((noinline)) LaneMask foreign_numbers(const GroupView& g, std::int32_t mark, LaneNumbers at, Lanes a,
                                                           Lanes b) {
   Lanes upper_a, upper_b;
@@ -92,7 +92,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     // Reference of elevations.
     const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
     const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
-    // Its direction from the place of the rays; the sonar may have turned since.
+    // Direction of the cell from the origin of the rays; the sonar may have turned since.
     Lanes seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
     if (moves) {
       const float *w = s.seen_turn, *o = s.seen_place;
@@ -113,7 +113,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     if (!any(keep)) continue;
 
     // Depth map between two bins, against the cell's own 1 / x with the tolerances of section 3.
-    // The parentheses choose the function of this instruction set, not the one found by the type of the axis.
+    // The parentheses select the function of this instruction set, not the one found by argument-dependent lookup.
     const Lanes bin_here = smaller((bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0))), last_bin);
     const LaneNumbers bin_below = whole_part(bin_here);
     const Lanes column_here = choose(keep, seen_column, map_first);

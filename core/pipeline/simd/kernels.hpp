@@ -1,5 +1,5 @@
-// The hot loops of a ping, which are compiled from kernels.inl for each instruction set and chosen at run time. They read and
-// write plain arrays. Their callers explain what they compute (scatter, synthesize, form_beams, receive).
+// The hot loops of a ping, compiled from kernels.inl for each instruction set and chosen at run time. They read and write plain
+// arrays. Their callers (scatter, synthesize, form_beams, receive) explain the formulas.
 #pragma once
 
 #include <cstddef>
@@ -24,16 +24,16 @@ struct TileSeen {
   float phase_turns;           // carrier phase of the tile centre, in [0, 1)
   float amplitude;             // product of all factors that are constant over the tile, and of weight_unit
   const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine
-  float area_amplitude;        // the same with the cell size in place of the speckle (expected power)
+  float area_amplitude;        // like `amplitude`, with the cell size in place of the speckle (expected power)
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
   // Tangents of its cells (absolute values): those of the fan's main part, or of the side lobes, where cells are coarser.
   float from_tangent, to_tangent;
   bool in_side_lobes;
-  float tolerance_share;              // fraction of the range, in addition to GroupView::depth_tolerance_m
-  float turned_away;                  // cells with normal * direction * turned_away > 0 scatter nothing; 0: all scatter
-  std::int32_t mark;                  // surface_mark of its object
-  bool moves;                         // during the ping: look-ups in the depth map use the place of cells in the axes of its rays
-  float seen_turn[9], seen_place[3];  // place in these axes = seen_turn * place + seen_place, row-major
+  float tolerance_share;  // fraction of the range, in addition to GroupView::depth_tolerance_m
+  float turned_away;      // cells with normal * direction * turned_away > 0 scatter nothing; 0: all scatter
+  std::int32_t mark;      // surface_mark of its object
+  bool moves;             // the sonar moves during the ping: look-ups in the depth map use positions in the axes of the rays
+  float seen_turn[9], seen_place[3];  // position in these axes = seen_turn * position + seen_place; row-major
 };
 
 /// Linear codes (eq. 37): floor(factor v^gamma + rounding), at most max_code.
@@ -49,7 +49,7 @@ struct GroupView {
   TangentAxis axis;                         // axis t of the depth map
   int bins;                                 // values per column of the depth map; the map has bins + 1
   int map_first_column, fan_columns;        // first column of the depth map; number of columns of the fan
-  int columns_beside;                       // columns beside its own in which a cell is looked up if the sonar moves
+  int columns_beside;                       // number of columns beside its own in which a cell is looked up if the sonar moves
   const float* inverse_depth;               // DepthMap::inverse_x
   const float* depth_slope;                 // DepthMap::per_column
   bool has_upper_marks;                     // in depth_slope
@@ -68,7 +68,7 @@ struct EchoArrays {
   float* re;
   float* im;
   std::int32_t* column;    // absolute column
-  float* power = nullptr;  // expected value of |re + i im|^2, for labels; null: not wanted, or re has it
+  float* power = nullptr;  // expected value of |re + i im|^2, for labels; null: not needed, or already in re
 };
 
 /// Rays that are scatterers. Each has its own complex Gaussian, which depends on its counters (core/base/random.hpp).
@@ -142,9 +142,9 @@ struct Kernels {
                           int n);
 };
 
-/// The kernels of a level; `automatic` is the level in the environment variable SONARD_SIMD, or the best of this processor. If
-/// the processor does not have the level, it is the next lower one (on ARM, NEON in place of AVX). Throws std::runtime_error if
-/// SONARD_SIMD is not the name of a level.
+/// The kernels of a level; `automatic` means the level in the environment variable SONARD_SIMD, else the best of this
+/// processor. If the processor lacks the level, the next lower one is used (on ARM, NEON in place of AVX). Throws
+/// std::runtime_error if SONARD_SIMD is not the name of a level.
 const Kernels& kernels_for(SimdLevel level);
 
 extern const Kernels portable_kernels, avx2_kernels, avx512_kernels, neon_kernels;

@@ -33,9 +33,9 @@ void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, flo
 }
 
 #if defined(__AVX512F__)
-/// Processes sixteen echoes at a time, and computes their places in vectors. A pulse is added to the two aligned vectors that it
-/// overlaps. The next echo is often one sample aside: a load that overlaps an unfinished store only in part stalls, while a load
-/// of the same whole vector does not.
+/// Processes sixteen echoes at a time, and computes their positions as vectors. A pulse is added to the two aligned vectors
+/// that it overlaps. Unaligned vectors would be slow: the next echo is often one sample further, and a load that partly
+/// overlaps an unfinished store stalls.
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {

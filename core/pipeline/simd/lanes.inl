@@ -10,7 +10,7 @@ inline Lanes load(const float* at) { return *reinterpret_cast<const Lanes*>(at);
 inline void store(float* at, Lanes v) { *reinterpret_cast<Lanes*>(at) = v; }
 inline Lanes all(float x) { return Lanes{} + x; }
 
-#if defined(__clang__)  // has no shuffle by lane numbers that are not constants
+#if defined(__clang__)  // clang has no shuffle by variable lane numbers
 inline Lanes shuffle(Lanes a, Lanes b, LaneNumbers from) {
   Lanes v;
   for (int l = 0; l < lanes; ++l) v[l] = from[l] < lanes ? a[from[l]] : b[from[l] - lanes];

@@ -52,7 +52,7 @@ void spread(const SpreadGrid& g, const SpreadEchoes& e, int count, double* grid)
         c += width;
         for (int k = 0; k < width; ++k) value[k] = value[k] * t + c[k];
       }
-      // The grid has room for a kernel beyond its end, so that the loop needs no wrap.
+      // The grid has room for a kernel beyond its end, so the loop need not wrap around.
       const int begin = static_cast<int>(first[i]);
       double* __restrict at = grid + 2 * (begin < 0 ? begin + g.points : begin);
       for (int k = 0; k < width; ++k) {

@@ -1,7 +1,6 @@
 // Makes beams of columns by a Fourier transform across the columns (tables: beam_transform.hpp). kernels.inl includes it once per
-// instruction set. Every value is a vector of `lanes` samples, all of which take the same path.
-// The transform is in place and without reordering: forward passes leave frequencies in digit-reversed order, the response is
-// stored in this order, and inverse passes reverse it.
+// instruction set. Every value is a vector of `lanes` samples. The transform is in place, without reordering: forward passes
+// leave the frequencies in digit-reversed order, the response is stored in this order, and inverse passes undo it.
 
 /// A complex value of one column for each of `lanes` samples.
 struct ComplexLanes {
