@@ -197,7 +197,7 @@ void Columns::guess_unit(const Words& words) {
   if (!has(t) || says_unit_) return;
   const std::string_view text = word(words, t);
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return;
-  // True for times after 1973; seconds with so many digits are beyond every stamp.
+  // True for times after 1973; seconds with 12 or more digits would exceed every stamp.
   if (text.size() < 12) return;
   power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
 }

@@ -5,7 +5,7 @@
 namespace sonar::motion {
 namespace {
 
-constexpr int most_digits = 18;  // every number with so many decimal digits fits in a signed 64-bit integer
+constexpr int most_digits = 18;  // every number with at most this many decimal digits fits in a signed 64-bit integer
 constexpr int second = 9;        // a second is 10^9 ns
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }

@@ -26,7 +26,7 @@ void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, B
                             scratch.transform.data(), out.data.data(), floats);
     return;
   }
-  // Copies samples side by side, because the records of columns are too far apart to stay in cache together.
+  // Copies samples next to each other, because the records of columns are too far apart to stay in cache together.
   scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
   const auto place_of = [&](int k) { return scratch.window.begin() + static_cast<std::ptrdiff_t>(k) * floats; };
   int done = 0;

@@ -13,7 +13,7 @@ namespace sonar {
 
 /// Buffers of form_beams, one per worker.
 struct BeamScratch {
-  std::vector<float> window;  // the samples of all columns, copied side by side, for panels of weights
+  std::vector<float> window;  // copies of the samples of all columns, for panels of weights
   AlignedFloats transform;    // working memory of a beam transform
 };
 

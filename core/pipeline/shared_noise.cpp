@@ -29,7 +29,7 @@ constexpr double silent = 0.03;
 constexpr std::size_t block_samples = SharedNoiseTable::block_samples;
 
 constexpr int most_groups = 32;  // each has a table
-// Limits of a table's complex values, 1 GiB, and of its sums: some 10 s.
+// Limits of a table's complex values (1 GiB) and of its sums (about 10 s).
 constexpr double most_values = 1 << 27, most_steps = 1e9;
 
 /// Least mean power of the leak in the beams, re the sum of the channels' powers, for which the level of (31) is applied. Below

@@ -21,7 +21,7 @@ constexpr double tail_db = 12;
 /// Neighbours on a floor may differ by this much because of speckle.
 constexpr double fill_db = 20;
 
-/// Levels [dB] of a picture. They rise with the codes of its samples, so that codes stand for them in comparisons.
+/// Levels [dB] of a picture. They increase with the codes of its samples, so that codes can be compared instead.
 class Levels {
  public:
   explicit Levels(const Ping& ping)

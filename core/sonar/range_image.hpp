@@ -20,7 +20,7 @@ struct RangeImageSettings : VendorSettings {
   double beam_height_rad = 0;        // two-way -3 dB width of a beam in elevation
   double range_unit_m = 0;           // unit of the ranges in samples; 65535 units must be at least range_m
   std::uint32_t least_strength = 1;  // weaker returns are dropped
-  double detection = 16;             // returns below so many times the noise power are dropped
+  double detection = 16;             // returns below this multiple of the noise power are dropped
   bool nearest = false;              // use the nearest return of a direction, not the strongest
   bool chosen_as_heard = false;      // choose the strongest cell with speckle included (each range cell has its own)
   bool range_of_loudest = false;  // report the range of the strongest return in the chosen cell, not the centroid of all returns

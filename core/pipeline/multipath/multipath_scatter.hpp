@@ -49,7 +49,7 @@ class OneWayPattern {
 /// Computes the echoes of tiles of cells via mirrors; one per worker and ping.
 class MultipathScatterer {
  public:
-  static constexpr int group_columns = 64;  // echoes are sorted by groups of so many receiving columns
+  static constexpr int group_columns = 64;  // echoes are sorted by groups of this many receiving columns
 
   MultipathScatterer(const PingContext& context, const ImagePaths& image_paths, const std::vector<PathReach>& reach,
                      const std::vector<float>& beam_correlation);
