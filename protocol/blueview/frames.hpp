@@ -72,7 +72,7 @@ struct Frame {
   wire::BytesView payload;
 };
 
-/// Splits a stream into frames. After bytes that are not a frame, next() returns nullopt for ever, and broken() returns the
+/// Splits a stream into frames. After bytes that are not a frame, next() always returns nullopt, and broken() returns the
 /// reason.
 class Framer {
  public:

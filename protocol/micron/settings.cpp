@@ -48,7 +48,7 @@ bool is_continuous(const HeadCommand& c) { return (c.control & control::continuo
 /// Width of the sector. If both limits are equal, it is a full turn.
 int width_of(const HeadCommand& c) { return c.left == c.right ? turn - 1 : wrapped(c.right - c.left); }
 
-/// Level that an 8-bit value of ADSpan or ADLow stands for: 255 is 80 dB.
+/// Level of an 8-bit value of ADSpan or ADLow: 255 is 80 dB.
 float db_of(int value) { return static_cast<float>(receiver_db * value / 255); }
 
 }  // namespace

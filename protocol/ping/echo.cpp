@@ -32,7 +32,7 @@ std::vector<double> amplitudes_of(const Ping& ping) {
 Echo find_echo(const Ping& ping) {
   constexpr double least_snr_db = 10;  // unknown: assumed; the highest of 200 points of noise seldom reaches it
   constexpr double certain_snr_db = 30;
-  constexpr int longest_gap = 2;  // so many points within an echo may be weak by speckle
+  constexpr int longest_gap = 2;  // points within an echo that may be weak because of speckle
   const PingSettings& s = ping.request.settings;
   const std::vector<double> amplitudes = amplitudes_of(ping);
   const auto amplitude = [&](int row) { return amplitudes[static_cast<std::size_t>(row)]; };

@@ -28,7 +28,7 @@ constexpr std::array<recording::FileKind, 1> kinds{{{
       return recording::read_sonar_file(std::move(source));
     },
     .write =
-        [](std::unique_ptr<recording::Sink> sink) {  // its datagrams, back to back
+        [](std::unique_ptr<recording::Sink> sink) {  // its successive datagrams
           return recording::write_raw_dump(std::move(sink), recording::Carrier::datagram);
         },
     .is_raw_dump = true,

@@ -4,7 +4,7 @@
 
 namespace sonar::bvt {
 
-/// Returns a name such as "BVT_SUCCESS", and "BVT_UNKNOWN_ERROR" for an unknown number. Never null; valid for ever.
+/// Returns a name such as "BVT_SUCCESS", and "BVT_UNKNOWN_ERROR" for an unknown number. Never null; always valid.
 const char* error_name(int code);
 /// Returns one sentence with the cause and the remedy.
 const char* error_text(int code);

@@ -6,7 +6,7 @@ namespace sonar::bvt {
 namespace {
 
 constexpr std::uint32_t place_bits = 20, places_at_most = (1u << place_bits) - 1, generations = 1u << 11;
-constexpr std::size_t rest = 1024;  // so many freed indices are kept back before one is used again
+constexpr std::size_t rest = 1024;  // number of freed indices that wait before one is reused
 
 std::uintptr_t number_of(const void* handle) {
   std::uintptr_t number;

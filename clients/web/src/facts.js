@@ -2,7 +2,7 @@
 import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;
-const replayed_lines = 100;  // at most; of a new connection, the daemon's lines_kept
+const replayed_lines = 100;  // limit of the repeated lines of a new connection; the daemon's lines_kept
 const recent_pings = 64;
 const history_s = 60;
 
@@ -10,9 +10,8 @@ const now_s = () => performance.now() / 1000;
 const sameLine = (a, b) => a.ns === b.ns && a.message === b.message && a.name === b.name && a.level === b.level;
 const beginsWith = (lines, beginning) => beginning.every((line, i) => sameLine(line, lines[i]));
 
-/// A new connection brings the last lines of the log again, then new ones. Returns those of `came` that follow `known`: all but the
-/// longest beginning that equals an end of `known`. Returns null while that is undecided, because all of `came` equal lines
-/// before the end.
+/// A new connection repeats the last lines of the log, then sends new ones. Returns the lines of `came` that are new: all
+/// except the longest beginning that equals an end of `known`. Returns null while that is undecided.
 function linesAfter(known, came) {
   const last = known.slice(-replayed_lines);
   for (let at = 0; at < last.length; at++) {
@@ -55,7 +54,7 @@ export class Facts {
     this.missed = 0;
     this.lastNumber = Infinity;  // number of the ping before
     this.history = [];  // {time_s, rate} of pings made, the last minute
-    this.droppedAt = new Map();  // client -> when its drops last rose, now_s
+    this.droppedAt = new Map();  // client -> time (now_s) of the last increase of its drops
     this.drops = new Map();
     this.movedAt = now_s();  // when the daemon's time last moved
     this.now_ns = null;
@@ -97,7 +96,7 @@ export class Facts {
   get preview() {
     return !this.listened && Boolean(this.sonarStatus?.preview || this.of('preview'));
   }
-  /// The rate that the sonar should have; 0 if its host requests each ping.
+  /// The expected rate of the sonar; 0 if its host requests each ping.
   get wantedRate() {
     const sonar = this.sonarStatus;
     return sonar?.on_request ? 0 : sonar?.rate_hz ?? 0;

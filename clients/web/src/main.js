@@ -22,8 +22,8 @@ import { activeTroubles, titleOf } from './panels/faults.js';
 const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: width of the fan, without rings
 const look = makeRemembered('look', { theme: '', tab: 'fan' });
 
-const scene_waits_s = 1.5;  // for the first picture, from the connection on
-const scene_waits_for_pings_s = 10;  // when a picture is being computed
+const scene_waits_s = 1.5;  // longest wait for the first picture after the connection
+const scene_waits_for_pings_s = 10;  // longest wait while a picture is being computed
 
 const facts = new Facts();
 const connection = new Connection({
@@ -154,7 +154,7 @@ function sceneMayBegin() {
   return performance.now() / 1000 - facts.openedAt > (expected ? scene_waits_for_pings_s : scene_waits_s);
 }
 
-/// Returns the name of what draws, once the graphics have started; '' if that is not known, null without WebGL2.
+/// Returns the name of the renderer once the graphics have started; '' if unknown, null without WebGL2.
 function startGraphics() {
   return new Promise((done) => {
     const worker = new Worker(document.body.dataset.graphics);

@@ -1,4 +1,4 @@
-// Formats of numbers. A dash stands for what is not known.
+// Formats numbers. Unknown values are shown as a dash.
 
 const thin = '\u202f';  // a space at which lines do not break
 const known = (value) => typeof value === 'number' && Number.isFinite(value);

@@ -1,4 +1,5 @@
-// The text of the fan's pane when there is no fresh picture, or a doubtful one: it gets the facts and returns one sentence and at most one button.
+// Determines, from the facts, the text over the fan if the picture is missing, old or doubtful: one sentence and at most one
+// button.
 import { fixed, short } from './numbers.js';
 
 const stands_after_s = 2;

@@ -125,7 +125,7 @@ class Folder final : public DatasetFolder {
                                             ": it was changed or damaged; remove both, and run the same command again");
   }
 
-  // Pings of a batch are computed side by side and written in order, so the bytes do not depend on the number of threads.
+  // Pings of a batch are computed in parallel and written in order, so the bytes do not depend on the number of threads.
   Result<void> make(std::uint64_t shard) override {
     differs_ = false;
     json part{{"images", json::array()}, {"pixels", json::object()}};

@@ -85,7 +85,7 @@ class NatsQueue final : public Queue {
     while ((s = into(connection_, [&](auto** c) { return natsConnection_Connect(c, options.get()); })) != NATS_OK) {
       const std::string why = std::string("no NATS server answers at ") + where_ + ": " + natsStatus_GetText(s) +
                               "; start one with nats-server -js -sd FOLDER, or give --nats its address";
-      // A server that is not there may come; wrong credentials stay wrong, so the program does not try again.
+      // A missing server may start later, but wrong credentials stay wrong, so the program does not try again.
       const bool is_away = s == NATS_NO_SERVER || s == NATS_TIMEOUT || s == NATS_IO_ERROR || s == NATS_CONNECTION_CLOSED;
       if (!is_away || !o.try_again || !o.try_again(why)) return failure(ErrorKind::unavailable, why);
     }

@@ -17,7 +17,7 @@ struct Progress {
   std::uint64_t bytes = 0;  // written
 };
 
-/// Returns the times of the pings of a job, from the first wanted one. Error usage: the poses are too few for so many pings.
+/// Returns the times of the pings of a job, from the first wanted one. Error usage: there are fewer poses than pings.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
 
 /// Returns a sentence if in some pings the sonar is above the sea surface, or above z = 0 in a scene without one. Empty

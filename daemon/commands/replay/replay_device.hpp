@@ -1,4 +1,4 @@
-// The sonar that a recording comes from, as its status datagram shows it: taken from the recording, with the local addresses.
+// The sonar of a recording, as its status datagram describes it: read from the recording, but with the local addresses.
 #pragma once
 
 #include <memory>

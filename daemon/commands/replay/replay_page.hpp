@@ -10,7 +10,7 @@ namespace sonar {
 
 class ReplayPage final : public HttpService {
  public:
-  /// The arguments outlive the page.
+  /// The arguments must outlive the page.
   ReplayPage(asio::io_context& io, const LimitConfig& limits, Admission& admission, Log& log, PlayedRecording of);
 
   Result<void> open(Endpoint at) { return listener_.open(at); }

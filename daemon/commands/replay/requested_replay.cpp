@@ -90,7 +90,7 @@ void RequestedReplay::on_change() {
   if (device_ == nullptr) return;
   if (was_last_ && !stopping_ && device_->sonar().settled())
     asio::post(io_, [this] {
-      if (was_last_) stop("recording served to its end");  // else another client has come
+      if (was_last_) stop("recording served to its end");  // else another client has connected
     });
   end_when_gone();
 }
@@ -119,7 +119,7 @@ asio::awaitable<PlayedPing> RequestedReplay::ping_for(const PingRequest& request
   if (pings_.is_scan()) co_return pings_.nearest(rpy_from_quat(request.sonar_in_world.orientation).yaw_rad);
   Read found = co_await asio::co_spawn(disk_, read(std::exchange(from_the_front_, false)), asio::use_awaitable);
   if (found.begins_again) pace_.begin_again();
-  was_last_ = found.is_last && !from_the_front_;  // the first client may have come meanwhile
+  was_last_ = found.is_last && !from_the_front_;  // the first client may have connected meanwhile
   co_return std::move(found.ping);
 }
 

@@ -19,7 +19,7 @@ class SonarOperations {
   void stop(const control::StopRecording& asked, Operations::Done done);
 
  private:
-  /// Finds a sonar; an empty name stands for the only one.
+  /// Finds a sonar; an empty name means the only one.
   Result<Device*> find(const std::string& name);
 
   Config& config_;

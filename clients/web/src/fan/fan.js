@@ -25,7 +25,7 @@ const empty_grid = { rows: 500, beams: 2, spacing_m: 0.02, start_m: 0, range_m: 
 export class Fan {
   constructor(facts, exact) {
     this.facts = facts;
-    this.exact = exact;  // for tests: the layout of `sonarctl view --png --no-rings`, so many pixels wide; else 0
+    this.exact = exact;  // for tests: width in pixels, with the layout of `sonarctl view --png --no-rings`; else 0
     this.canvas = $('fan');
     this.drawnCanvas = $('drawn');
     this.marks = $('fan-marks');
@@ -42,7 +42,7 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
-  /// Draws with the graphics processor from now on. Not with a software renderer: the table is many times faster.
+  /// Draws with the graphics processor from now on. Not used with a software renderer, because the table is many times faster.
   useGraphics() {
     const canvas = this.canvas.cloneNode();  // a canvas keeps the kind of its first context
     const painter = this.exact ? null : makeFanPainter(canvas);
@@ -141,7 +141,7 @@ export class Fan {
     const about = this.ping?.about;
     const polar = this.polar ?? empty_grid;
     if (!this.layout) this.arrange(polar, width, height);
-    const { layout } = this;  // painting may ask for another
+    const { layout } = this;  // painting may change this.layout
     const marked = { rings: this.rings, cursor: this.cursor, ratio: this.ratio, head_rad: about?.kind === 'sweep' ? about.head_rad : undefined };
     setHidden(this.drawnCanvas, !about);
     setHidden(this.canvas, Boolean(about) || !this.polar);

@@ -166,7 +166,7 @@ class FanPainter {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /// Waits for the picture; for measuring how long one takes.
+  /// Waits until the picture is drawn, to measure the time.
   finish() {
     this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
   }

@@ -48,7 +48,7 @@ function card(group, about) {
   );
 }
 
-/// Begins a trouble; returns what it does, or why it cannot begin.
+/// Begins a trouble. Returns its description, or the reason why it cannot begin.
 function button({ name, trouble }, facts, able, steering) {
   const about = facts.troubles.get(trouble.replace(/_/g, '-'));
   const cannot = about?.cannot_act.find((entry) => entry.key === facts.sonar)?.value;

@@ -10,7 +10,7 @@ const water = 0x0b2233;
 const least_interval_ms = 1000 / 15;
 const slow_ms = 60;  // a frame that takes longer is slow
 const free_ms = 17;  // a frame's end is noticed one frame of the browser later
-const rest_ms = 100;  // after a press of a button or key: its answer is painted before the next frame
+const rest_ms = 100;  // pause after the press of a button or key, so that its effect is painted before the next frame
 const click_px = 4;
 
 export class Scene {
