@@ -1,5 +1,5 @@
-// Kernel bodies that make codes of columns: the receive pattern, the pulses of points and of other sonars, crosstalk, envelope,
-// gain and quantisation. They compute the same as form_beams, interference and receive (core/pipeline).
+// Kernel bodies that compute codes from columns: the receive pattern, the pulses of points and of other sonars, crosstalk,
+// envelope, gain and quantisation. They compute the same as form_beams, interference and receive (core/pipeline).
 #pragma once
 
 #include <cmath>
@@ -138,7 +138,7 @@ SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
     const std::uint32_t j = first * beams_a_panel + beam;
     if (j >= beams) break;
     add_points(p, j, n, re[beam], im[beam]);
-    if (p.mixed == nullptr) {  // else refocus() and blend() add them, after the blur and the blend
+    if (p.mixed == nullptr) {  // otherwise refocus() and blend() add them later
       add_pulses(p, j, n, re[beam], im[beam]);
       add_shared_noise(p, j, n, re[beam], im[beam]);
     }

@@ -22,7 +22,7 @@ inline constexpr Box no_box{{huge_distance, huge_distance, huge_distance}, {-hug
 /// Returns the index of the root, which exists even without items. Deterministic. Cost: about 1 us per item.
 std::int32_t build_bvh(std::span<const Box> items, std::vector<BvhNode>& nodes, std::vector<std::uint32_t>& order);
 
-/// A ray that descends the hierarchy has room for so many links. Builders make no deeper hierarchy.
+/// Largest depth of a hierarchy: a descending ray has room for this many links.
 inline constexpr int deepest_bvh = 64;
 
 }  // namespace sonar::cuda

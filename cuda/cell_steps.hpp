@@ -1,6 +1,6 @@
 // Kernel bodies between the depth map and the columns' signals: each cell in view gives one echo or none; echoes are sorted into
-// columns in the order of tiles and cells; each column adds its echoes in this order. So the additions are those of the CPU, in
-// the same order, and need no atomic operations on floats.
+// columns in the order of tiles and cells; each column adds its echoes in this order. So the additions have the same order as
+// on the CPU, and need no atomic operations on floats.
 #pragma once
 
 #include <cmath>
@@ -38,7 +38,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float h = g.conical != 0 ? x : std::sqrt(x * x + y * y);
   const float inverse_h = 1.0f / larger(h, 1e-6f);
   const float column = (g.first_edge_sine - y * (g.conical != 0 ? inverse_r : inverse_h)) * g.columns_per_sine;
-  // Its direction from the place of the rays; the sonar may have turned since.
+  // Direction of the cell from the origin of the rays; the sonar may have turned since.
   float seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
   if (t.moves != 0) {
     const float *w = t.seen_turn, *o = t.seen_place;

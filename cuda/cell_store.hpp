@@ -1,6 +1,6 @@
 // The tiles of surface cells that are stored on the device. Each is sent once, when it first comes into view. They are copies of
-// the CPU's bytes (core/scene/cells), so that positions and speckle are the same. If the CPU has dropped a tile and made it
-// again, the hash of its weights identifies it.
+// the CPU's bytes (core/scene/cells), so that positions and speckle are the same. A hash of the weights detects that the CPU
+// has reused the memory of a tile for another.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,9 @@ class CellStore {
   CellStore(Machine& machine, std::size_t budget_bytes);
 
   /// Returns the address on the device of each tile's cells, in the order of `tiles`. Copies of tiles that are not there yet are
-  /// queued on `lane`; `staging` has their bytes and must stay unchanged until they have been copied. False: there is no room for
-  /// them beside the stored tiles; call clear() when no unfinished ping needs these, and call again. Several threads may call it
-  /// at once, each with its own staging or with one that locks itself.
+  /// queued on `lane`; `staging` has their bytes and must stay unchanged until they have been copied. False: there is no room;
+  /// call clear() when no unfinished ping needs the stored tiles, then call again. Several threads may call it at once, each
+  /// with its own staging or with one that locks itself.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
   void give_back();  // releases the memory, too

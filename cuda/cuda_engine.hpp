@@ -1,5 +1,5 @@
 // Makes the CUDA engine, an implementation of the interface in core/pipeline/ping_engine.hpp, if there is a device.
-// device_engine.hpp says how it works; docs/cuda.md says what it computes and what the CPU computes.
+// device_engine.hpp explains how it works; docs/cuda.md lists the parts that it computes and those that the CPU computes.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// A few words for the banner about CUDA in this build and on this machine. This is not in cuda_engine.hpp, so that the daemon's
+// The banner's text about CUDA in this build and on this machine. It is separate from cuda_engine.hpp, so that the daemon's
 // texts need no engine.
 #pragma once
 

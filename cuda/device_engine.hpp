@@ -12,9 +12,9 @@
 
 namespace sonar::cuda {
 
-/// Sizes are upper limits. Of the memory that is free on the device when the engine is made, cells get at most two fifths and
-/// each of the two batches at most a fifth. If memory is full nevertheless, the engine releases all of it and halves the batches,
-/// down to one batch of one ping; it fails if that does not fit.
+/// Sizes are upper limits. Of the device's memory that is free at the start, cells get at most two fifths and each of the two
+/// batches at most a fifth. If memory is full nevertheless, the engine releases all of it and halves the batches, down to one
+/// batch of one ping; it fails if that does not fit.
 struct DeviceEngineOptions {
   std::size_t cell_bytes = std::size_t{2} << 30;  // device memory for surface cells; a single ping may exceed it
   int batch = 0;                                  // pings that are launched together; 0 = 8, more with more threads, at most 32

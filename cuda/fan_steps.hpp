@@ -1,7 +1,7 @@
-// Kernel bodies of the fan of rays. They compute the same as trace_fan, in another order: one thread refines the interval between
-// two base rays from bottom to top and draws it into the depth map at once. So no list of samples is stored, and results do not
-// depend on the order of threads. FanRefinement (core/pipeline/fan_refinement.hpp) has the rule for refining; tests compare the
-// two.
+// Kernel bodies of the fan of rays. They compute the same as trace_fan, in another order: one thread refines the interval
+// between two base rays from bottom to top and draws it into the depth map immediately. So no samples are stored, and results
+// do not depend on the order of threads. FanRefinement (core/pipeline/fan_refinement.hpp) has the rule for refining; tests
+// compare the two.
 #pragma once
 
 #include <cmath>

@@ -52,8 +52,8 @@ struct BatchRoom {
 
   /// All arenas that a batch uses.
   std::array<Arena*, 4> arenas() { return {&tables, &work, &results, &cells}; }
-  /// Queues copies of views and tables. The views have the same addresses as those of the batch before, so that a captured graph
-  /// (cuda_module.cu) can be used again.
+  /// Queues copies of views and tables. The views have the same addresses as in the previous batch, so that a captured graph
+  /// (cuda_module.cu) can be reused.
   const PingView* upload();
 
  private:
@@ -75,12 +75,14 @@ class PingPreparer {
 
   /// Adds the pings to the room: one thread per ping if there are several (all of which may_go_together()), else all threads.
   /// Bodies must have been placed; `cells` must serve the requests. `lane` is that of the tables and cells that stay on the
-  /// device. Returns those for whose tiles there is no room: finish what is under way, forget_cells(), and again.
+  /// device. Returns the pings for whose tiles there is no room: finish the running batches, call forget_cells(), and add these
+  /// again.
   std::vector<AskedPing> add(std::span<const AskedPing> pings, SurfaceCells& cells, int lane, BatchRoom& room);
-  /// Whether nothing that one of them needs is changed for the other: places of bodies, gain of a plan, mirrors.
+  /// Whether the pings can be prepared together, because none changes what the other needs: poses of bodies, gain of a plan,
+  /// mirrors.
   static bool may_go_together(const AskedPing& a, const AskedPing& b);
   void forget_cells() { store_.clear(); }
-  /// The same, and releases their memory.
+  /// Like forget_cells(), and releases the memory.
   void give_back() { store_.give_back(); }
 
  private:

@@ -1,4 +1,4 @@
-// Makes pings of the results that a batch has copied from the device.
+// Completes pings from the results that a batch has copied from the device.
 #pragma once
 
 #include "cuda/prepare_ping.hpp"
