@@ -24,7 +24,7 @@ from record import record  # noqa: E402  the folder above
 
 COMMAND = "python3 tests/acceptance/life_cycle_test.py"
 ROOM = 5  # factor on promised times, for busy machines
-FOUR_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 4}"  # keys of the sonar, by way of its mount
+FOUR_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 4}"  # inserted after `mount:`, so it also adds a key of the sonar
 F_SETPIPE_SZ = 1031
 
 

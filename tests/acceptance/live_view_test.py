@@ -1,4 +1,4 @@
-"""The live view as viewers meet it: a strict client of its own on a live daemon. Rights, limits, and that looking changes nothing."""
+"""Tests the live view with our own strict client and a running daemon: rights, limits, and that watching changes nothing."""
 import collections
 import contextlib
 import hashlib

@@ -1,4 +1,4 @@
-"""An emulated M3 as its drivers meet it: packets of complex samples over TCP, decoded by hand-typed offsets (docs/protocols/m3.md)."""
+"""Tests an emulated M3 with a driver: packets of complex samples over TCP, decoded by hand-typed offsets (docs/protocols/m3.md)."""
 import cmath
 import math
 import pathlib

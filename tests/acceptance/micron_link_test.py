@@ -1,4 +1,4 @@
-"""An emulated Micron as its drivers meet it, over TCP and a pseudo-terminal, decoded from the tables of docs/protocols/micron.md."""
+"""Tests an emulated Micron with a driver, over TCP and a pseudo-terminal, decoded from the tables of docs/protocols/micron.md."""
 import pathlib
 import re
 import socket

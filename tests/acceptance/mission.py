@@ -10,7 +10,7 @@ from oculus_reader import Client, Ping, fire_message
 from running_sonard import SONARCTL, Sonard, run
 
 RATE_HZ = 2
-TWO_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 2}"  # keys of the sonar, by way of its mount
+TWO_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 2}"  # inserted after `mount:`, so it also adds a key of the sonar
 
 
 def way(seconds):

@@ -1,4 +1,4 @@
-"""An emulated Norbit as its drivers meet it: commands, bathymetry and water column over TCP, decoded by hand-typed offsets
+"""Tests an emulated Norbit with a driver: commands, bathymetry and water column over TCP, decoded by hand-typed offsets
 (docs/protocols/norbit.md)."""
 import math
 import pathlib

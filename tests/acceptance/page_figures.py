@@ -84,7 +84,7 @@ def click(page, selector):
 
 
 def delays(page, clicks):
-    """Of so many clicks, from the event to the next painted frame, in ms; the browser reports none below 16 ms."""
+    """The times [ms] from a click to the next painted frame, for several clicks; the browser reports none below 16 ms."""
     reported = page.run("window.clicks ?? []")
     return [0] * (clicks - len(reported)) + reported
 

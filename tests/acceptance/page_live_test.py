@@ -40,7 +40,7 @@ SENT = """window.sent = []; WebSocket.prototype.send = ((old) => function (data)
 
 
 class Driver(threading.Thread):
-    """Asks for pings and reads them, at most so many a second; keeps the last ones by number. It connects again when it is lost."""
+    """Requests and reads pings at a limited rate, and stores the last ones by number. It connects again after a lost connection."""
 
     def __init__(self, address, reads_hz=1000.0, **settings):
         super().__init__(daemon=True)

@@ -1,4 +1,4 @@
-"""An emulated Ping360, Surveyor, Omniscan, Ping1D and S500 as hosts of the ping protocol meet them; and under tshark."""
+"""Tests an emulated Ping360, Surveyor, Omniscan, Ping1D and S500 with hosts of the ping protocol, and with tshark."""
 import math
 import pathlib
 import re

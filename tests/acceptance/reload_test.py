@@ -61,7 +61,7 @@ class Watcher(threading.Thread):
             self.ending = error
 
     def ping_after(self, more, patience_s=60):
-        """The newest, when so many have come from now on."""
+        """The newest ping, after waiting for a number of new ones."""
         wanted, deadline = len(self.ids) + more, time.monotonic() + patience_s
         while len(self.ids) < wanted:
             assert self.ending is None and time.monotonic() < deadline, f"{len(self.ids)} of {wanted} pings; {self.ending!r}"

@@ -1,4 +1,4 @@
-// An environment variable with another value for as long as a test runs.
+// Changes an environment variable for the duration of a test.
 #pragma once
 
 #include <cstdlib>

@@ -20,7 +20,7 @@ class FailingMachine final : public cuda::Machine {
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
   /// A fault of the program instead of a lost device: std::logic_error at the call `last`, and none after it.
   bool has_fault = false;
-  /// `calls` is counted up, and outlives this; the call that finds it at `last` fails, as do all that follow.
+  /// `calls` counts the calls, and must outlive this object; call number `last` and all later ones fail.
   FailingMachine(int& calls, int last) : calls_(calls), last_(last) {}
 
   std::string name() const override { return "a device that fails"; }

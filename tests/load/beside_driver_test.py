@@ -26,7 +26,7 @@ from waterlinked_link_test import START, receiver, why_not  # noqa: E402
 QUICK = "--quick" in sys.argv
 LASTS_S = 3 if QUICK else 60
 RATE_HZ = 10
-EIGHT_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 8}"  # keys of the sonar, by way of its mount
+EIGHT_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 8}"  # inserted after `mount:`, so it also adds a key of the sonar
 COMMAND = "SONARD_BUILD=build/release python3 tests/load/beside_driver_test.py"
 
 

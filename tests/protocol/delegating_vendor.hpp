@@ -11,7 +11,7 @@ namespace sonar::protocol {
 
 class DelegatingVendor : public Vendor {
  public:
-  /// `of` outlives it.
+  /// `of` must outlive it.
   explicit DelegatingVendor(const Vendor& of) : of_(of) {}
   std::string_view name() const override { return of_.name(); }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return of_.models(); }

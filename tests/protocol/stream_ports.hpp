@@ -1,4 +1,4 @@
-// The ports of kind tcp_stream of a make, as its host meets them.
+// The ports of kind tcp_stream of a make, for its host.
 #pragma once
 
 #include <algorithm>

@@ -159,7 +159,7 @@ class Page:
         return self.run(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''")
 
     def press(self, key, times=1):
-        """So many presses are sent at once: each alone would wait for the browser, which is slow where it draws without a GPU."""
+        """Sends several key presses at once, because each alone would wait for the browser, which is slow without a GPU."""
         code = {" ": "Space", "?": "Slash"}.get(key, key)
         text = {"text": key} if len(key) == 1 else {"text": "\r"} if key == "Enter" else {}
         number = {"windowsVirtualKeyCode": KEY_NUMBERS[key]} if key in KEY_NUMBERS else {}  # without it the browser does nothing

@@ -1,5 +1,5 @@
 // A basin that uses every part of the model, and requests of two sonars, each with one change, which together use every setting.
-// For tests that compare whole pings.
+// Used by tests that compare whole pings.
 #pragma once
 
 #include <functional>
@@ -83,7 +83,7 @@ inline PingRequest low() {
   return r;
 }
 
-/// The same with beams three times as wide: cells, most of whose time goes into making them, are a ninth as many.
+/// Like basin(), with beams three times as wide, which need a ninth of the cells and so much less time.
 inline PingRequest with_wide_beams(PingRequest r) {
   SonarModel model = *r.model;
   model.modes[0].pattern.azimuth_width_rad *= 3;
@@ -91,7 +91,7 @@ inline PingRequest with_wide_beams(PingRequest r) {
   return r;
 }
 
-/// Requests of both sonars in turn: first with everything on, then each with one change, at last again with everything on.
+/// Requests of both sonars, alternating: first with everything on, then each with one change, finally with everything on again.
 inline std::vector<std::pair<std::string, PingRequest>> turns() {
   std::vector<std::pair<std::string, PingRequest>> all;
   const auto both = [&all](const std::string& what, const std::function<void(PingRequest&)>& change) {

@@ -11,7 +11,7 @@
 
 namespace sonar::reference {
 
-/// A point that scatters: where, and its amplitude at the array's centre, carrier included.
+/// A scattering point: its position, and its amplitude at the array's centre including the carrier.
 struct PlacedScatterer {
   Vec3d in_sonar;
   Complex amplitude;
@@ -24,7 +24,7 @@ class ElementArray {
   int elements() const { return static_cast<int>(place_m_.size()); }
 
   using Envelope = std::function<Complex(double)>;  // p(t)
-  /// s_j[n] of beams focused on every range of the grid. [beams][samples]
+  /// s_j[n] of beams that are focused at every range of the grid. [beams][samples]
   std::vector<std::vector<Complex>> beams(std::span<const PlacedScatterer> scatterers, std::span<const double> beam_sines,
                                           const Grid& grid, const Envelope& p, double reach_s) const;
 

@@ -1,4 +1,4 @@
-// Every instruction set that the machine at hand can run.
+// Lists the instruction sets that this machine supports.
 #pragma once
 
 #include <algorithm>

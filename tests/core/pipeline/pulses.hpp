@@ -1,4 +1,4 @@
-// Pulses of every shape for the tests, and the measured one as a formula too.
+// Pulses of every shape for tests; the measured one also as a formula.
 #pragma once
 
 #include <cmath>
@@ -14,8 +14,8 @@ namespace sonar::test {
 
 inline constexpr double measured_b_hz = 30e3;
 
-/// A lopsided complex pulse as a real receiver might make it: a Gaussian with a residual sweep, and a late, weaker, turned copy.
-/// The peak is p(0) = 1 to a part in 1e7.
+/// An asymmetric complex pulse like that of a real receiver: a Gaussian with a residual sweep, plus a delayed, weaker copy with
+/// another phase. The peak is p(0) = 1 to a part in 1e7.
 inline std::complex<double> measured_envelope(double time_s) {
   const double x = measured_b_hz * time_s, late = x - 4;
   return std::polar(std::exp(-x * x), 0.7 * x * x) + std::polar(0.1 * std::exp(-late * late), 1.0);

@@ -1,5 +1,5 @@
 // The slow reference: eq. (8) and (9) of the acoustic model summed directly in double, and closed forms of the levels to expect.
-// Shares the formulae of core/pipeline/arithmetic with the engine, but none of its tables, grids or float arithmetic.
+// It shares the formulae of core/pipeline/arithmetic with the engine, but not its tables, grids and float arithmetic.
 #pragma once
 
 #include <complex>
@@ -13,14 +13,14 @@ namespace sonar::reference {
 
 using Complex = std::complex<double>;
 
-/// The water that sound passes, and the transmitted pulse.
+/// Properties of the water and of the transmitted pulse.
 struct Medium {
   double sound_speed_mps = 1500;
   double absorption_np_per_m = 0;
   double source_upa = 1;
 };
 
-/// An echo before the azimuth receive pattern: A_i of eq. (6), its carrier included.
+/// An echo before the azimuth receive pattern: A_i of eq. (6), including the carrier.
 struct Scatterer {
   double range_m = 0, sine = 0;  // sine = y / r in the sonar's frame
   Complex amplitude;             // [uPa]
@@ -40,7 +40,7 @@ Scatterer scatterer_at(const FrequencyMode& mode, const Medium& medium, Vec3d in
 
 /// Eq. (8): g[n] = sum_i A_i p(t_n - tau_i).
 std::vector<Complex> signal_in_time(std::span<const Scatterer> scatterers, const Grid& grid);
-/// The same by the discrete spectrum: P(nu_m) = P_hat(nu_m) sum_i A_i e^{-i 2 pi nu_m tau_i}, inverse transform, scaled by the
+/// Eq. (8) by the discrete spectrum: P(nu_m) = P_hat(nu_m) sum_i A_i e^{-i 2 pi nu_m tau_i}, inverse transform, scaled by the
 /// sample rate. Equal to signal_in_time for delays of at least 4 / b from both ends (it wraps pulse tails).
 std::vector<Complex> signal_in_frequency(std::span<const Scatterer> scatterers, const Grid& grid);
 

@@ -1,4 +1,4 @@
-// Small worlds made in code for the oracles: flat and rough beds, walls, boxes, spheres, points.
+// Makes small scenes for the oracles: flat and rough beds, walls, boxes, spheres, points.
 #pragma once
 
 #include <functional>
@@ -8,19 +8,20 @@
 
 namespace sonar::test {
 
-/// Height field z(x, y) over a rectangle, two triangles a square of about `step_m`.
+/// Height field z(x, y) over a rectangle, with two triangles per square of about `step_m`.
 Mesh height_field(double x0, double x1, double y0, double y1, double step_m, const std::function<double(double, double)>& z);
-/// Wall in the plane x = 0, facing -x and +x alike.
+/// A two-sided wall in the plane x = 0.
 Mesh wall(double half_width_m, double half_height_m);
 /// Axis-aligned box about the origin.
 Mesh box(Vec3d half_size_m);
 /// Sphere about the origin: an octahedron halved `halvings` times, vertices on the sphere (8 * 4^halvings triangles).
 Mesh sphere(double radius_m, int halvings);
 
-/// Relief made of `waves` plane waves of random direction, wavelength 0.3 to 3 m and slope; rms height given. Same for ever.
+/// A relief of `waves` plane waves with random directions, wavelengths (0.3 to 3 m) and slopes, and the given rms height.
+/// Always the same.
 std::function<double(double, double)> rough_relief(double rms_height_m, int waves);
 
-/// Builds scenes piece by piece; every object gets its own material.
+/// Builds scenes step by step; every object gets its own material.
 class SceneMaker {
  public:
   SceneMaker& add(Mesh mesh, double lambert_db, Vec3d position_m = {}, Quatd orientation = {});

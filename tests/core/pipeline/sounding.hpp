@@ -20,7 +20,7 @@ FrequencyMode without_elevation_pattern(FrequencyMode mode);
 
 /// Rows at F_s = 2 b (spacing dr / 2.355), one sample a row, 16 bits.
 PingSettings native_rows(double range_m, double pulse_width_m);
-/// Rows as the default law makes them: pulse 0.9 of the row spacing.
+/// Rows of the default rule: the pulse is 0.9 of the row spacing.
 PingSettings default_rows(double range_m, int rows);
 
 struct SoundingOptions {
@@ -36,7 +36,7 @@ class Sounding {
   /// Request of the next ping; keep_pressure on, noise and specular off, water with c = 1500 m/s.
   PingRequest request;
 
-  const Ping& ping();  // with the request as it stands
+  const Ping& ping();  // for the present request
   const Ping& ping_from(Vec3d position, RollPitchYaw attitude = {});
   const Ping& last() const { return ping_; }
   PingEngine& engine() { return *engine_; }

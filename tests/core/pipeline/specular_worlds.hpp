@@ -1,5 +1,5 @@
-// Worlds of one mirror and their expected echoes: the Kirchhoff integral summed patch by patch, without Fresnel integrals and
-// principal radii. For the tests of specular echoes.
+// Scenes of one mirror and their expected echoes: the Kirchhoff integral summed patch by patch, without Fresnel integrals and
+// principal radii.
 #pragma once
 
 #include <complex>
@@ -12,7 +12,7 @@
 
 namespace sonar::test {
 
-/// A material that only mirrors: smooth, and no diffuse echo left.
+/// A material that only reflects: smooth, without a diffuse echo.
 Material mirror(double reflection = 1);
 
 struct Mirror {
@@ -39,7 +39,7 @@ class SpecularSounding {
  public:
   SpecularSounding(std::shared_ptr<const Scene> scene, const FrequencyMode& mode, const PingSettings& settings);
   Sounding& sounding() { return sounding_; }
-  /// Height of the loudest echo of the middle beam within `slack_m` of a range [uPa]; 0 where nothing comes.
+  /// Amplitude of the strongest echo of the middle beam within `slack_m` of a range [uPa]; 0 without an echo.
   double peak_upa(double range_m, double slack_m = 0.05);
   /// The same as a pressure re source at 1 m, absorption taken out: eq. 7 without exp(-2 alpha r).
   double strength_per_m(double range_m, double slack_m = 0.05);
@@ -55,7 +55,7 @@ class SpecularSounding {
 double db(double amplitude);
 /// A rigid surface's echo per source pressure at 1 m [1/m]: (1 / lambda) |integral of cos / R^2 exp(-i 2 k R) dA|, over
 /// surface(u, v), u and v in (0, 1), which returns place and area normal (length = area per du dv), sonar in the origin.
-/// Places that the sonar sees from behind do not count.
+/// Places that the sonar sees from behind are ignored.
 struct Patch {
   Vec3d place, area;
 };

@@ -1,4 +1,4 @@
-// Mesh files that ended the program that read them, or took all its memory. Small ones are seeds of mesh_file_fuzz as well
+// Mesh files that crashed the program that read them, or used up its memory. Small ones are seeds of mesh_file_fuzz as well
 // (tests/fuzz/corpus/mesh_file): SONARD_WRITE_SEEDS=folder makes the test write them.
 #pragma once
 
@@ -9,7 +9,7 @@ namespace sonar::tests {
 
 struct HostileMesh {
   std::string name, bytes;
-  std::string words;  // words of the refusal
+  std::string words;  // words of the error
 };
 
 inline std::string repeated(const std::string& text, int times) {
@@ -24,7 +24,7 @@ inline std::string collada_scene(const std::string& nodes, const std::string& li
          "</visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
 }
 
-/// `nodes` of which each contains the next `times`.
+/// `nodes` nodes, each of which contains the next one `times` times.
 inline std::string gltf_nodes(int nodes, int times) {
   std::string list;
   for (int i = 1; i <= nodes; ++i) {
