@@ -97,7 +97,7 @@ constexpr FamilyRow c550d{0.2,
 // Frequencies, ranges, azimuth widths: APL, VND; aperture 130 in both modes: BAS, TID, CAT; elevation 20 in both: CAT.
 constexpr ModeRow m750d_low{750e3, 130, 1.0, 20, 120, fitted_full_scale_upa::m750d_low};
 constexpr FamilyRow m750d{0.1, m750d_low, {1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m750d_high}};
-// Older hardware: 12 deg elevation in the high mode (APL); unknown: aperture 70, which no source at hand gives for it.
+// Older hardware: 12 deg elevation in the high mode (APL); unknown: aperture 70, which none of our sources states for it.
 constexpr FamilyRow m750d_old{0.1, m750d_low, {1.2e6, 70, 0.6, 12, 40, fitted_full_scale_upa::m750d_high}};
 // Low: BAS, APL, VND. High: frequency 140.625 MHz / 67 and aperture 60 from CAP, widths and range APL.
 constexpr ModeRow m1200d_low{1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m1200d_low};

@@ -139,6 +139,9 @@ LONGEST_FILE = 400  # lines; tests may be longer
 # A comment is a sentence, or a noun phrase that names the thing: these beginnings are fragments, these words are of persons.
 FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*([Oo]f|What|Nothing:)(?=[\s,])")
 PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed|new" + r"comers?|turned aw" + r"ay)\b", re.I)
+# Idioms with a plain word: "this many", "call it", "the reason if not", "always", "successive", "via", "only C++17".
+IDIOMS = re.compile(r"\b(so ma" + r"ny|to be cal" + r"led|(?:or|else) why n" + r"ot|for ev" + r"er|back to ba" + r"ck|and the li" + r"ke|by way o" + r"f"
+                    r"|C\+\+17-cle" + r"an)\b", re.I)
 # "is no frame" for "is not a frame", "goes on" for "continues".
 RIDDLES = re.compile(r"(?<!there )\b((?:is|are) none|(?:is|are) no (?!longer|more|less|farther)\w+|go(?:es)? on)\b", re.I)
 
@@ -236,13 +239,15 @@ def circle_violations(includes, part_of, parts):
 
 
 def wording_violations(name, text):
-    """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS or RIDDLES."""
+    """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS, IDIOMS or RIDDLES."""
     before = ""
     for number, line in enumerate(comments_of(text).splitlines(), 1):
         if not before.startswith("//") and (match := FRAGMENT.match(line)):
             yield number, f'comment: begins with "{match[1]}"; write a sentence, or a noun phrase that names the thing'
         if match := PERSONS.search(line):
             yield number, f'comment: "{match[1]}"; name the event: sent, reported, logged, refused'
+        if match := IDIOMS.search(line):
+            yield number, f'comment: "{match[1]}"; write the plain word: this many, call it, the reason if not, always, successive, via'
         if match := RIDDLES.search(line):
             yield number, f'comment: "{match[1]}"; write "is not a ...", or "continues"'
         before = line.strip()

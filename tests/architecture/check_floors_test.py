@@ -145,7 +145,9 @@ class Planted(unittest.TestCase):
                             ("int x;\n/// Nothing: no such field.", 'begins with "Nothing:"'),
                             ("int x;  // of each beam", 'begins with "of"'),
                             ("int x;  // the log is to" + "ld", '"to' + 'ld"'), ("/// nullopt: it is none.", '"is none"'),
-                            ("// Bytes that are no frame.", '"are no frame"'), ("// The scan goes on.", '"goes on"')]:
+                            ("// Bytes that are no frame.", '"are no frame"'), ("// The scan goes on.", '"goes on"'),
+                            ("// Waits for so ma" + "ny pings.", '"so ma' + 'ny"'), ("/// Empty, or why n" + "ot.", '"or why n' + 'ot"'),
+                            ("// To be cal" + "led once.", '"To be cal' + 'led"'), ("int x;  // kept for ev" + "er", '"for ev' + 'er"')]:
             with self.subTest(line=line):
                 self.expect("core/base/a.cpp", line + "\n", line.count("\n") + 1, words)
         self.assertEqual(found_in({

@@ -57,7 +57,7 @@ wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
 }
 
 /// Accepts one client, waits for its fire message and sends the result of `answer`, then waits until the client leaves. Later
-/// clients are connected, and receive nothing. With `visits` > 1 it ends the connection instead, and so on for so many clients;
+/// clients are connected, and receive nothing. With `visits` > 1 it ends the connection instead, for this many clients in turn;
 /// then it is gone.
 class FakeDevice {
  public:

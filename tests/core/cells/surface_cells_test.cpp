@@ -449,7 +449,7 @@ TEST(SurfaceCells, AnotherSceneWithTheSameSurfacesBuildsNoCells) {
   EXPECT_EQ(cells.built_last_time(), 0u);
 }
 
-// Every scene has a surface of its own, and none of them is kept for ever.
+// Every scene has its own surface, and old surfaces are dropped.
 TEST(SurfaceCells, ScenesThatDoNotComeBackAreForgotten) {
   constexpr std::size_t budget = 1u << 20;
   SurfaceCells cells(scene_of(terrain(20, 4.0, gentle)), Seed{4}, budget);

@@ -78,7 +78,7 @@ TEST(ListedBeams, PutATargetInTheBeamThatLooksAtIt) {
   }
 }
 
-// A point off the axis by half the beam's own width is 3 dB down, by way of columns (cells) as by its exact direction.
+// A point half the beam's own width off the axis is 3 dB down, both through columns (cells) and in its exact direction.
 TEST(ListedBeams, HaveWidthsOfTheirOwn) {
   const std::vector<double> azimuths = uneven_azimuths();
   std::vector<float> widths;

@@ -184,7 +184,7 @@ TEST(MultipathCells, ATankRingsOnBehindItsWalls) {
   Sounding on(tank(), p900(), default_rows(12, 200)), off(tank(), p900(), default_rows(12, 200));
   on.request.switches.multipath = true;
   for (Sounding* s : {&on, &off}) s->ping_from({-2, 0.3, 0.1});
-  // Beyond the farthest corner, 6.1 m away, nothing comes back but by way of the walls.
+  // Beyond the farthest corner, 6.1 m away, all echoes are reflected by the walls.
   EXPECT_EQ(energy(off, 7, 11.5, 0, 512), 0);
   EXPECT_GT(energy(on, 7, 11.5, 0, 512), 1e-4 * energy(on, 2, 6, 0, 512));
   const double by_cones = energy(on, 2, 11.5, 0, 512);

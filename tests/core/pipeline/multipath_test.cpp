@@ -1,4 +1,5 @@
-// Paths by way of flat mirrors, through the whole engine: where ghosts of points appear and how strong, what must not be there.
+// Tests paths via flat mirrors through the whole engine: positions and levels of the ghosts of points, and ghosts that must not
+// appear.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -18,7 +18,7 @@ std::vector<Bytes> captured() {
   Bytes bytes;
   for (std::istreambuf_iterator<char> at(file), end; at != end; ++at) bytes.push_back(static_cast<std::byte>(*at));
   std::vector<Bytes> packets;
-  for (std::size_t at = 0; at + 8 <= bytes.size();) {  // packets back to back
+  for (std::size_t at = 0; at + 8 <= bytes.size();) {  // successive packets
     std::size_t size = 0;
     for (std::size_t b = 4; b-- > 0;) size = size << 8 | std::to_integer<std::size_t>(bytes[at + 4 + b]);
     if (size == 0 || at + size > bytes.size()) return {};

@@ -173,7 +173,7 @@ std::vector<Image> recorded() {
   std::ifstream file(std::filesystem::path(folder) / "sonar3d15/ship_short.sonar", std::ios::binary);
   Bytes bytes;
   for (std::istreambuf_iterator<char> at(file), end; at != end; ++at) bytes.push_back(static_cast<std::byte>(*at));
-  for (std::size_t at = 0; at + 8 <= bytes.size();) {  // packets back to back
+  for (std::size_t at = 0; at + 8 <= bytes.size();) {  // successive packets
     std::size_t size = 0;
     for (std::size_t b = 4; b-- > 0;) size = size << 8 | std::to_integer<std::size_t>(bytes[at + 4 + b]);
     if (size == 0 || at + size > bytes.size()) return {};

@@ -44,8 +44,8 @@ TEST(InputRate, NoRateIsNoLimit) {
   EXPECT_EQ(rate.pause_after(std::size_t{1} << 40, Steady::time_point{}).count(), 0);
 }
 
-/// Bytes of so many floods, and of a client that sends `modest` bytes every 100 ms, read within 20 s; `waited`: the latter's
-/// time.
+/// Bytes read within 20 s from `floods` floods, and from a client that sends `modest` bytes every 100 ms; `waited`: the
+/// latter's time.
 struct Shared {
   std::size_t of_floods = 0;
   Steady::duration waited{};

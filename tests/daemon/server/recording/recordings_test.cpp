@@ -259,7 +259,7 @@ TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
   q.run();
   EXPECT_THAT(answers, ElementsAre("no recording is called \"7.raw\"", "ok"));
   answers.clear();
-  for (int round = 0; round < 12; ++round) {  // what has ended is remembered, but not for ever
+  for (int round = 0; round < 12; ++round) {  // only the last ended recordings are remembered
     start("again-" + std::to_string(round) + ".raw");
     q.run();
     q.recordings->stop({}, [](const Result<void>&) {});

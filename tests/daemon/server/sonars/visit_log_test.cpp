@@ -1,4 +1,4 @@
-// A client that reconnects for ever: a few lines of the log count all of its connections.
+// Tests a client that reconnects endlessly: a few log lines count all of its connections.
 #include "daemon/server/sonars/visit_log.hpp"
 
 #include <gmock/gmock.h>
