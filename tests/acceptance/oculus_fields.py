@@ -1,6 +1,6 @@
-"""Every field of every Oculus message, by hand from the sources of docs/protocols/oculus.md, under the dissector's filter names.
+"""Reads every field of every Oculus message, with the dissector's filter names, from the sources of docs/protocols/oculus.md.
 
-Shares nothing with the C++ code nor with the dissector; what oculus_reader.Ping reads too is compared with it.
+It shares no code with sonard or the dissector. Fields that oculus_reader.Ping also reads must have the same values there.
 """
 import struct
 
@@ -57,7 +57,7 @@ def fields_of(message):
 
 
 def _expect_as_read_before(ping, values):
-    """oculus_reader came first and is used by other tests: both readers say the same."""
+    """Compares the fields with those of oculus_reader, the older reader, which other tests use."""
     pairs = {"fire.masterMode": ping.mode, "fire.flags": ping.flags, "fire.range": ping.range, "fire.gainPercent": ping.gain,
              "ping.pingId": ping.id, "ping.frequency": ping.frequency, "ping.speedOfSoundUsed": ping.sound_speed_used,
              "ping.dataSize": ping.data_size, "ping.rangeResolution": ping.resolution, "ping.nRanges": ping.rows,

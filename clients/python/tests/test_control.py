@@ -9,7 +9,7 @@ import time
 import unittest
 from unittest import mock
 
-from common import PACKAGE  # and it is on the path
+from common import PACKAGE  # also puts sonard_client on sys.path
 
 from sonard_client import Control, ControlError, OculusClient, control
 

@@ -11,7 +11,7 @@ from sonard_client.judge.truth import Make, TruePing
 
 
 class Packets(unittest.TestCase):
-    """A connection as packets, with a repeated, an overtaken and an acknowledged one."""
+    """Packets of one connection: repeated ones, ones out of order, acknowledgements."""
 
     def setUp(self):
         self.connection = wire.Connection(1, "10.0.0.1:4000", 0.0, oculus.OculusReader(), oculus.is_fire)
@@ -88,7 +88,7 @@ class Streams(unittest.TestCase):
 
 
 class Whole:
-    """Takes each datagram for a ping."""
+    """Treats each datagram as one ping."""
     at = 0
 
     def feed(self, datagram):

@@ -220,7 +220,7 @@ Actions Sonar::stop(const std::string& why) {
   return actions;
 }
 
-// ---- what hosts send
+// ---- input from hosts
 
 Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
   Actions actions;
@@ -299,7 +299,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   if (notice != nullptr) {
     if (!observer) data_.report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.name}}, actions);
   } else if (observer) {
-    // Only clients may send settings, triggers and addresses. An observer that does may use the wrong port.
+    // Only clients may send settings, triggers and addresses. An observer that sends one may use the wrong port.
     data_.report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients change what a sonar does",
                  {{"observer", from.name}}, actions);
   } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
@@ -338,7 +338,7 @@ bool Sonar::end_faults(const std::string& name, Time now, Actions& actions) {
   return found;
 }
 
-/// Carries out the orders of faults for ports, clients and settings. Called after each call that may cause some.
+/// Carries out the orders of faults for ports, clients and settings. Called after each call that may cause orders.
 void Sonar::apply_fault_orders(Time now, Actions& actions) {
   for (const FaultOrder& order : faults_.take_orders()) apply(order, now, actions);
 }

@@ -1,5 +1,5 @@
-// Smooth ripples that hide nothing of themselves show no false dark arcs: whatever their wavelength, phase and heading, the mean
-// over 18 degrees of every row is that of the sum over the surface, in double.
+// Smooth ripples without shadows show no false dark arcs: at any wavelength, phase and heading, the mean power of each row over
+// 18 degrees equals a sum over the surface in double precision.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace sonar::test::ripples_test {
 namespace {
 
 constexpr double height = 2, tilt = 0.25, lambert_db = -20, from_m = 4.8, to_m = 7.6;
-// Half of the sonar's sector; half of the interval of the mean.
+// Half the sonar's sector; half the sector of the mean. Radians.
 constexpr double half_sector = 0.1745, half_mean = 0.9 * half_sector;
 
 struct Ripples {
@@ -37,7 +37,7 @@ double two_way_power(const FrequencyMode& mode, double psi_rad) {
   return std::abs(x) < 1e-9 ? 1 : std::pow(std::sin(pi * x) / (pi * x), 4);
 }
 
-/// Beams within the mean.
+/// The beams that the mean includes.
 std::vector<int> beams_of_mean(const Sounding& s) {
   std::vector<int> beams;
   for (int j = 0; j < s.beams(); ++j)
@@ -63,8 +63,8 @@ class MeanPattern {
   std::vector<double> power_;
 };
 
-/// Mean of E|s|^2 over some beams, for each row: the surface in pieces of a few millimetres by a fraction of a degree, sorted by
-/// range, times the squared pulse.
+/// Mean of E|s|^2 over some beams, for each row. The surface is divided into pieces of 4 mm by 0.003 rad; their power is summed
+/// by range and weighted by the squared pulse.
 std::vector<double> arcs_of(const Sounding& s, const std::vector<int>& beams, const Ripples& ripples) {
   constexpr double step = 0.004, turn = 0.003, bin = 0.002;
   const MeanPattern heard(s, beams);
@@ -128,13 +128,13 @@ TEST(Ripples, ShowNoFalseArcs) {
   for (const double wavelength : {0.05, 0.07, 0.1, 0.15, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.5, 2.0}) {
     const int of_each = 9;
     for (int i = 0; i < of_each; ++i, ++cases)
-      // Headings from across the sector's middle to along it; phases by the golden section.
+      // Three headings, 0 to 0.7 rad; the phases are spread by the golden section.
       expect_no_arc({wavelength, 2 * pi * std::fmod(0.618034 * cases, 1.0), (i % 3) * 0.35});
   }
   EXPECT_GE(cases, 100);
 }
 
-// One and a half ripples between two rays, both at slopes of 0: only the slope of the ray between them tells.
+// One and a half ripples between two rays that both hit slopes of 0: only the ray between them shows a slope.
 TEST(Ripples, ShowNoFalseArcsInStepWithTheRays) {
   for (const Ripples& ripples : {Ripples{0.39, 0.138, 0}, Ripples{0.349, 4.922, 0}}) expect_no_arc(ripples);
 }

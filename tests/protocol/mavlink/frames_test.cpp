@@ -1,4 +1,4 @@
-// Frames of both versions are found among others and among junk; damaged frames are refused, and no length is trusted.
+// Frames of both versions are found between other frames and junk; damaged frames are refused, and every length is checked.
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {

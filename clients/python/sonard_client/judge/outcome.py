@@ -69,7 +69,7 @@ def timeline(scene: Scene, seen: Observation, connections: List[Connection]) -> 
 
 
 def in_brief(records: Sequence[Dict[str, Any]]) -> List[Tuple[Dict[str, Any], str]]:
-    """Shortens the journal. Consecutive records that differ only in the ping become the first one and a text about the others."""
+    """Shortens the journal: keeps the first of consecutive records that differ only in the ping, and counts the others."""
     def alike(record: Dict[str, Any]) -> Tuple[Any, ...]:
         return tuple(str(record.get(key)) for key in ("event", "fault", "kind", "sonar", "client"))
     found: List[Tuple[Dict[str, Any], str]] = []

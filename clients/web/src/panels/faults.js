@@ -1,4 +1,4 @@
-// Faults on purpose: what acts now with its countdown, and a button for each trouble.
+// The panel of faults: the active ones with their countdowns, and a button for each trouble.
 import { $, make, setHidden, setText, showList } from '../dom.js';
 import { countdown } from '../numbers.js';
 
@@ -7,7 +7,7 @@ export const titleOf = (trouble) => trouble.replace(/[-_]/g, ' ').replace(/^./, 
 /// The requested fault: a trouble or a single kind. Its kinds are separate faults with the same `do`.
 export const troubleOf = (fault) => fault.do || fault.name;
 
-/// The faults that act, one entry a trouble and sonar: {trouble, sonar, names, ends_ns, by}.
+/// The faults that are active or waiting, one entry a trouble and sonar: {trouble, sonar, names, ends_ns, by}.
 export function activeTroubles(facts) {
   const groups = new Map();
   for (const fault of facts.faults) {
@@ -34,7 +34,7 @@ function offered(facts) {
   return out;
 }
 
-const wholes = new Map();  // {ends_ns, whole_s} of each trouble, for its bar; messages give the same end within a second
+const wholes = new Map();  // {ends_ns, whole_s} of each trouble, for its bar; the end differs by up to a second between messages
 
 function card(group, about) {
   return make(
