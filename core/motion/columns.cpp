@@ -156,7 +156,6 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
     if (out.place_[c] >= 0) return "column " + std::string(header[i]) + " appears twice";
     out.place_[c] = static_cast<int>(i);
     if (c != roll && c != pitch && c != yaw) continue;
-    out.says_angles_ = out.says_angles_ || name == long_names[c];
     (is_radians ? out.radians_ : has_degrees) = true;
   }
   if (out.radians_ && has_degrees) return "give all angles in one unit: roll_rad, pitch_rad and yaw_rad, or all in degrees";
@@ -237,7 +236,6 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   if (!has(qw)) {
     if (auto wrong = fill({roll, pitch, yaw})) return wrong;
     if (std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}) > farthest) return "an angle is beyond 1e8";
-    out.angles = {v[0], v[1], v[2]};
     const auto in_rad = [this](double angle) { return radians_ ? angle : rad_from_deg(angle); };
     out.pose.orientation = quat_from_rpy({in_rad(v[0]), in_rad(v[1]), in_rad(v[2])});
     return std::nullopt;

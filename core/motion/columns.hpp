@@ -21,7 +21,6 @@ struct Row {
   std::int64_t stamp_ns = 0;
   Pose pose;
   Vec3d velocity_mps, angular_velocity_radps;
-  Vec3d angles;           // roll, pitch and yaw as they are written; 0 where the file has none
   std::string_view body;  // from the column "body"
 };
 
@@ -51,8 +50,6 @@ class Columns {
   bool peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const;
   /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;
-  /// True if the file has a yaw and does not name the unit of angles, which then is degrees.
-  bool has_bare_angles() const { return has(yaw) && !says_angles_; }
   bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }
   bool has_angular_velocity() const { return has(wx); }
@@ -75,7 +72,7 @@ class Columns {
 
   std::array<int, columns> place_{};
   int power_ = 9;  // a stamp is a number of 10^power_ ns
-  bool says_unit_ = false, says_angles_ = false, radians_ = false;
+  bool says_unit_ = false, radians_ = false;
   std::size_t count_ = 0;
   bool matrix_ = false;
 };

@@ -123,10 +123,6 @@ class Reader {
       if (stamp_ns > static_cast<double>(farthest_stamp_ns)) return set_error("the time is beyond 146 years");
       row.stamp_ns = std::llround(stamp_ns);
     }
-    if (columns_->has_bare_angles()) {
-      lowest_yaw_ = std::min(lowest_yaw_, row.angles.z), highest_yaw_ = std::max(highest_yaw_, row.angles.z);
-      largest_angle_ = std::max({largest_angle_, std::abs(row.angles.x), std::abs(row.angles.y), std::abs(row.angles.z)});
-    }
     keep(row);
     ++rows_;
   }
@@ -276,8 +272,6 @@ class Reader {
     file.replaced = replaced_;
     file.unit = columns_->unit();
     file.unit_by_steps = unit_by_steps_;
-    constexpr double one_turn = 6.3, least_turn = 2;  // a heading that changes by less may well be in degrees
-    file.may_be_radians = largest_angle_ <= one_turn && highest_yaw_ - lowest_yaw_ >= least_turn;
     for (Track& t : tracks_) {
       for (Ns& at : t.points.times) at -= first;
       // Converts to ENU and FLU, which all other code uses (docs/glossary.md).
@@ -301,7 +295,6 @@ class Reader {
   char between_ = ' ', line_end_ = '\n';
   std::string_view from_here_;  // the text from the current line on
   bool unit_by_steps_ = false;
-  double lowest_yaw_ = INFINITY, highest_yaw_ = -INFINITY, largest_angle_ = 0;  // angles whose unit is not named
   Words words_;
   std::size_t line_ = 0, rows_ = 0, last_ = 0, replaced_ = 0;
   std::vector<Track> tracks_;

@@ -39,7 +39,6 @@ struct TrajectoryFile {
   std::size_t replaced = 0;           // poses that were replaced by a later line with the same stamp
   std::string_view unit = "seconds";  // unit of the stamps in the file
   bool unit_by_steps = false;         // neither the file nor its format names the unit: it is guessed from the steps
-  bool may_be_radians = false;        // angles whose unit is not named, read as degrees, are all within one turn in radians
 };
 
 /// A comment in the file can state the frame: `# frame: NED_FRD`. Errors: "name:line: reason".

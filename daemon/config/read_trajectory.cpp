@@ -82,8 +82,6 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
                             std::string(name_of(f.frame)).c_str(), (*way)->size(), seconds((*way)->duration()));
   if (f.unit != "seconds" || f.unit_by_steps) plan.about += ", stamps in " + std::string(f.unit);
   if (f.unit_by_steps) plan.about += " by their steps (a first line of names says otherwise: t_s x y z qx qy qz qw)";
-  if (f.may_be_radians)
-    plan.about += ", angles in degrees (they look like radians: name the columns roll_rad, pitch_rad, yaw_rad, or else yaw_deg)";
   if (f.replaced > 0) plan.about += ", " + text::counted(f.replaced, "pose") + " replaced by the next of the same stamp";
   return plan;
 }

@@ -39,7 +39,7 @@ constexpr const char* turned_cure =
 constexpr const char* order_cure =
     "write w where the format has it: last in a TUM line (t x y z qx qy qz qw), first in one of EuRoC";
 constexpr const char* angle_cure = "angles are radians there: were degrees sent? Multiply them by 0.0174533";
-constexpr const char* radians_cure = "roll_deg, pitch_deg and yaw_deg are degrees: multiply radians by 57.2958";
+constexpr const char* radians_cure = "call the columns roll_rad, pitch_rad and yaw_rad, or multiply the angles by 57.2958";
 constexpr const char* mount_cure =
     "rpy_deg is [roll, pitch, yaw]: a roll near 180, or a pitch beyond 90, turns it over and swaps port and starboard; to look "
     "aft, set yaw 180";

@@ -284,25 +284,6 @@ TEST(TrajectoryFile, AnglesMayBeRadians) {
   EXPECT_NEAR(yaw_deg("t,x,y,z,yaw\n0,1,2,3,1.5707963268\n"), 1.5707963268, 1e-6);
 }
 
-TEST(TrajectoryFile, AnglesThatLookLikeRadiansAreMarked) {
-  const struct {
-    const char *columns, *first, *last;
-    bool may_be;
-  } files[] = {{"roll,pitch,yaw", "0.1,0,-3.1", "0,0.2,3.1", true},
-               {"yaw", "0", "6.28", true},
-               {"yaw", "0", "7", false},
-               {"roll,pitch,yaw", "0,10,-3", "0,0,3", false},
-               {"yaw", "1.5", "2.5", false},
-               {"yaw_deg", "-3.1", "3.1", false},
-               {"yaw_rad", "-3.1", "3.1", false},
-               {"roll,pitch", "-3,0", "3,0", false},
-               {"roll_deg,pitch,yaw", "0,0,-3.1", "0,0,3.1", false}};
-  for (const auto& f : files)
-    EXPECT_EQ(parsed(std::string("t,x,y,z,") + f.columns + "\n0,1,2,3," + f.first + "\n1,1,2,3," + f.last + "\n").may_be_radians,
-              f.may_be)
-        << f.columns << ' ' << f.last;
-}
-
 TEST(TrajectoryFile, OneThatIsMissingIsSaidToBe) {
   for (const char* place : {"no-such-file.csv", ".", "/dev/null"}) {
     const auto file = load_trajectories(place, enu);

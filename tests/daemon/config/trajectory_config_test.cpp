@@ -63,10 +63,6 @@ TEST(TrajectoryConfig, WordsAndFiles) {
             "equal.tum: tum, ENU_FLU, 2 poses, 1.000 s, 1 pose replaced by the next of the same stamp");
   std::ofstream(directory() + "/ms.tum") << "# frame: ENU_FLU\n1305031102175 0 0 -3 0 0 0 1\n1305031103175 0 0 -3 0 0 0 1\n";
   EXPECT_EQ(vehicle("ms.tum").plan.about, "ms.tum: tum, ENU_FLU, 2 poses, 1.000 s, stamps in milliseconds");
-  std::ofstream(directory() + "/yaw.csv") << "# frame: ENU_FLU\nt,x,y,z,yaw\n0,0,0,-3,-3.1\n1,0,0,-3,3.1\n";
-  EXPECT_EQ(vehicle("yaw.csv").plan.about,
-            "yaw.csv: csv, ENU_FLU, 2 poses, 1.000 s, angles in degrees (they look like radians: name the columns roll_rad, "
-            "pitch_rad, yaw_rad, or else yaw_deg)");
 }
 
 TEST(TrajectoryConfig, EveryKey) {

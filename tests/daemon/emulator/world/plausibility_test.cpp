@@ -295,7 +295,7 @@ TEST(Plausibility, ATrajectoryWithRadiansInColumnsOfDegrees) {
       EXPECT_THAT(notes(playing(circling(frame, z_m, 1, radius_m), "dive.csv")),
                   ElementsAre(AllOf(HasSubstr("the headings of dive.csv stay within 6.3 deg, and "),
                                     HasSubstr(radius_m > 0 ? "would follow the course" : "jump by 6.28 deg"),
-                                    HasSubstr("multiply radians by 57.2958"))))
+                                    HasSubstr("call the columns roll_rad, pitch_rad and yaw_rad"))))
           << frame << radius_m;
     }
   }
