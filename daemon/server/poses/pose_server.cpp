@@ -22,6 +22,7 @@ constexpr int most_not_json = 8;  // limit of successive lines that are too long
 constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes; 32 floods keep 0.1 to 1 GB in the kernel
 constexpr std::chrono::milliseconds between_looks{10};  // pause before the next look for new input
 constexpr std::chrono::milliseconds longest_wait{100};  // limit for poses that wait in the kernel
+constexpr int most_tries = 16;  // at port 0: the number that the system chose for TCP may be in use for UDP
 constexpr const char* no_json = "not JSON: this port accepts poses as lines of JSON";
 
 std::size_t waiting_bytes(tcp::socket& socket) {
@@ -62,8 +63,12 @@ Result<Endpoint> PoseServer::open(Port& port, Endpoint at) {
 Result<void> PoseServer::open() {
   const auto add = [this](Encoding encoding, const PoseListener& wanted, Endpoint& out) -> Result<void> {
     if (!wanted.enabled) return {};
-    Port& port = ports_.emplace_back(encoding, udp::socket(io_), io_, admission_);
-    const auto at = open(port, wanted.at);
+    Result<Endpoint> at;
+    for (int tries = wanted.at.port == 0 ? most_tries : 1; tries > 0; --tries) {
+      at = open(ports_.emplace_back(encoding, udp::socket(io_), io_, admission_), wanted.at);
+      if (at) break;
+      ports_.pop_back();
+    }
     if (!at) {
       const std::string key = encoding == Encoding::json ? "poses.json" : "poses.protobuf";
       return failure(at.error().kind, at.error().text + "; " + key + " in the configuration can set another address, or off");
