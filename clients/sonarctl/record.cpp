@@ -27,10 +27,10 @@ constexpr int most_status_at_once = 32;
 
 Time unix_now() { return Time(std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())); }
 
-/// The sonard that serves the device, with the name of the sonar and a subscription to its pings.
+/// The sonard that serves the device, with the name and profile of the sonar and a subscription to its pings.
 struct Steering {
   ControlClient client;
-  std::string sonar;
+  std::string sonar, profile;
 };
 Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& device) {
   auto client = ControlClient::open(options);
@@ -42,7 +42,7 @@ Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& devic
     control::Subscribe subscription;
     subscription.pings = true;
     if (auto answer = client->request(subscription); !answer) return tl::unexpected(answer.error());
-    return Steering{std::move(*client), sonar.name()};
+    return Steering{std::move(*client), sonar.name(), sonar.profile()};
   }
   return failure(ErrorKind::usage, "the sonard at " + text_from(client->at()) + " serves no sonar at " + text_from(device));
 }
@@ -188,7 +188,8 @@ Result<void> record_device(const RecordOptions& options) {
   const std::string at = text_from(stream.device());
   const FirstPingWait waits(source, stream, opened->observes);
   auto status = listen_to_status(options, stream.make());
-  auto files = RecordFiles::create(options, stream.make(), stream.conversation(), steering ? steering->sonar : "sonar");
+  auto files = RecordFiles::create(options, stream.make(), stream.conversation(), steering ? steering->sonar : "sonar",
+                                   steering ? steering->profile : "");
   if (!files) return tl::unexpected(files.error());
   std::printf("connected to %s\n", at.c_str());
   std::fflush(stdout);
@@ -221,7 +222,8 @@ Result<void> convert(const RecordOptions& options) {
   nothing.as_it_is = true;
   const auto host = by->make->host(nothing);
   if (!host) return tl::unexpected(host.error());
-  auto files = RecordFiles::create(options, *by->make, recording::usual_ends(*by->make), name.empty() ? "sonar" : name);
+  auto files = RecordFiles::create(options, *by->make, recording::usual_ends(*by->make), name.empty() ? "sonar" : name,
+                                   by->sender.names_model ? by->sender.model->profile : "");
   if (!files) return tl::unexpected(files.error());
   Result<void> written;
   std::optional<Time> first;

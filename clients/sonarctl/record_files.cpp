@@ -24,7 +24,8 @@ recording::Samples samples_of(const PolarImage& image, unsigned bits) {
 }  // namespace
 
 Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make& make,
-                                        const recording::PcapConversation& conversation, const std::string& sonar) {
+                                        const recording::PcapConversation& conversation, const std::string& sonar,
+                                        const std::string& profile) {
   RecordFiles files;
   files.make_ = &make;
   Result<void> made;
@@ -59,7 +60,7 @@ Result<RecordFiles> RecordFiles::create(const RecordOptions& options, const Make
     return recording::write_raw_dump(std::move(sink), by_tcp ? recording::Carrier::stream : recording::Carrier::datagram);
   });
   add(options.mcap, [&](auto sink) {
-    auto session = std::make_unique<recording::McapSession>(std::move(sink), sonar, make);
+    auto session = std::make_unique<recording::McapSession>(std::move(sink), sonar, make, profile);
     files.mcap_ = session.get();
     return session;
   });

@@ -12,9 +12,11 @@ namespace sonar::clients {
 
 class RecordFiles {
  public:
-  /// Creates all files that the options name. Errors: io; usage for a format of another make.
+  /// Creates all files that the options name. `profile`: that of the sonar; empty: unknown. Errors: io; usage for a kind of file
+  /// that only another make has.
   static Result<RecordFiles> create(const RecordOptions& options, const Make& make,
-                                    const recording::PcapConversation& conversation, const std::string& sonar);
+                                    const recording::PcapConversation& conversation, const std::string& sonar,
+                                    const std::string& profile);
 
   /// Writes to every file. The first failure ends all of them. Errors: io.
   Result<void> write(const recording::RecordedMessage& message);

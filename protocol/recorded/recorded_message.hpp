@@ -36,6 +36,9 @@ class RecordingReader {
   virtual void rewind() = 0;
   /// False if the format stores no times; all are then 0.
   virtual bool knows_times() const { return true; }
+  /// The profile of the sonar, such as "oculus-m1200d", if the file states it; else empty. Known once next() has returned a
+  /// message.
+  virtual std::string profile() const { return {}; }
   /// Names the parts of the recording that were skipped, such as other sonars in the same file; empty: nothing was skipped.
   virtual std::string note() const { return {}; }
 };

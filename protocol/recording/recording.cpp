@@ -89,6 +89,10 @@ Result<Recording> open_recording(const std::filesystem::path& file, const std::s
 
 std::optional<SentBy> find_sender(RecordingReader& reader) {
   std::optional<SentBy> found;
+  const auto take_stated_model = [&reader](SentBy& by) {
+    for (const auto& model : by.make->device->models())
+      if (model->profile == reader.profile()) by.sender.model = model, by.sender.names_model = true;
+  };
   // A later message is better only if it names the model of the same sonar.
   const auto tells_more = [&found](const SentBy& by) {
     return !found || (by.sender.names_model && by.make == found->make && by.sender.serial == found->sender.serial);
@@ -98,6 +102,7 @@ std::optional<SentBy> find_sender(RecordingReader& reader) {
     if (!message) break;
     searched += message->bytes.size();
     if (auto by = sender_of(*message); by && tells_more(*by)) found = std::move(by);
+    if (found && !found->sender.names_model) take_stated_model(*found);
   }
   reader.rewind();
   return found;

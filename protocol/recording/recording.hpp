@@ -24,8 +24,8 @@ struct Recording {
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
 
-/// Finds the sonar of a recording by the first message that names its model, or else by its first message, within the first 64
-/// MB. Rewinds the reader.
+/// Finds the sonar of a recording by the first message that names its model, or else by its first message and the profile that
+/// the file states, within the first 64 MB. Rewinds the reader.
 std::optional<SentBy> find_sender(RecordingReader& reader);
 
 }  // namespace sonar::recording

@@ -52,6 +52,11 @@ def demo(maker):
     return Daemon(None, str(SONARD), [maker])
 
 
+def product_of(daemon):
+    """As sonard prints it when it starts."""
+    return re.search(r"^sonar +front +(.+?)  ", daemon.log(), re.MULTILINE).group(1)
+
+
 def rows_of(image):
     """The pixels of a RawImage, as lists of numbers."""
     size = {"mono8": 1, "mono16": 2, "32FC1": 4}[image["encoding"]]
@@ -154,7 +159,7 @@ class EachDemo(PageChecks, unittest.TestCase):
                 self.echoes_at_once(daemon, maker, kind, pings)
                 if not browser:
                     continue
-                product = re.search(r"^sonar +front +(.+?)  ", daemon.log(), re.MULTILINE).group(1)
+                product = product_of(daemon)
                 for width, height, theme in ((1600, 1000, "light"), (390, 844, "dark")):
                     with self.subTest(width=width):
                         page = self.opened(browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800, theme=theme))

@@ -13,7 +13,7 @@ import urllib.request
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
 from browser import Browser  # noqa: E402
-from demos_test import DEMOS, HTTP, SONAR, UNCOVERED, demo  # noqa: E402
+from demos_test import DEMOS, HTTP, SONAR, UNCOVERED, demo, product_of  # noqa: E402
 from foxglove_viewer import Refused, Viewer  # noqa: E402
 from page_checks import WHY_NOT, PageChecks, shown  # noqa: E402
 from recording_test import Replay  # noqa: E402
@@ -53,8 +53,8 @@ class Recordings(PageChecks, unittest.TestCase):
         self.addCleanup(os.chdir, os.getcwd())
         os.chdir(folder.name)
 
-    def look(self, viewer, kind):
-        """It plays; then it is sought, stopped and played again."""
+    def look(self, viewer, kind, product):
+        """It names the product and plays; then it is sought, stopped and played again."""
         viewer.greeted().subscribe("/recording/picture", "/recording/fan", "/recording/ping", "/status")
         self.assertEqual(viewer.first_of("/recording/picture", PATIENCE_S)["kind"], kind)
         image = viewer.first_of("/recording/fan")
@@ -63,6 +63,7 @@ class Recordings(PageChecks, unittest.TestCase):
         self.assertGreater(trajectory["duration_s"], 0)
         viewer.wait_for(lambda kind, value: kind == "word" and "playbackControl" in value.get("capabilities", ()) or viewer.info and
                         "playbackControl" in viewer.info["capabilities"])
+        self.assertIn(product, viewer.info["metadata"].values())
         first_ns = viewer.info["dataStartTime"]["sec"] * 10**9 + viewer.info["dataStartTime"]["nsec"]
 
         def tell(name, value):
@@ -89,13 +90,14 @@ class Recordings(PageChecks, unittest.TestCase):
     def test_every_demo_is_recorded_and_played(self):
         for maker, (kind, pings, port) in DEMOS.items():
             with self.subTest(demo=maker):
-                with demo(maker):
+                with demo(maker) as daemon:
+                    product = product_of(daemon)
                     path = record(maker, pings + 10)
                     with Viewer(HTTP, path=f"/?recording={path.name}") as viewer:
-                        self.look(viewer, kind)
+                        self.look(viewer, kind, product)
                 # On a slow machine doctor and listen may take the whole recording, which ends a replay without --loop.
                 with Replay(path, "--loop") as replay, Viewer(HTTP) as viewer:
-                    self.look(viewer, kind)
+                    self.look(viewer, kind, product)
                     self.assertIn("open      http://127.0.0.1:8088", replay.text())
                     with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=PATIENCE_S) as answer:  # doctor asks for it
                         self.assertEqual(answer.read(), f"ok: replays {path.name}\n".encode())

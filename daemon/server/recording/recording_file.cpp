@@ -127,7 +127,7 @@ RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, c
     : kind_(kind), make_(&make_of(sonar.vendor)), labels_(labels) {
   auto counted = std::make_unique<CountedSink>(std::move(sink), bytes_);
   if (kind == &mcap) {
-    auto session = std::make_unique<recording::McapSession>(std::move(counted), sonar.name, *make_);
+    auto session = std::make_unique<recording::McapSession>(std::move(counted), sonar.name, *make_, sonar.profile);
     mcap_ = session.get();
     writer_ = std::move(session);
   } else {

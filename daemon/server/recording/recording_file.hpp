@@ -38,6 +38,7 @@ struct RecordedSonar {
   std::string name, vendor;
   recording::PcapConversation ends;  // for the headers of a capture
   bool has_range_images = false;     // range images have no labels
+  std::string profile = {};          // of the sonar; empty: unknown
 };
 
 class RecordingFile {

@@ -133,6 +133,7 @@ std::string Device::problem() const {
 RecordedSonar Device::recorded() const {
   const protocol::Make* const make = protocol::find_make(sonar_.vendor().name());
   RecordedSonar sonar{config().name, std::string(sonar_.vendor().name()), {}};
+  sonar.profile = sonar_.state().model->profile;
   const Connection* const client = sonar_.connections().oldest_client();
   const Ipv4 host = client != nullptr ? client->peer.ip : Ipv4{127, 0, 0, 1};
   sonar.ends = recording::usual_ends(make != nullptr ? *make : protocol::makes().front(),

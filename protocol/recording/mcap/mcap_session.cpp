@@ -39,6 +39,7 @@ class McapRecordingReader final : public RecordingReader {
         if (others_.size() < most_names) others_.insert(sonar);
         continue;
       }
+      if (profile_.empty()) profile_ = metadata("profile");
       return RecordedMessage{message->logged_at, metadata("from") == "client" ? Origin::client : Origin::device,
                              metadata("carrier") == "udp" ? Carrier::datagram : Carrier::stream, std::move(message->data)};
     }
@@ -51,10 +52,11 @@ class McapRecordingReader final : public RecordingReader {
     return names.empty() ? "" : "the file holds other sonars too: " + names;
   }
   void rewind() override { reader_.rewind(); }
+  std::string profile() const override { return profile_; }
 
  private:
   mcap::Reader reader_;
-  std::string requested_, sonar_;
+  std::string requested_, sonar_, profile_;
   bool chosen_ = false;
   std::set<std::string> others_;
 };
@@ -62,8 +64,8 @@ class McapRecordingReader final : public RecordingReader {
 }  // namespace
 
 // All channels are defined here, but a channel is written into the file only with its first message.
-McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make)
-    : writer_(std::move(sink)), sonar_(std::move(sonar)), make_(&make) {
+McapSession::McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make, std::string profile)
+    : writer_(std::move(sink)), sonar_(std::move(sonar)), profile_(std::move(profile)), make_(&make) {
   device_ = vendor_channel("device", "device", "tcp");
   client_ = vendor_channel("client", "client", make.is_by_udp() ? "udp" : "tcp");
   status_ = vendor_channel("status", "device", "udp");
@@ -83,6 +85,7 @@ std::uint16_t McapSession::vendor_channel(const char* topic, const char* from, c
   channel.topic = std::string("/") + sonar_ + "/" + topic;
   channel.message_encoding = make_->name();
   channel.metadata = {{"vendor", channel.message_encoding}, {"sonar", sonar_}, {"from", from}, {"carrier", carrier}};
+  if (!profile_.empty()) channel.metadata["profile"] = profile_;
   return writer_.add_channel(std::move(channel));
 }
 

@@ -18,7 +18,9 @@ namespace sonar::recording {
 class McapSession final : public RecordingWriter {
  public:
   /// `make`: the make whose messages are written. Messages that hold samples (Codec::samples) are also written as images.
-  McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make = protocol::makes().front());
+  /// `profile`: that of the sonar, for messages that do not name their model; empty: not known.
+  McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make = protocol::makes().front(),
+              std::string profile = {});
 
   Result<void> write(const RecordedMessage& message) override;
   /// Writes the pose of the sonar at time `of`, also as the frame NAME of /tf. `at` must not decrease (see RecordedMessage).
@@ -41,7 +43,7 @@ class McapSession final : public RecordingWriter {
   Result<void> write_json(std::uint16_t channel, Time at, const std::string& text);
 
   mcap::Writer writer_;
-  std::string sonar_;
+  std::string sonar_, profile_;
   const protocol::Make* make_;
   std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, labels_, share_, caster_, instances_, faults_;
 };

@@ -153,6 +153,29 @@ TEST(Mcap, ClientsSendAsTheMakeDoes) {
   }
 }
 
+TEST(Mcap, TheStatedProfileNamesTheModelWhereNoMessageDoes) {
+  const auto sender_of_file = [](const std::string& profile) {
+    Bytes file;
+    McapSession writer(sink_into(file), "front", *protocol::find_make("oculus"), profile);
+    EXPECT_TRUE(writer.write({after_ms(0), Origin::device, Carrier::stream, ping_message(1, 2, 1, 8)}));
+    EXPECT_TRUE(writer.close());
+    auto messages = read_mcap(source_from("a file", file));
+    const auto by = messages ? find_sender(**messages) : std::nullopt;
+    if (!by) throw std::runtime_error("no sender was found");
+    EXPECT_EQ(read_all(**messages).size(), 1u) << "the reader must begin anew";
+    return by->sender;
+  };
+  const Sender stated = sender_of_file("oculus-m3000d");
+  EXPECT_TRUE(stated.names_model);
+  EXPECT_EQ(stated.model->profile, "oculus-m3000d");
+  EXPECT_NE(stated.serial, 0u) << "the message still tells it";
+  for (const char* const profile : {"", "aris-3000", "nothing"}) {
+    const Sender other = sender_of_file(profile);
+    EXPECT_FALSE(other.names_model) << profile;
+    EXPECT_EQ(other.model->profile, sender_of_file("").model->profile) << profile;
+  }
+}
+
 TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {
   auto opened = open_bytes(session(conversation(), false));  // chunks of 2 s: the last one never reached the file
   ASSERT_TRUE(opened);
