@@ -102,7 +102,7 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   if (!nlohmann::json::sax_parse(json, &reader)) return refused(reader.why);
   if (json.find_first_not_of(" \t\r\n") == std::string_view::npos || json[json.find_first_not_of(" \t\r\n")] != '{')
     return refused("not a JSON object: write {...}");
-  const auto status = google::protobuf::util::JsonStringToMessage({json.data(), json.size()},
+  const auto status = google::protobuf::util::JsonStringToMessage(google::protobuf::StringPiece(json.data(), json.size()),
                                                                   message.GetReflection()->MutableMessage(&message, field));
   if (!status.ok()) {
     const std::string mistake = mistake_in(json, *field->message_type()), words(status.message());

@@ -61,7 +61,7 @@ Bytes packet_of(const RangeMessage& message) {
   pb::RangeImage m;
   set_shot(m, message.shot);
   m.set_image_pixel_scale(message.pixel_scale_m);
-  m.mutable_image_pixel_data()->Assign(message.pixels.begin(), message.pixels.end());
+  m.mutable_image_pixel_data()->Add(message.pixels.begin(), message.pixels.end());  // protobuf 3.12 has no Assign()
   return packed(m);
 }
 
