@@ -29,6 +29,9 @@ class LeftOut(unittest.TestCase):
         self.assertEqual(self.left_out("clients/sonarctl/listen.cpp", "docs/faults.md"), HEAVY)
         self.assertEqual(self.left_out("core/pipeline/cpu/simulate.cpp"), {"package", "page"})
         self.assertEqual(self.left_out("clients/web/main.js"), HEAVY - {"page"})
+        for file in ("daemon/debian/postrm", "daemon/systemd/sonard.service", "tests/judge/right_driver.py", "core/requirements.cmake"):
+            with self.subTest(file=file):
+                self.assertNotIn("package", self.left_out(file))
         self.assertEqual(self.left_out("daemon/CMakeLists.txt"), HEAVY - {"package", "sanitizers"})
         for file in ("tests/protocol/hosts_test.cpp", "tests/is_sanitized.hpp", "clients/bvtsdk/core/link.cpp", "tests/fuzz/corpus/hosts/a.bin"):
             with self.subTest(file=file):
