@@ -24,8 +24,9 @@
 
 namespace sonar::protocol {
 
-// One row for each make. This file and the folders of the makes are the only product code that names one. The first row is the
-// make of the demo without a name and of unknown profiles. The first of `ports` is the one that a user may give another number.
+// One row for each make. Other code outside the folders of the makes names none, except the files that check_floors.py lists
+// (MAY_NAME_MAKES, NAME_MAKES). The first row is the make of the demo without a name and of unknown profiles. A user may give the
+// first of `ports` another number.
 std::vector<Make> product_makes() {
   return {
       {.device = &oculus::vendor(),
