@@ -19,16 +19,16 @@ inline std::string range_complaint(double range_m, std::string_view of, double l
          (field.empty() ? std::string() : " (" + std::string(field) + ")");
 }
 
-/// The refusal of gain_percent; empty: it is valid, or not set.
+/// The refusal of gain_percent. Empty if it is valid or not set.
 inline std::string gain_complaint(const SettingsOverride& wanted) {
   if (!wanted.gain_percent || (*wanted.gain_percent >= 0 && *wanted.gain_percent <= 100)) return {};
-  return text::format("the gain is 0 to 100 %%, not %g %% (gain_percent)", *wanted.gain_percent);
+  return text::format("the gain must be 0 to 100 %%, not %g %% (gain_percent)", *wanted.gain_percent);
 }
 
-/// The refusal of a rate by a sonar that has a standby; empty: the rate is valid, or not set.
+/// The refusal of a rate by a sonar that has a standby. Empty if the rate is valid or not set.
 inline std::string rate_complaint(const SettingsOverride& wanted) {
   if (!wanted.rate_hz || *wanted.rate_hz >= 0) return {};
-  return text::format("the rate is 0 Hz, standby, or above, not %g Hz (rate_hz)", *wanted.rate_hz);
+  return text::format("the rate must be 0 Hz (standby) or above, not %g Hz (rate_hz)", *wanted.rate_hz);
 }
 
 }  // namespace sonar::protocol

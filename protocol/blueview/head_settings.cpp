@@ -114,7 +114,7 @@ Applied apply(SonarSettings& settings, int head_index, Key key, const Value& val
   HeadSettings& head = settings.heads[static_cast<std::size_t>(head_index)];
   if (key == Key::name) {
     const auto* text = std::get_if<std::string>(&value);
-    if (text == nullptr) return refused(Code::bad_parameter, "a name is a text");
+    if (text == nullptr) return refused(Code::bad_parameter, "a name must be a text");
     settings.name = text->substr(0, 64);
     return {Value(settings.name), {}};
   }

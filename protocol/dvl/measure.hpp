@@ -1,5 +1,5 @@
-// Computes from a ping the measurement that the device reports (four beams, velocity, altitude), and dead reckoning from one ping
-// to the next. Pure functions.
+// Computes the measurement that the device reports for a ping (four beams, velocity, altitude), and the dead reckoning from one
+// ping to the next. Pure functions.
 #pragma once
 
 #include "protocol/dvl/settings.hpp"
@@ -10,7 +10,7 @@ struct Beam {
   bool is_valid = false;
   double velocity_mps = 0;  // the device's velocity along the beam, positive towards the ground
   double sigma_mps = 0;     // standard deviation of the velocity's noise
-  double distance_m = -1;   // in the device's metres
+  double distance_m = -1;   // by the device's speed of sound; -1: no echo
   double rssi_dbm = 0;
 };
 
@@ -23,13 +23,13 @@ struct Measurement {
   Vec3d velocity_mps;
   Covariance covariance{};
   double fom = 0, altitude_m = -1;
-  Time reflected_at{}, heard_at{};  // the middle of the ping at the ground; the end of the last echo
+  Time reflected_at{}, heard_at{};  // when the ground reflects the middle of the ping; when the last echo ends
 };
 
-/// The velocity of the ground along the beams comes from PingRequest::sonar_moves, which World derives from the poses of the
-/// vehicle: senders need not send velocities.
+/// The velocities of the beams follow from PingRequest::sonar_moves. World computes it from the poses of the vehicle, and from
+/// the velocity in the newest pose if there is one.
 Measurement measure(const Ping& ping);
-/// The measurement among the findings of the ping; computed if there is none.
+/// Returns the measurement among the findings of the ping; computes it if there is none.
 inline Measurement measured_in(const Ping& ping) { return protocol::found_in(ping, measure); }
 
 /// The range mode of the next ping.

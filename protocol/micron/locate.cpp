@@ -1,4 +1,4 @@
-// Finds in mtHeadData the fields and regions that faults change.
+// Finds the fields and regions of an mtHeadData frame that faults change.
 #include "protocol/micron/settings.hpp"
 
 namespace sonar::micron {

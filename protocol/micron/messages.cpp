@@ -15,7 +15,7 @@ std::array<std::uint8_t, 4> digits_of(std::uint16_t length) {
   return digits;
 }
 
-/// Whether this protocol has the message, by the public drivers' lists.
+/// Returns whether the public drivers list a message with this id.
 bool is_known(Id id) {
   switch (id) {
     case Id::version_data:
@@ -35,8 +35,8 @@ bool is_known(Id id) {
   return false;
 }
 
-/// Length of the frame with this header. A frame states its length twice, as digits and as a number. Both have to agree, so that
-/// bytes of an image that look like the start of a frame are seldom taken for one.
+/// Returns the length of the frame with this header. A frame states its length twice, as digits and as a number. Both have to
+/// agree, so that bytes of an image that look like the start of a frame are seldom taken for one.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   const auto header = read_front<Header>(bytes);
   if (!header || header->hex_length != digits_of(header->length) || (strict && !is_known(header->id))) return std::nullopt;
@@ -46,13 +46,13 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool st
 
 }  // namespace
 
-// The first digit of a length is 0, because the longest frame has less than 0x1000 bytes behind its first five.
+// A length is at most longest_frame - uncounted = 0x0FFA, so its first digit is 0.
 const recording::Framing framing{{'@', '0'}, header_size, length_of};
 
 Bytes framed(Id id, std::uint8_t source, std::uint8_t destination, BytesView payload) {
   const auto length = static_cast<std::uint16_t>(payload.size() + frame_size - uncounted);
   Header header{.hex_length = digits_of(length), .length = length, .source = source, .destination = destination, .id = id};
-  header.count = id == Id::head_data ? 0 : static_cast<std::uint8_t>(length - 5);  // MCG: head data in one piece have 0
+  header.count = id == Id::head_data ? 0 : static_cast<std::uint8_t>(length - 5);  // MCG: 0 in head data that is not split
   header.node = source == host_node ? destination : source;
   Bytes frame = wire::bytes_of(header);
   frame.insert(frame.end(), payload.begin(), payload.end());
@@ -74,7 +74,7 @@ Bytes packed(BytesView bins, bool upper_first) {
   return bytes;
 }
 
-// The upper half comes first here: the frame does not say which half is nearer (option first_4bit_bin).
+// The upper half of a byte is taken as the nearer bin, because the frame does not state the order (option first_4bit_bin).
 Bytes unpacked(BytesView bytes) {
   Bytes bins;
   for (const std::byte both : bytes) bins.insert(bins.end(), {both >> 4, both & std::byte{15}});

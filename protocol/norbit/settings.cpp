@@ -20,14 +20,15 @@ constexpr auto processing = std::chrono::milliseconds(5);
 
 std::string complaint(const Settings& s) {
   if (!(s.start_m >= 0 && s.stop_m <= farthest_m && s.stop_m >= s.start_m + shortest_m))
-    return text::format("start and stop are 0 to %g m, %g m apart at least", farthest_m, shortest_m);
+    return text::format("start and stop must be from 0 to %g m and at least %g m apart", farthest_m, shortest_m);
   if (s.rate_hz != -1 && !(s.rate_hz > 0 && s.rate_hz <= fastest_hz))
-    return text::format("the rate is above 0 and at most %g Hz, or -1", fastest_hz);
-  if (!(s.gain_db >= 0 && s.gain_db <= most_gain_db)) return text::format("the gain is 0 to %g dB", most_gain_db);
-  if (s.samples < 64 || s.samples > 2048) return "the samples are 64 to 2048";
-  if (s.beams != 64 && s.beams != 128 && s.beams != 256 && s.beams != 512) return "the beams are 64, 128, 256 or 512";
+    return text::format("the rate must be above 0 and at most %g Hz, or -1", fastest_hz);
+  if (!(s.gain_db >= 0 && s.gain_db <= most_gain_db)) return text::format("the gain must be 0 to %g dB", most_gain_db);
+  if (s.samples < 64 || s.samples > 2048) return "the number of samples must be 64 to 2048";
+  if (s.beams != 64 && s.beams != 128 && s.beams != 256 && s.beams != 512)
+    return "the number of beams must be 64, 128, 256 or 512";
   if (s.sound_mps != -1 && !(s.sound_mps >= slowest_mps && s.sound_mps <= fastest_mps))
-    return text::format("the sound velocity is %g to %g m/s, or -1", slowest_mps, fastest_mps);
+    return text::format("the sound velocity must be %g to %g m/s, or -1", slowest_mps, fastest_mps);
   return {};
 }
 

@@ -1,5 +1,5 @@
-// Encodes a ping in the vendor's bytes: echo rules, sizes, bearings. Only this file converts azimuth (to port) to bearing (to
-// starboard). Vendor::frame calls it once per ping; tests re-encode captured pings with the bare encoder.
+// Encodes a ping as a ping result: sizes, echo of the request, and bearings, which are positive to starboard (our azimuths are
+// positive to port). Vendor::frame calls it once per ping; tests encode captured pings again with the function for PingBlocks.
 #pragma once
 
 #include <span>
@@ -11,8 +11,8 @@
 
 namespace sonar::oculus {
 
-/// Fixed part of either version. header.version selects the fields: versions below 2 have ping_start_counter instead of the
-/// extension, the attitude and ping_start_time_s.
+/// The fixed part of a ping result of any version. header.version selects the fields: versions below 2 have ping_start_counter
+/// instead of the extension, the attitude and ping_start_time_s.
 struct PingHead {
   PingResultV2 fixed;
   std::uint32_t ping_start_counter = 0;
@@ -29,10 +29,10 @@ wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks);
 /// Bearing in 0.01 deg, positive to starboard, truncated towards 0 as in the captured pings.
 std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad);
 
-/// The fire settings as the ping repeats them (docs/protocols/oculus.md, 5.5). `sound_speed_used` replaces a requested 0.
+/// Returns the fire settings that the ping states (docs/protocols/oculus.md, 5.5). `sound_speed_used_mps` replaces a requested 0.
 FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps);
 
-/// The whole ping result of `ping`. `fire`: the request under which the ping was made.
+/// Returns the whole ping result of `ping`. `fire`: the request under which the ping was made.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const FireRequest& fire);
 
 }  // namespace sonar::oculus

@@ -29,7 +29,8 @@ double clamped(double value, double low, double high, const char* what, const ch
   return used;
 }
 
-/// Range of row 0 in row spacings. unknown: some driver assumes each of these values, hence option `row_origin`.
+/// Returns the range of row 0 in row spacings. The device's value is unknown: each of these is assumed by some driver (option
+/// `row_origin`).
 double row_centre(const protocol::OptionValues& options) {
   const std::string_view origin = text_option(options, option_name::row_origin);
   return origin == "near_edge" ? 0 : origin == "far_edge" ? 1 : 0.5;
@@ -111,8 +112,8 @@ bool asks_for_gain_assist(const FireSettings& fire, std::string_view option) {
   return (option == "flag_set" && bit) || (option == "flag_clear" && !bit);
 }
 
-/// In the high mode pings state a gain g as 40 + 0.6 g, which ENS inverts. With gain assist they state the requested gain, as in
-/// the captured pings (docs/protocols/oculus.md, 5.5).
+/// Returns the gain that pings state. In the high mode it is 40 + 0.6 g for a requested gain g (ENS inverts this); with gain
+/// assist it is g, as in the captured pings (docs/protocols/oculus.md, 5.5).
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo) {
   const bool high_frequency = fire.mode == 2;
   const bool mapped = gain_echo == "mapped" || (gain_echo != "verbatim" && (fire.flags & flag::gain_assist) == 0);
@@ -145,14 +146,14 @@ double device_sound_speed_mps(const protocol::DeviceState& device, double salini
                                 std::clamp(gauge_bar, 0.0, 1000.0));
 }
 
-// Nothing is refused: values out of range are clamped for use, and echoed as they were sent (docs/protocols/oculus.md, 3).
+// No request is refused here: values out of range are clamped for use, and echoed as sent (docs/protocols/oculus.md, 3).
 ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& device) {
   ResolvedSettings out;
   PingSettings& settings = out.settings;
   const FireSettings& asked = fire.settings;
   settings.mode = mode_index(*device.model, asked.mode);
   if (asked.mode != settings.mode + 1)
-    out.clamped.push_back("mode " + std::to_string(asked.mode) + " is not one of this model's, mode 1 is used");
+    out.clamped.push_back("this model has no mode " + std::to_string(asked.mode) + ", mode 1 is used");
   if (static_cast<std::uint8_t>(asked.ping_rate) > static_cast<std::uint8_t>(PingRate::standby))
     out.clamped.push_back("ping rate code " + std::to_string(static_cast<int>(asked.ping_rate)) + " is unknown, 10 Hz is used");
   const FrequencyMode& mode = device.model->modes[static_cast<std::size_t>(settings.mode)];
@@ -182,7 +183,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
   FireSettings used = asked;
   used.gain_percent = clamped(asked.gain_percent, 0, 100, "gain", "%", out.clamped);
   const bool scientific = settings.format.bits == 32;
-  // Samples of 32 bits have the gain that was requested: its mapping to 40 + 0.6 g concerns the other formats.
+  // Samples of 32 bits have the requested gain; only with the other formats may it be mapped to 40 + 0.6 g.
   const double percent =
       scientific ? used.gain_percent : echoed_gain_percent(used, text_option(device.options, option_name::gain_echo));
   settings.gain_db = static_cast<float>(db_per_percent * percent);
@@ -198,7 +199,7 @@ std::size_t ping_size(const PingSettings& settings) {
   return image_offset + static_cast<std::size_t>(settings.range_bin_count) * row;
 }
 
-// The line has the values as requested, so that a user recognises what a driver sends.
+// The text states the requested values, so that users recognise what their driver sends.
 std::string describe(const FireRequest& fire) {
   const FireSettings& s = fire.settings;
   const bool metres = (s.flags & flag::range_in_metres) != 0;
@@ -214,7 +215,7 @@ std::string describe(const FireRequest& fire) {
     sentence += "standby";
   }
   if (s.sound_speed_mps == 0) {
-    sentence += ", own sound speed";
+    sentence += ", sound speed of the device";
   } else {
     std::snprintf(text, sizeof text, ", sound speed %g m/s", s.sound_speed_mps);
     sentence += text;

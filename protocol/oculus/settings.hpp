@@ -62,7 +62,7 @@ ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& d
 /// Size in bytes of a ping result with these settings.
 std::size_t ping_size(const PingSettings& settings);
 
-/// A line for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, ...".
+/// A line for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, sound speed of the device, 512 beams, 8 bits, ...".
 std::string describe(const FireRequest& fire);
 
 }  // namespace sonar::oculus

@@ -86,7 +86,7 @@ void Conversation::set_id(const Frame& frame, protocol::Reaction& reaction) {
   std::uint8_t id = 0;
   wire::Reader reader(frame.payload);
   reader("device_id", id);
-  if (!reader.ok() || id == 0 || id == 255) return refuse(frame, "device ids are 1 to 254", reaction);
+  if (!reader.ok() || id == 0 || id == 255) return refuse(frame, "device_id must be 1 to 254", reaction);
   id_ = id;
   on_new_id(reaction);
   reaction.replies.push_back(ack(frame.header.id, id_));

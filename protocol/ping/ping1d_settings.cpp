@@ -59,8 +59,8 @@ std::string complaint(const Parameters& p) {
     return "scan_length is below 1000, or ends beyond 100000";
   if (p.speed_mm_per_s < 1000000 || p.speed_mm_per_s > 2000000) return "speed_of_sound is not in 1000000..2000000";
   if (p.gain > most_gain) return "gain_setting is not in 0..6";
-  if (p.mode_auto > 1) return "mode_auto is 0 or 1";
-  if (p.enable > 1) return "ping_enabled is 0 or 1";
+  if (p.mode_auto > 1) return "mode_auto must be 0 or 1";
+  if (p.enable > 1) return "ping_enabled must be 0 or 1";
   return {};
 }
 

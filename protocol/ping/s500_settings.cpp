@@ -15,7 +15,7 @@
 namespace sonar::ping::s500 {
 namespace {
 
-constexpr int points = 1024;                // DEF: powers of a ping of one frequency
+constexpr int points = 1024;                // DEF: number of powers in a profile of one frequency
 constexpr std::uint32_t most_mm = 142000;   // CLI: limit of the hosts
 constexpr int fastest_ms = 100;             // MAN: at most 10 pings a second
 constexpr double shortest_pulse_us = 20;    // unknown: assumed
@@ -97,11 +97,12 @@ bool same_settings(const Settings& a, const Settings& b) {
 std::string complaint(const SetPingParams& p) {
   if ((p.length_mm != 0 && p.length_mm < shortest_range_mm) || p.length_mm > most_mm || p.start_mm > most_mm ||
       p.start_mm + p.length_mm > most_mm)
-    return "length_mm is 0 or from 1000, its end to 142000";
+    return "length_mm must be 0 or at least 1000, and the range must end by 142000";
   if (p.gain < -1 || p.gain > most_gain()) return "gain_index is not in -1..13";
   if (p.period_ms < -1) return "msec_per_ping is not in -1..32767";
-  if (p.report != Id{} && p.report != Id::s500_distance2 && p.report != Id::s500_profile6) return "report_id is 0, 1223 or 1308";
-  return p.chirp > 1 ? "chirp is 0 or 1" : "";
+  if (p.report != Id{} && p.report != Id::s500_distance2 && p.report != Id::s500_profile6)
+    return "report_id must be 0, 1223 or 1308";
+  return p.chirp > 1 ? "chirp must be 0 or 1" : "";
 }
 
 // An automatic range or gain starts from the value in force.
@@ -217,8 +218,8 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
   profile.start_mm = mm(made.range_start_m);
   profile.length_mm = mm(made.range_m - made.range_start_m);
   profile.start_hz = profile.end_hz = static_cast<std::uint32_t>(device.model->modes.front().centre_hz);
-  profile.sampling_hz = static_cast<std::uint32_t>(
-      std::lround(static_cast<double>(made.device_sound_speed_mps) / (2 * made.range_bin_m)));  // unknown: that of the results
+  profile.sampling_hz = static_cast<std::uint32_t>(std::lround(static_cast<double>(made.device_sound_speed_mps) /
+                                                               (2 * made.range_bin_m)));  // unknown: here the rate of the powers
   profile.power_up_ms = power_up_ms;
   profile.pulse_s = 2 * made.pulse_width_m / made.device_sound_speed_mps;
   profile.analog_gain = made.gain_db;

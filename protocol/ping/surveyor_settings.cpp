@@ -85,7 +85,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 }
 
 std::string complaint(const PingParameters& p) {
-  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > longest_m) return "start_mm and end_mm are from 0 to 200000";
+  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > longest_m) return "start_mm and end_mm must be from 0 to 200000";
   if (p.start_mm >= 1000 * end_m(p)) return "start_mm is not before end_mm";
   if (!(p.speed_mps >= 1000 && p.speed_mps <= 2000)) return "sos_mps is not in 1000..2000";
   if (p.gain < -1 || p.gain > 100) return "gain_index is not in -1..100";

@@ -54,7 +54,8 @@ TEST(Overrides, OfEachProductAreRefusedInTheWordsOfTheirSettingsWithThePermitted
         EXPECT_EQ(why(set().range(0.999 * std::stod(found[2]))), "");
         EXPECT_EQ(std::stod(found[3]), wrong_m);
       }
-      EXPECT_THAT(why(set().gain(300)), testing::AnyOf(HasSubstr("the gain is 0 to 100 %, not 300 %"), HasSubstr("own gain")));
+      EXPECT_THAT(why(set().gain(300)),
+                  testing::AnyOf(HasSubstr("the gain must be 0 to 100 %, not 300 %"), HasSubstr("own gain")));
       EXPECT_THAT(why(set().rate(-1)), HasSubstr("rate"));
     }
 }
@@ -133,7 +134,7 @@ TEST(OculusOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
   EXPECT_THAT(why(set().of_mode(2)), HasSubstr("2 mode(s)"));
   EXPECT_THAT(why(set().with_beams(300)), HasSubstr("256 or 512"));
   EXPECT_THAT(why(set().gain(101)), HasSubstr("0 to 100"));
-  EXPECT_THAT(why(set().rate(-1)), HasSubstr("the rate is 0 Hz, standby, or above"));
+  EXPECT_THAT(why(set().rate(-1)), HasSubstr("the rate must be 0 Hz (standby) or above"));
   EXPECT_THAT(why(set().bits(24)), HasSubstr("8 or 16 bits"));
 }
 

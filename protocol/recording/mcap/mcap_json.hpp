@@ -1,4 +1,5 @@
-// JSON messages in sonard's own schemas: ground truth, faults, labels. mcap_session writes them into MCAP files.
+// Makes sonard's own JSON schemas (ground truth, faults, labels), and the messages of truth and labels. mcap_session writes them
+// into MCAP files.
 #pragma once
 
 #include <span>
@@ -20,12 +21,12 @@ JsonSchema fault_schema();  // sonard.FaultEntry
 JsonSchema label_schema();  // sonard.PingInstances
 
 struct SceneNames {
-  std::vector<std::string> objects;  // names, by BeamTruth::object
-  std::vector<std::string> bodies;   // names of moving bodies, by PingRequest::bodies_in_world
+  std::vector<std::string> objects;  // names of the objects; BeamTruth::object is an index into them
+  std::vector<std::string> bodies;   // names of the moving bodies, in the order of PingRequest::bodies_in_world
   struct Instance {
     std::string name, of_class;
   };
-  std::vector<Instance> instances = {};  // [instance - 1] of PingLabels
+  std::vector<Instance> instances = {};  // instance n of PingLabels is the element n - 1
 };
 
 /// Ground truth of a ping: the poses of the sonar and of the moving bodies at transmission, and per beam the first object hit.

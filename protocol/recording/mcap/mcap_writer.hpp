@@ -17,7 +17,8 @@ class Writer {
 
   std::uint16_t add_schema(std::string name, std::string encoding, Bytes data);
   std::uint16_t add_channel(Channel channel);  // sets its id
-  /// Messages of a channel are numbered from 0. io: later calls fail; the file stays readable.
+  /// Appends a message; the messages of a channel are numbered from 0. Errors: io; after one, later calls fail, and the file
+  /// stays readable.
   Result<void> write(std::uint16_t channel, Time at, BytesView data);
   /// Ends the last chunk, adds summary and footer, closes. After an error of write() it tries to add the summary of the written
   /// chunks, and returns the first error. Errors: io.
@@ -44,7 +45,8 @@ class Writer {
   std::vector<Schema> schemas_;
   std::vector<Channel> channels_;
   std::vector<std::uint32_t> next_sequence_;
-  std::vector<bool> announced_, announced_before_;  // channels written to the file or this chunk; to the file
+  std::vector<bool> announced_;         // per channel: whether it is in the file or the present chunk
+  std::vector<bool> announced_before_;  // per channel: whether it is in the file
   Bytes chunk_;
   Time chunk_first_{}, chunk_last_{};
   std::map<std::uint16_t, Entries> entries_;

@@ -220,8 +220,9 @@ TEST(Dialogue, SummarySaysWhatWasAsked) {
     request.extension.flags = extended;
     return events_of<ChangeSettings>(Conversation().say(make_fire(request))).at(0).summary;
   };
-  EXPECT_EQ(summary(fire(0, 2, PingRate::hz10, 0x49, 5, 50), 0, 0),
-            "mode 2, range 5 m, gain 50 %, gamma 127, rate 10 Hz, own sound speed, 512 beams, 8 bits, flags 73, version 0");
+  EXPECT_EQ(
+      summary(fire(0, 2, PingRate::hz10, 0x49, 5, 50), 0, 0),
+      "mode 2, range 5 m, gain 50 %, gamma 127, rate 10 Hz, sound speed of the device, 512 beams, 8 bits, flags 73, version 0");
   EXPECT_THAT(summary(fire(0, 1, PingRate::standby, 0x4B, 5, 50), 1480, 0),
               HasSubstr("gamma 127, standby, sound speed 1480 m/s, 512 beams, 16 bits"));
   EXPECT_THAT(summary(fire(2, 1, PingRate::hz10, 0x0D, 5, 50), 0, 0x200), HasSubstr("256 beams, 32 bits"));
