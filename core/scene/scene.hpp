@@ -28,7 +28,7 @@ struct GsabLaw {
 inline constexpr double largest_lambert = 1 / pi;
 inline constexpr double largest_lambert_db = -4.97;  // 10 log10 of largest_lambert, for scene files and messages
 
-/// Patches of stronger and weaker scattering, fixed to the surface: a Gamma field with mean 1. Makes K-distributed echoes.
+/// Patches of stronger and weaker scattering, fixed to the surface: a Gamma field with mean 1. It makes echoes K-distributed.
 struct Texture {
   float shape = 0;  // nu: scintillation index 1 + 2 / nu; 0 = no texture
   float correlation_m = 0.5f;
@@ -59,7 +59,7 @@ struct Mesh {
   bool operator==(const Mesh&) const = default;
 };
 
-/// The exact surface of which a mesh was made, for exact specular echoes. Same frame as the mesh.
+/// The exact surface from which a mesh was made, in the frame of the mesh. Specular echoes are computed from it.
 struct Primitive {
   enum class Kind { none, sphere, cylinder, box, plane };
   Kind kind = Kind::none;
@@ -69,7 +69,7 @@ struct Primitive {
   bool operator==(const Primitive&) const = default;
 };
 
-/// A mesh placed in the world. Its index in Scene::objects is part of the key of its speckle.
+/// A mesh, placed in the world or on a moving body. Its index in Scene::objects is part of the key of its random speckle.
 struct Object {
   std::string name;
   std::shared_ptr<const Mesh> mesh;
@@ -81,7 +81,7 @@ struct Object {
   bool operator==(const Object&) const = default;  // compares addresses of meshes, not their contents
 };
 
-/// An analytic echo without a surface.
+/// A point with a target strength and without a surface; its echo is computed analytically.
 struct PointTarget {
   std::string name;
   Vec3d position_m;  // in the world, or in its body when body >= 0
@@ -111,7 +111,7 @@ struct WaterColumn {
 struct OtherSonar {
   std::string name;
   Vec3d position_m;     // in the world
-  float level_upa = 0;  // amplitude in a channel of ours that points at it, 1 m away; falls as 1 / r and with absorption
+  float level_upa = 0;  // amplitude at 1 m in a channel that points at it; falls as 1 / r and by absorption
   float rate_hz = 7;
   float pulse_s = 1e-4f;
   bool operator==(const OtherSonar&) const = default;
@@ -130,20 +130,21 @@ struct Scene {
   std::optional<Vec3d> ray_origin;  // the origin to keep when a running scene is changed (core/scene/ray_origin.hpp)
   std::vector<std::string> notes;   // sentences about decisions of the loader that the user should know
 
-  /// Pose of an object in its body; in the world for a static one.
+  /// Returns the pose of an object in its body, or in the world if it is static.
   Pose in_body(const Object& object) const {
     if (object.body < 0) return object.in_world;
     return compose(inverse(bodies_in_world.at(static_cast<std::size_t>(object.body))), object.in_world);
   }
-  /// World pose of an object, or position of a point, for these poses of bodies. Bodies without one keep the pose of the scene
-  /// file.
+  /// Returns the world pose of an object, or the world position of a point, for these poses of the bodies. Bodies beyond the end
+  /// of `bodies` have the poses of the scene file.
   Pose in_world(const Object& object, std::span<const Pose> bodies) const {
     return is_attached(object.body, bodies) ? compose(bodies[static_cast<std::size_t>(object.body)], in_body(object))
                                             : object.in_world;
   }
   Vec3d in_world(const PointTarget& point, std::span<const Pose> bodies) const {
-    return is_attached(point.body, bodies) ? transform(bodies[static_cast<std::size_t>(point.body)], point.position_m)
-                                           : point.position_m;
+    if (point.body < 0) return point.position_m;
+    const auto body = static_cast<std::size_t>(point.body);
+    return transform(body < bodies.size() ? bodies[body] : bodies_in_world.at(body), point.position_m);
   }
   std::size_t triangle_count() const {
     std::size_t n = 0;

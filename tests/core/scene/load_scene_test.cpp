@@ -141,6 +141,10 @@ objects:
   EXPECT_EQ(length(scene->point_targets[0].position_m), 0);
   EXPECT_EQ(scene->point_targets[1].body, 0);
   EXPECT_EQ(scene->point_targets[1].position_m.z, 0.5);
+  EXPECT_NEAR(length(scene->in_world(scene->point_targets[1], {}) - Vec3d{5, 0, -1.5}), 0, 1e-12) << "poses of the file";
+  const std::vector<Pose> moved{{{1, 2, 3}, {}}};  // only the first body has a pose
+  EXPECT_NEAR(length(scene->in_world(scene->point_targets[1], moved) - Vec3d{1, 2, 3.5}), 0, 1e-12);
+  EXPECT_NEAR(length(scene->in_world(scene->point_targets[0], moved) - Vec3d{7, 7, 7}), 0, 1e-12);
 }
 
 TEST(LoadScene, MeshFilesMaterialsByNameAndSharing) {
