@@ -1,6 +1,6 @@
-// Vectors, quaternions and poses of all modules: plain structs, shared with device code.
-// World axes are ENU (z up), axes of bodies and sonars are FLU (x ahead, y to port, z up). Quaternions are Hamilton, body to
-// world. Only C++17, because nvcc compiles this file too.
+// Vectors, quaternions and poses, as plain structs for all modules. World axes are ENU (x east, y north, z up); axes of bodies
+// and sonars are FLU (x ahead, y to port, z up). Quaternions follow Hamilton's convention; the orientation of a pose a_in_b
+// rotates vectors of a into b. nvcc compiles this file too, so it uses only C++17.
 #pragma once
 
 #include <cmath>
@@ -9,10 +9,10 @@
 
 namespace sonar {
 
-struct Vec3 {  // directions, and places relative to the sonar [m]
+struct Vec3 {  // directions, and places near an origin, such as the vertices of a mesh [m]
   float x = 0, y = 0, z = 0;
 };
-struct Vec3d {  // places in the world [m]
+struct Vec3d {  // places in the world [m], velocities, directions
   double x = 0, y = 0, z = 0;
 };
 struct Quatd {
@@ -27,7 +27,7 @@ struct Pose {
 struct Rotation {
   double m[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 };
-/// Intrinsic Z-Y-X angles (yaw, then pitch, then roll) in the frame of the quaternion from which they were computed.
+/// Intrinsic Z-Y-X angles: yaw, then pitch, then roll, about the axes of the frames between which the quaternion rotates.
 struct RollPitchYaw {
   double roll_rad = 0, pitch_rad = 0, yaw_rad = 0;
 };
@@ -156,7 +156,7 @@ SONAR_HD inline Quatd enu_flu_from_ned_frd(Quatd frd_in_ned) {
 SONAR_HD inline Pose enu_flu_from_ned_frd(const Pose& p) {
   return {enu_from_ned(p.position_m), enu_flu_from_ned_frd(p.orientation)};
 }
-/// Converts the pose of a mount from the body's FRD axes to its FLU axes.
+/// Converts the pose of an FRD frame in an FRD frame, such as a mount, to that of the same frames with FLU axes.
 SONAR_HD inline Pose flu_from_frd(const Pose& p) {
   return {flu_from_frd(p.position_m), Quatd{p.orientation.w, p.orientation.x, -p.orientation.y, -p.orientation.z}};
 }

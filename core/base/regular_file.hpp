@@ -1,5 +1,5 @@
 // Opens the files that configurations, scenes and users name, only if they are regular files. Opening a FIFO can block forever;
-// reading a device may never end, or may start an action. Every reader of such files opens them here.
+// reading a device may never end, or may start an action. Recordings (protocol/recorded/byte_source.cpp) have the same rule.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// The samples of a decoded ping by row (range) and beam, with the direction of each beam, independent of the vendor. draw_fan
-// draws it; image_statistics measures it.
+// The samples of a decoded ping of any make, by row (range) and beam, with the direction of each beam. draw_fan draws them;
+// image_statistics measures them.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace sonar {
 
-/// How wide linear samples become brightness. Each make defines it after the maker's viewer.
+/// How linear samples with a large range of values become brightness. Makes that send such samples set it.
 struct Shades {
   std::size_t per_mille = 999;  // this many of a thousand samples are within the colour map; brighter ones saturate
   float gamma = 1;              // brightness is (code / full scale)^gamma
@@ -25,7 +25,7 @@ struct PolarImage {
   Shades shades = {};
 
   float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }
-  /// The code, at least 1, that `per_mille` of a thousand samples do not exceed.
+  /// Returns the code that `per_mille` of a thousand samples do not exceed, at least 1.
   float brightest(std::size_t per_mille) const {
     std::vector<float> codes = samples;
     const auto place = codes.begin() + static_cast<std::ptrdiff_t>((codes.size() - 1) * per_mille / 1000);
@@ -36,7 +36,7 @@ struct PolarImage {
     full_scale = brightest(of_make.per_mille);
     shades = of_make;
   }
-  /// 1: the end of the colour map.
+  /// Returns the brightness of a code: 1 at full scale, where the colour map ends.
   float brightness(float code) const {
     const float part = code / full_scale;
     return shades.gamma == 1 ? part : std::pow(std::max(0.0f, part), shades.gamma);

@@ -1,5 +1,5 @@
-// A sonar's picture as lines of text for a terminal: coloured half blocks, each character showing two pixels, or letters if
-// there are no colours. `sonarctl view --term` prints it.
+// Draws a sonar's picture as lines of text for a terminal: as coloured half blocks, of which each shows two pixels, or without
+// colours as ASCII characters, whose density shows the brightness. `sonarctl view --term` prints them.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@
 namespace sonar {
 
 enum class TerminalColours {
-  none,         // plain ASCII: brightness by letter
+  none,         // ASCII characters of different density
   palette_256,  // xterm's fixed colours
   true_colour,  // 24 bit
 };
@@ -24,8 +24,8 @@ struct TerminalStyle {
   bool labels = true;  // metres at the starboard edge
 };
 
-/// Lines without newline characters; each line restores the terminal's colours. Errors: as draw_fan, and less space than 24
-/// columns and 8 lines.
+/// Returns lines without newline characters; each line restores the terminal's colours. Errors: those of draw_fan, and usage for
+/// fewer than 24 columns or 8 lines.
 Result<std::vector<std::string>> draw_terminal_picture(const SonarPicture& picture, const TerminalStyle& style);
 
 /// Index of the nearest of xterm's colours 16 to 255.

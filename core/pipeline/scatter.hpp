@@ -1,5 +1,5 @@
 // Stage two: computes the echo of each visible surface cell: position on the sample grid, column, amplitude and carrier phase.
-// The speckle is fixed to the surface. Also the scatterers of the fixed fan and the analytic point targets.
+// The speckle is fixed to the surface. Scatters the fixed fan and point targets, too.
 #pragma once
 
 #include <complex>

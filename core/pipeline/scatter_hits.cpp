@@ -9,14 +9,14 @@
 namespace sonar {
 namespace {
 
-/// Direction of a ray of the fixed fan, sonar axes.
+/// Returns the direction of a ray of the fixed fan, in sonar axes.
 Vec3d direction_of_hit(const FanHit& hit, double sine, bool conical) {
   const ConicalDirection d{sine, static_cast<double>(hit.elevation_rad)};
   return conical ? sonar_from_conical(d) : sonar_from_flat(d);
 }
 
-// Eq. 6 with one scatterer per ray: sigma = sigma_b r^2 dOmega / cos(alpha), since a ray's footprint has the area
-// r^2 dOmega / cos(alpha). Hence sqrt(sigma) / r^2 = sqrt(sigma_b dOmega / cos(alpha)) / r.
+// Equation (6) has one scatterer for each ray. The footprint of a ray has the area r^2 dOmega / cos(alpha), so
+// sigma = sigma_b r^2 dOmega / cos(alpha) and sqrt(sigma) / r^2 = sqrt(sigma_b dOmega / cos(alpha)) / r.
 /// Converts hits to echoes, as many at a time as the kernels accept.
 class HitBatch {
  public:
@@ -46,7 +46,7 @@ class HitBatch {
     if (!(at_sample > -plan_.taps / 2 && at_sample < plan_.samples + plan_.taps / 2 - 1)) return;
     if (!(r >= nearest_scatterer_m && hit.cosine >= 0 && hit.cosine < 1.001f)) return;
     const Object& object = scene_.objects[hit.object];
-    // sqrt(sigma) / r^2, sigma = strength * footprint_area_m2; the solid angle of a ray is in its weight.
+    // The weight is the source's pressure times sqrt(sigma) / r^2; the ray's own weight contains the root of its solid angle.
     const float strength = laws_[object.mesh->material[hit.triangle]].root_strength(hit.cosine);
     // cosine_floor limits the footprint of a facet that is seen edge-on.
     const float slant = std::sqrt(std::max(hit.cosine, static_cast<float>(cosine_floor)));
@@ -69,7 +69,7 @@ class HitBatch {
     std::copy(column_, column_ + count_, out.column);
     if (plan_.expected_power)
       for (int i = 0; i < count_; ++i) {
-        // Two-way absorption e^{-2 a r}; in expected power the square is the mean over the draw.
+        // The amplitude falls by the two-way absorption e^{-2 a r}. Its square is the power's mean over the random draws.
         const float amplitude = weight_[i] * std::exp(-arguments_.decay_per_m * range_m_[i]);
         out.re[i] = amplitude * amplitude;
         out.im[i] = 0;
@@ -81,12 +81,13 @@ class HitBatch {
   }
 
  private:
-  /// Solid-angle weight of a ray within its column (flat beams only): dOmega = cos(psi) dtheta dpsi, u = sin(theta).
+  /// Returns the part of a ray's weight that depends on its column; only flat beams have one. Their solid angle is
+  /// dOmega = cos(psi) dtheta dpsi, with u = sin(theta).
   float column_weight(int column) {
     if (plan_.switches.conical) return 1;
     if (column != last_column_) {
       const double sine = plan_.columns.sine(column);
-      // Root of dtheta = du / cos(theta): weights are amplitudes.
+      // Weights are amplitudes, hence the root of dtheta = du / cos(theta).
       last_weight_ = static_cast<float>(1 / std::sqrt(std::sqrt(1 - sine * sine)));
       last_column_ = column;
     }

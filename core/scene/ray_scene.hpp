@@ -1,7 +1,7 @@
-// Traces rays through a scene, by a bounding-volume hierarchy (Embree, used only in embree_scene.cpp). Static geometry is built
-// once, relative to `origin()`; moving bodies are instances that are placed for each ping. A program can replace the tracer at
-// link time by defining the members of RayScene. Tests that trace analytic primitives under the thread sanitizer do so
-// (tests/core/pipeline/analytic_rays.cpp).
+// Traces rays through a scene, by a bounding-volume hierarchy (Embree, used only by embree_scene.cpp and embree_trees.hpp).
+// Static geometry is built once, relative to `origin()`; moving bodies are instances that are placed for each ping. A program can
+// replace the tracer at link time by defining the members of RayScene. Tests that trace analytic primitives under the thread
+// sanitizer do so (tests/core/pipeline/analytic_rays.cpp).
 #pragma once
 
 #include <cstdint>

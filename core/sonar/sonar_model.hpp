@@ -1,4 +1,4 @@
-// The constants of a product, for each of its frequency modes. protocol/<vendor>/models.cpp has their values.
+// The constants of a product, for each of its frequency modes. The folder of its make has their values.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// Finds the nearest valid name to a mistyped one, for "did you mean" errors. All readers of names (keys, choices, materials)
-// use it.
+// Finds the valid name (key, choice, material) nearest to a mistyped one, for "did you mean" errors.
 #pragma once
 
 #include <span>
@@ -8,10 +7,10 @@
 
 namespace sonar::text {
 
-/// The nearest candidate, at most a third of the name's length in edits away (at least one edit is allowed; a swap counts as
-/// one; case and - _ are ignored); or empty.
+/// Returns the candidate that differs by the fewest edits, at most by a third of the name's length, but at least one edit is
+/// allowed. A swap of neighbours is one edit; case is ignored, and '-', '_' and ' ' are the same. Empty if there is none.
 std::string_view nearest(std::string_view name, std::span<const std::string_view> candidates);
-/// `; did you mean "x"?` if a candidate is near, else `; <label>: a, b, c` (at most twelve names); empty without candidates.
+/// `; did you mean "x"?` if a candidate is near, else `; <label>: a, b, c` (at most 20 names); empty without candidates.
 std::string suggestion(std::string_view name, std::span<const std::string_view> candidates, std::string_view label);
 
 }  // namespace sonar::text

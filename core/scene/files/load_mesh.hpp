@@ -1,5 +1,5 @@
-// Reads mesh files (OBJ, STL, PLY, glTF/GLB, DAE) into checked triangles, relative to the mesh's middle. Only the scene loader
-// uses it.
+// Reads mesh files (OBJ, STL, PLY, glTF/GLB, DAE) into checked triangles, relative to the mesh's middle. The loader of
+// scenes and the importer of worlds (clients/scene_tools) use it.
 #pragma once
 
 #include "core/base/result.hpp"

@@ -1,5 +1,5 @@
-// The files that the importer may open: the mesh, and files that the mesh names, in its folder or the scene's. Regular files
-// only.
+// The files that the importer may open: the mesh, and files that the mesh names, in its folder or the scene's. It opens only
+// regular files.
 #pragma once
 
 #include <assimp/DefaultIOSystem.h>

@@ -1,5 +1,5 @@
-// The importer of mesh files. Its library does not check all of its input, so it runs in a separate program
-// (docs/decisions/0023-meshes-in-a-child.md). Fuzzers call it directly.
+// Imports mesh files with Assimp. That library does not check all of its input, so the import runs in a separate program
+// (docs/decisions/0023-meshes-in-a-child.md). Fuzzers call import_mesh() directly.
 #pragma once
 
 #include <cstdint>

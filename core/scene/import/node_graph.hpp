@@ -1,5 +1,5 @@
-// The graph of the nodes of a mesh file, from which the size of the scene is computed before an importer reads
-// it.
+// The graph of the nodes of a mesh file. Its size shows, before an importer reads the file, whether the scene would become too
+// large.
 #pragma once
 
 #include <cstddef>
@@ -22,8 +22,8 @@ class NodeGraph {
   }
   void contains(std::size_t parent, std::size_t child) { nodes_[parent].children.push_back(child); }
 
-  /// The fault of the graph, as a sentence without the file's name: nodes that contain themselves, are too deep, or are
-  /// repeated too often below the roots. nullopt if there is no fault. Time: linear in the edges.
+  /// Returns the fault of the graph, as a text to put behind the file's name: a node contains itself, nodes are too deep, or they
+  /// are repeated too often below the roots. nullopt if there is no fault. Takes time linear in the number of edges.
   std::optional<std::string> fault(const std::vector<std::size_t>& roots) const;
 
   /// The roots and the nodes below them, each as often as it is shown. The graph must have no fault.
