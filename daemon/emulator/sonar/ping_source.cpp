@@ -1,5 +1,6 @@
 #include "daemon/emulator/sonar/ping_source.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/sonar/phases.hpp"
@@ -29,6 +30,12 @@ void PingSource::use_initial_settings() {
   if (initial.receivers) audience_.restore_receivers(*std::move(initial.receivers));
   // The ping that is being computed has the settings of clients that have left: on_ping() drops it.
   busy_unwanted_ = busy_;
+  drop_unsent();
+}
+
+void PingSource::drop_unsent() {
+  sonar_.figures.unwanted += unsent_.size();
+  unsent_.clear();
 }
 
 void PingSource::change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions) {
@@ -221,6 +228,25 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
     ++figures.unwanted;  // its clients left while it was computed
   }
   return false;
+}
+
+bool PingSource::keep_unsent(PingOutcome& outcome, Time now) {
+  auto leaves = outcome.recorded == nullptr ? sonar_.vendor.leaves_at(*outcome.ping, sonar_.state) : std::nullopt;
+  if (leaves && !unsent_.empty()) leaves = std::max(*leaves, unsent_.back().first);  // pings keep their order
+  if (!leaves || *leaves <= now) return false;
+  unsent_.emplace_back(*leaves, std::move(outcome));
+  return true;
+}
+
+std::optional<Time> PingSource::next_unsent() const {
+  return unsent_.empty() ? std::nullopt : std::optional(unsent_.front().first);
+}
+
+std::optional<PingOutcome> PingSource::take_unsent(Time now) {
+  if (unsent_.empty() || unsent_.front().first > now) return std::nullopt;
+  std::optional<PingOutcome> first = std::move(unsent_.front().second);
+  unsent_.pop_front();
+  return first;
 }
 
 /// Reports that the sonar is above the sea surface or back in the water. Above it the engine computes only noise.

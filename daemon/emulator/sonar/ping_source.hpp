@@ -2,9 +2,11 @@
 // result on the device.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "core/sonar/gain_assist.hpp"
 #include "daemon/emulator/connections/pacer.hpp"
@@ -50,7 +52,10 @@ class PingSource {
   void trigger(const protocol::RequestPing& request, Time now);
   Actions tick(Time now);
   void skip(std::chrono::nanoseconds by) { pacer_.skip(by); }
-  void stop() { pacer_.stop(); }
+  void stop() {
+    pacer_.stop();
+    drop_unsent();
+  }
   // Effects of faults.
   void forget_settings(Time now);
   /// Restarts the device's clock. Unless `clock_only`, ping numbers begin at 1 again and the settings become the initial ones.
@@ -65,11 +70,18 @@ class PingSource {
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
   /// Handles the engine's result. Returns whether clients get the ping.
   bool on_ping(const PingOutcome& outcome, Time now, Actions& actions);
+  /// Keeps a ping that a slow device sends later; false: it leaves now.
+  bool keep_unsent(PingOutcome& outcome, Time now);
+  std::optional<Time> next_unsent() const;
+  /// The next kept ping that is due.
+  std::optional<PingOutcome> take_unsent(Time now);
 
  private:
   PingRequest request_at(Time at, const protocol::RequestPing& aim) const;
   void request_ping(Time at, Actions& actions);
   PingNumber next_number();
+  /// Like the ping that is being computed, those that are not sent yet are lost with the clients that requested them.
+  void drop_unsent();
   void follow_water();
   void note_water(const PingRequest& computed, Time now, Actions& actions);
 
@@ -90,6 +102,8 @@ class PingSource {
   std::shared_ptr<const VendorSettings> busy_settings_;
   bool busy_blank_ = false;     // requested as noise only
   bool busy_unwanted_ = false;  // the clients that requested it have left
+
+  std::deque<std::pair<Time, PingOutcome>> unsent_;  // by the time at which a slow device sends them
 
   std::uint32_t ping_number_ = 0;
   std::uint64_t numbered_skips_ = 0;  // ticks lost to overload before the last ping

@@ -58,7 +58,7 @@ DeviceFigures Sonar::figures() const {
 // ---- time
 
 std::optional<Time> Sonar::next_conversation() const {
-  return earlier(next_unsent(), audience_.earliest(&Connection::next_tick));
+  return earlier(source_.next_unsent(), audience_.earliest(&Connection::next_tick));
 }
 
 /// While poses are stale and the rule for them forbids pings, no request is due: stepped time does not wait for it.
@@ -70,7 +70,7 @@ std::optional<Time> Sonar::next_request() const {
 std::optional<Time> Sonar::next_tick() const { return earlier(source_.pacer().next_tick(), next_tick_of_conversations()); }
 
 std::optional<Time> Sonar::next_tick_of_conversations() const {
-  std::optional<Time> first = earlier(next_unsent(), earlier(faults_.next_tick(), delivery_.next_release()));
+  std::optional<Time> first = earlier(source_.next_unsent(), earlier(faults_.next_tick(), delivery_.next_release()));
   for (const Connection& c : connections().all())
     if (const auto t = c.next_tick()) first = earlier(first, data_.clock_time(*t));
   return first;
@@ -91,7 +91,7 @@ Actions Sonar::tick_conversations(Time now) {
     audience_.guarded(c, actions, [&] { handle(c, c.dialogue->on_tick(at, source_.pacer().trigger_waits()), now, actions); });
     c.not_before = at + shortest_rhythm;
   }
-  deliver_unsent(now, actions);
+  while (const auto unsent = source_.take_unsent(now)) deliver(*unsent, now, actions);
   faults_.on_tick(now);
   delivery_.release_held(now, false, actions);
   apply_fault_orders(now, actions);
@@ -111,12 +111,7 @@ void Sonar::skip(std::chrono::nanoseconds by) {
 Actions Sonar::on_ping(PingOutcome outcome, Time now) {
   Actions actions;
   if (!source_.on_ping(outcome, now, actions)) return actions;
-  auto leaves = outcome.recorded == nullptr ? vendor().leaves_at(*outcome.ping, state()) : std::nullopt;
-  if (leaves && !unsent_.empty()) leaves = std::max(*leaves, unsent_.back().first);  // pings keep their order
-  if (leaves && *leaves > now)
-    unsent_.emplace_back(*leaves, std::move(outcome));
-  else
-    deliver(outcome, now, actions);
+  if (!source_.keep_unsent(outcome, now)) deliver(outcome, now, actions);
   return actions;
 }
 
@@ -130,17 +125,6 @@ void Sonar::deliver(const PingOutcome& outcome, Time now, Actions& actions) {
   if (pings() == 1)
     data_.report(Report::Topic::state, LogLevel::debug, "first ping simulated", {{"ms", outcome.seconds * 1e3}}, actions);
 }
-
-void Sonar::deliver_unsent(Time now, Actions& actions) {
-  if (audience_.stopping()) unsent_.clear();
-  while (!unsent_.empty() && unsent_.front().first <= now) {
-    const PingOutcome outcome = std::move(unsent_.front().second);
-    unsent_.pop_front();
-    deliver(outcome, now, actions);
-  }
-}
-
-std::optional<Time> Sonar::next_unsent() const { return unsent_.empty() ? std::nullopt : std::optional(unsent_.front().first); }
 
 // ---- connections
 

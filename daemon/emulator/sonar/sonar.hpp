@@ -6,7 +6,6 @@
 // are the daemon's; conversations run on unskipped time, which does not include the jumps of stepped time.
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -149,8 +148,6 @@ class Sonar {
   };
   static Source source_of(Connection& connection) { return {&connection, connection.peer.name, connection.peer.ip}; }
   void deliver(const PingOutcome& outcome, Time now, Actions& actions);
-  void deliver_unsent(Time now, Actions& actions);
-  std::optional<Time> next_unsent() const;
   void handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions);
   void on_event(const Source& from, const protocol::Event& event, Time now, Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
@@ -165,7 +162,6 @@ class Sonar {
   Faults faults_;
   PingSource source_;
   Delivery delivery_;
-  std::deque<std::pair<Time, PingOutcome>> unsent_;  // by the time at which a slow device sends them
   std::size_t reactions_ = 0;
 };
 

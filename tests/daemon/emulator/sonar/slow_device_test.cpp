@@ -73,7 +73,54 @@ TEST_F(SlowDevice, AClientThatDoesNotReadLosesTheOldestReports) {
   time.run(seconds(30));
   time.clients[client].reads = true;
   time.run(milliseconds(1));
-  EXPECT_LE(reports(time, client).size(), static_cast<std::size_t>(time.sonar("down").config().outbox.depth) + 2);
+  const std::size_t count = reports(time, client).size();
+  EXPECT_GE(count, 1u) << "the newest ones wait";
+  EXPECT_LE(count, static_cast<std::size_t>(time.sonar("down").config().outbox.depth) + 2);
+}
+
+/// A client that connects while reports of the client before wait gets only pings fired since it connected.
+TEST_F(SlowDevice, ItsUnsentReportsAreLostWithTheLastClient) {
+  VirtualTime time(dvl("report_delay_ms: 800"));
+  const Sonar& sonar = time.sonar("down");
+  const ConnectionId first = time.connect("down"), other = time.connect("down");
+  time.run(seconds(3));
+  ASSERT_FALSE(reports(time, first).empty());
+  time.close(other);
+  EXPECT_EQ(sonar.figures().unwanted, 0u) << "another client is served";
+  time.close(first);
+  const std::uint64_t lost = sonar.figures().unwanted;
+  EXPECT_GE(lost, 1u) << "reports waited";
+  time.run(milliseconds(100));
+  const std::int64_t connected = microseconds_of(time.now);
+  const ConnectionId next = time.connect("down");
+  time.run(seconds(3));
+  const auto received = reports(time, next);
+  ASSERT_FALSE(received.empty());
+  for (const auto& report : received) EXPECT_GE(report["time_of_validity"].get<std::int64_t>(), connected);
+  EXPECT_EQ(sonar.figures().unwanted, lost);
+}
+
+TEST_F(SlowDevice, ItsUnsentReportsAreLostInATakeOver) {
+  VirtualTime time(dvl("report_delay_ms: 800}, clients: {max: 1, when_full: take_over"));
+  time.connect("down");
+  time.run(seconds(3));
+  const std::int64_t connected = microseconds_of(time.now);
+  const ConnectionId next = time.connect("down");
+  EXPECT_GE(time.sonar("down").figures().unwanted, 1u);
+  time.run(seconds(3));
+  const auto received = reports(time, next);
+  ASSERT_FALSE(received.empty());
+  for (const auto& report : received) EXPECT_GE(report["time_of_validity"].get<std::int64_t>(), connected);
+}
+
+TEST_F(SlowDevice, AStopCountsItsUnsentReports) {
+  VirtualTime time(dvl("report_delay_ms: 800"));
+  time.connect("down");
+  time.run(seconds(3));
+  Sonar& sonar = time.sonar("down");
+  ASSERT_TRUE(sonar.next_conversation());
+  sonar.stop("the test ends");
+  EXPECT_GE(sonar.figures().unwanted, 1u);
 }
 
 /// The end of a fault does not release what its device has not sent yet.
@@ -85,12 +132,16 @@ TEST_F(SlowDevice, AFaultDelaysItFurther) {
   FaultRecord record;
   record.what = "delayed-delivery";
   time.add_fault("down", record);
+  std::size_t count = 0;
   for (int ms = 0; ms < 2000; ++ms) {
     if (ms == 1000) time.end_faults("down");
     time.run(milliseconds(1));
-    for (const auto& report : reports(time, client))
+    for (const auto& report : reports(time, client)) {
       EXPECT_GE(microseconds_of(time.now), report["time_of_transmission"].get<std::int64_t>());
+      ++count;
+    }
   }
+  EXPECT_GE(count, 5u);
 }
 
 }  // namespace
