@@ -113,6 +113,13 @@ Id id_in(BytesView message) {
   return frame ? frame->header.id : Id{};
 }
 std::optional<recording::PingPart> part_if(bool is_part) { return is_part ? std::optional(recording::PingPart{}) : std::nullopt; }
+/// Whether `poorer`, of the result `result`, equals that which is made of the recorded `message`, as `answer` makes it.
+template <class Answer>
+bool holds_result(BytesView message, BytesView poorer, Results result, Answer answer) {
+  const std::vector<Bytes> made = answer(message, result);
+  const auto frame = made.size() == 1 ? whole_frame(made.front()) : std::nullopt, recorded = whole_frame(poorer);
+  return frame && recorded && frame->payload == recorded->payload;
+}
 /// Messages that a Surveyor or an Omniscan sends while pings are enabled. A ping may have several.
 std::optional<recording::PingPart> measured_part(BytesView message) {
   const Id id = id_in(message);
@@ -184,7 +191,12 @@ recording::Codec ping1d::codec() {
                                                                                                          : std::nullopt;
           },
       .ping_part = [](BytesView message) { return part_if(results_of(id_in(message)) != no_result); },
-      .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); }};
+      .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); },
+      .is_richer =
+          [](BytesView message, BytesView than) {
+            const Results poorer = results_of(id_in(than));
+            return poorer < results_of(id_in(message)) && holds_result(message, than, poorer, answer);
+          }};
 }
 
 recording::Codec s500::codec() {
@@ -196,7 +208,12 @@ recording::Codec s500::codec() {
             return holds(message, {Id::s500_distance2, Id::s500_profile6}) ? one_of(vendor()) : std::nullopt;
           },
       .ping_part = [](BytesView message) { return part_if(results_of(id_in(message)) != no_result); },
-      .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); }};
+      .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); },
+      .is_richer =
+          [](BytesView message, BytesView than) {
+            const Results poorer = results_of(id_in(than));
+            return poorer < results_of(id_in(message)) && holds_result(message, than, poorer, answer);
+          }};
 }
 
 }  // namespace sonar::ping

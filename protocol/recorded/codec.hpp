@@ -73,6 +73,9 @@ struct Codec {
   /// A message of ping_part() as the messages that Vendor::frame() or Vendor::datagrams() makes of a ping that was requested with
   /// `request`, in order. Null: the same bytes.
   std::vector<Bytes> (*answer)(BytesView message, const VendorSettings* request) = nullptr;
+  /// Whether a message of ping_part() holds all that another one of the same ping holds, and more. Null: no ping has two such
+  /// messages.
+  bool (*is_richer)(BytesView message, BytesView than) = nullptr;
 };
 
 }  // namespace sonar::recording

@@ -53,9 +53,27 @@ std::optional<PlayedPings::Part> PlayedPings::read() {
   }
 }
 
+/// Takes the messages of a ping. They follow each other from the poorest to the richest or the other way around.
+recording::Bytes PlayedPings::take_richest() {
+  recording::Bytes richest = std::move(ahead_->bytes);
+  ahead_ = read();
+  if (!ahead_ || codec_.is_richer(ahead_->bytes, richest)) {
+    for (; ahead_ && codec_.is_richer(ahead_->bytes, richest); ahead_ = read()) richest = std::move(ahead_->bytes);
+    return richest;
+  }
+  recording::Bytes last = richest;
+  for (; ahead_ && codec_.is_richer(last, ahead_->bytes); ahead_ = read()) last = std::move(ahead_->bytes);
+  return richest;
+}
+
 std::optional<PlayedPing> PlayedPings::next() {
   if (!ahead_) return std::nullopt;
   PlayedPing ping{ahead_->at, {}};
+  if (codec_.is_richer != nullptr) {
+    const std::uint16_t port = ahead_->part.port;
+    ping.parts.emplace_back(port, take_richest());
+    return ping;
+  }
   const auto is_new_port = [&ping](std::uint16_t port) {
     return std::none_of(ping.parts.begin(), ping.parts.end(), [port](const auto& part) { return part.first == port; });
   };

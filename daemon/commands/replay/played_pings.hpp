@@ -30,6 +30,7 @@ class PlayedPings {
   bool is_scan() const { return !lines_.empty(); }
 
   /// The next ping; nullopt at the end. Packets of different ports that follow each other are one ping.
+  /// Of several messages of a ping it is the richest.
   std::optional<PlayedPing> next();
   /// True if next() has returned the last ping.
   bool at_end() const { return !ahead_; }
@@ -49,6 +50,7 @@ class PlayedPings {
     PlayedPing ping;
   };
   std::optional<Part> read();
+  recording::Bytes take_richest();
 
   recording::RecordingReader& reader_;
   const recording::Codec& codec_;

@@ -10,6 +10,7 @@
 
 #include "daemon/commands/replay/requested_replay.hpp"
 #include "protocol/norbit/host.hpp"
+#include "protocol/ping/host.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/ping/ping_log.hpp"
@@ -374,6 +375,71 @@ TEST(ReplayOfPing1D, AHostByTcpGetsTheRecordedBytes) {
   const Bytes acked = ping::ack(ping::Id::ping1d_continuous_start, 1), got = host.read_to_end();
   ASSERT_EQ(got.size(), acked.size() + all.size());
   EXPECT_EQ(Bytes(got.begin() + static_cast<std::ptrdiff_t>(acked.size()), got.end()), all);
+}
+
+Bytes ping1d_distance(std::uint32_t number) {
+  ping::Distance distance;
+  distance.distance_mm = 1000 + number;
+  distance.confidence = 90;
+  distance.ping = number;
+  distance.length_mm = 4000;
+  return ping::framed_message(ping::Id::ping1d_distance, 1, distance);
+}
+Bytes ping1d_simple(std::uint32_t number) {
+  return ping::framed_message(ping::Id::ping1d_distance_simple, 1, ping::DistanceSimple{1000 + number, 90});
+}
+/// The messages with which PlayedPings represents the pings of a recording.
+std::vector<Bytes> played(const std::vector<Bytes>& messages, const recording::Codec& of) {
+  std::vector<RecordedMessage> all;
+  for (const Bytes& message : messages) all.push_back({{}, Origin::device, Carrier::datagram, message});
+  Messages reader(std::move(all));
+  PlayedPings pings(reader, of);
+  EXPECT_TRUE(pings.open("f"));
+  std::vector<Bytes> richest;
+  while (const auto ping = pings.next()) richest.push_back(ping->parts.front().second);
+  EXPECT_TRUE(pings.at_end());
+  return richest;
+}
+
+TEST(ReplayOfPing1D, TheRichestMessageOfAPingStandsForIt) {
+  const recording::Codec of = ping::ping1d::codec();
+  const auto simple = ping1d_simple, distance = ping1d_distance, profile = ping1d_profile;
+  EXPECT_THAT(played({simple(1), profile(1), simple(2), profile(2)}, of), ElementsAre(profile(1), profile(2)));
+  EXPECT_THAT(played({profile(1), simple(1), profile(2), simple(2)}, of), ElementsAre(profile(1), profile(2)));
+  EXPECT_THAT(played({simple(1), distance(1), profile(1), simple(2), distance(2)}, of), ElementsAre(profile(1), distance(2)));
+  EXPECT_THAT(played({simple(1), profile(2), distance(3), simple(4)}, of),
+              ElementsAre(simple(1), profile(2), distance(3), simple(4)))
+      << "four pings";
+  EXPECT_THAT(played({simple(1), simple(1), profile(1), profile(1)}, of), ElementsAre(simple(1), profile(1), profile(1)))
+      << "a ping has one message of each kind";
+}
+
+TEST(ReplayOfS500, TheRichestMessageOfAPingStandsForIt) {
+  ping::Profile6 profile;
+  profile.depth_m = 2.5f;
+  profile.smooth_depth_m = 2.25f;
+  profile.confidence = 80;
+  profile.smooth_confidence = 70;
+  profile.power_up_ms = 100;
+  const Bytes distance = ping::framed_message(ping::Id::s500_distance2, 0, ping::Distance2{2500, 2250, 0, 80, 70, 100}),
+              later = ping::framed_message(ping::Id::s500_distance2, 0, ping::Distance2{2500, 2250, 0, 80, 70, 200}),
+              altitude = ping::framed_message(ping::Id::ping1d_distance_simple, 0, ping::DistanceSimple{2500, 80}),
+              whole = ping::framed_message(ping::Id::s500_profile6, 0, profile);
+  EXPECT_THAT(played({altitude, distance, whole, later}, ping::s500::codec()), ElementsAre(whole, later));
+}
+
+TEST(ReplayOfPing1D, EveryProfileHasSamplesIfEveryPingHas) {
+  Replay replay(file_of(raw_dump, {ping1d_simple(1), ping1d_profile(1), ping1d_simple(2), ping1d_profile(2)}));
+  Udp host(9090);
+  for (std::uint32_t number = 1; number <= 2; ++number) {
+    host.send(wanted(ping::Id::ping1d_profile));
+    const auto frame = host.read();
+    ASSERT_TRUE(frame && frame->header.id == ping::Id::ping1d_profile);
+    const auto profile = message_in<ping::Profile>(*frame);
+    EXPECT_EQ(profile.ping, number);
+    EXPECT_EQ(profile.count, 3u);
+  }
+  EXPECT_TRUE(replay.ends());
 }
 
 TEST(ReplayOfS500, AStreamOfAnotherReportIsMadeOfTheRecordedOne) {
