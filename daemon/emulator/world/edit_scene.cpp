@@ -34,7 +34,7 @@ std::string complaint_about(const Scene& scene, const std::string& name) {
   if (name.empty() || name.size() > longest_name || !is_printable(name))
     return "an object needs a name of 1 to 64 printable characters";
   if (object_named(scene, name) != nullptr || is_point(scene, name) || body_named(scene, name) >= 0)
-    return "there is an object " + in_quotes(name) + " already; objects need names of their own";
+    return "the scene has an object " + in_quotes(name) + " already; choose another name";
   return {};
 }
 
@@ -45,10 +45,11 @@ std::shared_ptr<const Mesh> mesh_of(const Mesh& mesh, std::size_t material) {
   return copy;
 }
 
+bool is_removed(const Object& object) { return object.name.empty() && !object.visible; }
+
 /// Returns the index for a new object: that of a removed object, else a new one at the end.
 std::size_t free_place(Scene& scene) {
-  const auto left =
-      std::find_if(scene.objects.begin(), scene.objects.end(), [](const Object& o) { return o.name.empty() && !o.visible; });
+  const auto left = std::find_if(scene.objects.begin(), scene.objects.end(), is_removed);
   if (left != scene.objects.end()) return static_cast<std::size_t>(left - scene.objects.begin());
   scene.objects.emplace_back();
   return scene.objects.size() - 1;
@@ -102,7 +103,8 @@ Result<ScenePointer> with_object(const Scene& scene, const control::AddObject& w
   if (const std::string why = complaint_about(scene, wanted.name); !why.empty()) return refused(why);
   const Object* const like = object_named(scene, wanted.like);
   if (like == nullptr) return tl::make_unexpected(no_such_object(scene, wanted.like));
-  if (scene.objects.size() >= most_objects) return refused("the scene has 20000 objects already");
+  if (scene.objects.size() >= most_objects && std::none_of(scene.objects.begin(), scene.objects.end(), is_removed))
+    return refused("the scene has 20000 objects already");
   if (wanted.moving && scene.body_names.size() >= most_bodies) return refused("the scene has 256 moving objects already");
 
   auto mesh = like->mesh;
@@ -153,8 +155,8 @@ Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObjec
 }
 
 bool is_same(const Scene& a, const Scene& b) {
-  // All members are listed, so that a new member of Scene breaks this line and is compared too. Name and notes are not
-  // compared, because they do not change the pings.
+  // This line lists all members, so that it does not compile with a new one, which must then be compared too. Name and notes are
+  // not compared, because they do not change the pings.
   const auto& [name, materials, objects, point_targets, body_names, bodies_in_world, sea_surface, water_column, other_sonars,
                ray_origin, notes] = a;
   return ray_origin_of(a) == ray_origin_of(b) && materials == b.materials && point_targets == b.point_targets &&

@@ -58,6 +58,20 @@ TEST(EditScene, ARemovedObjectLeavesAPlaceThatTheNextOneTakes) {
   EXPECT_TRUE((*more)->objects[1].visible);
 }
 
+TEST(EditScene, AFullSceneTakesAnObjectInThePlaceOfARemovedOne) {
+  const auto scene = small_scene(true);
+  scene->objects.resize(20000, Object{.name = "stone", .mesh = small_mesh(), .in_world = {}});
+  const auto full = with_object(*scene, added("buoy"));
+  ASSERT_FALSE(full);
+  EXPECT_THAT(full.error().text, HasSubstr("the scene has 20000 objects already"));
+  const auto less = without_object(*scene, "box");
+  ASSERT_TRUE(less);
+  const auto again = with_object(**less, added("buoy", "floor"));
+  ASSERT_TRUE(again) << again.error().text;
+  EXPECT_EQ((*again)->objects.size(), 20000u);
+  EXPECT_EQ((*again)->objects[1].name, "buoy");
+}
+
 TEST(EditScene, MovingObjectsComeAndGoWithTheirBodies) {
   const auto more = with_object(*small_scene(true), added("whale", "crate", true));
   ASSERT_TRUE(more);
