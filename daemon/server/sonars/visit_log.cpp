@@ -16,8 +16,8 @@ void VisitLog::say(Kind kind, const std::string& what, std::vector<LogField> fie
     fields.insert(fields.begin(), {"sonar", sonar_});
     return log_.info(what, fields);
   }
-  ++unsaid_[static_cast<std::size_t>(kind)];
-  last_unsaid_ = what;
+  ++suppressed_[static_cast<std::size_t>(kind)];
+  last_suppressed_ = what;
 }
 
 /// After a crowded spell the next one begins at once, in which visits are only counted.
@@ -35,16 +35,16 @@ void VisitLog::begin_spell() {
 }
 
 void VisitLog::sum_up() {
-  const auto unsaid = std::exchange(unsaid_, {});
-  if (std::accumulate(unsaid.begin(), unsaid.end(), std::uint64_t{0}) == 0) return;
-  const auto count = [&](Kind kind) { return unsaid[static_cast<std::size_t>(kind)]; };
+  const auto suppressed = std::exchange(suppressed_, {});
+  if (std::accumulate(suppressed.begin(), suppressed.end(), std::uint64_t{0}) == 0) return;
+  const auto count = [&](Kind kind) { return suppressed[static_cast<std::size_t>(kind)]; };
   log_.info("clients come and go", {{"sonar", sonar_},
                                     {"connected", count(Kind::connected)},
                                     {"gone", count(Kind::gone)},
                                     {"refused", count(Kind::refused)},
                                     {"wait", count(Kind::waits)},
                                     {"within_s", spell_.count() / 1000},
-                                    {"last", last_unsaid_}});
+                                    {"last", last_suppressed_}});
 }
 
 void VisitLog::end() {

@@ -34,8 +34,8 @@ class VisitLog {
   bool in_spell_ = false, ended_ = false;
   bool crowded_ = false;  // the previous spell had too many visits, so this one is only summarised
   int visits_ = 0;        // visits in this spell
-  std::array<std::uint64_t, static_cast<std::size_t>(Kind::kinds)> unsaid_{};
-  std::string last_unsaid_;
+  std::array<std::uint64_t, static_cast<std::size_t>(Kind::kinds)> suppressed_{};
+  std::string last_suppressed_;
 };
 
 }  // namespace sonar

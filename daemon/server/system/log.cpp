@@ -109,23 +109,23 @@ void Log::emit(LogLevel level, std::string_view phrase, const std::vector<LogFie
   sink_->logger.log(spdlog_level(level), spdlog::string_view_t(line));
 }
 
-bool LogLimiter::allows(Clock::time_point now, std::uint64_t& unsaid) {
+bool LogLimiter::allows(Clock::time_point now, std::uint64_t& suppressed) {
   // A token bucket: one token per second, at most five; each line needs one.
   if (last_ != Clock::time_point{}) tokens_ = std::min(5.0, tokens_ + std::chrono::duration<double>(now - last_).count());
   last_ = now;
   if (tokens_ < 1) {
-    ++swallowed_;
+    ++suppressed_;
     return false;
   }
   tokens_ -= 1;
-  unsaid = std::exchange(swallowed_, 0);
+  suppressed = std::exchange(suppressed_, 0);
   return true;
 }
 
 void log_limited(Log& log, LogLimiter& limiter, LogLevel level, std::string_view phrase, std::vector<LogField> fields) {
-  std::uint64_t unsaid = 0;
-  if (!limiter.allows(LogLimiter::Clock::now(), unsaid)) return;
-  if (unsaid > 0) fields.emplace_back("unsaid", unsaid);
+  std::uint64_t suppressed = 0;
+  if (!limiter.allows(LogLimiter::Clock::now(), suppressed)) return;
+  if (suppressed > 0) fields.emplace_back("suppressed", suppressed);
   log.write(level, phrase, fields);
 }
 

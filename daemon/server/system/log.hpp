@@ -39,13 +39,14 @@ class Log {
 class LogLimiter {
  public:
   using Clock = std::chrono::steady_clock;
-  /// Returns true if the line should be written. `unsaid` is set to the number of suppressed lines since the last one.
-  bool allows(Clock::time_point now, std::uint64_t& unsaid);
+  /// Returns true if the line should be written. Then `suppressed` is the number of lines
+  /// suppressed since the last written one.
+  bool allows(Clock::time_point now, std::uint64_t& suppressed);
 
  private:
   double tokens_ = 5;
   Clock::time_point last_{};
-  std::uint64_t swallowed_ = 0;
+  std::uint64_t suppressed_ = 0;
 };
 
 /// Writes a line if its limiter allows it. The first line after suppressed ones states their number.
