@@ -66,9 +66,9 @@ bool FileResolver::resolve(PlacedShape& placed) {
 void FileResolver::report_missing() {
   if (missing_.empty()) return;
   std::string text = missing_.front().what +
-                     ": no such file here; give the folder that holds it with --model-path, or continue without it with "
+                     ": the file was not found; give the folder that holds it with --model-path, or continue without it with "
                      "--skip-missing";
-  for (std::size_t i = 1; i < missing_.size(); ++i) text += (i == 1 ? "; neither are there: " : ", ") + missing_[i].what;
+  for (std::size_t i = 1; i < missing_.size(); ++i) text += (i == 1 ? "; also missing: " : ", ") + missing_[i].what;
   std::vector<std::string> commands;  // one a model
   for (const Missing& m : missing_)
     if (!m.fetch.empty() && std::find(commands.begin(), commands.end(), m.fetch) == commands.end()) commands.push_back(m.fetch);

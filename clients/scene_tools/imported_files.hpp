@@ -1,5 +1,5 @@
-// Finds the mesh and heightmap files that an imported world names, tries them with the scene's loader, and converts those that a
-// scene cannot express. Internal to import_scene.
+// Finds the mesh and heightmap files that an imported world names, and tests whether the scene's loader can read them. A scene
+// file has one positive scale for a mesh, so meshes with other scales are written again, scaled. Used by import_scene.
 #pragma once
 
 #include <filesystem>
@@ -15,9 +15,10 @@ namespace sonar::scene_tools {
 class FileResolver {
  public:
   FileResolver(const Library& library, std::filesystem::path scene, bool skip_missing, bool try_files, Findings& findings);
-  /// Sets the entry of the scene for a shape from a file. Returns false if the file is missing, or omitted and listed.
+  /// Sets path, scale and size of a shape that comes from a file. Returns false if the file is missing, or if it cannot be used
+  /// and is listed as omitted.
   bool resolve(PlacedShape& placed);
-  /// Fails if files were not found and must not be skipped; the error names each file once.
+  /// Reports an error if files are missing and must not be skipped; it names each file once.
   void report_missing();
   /// Writes the meshes that had to be converted into a folder beside the scene.
   Result<void> write_converted();
@@ -40,7 +41,7 @@ class FileResolver {
   };
   std::vector<Missing> missing_;
   std::map<std::filesystem::path, std::string> tried_;      // why a mesh cannot be used; empty if it can
-  std::map<std::string, std::string> known_conversions_;    // by file and scale: the path to write
+  std::map<std::string, std::string> known_conversions_;    // by file and scale: the path of the scaled mesh
   std::map<std::filesystem::path, std::string> converted_;  // file to write, its text
 };
 

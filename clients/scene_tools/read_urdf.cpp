@@ -53,7 +53,7 @@ class UrdfReader {
     const std::string_view kind = element.name();
     if (kind == "link") {
       if (!links_.insert(std::string(element.attribute("name"))).second)
-        findings_.fail(element.place(), called(element) + ": a name used twice");
+        findings_.fail(element.place(), called(element) + ": the name is used twice");
     } else if (kind == "joint") {
       read_joint(element);
     } else if (kind != "material") {

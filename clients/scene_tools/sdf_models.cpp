@@ -14,7 +14,7 @@ constexpr std::size_t most_models = 4096, most_elements = 5'000'000;
 
 bool is_true(std::string_view text) { return text == "true" || text == "1"; }
 
-/// The kind of a well-known model without an echo of its own, which is left out even where it is found. Empty for all others.
+/// Returns the kind of a well-known model that has no echo, which is omitted even if it is found. Empty for all others.
 std::string known_kind_without_echo(std::string_view name) {
   if (name == "sun") return "light";
   if (name == "sky" || name == "skybox") return "sky";
@@ -23,7 +23,7 @@ std::string known_kind_without_echo(std::string_view name) {
   return {};
 }
 
-/// The kind of a model that is not found and probably has no echo. Empty for all others.
+/// Returns the kind of a model that was not found and probably has no echo. Empty for all others.
 std::string probable_kind_without_echo(std::string_view name) {
   if (name == "axes" || name.ends_with(" frame")) return "coordinate frame";
   return name == "ocean" ? "drawn water surface" : "";
@@ -78,7 +78,7 @@ void SdfTree::report_missing() {
   }
   if (options_.skip_missing) return;
   findings_.fail(missing_.front().at,
-                 "include: models that are not here; fetch them, give the folder that holds them with --model-path, or continue "
+                 "include: models were not found; fetch them, give the folder that holds them with --model-path, or continue "
                  "without them with --skip-missing:" +
                      list);
 }
@@ -116,8 +116,9 @@ void SdfTree::add_frame(SdfModel& model, const Element& element, std::string bas
   frame.base = std::move(base);
   const auto [place, is_new] = model.frames.try_emplace(name, frame);
   if (is_new || !is_link) return;
-  if (place->second.element.name() == "link") return findings_.fail(element.place(), called(element) + ": a name used twice");
-  place->second = std::move(frame);  // joints may share names with links
+  if (place->second.element.name() == "link")
+    return findings_.fail(element.place(), called(element) + ": the name is used twice");
+  place->second = std::move(frame);  // replaces that of a joint with the same name
 }
 
 void SdfTree::add_model(SdfModel& parent, const Element& element, const Element& include, int include_depth) {
@@ -188,7 +189,7 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
   if (elements_ > most_elements) return findings_.fail(include.place(), "include: more than 5 million elements altogether");
   const Element root = file->root();
   if (root.name() != "sdf")
-    return findings_.fail(root.place(), std::string("<") + plain(root.name()) + "> where an included model needs <sdf>" +
+    return findings_.fail(root.place(), std::string("an included file must begin with <sdf>, not <") + plain(root.name()) + ">" +
                                             (root.name() == "robot" ? "; import a URDF by itself" : ""));
   if (const Element model = root.child("model")) return add_model(parent, model, include, include_depth + 1);
   if (root.child("light")) return findings_.leave_out_of_no_echo("light");
@@ -230,7 +231,8 @@ std::string nearest_frame(const SdfModel& model, const std::string& name) {
   return text::suggestion(name, views, "there are");
 }
 
-/// The model that has a frame of that name: this one, or one that was merged into it, which may have it from a further one.
+/// Returns the model that has a frame of that name: this one, or one that was merged into it, perhaps through others. Null if
+/// none has it.
 SdfModel* holder_of(SdfModel& model, const std::string& name) {
   if (model.frames.contains(name)) return &model;
   const auto found = std::find_if(model.nested.begin(), model.nested.end(),

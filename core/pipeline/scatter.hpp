@@ -1,5 +1,5 @@
 // Stage two: computes the echo of each visible surface cell: position on the sample grid, column, amplitude and carrier phase.
-// The speckle is fixed to the surface. Scatters the fixed fan and point targets, too.
+// The speckle is fixed to the surface. It also computes the echoes of the fixed fan and of point targets.
 #pragma once
 
 #include <complex>

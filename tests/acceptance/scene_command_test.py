@@ -106,7 +106,7 @@ class SceneCommand(unittest.TestCase):
         self.assertIn("--overwrite", self.ctl("import", WORLDS / "quay.world", "--out", self.scene, code=64))
         world = self.path / "w.sdf"
         world.write_text('<sdf version="1.9"><world name="w">\n<include><uri>model://gone</uri></include></world></sdf>', encoding="utf-8")
-        self.assertIn("w.sdf:2: include: models that are not here", self.ctl("import", world, "--out", self.path / "o.yaml", code=65))
+        self.assertIn("w.sdf:2: include: models were not found", self.ctl("import", world, "--out", self.path / "o.yaml", code=65))
         self.assertIn("nothing in it has a shape that a scene can hold; left out: w.sdf:2: include of model://gone: not found",
                       self.ctl("import", world, "--out", self.path / "o.yaml", "--skip-missing", code=65))
         self.assertFalse((self.path / "o.yaml").exists())

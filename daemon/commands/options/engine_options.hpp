@@ -1,5 +1,5 @@
-// Options of the engine and of the model's parts, the same for every command that pings: run, render and bench. Values from the
-// command line or the environment override the file.
+// Options of the engine and of the model's parts, shared by `sonard run`, `sonard render` and the benchmark (tests/bench). Values
+// from the command line or the environment override those of the file.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ class App;
 
 namespace sonar {
 
-/// Empty = as the configuration says.
+/// Empty members leave the values of the configuration.
 struct EngineOptionsGiven {
   std::string device, simd, mode;
   std::optional<int> threads;
@@ -35,7 +35,8 @@ void add_device_option(CLI::App& app, EngineOptionsGiven& given);
 void add_model_options(CLI::App& app, EngineOptionsGiven& given);
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given);
 
-/// Refuses (usage) an option that switches on a part without effect in this mode or fixed fan. In the file this is not an error.
+/// Errors: usage, if an option switches on a part that has no effect in this mode or with this fixed fan. A part that the file
+/// switches on is not refused here.
 Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);
 
 }  // namespace sonar

@@ -23,7 +23,8 @@ struct ReplayCommand {
 };
 
 void add_replay_options(CLI::App& app, ReplayCommand& replay);
-/// Serves until the recording is over or a signal comes.
+/// Serves until a driver has received the whole recording, or until SIGINT or SIGTERM. With `loop`, and for recordings of scans,
+/// only a signal ends it.
 Result<void> run_replay(const ReplayCommand& command);
 
 }  // namespace sonar

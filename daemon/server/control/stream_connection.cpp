@@ -12,7 +12,7 @@ namespace {
 using control::response_of;
 using control::StatusCode;
 
-constexpr std::size_t longest_before_hello = 4096;  // smaller than the limit after Hello
+constexpr std::size_t longest_before_hello = 4096;  // bytes that a client may send before its Hello is accepted
 constexpr std::size_t work_of_a_turn = 4096;        // bytes, after which other connections have their turn
 constexpr std::size_t least_work = 64;              // cost of a message in addition to its bytes
 constexpr std::size_t skipping_is_cheaper = 16;     // factor by which skipping a pose costs less than accepting it
@@ -25,7 +25,7 @@ StatusCode code_of(OperationResult::Code code) {
                                                   : StatusCode::failed;
 }
 
-/// Whether a request is a pose without an id, which gets no answer.
+/// Returns whether a request is a pose without an id, which is answered only if it is refused.
 bool is_unasked(std::uint64_t id, const auto& operation) {
   return id == 0 && std::holds_alternative<control::PoseSample>(operation);
 }
@@ -76,8 +76,8 @@ void StreamConnection::close() {
 
 // ---- requests
 
-/// Requests are read in turns of bounded size. A pose above the rate limit waits in `newest_pose_` until the rate allows it,
-/// another request arrives, or a newer pose replaces it.
+/// Reads requests, a bounded number of bytes at a time. A pose above the rate limit waits in `newest_pose_` until the rate allows
+/// it, another request arrives, or a newer pose replaces it.
 asio::awaitable<void> StreamConnection::read() {
   std::vector<std::byte> buffer(work_of_a_turn);
   std::size_t received = 0;
@@ -122,11 +122,11 @@ asio::awaitable<void> StreamConnection::read() {
     if (!ending_ && !over()) co_await limit_rate(work);
   }
   ending_ = true;
-  wake_writer_.cancel();  // it writes the remaining answers, then closes
+  wake_writer_.cancel();  // write() sends the remaining answers, then closes the connection
 }
 
-/// Whether a pose is above the client's share of the rate. Such poses are skipped, except the newest, so that no pose acts
-/// late.
+/// Returns whether the client has used up its share of the rate of poses. Then its poses are skipped, except the newest, so that
+/// no pose takes effect late.
 bool StreamConnection::is_beyond_pose_rate() {
   if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
   return targets_.pose_rate.left(*pose_rate_, Steady::now()) == 0;
@@ -145,7 +145,7 @@ asio::awaitable<void> StreamConnection::take_newest_pose() {
   co_await limit_rate(work);
 }
 
-/// Waits while the client is over its limits, or its address over the limit of work; input then waits in the kernel.
+/// Waits if the client has exceeded its rate of bytes, or its address the limit of work. Meanwhile input waits in the kernel.
 asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
   const auto now = Steady::now();
   auto pause = rate_.pause_after(work.bytes, now);
@@ -174,7 +174,7 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
   if (!greeted_) return refuse_and_end(request->id, StatusCode::refused, "the first message must be a Hello");
-  // Poses without an answer have their own rate limit; everything else counts as work of the address.
+  // Poses without an id have a rate limit of their own; other requests count as work of the address.
   if (is_unasked(request->id, request->op))
     work.pose_bytes += message.size() + least_work;
   else
@@ -211,7 +211,7 @@ bool StreamConnection::refuse_and_end(std::uint64_t id, StatusCode code, const s
   return false;
 }
 
-/// Always true, because no request after the greeting ends the connection.
+/// Returns true: no valid request after the greeting ends the connection.
 bool StreamConnection::accept_greeted(const control::Request& request) {
   std::visit(
       [&](const auto& op) {

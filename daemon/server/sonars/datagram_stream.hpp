@@ -1,6 +1,6 @@
 // Sends the messages of an emulated sonar as datagrams: to all receivers of a port of kind udp_stream, or to the host of a port
-// of kind udp_dialogue. It sends whole messages in order, no faster than the port allows. Owned by its Device and its
-// coroutine.
+// of kind udp_dialogue. It sends whole messages in order, and pauses between the datagrams of a message. Owned by its Device and
+// its coroutine.
 #pragma once
 
 #include <chrono>
@@ -13,7 +13,7 @@ namespace sonar {
 
 class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
  public:
-  /// `socket` and `parent` must outlive it. `gap`: shortest time between two datagrams of a ping.
+  /// `socket` and `parent` must outlive it. `gap`: shortest time between two datagrams of a message.
   DatagramStream(SessionParent& parent, udp::socket& socket, ConnectionId id, std::chrono::nanoseconds gap)
       : parent_(parent), socket_(socket), id_(id), gap_(gap), wake_(socket.get_executor()), pause_(socket.get_executor()) {}
 
@@ -46,7 +46,7 @@ class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
   std::chrono::nanoseconds gap_;
   asio::steady_timer wake_, pause_;
   std::chrono::steady_clock::time_point began_at_ = std::chrono::steady_clock::now(), heard_at_ = began_at_, looked_at_;
-  int looks_ = 0;  // number of looks since heard_at_
+  int looks_ = 0;  // number of probes of the silent host since heard_at_
   bool finishing_ = false, by_host_ = false;
   std::string why_;
 };

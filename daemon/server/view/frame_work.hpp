@@ -1,6 +1,6 @@
-// Counts the WebSocket frames of a viewer, because each frame costs time in addition to its bytes. The library does not report
-// empty fragments and control frames (RFC 6455, 5.2). FrameWork parses only the headers of frames; bytes may arrive in any
-// pieces.
+// Computes the work that the WebSocket frames of a viewer cause: each frame costs time in addition to its bytes. FrameWork parses
+// the headers of frames itself, because the library reports neither empty fragments nor control frames (RFC 6455, 5.2). The
+// bytes may arrive in any pieces.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@ class FrameWork {
   }
 
  private:
-  /// Parses one byte of a frame header; returns the work of the frame with its first byte, else 0.
+  /// Parses one byte of a frame header. Returns the fixed work of the frame if the byte is the first of the header, else 0.
   std::size_t take(std::uint8_t byte) {
     std::size_t work = 0;
     if (at_ == 0) {

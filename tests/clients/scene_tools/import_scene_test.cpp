@@ -245,9 +245,9 @@ TEST_F(ImportScene, FilesThatASceneCannotReadAreLeftOut) {
   EXPECT_THAT(done->left_out, ElementsAre(HasSubstr("a.fbx: a scene reads OBJ"), HasSubstr("bad.stl"), HasSubstr("h.tif"),
                                           HasSubstr("no.png: ")));
   EXPECT_THAT(text(), HasSubstr("#   w.sdf:3: mesh a.fbx: a scene reads OBJ, STL, PLY, glTF, GLB and DAE\n"));
-  EXPECT_THAT(error(sdf(model("a", mesh("gone.stl")))), HasSubstr("w.sdf:3: mesh gone.stl: no such file here"));
+  EXPECT_THAT(error(sdf(model("a", mesh("gone.stl")))), HasSubstr("w.sdf:3: mesh gone.stl: the file was not found"));
   EXPECT_THAT(error(sdf(model("a", mesh("gone.stl")) + model("b", mesh("lost.stl")) + model("c", mesh("gone.stl")))),
-              ::testing::EndsWith("with --skip-missing; neither are there: mesh lost.stl"));
+              ::testing::EndsWith("with --skip-missing; also missing: mesh lost.stl"));
   options.read.skip_missing = true;
   EXPECT_EQ(error(sdf(model("a", mesh("gone.stl")) + model("d", link("l")))), "no error");
 }

@@ -213,7 +213,7 @@ TEST(ReadSdf, MistakesAreToldWithFileAndLine) {
               StartsWith("w.sdf:3: pose: 6 numbers are needed here, not 3"));
   EXPECT_THAT(r.error(sdf(model("m", link("l", "<pose>1 2 3 0 0 x</pose>")))), HasSubstr("\"x\" is not a number"));
   EXPECT_THAT(r.error(sdf(model("m", link("l", "<pose>1 2 3 0 0 nan</pose>")))), HasSubstr("\"nan\" is not a number"));
-  EXPECT_THAT(r.error(sdf(model("m", link("l") + link("l")))), HasSubstr("link \"l\": a name used twice"));
+  EXPECT_THAT(r.error(sdf(model("m", link("l") + link("l")))), HasSubstr("link \"l\": the name is used twice"));
   EXPECT_THAT(r.error(sdf("<include><uri>model://gone</uri></include>")),
               ::testing::AllOf(StartsWith("w.sdf:3:"), HasSubstr("--model-path")));
   EXPECT_THAT(r.error("<sdf><world>"), StartsWith("w.sdf:1: not well-formed XML"));
@@ -229,11 +229,10 @@ TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
   const std::string rock = "https://fuel.gazebosim.org/1.0/Cole/models/Ocean Rock 03";
   const std::string world = sdf("<include><uri> " + rock + " </uri></include>\n<include><uri>" + rock + "</uri></include>\n" +
                                 "<include><uri>model://gone</uri></include>" + model("m", link("l")));
-  EXPECT_EQ(
-      r.error(world),
-      "w.sdf:3: include: models that are not here; fetch them, give the folder that holds them with --model-path, or continue "
-      "without them with --skip-missing: gz fuel download --url '" +
-          rock + "' (2 includes); model://gone");
+  EXPECT_EQ(r.error(world),
+            "w.sdf:3: include: models were not found; fetch them, give the folder that holds them with --model-path, or continue "
+            "without them with --skip-missing: gz fuel download --url '" +
+                rock + "' (2 includes); model://gone");
   r.options.skip_missing = true;
   ASSERT_TRUE(r.read(world));
   EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: include of " + rock +
