@@ -15,11 +15,12 @@ namespace {
 using text::counted;
 using text::format;
 
-constexpr std::string_view ended_by_fault = "a fault";  // Visit::why of a connection that a fault has ended
-constexpr double soon_s = 1;                            // time in which a correct driver requests pings, and reads what was sent
-constexpr double recent_s = 60;                         // visits that are longer ago are not reported
-constexpr double enough_of_rate = 0.9;                  // share of the requested rate below which the rate is reported
-constexpr std::size_t most_elsewhere = 4;               // connections to wrong addresses that are reported at a time
+// Visit::why of connections that ended through no fault of their driver.
+constexpr std::string_view ended_by_fault = "a fault", ended_by_take_over = "another client took over";
+constexpr double soon_s = 1;               // time in which a correct driver requests pings, and reads what was sent
+constexpr double recent_s = 60;            // visits that are longer ago are not reported
+constexpr double enough_of_rate = 0.9;     // share of the requested rate below which the rate is reported
+constexpr std::size_t most_elsewhere = 4;  // connections to wrong addresses that are reported at a time
 
 std::string seconds_text(double s) { return format("%.0f s", s); }
 
@@ -163,13 +164,15 @@ class SonarJudge {
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
     if (!is_recent(gone) || gone.by_itself()) return;
-    // It has connected again, and gets pings; then the other connection is of the past. A client of the same host that was
-    // connected before is another driver.
+    // It has connected again, and gets pings; then the other connection is of the past. It may connect before the first
+    // connection ends, but not before that one began: a client of the same host that did is another driver.
     const auto host = [](const std::string& address) { return address.substr(0, address.rfind(':')); };
     const bool is_back = std::any_of(sonar_.clients().begin(), sonar_.clients().end(), [&](const v1::ClientStatus& client) {
-      return client.pings_written() > 0 && host(client.address()) == host(gone.address()) && client.connected_s() <= gone.ago_s();
+      return client.pings_written() > 0 && host(client.address()) == host(gone.address()) &&
+             client.connected_s() < gone.connected_s();
     });
-    const bool got_none = gone.without_ping() && !is_back && gone.why() != ended_by_fault;
+    const bool by_others = gone.why() == ended_by_fault || gone.why() == ended_by_take_over;
+    const bool got_none = gone.without_ping() && !is_back && !by_others;
     add(got_none ? Level::fail : Level::warn, "driver",
         "The connection of " + gone.address() + " ended at " + utc_text(gone.utc_ns()) + ": " + reason_of(gone),
         got_none ? std::string(make_.remedy) : "", gone.address());

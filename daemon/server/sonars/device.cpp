@@ -201,10 +201,14 @@ void Device::on_over(ConnectionId id, const std::string& why, bool by_client) {
   const SessionPointer session = session_of(id);
   if (network_.digest && session && connection != nullptr && connection->role == Role::client)
     digests_.push_back({connection->number, session->digest().size(), session->digest().hex()});
+  std::chrono::nanoseconds lasted{};
+  if (session) lasted = session->connected_for();
+  if (const StreamPointer dialogue = stream_of(id)) lasted = dialogue->connected_for();
   sessions_.remove(session);
   streams_.remove_if([id](const StreamPointer& s) { return s->id() == id; });
   // Before the free slot is assigned, because a waiting client may have disconnected.
   forget_who_left();
+  closing_since_ = std::chrono::steady_clock::now() - lasted;
   perform(sonar_.on_closed(id, why, network_.clock.now(), by_client));
 }
 
@@ -340,6 +344,7 @@ void Device::carry_out(const Closed& action) {
     gone_ = Visit{action.peer, action.why};
     gone_->by_itself = action.by_client;
     gone_->without_ping = action.pings_written == 0;
+    gone_->connected_at = closing_since_;
     report_visit(Role::client, VisitLog::Kind::gone, "client gone: " + action.why,
                  {{"client", action.peer}, {"pings", action.pings_written}, {"dropped", action.pings_dropped}});
     parent_.on_client(*this, action.peer, false, action.why);

@@ -73,6 +73,7 @@ struct Visit {
   std::string address, why;
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
   bool by_itself = false, without_ping = false;
+  std::optional<std::chrono::steady_clock::time_point> connected_at = {};  // of a connection that ended
 };
 
 class Device final : public SessionParent {
@@ -217,9 +218,10 @@ class Device final : public SessionParent {
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
   std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>>
-      closed_;                                      // receivers that were unreachable, with the time of the next attempt
-  int refusing_ = 0, waiting_ = 0;                  // connections
-  std::optional<Visit> refused_, gone_, searched_;  // the last ones
+      closed_;                                           // receivers that were unreachable, with the time of the next attempt
+  int refusing_ = 0, waiting_ = 0;                       // connections
+  std::optional<Visit> refused_, gone_, searched_;       // the last ones
+  std::chrono::steady_clock::time_point closing_since_;  // when the connection that ends now had connected
   std::string silenced_by_;
 
   bool started_ = false, stopping_ = false;

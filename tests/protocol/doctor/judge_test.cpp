@@ -195,18 +195,23 @@ TEST(Judge, OneThatWasDisconnectedBeforeItsFirstPing) {
 }
 
 TEST(Judge, OneThatWasDisconnectedAndIsBack) {
-  const std::string gone =
-      R"(gone { address: "127.0.0.1:1" why: "is no link" utc_ns: 3723000000000 without_ping: true ago_s: 5 })";
+  const auto left = [](const std::string& address, const std::string& connected_s) {
+    return R"(gone { address: ")" + address + R"(" why: "is no link" utc_ns: 3723000000000 without_ping: true ago_s: 2 )" +
+           "connected_s: " + connected_s + " }";
+  };
+  const std::string gone = left("127.0.0.1:1", "5");
   EXPECT_TRUE(any_fails(with(pinging + silent + "}" + gone))) << "connected, without a ping";
-  EXPECT_TRUE(
-      any_fails(with(pinging + silent + R"(pings_written: 3 } gone { address: "127.0.0.1:1" without_ping: true ago_s: 2 })")))
+  EXPECT_TRUE(any_fails(with(pinging + silent + "pings_written: 3 }" + left("127.0.0.1:1", "2.5"))))
       << "another driver of that host, which was connected before";
   const Finding f = trouble(with(pinging + silent + "pings_written: 3 }" + gone), "driver");
   EXPECT_EQ(f.level, Level::warn);
   EXPECT_EQ(f.cure, "");
-  EXPECT_TRUE(
-      any_fails(with(pinging + silent + R"(pings_written: 3 } gone { address: "127.0.0.9:1" without_ping: true ago_s: 5 })")))
-      << "another driver";
+  EXPECT_TRUE(any_fails(with(pinging + silent + "pings_written: 3 }" + left("127.0.0.9:1", "5")))) << "another driver";
+}
+
+TEST(Judge, OneThatAnotherClientReplaced) {
+  const std::string gone = R"(gone { address: "10.0.0.7:1" why: "another client took over" without_ping: true ago_s: 2 })";
+  EXPECT_EQ(trouble(with(pinging + driver + gone), "driver").level, Level::warn);
 }
 
 /// The driver has done what it must; the fault itself is reported as long as it acts.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "daemon/server/sonars/session.hpp"
+#include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -249,6 +250,9 @@ TEST(Admission, TakeOverEndsTheOldOneAtAMessageBoundary) {
   reader.join();
   EXPECT_TRUE(whole) << "FIN";
   EXPECT_EQ(old.decoder.buffered_bytes(), 0u);
+  ASSERT_TRUE(eventually([&] { return daemon.status().sonars(0).has_gone(); }));
+  const auto status = daemon.status();
+  EXPECT_GT(status.sonars(0).gone().connected_s(), status.sonars(0).clients(0).connected_s()) << "the old one connected first";
 }
 
 TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
