@@ -84,15 +84,19 @@ void MavlinkPoses::clear_histories() {
   ++resets_;
 }
 
+bool MavlinkPoses::is_excluded(const Frame& frame) const {
+  return (settings_.system_id != 0 && frame.system != settings_.system_id) ||
+         (settings_.component_id != 0 && frame.component != settings_.component_id);
+}
+
 /// Whether the frame is from the selected system. Selects one if there is none: the configured system, or else the first that
 /// sends a pose or the heartbeat of an autopilot. Another one is selected only after the first has been silent for
 /// system_silence.
 bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   if (frame.system == self_.system && frame.component == own_component)
     return false;  // sent by this component, returned by a router
-  if (settings_.component_id != 0 && frame.component != settings_.component_id) return false;
+  if (is_excluded(frame)) return false;
   if (settings_.system_id != 0) {
-    if (frame.system != settings_.system_id) return false;
     if (!system_) select_vehicle(frame.system, now);
     return true;
   }

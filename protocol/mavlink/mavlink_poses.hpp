@@ -122,6 +122,8 @@ class MavlinkPoses {
   static bool contains_pose(std::uint32_t id);
   /// Whether only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
   static bool identifies_vehicle(const Frame& frame);
+  /// Whether system_id or component_id select other senders.
+  bool is_excluded(const Frame& frame) const;
   bool is_from_vehicle(const Frame& frame, Time now);
   bool is_selected_component(const Frame& frame, Time now);
   void select_vehicle(std::uint8_t system, Time now);

@@ -98,7 +98,7 @@ bool MavlinkPoses::identifies_vehicle(const Frame& frame) {
 void MavlinkPoses::note_ignored(const Frame& frame, Reaction& out) {
   if (frame.component == own_component) return;
   ignored_ = {frame.system, frame.component};
-  if (system_ && identifies_vehicle(frame)) tell_ignored(frame, out);
+  if (system_ && !is_excluded(frame) && identifies_vehicle(frame)) tell_ignored(frame, out);
 }
 
 /// Each system and component is named once: two vehicles at one port are a mistake that nothing else shows.

@@ -231,6 +231,24 @@ TEST(MavlinkReports, WhoIsIgnoredBesideTheVehicleIsNamedOnce) {
   }
 }
 
+TEST(MavlinkReports, WhoIsExcludedBySettingsIsNotNamed) {
+  Sender one{{7, 1, 0}}, companion{{7, 191, 0}}, two{{8, 1, 0}}, its_companion{{8, 191, 0}};
+  const auto notices = [&](std::uint8_t system, std::uint8_t component, const Bytes& other) {
+    Settings settings;
+    settings.system_id = system;
+    settings.component_id = component;
+    MavlinkPoses poses(settings);
+    EXPECT_TRUE(poses.on_datagram(one(odometry(1, 0)), at_s(0)).from_vehicle);
+    return poses.on_datagram(other, at_s(0.1)).notices;
+  };
+  EXPECT_THAT(notices(7, 0, two(odometry(1, 0))), IsEmpty());
+  EXPECT_THAT(notices(7, 0, companion(odometry(1, 0))), ElementsAre(HasSubstr("component_id selects another")));
+  EXPECT_THAT(notices(0, 1, companion(odometry(1, 0))), IsEmpty());
+  EXPECT_THAT(notices(0, 1, its_companion(odometry(1, 0))), IsEmpty());
+  EXPECT_THAT(notices(0, 1, two(odometry(1, 0))), ElementsAre(HasSubstr("select one by system_id")));
+  EXPECT_THAT(notices(7, 1, its_companion(odometry(1, 0))), IsEmpty());
+}
+
 TEST(MavlinkReports, AnotherSystemIsReportedToo) {
   MavlinkPoses poses({});
   poses.on_datagram(Sender{{1, 1, 0}}(odometry(1, 0)), at_s(0));
