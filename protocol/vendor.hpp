@@ -1,4 +1,4 @@
-// The only interface between the daemon and a vendor's protocol. A Vendor encodes pings and beacons; its Dialogues are the
+// The interface between an emulated sonar and a vendor's protocol. A Vendor encodes pings and beacons; its Dialogues are the
 // conversations with clients. All are pure: no sockets, no clock, no log. The daemon has the time and the send buffers.
 #pragma once
 

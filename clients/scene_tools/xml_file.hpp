@@ -1,5 +1,5 @@
-// XML files for the importers: elements with their positions in the file, and a list of errors and omissions. Only this file uses
-// tinyxml2; it limits all sizes, so that the readers can accept any text.
+// XML files for the importers: elements with their positions in the file, and a list of errors and omissions. Only xml_file.cpp
+// uses tinyxml2; it limits all sizes, so that the readers can accept any text.
 #pragma once
 
 #include <cstddef>

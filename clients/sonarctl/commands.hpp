@@ -1,5 +1,5 @@
-// The commands of sonarctl, one function each; main.cpp fills the options from the command line. Results go to standard output,
-// errors are returned as one sentence with the ErrorKind that determines the exit code.
+// The commands of sonarctl, one function each; command_line.hpp fills the options from the command line. Results go to standard
+// output, errors are returned as one sentence with the ErrorKind that determines the exit code.
 #pragma once
 
 #include <cstdint>

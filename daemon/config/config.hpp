@@ -1,5 +1,5 @@
-// The configuration file as a tree of structs with defaults, read and validated once (docs/configuration.md). No other part of
-// the daemon reads settings.
+// The configuration file as a tree of structs with defaults, read and validated once (docs/configuration.md). Options of the
+// command line and environment variables override values in it.
 #pragma once
 
 #include <array>

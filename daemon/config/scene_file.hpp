@@ -1,4 +1,4 @@
-// Resolves the name of a scene: a file on disk, else a scene built into the program. Only this file does so.
+// Resolves the name of a scene: a file on disk, else a scene built into the program.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// The whole daemon: the world, the pose listeners and a Device for each sonar, run by one I/O thread until it must stop. main.cpp
-// and the tests create one; tests pass a factory of fake engines.
+// The whole daemon: the world, the pose listeners and a Device for each sonar, run by one I/O thread until it must stop. `sonard
+// run` and the tests create one; tests pass a factory of fake engines.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
 // Requests to a running daemon as plain structs: the messages of control.proto, checked and in sonard's frames (world ENU, body
-// FLU, SI). protocol/control converts from protobuf and JSON; daemon/server/api/operations.hpp executes them. Answers and
+// FLU, SI). protocol/control converts from protobuf and JSON; daemon/server/operations carries them out. Answers and
 // events are protobuf classes (protocol/control/answers.hpp).
 #pragma once
 

@@ -1,5 +1,5 @@
 // A received pose, checked and converted to our frames: world ENU, body FLU, SI units, int64 nanoseconds. protocol/control
-// makes these from protobuf and JSON; daemon/emulator/world/world.hpp keeps them.
+// makes these from protobuf and JSON, protocol/mavlink from MAVLink; daemon/emulator/world/world.hpp keeps them.
 #pragma once
 
 #include <array>

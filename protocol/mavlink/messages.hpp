@@ -1,7 +1,7 @@
-// The MAVLink messages with poses, and commands. Fields are in wire order: base fields sorted by size, then extensions in the
-// order of their addition. Each row's number, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and common.xml of
-// the MAVLink project; a test computes CRC_EXTRA and lengths from the fields below. protocol/mavlink/frames.hpp reads and
-// writes them.
+// The MAVLink messages with poses and distances, and commands. Fields are in wire order: base fields sorted by size, then
+// extensions in the order of their addition. Each row's number, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and
+// common.xml of the MAVLink project; a test computes CRC_EXTRA and lengths from the fields below. protocol/mavlink/frames.hpp
+// reads and writes them.
 #pragma once
 
 #include <array>

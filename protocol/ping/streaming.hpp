@@ -1,4 +1,4 @@
-// The part that Surveyor, Omniscan and Ping1D share: they send pings by TCP or UDP while a host enables them.
+// The part that Surveyor, Omniscan, Ping1D and S500 share: they send pings by TCP or UDP while a host enables them.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // Opens recordings of any format, recognised by their first bytes: captures (pcap, pcapng), MCAP, a make's own format, raw
-// dumps. Used by `sonard replay`, and by `sonarctl` for --from.
+// dumps. Used by `sonard replay`, the live view, and `sonarctl` for --from.
 #pragma once
 
 #include <filesystem>

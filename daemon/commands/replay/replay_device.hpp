@@ -1,4 +1,5 @@
-// The sonar of a recording, as its status datagram describes it: read from the recording, but with the local addresses.
+// The sonar of a recording: for an Oculus the recorded status datagram describes it, but with the local addresses; for other
+// makes the vendor and the state of the device do.
 #pragma once
 
 #include <memory>
@@ -13,7 +14,7 @@ namespace sonar {
 /// An Oculus, which sends by itself, or a sonar that answers its hosts.
 struct ReplayDevice {
   oculus::StatusMessage status;
-  bool recorded_status = false;              // if false, it is made up from the device id
+  bool recorded_status = false;              // if false, it is made from the device id
   const protocol::Make* make = nullptr;      // null: an Oculus
   const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null; and its state
   std::shared_ptr<protocol::DeviceState> state;

@@ -1,8 +1,8 @@
 // Serves a recording as the recorded sonar would: over TCP, to one client at a time, its messages byte for byte; and status
 // datagrams. A sonar that sends pings on request answers its host, and sends them once the host requests them: an ARIS as
 // datagrams to the receivers that its controller sets; a Sonar 3D-15 in the same way, to the receivers set over HTTP, as for one
-// client that does not leave. This is all of `sonard replay` except its command line; it has one thread beside that of ReadAhead,
-// no scene and no engine.
+// client that does not leave. It has no scene and no engine. RequestedReplay serves the sonars whose
+// hosts decide which pings they get.
 #pragma once
 
 #include <functional>

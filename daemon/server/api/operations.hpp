@@ -1,5 +1,5 @@
-// Operations of a running daemon, for the servers of the control protocol: the App carries them out, the stream server and the
-// HTTP server only translate. I/O thread only.
+// Operations of a running daemon, for the servers of the control protocol: AppOperations carries them out; the stream server
+// and the HTTP server only translate. I/O thread only.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-// The thread that writes files: recordings and the journal of faults. The I/O thread never waits for a disk; it passes jobs to
-// this thread, which runs them in order. App owns it.
+// The thread that writes files: recordings and the journal of faults. The I/O thread passes jobs to it, so that it need not wait
+// for a disk; jobs run in order. App owns it.
 #pragma once
 
 #include <unistd.h>
