@@ -76,8 +76,8 @@ struct DecodedPing {
   PingHead head;
   wire::Bytes samples;
 };
-/// bad_data: an invalid ping. fields(PingHead) cannot read the payload, because it describes pings of the emulated sonar, which
-/// fills five of the eleven navigation fields; the protocol allows any of them.
+/// Errors: bad_data for an invalid ping. fields(PingHead) cannot read the payload, because it describes pings of the emulated
+/// sonar, which fills five of the eleven navigation fields; the protocol allows any of them.
 Result<DecodedPing> read_ping(wire::BytesView payload) {
   constexpr std::size_t fixed = wire::wire_size<PingHead>() - 8 - 4 * 4 - 4;  // bytes before the navigation data
   DecodedPing ping;

@@ -40,8 +40,8 @@ Bytes encode_response(v1::Response response);
 /// Encodes the datagram of a pose, for senders, in the frame `sent_in`.
 Bytes encode_pose_datagram(const PoseSample& sample);
 Bytes encode_request(const Request& request);
-/// Reads a response. bad_data: the bytes are not a Response, a number is NaN or infinite, the norm of an orientation is not 1,
-/// or the kind of an event is unknown.
+/// Reads a response. Errors: bad_data if the bytes are not a Response, a number is NaN or infinite, the norm of an
+/// orientation is not 1, or the kind of an event is unknown.
 Result<std::shared_ptr<const v1::Response>> decode_response(BytesView message);
 
 // ---- requests and messages in protobuf's JSON mapping, for HTTP and for users

@@ -44,7 +44,8 @@ struct PlaybackControl {
   Time to{};  // target of a seek
   std::string request;
 };
-/// Reads a frame that a viewer sent. bad_data: it is too short, its lengths do not fit, or its opcode is not one of a viewer.
+/// Reads a frame that a viewer sent. Errors: bad_data if it is too short, its lengths do not fit, or its opcode
+/// is not one of a viewer.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame);
 
 /// The bytes of a call or a playback control, as a viewer sends them; for tests and clients.

@@ -51,7 +51,7 @@ using Received = std::variant<DecodedPing, DummyMessage, UserConfigMessage, LogT
 Received decode_message(wire::BytesView message);
 /// nullopt if the message is shorter than the fixed part.
 std::optional<DecodedPing> decode_ping(wire::BytesView message);
-/// Decodes a status datagram. bad_data: fewer than 142 bytes, or a wrong magic.
+/// Decodes a status datagram. Errors: bad_data for fewer than 142 bytes or a wrong magic.
 Result<StatusMessage> decode_status(wire::BytesView datagram);
 
 /// Decodes the TCP stream of a device, in chunks of any size. Lengths above reply_limit are junk; nothing is allocated for

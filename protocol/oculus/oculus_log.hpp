@@ -69,7 +69,7 @@ inline constexpr std::uint16_t oculus_message_item = 10, oculus_time_item = 1010
 static_assert(wire::wire_size<OculusLogHeader>() == 48);
 static_assert(wire::wire_size<OculusLogItem>() == 40);
 
-/// Reads a log of version 1. bad_data: another kind of file, a log of version 2, or an encrypted one.
+/// Reads a log of version 1. Errors: bad_data for another kind of file, a log of version 2, or an encrypted one.
 Result<std::unique_ptr<RecordingReader>> read_oculus_log(std::unique_ptr<Source> source);
 /// Writes the messages of the device's TCP stream; the format cannot store the bytes between messages.
 std::unique_ptr<RecordingWriter> write_oculus_log(std::unique_ptr<Sink> sink);

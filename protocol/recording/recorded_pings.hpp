@@ -21,7 +21,7 @@ std::vector<RecordedPing> decode_next(protocol::Host& host, const protocol::Make
 
 class RecordedPings {
  public:
-  /// bad_data: the recording contains no ping of a known sonar.
+  /// Errors: bad_data if the recording contains no ping of a known sonar.
   static Result<RecordedPings> open(std::unique_ptr<RecordingReader> reader);
 
   /// nullopt at the end.

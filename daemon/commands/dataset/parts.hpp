@@ -15,7 +15,7 @@ std::string ping_key(std::uint64_t number);
 std::filesystem::path part_file(const std::filesystem::path& set, std::uint64_t shard);
 
 /// `pixels`: samples by class; `images`: by ping `id`, `width`, `height`, `negative`, `scene` (equal for equal scenes), `draws`
-/// and `annotations`. bad_data: it cannot be read.
+/// and `annotations`. Errors: bad_data if it cannot be read.
 Result<nlohmann::json> read_part(const std::filesystem::path& set, std::uint64_t shard);
 
 nlohmann::json read_json(const std::filesystem::path& file);

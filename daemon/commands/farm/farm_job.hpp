@@ -45,7 +45,7 @@ Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const s
 /// in neither.
 Result<std::filesystem::path> receive_files(const FarmJob& record, const std::filesystem::path& files, Queue& queue);
 
-/// Reads the job file of receive_files(). bad_data: its size differs from the record.
+/// Reads the job file of receive_files(). Errors: bad_data if its size differs from the record.
 Result<dataset::DatasetJob> load_files(const FarmJob& record, const std::filesystem::path& file);
 
 /// A sentence if this program would make other bytes than the submitting one, else empty.

@@ -50,7 +50,8 @@ class OutputFolder {
   int lock_ = -1;  // an open folder with the lock on it; -1 where the file system has no locks
 };
 
-/// Writes the parts into one file, which is renamed when complete. io: a full disk, a folder that is missing or not writable.
+/// Writes the parts into one file, which is renamed when complete. Errors: io if the disk
+/// is full, or the folder is missing or not writable.
 Result<void> write_output(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts);
 
 }  // namespace sonar::render

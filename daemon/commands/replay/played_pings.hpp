@@ -24,7 +24,8 @@ class PlayedPings {
 
   /// `codec` must have ping_part. Both must outlive the object.
   PlayedPings(recording::RecordingReader& reader, const recording::Codec& codec) : reader_(reader), codec_(codec) {}
-  /// Reads the first ping, or all of a scan. bad_data: there is no ping, or a scan is too long; `file` is for the error.
+  /// Reads the first ping, or all of a scan. Errors: bad_data if there is no ping or a scan is too
+  /// long; they name `file`.
   Result<void> open(const std::string& file);
   /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all others.
   bool is_scan() const { return !lines_.empty(); }

@@ -22,7 +22,7 @@ class RequestedReplay final : public DeviceParent {
   RequestedReplay(asio::io_context& io, recording::RecordingReader& reader, const ReplayDevice& device, ReplayOptions options,
                   Log& log);
 
-  /// Opens all ports. unavailable; bad_data: the recording holds no ping. `file` is for errors.
+  /// Opens all ports. Errors: unavailable; bad_data if the recording holds no ping. They name `file`.
   Result<void> open(const std::string& file);
   /// Serves in io.run(), which returns when all pings were sent (neither with `loop` nor of a scan) or after stop().
   void start();

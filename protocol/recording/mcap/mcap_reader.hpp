@@ -12,7 +12,7 @@ namespace sonar::recording::mcap {
 
 class Reader {
  public:
-  /// bad_data: the magic number is missing.
+  /// Errors: bad_data if the magic number is missing.
   static Result<Reader> open(std::unique_ptr<Source> source);
 
   std::optional<Message> next();

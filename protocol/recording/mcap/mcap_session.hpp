@@ -48,7 +48,7 @@ class McapSession final : public RecordingWriter {
   std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, labels_, share_, caster_, instances_, faults_;
 };
 
-/// Reads the vendor's messages of the named sonar; without a name, of the first one. bad_data: not an MCAP file.
+/// Reads the vendor's messages of the named sonar; without a name, of the first one. Errors: bad_data if it is not an MCAP file.
 Result<std::unique_ptr<RecordingReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar = {});
 
 }  // namespace sonar::recording

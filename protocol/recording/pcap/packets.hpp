@@ -21,7 +21,7 @@ struct Packet {
 class PacketReader {
  public:
   static constexpr std::size_t longest_packet = 256 << 10;  // tcpdump's own bound
-  /// bad_data: the source is not a capture file.
+  /// Errors: bad_data if the source is not a capture file.
   static Result<PacketReader> open(Source& source);
 
   std::optional<Packet> next();

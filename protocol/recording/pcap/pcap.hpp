@@ -17,7 +17,7 @@ struct PcapReading {
 };
 /// Reads all connections of one sonar, one after the other, and its status datagrams; if it sends pings by UDP, all its
 /// datagrams. First it reads the file once to find the sonar: the sender of a make's messages at that make's port, else the one
-/// that sent most. bad_data: none found.
+/// that sent most. Errors: bad_data if there is none.
 Result<std::unique_ptr<RecordingReader>> read_pcap(std::unique_ptr<Source> source, const PcapReading& reading = {});
 
 struct PcapConversation {
