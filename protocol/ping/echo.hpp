@@ -1,5 +1,5 @@
 // Finds the strongest echo in a ping of one beam, and derives from it the range and gain of the next ping, for the family's
-// range finders. Pure functions. The algorithms of real devices are unknown; all of this is assumed (docs/protocols/ping1d.md).
+// range finders. Pure functions. The algorithms of real devices are unknown: all of this is assumed (docs/protocols/ping1d.md).
 #pragma once
 
 #include <cstdint>
