@@ -9,6 +9,7 @@ import threading
 import time
 import unittest
 
+from foxglove_viewer import Viewer
 from oculus_reader import Client, fire_message, reading
 from running_sonard import ROOT, SONARCTL, Sonard, eventually, run
 
@@ -122,7 +123,13 @@ class Clocks(unittest.TestCase):
                 asking.wait(60)
             return leave
 
-        for ask in by_http, by_stream:
+        def by_live_view(daemon, _where):
+            viewer = Viewer(daemon.address).greeted()
+            viewer.wait_for(lambda kind, word: kind == "word" and word["op"] == "advertiseServices")
+            viewer.request("/sonard/step", b'{"dt_s": 3000}')
+            return viewer.socket.close
+
+        for ask in by_http, by_stream, by_live_view:
             with Sonard(arguments=["--clock", "lockstep"]) as daemon, Client(daemon.address) as client:
                 where = f"{daemon.address}:14770"
                 client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))

@@ -198,11 +198,15 @@ class Viewer:
     def _values_for(self, request):
         return self.wait_for(lambda kind, word: kind == "word" and word["op"] == "parameterValues" and word.get("id") == request)["parameters"]
 
-    def call(self, name, payload, call=1):
-        """The answer of a service or the reason of its failure, and which of both it is."""
+    def request(self, name, payload, call=1):
+        """Calls a service without waiting for its answer."""
         services = next(word for word in self.words if word["op"] == "advertiseServices")["services"]
         service = next(s["id"] for s in services if s["name"] == name)
         self.send_frame(2, struct.pack("<BIII", 2, service, call, 4) + b"json" + payload)
+
+    def call(self, name, payload, call=1):
+        """The answer of a service or the reason of its failure, and which of both it is."""
+        self.request(name, payload, call)
         kinds = []
 
         def is_answer(kind, value):

@@ -33,7 +33,7 @@ class Operations {
   virtual ~Operations() = default;
 
   /// `done` is called once: before this returns, or later when the operation takes time (scenes); never after stop(). `has_left`
-  /// returns true once the client has closed its end of the connection; a step then ends.
+  /// returns true once the client has closed its end of the connection, or half of it; a step then ends.
   virtual void perform(const control::Operation& operation, const Sender& sender, Done done, HasLeft has_left = {}) = 0;
   /// Counters and histograms as Prometheus text, version 0.0.4.
   virtual std::string metrics() const = 0;

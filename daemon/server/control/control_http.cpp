@@ -90,7 +90,9 @@ asio::awaitable<HttpAnswer> ControlHttp::perform(control::Operation operation, H
     co_await timer.async_wait(into(ec));
   }
   if (*result) co_return answer_from(**result);
-  co_return answer_of(504, StatusCode::failed, "not finished after 5 minutes; the operation continues, see /api/v1/status");
+  co_return answer_of(
+      504, StatusCode::failed,
+      "not finished after 5 minutes; the operation continues (a step ends with this connection), see /api/v1/status");
 }
 
 HttpStream ControlHttp::stream_of(const control::Subscribe& wanted) {

@@ -140,8 +140,8 @@ void ViewFeed::call(Viewer& viewer, const foxglove::ServiceCall& call) {
   if (!request) return viewer.fail(call, request.error().text);
   std::visit(
       [&, from = connection_of(viewer)](auto operation) {
-        if constexpr (std::is_constructible_v<control::Operation, decltype(operation)>)
-          of_.operations.perform(std::move(operation), sender_of(viewer), [from, call](const OperationResult& result) {
+        if constexpr (std::is_constructible_v<control::Operation, decltype(operation)>) {
+          const auto done = [from, call](const OperationResult& result) {
             const auto connection = from.lock();
             if (!connection) return;
             if (result.code == OperationResult::Code::done)
@@ -149,7 +149,13 @@ void ViewFeed::call(Viewer& viewer, const foxglove::ServiceCall& call) {
             else
               connection->viewer().fail(call, result.text);
             connection->wake();
-          });
+          };
+          const auto has_left = [from] {
+            const auto connection = from.lock();
+            return !connection || connection->over();
+          };
+          of_.operations.perform(std::move(operation), sender_of(viewer), done, has_left);
+        }
       },
       std::move(request->op));
 }
