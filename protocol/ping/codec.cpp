@@ -120,12 +120,13 @@ bool holds_result(BytesView message, BytesView poorer, Results result, Answer an
   const auto frame = made.size() == 1 ? whole_frame(made.front()) : std::nullopt, recorded = whole_frame(poorer);
   return frame && recorded && frame->payload == recorded->payload;
 }
-/// Messages that a Surveyor or an Omniscan sends while pings are enabled. A ping may have several.
-std::optional<recording::PingPart> measured_part(BytesView message) {
+/// Messages that a Surveyor sends while pings are enabled. A ping may have several.
+std::optional<recording::PingPart> surveyor_part(BytesView message) {
   const Id id = id_in(message);
-  return part_if(id == Id::atof_point_data || id == Id::yz_point_data || id == Id::os_mono_profile || id == Id::attitude_report ||
-                 id == Id::water_stats);
+  return part_if(id == Id::atof_point_data || id == Id::yz_point_data || id == Id::attitude_report || id == Id::water_stats);
 }
+/// A log may hold the messages of a Surveyor and an Omniscan; each replay serves those of its product.
+std::optional<recording::PingPart> omniscan_part(BytesView message) { return part_if(id_in(message) == Id::os_mono_profile); }
 
 constexpr std::array<recording::FileKind, 1> kinds{{{
     .ending = ".svlog",
@@ -171,7 +172,7 @@ recording::Codec surveyor::codec() {
               [](const RecordedMessage& message) {
                 return holds(message, {Id::atof_point_data, Id::yz_point_data}) ? one_of(vendor()) : std::nullopt;
               },
-          .ping_part = measured_part};
+          .ping_part = surveyor_part};
 }
 recording::Codec omniscan::codec() {
   return {
@@ -179,7 +180,7 @@ recording::Codec omniscan::codec() {
       .files = kinds,
       .sender =
           [](const RecordedMessage& message) { return holds(message, {Id::os_mono_profile}) ? one_of(vendor()) : std::nullopt; },
-      .ping_part = measured_part};
+      .ping_part = omniscan_part};
 }
 
 recording::Codec ping1d::codec() {

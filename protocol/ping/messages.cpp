@@ -111,7 +111,6 @@ std::optional<Frame> Framer::next() {
   return std::nullopt;
 }
 
-// A datagram that only looks like the protocol must not take the dialogue away from the host that has it.
 std::optional<Frame> whole_frame(BytesView message) {
   Framer framer(longest_payload, true);
   framer.append(message);
@@ -119,6 +118,7 @@ std::optional<Frame> whole_frame(BytesView message) {
   return frame && frame->sum_is_right ? std::move(frame) : std::nullopt;
 }
 
+// A datagram that only looks like the protocol must not take the dialogue away from the host that has it.
 bool holds_frame(BytesView datagram) {
   Framer framer(longest_request, true);
   framer.append(datagram);

@@ -28,7 +28,7 @@ class RequestedReplay final : public DeviceParent {
   void start();
   void stop(const std::string& why = "the replay stops");
 
-  /// `messages` counts pings.
+  /// `messages` counts the recorded pings that were sent; each message of a Surveyor counts as one.
   ReplayServer::Figures figures() const;
   const Result<void>& outcome() const { return outcome_; }
   /// All its ports: "tcp 127.0.0.2:9090, udp 127.0.0.2:9090"

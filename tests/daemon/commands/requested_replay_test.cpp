@@ -12,6 +12,7 @@
 #include "protocol/norbit/host.hpp"
 #include "protocol/ping/host.hpp"
 #include "protocol/ping/messages.hpp"
+#include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/ping/s500_messages.hpp"
@@ -508,6 +509,14 @@ TEST(ReplayOfSurveyor, AHostByUdpGetsEveryMessageAtTheRecordedPace) {
   EXPECT_GE(std::chrono::steady_clock::now() - begin, milliseconds(590));
   EXPECT_TRUE(replay.ends());
   EXPECT_EQ(replay.figures().messages, 8u);
+}
+
+TEST(ReplayOfSurveyor, AnotherProductsMessagesInTheLogAreNotServed) {
+  const Bytes tilt = ping::framed_message(ping::Id::attitude_report, 0, ping::AttitudeReport{{}, {}, 0, 200}),
+              profile = ping::framed_message(ping::Id::os_mono_profile, 0, ping::OsMonoProfile{});
+  const std::vector<Bytes> log{tilt, points(1), profile, points(2), profile};
+  EXPECT_THAT(played(log, ping::surveyor::codec()), ElementsAre(tilt, points(1), points(2)));
+  EXPECT_THAT(played(log, ping::omniscan::codec()), ElementsAre(profile, profile));
 }
 
 TEST(ReplayOfSurveyor, AHostByTcpIsAnsweredAndGetsPingsWhileItEnablesThem) {
