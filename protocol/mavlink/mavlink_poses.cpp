@@ -84,11 +84,6 @@ void MavlinkPoses::clear_histories() {
   ++resets_;
 }
 
-bool MavlinkPoses::is_excluded(const Frame& frame) const {
-  return (settings_.system_id != 0 && frame.system != settings_.system_id) ||
-         (settings_.component_id != 0 && frame.component != settings_.component_id);
-}
-
 /// Whether the frame is from the selected system. Selects one if there is none: the configured system, or else the first that
 /// sends a pose or the heartbeat of an autopilot. Another one is selected only after the first has been silent for
 /// system_silence.

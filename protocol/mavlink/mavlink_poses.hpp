@@ -123,7 +123,10 @@ class MavlinkPoses {
   /// Whether only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
   static bool identifies_vehicle(const Frame& frame);
   /// Whether system_id or component_id select other senders.
-  bool is_excluded(const Frame& frame) const;
+  bool is_excluded(const Frame& frame) const {
+    return (settings_.system_id != 0 && frame.system != settings_.system_id) ||
+           (settings_.component_id != 0 && frame.component != settings_.component_id);
+  }
   bool is_from_vehicle(const Frame& frame, Time now);
   bool is_selected_component(const Frame& frame, Time now);
   void select_vehicle(std::uint8_t system, Time now);

@@ -73,7 +73,7 @@ struct Visit {
   std::string address, why;
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
   bool by_itself = false, without_ping = false;
-  std::optional<std::chrono::steady_clock::time_point> connected_at = {};  // of a connection that ended
+  std::optional<std::chrono::steady_clock::time_point> connected_at = {};  // start of a connection that ended
 };
 
 class Device final : public SessionParent {
