@@ -28,8 +28,8 @@ struct SourceOptions {
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // limit of the time without a byte
   double return_limit_s = 60;   // limit of the wait for a new connection, in runs without a limit of time or pings
-  double picture_limit_s =
-      30;  // limit of the wait for a picture of many pings, from the first ping on; enough for a Ping360 to scan 180 degrees
+  // Limit of the wait for a picture of many pings, from the first ping on; enough for a Ping360 to scan 180 degrees.
+  double picture_limit_s = 30;
   bool observe = false;         // occupy no client slot, request nothing
   bool keeps_messages = false;  // fill PingStream::Item::messages
   std::string control;  // HOST:PORT of sonard's control stream, which reports the address for observers; empty = the default

@@ -49,8 +49,8 @@ enum class Domain : std::uint32_t {
   leak = 0x6c65616bu,           // with noise_place; combined with the sonar's number
   fixed_fan = 0x66616eu,        // a hit of the fixed fan
   paper_speckle = 0x50323521u,  // a hit of the modes paper and raster
-  other_sonar =
-      0x6f746872u,  // phase and carrier offset of another sonar; with the key's words swapped, those of each of its pulses
+  // Phase and carrier offset of another sonar; with the key's words swapped, those of each of its pulses.
+  other_sonar = 0x6f746872u,
   range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the hit point of the ray
   range_noise = 0x726e6f69u,      // noise of a pixel in range images
   relief_value = 0x76616c75u,     // seabed and rocks; used as the key's high word, combined with the stream

@@ -9,8 +9,8 @@
 namespace sonar {
 namespace {
 
-constexpr double scale = 0.9996, false_easting_m = 500'000,
-                 false_northing_m = 10'000'000;  // the false northing of the southern hemisphere
+// The northing is that of the southern hemisphere; the northern one has none.
+constexpr double scale = 0.9996, false_easting_m = 500'000, false_northing_m = 10'000'000;
 constexpr double n = earth_flattening / (2 - earth_flattening), n2 = n * n, n3 = n2 * n, n4 = n3 * n;
 constexpr double rectifying_m = earth_semi_major_m / (1 + n) * (1 + n2 / 4 + n4 / 64);
 /// Coefficients from the plane to the conformal sphere.

@@ -15,8 +15,8 @@ namespace sonar {
 namespace {
 
 /// File systems whose files the kernel makes or interprets. Even root cannot create ordinary files there.
-constexpr unsigned long mqueue_magic = 0x19800202, configfs_magic = 0x62656570,
-                        fusectl_magic = 0x65735543;  // from the kernel's sources
+// From the kernel's sources.
+constexpr unsigned long mqueue_magic = 0x19800202, configfs_magic = 0x62656570, fusectl_magic = 0x65735543;
 constexpr std::array<unsigned long, 19> kernels_own{PROC_SUPER_MAGIC, SYSFS_MAGIC,    CGROUP_SUPER_MAGIC, CGROUP2_SUPER_MAGIC,
                                                     DEBUGFS_MAGIC,    TRACEFS_MAGIC,  SECURITYFS_MAGIC,   DEVPTS_SUPER_MAGIC,
                                                     BPF_FS_MAGIC,     PSTOREFS_MAGIC, HUGETLBFS_MAGIC,    BINFMTFS_MAGIC,

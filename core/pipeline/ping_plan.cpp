@@ -192,8 +192,8 @@ void lay_out_noise_profile(PingPlan& p) {
     p.noise_profile.far.push_back(static_cast<float>(far));
     p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
   }
-  constexpr double least =
-      1e-3;  // smallest relevant difference near - far, less than 0.05 dB; the difference is at most about 10 dB
+  // Smallest relevant difference near - far, less than 0.05 dB; the difference is at most about 10 dB.
+  constexpr double least = 1e-3;
   for (int n = 0; n < p.samples && !profile.near_noise_db.empty(); ++n) {
     const double decay = std::exp(-(n + p.sample_offset) * p.sample_spacing_m / static_cast<double>(profile.near_m));
     if (decay < least) break;

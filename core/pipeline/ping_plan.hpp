@@ -28,8 +28,8 @@ struct Fan {
   int bins = 0;
   std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from bottom to top
-  int side_elevations =
-      0;  // number of elevations at each end that lie in side lobes; these are not refined, and side_columns columns share them
+  // Number of elevations at each end that lie in side lobes; these are not refined, and side_columns columns share them.
+  int side_elevations = 0;
   bool is_side(int interval) const {
     return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
   }

@@ -41,8 +41,8 @@ struct BeamProfile {
 struct SharedNoise {
   float level_db = -200;  // level of a channel, re the channel's own noise; below -150 = none
   int channels = 128;     // even
-  int group =
-      32;  // number of neighbours that share it, with weights that decrease to both ends; even; half of it divides `channels`
+  // Number of neighbours that share it, with weights that decrease to both ends; even; half of it divides `channels`.
+  int group = 32;
   float sine = 0.56f;    // sine of its apparent direction at long range: half a wavelength / channel spacing
   float full_m = 0.25f;  // below this range its power is proportional to the range
   float steady = 0;      // fraction of its power that is the same in every ping and in phase in all channels
@@ -57,8 +57,8 @@ struct ReceiverModel {
   float tvg_ceiling_db = 80;  // infinity switches it off
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
-  float noise_width =
-      1;  // -3 dB width of the noise filter divided by the pulse's; unused with a measured pulse, which is the filter
+  // -3 dB width of the noise filter divided by the pulse's; unused with a measured pulse, which is the filter.
+  float noise_width = 1;
   float crosstalk_db = -200;  // amplitude, re the channel, with which every channel is added to every beam; below -150 = none
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;

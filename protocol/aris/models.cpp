@@ -93,8 +93,8 @@ FrequencyMode mode_of(const Product& product, const ModeChoice& choice) {
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = beam_azimuths(product, beams, choice.telephoto);
   mode.beam_widths_rad = beam_widths(mode.beam_azimuths_rad, hz[1] / hz[frequency]);
-  mode.waveform.shape =
-      Waveform::Shape::cw;  // unknown; a tone after its matched filter fits the correlation of neighbouring rows in SMP
+  // unknown; a tone after its matched filter fits the correlation of neighbouring rows in SMP.
+  mode.waveform.shape = Waveform::Shape::cw;
   mode.horizontal_aperture_rad = static_cast<float>(2 * mode.beam_azimuths_rad.front()) + mode.beam_widths_rad.front();
   const double elevation_deg = choice.telephoto                          ? telephoto_elevation_deg
                                : product.system == SystemType::aris_3000 ? elevation_3000_deg

@@ -33,8 +33,8 @@ struct CellView {
   float main_elevation_rad = 2, side_from_rad = 2;
   float side_area_per_range_m = 0;  // cell area divided by range, at grazing incidence; cells are larger at steep incidence
   int side_coarser = 0;
-  bool exact_small =
-      false;  // objects with few cells get finer ones, because without speckle the positions of cells would be visible
+  // Objects with few cells get finer ones, because without speckle the positions of cells would be visible.
+  bool exact_small = false;
   /// If set, it replaces the bounds of the fan. For a ball around a point in the sonar's axes it returns the distances at which
   /// the ball is visible (mirrors can make them larger than the true one); nullopt if it is not visible.
   std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;

@@ -205,8 +205,8 @@ void SurfaceCells::visit(SurfacePatch& patch, CellNode& node, const Look& look, 
     const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(CellNode) % dividing_.size()]);
     if (!node.divided.load(std::memory_order_relaxed)) found.new_bytes += patch.divide(node);
   }
-  for (const auto& child :
-       node.children) {  // prefetches all children before visiting the first, because they are scattered in memory
+  // Prefetches all children before visiting the first, because they are scattered in memory.
+  for (const auto& child : node.children) {
     if (!child) continue;
     const auto* at = reinterpret_cast<const char*>(child.get());
     __builtin_prefetch(at);

@@ -20,8 +20,8 @@ inline constexpr std::size_t max_mesh_triangles = 20'000'000;
 
 /// Heights over the product of two rising coordinate lists; NaN = no ground there.
 struct HeightGrid {
-  std::vector<double> x,
-      y;  // increasing, at least two each; metres, or degrees of longitude and latitude if an origin but no zone is set
+  // Increasing, at least two each; metres, or degrees of longitude and latitude if an origin but no zone is set.
+  std::vector<double> x, y;
   std::vector<float> z_m;  // [y][x]
   /// If set, x and y are converted to the plane tangent to the ellipsoid here. Heights do not change, as if the sea were flat.
   std::optional<Geodetic> origin = {};

@@ -223,8 +223,8 @@ void MavlinkServer::act_on(Link& link, const mavlink::Reaction& reaction, const 
                            const std::optional<udp::endpoint>& to) {
   for (const std::string& why : reaction.refusals) intake_.refuse(why, {from, from});
   for (const mavlink::SourcedPose& pose : reaction.poses) {
-    const std::string source =
-        link.name + " " + pose.source;  // a router may send from any port, so the link counts as the sender
+    // A router may send from any port, so the link counts as the sender.
+    const std::string source = link.name + " " + pose.source;
     intake_.take(pose.sample, {source, source});
   }
   for (const std::string& notice : reaction.notices) log_limited(log_, link.notices, LogLevel::info, link.name + ": " + notice);

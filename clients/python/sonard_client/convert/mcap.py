@@ -55,7 +55,7 @@ class _Reader:
         self.name, self.warn = name, warn
         self.schemas: Dict[int, str] = {0: ""}
         self.channels: Dict[int, Channel] = {}
-        self.refused = 0 # refused chunks
+        self.refused = 0  # number of refused chunks
         self.why = ""
 
     def records(self, file: BinaryIO, size: int) -> Iterator[Recorded]:
