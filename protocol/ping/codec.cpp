@@ -113,9 +113,11 @@ Id id_in(BytesView message) {
   return frame ? frame->header.id : Id{};
 }
 std::optional<recording::PingPart> part_if(bool is_part) { return is_part ? std::optional(recording::PingPart{}) : std::nullopt; }
-/// Whether `poorer`, of the result `result`, equals that which is made of the recorded `message`, as `answer` makes it.
-template <class Answer>
-bool holds_result(BytesView message, BytesView poorer, Results result, Answer answer) {
+/// Whether the recorded `message` has a richer result than `poorer`, and `answer` makes `poorer` of it.
+template <class ResultsOf, class Answer>
+bool holds_result(BytesView message, BytesView poorer, ResultsOf results_of, Answer answer) {
+  const Results result = results_of(id_in(poorer));
+  if (result >= results_of(id_in(message))) return false;
   const std::vector<Bytes> made = answer(message, result);
   const auto frame = made.size() == 1 ? whole_frame(made.front()) : std::nullopt, recorded = whole_frame(poorer);
   return frame && recorded && frame->payload == recorded->payload;
@@ -193,11 +195,7 @@ recording::Codec ping1d::codec() {
           },
       .ping_part = [](BytesView message) { return part_if(results_of(id_in(message)) != no_result); },
       .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); },
-      .is_richer =
-          [](BytesView message, BytesView than) {
-            const Results poorer = results_of(id_in(than));
-            return poorer < results_of(id_in(message)) && holds_result(message, than, poorer, answer);
-          }};
+      .is_richer = [](BytesView message, BytesView than) { return holds_result(message, than, results_of, answer); }};
 }
 
 recording::Codec s500::codec() {
@@ -210,11 +208,7 @@ recording::Codec s500::codec() {
           },
       .ping_part = [](BytesView message) { return part_if(results_of(id_in(message)) != no_result); },
       .answer = [](BytesView message, const VendorSettings* request) { return answer(message, settings_from(request).results); },
-      .is_richer =
-          [](BytesView message, BytesView than) {
-            const Results poorer = results_of(id_in(than));
-            return poorer < results_of(id_in(message)) && holds_result(message, than, poorer, answer);
-          }};
+      .is_richer = [](BytesView message, BytesView than) { return holds_result(message, than, results_of, answer); }};
 }
 
 }  // namespace sonar::ping

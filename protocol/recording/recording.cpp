@@ -90,8 +90,10 @@ Result<Recording> open_recording(const std::filesystem::path& file, const std::s
 std::optional<SentBy> find_sender(RecordingReader& reader) {
   std::optional<SentBy> found;
   const auto take_stated_model = [&reader](SentBy& by) {
+    const std::string stated = reader.profile();
+    if (stated.empty()) return;
     for (const auto& model : by.make->device->models())
-      if (model->profile == reader.profile()) by.sender.model = model, by.sender.names_model = true;
+      if (model->profile == stated) by.sender.model = model, by.sender.names_model = true;
   };
   // A later message is better only if it names the model of the same sonar.
   const auto tells_more = [&found](const SentBy& by) {
