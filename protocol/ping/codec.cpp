@@ -113,7 +113,7 @@ Id id_in(BytesView message) {
   return frame ? frame->header.id : Id{};
 }
 std::optional<recording::PingPart> part_if(bool is_part) { return is_part ? std::optional(recording::PingPart{}) : std::nullopt; }
-/// Whether the recorded `message` has a richer result than `poorer`, and `answer` makes `poorer` of it.
+/// True if the recorded `message` has a richer result than `poorer`, and `answer` makes `poorer` of it.
 template <class ResultsOf, class Answer>
 bool holds_result(BytesView message, BytesView poorer, ResultsOf results_of, Answer answer) {
   const Results result = results_of(id_in(poorer));
