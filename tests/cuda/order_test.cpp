@@ -22,10 +22,7 @@ std::vector<PingRequest> requests() {
   for (auto& [what, request] : turns())
     if (wanted.count(what) > 0) {
       request.switches.multipath = what == "everything, high";
-      SonarModel wide = *request.model;  // a ninth of the cells
-      wide.modes[0].pattern.azimuth_width_rad *= 3;
-      request.model = std::make_shared<const SonarModel>(std::move(wide));
-      all.push_back(std::move(request));
+      all.push_back(with_wide_beams(std::move(request)));
     }
   EXPECT_EQ(all.size(), wanted.size());
   return all;

@@ -87,6 +87,7 @@ inline PingRequest low() {
 inline PingRequest with_wide_beams(PingRequest r) {
   SonarModel model = *r.model;
   model.modes[0].pattern.azimuth_width_rad *= 3;
+  for (float& width : model.modes[0].beam_widths_rad) width *= 3;
   r.model = std::make_shared<const SonarModel>(std::move(model));
   return r;
 }

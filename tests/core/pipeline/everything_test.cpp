@@ -39,11 +39,14 @@ class Engine {
 TEST(Everything, IsTheSameBytesForAnyNumberOfThreadsAndWhateverCameBefore) {
   const std::shared_ptr<const Scene> scene = basin();
   Engine one(scene, 1), two(scene, 2), four(scene, 4);
-  for (const auto& [what, request] : turns()) {
+  for (const auto& [what, narrow] : turns()) {
+    // All cells of the narrow beams where everything is on; a single change is tested on fewer.
+    const bool everything = what.starts_with("everything");
+    const PingRequest request = everything ? narrow : with_wide_beams(narrow);
     const Ping ping = one.ping(request);
     const std::string bytes = bytes_of(ping);
     EXPECT_TRUE(bytes == bytes_of(two.ping(request))) << what << ": 2 threads";
-    if (what.starts_with("everything")) {
+    if (everything) {
       EXPECT_TRUE(bytes == bytes_of(four.ping(request))) << what << ": 4 threads";
     }
     if (!what.ends_with("switched")) {
