@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/scene/files/geo_keys.hpp"
+#include "core/text/format.hpp"
 #include "tests/core/scene/temporary_files.hpp"
 
 namespace sonar::coordinate_systems_test {
@@ -64,6 +65,35 @@ TEST(CoordinateSystems, WktIsUtmByItsParametersWhateverItsName) {
   EXPECT_EQ(degrees.name, "DHDN");
   EXPECT_FALSE(system_of_wkt("GEOGCS[\"WGS 84\",DATUM[\"d\",SPHEROID[" + grs80 + "]]]").other_datum);
   EXPECT_FALSE(system_of_wkt("GEOGCS[\"WGS 84\"]").other_datum) << "without an ellipsoid";
+}
+
+TEST(CoordinateSystems, OfPrjFilesOfSeveralWriters) {
+  const auto of = [](std::string_view wkt) {
+    const CoordinateSystem s = system_of_wkt(wkt);
+    return text::format("%s %.4f %.4f%s",
+                        !s.geographic   ? "?"
+                        : *s.geographic ? "degrees"
+                                        : "lengths",
+                        s.unit_m, s.height_unit_m, s.web_mercator ? " Mercator" : "");
+  };
+  const std::string datum = "DATUM[\"D\",SPHEROID[\"S\",6378137,298.25]]", degrees = "UNIT[\"Degree\",0.0174532925]";
+  EXPECT_EQ(of("GEOGCS[\"G\"," + datum + "," + degrees + "]"), "degrees 1.0000 1.0000");
+  EXPECT_EQ(of("PROJCS[\"P\",GEOGCS[\"G\"," + datum + "," + degrees + "],PARAMETER[\"F\",0],UNIT[\"Foot_US\",0.3048006096]]"),
+            "lengths 0.3048 1.0000");
+  EXPECT_EQ(
+      of("COMPD_CS[\"C\",PROJCS[\"P\",GEOGCS[\"G\"," + degrees + "],UNIT[\"metre\",1]],VERT_CS[\"V\",UNIT[\"foot\",0.3048]]]"),
+      "lengths 1.0000 0.3048");
+  EXPECT_EQ(of("COMPOUNDCRS[\"C\",\n  GEOGCRS[\"G\",CS[ellipsoidal,2],AXIS[\"lat\",north]],VERTCRS[\"V\",CS[vertical,1],"
+               "AXIS[\"H\",up,LENGTHUNIT[\"foot\",0.3048]]]]"),
+            "degrees 1.0000 0.3048");
+  EXPECT_EQ(of("PROJCRS[\"P\",BASEGEOGCRS[\"G\"],CONVERSION[\"c\",PARAMETER[\"F\",0,LENGTHUNIT[\"metre\",1]]],CS[Cartesian,2],"
+               "AXIS[\"X\",east],AXIS[\"Y\",north],LENGTHUNIT[\"kilometre\",1000]]"),
+            "lengths 1000.0000 1.0000");
+  EXPECT_EQ(of("PROJCS[\"WGS_1984_Web_Mercator_Auxiliary_Sphere\",GEOGCS[\"G\"],UNIT[\"Meter\",1.0]]"),
+            "lengths 1.0000 1.0000 Mercator");
+  EXPECT_EQ(of("PROJCS[\"P\",UNIT[\"none\",0]]"), "lengths 1.0000 1.0000");
+  EXPECT_EQ(of(std::string(100, '[') + "UNIT[\"x"), "? 1.0000 1.0000");
+  EXPECT_EQ(of("]]],,\""), "? 1.0000 1.0000");
 }
 
 TEST(CoordinateSystems, LongitudesOfWktMayBeginElsewhereAndAnglesBeGrads) {
