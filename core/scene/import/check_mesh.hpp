@@ -28,6 +28,13 @@ MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
 /// The fault in the container of a GLB file, version 2. The importer calls every such fault an unknown format.
 MeshFault glb_fault(std::string_view file);
 
+/// Complete texts. These find records that are not complete, which the importer leaves out or misreads. Binary files, which make
+/// it fail if they are cut short, pass.
+bool is_text_ply(std::string_view head);
+MeshFault check_ply_text(std::string_view file);
+MeshFault check_stl_text(std::string_view file);
+MeshFault check_obj(std::string_view file);
+
 /// Number of faces in the header of a PLY file, or number of facets in a text STL file.
 std::uint64_t faces_of_ply(std::string_view head);
 /// Bytes of the header of a PLY file with its last line end; 0 if it is not whole.

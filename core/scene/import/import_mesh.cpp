@@ -114,21 +114,29 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
 }
 
 Result<MeshFault> check_text(const MeshFile& request, const std::string& extension, ListedFaces& faces) {
-  const bool ply = extension == ".ply", collada = extension == ".dae", gltf = extension == ".gltf" || extension == ".glb";
-  if (!ply && !collada && !gltf) return MeshFault();
   std::string held;
   std::string_view text = request.in_memory;
   std::uintmax_t bytes = text.size();
-  if (text.empty()) {
-    auto read = read_regular(request.file, ply ? ply_head_bytes : max_mesh_bytes);
-    if (!read) return tl::make_unexpected(read.error());
+  const auto read = [&](std::size_t most) -> Result<void> {
+    if (!request.in_memory.empty()) return {};
+    auto contents = read_regular(request.file, most);
+    if (!contents) return tl::make_unexpected(contents.error());
+    text = held = *std::move(contents);
+    return {};
+  };
+  if (extension == ".ply") {  // the counts of the header are checked before the rest is read
+    if (auto head = read(ply_head_bytes); !head) return tl::make_unexpected(head.error());
     std::error_code error;
-    bytes = std::filesystem::file_size(request.file, error);
-    text = held = *std::move(read);
+    if (request.in_memory.empty()) bytes = std::filesystem::file_size(request.file, error);
+    if (auto fault = check_ply(text.substr(0, ply_head_bytes), bytes)) return fault;
+    if (!is_text_ply(text.substr(0, ply_head_bytes))) return MeshFault();
   }
-  return ply       ? check_ply(text.substr(0, ply_head_bytes), bytes)
-         : collada ? check_collada(text, &faces)
-                   : check_gltf(text, &faces);
+  if (auto all = read(max_mesh_bytes); !all) return tl::make_unexpected(all.error());
+  return extension == ".ply"   ? check_ply_text(text)
+         : extension == ".obj" ? check_obj(text)
+         : extension == ".stl" ? check_stl_text(text)
+         : extension == ".dae" ? check_collada(text, &faces)
+                               : check_gltf(text, &faces);
 }
 
 }  // namespace

@@ -317,7 +317,8 @@ TEST_F(LoadMesh, TextStlMayHaveCapitalsAndBlankLinesFirst) {
     expect_extent(good("t.stl", text), {0, 0, 0}, {2, 1, 3});
   EXPECT_THAT(refusal("cut.stl", binary_stl().substr(0, 200)),
               HasSubstr("is not an STL file, or cut short"));  // begins with "solid", too
-  EXPECT_THAT(refusal("cut.stl", stl.substr(0, 60)), HasSubstr("is it cut short? Export it again"));
+  EXPECT_THAT(refusal("cut.stl", stl.substr(0, 60)),
+              HasSubstr("ends within facet 1 (line 5); it is cut short or damaged, export it again"));
 }
 
 TEST_F(LoadMesh, OtherKindsOfFilesAreNamed) {

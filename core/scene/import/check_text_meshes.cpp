@@ -1,0 +1,191 @@
+#include <algorithm>
+#include <charconv>
+#include <vector>
+
+#include "core/base/letters.hpp"
+#include "core/scene/import/check_mesh.hpp"
+
+namespace sonar {
+namespace {
+
+constexpr std::string_view between_words = " \t\v\f", cut_short = "; it is cut short or damaged, export it again";
+
+/// Lines of a text that end with a line feed, a carriage return or both.
+class Lines {
+ public:
+  explicit Lines(std::string_view text, std::uint64_t lines_before = 0) : left_(text), number_(lines_before) {}
+  bool next() {
+    if (left_.empty()) return false;
+    const std::size_t end = std::min(left_.find_first_of("\r\n"), left_.size());
+    line_ = left_.substr(0, end);
+    left_.remove_prefix(end);
+    ends_ = !left_.empty();
+    returns_ = left_.starts_with("\r\n");
+    left_.remove_prefix(returns_ ? 2 : ends_ ? 1 : 0);
+    ++number_;
+    return true;
+  }
+  std::string_view line() const { return line_; }
+  /// False only for a last line without a line end.
+  bool has_end() const { return ends_; }
+  bool ends_with_return() const { return returns_; }
+  std::uint64_t number() const { return number_; }
+
+ private:
+  std::string_view left_, line_;
+  bool ends_ = true, returns_ = false;
+  std::uint64_t number_;
+};
+
+/// Removes the next word of `line` and returns it; empty at the end of the line.
+std::string_view take_word(std::string_view& line) {
+  line.remove_prefix(std::min(line.find_first_not_of(between_words), line.size()));
+  const std::string_view word = line.substr(0, line.find_first_of(between_words));
+  line.remove_prefix(word.size());
+  return word;
+}
+
+bool is_like_number(std::string_view word) {
+  const std::size_t sign = word.starts_with('-') || word.starts_with('+') ? 1 : 0;
+  const std::string begin = small_letters(word.substr(sign, 3));
+  return word.find_first_of("0123456789") != word.npos || begin == "nan" || begin == "inf";
+}
+
+std::string at_line(const Lines& lines) { return " (line " + std::to_string(lines.number()) + ")"; }
+
+struct PlyElement {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<bool> is_list;  // one for each property
+};
+
+std::vector<PlyElement> elements_of(const std::string& head, bool& is_text) {
+  std::vector<PlyElement> elements;
+  Lines lines(head);
+  while (lines.next()) {
+    std::string_view rest = lines.line();
+    const std::string_view word = take_word(rest), second = take_word(rest), third = take_word(rest);
+    if (word == "format") is_text = second == "ascii";
+    if (word == "property" && !elements.empty()) elements.back().is_list.push_back(second == "list");
+    if (word != "element") continue;
+    elements.push_back({std::string(second.substr(0, 32)), 0, {}});
+    std::from_chars(third.data(), third.data() + third.size(), elements.back().count);
+  }
+  return elements;
+}
+
+/// The fault of one record, a line with the values of all properties; empty if there is none.
+std::string fault_of_record(std::string_view line, const PlyElement& element) {
+  std::uint64_t values = 0, needed = element.is_list.size();
+  std::uint64_t in_list = 0;  // values of a list that are left
+  for (std::size_t property = 0; property < element.is_list.size() || in_list > 0; ++values) {
+    const std::string_view word = take_word(line);
+    if (word.empty()) return " has " + std::to_string(values) + " of " + std::to_string(needed) + " values";
+    if (!is_like_number(word)) return " has \"" + std::string(word.substr(0, 32)) + "\", which is not a number";
+    if (in_list > 0) {
+      --in_list;
+    } else if (element.is_list[property++]) {
+      std::from_chars(word.data(), word.data() + word.size(), in_list);
+      needed += std::min<std::uint64_t>(in_list, std::uint64_t{1} << 62);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+bool is_text_ply(std::string_view head) {
+  bool is_text = false;
+  elements_of(small_letters(head.substr(0, bytes_of_ply_head(head))), is_text);
+  return is_text;
+}
+
+MeshFault check_ply_text(std::string_view file) {
+  const std::size_t head_bytes = bytes_of_ply_head(file.substr(0, ply_head_bytes));
+  bool is_text = false;
+  const std::string head = small_letters(file.substr(0, head_bytes));
+  const auto elements = elements_of(head, is_text);
+  if (!is_text) return std::nullopt;
+  Lines lines(file.substr(head_bytes), static_cast<std::uint64_t>(std::count(head.begin(), head.end(), '\n')));
+  for (const PlyElement& element : elements)
+    for (std::uint64_t k = 0; k < element.count && !element.is_list.empty(); ++k) {
+      const std::string which = element.name + " " + std::to_string(k + 1) + " of " + std::to_string(element.count);
+      bool there = lines.next();
+      // The importer skips one blank line, and takes further ones for records.
+      if (there && lines.line().empty() && !lines.ends_with_return()) there = lines.next();
+      if (!there) return "ends before " + which + ", which its header counts" + std::string(cut_short);
+      if (const std::string fault = fault_of_record(lines.line(), element); !fault.empty())
+        return which + at_line(lines) + fault + std::string(cut_short);
+    }
+  return std::nullopt;
+}
+
+MeshFault check_stl_text(std::string_view file) {
+  if (file.substr(0, 512).find('\0') != file.npos) return std::nullopt;  // binary
+  std::uint64_t facets = 0, corners = 0, numbers_left = 0;
+  bool in_facet = false, ended = false;
+  Lines lines(file);
+  const auto which = [&] { return "facet " + std::to_string(facets) + at_line(lines); };
+  const auto wrong_corners = [&] {
+    return which() + " has " + std::to_string(corners) + " corners, not 3" + std::string(cut_short);
+  };
+  while (lines.next()) {
+    std::string_view line = lines.line();
+    for (std::string_view word; !(word = take_word(line)).empty();) {
+      if (numbers_left > 0) {
+        if (!is_like_number(word)) return which() + " has a corner with fewer than 3 numbers" + std::string(cut_short);
+        --numbers_left;
+      } else if (same_letters(word, "solid") || same_letters(word, "endsolid")) {
+        ended = word.size() > 5;
+        if (ended && in_facet && corners != 3) return wrong_corners();
+        in_facet = in_facet && !ended;
+        // Its name follows, up to the end of the line unless the file has only one.
+        line.remove_prefix(std::min(small_letters(line).find("facet normal"), line.size()));
+      } else if (same_letters(word, "facet")) {
+        if (in_facet && corners != 3) return wrong_corners();
+        in_facet = true, ended = false, corners = 0, ++facets;
+      } else if (same_letters(word, "vertex")) {
+        ++corners, numbers_left = 3;
+      } else if (same_letters(word, "endfacet")) {
+        if (corners != 3) return wrong_corners();
+        in_facet = false;
+      }
+    }
+  }
+  if (numbers_left > 0 || in_facet) return "ends within " + which() + std::string(cut_short);
+  if (!ended) return "ends after " + which() + " without endsolid" + std::string(cut_short);
+  return std::nullopt;
+}
+
+MeshFault check_obj(std::string_view file) {
+  Lines lines(file);
+  std::uint64_t vertices = 0;
+  while (lines.next()) {
+    std::string_view line = lines.line();
+    if (lines.number() == 1 && line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
+    const std::string_view statement = take_word(line);
+    const bool is_vertex = statement == "v", is_face = statement == "f";
+    if (!is_vertex && !is_face) continue;
+    vertices += is_vertex;
+    const std::string place = at_line(lines);
+    std::uint64_t words = 0, numbers = 0;
+    for (std::string_view word = take_word(line); !word.starts_with('#'); word = take_word(line)) {
+      if (word == "\\" || (word.empty() && lines.line().ends_with('\\'))) {
+        if (!lines.next()) break;  // continues in the next line
+        line = lines.line();
+        continue;
+      }
+      if (word.empty()) break;
+      ++words;
+      numbers += is_like_number(word);
+    }
+    if (is_vertex && (numbers != words || (words != 3 && words != 4 && words != 6)))
+      return "vertex " + std::to_string(vertices) + place + " has " + std::to_string(numbers) + " numbers, not 3, 4 or 6" +
+             (words > 4 ? "; export it without further ones" : std::string(cut_short));
+    if (is_face && words < 3 && !lines.has_end())
+      return "ends within a face" + place + " of " + std::to_string(words) + " corners" + std::string(cut_short);
+  }
+  return std::nullopt;
+}
+
+}  // namespace sonar
