@@ -8,6 +8,11 @@ std::string text_of(Ipv4 ip) { return text::format_ipv4(ip); }
 std::string text_of(Endpoint endpoint) { return text_of(endpoint.ip) + ":" + std::to_string(endpoint.port); }
 bool is_loopback(Ipv4 ip) { return ip[0] == 127; }
 
+std::string why_not_of_a_computer(Ipv4 ip) {
+  if (ip[0] < 224 && ip != Ipv4{127, 255, 255, 255}) return {};
+  return text_of(ip) + " is a multicast or broadcast address; give an address of this computer";
+}
+
 bool AddressRange::contains(Ipv4 address) const {
   for (int bit = 0; bit < prefix_bits; ++bit) {
     const auto byte = static_cast<std::size_t>(bit / 8);

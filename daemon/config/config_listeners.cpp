@@ -7,15 +7,18 @@ namespace sonar {
 using text::Map;
 using text::Node;
 
-Endpoint read_endpoint(const Node& node, bool port_needed) {
+Endpoint read_endpoint(const Node& node, bool is_listener) {
   const std::string text = node.text(64);
   const std::size_t colon = text.find(':');
   Endpoint endpoint;
   const auto ip = parse_ipv4(std::string_view(text).substr(0, colon));
   const auto port = colon == std::string::npos ? std::optional<std::int64_t>(0) : text::parse_integer(text.substr(colon + 1));
-  if (!ip || (port_needed && colon == std::string::npos))
+  const std::string why = is_listener && ip ? why_not_of_a_computer(*ip) : "";
+  if (!why.empty())
+    node.fail(why);
+  else if (!ip || (is_listener && colon == std::string::npos))
     node.fail("is not an address; write it as " +
-              std::string(port_needed ? "127.0.0.1:14770" : "127.255.255.255 or 192.168.1.7:52102"));
+              std::string(is_listener ? "127.0.0.1:14770" : "127.255.255.255 or 192.168.1.7:52102"));
   else if (!port || *port < 0 || *port > 65535)
     node.fail("port must be a number from 0 to 65535");
   else

@@ -23,6 +23,7 @@ void read_link(const Node& node, bool has_ranges, MavlinkConfig& link) {
   if (!ip || port < (link.dials ? 1 : 0) || port > 65535)
     return node.fail("is not a MAVLink endpoint; write udpin:127.0.0.1:14551 to listen, or udpout:127.0.0.1:14551 to dial");
   link.at = {*ip, static_cast<std::uint16_t>(port)};
+  if (const std::string why = why_not_of_a_computer(link.at.ip); !link.dials && !why.empty()) return node.fail(why);
   if (!link.dials && !is_loopback(link.at.ip) && !has_ranges)
     node.fail("poses from other computers need poses.allow_from, e.g. allow_from: [192.168.1.0/24]");
   if (link.dials && link.at.ip == Ipv4{}) node.fail("udpout needs the address of the other end");

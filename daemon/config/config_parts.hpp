@@ -18,8 +18,8 @@ Enum read_enum(const text::Node& node, Enum fallback, const std::array<std::stri
 Pose read_world_pose(const text::Node& node);
 /// `{frame: FLU | FRD, xyz_m, rpy_deg}` of a sonar on its vehicle.
 Pose read_mount(const text::Node& node);
-/// "127.0.0.1:14770"; the port may be missing unless `port_needed`.
-Endpoint read_endpoint(const text::Node& node, bool port_needed);
+/// "127.0.0.1:14770" of a listener, at an address that a computer can have; the port of a destination may be missing.
+Endpoint read_endpoint(const text::Node& node, bool is_listener);
 /// `{lat, lon, alt}` of the world's origin; nullopt if absent.
 std::optional<Geodetic> read_origin(const text::Node& node);
 /// One endpoint, or a list of links. `has_ranges`: poses.allow_from is given.

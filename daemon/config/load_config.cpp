@@ -28,7 +28,7 @@ Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
 /// The address of one computer, or 0.0.0.0.
 Ipv4 read_host_ip(const Node& node, Ipv4 fallback = {}) {
   const Ipv4 ip = read_ip(node, fallback);
-  if (ip[0] >= 224) node.fail(text_of(ip) + " is a multicast or broadcast address; give an address of this computer");
+  if (const std::string why = why_not_of_a_computer(ip); !why.empty()) node.fail(why);
   return ip;
 }
 

@@ -22,6 +22,7 @@ Result<void> rebind(Config& config, std::string_view address) {
         ErrorKind::usage,
         "0.0.0.0 is not an address that drivers can connect to; give one of this computer's, or write bind_ip: 0.0.0.0 and "
         "advertise_ip in a configuration file");
+  if (const std::string why = why_not_of_a_computer(*ip); !why.empty()) return failure(ErrorKind::usage, why);
   SonarConfig& first = config.sonars.front();
   for (const SonarConfig& other : config.sonars)
     if (&other != &first && (other.bind_ip == *ip || other.bind_ip == Ipv4{}))

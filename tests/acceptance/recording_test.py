@@ -368,7 +368,8 @@ class OneIntoAnother(Files):
         done = self.convert(SEEDS / "aris_file/two.aris", "--oculus", self.path("oculus"))
         self.assertEqual((done.returncode, self.path("oculus").exists()), (64, False))
         self.assertIn("such files do not hold the messages of an ARIS", done.stderr)
-        for code, words in [(66, [self.folder / "none"]), (65, [self.path("raw")]), (64, [self.path("raw"), "--ip", "nowhere"])]:
+        for code, words in [(66, [self.folder / "none"]), (65, [self.path("raw")]), (64, [self.path("raw"), "--ip", "nowhere"]),
+                            (64, [self.path("raw"), "--ip", "224.0.0.1"]), (64, [self.path("raw"), "--http", "255.255.255.255:1"])]:
             done = run(SONARD, "replay", *words)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)
 

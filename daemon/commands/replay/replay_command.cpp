@@ -56,10 +56,17 @@ Result<Endpoint> endpoint_from(const std::string& place, const std::string& opti
   return Endpoint{*ip, static_cast<std::uint16_t>(*port)};
 }
 
+/// The same for an address of this computer.
+Result<Endpoint> listener_from(const std::string& place, const std::string& option) {
+  const auto at = endpoint_from(place, option);
+  const std::string why = at ? why_not_of_a_computer(at->ip) : "";
+  return why.empty() ? at : failure(ErrorKind::usage, option + ": " + why);
+}
+
 /// Returns the line of the banner; empty if the page is off or its default address is in use.
 Result<std::string> open_page(ReplayPage& page, const ReplayCommand& command, Log& log) {
   if (command.http == "off") return std::string();
-  const auto at = endpoint_from(command.http, "--http");
+  const auto at = listener_from(command.http, "--http");
   if (!at) return tl::make_unexpected(at.error());
   if (const auto opened = page.open(*at); !opened) {
     const std::string what = opened.error().text + "; --http can set another address, or off";
@@ -76,7 +83,10 @@ Result<ReplayOptions> options_from(const ReplayCommand& command) {
   const auto usage = [](const Error& error) { return failure(ErrorKind::usage, error.text); };
   const auto ip = parse_ipv4(command.ip);
   if (!ip) return usage(ip.error());
+  if (const std::string why = why_not_of_a_computer(*ip); !why.empty()) return failure(ErrorKind::usage, "--ip: " + why);
   options.at = {*ip, command.port};
+  if (command.http != "off")
+    if (const auto page = listener_from(command.http, "--http"); !page) return tl::make_unexpected(page.error());
   for (const std::string& place : command.status_to) {
     const auto to = endpoint_from(place, "--status-to");
     if (!to) return tl::make_unexpected(to.error());

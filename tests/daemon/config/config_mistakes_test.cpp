@@ -52,6 +52,32 @@ TEST(ConfigMistakes, SaysWhatASceneFileIsThatCannotBeRead) {
   EXPECT_THAT(why("world: {scene: fifo.yaml}\n" + vehicles + sonar), HasSubstr("fifo.yaml: is a FIFO, not a regular file"));
 }
 
+TEST(ConfigMistakes, ListenersAtMulticastAndBroadcastAddressesAreRefused) {
+  for (const std::string ip : {"224.0.0.1", "239.255.0.1", "255.255.255.255", "240.0.0.1", "127.255.255.255"}) {
+    const std::string words = ": " + ip + " is a multicast or broadcast address; give an address of this computer";
+    const auto with = [&](const std::string& more) { return why(world + vehicles + sonar + more); };
+    for (const char* key : {"protobuf", "json"})
+      EXPECT_THAT(with(std::string("poses: {allow_from: [10.0.0.0/8], ") + key + ": '" + ip + ":14990'}\n"),
+                  HasSubstr(std::string("poses.") + key + words));
+    EXPECT_THAT(with("poses: {allow_from: [10.0.0.0/8], mavlink: 'udpin:" + ip + ":14551'}\n"),
+                HasSubstr("poses.mavlink" + words));
+    EXPECT_EQ(with("poses: {mavlink: 'udpout:" + ip + ":14551'}\n"), "accepted") << "a destination";
+    for (const char* key : {"stream", "http"})
+      EXPECT_THAT(with(std::string("control: {token_file: t, ") + key + ": '" + ip + ":14990'}\n"),
+                  HasSubstr(std::string("control.") + key + words));
+    EXPECT_THAT(why(world + vehicles + "sonars: [{name: a, profile: oculus-m1200d, bind_ip: " + ip + "}]\n"),
+                HasSubstr("sonars[0].bind_ip" + words));
+    EXPECT_EQ(with("    status_to: ['" + ip + "']\n"), "accepted") << "a destination";
+    auto config = parse_config(world + vehicles + sonar, "sonard.yaml", directory());
+    ASSERT_TRUE(config);
+    const auto moved = rebind(*config, ip);
+    ASSERT_FALSE(moved);
+    EXPECT_EQ(moved.error().kind, ErrorKind::usage);
+    EXPECT_THAT(moved.error().text, HasSubstr(words.substr(2)));
+  }
+  EXPECT_THAT(why(world + vehicles + sonar + "control: {stream: '[ff02::1]:14990'}\n"), HasSubstr("is not an address"));
+}
+
 TEST(ConfigMistakes, NamesAMistypedKeyThatSeveralSonarsShare) {
   const auto two_with = [&](const std::string& key) {
     const std::string rest = "profile: oculus-m1200d, " + key + ": 127.0.0.";
