@@ -22,6 +22,7 @@ Result<std::string> token_from(const std::filesystem::path& file) {
   constexpr const char* blanks = " \t\r\n";
   constexpr std::size_t most_bytes = 4096;
   const auto text = read_regular(file, most_bytes);  // reading a FIFO or a device might never end
+  if (!text && !is_absent(file)) return failure(ErrorKind::missing_file, "cannot read a token from " + text.error().text);
   const std::size_t first = text ? text->find_first_not_of(blanks) : std::string::npos;
   if (first == std::string::npos)
     return failure(ErrorKind::missing_file, "cannot read a token from " + file.string() +

@@ -23,7 +23,14 @@ const char* kind_of(mode_t mode) {
 }
 
 tl::unexpected<Error> not_opened(const std::filesystem::path& file) {
-  return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + std::strerror(errno));
+  const int error = errno;
+  std::error_code ec;
+  const std::string to = error == ENOENT ? std::filesystem::read_symlink(file, ec).string() : "";
+  const std::string why = error == ELOOP    ? "its links lead round in a circle, or are too many; name the file itself"
+                          : error == EACCES ? "Permission denied; give this user the right to read it and to enter its folders"
+                          : to.empty()      ? std::strerror(error)
+                                            : "it is a link to " + to + ", which is not there";
+  return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + why);
 }
 
 std::filesystem::path& folder_to_read() {  // empty = all
@@ -44,14 +51,19 @@ bool is_readable(const std::filesystem::path& file) {
 void confine_reads(const std::filesystem::path& folder) { folder_to_read() = std::filesystem::canonical(folder); }
 const std::filesystem::path& readable_folder() { return folder_to_read(); }
 
+bool is_absent(const std::filesystem::path& file) {
+  struct stat status {};
+  return ::lstat(file.c_str(), &status) != 0 && (errno == ENOENT || errno == ENOTDIR);
+}
+
 Result<OpenFile> open_regular(const std::filesystem::path& file) {
   if (!is_readable(file))
     return failure(ErrorKind::missing_file, file.string() + ": is outside of " + readable_folder().string() +
                                                 ", the only folder whose files this program reads; put a copy there");
   struct stat status {};
   const auto is_other = [&] {
-    return failure(ErrorKind::missing_file,
-                   file.string() + ": is a " + kind_of(status.st_mode) + ", not a regular file; save the contents in one");
+    return failure(ErrorKind::missing_file, file.string() + ": is a " + kind_of(status.st_mode) + ", not a regular file; " +
+                                                (S_ISDIR(status.st_mode) ? "name a file in it" : "save the contents in one"));
   };
   if (::stat(file.c_str(), &status) != 0) return not_opened(file);
   if (!S_ISREG(status.st_mode)) return is_other();  // opening a device may start an action

@@ -17,6 +17,10 @@ struct CloseFile {
 };
 using OpenFile = std::unique_ptr<std::FILE, CloseFile>;
 
+/// True if nothing has this name: no file, no folder, and no link, even one that leads nowhere. For all other names
+/// open_regular() gives the reason why they cannot be read.
+bool is_absent(const std::filesystem::path& file);
+
 /// Opens a file for reading in binary mode. Error: missing_file if it does not exist or is not a regular file ("x.png: is a
 /// FIFO, not a regular file").
 Result<OpenFile> open_regular(const std::filesystem::path& file);

@@ -61,9 +61,7 @@ Pose read_mount(const Node& node) {
 SceneFile read_scene_file(const Node& node, const std::filesystem::path& directory) {
   const std::string given = node.text();
   if (auto found = find_scene(given, directory)) return *std::move(found);
-  std::error_code ec;
-  // A file that exists but is unreadable must not be reported as missing.
-  if (const auto place = directory / given; !given.empty() && std::filesystem::exists(place, ec))
+  if (const auto place = directory / given; !given.empty() && !is_absent(place))
     if (const auto opened = open_regular(place); !opened) {
       node.fail(opened.error().text);
       return {given};

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/regular_file.hpp"
 #include "daemon/config/load_config.hpp"
 
 namespace sonar {
@@ -28,8 +29,7 @@ Result<FoundConfig> find_config(const std::string& file, bool demo) {
   if (!file.empty()) return found(load_config(file), file, file);
   std::string searched;
   for (const auto& path : search_path()) {
-    std::error_code ec;
-    if (std::filesystem::exists(path, ec)) return found(load_config(path), path.string(), path);
+    if (!is_absent(path)) return found(load_config(path), path.string(), path);
     searched += (searched.empty() ? "" : ", ") + path.string();
   }
   return found(demo_config(), "none found (looked in " + searched + ") -> demo");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/regular_file.hpp"
 #include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 
@@ -46,8 +47,8 @@ TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::Rea
   const std::filesystem::path path = folder_ / name;
   for (const Known& k : known_)
     if (k.path == path && k.options == options) return k.named;
-  std::error_code ec;
-  if (!std::filesystem::exists(path, ec) || std::filesystem::is_directory(path, ec)) {
+  if (is_absent(path)) {
+    std::error_code ec;
     // An empty folder means the working directory. For an absolute path the error names no folder.
     const auto folder = std::filesystem::absolute(folder_.empty() ? "." : folder_, ec).lexically_normal();
     const bool is_whole = std::filesystem::path(name).is_absolute();

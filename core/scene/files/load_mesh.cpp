@@ -90,7 +90,7 @@ Result<LoadedMesh> import_in_a_child(const MeshFile& request) {
 Result<LoadedMesh> load_mesh(const MeshFile& request) {
   const bool on_disk = request.in_memory.empty();
   std::error_code error;
-  if (on_disk && !std::filesystem::exists(request.file, error)) {
+  if (on_disk && is_absent(request.file)) {
     return failure(ErrorKind::missing_file,
                    "no mesh file at " + request.file.string() + "; paths are relative to the scene file");
   }

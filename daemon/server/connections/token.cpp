@@ -28,7 +28,9 @@ tl::unexpected<Error> unusable(const std::filesystem::path& file, const std::str
 /// Refuses tokens that are too short, because they can be guessed, and tokens with blanks, which a header would cut.
 Result<Token> Token::read(const std::filesystem::path& file, std::string& warning) {
   const auto read = read_regular(file, 2 * longest);
-  if (!read) return unusable(file, "cannot be read; make one: (umask 077; openssl rand -hex 24 > " + file.string() + ")");
+  if (!read && is_absent(file))
+    return unusable(file, "cannot be read; make one: (umask 077; openssl rand -hex 24 > " + file.string() + ")");
+  if (!read) return failure(ErrorKind::config, "control.token_file " + read.error().text);
   std::string text = *read;
   const auto first = text.find_first_not_of(blanks);
   text = first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(blanks) - first + 1);

@@ -52,6 +52,25 @@ TEST(ConfigMistakes, SaysWhatASceneFileIsThatCannotBeRead) {
   EXPECT_THAT(why("world: {scene: fifo.yaml}\n" + vehicles + sonar), HasSubstr("fifo.yaml: is a FIFO, not a regular file"));
 }
 
+TEST(ConfigMistakes, SaysWhyAFileThatIsThereCannotBeRead) {
+  namespace fs = std::filesystem;
+  const fs::path folder = directory();
+  fs::create_directory(folder / "maps.yaml");
+  fs::create_symlink("round.yaml", folder / "round.yaml");
+  fs::create_symlink("gone", folder / "link.yaml");
+  const std::pair<const char*, const char*> cases[] = {
+      {"maps.yaml", "maps.yaml: is a folder, not a regular file; name a file in it"},
+      {"round.yaml", "round.yaml: cannot be opened: its links lead round in a circle"},
+      {"link.yaml", "link.yaml: cannot be opened: it is a link to gone, which is not there"}};
+  for (const auto& [name, words] : cases) {
+    EXPECT_THAT(why(std::string("world: {scene: ") + name + "}\n" + vehicles + sonar), HasSubstr(words));
+    EXPECT_THAT(why(world + "vehicles: [{name: a, trajectory: {file: " + name + "}}]\n" + sonar), HasSubstr(words));
+    EXPECT_THAT(why(world + "vehicles: [{name: a, trajectory: " + name + "}]\n" + sonar), HasSubstr(words));
+    EXPECT_THAT(load_config(folder / name).error().text, HasSubstr(words));
+  }
+  for (const char* name : {"maps.yaml", "round.yaml", "link.yaml"}) fs::remove(folder / name);
+}
+
 TEST(ConfigMistakes, ListenersAtMulticastAndBroadcastAddressesAreRefused) {
   for (const std::string ip : {"224.0.0.1", "239.255.0.1", "255.255.255.255", "240.0.0.1", "127.255.255.255"}) {
     const std::string words = ": " + ip + " is a multicast or broadcast address; give an address of this computer";

@@ -53,7 +53,16 @@ TEST_F(TokenFile, ThatHoldsNoSecretIsRefusedWithoutShowingIt) {
   const auto missing = Token::read(file, warning);
   ASSERT_FALSE(missing);
   EXPECT_THAT(missing.error().text, HasSubstr("cannot be read"));
-  EXPECT_FALSE(Token::read(::testing::TempDir(), warning));
+  EXPECT_THAT(missing.error().text, HasSubstr("make one: (umask 077"));
+  const auto folder = Token::read(::testing::TempDir(), warning);
+  ASSERT_FALSE(folder);
+  EXPECT_THAT(folder.error().text, HasSubstr(": is a folder, not a regular file; name a file in it"));
+  EXPECT_EQ(folder.error().text.find("make one"), std::string::npos) << "a file of this name cannot be made";
+  std::filesystem::create_symlink(file, file);
+  const auto circle = Token::read(file, warning);
+  std::filesystem::remove(file);
+  ASSERT_FALSE(circle);
+  EXPECT_THAT(circle.error().text, HasSubstr("its links lead round in a circle"));
 }
 
 TEST_F(TokenFile, ThatEverybodyReadsIsWarnedAbout) {
