@@ -1,9 +1,11 @@
 #include "clients/sonarctl/ping_stream.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +14,7 @@
 
 #include "clients/sonarctl/http.hpp"
 #include "core/text/ipv4.hpp"
+#include "core/base/regular_file.hpp"
 #include "protocol/recording/recorded_pings.hpp"
 
 namespace sonar::clients {
@@ -355,7 +358,11 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": check that its folder exists and is writable");
   return {};
 }
+  const int opened = open_to_write(file, O_CREAT);  // a stream would wait for the reader of a pipe
+  const int error = errno;
+  if (opened < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(error));
 
+  ::close(opened);
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar) {
   auto opened = recording::open_recording(file, sonar);
   if (!opened) return tl::unexpected(opened.error());

@@ -101,4 +101,14 @@ Result<std::string> read_regular(const std::filesystem::path& file, std::size_t 
   return text;
 }
 
+int open_to_write(const std::filesystem::path& file, int flags) {
+  const int descriptor = ::open(file.c_str(), flags | O_WRONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY, 0666);
+  if (descriptor >= 0) ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) & ~O_NONBLOCK);
+  return descriptor;
+}
+
+std::string why_not_written(int error) {
+  return error == ENXIO ? "it is a pipe that no program reads; start its reader first" : std::strerror(error);
+}
+
 }  // namespace sonar

@@ -15,6 +15,8 @@
 #include <string>
 #include <system_error>
 
+#include "core/base/regular_file.hpp"
+
 namespace sonar {
 namespace {
 
@@ -111,12 +113,12 @@ Result<void> write_whole_file(const std::filesystem::path& file, std::initialize
   const bool replaces = !is_device_or_pipe(file);  // devices and pipes are written, not replaced
   const std::filesystem::path target = replaces ? behind_links(file) : file;
   const std::filesystem::path unfinished = replaces ? target.string() + ".tmp" : target.string();
-  const int lock = replaces ? open_alone(unfinished) : ::open(target.c_str(), O_WRONLY | O_CLOEXEC);
+  const int lock = replaces ? open_alone(unfinished) : open_to_write(target, 0);
   const auto failed = [&](int why) {
     std::error_code ignored;
     if (lock >= 0 && replaces) std::filesystem::remove(unfinished, ignored);
     if (lock >= 0) ::close(lock);
-    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(why));
+    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(why));
   };
   if (lock < 0) return failed(errno);
   const int descriptor = ::fcntl(lock, F_DUPFD_CLOEXEC, 0);

@@ -9,6 +9,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "core/base/regular_file.hpp"
+
 namespace sonar::recording {
 namespace {
 
@@ -154,10 +156,10 @@ std::unique_ptr<Source> source_from(std::string name, Bytes bytes) {
 namespace {
 
 Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int more_flags) {
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | more_flags, 0666);
+  const int fd = open_to_write(file, O_CREAT | more_flags);
   const int error = errno;
   if (fd < 0 && error == EEXIST) return failure(ErrorKind::io, file.string() + " exists already: give another name");
-  if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(error));
+  if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(error));
   Descriptor opened(fd);
   struct stat about {};
   if (::fstat(fd, &about) == 0 && S_ISREG(about.st_mode)) {

@@ -16,7 +16,7 @@ import unittest
 
 import mcap_checker
 from oculus_reader import HEADER, Client, Ping, fire_message
-from running_sonard import ROOT, SONARCTL, SONARD, Sonard, run
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, run
 from tshark import messages, tshark, why_not
 
 KINDS = ["pcap", "mcap", "oculus", "raw"]
@@ -351,6 +351,18 @@ class OneIntoAnother(Files):
         for path in (found[0], *map(self.path, ["pcap", "mcap", "oculus"])):
             with self.subTest(path.name), Replay(path, "--stepped") as replay:
                 self.assertEqual(replay.everything(), found[0].read_bytes())
+
+    def test_a_pipe_that_nobody_reads_is_not_waited_for(self):
+        source = self.path("raw")
+        source.write_bytes(self.made())
+        os.mkfifo(self.folder / "pipe")
+        for words in (["record", "--from", source, "--raw"], ["record", "--from", source, "--pcap"], ["view", "--from", source, "--png"]):
+            done = run(SONARCTL, *words, self.folder / "pipe", patience_s=60)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (74, 1), done.stderr)
+            self.assertIn("pipe: it is a pipe that no program reads; start its reader first", done.stderr)
+        with subprocess.Popen(["cat", self.folder / "pipe"], stdout=subprocess.PIPE) as reader:
+            eventually(lambda: run(SONARCTL, "record", "--from", source, "--raw", self.folder / "pipe").returncode == 0)
+            self.assertEqual(reader.communicate()[0], source.read_bytes())
 
     def test_refusals(self):
         self.path("raw").write_bytes(b"nothing of the kind")

@@ -1,11 +1,13 @@
 // Only regular files are opened: the error names any other kind, and opening never waits for it.
 #include "core/base/regular_file.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <fstream>
 
 namespace sonar {
@@ -55,6 +57,20 @@ TEST_F(RegularFile, LinksThatLeadToNoFileAreExplained) {
   std::ofstream(folder / "file") << "x";
   EXPECT_FALSE(is_absent(folder / "file"));
   EXPECT_TRUE(is_absent(folder / "file" / "below")) << "a file has nothing below it";
+}
+
+TEST_F(RegularFile, AFifoWithoutAReaderIsNotWaitedForWhenItIsToBeWritten) {
+  const auto pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(open_to_write(pipe, O_CREAT), -1);
+  EXPECT_EQ(why_not_written(errno), "it is a pipe that no program reads; start its reader first");
+  const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK), writer = open_to_write(pipe, O_CREAT);
+  ASSERT_GE(writer, 0);
+  EXPECT_EQ(::fcntl(writer, F_GETFL) & O_NONBLOCK, 0) << "a full pipe makes writers wait, no bytes are lost";
+  ::close(writer), ::close(reader);
+  const int file = open_to_write(folder / "new", O_CREAT);
+  EXPECT_GE(file, 0);
+  ::close(file);
 }
 
 }  // namespace
