@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 
 #include "clients/sonarctl/http.hpp"
@@ -373,8 +374,16 @@ Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std:
   while (auto found = pings->next()) {
     if (number ? count++ == *number : found->ping.is_whole()) return std::move(found->ping);
     last = std::move(found->ping);
+  const auto note_damage = [&pings] {
+    if (const auto damage = pings->reader().damage())
+      std::fprintf(stderr, "sonarctl: %s; the ping is one of the rest\n", damage->text.c_str());
+  };
   }
-  if (last && !number) return *std::move(last);
+    if (number ? count == *number : found->ping.is_whole()) note_damage();
+  if (last && !number) {
+    note_damage();
+    return *std::move(last);
+  }
   if (last)
     return failure(ErrorKind::usage,
                    file.string() + " holds pings 0 to " + std::to_string(count - 1) + ", not " + std::to_string(*number));

@@ -364,6 +364,22 @@ class OneIntoAnother(Files):
             eventually(lambda: run(SONARCTL, "record", "--from", source, "--raw", self.folder / "pipe").returncode == 0)
             self.assertEqual(reader.communicate()[0], source.read_bytes())
 
+    def test_junk_in_a_raw_dump_is_told(self):
+        sound = self.made()
+        junk = self.folder / "junk.raw"
+        junk.write_bytes(sound + b"what is this?" + sound)
+        done = self.convert(junk, "--mcap", self.path("mcap"))
+        told = f"junk.raw: 13 bytes from byte {len(sound)} on belong to no message"
+        self.assertEqual(done.returncode, 65)
+        self.assertIn(told, done.stderr)
+        for number, words in ((3, ""), (4, f"sonarctl: {self.folder}/{told}; the ping is one of the rest\n")):
+            done = run(SONARCTL, "view", "--from", junk, "--ping", str(number), "--png", self.folder / "a.png")
+            self.assertEqual((done.returncode, done.stderr), (0, words))
+        junk.write_bytes(sound[:16] + b"nothing but junk" * 9)
+        for words in (["view", "--from", junk, "--png", self.folder / "b.png"], ["record", "--from", junk, "--pcap", self.path("pcap")]):
+            done = run(SONARCTL, *words)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (65, 1), done.stderr)
+
     def test_refusals(self):
         self.path("raw").write_bytes(b"nothing of the kind")
         for code, words in [(64, ["record", "127.0.0.2"]), (66, ["record", "--from", self.folder / "none", "--raw", "x"]),

@@ -168,8 +168,43 @@ TEST(Recording, BytesBetweenMessagesAreKept) {
     auto opened = open_bytes(recorded(format, messages));
     ASSERT_TRUE(opened);
     EXPECT_EQ(device_stream(read_all(*opened->reader)), device_stream(messages)) << name_of(format);
-    EXPECT_FALSE(opened->reader->damage());
+    const auto damage = opened->reader->damage();
+    if (format != Format::raw_dump) {
+      EXPECT_FALSE(damage);
+      continue;
+    }
+    ASSERT_TRUE(damage);
+    EXPECT_EQ(damage->kind, ErrorKind::bad_data);
+    const std::vector<RecordedMessage> before(messages.begin(), messages.begin() + 3);
+    const std::string from = std::to_string(device_stream(before).size());
+    EXPECT_THAT(damage->text, HasSubstr("8 bytes from byte " + from + " on belong to no message"));
   }
+}
+
+TEST(Recording, JunkInARawDumpIsCountedWithItsPlace) {
+  const Bytes ping = ping_message(1);
+  const auto damage_of = [](std::initializer_list<Bytes> parts) {
+    Bytes file;
+    for (const Bytes& part : parts) file.insert(file.end(), part.begin(), part.end());
+    auto opened = open_bytes(file);
+    if (!opened) return opened.error().text;
+    EXPECT_EQ(device_stream(read_all(*opened->reader)).size(), file.size());
+    const auto first = opened->reader->damage();
+    opened->reader->rewind();
+    EXPECT_FALSE(opened->reader->damage());
+    read_all(*opened->reader);
+    EXPECT_EQ(opened->reader->damage().has_value(), first.has_value());
+    return first ? first->text : std::string();
+  };
+  const std::string after_one = std::to_string(ping.size());
+  EXPECT_EQ(damage_of({ping, ping}), "");
+  // The second piece begins as a message does, with an unknown type: both are one place.
+  EXPECT_THAT(damage_of({ping, bytes_of("S"), bytes_of("SOSOSOSOSOSOSOSOSOSO"), ping}),
+              HasSubstr("21 bytes from byte " + after_one + " on belong to no message"));
+  EXPECT_THAT(damage_of({ping, bytes_of("x")}), HasSubstr("1 byte from byte " + after_one + " on belong to no message"));
+  EXPECT_THAT(damage_of({ping, bytes_of("xy"), ping, bytes_of("z"), ping}),
+              HasSubstr("2 bytes from byte " + after_one + " on belong to no message; 1 more such place"));
+  EXPECT_THAT(damage_of({bytes_of("no message"), ping}), HasSubstr("is not a recording"));
 }
 
 TEST(Recording, ADamagedPlaceCostsOnlyItself) {
