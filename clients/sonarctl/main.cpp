@@ -1,8 +1,10 @@
 // sonarctl: the tool for users of a sonar.
 #include <csignal>
+#include <cstdio>
 
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
+#include "core/base/stack_limit.hpp"
 #include "core/base/standard_streams.hpp"
 
 int main(int argc, char** argv) {
@@ -17,5 +19,9 @@ int main(int argc, char** argv) {
   if (on_hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &on_interrupt, nullptr);  // nohup ignores it
   std::signal(SIGPIPE, SIG_IGN);
   sonar::open_closed_standard_streams();
+  if (const auto room = sonar::make_room_for_stacks(); !room) {
+    std::fprintf(stderr, "sonarctl: %s\n", room.error().text.c_str());
+    return sonar::exit_code(room.error().kind);
+  }
   return sonar::clients::run(argc, argv);
 }

@@ -7,6 +7,7 @@
 
 #include <boost/system/system_error.hpp>
 
+#include "core/base/stack_limit.hpp"
 #include "core/base/standard_streams.hpp"
 #include "daemon/commands/check_command.hpp"
 #include "daemon/commands/dataset/dataset_command.hpp"
@@ -66,6 +67,7 @@ int main(int argc, char** argv) {
   sonar::open_closed_standard_streams();
   const auto begin = std::chrono::steady_clock::now();
   bool json = false;
+  if (const auto room = sonar::make_room_for_stacks(); !room) return sonar::report_error(room.error(), json);
   try {
     const auto command = sonar::parse_command_line(argc, argv);
     const auto code = sonar::run_command(command, begin, json);

@@ -163,6 +163,14 @@ class Mistakes(unittest.TestCase):
 
         self.expect(short_of("ulimit -v 200000"), 69, "memory")
         if os.geteuid() != 0:  # the superuser has no such limit
+        for kib in (64, 256, 1023):
+            for program, *words in ((SONARD, "run", "--demo"), (SONARD, "check", "--demo"), (SONARCTL, "--version"),
+                                    (SONARCTL, "scene", "check", "demo.yaml")):
+                self.expect(run("bash", "-c", f"ulimit -s {kib}; exec \"$@\"", "-", program, *words), 69,
+                            f"the stack is limited to {kib} KiB, and at least 1024 are needed; raise the limit (ulimit -s")
+        for limit in ("ulimit -S -s 64", "ulimit -s 1024"):  # the first may be raised
+            result = run("bash", "-c", f"{limit}; exec {SONARCTL} scene check {ROOT}/scenes/wreck.yaml")
+            self.assertEqual((result.returncode, result.stderr), (0, ""), limit)
             self.expect(short_of("ulimit -u 1"), 69, "cannot start a thread", "ulimit -u")
 
     def test_a_token_that_never_comes_is_not_waited_for(self):

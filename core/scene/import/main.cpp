@@ -8,6 +8,7 @@
 
 #include "core/base/confined_reads.hpp"
 #include "core/base/memory_left.hpp"
+#include "core/base/stack_limit.hpp"
 #include "core/scene/import/import_limits.hpp"
 #include "core/scene/import/import_mesh.hpp"
 
@@ -37,7 +38,8 @@ int main(int argc, char** argv) {
     constexpr std::string_view text = "sonard-import-mesh is started by a sonard or sonarctl of the same version, not by hand\n";
     return ::write(STDERR_FILENO, text.data(), text.size()) < 0 ? 74 : 64;
   }
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // ends this process when its parent ends
+  static_cast<void>(make_room_for_stacks());  // the parent has the same limits and has reported a small one
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);         // ends this process when its parent ends
   if (::getppid() != request->parent) return 0;
   begin_import_limits(*request, STDOUT_FILENO);
   if (!request->readable.empty()) confine_reads(request->readable);
