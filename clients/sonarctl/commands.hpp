@@ -88,7 +88,4 @@ struct PoseOptions {
 };
 Result<void> send_poses(const PoseOptions& options);
 
-/// Set by Ctrl-C. Commands then end as at their time limit.
-extern volatile int interrupted;
-
 }  // namespace sonar::clients

@@ -25,7 +25,8 @@ Result<HttpReply> http_ask(const Endpoint& at, const std::string& method, const 
   std::array<std::byte, 4096> chunk;
   while (answer.size() < longest_answer) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-    const Read read = read_some(*socket, chunk, std::max(left, std::chrono::milliseconds(0)));
+    const Read read = read_some(*socket, chunk, std::clamp(left, std::chrono::milliseconds(0), longest_step));
+    if (read.what == Wait::timed_out && left.count() > 0 && interrupted == 0) continue;
     if (read.what != Wait::data) break;
     for (std::size_t i = 0; i < read.size; ++i) answer += static_cast<char>(chunk[i]);
   }

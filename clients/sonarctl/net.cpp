@@ -15,6 +15,9 @@
 #include <thread>
 
 namespace sonar::clients {
+
+volatile int interrupted = 0;
+
 namespace {
 
 using AddressList = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
@@ -56,7 +59,10 @@ int try_connect(const Socket& socket, const addrinfo& address, std::chrono::mill
   if (error == EINPROGRESS) {
     pollfd ready{socket.fd(), POLLOUT, 0};
     socklen_t size = sizeof error;
-    if (::poll(&ready, 1, static_cast<int>(patience.count())) != 1) return ETIMEDOUT;
+    int polled = 0;
+    for (; polled == 0 && patience.count() > 0 && interrupted == 0; patience -= longest_step)
+      polled = ::poll(&ready, 1, static_cast<int>(std::min(patience, longest_step).count()));
+    if (polled != 1) return ETIMEDOUT;
     ::getsockopt(socket.fd(), SOL_SOCKET, SO_ERROR, &error, &size);
   }
   ::fcntl(socket.fd(), F_SETFL, flags);
@@ -103,6 +109,7 @@ Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono
   for (;;) {
     int error = 0;
     for (std::size_t i = 0; i < places.size(); ++i) {
+      if (interrupted != 0) return failure(ErrorKind::io, "interrupted before tcp " + names + " accepted a connection");
       auto socket = open_socket(SOCK_STREAM);
       if (!socket) return tl::unexpected(socket.error());
       const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());

@@ -71,4 +71,9 @@ Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chro
 bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 
+/// Set by Ctrl-C and SIGTERM. Commands then end as at their time limit; nothing connects any more.
+extern volatile int interrupted;
+/// Waits take steps of this length, so that a signal which comes between a look at `interrupted` and the wait is noticed soon.
+constexpr std::chrono::milliseconds longest_step{100};
+
 }  // namespace sonar::clients

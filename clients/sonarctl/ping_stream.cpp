@@ -14,8 +14,8 @@
 #include <cstring>
 
 #include "clients/sonarctl/http.hpp"
-#include "core/text/ipv4.hpp"
 #include "core/base/regular_file.hpp"
+#include "core/text/ipv4.hpp"
 #include "protocol/recording/recorded_pings.hpp"
 
 namespace sonar::clients {
@@ -113,6 +113,7 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
       failed = connected.error();
       if (failed.kind == ErrorKind::usage) return tl::unexpected(failed);
     }
+    if (interrupted != 0) return failure(ErrorKind::io, "interrupted before " + device.host + " answered");
     if (is_last) return tl::unexpected(failed);
     for (const Candidate& candidate : others) {
       const bool by_http = candidate.first->ports.front().kind == Kind::http;
@@ -173,11 +174,13 @@ Result<void> PingStream::start(std::optional<Socket> connected, milliseconds pat
     own.push_back(sockets_.back() ? ntohs(own_address(*sockets_.back()).sin_port) : std::uint16_t{0});
   }
   carry_out(host_->on_open(own, now()));
-  while (!host_->is_open() && !ended_ && !interrupted_ && Clock::now() < deadline) receive(left_until(deadline));
+  while (!host_->is_open() && !ended_ && interrupted == 0 && Clock::now() < deadline)
+    receive(std::min<milliseconds>(left_until(deadline), longest_step));
   const std::optional<Error> why = std::exchange(ended_, std::nullopt);
   is_started_ = host_->is_open() && !why;
   if (is_started_) return {};
-  if (interrupted_) return failure(ErrorKind::io, "interrupted");
+  interrupted_ = false;
+  if (interrupted != 0) return failure(ErrorKind::io, "interrupted before " + place() + " answered");
   if (!why || why->kind == ErrorKind::unavailable)
     return failure(ErrorKind::unavailable,
                    place() + " does not answer as " + std::string(make_->title) + " does" + is_sonard_there);
@@ -355,15 +358,15 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (make_->each_ping_requested)  // a recording would begin after the greeting, without which its pings are not readable
     return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
                                          ": sonarctl record keeps the messages of both ends");
-  record_.open(file, std::ios::binary | std::ios::trunc);
-  if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": check that its folder exists and is writable");
-  return {};
-}
   const int opened = open_to_write(file, O_CREAT);  // a stream would wait for the reader of a pipe
   const int error = errno;
   if (opened < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(error));
-
+  record_.open(file, std::ios::binary | std::ios::trunc);
   ::close(opened);
+  if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": check that its folder exists and is writable");
+  return {};
+}
+
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar) {
   auto opened = recording::open_recording(file, sonar);
   if (!opened) return tl::unexpected(opened.error());
@@ -371,15 +374,15 @@ Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std:
   if (!pings) return failure(pings.error().kind, file.string() + " " + pings.error().text);
   std::optional<HostPing> last;
   std::size_t count = 0;
-  while (auto found = pings->next()) {
-    if (number ? count++ == *number : found->ping.is_whole()) return std::move(found->ping);
-    last = std::move(found->ping);
   const auto note_damage = [&pings] {
     if (const auto damage = pings->reader().damage())
       std::fprintf(stderr, "sonarctl: %s; the ping is one of the rest\n", damage->text.c_str());
   };
-  }
+  while (auto found = pings->next()) {
     if (number ? count == *number : found->ping.is_whole()) note_damage();
+    if (number ? count++ == *number : found->ping.is_whole()) return std::move(found->ping);
+    last = std::move(found->ping);
+  }
   if (last && !number) {
     note_damage();
     return *std::move(last);

@@ -11,8 +11,6 @@
 
 namespace sonar::clients {
 
-volatile int interrupted = 0;
-
 namespace {
 
 /// This many pings with older settings may still arrive after ours were sent.

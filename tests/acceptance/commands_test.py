@@ -4,9 +4,10 @@ import pathlib
 import signal
 import subprocess
 import tempfile
+import time
 import unittest
 
-from running_sonard import BUILD, ROOT, SONARCTL, SONARD, run
+from running_sonard import BUILD, ROOT, SONARCTL, SONARD, Sonard, eventually, run
 
 
 def check(text):
@@ -162,7 +163,6 @@ class Mistakes(unittest.TestCase):
             return run("bash", "-c", f"{limit}; exec {SONARD} run --demo")
 
         self.expect(short_of("ulimit -v 200000"), 69, "memory")
-        if os.geteuid() != 0:  # the superuser has no such limit
         for kib in (64, 256, 1023):
             for program, *words in ((SONARD, "run", "--demo"), (SONARD, "check", "--demo"), (SONARCTL, "--version"),
                                     (SONARCTL, "scene", "check", "demo.yaml")):
@@ -171,6 +171,7 @@ class Mistakes(unittest.TestCase):
         for limit in ("ulimit -S -s 64", "ulimit -s 1024"):  # the first may be raised
             result = run("bash", "-c", f"{limit}; exec {SONARCTL} scene check {ROOT}/scenes/wreck.yaml")
             self.assertEqual((result.returncode, result.stderr), (0, ""), limit)
+        if os.geteuid() != 0:  # the superuser has no such limit
             self.expect(short_of("ulimit -u 1"), 69, "cannot start a thread", "ulimit -u")
 
     def test_a_token_that_never_comes_is_not_waited_for(self):
@@ -182,6 +183,41 @@ class Mistakes(unittest.TestCase):
 
     def test_an_address_of_another_machine_is_69_with_the_way_out(self):
         self.expect(run(SONARD, "run", "--demo", "--bind", "192.0.2.7"), 69, "192.0.2.7", "--bind")
+
+
+class Interrupted(unittest.TestCase):
+    def ends_soon(self, process):
+        begin = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=120)
+        self.assertLess(time.monotonic() - begin, 10)
+
+    def started(self, *words):
+        """The process, once its handler of SIGTERM is in place."""
+        process = subprocess.Popen([SONARCTL, *words], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                   text=True)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        status = pathlib.Path(f"/proc/{process.pid}/status")
+        eventually(lambda: int(status.read_text().split("SigCgt:")[1].split()[0], 16) >> signal.SIGTERM - 1 & 1)
+        return process
+
+    def test_the_first_signal_ends_the_search_for_a_sonar(self):
+        for words in (["listen", "127.0.0.77"], ["view", "127.0.0.77", "--png", "x.png"], ["stats", "127.0.0.77"],
+                      ["listen", "127.0.0.77", "--make", "waterlinked"]):
+            with self.subTest(words):
+                process = self.started(*words, "--wait", "60")
+                self.ends_soon(process)
+                self.assertGreater(process.returncode, 0)  # no signal ended it
+
+    def test_the_first_signal_ends_the_wait_for_one_that_is_gone(self):
+        with Sonard() as daemon:
+            process = self.started("listen", daemon.address, "--wait", "60")
+            eventually(lambda: daemon.get("/metrics").count("sonard_pings_sent_total"))
+            daemon.process.kill()
+            eventually(lambda: "connecting again" in process.stderr.readline())
+            self.ends_soon(process)
+            self.assertEqual(process.returncode, 0)
 
 
 class CheckAndRun(unittest.TestCase):
