@@ -1,13 +1,42 @@
 """sonarctl status, events, set, load and object beside a running daemon."""
 import json
 import pathlib
+import re
 import socket
 import subprocess
 import tempfile
 import time
 import unittest
 
-from running_sonard import ROOT, SONARCTL, Sonard, run
+from running_sonard import ROOT, SONARCTL, SONARD, Daemon, Sonard, eventually, run
+
+
+FREE_PORTS = f"""\
+world: {{scene: {ROOT}/scenes/demo.yaml}}
+vehicles: [{{name: rov}}]
+sonars: [{{name: front, profile: oculus-m1200d, bind_ip: ADDRESS, status_to: [ADDRESS]}}]
+poses: {{protobuf: "ADDRESS:0", json: "ADDRESS:0", mavlink: "udpin:127.0.0.1:0"}}
+control: {{stream: "ADDRESS:0", http: "ADDRESS:0"}}
+"""
+
+
+class PortZero(unittest.TestCase):
+    def test_the_system_chooses_free_ports_and_sonard_prints_them(self):
+        with Daemon(FREE_PORTS, str(SONARD)) as daemon:
+            at = daemon.address.replace(".", "\\.")
+            poses = re.search(rf"pose +udp {at}:(\d+) \(protobuf\)  udp and tcp {at}:(\d+) \(json\)  udpin:127.0.0.1:(\d+) ",
+                              daemon.log())
+            control = re.search(rf"control +tcp {at}:(\d+)   http http://{at}:(\d+)", daemon.log())
+            self.assertTrue(poses and control, daemon.log())
+            ports = poses.groups() + control.groups()
+            self.assertEqual((len(set(ports)), "0" in ports), (5, False), ports)
+            stream = f"{daemon.address}:{control[1]}"
+            for number, (port, words) in enumerate(((poses[1], []), (poses[2], ["--json"]))):
+                sent = run(SONARCTL, "pose", "once", "--xyz", f"{number + 1},2,-3", "--to", f"{daemon.address}:{port}", *words)
+                self.assertEqual((sent.returncode, sent.stderr), (0, ""))
+
+                place = f"{number + 1}.00 2.00 -3.00 m"
+                eventually(lambda place=place: place in run(SONARCTL, "status", "--control", stream).stdout)
 
 
 class Steering(unittest.TestCase):
