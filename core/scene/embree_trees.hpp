@@ -35,9 +35,10 @@ inline std::string device_settings(int threads) {
 }
 
 inline std::string why_not(RTCError error) {
+  constexpr const char* cure = "; use a smaller scene, or allow more (ulimit -v, LimitAS=, MemoryMax=)";
   if (error == RTC_ERROR_UNSUPPORTED_CPU) return " on this processor";
-  if (error == RTC_ERROR_OUT_OF_MEMORY) return ": not enough memory";
-  return ": code " + std::to_string(error) + "; memory or threads may be short (ulimit -v, ulimit -u)";
+  if (error == RTC_ERROR_OUT_OF_MEMORY) return std::string(": not enough memory") + cure;
+  return ": code " + std::to_string(error) + "; memory or threads may be short" + cure + ", and threads (ulimit -u)";
 }
 
 // Owners of Embree's reference-counted handles.
@@ -51,8 +52,7 @@ struct Device {
   Device& operator=(const Device&) = delete;
   void check() const {
     const RTCError error = rtcGetDeviceError(handle);
-    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::runtime_error("not enough memory to build the scene for ray tracing");
-    if (error != RTC_ERROR_NONE) throw std::runtime_error("the ray tracer failed with code " + std::to_string(error));
+    if (error != RTC_ERROR_NONE) throw std::runtime_error("the ray tracer (Embree) cannot build the scene" + why_not(error));
   }
   // The widest packet of rays for which Embree has code on this processor. Embree traces wider packets as a stream, which is
   // slower, and Embree 3.13 then also reads rays that `valid` excludes.

@@ -72,6 +72,12 @@ void limit_import(std::uintmax_t bytes) {
         limits.name + ": takes more than the " + std::to_string(memory >> 20) +
         " MiB of memory that are left to read it; use a smaller mesh, or give sonard more (MemoryMax, docker --memory)";
   }
+  rlimit space{};
+  if (::getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_max != RLIM_INFINITY && space.rlim_max < limits.at_start + memory) {
+    limits.memory_kind = ErrorKind::unavailable;
+    limits.memory = limits.name + ": takes more memory to read than the limit of addresses leaves, " +
+                    std::to_string(space.rlim_max >> 20) + " MiB in all; raise it (ulimit -v, LimitAS=)";
+  }
   const std::uint64_t seconds = import_seconds + import_seconds_of_a_million * bytes / 1'000'000;
   limits.time =
       limits.name + ": is not read within " + std::to_string(seconds) + " s of processor time; simplify it, or join its objects";
