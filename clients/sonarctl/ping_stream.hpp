@@ -102,10 +102,6 @@ class PingStream {
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 
-/// Ping `number` (from 0) of a recording; nullopt: the first complete one, else the last. `sonar`: selects one of several.
-/// Error usage: there are fewer pings.
-Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
-
 /// The result of waiting for a device's beacon, of a make whose beacons contain the address for hosts.
 struct Discovered {
   Endpoint device;

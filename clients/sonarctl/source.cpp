@@ -8,6 +8,7 @@
 #include "clients/sonarctl/waiting.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/recording/recorded_pings.hpp"
 
 namespace sonar::clients {
 
@@ -187,6 +188,33 @@ Result<OpenedStream> connect(const SourceOptions& source, bool say) {
   const Result<Endpoint> device = find_device(source, say);
   if (!device) return tl::unexpected(device.error());
   return open_stream(source, *device);
+}
+
+Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar) {
+  auto opened = recording::open_recording(file, sonar);
+  if (!opened) return tl::unexpected(opened.error());
+  auto pings = recording::RecordedPings::open(std::move(opened->reader));
+  if (!pings) return failure(pings.error().kind, file.string() + " " + pings.error().text);
+  std::optional<HostPing> last;
+  std::size_t count = 0;
+  const auto note_damage = [&pings] {
+    if (const auto damage = pings->reader().damage())
+      std::fprintf(stderr, "sonarctl: %s; the ping is one of the rest\n", damage->text.c_str());
+  };
+  while (auto found = pings->next()) {
+    if (number ? count == *number : found->ping.is_whole()) note_damage();
+    if (number ? count++ == *number : found->ping.is_whole()) return std::move(found->ping);
+    last = std::move(found->ping);
+  }
+  if (last && !number) {
+    note_damage();
+    return *std::move(last);
+  }
+  if (last)
+    return failure(ErrorKind::usage,
+                   file.string() + " holds pings 0 to " + std::to_string(count - 1) + ", not " + std::to_string(*number));
+  const auto damage = pings->reader().damage();
+  return failure(ErrorKind::bad_data, file.string() + " holds no ping of a known sonar" + (damage ? ": " + damage->text : ""));
 }
 
 Result<HostPing> fetch_ping(const SourceOptions& source, std::optional<std::size_t> number, bool of_samples) {

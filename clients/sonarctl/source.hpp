@@ -59,6 +59,10 @@ void print_notices(const std::vector<std::string>& notices);
 Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint);
 
+/// Ping `number` (from 0) of a recording; nullopt: the first complete one, else the last. `sonar`: selects one of several.
+/// Error usage: there are fewer pings.
+Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
+
 /// Returns read_ping() of a recording, or the first ping of a device with the requested settings. If a picture consists of many
 /// pings, it waits until the picture is complete or source.picture_limit_s is over; not with `of_samples`, if single pings have
 /// no picture.
