@@ -25,7 +25,8 @@ from record import record  # noqa: E402
 from running_sonard import Sonard  # noqa: E402
 
 MINUTES = float(os.environ.get("SONARD_PAGE_MINUTES", 20))
-OPENINGS, CLICKED, ROUNDS = 10, ("#theme", "#freeze", "#freeze", "[data-camera=top]", "[data-camera=orbit]"), 12
+OPENINGS, SCRIPTS_MS = 10, 50  # a click whose scripts take longer delays the next frame by more than the browser does
+CLICKED, ROUNDS = ("#theme", "#freeze", "#freeze", "[data-camera=top]", "[data-camera=orbit]"), 12
 
 # A sphere ahead of a sonar in free water.
 TARGET = """\
@@ -63,7 +64,8 @@ MOVES = """async (n) => {
   }
   return out;
 }"""
-CLICKS = """new PerformanceObserver((list) => list.getEntries().forEach((e) => e.name === 'click' && (window.clicks ??= []).push(e.duration)))
+CLICKS = """new PerformanceObserver((list) => list.getEntries().forEach((e) => e.name === 'click'
+    && (window.clicks ??= []).push([e.duration, e.processingEnd - e.startTime])))
   .observe({ type: 'event', durationThreshold: 16 })"""
 
 
@@ -84,9 +86,17 @@ def click(page, selector):
 
 
 def delays(page, clicks):
-    """The times [ms] from a click to the next painted frame, for several clicks; the browser reports none below 16 ms."""
+    """The times [ms] from each click to the next painted frame, and to the end of the page's scripts for it. The browser reports no
+    click whose frame comes within 16 ms. Without a graphics processor, painting takes most of the first time."""
     reported = page.run("window.clicks ?? []")
-    return [0] * (clicks - len(reported)) + reported
+    return [[0] * (clicks - len(reported)) + list(times) for times in zip(*reported)] or [[0] * clicks] * 2
+
+
+def keep_clicks(found, bounds_ms, where):
+    """The part of the scripts is an item of its own: a slow frame of the browser is no fault of the page."""
+    for times, (item, bound_ms) in zip(found, bounds_ms.items()):
+        p50, p95 = part(times, 0.5), part(times, 0.95)
+        kept(item, f"p50 {p50:.0f} ms, p95 {p95:.0f} ms of {len(times)}", f"p95 < {bound_ms} ms", p95 < bound_ms, where)
 
 
 @unittest.skipIf(WHY_NOT, WHY_NOT)
@@ -100,12 +110,16 @@ class FirstMinute(unittest.TestCase):
         return self.browser.open(f"http://{HTTP}:8088/", 1440, 900, **options)
 
     def test_first_picture(self):
-        took = []
-        for _ in range(OPENINGS):
-            with demo("oculus"), self.open(script=SEEN_AT) as page:
-                took.append(page.wait("window.seenAt"))
-        p50, worst = part(took, 0.5), max(took)
-        kept("page-first-picture", f"p50 {p50:.0f} ms, longest {worst:.0f} ms of {OPENINGS}", "< 1000 ms", p50 < 1000, "FirstMinute")
+        """In a browser that runs, and in a new one, which starts its processes and graphics meanwhile."""
+        for item, openings in (("page-first-picture", OPENINGS), ("page-first-picture-new-browser", OPENINGS // 2)):
+            took = []
+            for _ in range(openings):
+                if "new" in item:
+                    self.browser = self.enterContext(Browser())
+                with demo("oculus"), self.open(script=SEEN_AT) as page:
+                    took.append(page.wait("window.seenAt"))
+            p50, worst = part(took, 0.5), max(took)
+            kept(item, f"p50 {p50:.0f} ms, longest {worst:.0f} ms of {openings}", "< 1000 ms", p50 < 1000, "FirstMinute")
 
     def test_clicks(self):
         with demo("oculus"), self.open(script=CLICKS) as page:
@@ -113,9 +127,7 @@ class FirstMinute(unittest.TestCase):
             for selector in ROUNDS * CLICKED:
                 click(page, selector)
                 time.sleep(0.3)
-            found = delays(page, ROUNDS * len(CLICKED))
-            p50, p95 = part(found, 0.5), part(found, 0.95)
-            kept("page-demo-clicks", f"p50 {p50:.0f} ms, p95 {p95:.0f} ms of {len(found)}", "p95 < 150 ms", p95 < 150, "FirstMinute")
+            keep_clicks(delays(page, ROUNDS * len(CLICKED)), {"page-demo-clicks": 150, "page-demo-clicks-scripts": SCRIPTS_MS}, "FirstMinute")
 
     def test_size(self):
         """Of all that the page loads until its picture is there."""
@@ -192,9 +204,7 @@ class Long(unittest.TestCase):
             quality = page.run("sonardTest.fan.quality")
             kept("page-pictures", f"{drawn:.1f} of {read:.1f} Hz, fan 640 wide, quality {quality} of 2, software GL", ">= 14 of 15 Hz",
                  drawn >= 14 / 15 * read)
-            clicks = delays(page, 40)
-            kept("page-clicks", f"p50 {part(clicks, 0.5):.0f} ms, p95 {part(clicks, 0.95):.0f} ms of {len(clicks)}", "p95 < 100 ms",
-                 part(clicks, 0.95) < 100)
+            keep_clicks(delays(page, 40), {"page-clicks": 100, "page-clicks-scripts": SCRIPTS_MS}, "Long")
 
 
 if __name__ == "__main__":

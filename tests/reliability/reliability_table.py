@@ -64,7 +64,9 @@ ITEMS = {
     ],
     "Page": [
         ("page-first-picture", "the demo: opening of the page to its first picture", "< 1000 ms"),
+        ("page-first-picture-new-browser", "the same in a browser that has just been started", "< 1000 ms"),
         ("page-demo-clicks", "the demo: click to the next picture of the browser", "p95 < 150 ms"),
+        ("page-demo-clicks-scripts", "the demo: click to the end of the page's scripts", "p95 < 50 ms"),
         ("page-size", "what the page loads until its first picture", "< 200 kB as sent"),
         ("page-memory", "growth of the page's memory in 20 min beside a driver", "+10 MB"),
         ("page-pose-to-pixel", "set_object is answered: time until the picture shows it", "p50 < 100, p95 < 150 ms"),
@@ -72,6 +74,7 @@ ITEMS = {
         ("page-computing", "the same: computing of a ping, a part of the first", "< 20 ms"),
         ("page-pictures", "a driver at 15 Hz: pictures drawn", ">= 14 of 15 Hz"),
         ("page-clicks", "the same: click to the next picture of the browser", "p95 < 100 ms"),
+        ("page-clicks-scripts", "the same: click to the end of the page's scripts", "p95 < 50 ms"),
     ],
     "Input": [
         ("dissector", "a recorded run: fields of the Wireshark dissector = sonard's decoder", "equal, field by field"),
