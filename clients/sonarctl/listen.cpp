@@ -71,7 +71,7 @@ class Listener {
       if (item.what == Wait::data) {
         last_message_ = Clock::now();
         received_ = true;
-        print_notices(item.notices);
+        print_notices(notices_.kept(item.notices));
         if (item.ping) handle_ping(*item.ping);
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
         return tl::unexpected(silence(options_.source, *stream_, received_, "nothing more",
@@ -129,6 +129,7 @@ class Listener {
   std::string_view rate_unit_;
   Outage outage_;
   PingLog log_;
+  NoticeLog notices_;
   Clock::time_point start_, last_message_ = Clock::now();
   FirstPingWait waits_;
   std::optional<HostPing> last_ping_;

@@ -45,6 +45,24 @@ PingSummary PingLog::summary(const std::optional<protocol::Host::Counts>& of_wir
   return summary;
 }
 
+std::vector<std::string> NoticeLog::kept(const std::vector<std::string>& notices) {
+  constexpr std::uint64_t first_ones = 3;
+  std::vector<std::string> kept;
+  for (const std::string& notice : notices) {
+    std::string kind = notice;
+    std::erase_if(kind, [](char c) { return c >= '0' && c <= '9'; });
+    if (counts_.size() >= most_kinds && !counts_.contains(kind)) kind.clear();  // all further kinds count as one
+    const std::uint64_t count = ++counts_[kind];
+    std::uint64_t ten = 1;
+    while (ten < count) ten *= 10;
+    if (count <= first_ones)
+      kept.push_back(notice);
+    else if (count == ten)
+      kept.push_back(notice + "  (the " + std::to_string(count) + "th message of this kind)");
+  }
+  return kept;
+}
+
 double percentile(std::vector<double> values, double share) {
   if (values.empty()) return 0;
   const auto last = static_cast<double>(values.size() - 1);

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -38,6 +39,17 @@ class PingLog {
  private:
   PingSummary summary_;
   std::vector<Seconds> arrivals_;
+};
+
+/// Shortens notices that come with each ping. Those that differ in numbers alone are of one kind: of each kind the first three
+/// are kept, then the 10th, the 100th and so on, with their number.
+class NoticeLog {
+ public:
+  std::vector<std::string> kept(const std::vector<std::string>& notices);
+
+ private:
+  static constexpr std::size_t most_kinds = 100;
+  std::map<std::string, std::uint64_t> counts_;  // by text without digits
 };
 
 /// The value below which the fraction `share` (0..1) of the values lies; 0 if there are none.

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "clients/sonarctl/elapsed.hpp"
+#include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/record_files.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/waiting.hpp"
@@ -93,7 +94,7 @@ class Recorder {
   }
 
   Result<void> store(const PingStream::Item& item) {
-    print_notices(item.notices);
+    print_notices(notices_.kept(item.notices));
     for (const RecordedMessage& message : item.messages) {
       if (Result<void> written = files_.write(message); !written) return written;
       last_ = std::max(last_, message.at);
@@ -149,6 +150,7 @@ class Recorder {
   std::optional<Steering> steering_;
   RecordFiles& files_;
   FirstPingWait waits_;
+  NoticeLog notices_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double last_heard_s_ = 0;
   Time last_ = unix_now();  // time of the latest recorded message

@@ -61,6 +61,19 @@ TEST(PingLog, TellsWhatTheSonarLimited) {
   EXPECT_THAT(text_from(log.summary(std::nullopt), true, "Hz"), Not(HasSubstr("limits them")));
 }
 
+TEST(NoticeLog, KeepsTheFirstOfAKindAndThenFew) {
+  NoticeLog log;
+  std::vector<std::string> kept;
+  for (int i = 1; i <= 1000; ++i)
+    for (const std::string& line : log.kept({"ping " + std::to_string(i) + " is late"})) kept.push_back(line);
+  EXPECT_THAT(
+      kept, ElementsAre("ping 1 is late", "ping 2 is late", "ping 3 is late", "ping 10 is late  (the 10th message of this kind)",
+                        HasSubstr("the 100th"), HasSubstr("the 1000th")));
+  EXPECT_THAT(log.kept({"ping 9 is early"}), ElementsAre("ping 9 is early")) << "of another kind";
+  for (int i = 0; i < 200; ++i) log.kept({"kind " + std::string(static_cast<std::size_t>(i), 'x')});
+  EXPECT_THAT(log.kept({"one kind too many"}), ElementsAre());
+}
+
 TEST(PingLog, ComplainsOfSilenceAndJunk) {
   const protocol::Host::Counts junk{0, 0, 3, 0};
   EXPECT_THAT(complaints(PingLog().summary(junk), true), ElementsAre("no ping arrived", HasSubstr("3 bytes between messages")));
