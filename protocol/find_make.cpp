@@ -20,19 +20,22 @@ std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::
   std::vector<DriverAddress> all;
   for (const Port& port : vendor.ports()) {
     using Kind = Port::Kind;
-    if (port.kind == Kind::tcp_stream) all.push_back({"tcp", {ip, port.number}});
-    if (port.kind == Kind::udp_dialogue || port.kind == Kind::udp_answer) all.push_back({"udp", {ip, port.number}});
-    if (port.kind == Kind::http) all.push_back({"http", {ip, port.number}});
-    if (port.kind == Kind::udp_stream && port.group.port != 0) all.push_back({"multicast", port.group, true});
+    if (port.kind == Kind::tcp_stream) all.push_back({"tcp", {ip, port.number}, port.carries});
+    if (port.kind == Kind::udp_dialogue || port.kind == Kind::udp_answer) all.push_back({"udp", {ip, port.number}, port.carries});
+    if (port.kind == Kind::http) all.push_back({"http", {ip, port.number}, port.carries});
+    if (port.kind == Kind::udp_stream && port.group.port != 0) all.push_back({"multicast", port.group, port.carries, true});
     if (port.kind == Kind::udp_beacon)
-      for (const Endpoint& to : status_to) all.push_back({"status", to, true});
+      for (const Endpoint& to : status_to)
+        all.push_back({"status", {to.ip, to.port == 0 ? port.number : to.port}, port.carries, true});
   }
   return all;
 }
 
-std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first) {
-  return text::format("%-10.*s %-26.*s %s", static_cast<int>(protocol.size()), protocol.data(), static_cast<int>(at.size()),
-                      at.data(), sonar_speaks_first ? "sends without a request" : "waits for the driver");
+std::string line_of(std::string_view protocol, std::string_view at, std::string_view carries, bool sonar_speaks_first) {
+  std::string line = text::format("%-10.*s %-26.*s ", static_cast<int>(protocol.size()), protocol.data(),
+                                  static_cast<int>(at.size()), at.data());
+  if (!carries.empty()) line.append(carries).append("; ");
+  return line + (sonar_speaks_first ? "sends without a request" : "waits for the driver");
 }
 
 Result<SonarPicture> drawing_of(const HostPing& ping) {

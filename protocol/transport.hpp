@@ -22,6 +22,8 @@ struct Port {
     udp_dialogue,  // one Dialogue at `number` with the host that sent the last request; it gets Vendor::datagrams of its pings
   } kind{};
   std::uint16_t number = 0;
+  std::string_view carries = {};        // what drivers send and get there, for people: "settings, pings"
+  bool has_pings = true;                // tcp_stream: false = its connections get no pings, only answers to commands
   std::chrono::milliseconds period{0};  // period of a beacon
   bool on_change = false;               // the beacon is also sent when a client connects or leaves
   Endpoint group{};                     // receiver of a udp_stream until SetReceivers, often a multicast group; port 0 = none
@@ -35,6 +37,7 @@ struct Port {
 struct DriverAddress {
   std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
   Endpoint at;
+  std::string_view carries;         // as Port::carries
   bool sonar_speaks_first = false;  // false: the driver speaks first
 };
 

@@ -180,7 +180,8 @@ class Vendor {
 /// A sonar that sends its pings without a request, from power-up on, to every client of one TCP port.
 class PushingVendor : public Vendor {
  public:
-  explicit PushingVendor(std::uint16_t tcp_port) : ports_{{{.kind = Port::Kind::tcp_stream, .number = tcp_port}}} {}
+  explicit PushingVendor(std::uint16_t tcp_port)
+      : ports_{{{.kind = Port::Kind::tcp_stream, .number = tcp_port, .carries = "pings"}}} {}
   std::span<const Port> ports() const override { return ports_; }
   int default_max_clients() const override { return 4; }  // unknown: assumed
   bool pings_before_first_request(const DeviceState&) const override { return true; }
@@ -202,9 +203,9 @@ struct Profile {
 };
 Result<Profile> find_profile(std::string_view profile);
 
-/// The addresses of a sonar at `ip`, port by port. `status_to`: the receivers of its status messages.
+/// The addresses of a sonar at `ip`, port by port. `status_to`: the receivers of its status messages; port 0 = the vendor's own.
 std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::span<const Endpoint> status_to);
-/// A line such as "tcp        127.0.0.2:52100            waits for the driver".
-std::string line_of(std::string_view protocol, std::string_view at, bool sonar_speaks_first);
+/// A line such as "tcp        127.0.0.2:52100            settings, pings; waits for the driver".
+std::string line_of(std::string_view protocol, std::string_view at, std::string_view carries, bool sonar_speaks_first);
 
 }  // namespace sonar::protocol

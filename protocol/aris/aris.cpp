@@ -15,8 +15,8 @@ using namespace std::chrono_literals;
 using PortKind = protocol::Port::Kind;
 // unknown: the gap between the parts of a frame. With 20 us a receive buffer of 64 kB does not overflow.
 constexpr std::array<protocol::Port, 3> port_table{
-    {{.kind = PortKind::tcp_stream, .number = command_port},
-     {.kind = PortKind::udp_beacon, .number = beacon_port, .period = 1000ms, .on_change = true},
+    {{.kind = PortKind::tcp_stream, .number = command_port, .carries = "settings; frames come by UDP"},
+     {.kind = PortKind::udp_beacon, .number = beacon_port, .carries = "address, state", .period = 1000ms, .on_change = true},
      {.kind = PortKind::udp_stream, .any_group = true, .gap = 20us}}};
 
 class ArisVendor final : public protocol::Vendor {

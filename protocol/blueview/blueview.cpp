@@ -14,7 +14,8 @@ namespace {
 using PortKind = protocol::Port::Kind;
 // The drop-in libraries find sonars by a broadcast, so there is no beacon.
 constexpr std::array<protocol::Port, 2> port_table{
-    {{.kind = PortKind::tcp_stream, .number = tcp_port}, {.kind = PortKind::udp_answer, .number = discovery_port}}};
+    {{.kind = PortKind::tcp_stream, .number = tcp_port, .carries = "settings, pings"},
+     {.kind = PortKind::udp_answer, .number = discovery_port, .carries = "discovery"}}};
 
 class BlueViewVendor final : public protocol::Vendor {
  public:

@@ -180,6 +180,9 @@ class SonarJudge {
 
   void check_client(const v1::ClientStatus& client) {
     const bool has_fired = client.requests() > 0 || client.pings_written() > 0;
+    if (client.commands_only() && (has_fired || sonar_.pinging()))
+      return add(Level::ok, "driver", client.address() + " is connected to " + sonar_.name() + " for commands, and gets no pings",
+                 "", client.address());
     if (has_fired)
       add(Level::ok, "driver", client.address() + " is connected to " + sonar_.name() + " and has asked for pings", "",
           client.address());

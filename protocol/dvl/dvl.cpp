@@ -19,7 +19,8 @@ std::optional<double> wanted_delay_ms(const protocol::DeviceState& device) {
 
 using PortKind = protocol::Port::Kind;
 constexpr std::array<protocol::Port, 2> port_table{
-    {{.kind = PortKind::tcp_stream, .number = tcp_port}, {.kind = PortKind::tcp_stream, .number = serial_port}}};
+    {{.kind = PortKind::tcp_stream, .number = tcp_port, .carries = "settings, reports in JSON"},
+     {.kind = PortKind::tcp_stream, .number = serial_port, .carries = "settings, serial sentences"}}};
 
 class DvlVendor final : public protocol::PushingVendor {
  public:

@@ -10,7 +10,8 @@
 namespace sonar::micron {
 namespace {
 
-constexpr std::array<protocol::Port, 1> port_table{{{.kind = protocol::Port::Kind::tcp_stream, .number = tcp_port}}};
+constexpr std::array<protocol::Port, 1> port_table{
+    {{.kind = protocol::Port::Kind::tcp_stream, .number = tcp_port, .carries = "settings, scan lines"}}};
 
 class MicronVendor final : public protocol::Vendor {
  public:

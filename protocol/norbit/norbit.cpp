@@ -8,9 +8,10 @@ namespace sonar::norbit {
 namespace {
 
 using PortKind = protocol::Port::Kind;
-constexpr std::array<protocol::Port, 3> port_table{{{.kind = PortKind::tcp_stream, .number = bathymetry_port},
-                                                    {.kind = PortKind::tcp_stream, .number = column_port},
-                                                    {.kind = PortKind::tcp_stream, .number = command_port}}};
+constexpr std::array<protocol::Port, 3> port_table{
+    {{.kind = PortKind::tcp_stream, .number = bathymetry_port, .carries = "points"},
+     {.kind = PortKind::tcp_stream, .number = column_port, .carries = "water column"},
+     {.kind = PortKind::tcp_stream, .number = command_port, .carries = "commands", .has_pings = false}}};
 
 class NorbitVendor final : public protocol::Vendor {
  public:

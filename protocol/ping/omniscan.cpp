@@ -10,7 +10,7 @@ namespace sonar::ping::omniscan {
 namespace {
 
 using protocol::Reaction;
-constexpr auto port_table = streaming_ports(51200);
+constexpr auto port_table = streaming_ports(51200, "settings, profiles");
 
 class OmniscanDialogue final : public StreamingConversation<Settings, settings_from> {
   /// ping-python sends nothing while it reads an Omniscan. A Surveyor asks its hosts for the time, so they do send.

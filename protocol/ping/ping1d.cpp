@@ -8,7 +8,8 @@
 namespace sonar::ping::ping1d {
 namespace {
 
-constexpr auto port_table = streaming_ports(9090);  // port of the bridge by which vehicles serve the serial line
+// The port of the bridge by which vehicles serve the serial line.
+constexpr auto port_table = streaming_ports(9090, "settings, distances, profiles");
 
 class Ping1DVendor final : public StreamingVendor {
  public:

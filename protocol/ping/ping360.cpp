@@ -16,7 +16,8 @@ namespace {
 using PortKind = protocol::Port::Kind;
 constexpr std::uint16_t data_port = 12345, discovery_port = 30303;
 constexpr std::array<protocol::Port, 2> port_table{
-    {{.kind = PortKind::udp_dialogue, .number = data_port}, {.kind = PortKind::udp_answer, .number = discovery_port}}};
+    {{.kind = PortKind::udp_dialogue, .number = data_port, .carries = "settings, scan lines"},
+     {.kind = PortKind::udp_answer, .number = discovery_port, .carries = "discovery"}}};
 
 std::string text_of(protocol::BytesView bytes) {
   std::string text;

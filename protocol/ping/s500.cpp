@@ -11,7 +11,7 @@ namespace {
 
 using protocol::Reaction;
 
-constexpr auto port_table = streaming_ports(51200);
+constexpr auto port_table = streaming_ports(51200, "settings, profiles");
 constexpr std::uint16_t firmware_major = 2, firmware_minor = 2;
 constexpr double processor_above_water_c = 20;  // assumed
 

@@ -8,12 +8,12 @@
 
 namespace sonar::ping {
 
-constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number) {
+constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number, std::string_view carries) {
   // ping-python reads one message of each packet that it receives, so messages in one packet would fill its queue. The value is
   // chosen.
   constexpr std::chrono::milliseconds between_messages{3};
-  return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number, .gap = between_messages},
-           {.kind = protocol::Port::Kind::udp_dialogue, .number = number}}};
+  return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number, .carries = carries, .gap = between_messages},
+           {.kind = protocol::Port::Kind::udp_dialogue, .number = number, .carries = carries}}};
 }
 
 /// The conversation of a product that pings while a host enables it. Its `Settings` have `id` and `parameters.enable`; its

@@ -8,7 +8,7 @@ namespace sonar::ping::surveyor {
 namespace {
 
 using protocol::Reaction;
-constexpr auto port_table = streaming_ports(62312);
+constexpr auto port_table = streaming_ports(62312, "settings, points");
 constexpr auto utc_period = std::chrono::seconds(10);
 
 /// One host's conversation. The device asks each host for the time, at once and every 10 s; pings flow while they are enabled.

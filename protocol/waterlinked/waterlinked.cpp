@@ -12,7 +12,8 @@ namespace {
 using PortKind = protocol::Port::Kind;
 // Port::gap is 0: the two images of a shot follow at once, because clients pair images that arrive within 25 ms.
 constexpr std::array<protocol::Port, 2> port_table{
-    {{.kind = PortKind::http, .number = 80}, {.kind = PortKind::udp_stream, .group = multicast_group}}};
+    {{.kind = PortKind::http, .number = 80, .carries = "settings"},
+     {.kind = PortKind::udp_stream, .carries = "range images", .group = multicast_group}}};
 
 class WaterLinkedVendor final : public protocol::Vendor {
  public:

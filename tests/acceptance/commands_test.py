@@ -130,6 +130,13 @@ class Mistakes(unittest.TestCase):
     def test_a_good_configuration_is_0(self):
         self.expect(check(GOOD), 0)
 
+    def test_a_good_configuration_lists_what_drivers_find_where(self):
+        for profile, lines in (("oculus-m1200d", ["sonar front, Oculus M1200d", "  tcp        127.0.0.2:52100            settings, pings; waits for the driver",
+                                                  "  status     127.255.255.255:52102      address, state; sends without a request"]),
+                               ("norbit-wbms", ["  tcp        127.0.0.2:2211             water column; waits for the driver"])):
+            said = check(GOOD.replace("oculus-m1200d", profile)).stdout.splitlines()
+            self.assertEqual([line for line in lines if line not in said], [], said)
+
     def test_a_mistyped_key_is_78_and_the_nearest_one_is_named(self):
         self.expect(check(GOOD.replace("bind_ip", "bind_op")), 78, "test.yaml:3:", "bind_op", 'did you mean "bind_ip"')
 

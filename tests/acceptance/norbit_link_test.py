@@ -84,6 +84,8 @@ class Link(unittest.TestCase):
                 self.assertAlmostEqual(row * row_m, range_m, delta=0.1)
                 self.assertAlmostEqual(angles[beam], bearing_deg, delta=1.5)
             self.assertEqual(driver.points()[0], number + 1)
+            clients = daemon.status()["sonars"][0]["clients"]
+            self.assertEqual(sorted(client.get("commands_only", False) for client in clients), [False, False, True])
             self.assertTrue(driver.say("set_power").startswith("set_power 1 "))
             self.assertIn("unchanged", driver.say("set_range 0 1000"))
             eventually(lambda: "set_range is refused" in daemon.log())

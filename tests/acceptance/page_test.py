@@ -246,6 +246,17 @@ class Page(PageChecks, unittest.TestCase):
         self.mock.state("fine")
         page.wait("document.body.dataset.situation === 'fine'")
 
+    def test_a_connection_for_commands_needs_no_pings_and_addresses_say_what_they_carry(self):
+        self.mock.state("commands")
+        page = self.open()
+        shown(page)
+        page.wait("document.querySelector('#clients tr .dot').className === 'dot ok'")  # the rate of the driver is known
+        rows = page.run("[...document.querySelectorAll('#clients tr')].map((r) => [r.querySelector('.dot').className, r.children[1].innerText, r.children[3].innerText])")
+        self.assertEqual(rows[1], ["dot ok", "–", "–"])
+        self.assertIn("for commands: it gets no pings", page.run("document.querySelector('#clients tr:nth-child(2) .who').title"))
+        self.assertEqual(page.run("[...document.querySelectorAll('#addresses li')].map((e) => e.innerText)"),
+                         ["tcp 127.0.0.2:2210 · points", "tcp 127.0.0.2:2209 · commands", "status 127.255.255.255:9 · sends without a request"])
+
     def test_log_lines_that_a_new_connection_brings_again_are_shown_once(self):
         page = self.open(1100, 760, query="?test=300")
         shown(page)

@@ -49,6 +49,17 @@ TEST(DoctorPlaces, AWrongUdpAddressNamesWhatIsServedElsewhere) {
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("sonard (pid 12) listens on 127.0.0.2:7777: sonarctl doctor"));
 }
 
+TEST(DoctorPlaces, ListsWhatEachAddressOfASonarCarries) {
+  Facts facts = facts_by_udp("127.0.0.2", Outcome::refused);
+  serve(facts, R"(advertised: "127.0.0.2" addresses { protocol: "status" address: "127.255.255.255:9" sonar_speaks_first: true
+    carries: "state" } addresses { protocol: "udp" address: "127.0.0.2:7777" carries: "settings, lines" })");
+  EXPECT_THAT(text_from(run_checks(facts)),
+              HasSubstr("ok    front: status 127.255.255.255:9 (state), udp 127.0.0.2:7777 (settings, lines)\n"));
+  serve(facts, there);
+  EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("ok    front: status 127.255.255.255:9, udp 127.0.0.2:7777\n"))
+      << "an older daemon";
+}
+
 TEST(DoctorPlaces, AUdpAddressThatDoesNotAnswerIsNoMatterOfTcp) {
   Facts facts = facts_by_udp("127.0.0.2", Outcome::unreachable);
   facts.sonars[0].stream.error = "no answer";

@@ -66,7 +66,7 @@ TEST(StatusText, NamesEverything) {
       environment { temperature_c { value: 12 } salinity_psu { value: 30 } ph { value: 8 } sound_speed_mps { value: 0 } }
       sonars {
         name: "front" profile: "oculus-m1200d" listens: "0.0.0.0:52100" advertised: "10.0.0.5"
-        addresses { protocol: "tcp" address: "0.0.0.0:52100" }
+        addresses { protocol: "tcp" address: "0.0.0.0:52100" carries: "settings, pings" }
         addresses { protocol: "status" address: "10.0.0.255:52102" sonar_speaks_first: true }
         pinging: true range_m: 10 frequency_hz: 2.1e6 beams: 512 rows: 437
         position { x: -6 z: -3 } orientation { w: 0.9961946980917455 y: 0.08715574274765817 }  # 10 degrees bow down
@@ -88,7 +88,7 @@ TEST(StatusText, NamesEverything) {
        {"sonard 0.1.0  up 62 min  120 MB\n", "config    a.yaml\n", "scene     demo:harbour  seed 1  clock realtime\n",
         "water     12 C, 30 psu, pH 8, sound speed computed\n",
         "sonar     front  oculus-m1200d  2.1 MHz  10 m  standby  gain 0 dB  512 beams x 437 rows  transmitter off\n",
-        "tcp        0.0.0.0:52100              waits for the driver\n",
+        "tcp        0.0.0.0:52100              settings, pings; waits for the driver\n",
         "status     10.0.0.255:52102           sends without a request\n", "advertised as 10.0.0.5\n",
         "place   -6.00 0.00 -3.00 m, heading 90.0, pitch -10.0, roll 0.0 deg\n",
         "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n",
@@ -111,6 +111,12 @@ TEST(StatusText, HasTheMeasuredRateBesideTheOneThatIsSet) {
               HasSubstr("  10 Hz, measured 10.0 lines/s  gain"));
   EXPECT_THAT(text_of(R"(profile: "oculus-m1200d" rate_hz: 10 preview: true figures { made_hz: 4.97 })"),
               HasSubstr("  10 Hz, preview 5.0 Hz  gain"));
+}
+
+TEST(StatusText, CountsNoPingsOfAConnectionForCommands) {
+  const auto text = text_from(control::message_from<v1::DaemonStatus>(
+      R"(sonars { profile: "norbit-wbms" clients { address: "10.0.0.7:1" commands_only: true connected_s: 90 } })"));
+  EXPECT_THAT(text, HasSubstr("10.0.0.7:1  commands only, 0.0 MB, 90 s\n"));
 }
 
 TEST(StatusText, TellsHowLongAHostWithoutAConnectionIsSilent) {

@@ -12,7 +12,8 @@ using protocol::ChangeSettings;
 using protocol::DeviceState;
 
 constexpr int beams = 64, rows = 200;
-constexpr std::array<protocol::Port, 1> port_table{{{.kind = protocol::Port::Kind::tcp_stream, .number = tcp_port}}};
+constexpr std::array<protocol::Port, 1> port_table{
+    {{.kind = protocol::Port::Kind::tcp_stream, .number = tcp_port, .carries = "settings, pings"}}};
 
 struct HeldSettings final : VendorSettings {
   explicit HeldSettings(const Settings& s) : settings(s) {}

@@ -534,5 +534,24 @@ TEST(Makes, HaveNamesAndPortsOfTheirOwn) {
   }
 }
 
+TEST(Makes, NameWhatEachAddressCarries) {
+  const std::vector<Endpoint> status_to{{{10, 0, 0, 255}, 0}};
+  for (const Make& one : makes()) {
+    const auto addresses = driver_addresses(*one.device, {10, 0, 0, 5}, status_to);
+    EXPECT_FALSE(addresses.empty()) << one.name();
+    for (const DriverAddress& address : addresses) {
+      EXPECT_FALSE(address.carries.empty()) << one.name() << ' ' << address.at.port;
+      EXPECT_NE(address.at.port, 0) << one.name();
+      EXPECT_LE(line_of(address.protocol, "255.255.255.255:65535", address.carries, address.sonar_speaks_first).size(), 110u);
+    }
+  }
+}
+
+TEST(Makes, AddressLinesOfAnOlderDaemonHaveNoContent) {
+  EXPECT_EQ(line_of("tcp", "127.0.0.2:52100", "", false), "tcp        127.0.0.2:52100            waits for the driver");
+  EXPECT_EQ(line_of("tcp", "127.0.0.2:52100", "pings", true),
+            "tcp        127.0.0.2:52100            pings; sends without a request");
+}
+
 }  // namespace
 }  // namespace sonar::protocol::hosts_test

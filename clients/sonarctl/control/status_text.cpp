@@ -43,10 +43,18 @@ std::string settings_text(const v1::SonarStatus& s) {
   return text + (s.pinging() ? "" : "  not pinging");
 }
 
+std::string client_text(const v1::ClientStatus& c) {
+  std::string text = c.address() + "  ";
+  text +=
+      c.commands_only() ? "commands only" : format("%llu pings, %llu dropped", wide(c.pings_written()), wide(c.pings_dropped()));
+  text += format(", %.1f MB, ", static_cast<double>(c.bytes_written()) / 1e6) + duration_text(c.connected_s());
+  return text + (c.silent_s() >= told_silence_s ? format(", last heard %.0f s ago", c.silent_s()) : "");
+}
+
 std::string sonar_text(const v1::SonarStatus& s) {
   std::string text = line("sonar", s.name() + "  " + s.profile() + "  " + settings_text(s));
   for (const v1::SonarAddress& a : s.addresses())
-    text += "          " + protocol::line_of(a.protocol(), a.address(), a.sonar_speaks_first()) + "\n";
+    text += "          " + protocol::line_of(a.protocol(), a.address(), a.carries(), a.sonar_speaks_first()) + "\n";
   if (!s.advertised().empty() && !s.listens().empty() && !s.listens().starts_with(s.advertised() + ":"))
     text += line("", "advertised as " + s.advertised());
   if (!s.observers().empty()) text += line("", format("observers at %s (%u now)", s.observers().c_str(), s.observing()));
@@ -58,11 +66,7 @@ std::string sonar_text(const v1::SonarStatus& s) {
                                  f.latency_ms_p50(), f.latency_ms_p99(), f.late_ms_p99()));
   text += line("  clients", format("%d now, %llu since the start, %llu refused", s.clients_size(), wide(f.clients()),
                                    wide(f.refused_clients())));
-  for (const v1::ClientStatus& c : s.clients())
-    text += line("  client", format("%s  %llu pings, %llu dropped, %.1f MB, ", c.address().c_str(), wide(c.pings_written()),
-                                    wide(c.pings_dropped()), static_cast<double>(c.bytes_written()) / 1e6) +
-                                 duration_text(c.connected_s()) +
-                                 (c.silent_s() >= told_silence_s ? format(", last heard %.0f s ago", c.silent_s()) : ""));
+  for (const v1::ClientStatus& c : s.clients()) text += line("  client", client_text(c));
   return text;
 }
 

@@ -74,6 +74,18 @@ bool was_examined(const Facts& facts, const v1::SonarStatus& sonar) {
                                              [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised(); });
 }
 
+/// Lists the addresses of each sonar, and what drivers send and get there.
+void list_addresses(const Facts& facts, std::vector<Finding>& findings) {
+  for (const v1::SonarStatus& sonar : facts.control.status->sonars()) {
+    if (sonar.addresses().empty() || !was_examined(facts, sonar)) continue;
+    std::string all;
+    for (const v1::SonarAddress& address : sonar.addresses())
+      all += (all.empty() ? ": " : ", ") + address.protocol() + " " + address.address() +
+             (address.carries().empty() ? "" : " (" + address.carries() + ")");
+    findings.push_back({Level::ok, "addresses", sonar.name() + all, ""});
+  }
+}
+
 /// Reports the sonars of makes that hosts search for.
 void check_search(const Facts& facts, std::vector<Finding>& findings) {
   for (const FoundSonar& found : facts.found)
@@ -122,6 +134,7 @@ std::string served_by(const v1::DaemonStatus& status) {
 
 void check_daemon(const Facts& facts, std::vector<Finding>& findings) {
   check_control(facts, findings);
+  if (facts.control.status) list_addresses(facts, findings);
   if (facts.control.status) sonar::doctor::check_poses(*facts.control.status, findings);
   check_http(facts, findings);
   check_search(facts, findings);

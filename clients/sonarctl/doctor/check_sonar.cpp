@@ -296,7 +296,7 @@ class SonarChecks {
     const v1::SonarStatus* const reported = find(now);
     if (reported == nullptr) return;
     const bool all_get_pings = std::all_of(reported->clients().begin(), reported->clients().end(),
-                                           [](const v1::ClientStatus& client) { return client.pings_written() > 0; });
+                                           [](const v1::ClientStatus& c) { return c.pings_written() > 0 || c.commands_only(); });
     std::vector<Finding> found;
     for (Finding& finding : sonar::doctor::judge(now, before)) {
       if (finding.sonar != reported->name() || finding.level == Level::ok || finding.check == "rate") continue;
@@ -310,7 +310,8 @@ class SonarChecks {
     const bool any_fails = std::any_of(found.begin(), found.end(), [](const Finding& f) { return f.level == Level::fail; });
     for (const Finding& f : found) add(f.level, f.check, f.text, f.cure);
     for (const v1::ClientStatus& client : reported->clients())
-      if (!any_fails && client.pings_written() == 0 && client.connected_s() >= first_ping_within_s(client, *reported))
+      if (!any_fails && client.pings_written() == 0 && !client.commands_only() &&
+          client.connected_s() >= first_ping_within_s(client, *reported))
         add(Level::fail, "driver",
             client.address() + " is connected and gets no ping" +
                 (clock().empty() || clock() == "realtime" ? "" : "; clock: " + clock()),

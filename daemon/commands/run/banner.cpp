@@ -48,7 +48,7 @@ std::string sonar_lines(const Device& device) {
                      format("  %s  %.4g m", text::counted(s.beam_count, "beam").c_str(), s.range_m) +
                      (s.rate_hz > 0 && !s.triggered ? format("  %g Hz\n", static_cast<double>(s.rate_hz)) : "\n");
   for (const protocol::DriverAddress& address : device.addresses())
-    text += "  " + protocol::line_of(address.protocol, text_of(address.at), address.sonar_speaks_first) + "\n";
+    text += "  " + protocol::line_of(address.protocol, text_of(address.at), address.carries, address.sonar_speaks_first) + "\n";
   if (device.sonar().state().advertise_ip != device.config().bind_ip)
     text += "  advertised as " + text_of(device.sonar().state().advertise_ip) + "\n";
   if (const protocol::Make& make = protocol::make_of_profile(model.profile); !make.driver_call.empty())

@@ -73,7 +73,8 @@ struct Closed {
   bool served = false;  // false: it was waiting for a slot
   std::uint64_t pings_written = 0, pings_dropped = 0;
   std::string why;
-  bool by_client = false;  // the client closed the connection
+  bool by_client = false;     // the client closed the connection
+  bool for_commands = false;  // its port never has pings
 };
 /// The content of the status broadcast has changed: send it now.
 struct Announce {};

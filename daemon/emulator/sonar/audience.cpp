@@ -126,7 +126,8 @@ void Audience::remove(Connection& connection, const std::string& why, bool by_cl
   for (Connection::Held& held : connection.held) connection.outbox.push_ping(std::move(held.ping));
   connection.outbox.end(connection.finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection.peer.name, connection.role, connection.state != Connection::State::waiting,
-                              connection.pings_written(), connection.outbox.pings_dropped(), why, by_client});
+                              connection.pings_written(), connection.outbox.pings_dropped(), why, by_client,
+                              connection.is_for_commands()});
   if (connection.role != Role::observer) add_traffic(sonar_.figures, connection);
   connections_.remove(connection.id);
 }

@@ -343,7 +343,7 @@ void Device::carry_out(const Closed& action) {
   } else {
     gone_ = Visit{action.peer, action.why};
     gone_->by_itself = action.by_client;
-    gone_->without_ping = action.pings_written == 0;
+    gone_->without_ping = action.pings_written == 0 && !action.for_commands;
     gone_->connected_at = closing_since_;
     report_visit(Role::client, VisitLog::Kind::gone, "client gone: " + action.why,
                  {{"client", action.peer}, {"pings", action.pings_written}, {"dropped", action.pings_dropped}});

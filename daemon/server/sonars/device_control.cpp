@@ -46,6 +46,7 @@ void fill(v1::ClientStatus& out, const Connection& c, Session* session) {
   out.set_bytes_read(c.bytes_read);
   out.set_requests(static_cast<std::uint32_t>(c.requests));
   out.set_complaint(c.complaint);
+  out.set_commands_only(c.is_for_commands());
   if (session == nullptr) return;
   out.set_connected_s(seconds(session->connected_for()));
   out.set_unread_s(seconds(session->stands_for()));
@@ -69,6 +70,7 @@ v1::SonarStatus Device::status(Time now) const {
     out.set_protocol(std::string(address.protocol));
     out.set_address(text_of(address.at));
     out.set_sonar_speaks_first(address.sonar_speaks_first);
+    out.set_carries(std::string(address.carries));
   }
   s.set_advertised(text_of(state.advertise_ip));
   for (const udp::endpoint& to : status_destinations())

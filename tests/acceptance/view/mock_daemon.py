@@ -35,7 +35,7 @@ ABOUT = {"thin_tether": {"sentence": "The tether is slow and late."}, "power_cyc
          "lease_renewal": {"sentence": "The address is withdrawn and returns.",
                            "cannot_act": [{"key": "front", "value": "needs two network namespaces: sonarctl lab"}]}}
 DURATION_S = 90.0
-DRIVER, SLOW = "192.0.2.7:49210", "192.0.2.9:51544"
+DRIVER, SLOW, COMMANDER = "192.0.2.7:49210", "192.0.2.9:51544", "192.0.2.7:49212"
 OK, WARNING, ERROR = 0, 1, 2
 
 
@@ -135,6 +135,12 @@ class MockDaemon:
             written = int(up_s * 7)
             clients.append({"address": SLOW, "pings_written": written, "bytes_written": written * 231_000,
                             "pings_dropped": self.drops, "connected_s": 60 + up_s})
+        addresses = []
+        if self.name == "commands":
+            clients.append({"address": COMMANDER, "commands_only": True, "requests": 3, "connected_s": 60 + up_s})
+            addresses = [{"protocol": "tcp", "address": "127.0.0.2:2210", "carries": "points"},
+                         {"protocol": "tcp", "address": "127.0.0.2:2209", "carries": "commands"},
+                         {"protocol": "status", "address": "127.255.255.255:9", "sonar_speaks_first": True}]
         trajectory = None if self.name in ("follow", "no pose") else {
             "file": "survey.csv", "position_s": self.trajectory_s(), "duration_s": DURATION_S,
             "speed": self.parameters["/rov/trajectory/speed"], "paused": self.parameters["/rov/trajectory/paused"], "loop": True}
@@ -145,7 +151,7 @@ class MockDaemon:
                             "range_m": self.parameters["/front/range_m"], "rate_hz": self.parameters["/front/rate_hz"],
                             "gain_db": 67.2, "frequency_hz": 2.1e6, "beams": 512,
                             "rows": description["settings"]["rows"], "transmits": self.parameters["/front/transmit"],
-                            "clients": clients, "asked_by": DRIVER if self.name == "standby" else "",
+                            "addresses": addresses, "clients": clients, "asked_by": DRIVER if self.name == "standby" else "",
                             "on_request": self.name == "on request",
                             "figures": {"pings": self.made, "made_hz": self.made_hz if self.pinging else 0, "simulation_ms": 138 if self.name == "slow engine" else 22.5,
                                         "latency_ms_p50": 26.2, "latency_ms_p99": 40}}],

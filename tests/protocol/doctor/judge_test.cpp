@@ -138,6 +138,13 @@ TEST(Judge, ConnectedAndNeverFired) {
               IsEmpty());
 }
 
+TEST(Judge, AConnectionForCommandsNeedsNoPings) {
+  const std::string commands = R"(clients { address: "127.0.0.1:40123" connected_s: 9 commands_only: true )";
+  EXPECT_THAT(troubles(judge(with(pinging + driver + commands + "}"), nullptr)), IsEmpty());
+  EXPECT_THAT(troubles(judge(with(commands + "requests: 1 }"), nullptr)), IsEmpty());
+  EXPECT_THAT(trouble(with(commands + "}"), "driver").text, HasSubstr("has not asked for pings")) << "nobody gets pings yet";
+}
+
 TEST(Judge, StandbyAndNoiseOnlyNameWhoAsked) {
   EXPECT_EQ(trouble(with(driver + R"(asked_by: "192.0.2.7:4000")"), "standby").text,
             "front is in standby: its rate is 0, set by 192.0.2.7:4000");

@@ -15,15 +15,15 @@ function rowsOf(facts) {
       const key = `${sonar.name} ${client.address}`;
       const rate = facts.clientPings.rate(key);
       const rising = now_s() - (facts.droppedAt.get(key) ?? -Infinity) < rising_s;
-      const silent = rate === 0;
+      const silent = rate === 0 && !client.commands_only;
       rows.push({
         key,
         who: client.address,
-        title: sonars.length > 1 ? `of ${sonar.name}` : `connected for ${fixed(client.connected_s, 0)} s`,
+        title: (sonars.length > 1 ? `of ${sonar.name}` : `connected for ${fixed(client.connected_s, 0)} s`) + (client.commands_only ? ', for commands: it gets no pings' : ''),
         dot: silent || rising ? 'warning' : rate === undefined ? '' : 'ok',
-        hz: fixed(rate, 1),
+        hz: client.commands_only ? dash : fixed(rate, 1),
         megabits: megabits(facts.clientBytes.rate(key) === undefined ? undefined : 8 * facts.clientBytes.rate(key)),
-        dropped: whole(client.pings_dropped),
+        dropped: client.commands_only ? dash : whole(client.pings_dropped),
         rising,
       });
     }
@@ -69,7 +69,7 @@ export function drawConnections(facts) {
   const addresses = facts.sonarStatus?.addresses ?? [];
   const wait = facts.listened ? '' : ' · waits for the driver';
   showList($('addresses'), [addresses, wait], () =>
-    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), a.sonar_speaks_first ? ' · sends without a request' : wait)));
+    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), a.carries && ` · ${a.carries}`, a.sonar_speaks_first ? ' · sends without a request' : wait)));
 }
 
 /// The pings made a second in the last minute; the newest on the right. Draws only what has changed.
