@@ -214,7 +214,11 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
                    static_cast<double>(shape.seed), shape.relief_m, shape.wavelength_m, static_cast<double>(shape.octaves),
                    shape.persistence, shape.slope[0], shape.slope[1], shape.ripples.wavelength_m, shape.ripples.height_m,
                    shape.ripples.direction_rad, shape.ripples.bend}),
-        [&] { return from_grid(make_seabed(shape), material, size, false); });
+        [&] {
+          HeightGrid grid = make_seabed(shape);
+          for (const std::string& note : grid.notes) scene.notes.push_back("seabed: " + note);
+          return from_grid(std::move(grid), material, size, false);
+        });
   }
   const Node file = keys.required("file");
   const std::filesystem::path path = folder / file.text(1024);

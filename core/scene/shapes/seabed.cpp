@@ -5,11 +5,13 @@
 
 #include "core/scene/shapes/relief_noise.hpp"
 #include "core/scene/shapes/terrain.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar {
 namespace {
 
 constexpr double widening = 1.08, widest_m = 1.0;
+constexpr double noted_share = 0.25;  // ripples with less of their height are noted
 
 struct Axis {
   std::vector<double> at_m, spacing_m;
@@ -55,6 +57,15 @@ double ripple_profile(double cycles) {
   return 0.5 * (c + 0.25 * (c * c - 0.5)) / 1.125;
 }
 
+/// Ripples of which the finest part of the grid shows less than a quarter.
+std::vector<std::string> notes_on(const Ripples& r, double spacing_m) {
+  const double share = carried(r.wavelength_m, spacing_m);
+  if (share >= noted_share) return {};
+  const std::string has = share <= 0 ? "do not appear" : text::format("have %.0f %% of their height at most", 100 * share);
+  return {text::format("its ripples of wavelength %g m ", r.wavelength_m) + has +
+          text::format(": the grid has a spacing of %.3g m there; set spacing_m: %.3g", spacing_m, r.wavelength_m / 6)};
+}
+
 }  // namespace
 
 std::size_t seabed_triangles(const SeabedShape& s) {
@@ -91,6 +102,8 @@ HeightGrid make_seabed(const SeabedShape& s) {
     const GradientField bend(s.size_x_m / 2, s.size_y_m / 2, 8 * r.wavelength_m, s.seed, 1001);
     const GradientField strength(s.size_x_m / 2, s.size_y_m / 2, 15 * r.wavelength_m, s.seed, 1002);
     const double cx = std::cos(r.direction_rad), cy = std::sin(r.direction_rad);
+    const auto finest = [](const Axis& axis) { return *std::min_element(axis.spacing_m.begin(), axis.spacing_m.end()); };
+    grid.notes = notes_on(r, std::hypot(cx * finest(x), cy * finest(y)));
     each([&](std::size_t k, std::size_t i, std::size_t j) {
       const double spacing = std::hypot(cx * x.spacing_m[i], cy * y.spacing_m[j]);
       const double w = carried(r.wavelength_m, spacing);

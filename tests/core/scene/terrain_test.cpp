@@ -73,6 +73,20 @@ TEST(Seabed, RipplesHaveTheirWavelengthAndHeight) {
   EXPECT_LT(high - low, 0.0605f);
 }
 
+TEST(Seabed, NotesRipplesThatAreTooFineForItsGrid) {
+  const auto notes = [](double wavelength_m, double direction_rad, double height_m) {
+    SeabedShape shape{.size_x_m = 8, .size_y_m = 4, .fine_x_m = 4, .fine_y_m = 4, .spacing_x_m = 0.2, .spacing_y_m = 0.05};
+    shape.ripples = {.wavelength_m = wavelength_m, .height_m = height_m, .direction_rad = direction_rad};
+    return make_seabed(shape).notes;
+  };
+  EXPECT_THAT(notes(0.5, 0, 0.1), testing::ElementsAre("its ripples of wavelength 0.5 m do not appear: the grid has a spacing of "
+                                                       "0.2 m there; set spacing_m: 0.0833"));
+  EXPECT_THAT(notes(0.72, 0, 0.1), testing::ElementsAre(HasSubstr("have 20 % of their height at most")));
+  EXPECT_THAT(notes(1.3, 0, 0.1), testing::IsEmpty());
+  EXPECT_THAT(notes(0.5, pi / 2, 0.1), testing::IsEmpty()) << "the grid is finer along y";
+  EXPECT_THAT(notes(0.5, 0, 0), testing::IsEmpty()) << "no ripples";
+}
+
 TEST(Seabed, WidensOutsideItsFinePartAndKeepsItsEstimate) {
   const SeabedShape shape{.size_x_m = 60, .size_y_m = 60, .fine_x_m = 10, .fine_y_m = 10, .spacing_x_m = 0.1, .spacing_y_m = 0.1};
   const HeightGrid grid = make_seabed(shape);
