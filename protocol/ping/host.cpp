@@ -151,8 +151,7 @@ class Ping360Host final : public PingHost {
  public:
   using PingHost::PingHost;
   HostActions on_open(std::span<const std::uint16_t>, Time) override {
-    constexpr std::array<std::byte, 2> wanted{std::byte{static_cast<std::uint8_t>(Id::protocol_version)}};
-    return {protocol::HostSend{0, framed(Id::general_request, 0, wanted)}};
+    return {protocol::HostSend{0, request_for(Id::protocol_version)}};
   }
   /// Stops the scan that this host has requested. It does not stop that of another driver.
   HostActions on_leave() override {

@@ -1,5 +1,6 @@
 #include "protocol/ping/ping_host.hpp"
 
+#include <array>
 #include <utility>
 
 #include "core/sonar/sample_code.hpp"
@@ -25,6 +26,12 @@ Id refused_in(const Frame& nack) {
 double period_ms_of(const protocol::SettingsOverride& wanted) {
   const double rate_hz = wanted.rate_hz.value_or(0);
   return rate_hz > 0 ? period_ms(rate_hz) : 0;
+}
+
+Bytes request_for(Id wanted) {
+  const auto number = static_cast<std::uint16_t>(wanted);
+  const std::array payload{static_cast<std::byte>(number & 0xff), static_cast<std::byte>(number >> 8)};
+  return framed(Id::general_request, 0, payload);
 }
 
 Line powers_in(BytesView rest, std::size_t count, float lowest_db, float highest_db) {

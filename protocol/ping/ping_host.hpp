@@ -21,6 +21,9 @@ inline constexpr double usual_range_m = 10;
 /// The period for the wanted rate [ms]. 0: no rate is wanted, so the device chooses it.
 double period_ms_of(const protocol::SettingsOverride& wanted);
 
+/// Asks for a message; the device's settings stay as they are.
+Bytes request_for(Id wanted);
+
 /// Reads a message from the front of the payload; returns the rest.
 template <class M>
 std::optional<BytesView> read_front(const Frame& frame, M& message) {

@@ -1,7 +1,9 @@
-// The host of an Omniscan and of an S500. Both have the same port. If the sonar refuses the request of the one product, the host
-// sends that of the other.
+// The host of an Omniscan and of an S500. Both have the same port. The host first asks for a message that only an S500 has, which
+// changes nothing. If the sonar refuses the request of the one product nevertheless, the host sends that of the other.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/text/format.hpp"
@@ -42,6 +44,9 @@ struct Product {
 constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, omniscan_request};
 constexpr Product s500_product{"an S500", Id::s500_set_ping_params, s500_request};
 
+constexpr Id only_s500_has = Id::ping1d_range;           // an Omniscan refuses the request for it
+constexpr std::chrono::milliseconds answer_within{500};  // then the sonar is taken for an Omniscan
+
 /// A ping of `rows` powers; its note, such as the distance, is not set yet.
 HostPing ping_of(std::uint32_t number, std::uint32_t start_mm, double row_m, std::size_t rows, double hz,
                  std::string_view title) {
@@ -63,21 +68,42 @@ class PowerHost final : public PingHost {
         refusable_(wanted.request_id),
         other_(other),
         settings_(settings.settings) {}
+  HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
+    if (!asks() || title_ != omniscan_product.title) return PingHost::on_open(own, now);
+    ask_at_ = now + answer_within;
+    return {protocol::HostSend{0, request_for(only_s500_has)}};
+  }
+  HostActions on_tick(Time now) override {
+    HostActions actions;
+    if (ask_at_ && now >= *ask_at_) ask_once(actions);
+    return actions;
+  }
+  std::optional<Time> next_tick() const override { return ask_at_; }
   /// Both products until the sonar shows which one it is: they share the port.
   std::string about() const override {
     return shown_.empty() ? std::string(title_) + " or " + std::string(other_.title) : std::string(shown_);
   }
 
  private:
+  void ask_once(HostActions& actions) {
+    if (std::exchange(ask_at_, std::nullopt)) ask(actions);
+  }
+  void switch_to_other(HostActions& actions) {
+    title_ = shown_ = other_.title;
+    actions.emplace_back(protocol::HostSend{0, other_.request(settings_)});
+  }
+  void on_frame(const Frame& frame, HostActions& actions) override {
+    if (frame.header.id == only_s500_has && std::exchange(ask_at_, std::nullopt)) switch_to_other(actions);
+  }
   /// The request was refused: the sonar is perhaps the other product. Its request is sent once; a second refusal is an error. A
   /// recording holds refusals of another host's request, which are ignored.
   bool on_nack(Id refused, HostActions& actions) override {
+    if (refused == only_s500_has) return ask_once(actions), true;
     const bool has_switched = title_ == other_.title;
     if (refused != refusable_ && refused != other_.request_id) return false;
     if (!asks() || refused != (has_switched ? other_.request_id : refusable_)) return true;
     if (has_switched) return false;
-    title_ = shown_ = other_.title;
-    actions.emplace_back(protocol::HostSend{0, other_.request(settings_)});
+    switch_to_other(actions);
     return true;
   }
   std::optional<HostPing> ping_from(const Frame& frame) override {
@@ -116,6 +142,7 @@ class PowerHost final : public PingHost {
   Id refusable_;
   const Product& other_;
   protocol::SettingsOverride settings_;
+  std::optional<Time> ask_at_;  // when the request is sent even if the sonar has not shown its product; nullopt: it was sent
   protocol::Waterfall waterfall_;
 };
 

@@ -366,7 +366,8 @@ class Tools(unittest.TestCase):
         for profile, port, mount, line in (("ping360", PING360, "{frame: FLU, xyz_m: [0, 0, 0]}", r"x 1  8 bit .* angle \d+ grad"),
                                            ("surveyor-240", SURVEYOR, DOWN, r"points from \d+\.\d\d to \d+\.\d\d m"),
                                            ("omniscan-450", OMNISCAN, SIDE, r"strongest -?\d+\.\d dB at \d+\.\d\d m"),
-                                           ("ping1d", PING1D, DOWN, r"distance \d\.\d{3} m, confidence \d+ %")):
+                                           ("ping1d", PING1D, DOWN, r"distance \d\.\d{3} m, confidence \d+ %"),
+                                           ("s500", S500, DOWN, r"distance \d\.\d{3} m, confidence \d+ %")):
             with self.subTest(profile), Sonard(profile=profile, mount=mount) as daemon, tempfile.TemporaryDirectory() as folder:
                 at = f"{daemon.address}:{port}"
                 examined = daemon.ctl("doctor", "--within", 60, "--control", f"{daemon.address}:14770")
@@ -381,6 +382,7 @@ class Tools(unittest.TestCase):
                 viewed = run(SONARCTL, "view", at, "--png", picture, "--range", 4)
                 self.assertEqual((viewed.returncode, picture.exists()), (0, True), viewed.stderr)
                 self.assertEqual(profile == "surveyor-240", bool(re.search(r"pixels, \d+ points, 4\.00 m, points$", viewed.stdout.strip())), viewed.stdout)
+                self.assertNotIn("refused", daemon.log(), "an Omniscan and an S500 have the same port")
                 of_many = profile != "surveyor-240"
                 self.assertEqual(bool(re.search(r"the picture has \d+ of \d\d\d scan lines", viewed.stderr)), of_many, viewed.stderr)
 

@@ -2,6 +2,9 @@
 // and its automatic range and gain.
 #include <gmock/gmock.h>
 
+#include <variant>
+
+#include "protocol/ping/host.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/ping/s500_settings.hpp"
@@ -204,6 +207,35 @@ TEST(S500, OnlyWhatIsAutomaticFollowsAPing) {
   now.parameters = requested(now.parameters, {.length_mm = 0});
   const Ping before = profile_with(Settings{}, 900, 5);
   EXPECT_EQ(after(before, now).parameters.reach.length_mm, 10000u) << "of older settings";
+}
+
+/// The host of both products at port 51200 does not know which one answers.
+TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
+  const auto sent = [](const protocol::HostActions& actions) {
+    std::vector<Bytes> all;
+    for (const auto& action : actions)
+      if (const auto* send = std::get_if<protocol::HostSend>(&action)) all.push_back(send->bytes);
+    return ids_in(frames_in(all));
+  };
+  const auto opened = [&] {
+    auto host = *omniscan::make_host({});
+    EXPECT_THAT(sent(host->on_open({}, at_s(0))), ElementsAre(Id::general_request)) << "no settings yet";
+    return host;
+  };
+  const Bytes range = framed_message(Id::ping1d_range, 1, ScanRange{0, 5000}),
+              unknown = nack(Id::ping1d_range, 1, "unknown message");
+  const auto beside_an_s500 = opened();
+  EXPECT_THAT(sent(beside_an_s500->on_bytes(0, range, at_s(0.1))), ElementsAre(Id::s500_set_ping_params));
+  EXPECT_EQ(beside_an_s500->about(), "an S500");
+  const auto beside_an_omniscan = opened();
+  EXPECT_THAT(sent(beside_an_omniscan->on_bytes(0, unknown, at_s(0.1))), ElementsAre(Id::os_ping_params));
+  EXPECT_FALSE(beside_an_omniscan->next_tick());
+  EXPECT_THAT(sent(beside_an_omniscan->on_bytes(0, range, at_s(0.2))), ElementsAre()) << "of another host's request";
+  const auto unanswered = opened();
+  EXPECT_THAT(unanswered->on_tick(at_s(0.4)), testing::IsEmpty());
+  EXPECT_THAT(sent(unanswered->on_tick(*unanswered->next_tick())), ElementsAre(Id::os_ping_params));
+  EXPECT_THAT(sent(unanswered->on_bytes(0, nack(Id::os_ping_params, 1, "unknown message"), at_s(1))),
+              ElementsAre(Id::s500_set_ping_params));
 }
 
 }  // namespace
