@@ -146,13 +146,16 @@ class SurveyorHost final : public PingHost {
 };
 
 /// First requests the protocol version, which changes nothing. UDP has no connection, so the answer shows that a sonar is there;
-/// then the host requests a scan.
+/// then the host requests a scan. A datagram may be lost, so the first request is repeated until it is answered.
 class Ping360Host final : public PingHost {
  public:
   using PingHost::PingHost;
-  HostActions on_open(std::span<const std::uint16_t>, Time) override {
+  HostActions on_open(std::span<const std::uint16_t>, Time now) override {
+    ask_again_at_ = now + answer_within;
     return {protocol::HostSend{0, request_for(Id::protocol_version)}};
   }
+  HostActions on_tick(Time now) override { return !is_open_ && now >= ask_again_at_ ? on_open({}, now) : HostActions{}; }
+  std::optional<Time> next_tick() const override { return is_open_ ? std::nullopt : std::optional(ask_again_at_); }
   /// Stops the scan that this host has requested. It does not stop that of another driver.
   HostActions on_leave() override {
     if (!is_open_ || !asks()) return {};
@@ -188,7 +191,10 @@ class Ping360Host final : public PingHost {
     return ping;
   }
 
+  static constexpr std::chrono::milliseconds answer_within{1000};  // chosen
+
   bool is_open_ = false;
+  Time ask_again_at_{};
   protocol::Sweep sweep_{grads};
   std::uint32_t pings_ = 0;  // a Ping360 does not number its pings
 };

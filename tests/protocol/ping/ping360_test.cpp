@@ -1,7 +1,10 @@
 // A host's conversation with an emulated Ping360, without a socket: turn times, scans, echoes, refusals, discovery.
 #include <gmock/gmock.h>
 
+#include <variant>
+
 #include "core/base/geometry.hpp"
+#include "protocol/ping/host.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
@@ -286,6 +289,26 @@ TEST(Ping360, SamplesAreTakenInTimeWithTheTrueSpeedOfSound) {
     EXPECT_NEAR(s.range_of_row(0), 88 * 25e-9 * speed / 2, 1e-9);
     EXPECT_NEAR(s.range_m, 1200 * 88 * 25e-9 * speed / 2, 1e-9);
   }
+}
+
+TEST(Ping360Host, RepeatsItsFirstRequestUntilItIsAnswered) {
+  const auto host = ping360::make_host({});
+  ASSERT_TRUE(host);
+  const auto sent = [](const protocol::HostActions& actions) {
+    return actions.size() == 1 ? std::get<protocol::HostSend>(actions.front()).bytes : Bytes{};
+  };
+  const Bytes first = sent((*host)->on_open({}, at_s(0)));
+  EXPECT_FALSE(first.empty());
+  EXPECT_TRUE((*host)->on_tick(at_s(0.9)).empty());
+  for (const double s : {1.0, 2.0}) {
+    EXPECT_EQ((*host)->next_tick(), at_s(s));
+    EXPECT_EQ(sent((*host)->on_tick(at_s(s))), first);
+  }
+  EXPECT_FALSE((*host)->is_open());
+  (*host)->on_bytes(0, framed_message(Id::protocol_version, 1, ProtocolVersion{}), at_s(2.5));
+  EXPECT_TRUE((*host)->is_open());
+  EXPECT_FALSE((*host)->next_tick());
+  EXPECT_TRUE((*host)->on_tick(at_s(9)).empty());
 }
 
 }  // namespace

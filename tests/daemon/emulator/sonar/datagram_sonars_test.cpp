@@ -211,6 +211,20 @@ TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
   EXPECT_NEAR(static_cast<double>(sounder.atof().utc_ms - utc_ms), 100, 100);
 }
 
+/// Its host's port is closed, and the request of the next host arrives before the dialogue has ended.
+TEST(SurveyorInVirtualTime, AHostThatLeavesFreesItsSlotAtOnce) {
+  Sounder sounder;
+  const auto next = [&](ConnectionId id) {
+    const protocol::Port& port = *sounder.sonar().vendor().port(protocol::Port::Kind::udp_dialogue);
+    sounder.sonar().on_connect(id, Role::client, {"next", {10, 0, 0, 6}, 5000}, sounder.time.now, &port);
+    const Connection* const connection = sounder.sonar().connections().find(id);
+    return connection != nullptr && connection->state == Connection::State::served;
+  };
+  EXPECT_FALSE(next(stream + 1)) << "it has one slot";
+  sounder.sonar().finish(stream);
+  EXPECT_TRUE(next(stream + 2));
+}
+
 // ---- Ping1D
 
 struct Altimeter : Talk {
