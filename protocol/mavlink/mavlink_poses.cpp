@@ -134,7 +134,7 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
       continue;
     }
     if (!is_from_vehicle(*frame, now)) {
-      note_ignored(*frame, out);
+      note_ignored(*frame, {now, out});
       continue;
     }
     last_received_ = now;
@@ -142,7 +142,7 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
     if (is_selected_component(*frame, now))
       on_frame(*frame, {now, out});
     else if (contains_pose(frame->id))
-      tell_ignored(*frame, out);
+      tell_ignored(*frame, {now, out});
   }
   add_counts(frames.counts(), out);
   return out;

@@ -6,7 +6,6 @@
 #include <functional>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -85,6 +84,8 @@ class MavlinkPoses {
   Reaction on_tick(Time now);
   /// Empty while poses arrive; else one sentence with everything that is missing.
   std::string health_error(Time now) const;
+  /// Names another vehicle (system) whose messages are ignored, while it sends. Else empty.
+  std::string rival(Time now) const;
 
   /// Whether distances are wanted: by the settings, or by the last command of the vehicle.
   bool wants_distances() const { return distances_.wanted(); }
@@ -161,8 +162,8 @@ class MavlinkPoses {
   bool receives(std::uint32_t message, Time now) const { return received_within(message, now, system_silence); }
   bool received_within(std::uint32_t message, Time now, std::chrono::nanoseconds within) const;
   bool has_poses(Time now) const;
-  void note_ignored(const Frame& frame, Reaction& out);
-  void tell_ignored(const Frame& frame, Reaction& out);
+  void note_ignored(const Frame& frame, Moment at);
+  void tell_ignored(const Frame& frame, Moment at);
   void request_messages(Reaction& out);
 
   Settings settings_;
@@ -181,7 +182,10 @@ class MavlinkPoses {
   std::optional<bool> reported_;    // whether poses arrive
   std::chrono::nanoseconds reminder_period_{0};
   std::optional<std::pair<int, int>> ignored_;  // system and component of the last ignored message
-  std::set<std::pair<int, int>> told_ignored_;  // those that a notice has named since the vehicle was selected
+  /// Text of the notice for each system and component that one has named since the vehicle was selected.
+  std::map<std::pair<int, int>, std::string> told_ignored_;
+  std::pair<int, int> rival_{};  // the last of them that sent, of another system than the vehicle's
+  Time rival_at_{};
   std::map<std::uint32_t, Arrival> received_;
 
   Attitudes attitudes_;

@@ -95,24 +95,37 @@ bool MavlinkPoses::identifies_vehicle(const Frame& frame) {
   return frame.id == Heartbeat::id ? message_in<Heartbeat>(frame).autopilot != Heartbeat::no_autopilot : contains_pose(frame.id);
 }
 
-void MavlinkPoses::note_ignored(const Frame& frame, Reaction& out) {
+void MavlinkPoses::note_ignored(const Frame& frame, Moment at) {
   if (frame.component == own_component) return;
   ignored_ = {frame.system, frame.component};
-  if (system_ && !is_excluded(frame) && identifies_vehicle(frame)) tell_ignored(frame, out);
+  if (system_ && !is_excluded(frame) && identifies_vehicle(frame)) tell_ignored(frame, at);
 }
 
 /// Each system and component is named once: two vehicles at one port are a mistake that nothing else shows.
-void MavlinkPoses::tell_ignored(const Frame& frame, Reaction& out) {
-  if (told_ignored_.size() >= most_told || !told_ignored_.emplace(frame.system, frame.component).second) return;
+void MavlinkPoses::tell_ignored(const Frame& frame, Moment at) {
+  const std::pair<int, int> sender(frame.system, frame.component);
+  if (!told_ignored_.contains(sender) && told_ignored_.size() >= most_told) return;
+  if (frame.system != *system_) {
+    rival_ = sender;
+    rival_at_ = at.now;
+  }
+  if (told_ignored_.contains(sender)) return;
   const auto name_of = [](int system, int component) {
     return "system " + std::to_string(system) + ", component " + std::to_string(component);
   };
   const auto known = received_.find(frame.id);
   const int steering = frame.system == *system_ && known != received_.end() ? known->second.component : autopilot_component_;
-  out.notices.push_back(name_of(frame.system, frame.component) + " sends " + std::string(find_message(frame.id)->name) +
-                        " and is ignored: " + name_of(*system_, steering) + " steers " + settings_.vehicle +
-                        (frame.system == *system_ ? "; component_id selects another"
-                                                  : "; give each vehicle a port of its own, or select one by system_id"));
+  const std::string text = name_of(frame.system, frame.component) + " sends " + std::string(find_message(frame.id)->name) +
+                           " and is ignored: " + name_of(*system_, steering) + " steers " + settings_.vehicle +
+                           (frame.system == *system_ ? "; component_id selects another"
+                                                     : "; give each vehicle a port of its own, or select one by system_id");
+  told_ignored_.emplace(sender, text);
+  at.out.notices.push_back(text);
+}
+
+std::string MavlinkPoses::rival(Time now) const {
+  const auto told = told_ignored_.find(rival_);
+  return told != told_ignored_.end() && now - rival_at_ <= system_silence ? told->second : std::string();
 }
 
 /// The reason why x and y do not change, and the messages that would change them.

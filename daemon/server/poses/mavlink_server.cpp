@@ -100,10 +100,14 @@ std::vector<LinkFigures> MavlinkServer::figures() const {
 }
 std::vector<Note> MavlinkServer::notes() const {
   std::vector<Note> all;
-  for (const Link& l : links_)
-    if (const std::string error = l.poses.health_error(wire_time()); !error.empty())
+  for (const Link& l : links_) {
+    const Time now = wire_time();
+    if (const std::string error = l.poses.health_error(now); !error.empty())
       all.push_back({l.config.vehicle, l.name + ": " + error,
                      "docs/poses.md lists the messages that make a pose, and how to request them"});
+    if (const std::string rival = l.poses.rival(now); !rival.empty())
+      all.push_back({l.config.vehicle, l.name + ": " + rival, ""});
+  }
   return all;
 }
 Endpoint MavlinkServer::listens_at(std::size_t link) const {

@@ -221,9 +221,12 @@ TEST(MavlinkReports, WhoIsIgnoredBesideTheVehicleIsNamedOnce) {
               ElementsAre(AllOf(HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored"),
                                 HasSubstr("system 7, component 1 steers rov; give each vehicle a port of its own"))));
   EXPECT_THAT(poses.on_datagram(two(odometry(1, 0)), at_s(0.3)).notices, IsEmpty()) << "once";
+  EXPECT_THAT(poses.rival(at_s(5.2)), HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored")) << "while it sends";
+  EXPECT_THAT(poses.rival(at_s(5.4)), IsEmpty());
   EXPECT_THAT(poses.on_datagram(companion(odometry(1, 0)), at_s(0.4)).notices,
               ElementsAre(AllOf(HasSubstr("system 7, component 191 sends ODOMETRY and is ignored"),
                                 HasSubstr("system 7, component 1 steers rov; component_id selects another"))));
+  EXPECT_THAT(poses.rival(at_s(5.35)), IsEmpty()) << "a companion of the vehicle is no rival";
   for (int system = 9; system < 250; ++system) {
     Sender more{{static_cast<std::uint8_t>(system), 1, 0}};
     const auto notices = poses.on_datagram(more(odometry(1, 0)), at_s(0.5)).notices;
