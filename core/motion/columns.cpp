@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/letters.hpp"
+#include "core/base/plausible_angles.hpp"
 #include "core/motion/stamp.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/nearest.hpp"
@@ -237,7 +238,9 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
     if (auto wrong = fill({roll, pitch, yaw})) return wrong;
     if (std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}) > farthest) return "an angle is beyond 1e8";
     const auto in_rad = [this](double angle) { return radians_ ? angle : rad_from_deg(angle); };
-    out.pose.orientation = quat_from_rpy({in_rad(v[0]), in_rad(v[1]), in_rad(v[2])});
+    const RollPitchYaw rpy{in_rad(v[0]), in_rad(v[1]), in_rad(v[2])};
+    out.pose.orientation = quat_from_rpy(rpy);
+    out.largest_angle_rad = radians_ ? angle_beyond_radians(rpy) : 0;
     return std::nullopt;
   }
   if (auto wrong = fill({qw, qx, qy, qz})) return wrong;

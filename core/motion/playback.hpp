@@ -33,8 +33,9 @@ struct PlaybackRules {
 struct Plan {
   std::shared_ptr<const Trajectory> trajectory = {};  // null = none
   PlaybackRules rules = {};
-  std::string file = {};   // name of the file as the user wrote it
-  std::string about = {};  // format, frame, length, for people
+  std::string file = {};         // name of the file as the user wrote it
+  std::string about = {};        // format, frame, length, for people
+  double largest_angle_rad = 0;  // as in TrajectoryFile::Body
   explicit operator bool() const { return trajectory != nullptr; }
 };
 /// Whether both plans have the same points and the same rules.

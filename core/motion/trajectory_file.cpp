@@ -73,6 +73,7 @@ std::optional<Frame> frame_called(std::string_view word) {
 struct Track {
   std::string body;
   Points points;
+  double largest_angle_rad = 0;
 };
 
 class Reader {
@@ -234,6 +235,7 @@ class Reader {
     }
     p.times.emplace_back(row.stamp_ns);
     p.poses.push_back(row.pose);
+    track->largest_angle_rad = std::max(track->largest_angle_rad, row.largest_angle_rad);
     if (columns_->has_velocity()) p.velocities_mps.push_back(row.velocity_mps);
     if (columns_->has_angular_velocity()) p.angular_velocities_radps.push_back(row.angular_velocity_radps);
   }
@@ -244,7 +246,7 @@ class Reader {
     for (last_ = 0; last_ < tracks_.size(); ++last_)
       if (tracks_[last_].body == body) return &tracks_[last_];
     if (tracks_.size() == most_bodies) return nullptr;
-    return &tracks_.emplace_back(Track{std::string(body), {}});
+    return &tracks_.emplace_back(Track{std::string(body), {}, 0});
   }
 
   void check_whole_file() {
@@ -276,7 +278,8 @@ class Reader {
       for (Ns& at : t.points.times) at -= first;
       // Converts to ENU and FLU, which all other code uses (docs/glossary.md).
       if (file.frame == Frame::ned_frd) turn_to_enu_flu(t.points);
-      file.bodies.push_back({std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration)});
+      file.bodies.push_back(
+          {std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration), t.largest_angle_rad});
     }
     return file;
   }

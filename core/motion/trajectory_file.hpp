@@ -30,6 +30,7 @@ struct TrajectoryFile {
   struct Body {
     std::string name;  // empty if the file has no names
     std::shared_ptr<const Trajectory> trajectory;
+    double largest_angle_rad = 0;  // the largest of angle_beyond_radians(); 0 if all angles are plausible
   };
   std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;

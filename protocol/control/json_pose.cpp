@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/plausible_angles.hpp"
 #include "protocol/control/json_depth.hpp"
 #include "protocol/control/refused.hpp"
 
@@ -74,8 +75,9 @@ Result<std::array<double, 4>> orientation_of(const json& object, std::string& fi
   for (const double angle : **attitude)
     if (!std::isfinite(angle)) return refused("attitude has a NaN or infinite component");
   fields += " attitude";
-  largest_angle_rad = angle_beyond_radians(**attitude);
-  const Quatd q = quat_from_rpy({(**attitude)[0], (**attitude)[1], (**attitude)[2]});
+  const RollPitchYaw rpy{(**attitude)[0], (**attitude)[1], (**attitude)[2]};
+  largest_angle_rad = angle_beyond_radians(rpy);
+  const Quatd q = quat_from_rpy(rpy);
   return std::array<double, 4>{q.w, q.x, q.y, q.z};
 }
 

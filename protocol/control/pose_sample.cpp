@@ -31,12 +31,6 @@ Vec3d vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 std::string_view name_of(Frame frame) { return frame == Frame::ned_frd ? "NED/FRD" : "ENU/FLU"; }
 
-double angle_beyond_radians(const std::array<double, 3>& rpy_rad) {
-  constexpr double most_tilt_rad = 1.01 * pi, most_yaw_rad = 10 * 2 * pi;
-  const double tilt_rad = std::max(std::abs(rpy_rad[0]), std::abs(rpy_rad[1])), yaw_rad = std::abs(rpy_rad[2]);
-  return tilt_rad > most_tilt_rad || yaw_rad > most_yaw_rad ? std::max(tilt_rad, yaw_rad) : 0;
-}
-
 // Both JSON and protobuf poses pass here, so both have the same limits and the same texts.
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw) {
   if (!raw.frame) return refused("frame is missing: give NED_FRD or ENU_FLU; there is no default");

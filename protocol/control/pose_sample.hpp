@@ -57,9 +57,6 @@ struct RawPose {
   std::optional<std::array<double, 3>> angular_velocity_radps;
   double largest_angle_rad = 0;  // as in PoseSample
 };
-/// The largest absolute angle if one of the angles is implausible as radians: a roll or pitch above half a turn, or a yaw above
-/// ten turns (some senders do not wrap headings). Else 0.
-double angle_beyond_radians(const std::array<double, 3>& rpy_rad);
 /// Fills pose and velocities of `sample` from `raw`, or returns an error in one sentence: no frame, NaN or infinity, an absurd
 /// size, or a quaternion whose norm differs from 1 by more than 1e-3 (smaller errors are corrected).
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw);

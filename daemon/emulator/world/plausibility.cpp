@@ -39,6 +39,7 @@ constexpr const char* turned_cure =
 constexpr const char* order_cure =
     "write w where the format has it: last in a TUM line (t x y z qx qy qz qw), first in one of EuRoC";
 constexpr const char* angle_cure = "angles are radians there: were degrees sent? Multiply them by 0.0174533";
+constexpr const char* degrees_cure = "were degrees written? Call the columns roll_deg, pitch_deg and yaw_deg";
 constexpr const char* radians_cure = "call the columns roll_rad, pitch_rad and yaw_rad, or multiply the angles by 57.2958";
 constexpr const char* mount_cure =
     "rpy_deg is [roll, pitch, yaw]: a roll near 180, or a pitch beyond 90, turns it over and swaps port and starboard; to look "
@@ -314,6 +315,11 @@ std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan
   std::vector<Note> notes;
   add(notes, carrier.vehicle,
       doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
+  if (plan.largest_angle_rad > 0) {
+    const std::string angle = format(" has an angle of %.4g rad", plan.largest_angle_rad);
+    add(notes, carrier.vehicle, Doubt{plan.file + angle, degrees_cure});
+    return notes;  // doubts about attitudes would be consequences of this one
+  }
   if (const auto why = radians_read_as_degrees(poses))
     add(notes, carrier.vehicle, Doubt{"the headings of " + plan.file + " " + *why, radians_cure});
   if (const OtherAxes* axes = axes_of(poses)) {

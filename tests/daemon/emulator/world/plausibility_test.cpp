@@ -301,6 +301,19 @@ TEST(Plausibility, ATrajectoryWithRadiansInColumnsOfDegrees) {
   }
 }
 
+TEST(Plausibility, ATrajectoryWithDegreesInColumnsOfRadians) {
+  const auto with = [](const std::string& columns, const std::string& values) {
+    return playing("# frame: ENU_FLU\nt_s,x_m,y_m,z_m," + columns + "\n0,0,0,-3,0,0,0\n1,0,0,-3," + values + "\n", "dive.csv");
+  };
+  const std::string radians = "roll_rad,pitch_rad,yaw_rad";
+  EXPECT_THAT(
+      notes(with(radians, "0,-10,90")),
+      ElementsAre("dive.csv has an angle of 90 rad; were degrees written? Call the columns roll_deg, pitch_deg and yaw_deg"));
+  EXPECT_THAT(notes(with(radians, "0,0,270")), ElementsAre(HasSubstr("an angle of 270 rad")));
+  EXPECT_THAT(notes(with(radians, "0,0.2,-7.5")), IsEmpty()) << "a heading that is not wrapped";
+  EXPECT_THAT(notes(with("roll_deg,pitch_deg,yaw_deg", "0,-10,90")), IsEmpty());
+}
+
 TEST(Plausibility, AVehicleThatHoldsItsHeadingHasDegrees) {
   // A survey in lanes with the bow always north, and small swings of the heading.
   std::string lanes = "# frame: ENU_FLU\nt_s,x_m,y_m,z_m,yaw_deg\n", ferry = lanes;
