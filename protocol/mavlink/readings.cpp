@@ -12,16 +12,49 @@ namespace {
 using control::Frame;
 using control::RawPose;
 
-// MAV_FRAME of common.xml.
+// MAV_FRAME of common.xml, which since 2019 has only descriptions of 13 to 19, and no names.
 enum MavFrame : std::uint8_t {
   local_ned = 1,
   local_enu = 4,
-  body_ned = 8,
+  body_ned = 8,  // deprecated, as the next one; both mean body_frd
+  body_offset_ned = 9,
   body_frd = 12,
   body_flu = 13,
+  mocap_ned = 14,
+  mocap_enu = 15,
+  vision_ned = 16,
+  vision_enu = 17,
+  estim_ned = 18,
+  estim_enu = 19,
   local_frd = 20,
   local_flu = 21,
 };
+constexpr std::array frame_names = {"GLOBAL",
+                                    "LOCAL_NED",
+                                    "MISSION",
+                                    "GLOBAL_RELATIVE_ALT",
+                                    "LOCAL_ENU",
+                                    "GLOBAL_INT",
+                                    "GLOBAL_RELATIVE_ALT_INT",
+                                    "LOCAL_OFFSET_NED",
+                                    "BODY_NED",
+                                    "BODY_OFFSET_NED",
+                                    "GLOBAL_TERRAIN_ALT",
+                                    "GLOBAL_TERRAIN_ALT_INT",
+                                    "BODY_FRD",
+                                    "BODY_FLU",
+                                    "MOCAP_NED",
+                                    "MOCAP_ENU",
+                                    "VISION_NED",
+                                    "VISION_ENU",
+                                    "ESTIM_NED",
+                                    "ESTIM_ENU",
+                                    "LOCAL_FRD",
+                                    "LOCAL_FLU"};
+
+std::string frame_text(std::uint8_t frame) {
+  return std::to_string(frame) + (frame < frame_names.size() ? std::string(" (") + frame_names[frame] + ")" : "");
+}
 
 constexpr double highest_m = 1e5;                               // keeps the results finite; no vehicle with a sonar is higher
 const Quatd half_turn_ahead{0, 1, 0, 0};                        // turns FRD into FLU, and back
@@ -105,9 +138,16 @@ Result<RawPose> raw_pose(const Odometry& m) {
   Vec3d ned_m{m.x_m, m.y_m, m.z_m};
   switch (m.frame_id) {
     case local_ned:
+    case mocap_ned:
+    case vision_ned:
+    case estim_ned:
+      break;
     case local_frd:  // the direction ahead at the start counts as north
       break;
     case local_enu:
+    case mocap_enu:
+    case vision_enu:
+    case estim_enu:
       ned_m = enu_from_ned(ned_m);  // its own inverse
       in_ned = enu_and_ned * in_ned;
       break;
@@ -116,21 +156,22 @@ Result<RawPose> raw_pose(const Odometry& m) {
       in_ned = half_turn_ahead * in_ned;
       break;
     default:
-      return failure(ErrorKind::bad_data, "frame_id " + std::to_string(m.frame_id) +
+      return failure(ErrorKind::bad_data, "frame_id " + frame_text(m.frame_id) +
                                               " is not served; send MAV_FRAME_LOCAL_NED, LOCAL_FRD, LOCAL_ENU or LOCAL_FLU");
   }
   Vec3d velocity_mps{m.vx_mps, m.vy_mps, m.vz_mps};
   Vec3d rates_radps{m.roll_radps, m.pitch_radps, m.yaw_radps};
-  const bool velocity_in_world = m.child_frame_id == m.frame_id && (m.frame_id == local_ned || m.frame_id == local_frd);
+  const bool is_enu = m.frame_id == local_enu || m.frame_id == mocap_enu || m.frame_id == vision_enu || m.frame_id == estim_enu;
+  const bool velocity_in_world = m.child_frame_id == m.frame_id && !is_enu && m.frame_id != local_flu;
   if (velocity_in_world) {
     velocity_mps = rotate(conjugate(in_ned), velocity_mps);
   } else if (m.child_frame_id == body_flu) {
     in_ned = in_ned * half_turn_ahead;
     velocity_mps = flu_from_frd(velocity_mps);
     rates_radps = flu_from_frd(rates_radps);
-  } else if (m.child_frame_id != body_frd && m.child_frame_id != body_ned) {
+  } else if (m.child_frame_id != body_frd && m.child_frame_id != body_ned && m.child_frame_id != body_offset_ned) {
     return failure(ErrorKind::bad_data,
-                   "child_frame_id " + std::to_string(m.child_frame_id) + " is not served; send MAV_FRAME_BODY_FRD");
+                   "child_frame_id " + frame_text(m.child_frame_id) + " is not served; send MAV_FRAME_BODY_FRD");
   }
   RawPose pose = raw_pose(ned_m, in_ned);
   set_motion(pose, velocity_mps, rates_radps);

@@ -276,7 +276,8 @@ class Telemetry(WithFolder):
         self.assertIn("ends within a frame", self.warned[0])
 
     def test_odometry_of_a_body_in_frd_or_flu(self):
-        for frames in ((1, 1), (1, 8), (1, 12), (20, 20), (20, 8), (20, 12), (1, 13), (20, 13)):
+        for frames in ((1, 1), (1, 8), (1, 9), (1, 12), (20, 20), (20, 8), (20, 12), (1, 13), (20, 13), (14, 12), (16, 16), (16, 13),
+                       (18, 8)):
             with self.subTest(frames):
                 turned = (0, 1, 0, 0) if frames[1] == 13 else (1, 0, 0, 0)
                 track = self.convert(made.telemetry_log(("ODOMETRY",), frames=frames, turned=turned))
@@ -285,10 +286,10 @@ class Telemetry(WithFolder):
 
     def test_odometry_in_a_world_of_enu_or_flu(self):
         a = math.sqrt(0.5)
-        of_frame = {4: ((0, a, a, 0), lambda n, e, d: (e, n, -d)), 21: ((0, 1, 0, 0), lambda n, e, d: (n, -e, -d))}
-        for frame, body in ((4, 8), (4, 12), (4, 13), (21, 12), (21, 13)):
+        enu, flu = ((0, a, a, 0), lambda n, e, d: (e, n, -d)), ((0, 1, 0, 0), lambda n, e, d: (n, -e, -d))
+        for frame, body in ((4, 8), (4, 12), (4, 13), (21, 9), (21, 12), (21, 13), (15, 12), (17, 13), (19, 8)):
             with self.subTest(frame=frame, body=body):
-                turn, place = of_frame[frame]
+                turn, place = flu if frame == 21 else enu
                 log = b""
                 for step in range(50):
                     t, north, east, down, *angles = made.moment(step)
@@ -311,9 +312,12 @@ class Telemetry(WithFolder):
         self.assertEqual([abs(part) for part in row.orientation], [1, 0, 0, 0])
 
     def test_odometry_in_unsupported_frames_is_omitted(self):
-        for frames in ((21, 21), (4, 4), (4, 20), (1, 20), (20, 1), (1, 0), (12, 12)):
+        names = {0: "GLOBAL", 1: "LOCAL_NED", 4: "LOCAL_ENU", 7: "LOCAL_OFFSET_NED", 12: "BODY_FRD", 14: "MOCAP_NED", 20: "LOCAL_FRD",
+                 21: "LOCAL_FLU"}
+        for frames in ((21, 21), (4, 4), (4, 20), (1, 20), (20, 1), (1, 0), (12, 12), (7, 12), (14, 1), (99, 12)):
             with self.subTest(frames):
-                frame_ids = "frame_id %d and child_frame_id %d" % frames
+                frame_ids = " and ".join(f"{of} {n}" + (f" ({names[n]})" if n in names else "")
+                                         for of, n in zip(("frame_id", "child_frame_id"), frames))
                 self.convert(made.telemetry_log(("ODOMETRY",), 3) + made.telemetry_log(("ODOMETRY",), 2, frames=frames))
                 self.assertIn(f"ODOMETRY with {frame_ids} (2 messages) was omitted", self.warned[0])
                 with self.assertRaises(ConvertError):

@@ -42,15 +42,27 @@ TEST(MavlinkOdometry, EveryPairOfFramesMeansTheSameVehicle) {
   expect_the_vehicle(sent(enu, body_flu, Vec3{2, 10, -3}, Quatd{}, moves_flu, turns_flu));
   expect_the_vehicle(sent(enu, body_frd, Vec3{2, 10, -3}, Quatd{0, 1, 0, 0}, moves_frd, turns_frd));
   expect_the_vehicle(sent(flu, body_flu, Vec3{10, -2, -3}, about_z(-quarter), moves_flu, turns_flu));
+  for (const std::uint8_t old_ned : {14, 16, 18}) {  // frames of older senders, described in common.xml
+    expect_the_vehicle(sent(old_ned, body_frd, Vec3{10, 2, 3}, about_z(quarter), moves_frd, turns_frd));
+    expect_the_vehicle(sent(old_ned, old_ned, Vec3{10, 2, 3}, about_z(quarter), Vec3{0.5f, 1, 0}, turns_frd));
+  }
+  for (const std::uint8_t old_enu : {15, 17, 19})
+    expect_the_vehicle(sent(old_enu, body_flu, Vec3{2, 10, -3}, Quatd{}, moves_flu, turns_flu));
+  for (const std::uint8_t old_body : {8, 9})
+    expect_the_vehicle(sent(ned, old_body, Vec3{10, 2, 3}, about_z(quarter), moves_frd, turns_frd));
 }
 
 TEST(MavlinkOdometry, UnknownFramesAreRefusedByName) {
-  const auto other_world = raw_pose(with(7, body_frd, {}, {}, {}, {}));
-  ASSERT_FALSE(other_world);
-  EXPECT_THAT(other_world.error().text, ::testing::HasSubstr("frame_id 7"));
-  const auto other_body = raw_pose(with(ned, 0, {}, {}, {}, {}));
-  ASSERT_FALSE(other_body);
-  EXPECT_THAT(other_body.error().text, ::testing::HasSubstr("child_frame_id 0"));
+  const auto refused = [](std::uint8_t frame, std::uint8_t child) {
+    const auto pose = raw_pose(with(frame, child, {}, {}, {}, {}));
+    return pose ? "" : pose.error().text;
+  };
+  EXPECT_THAT(refused(7, body_frd), ::testing::StartsWith("frame_id 7 (LOCAL_OFFSET_NED) is not served"));
+  EXPECT_THAT(refused(body_frd, body_frd), ::testing::StartsWith("frame_id 12 (BODY_FRD) is not served"));
+  EXPECT_THAT(refused(22, body_frd), ::testing::StartsWith("frame_id 22 is not served"));
+  EXPECT_THAT(refused(ned, 0), ::testing::StartsWith("child_frame_id 0 (GLOBAL) is not served"));
+  EXPECT_THAT(refused(enu, enu), ::testing::StartsWith("child_frame_id 4 (LOCAL_ENU) is not served"));
+  EXPECT_THAT(refused(flu, flu), ::testing::StartsWith("child_frame_id 21 (LOCAL_FLU) is not served"));
 }
 
 TEST(MavlinkOdometry, UnknownVelocitiesAreLeftOut) {

@@ -47,10 +47,20 @@ MESSAGES: Dict[int, Message] = {
                  _names("time_usec x y z q1 q2 q3 q4 vx vy vz rollspeed pitchspeed yawspeed frame_id child_frame_id "
                         "reset_counter estimator_type quality")),
 }
-# MAV_FRAME, as frame_id and child_frame_id of ODOMETRY.
-LOCAL_NED, LOCAL_ENU, LOCAL_FRD, LOCAL_FLU = 1, 4, 20, 21
 SUBMARINE = 12  # MAV_TYPE
-BODY_NED, BODY_FRD, BODY_FLU = 8, 12, 13  # BODY_NED is deprecated and means FRD
+# MAV_FRAME, as frame_id and child_frame_id of ODOMETRY. Since 2019 common.xml has only descriptions of 13 to 19, and no names.
+FRAMES = _names("GLOBAL LOCAL_NED MISSION GLOBAL_RELATIVE_ALT LOCAL_ENU GLOBAL_INT GLOBAL_RELATIVE_ALT_INT LOCAL_OFFSET_NED BODY_NED "
+                "BODY_OFFSET_NED GLOBAL_TERRAIN_ALT GLOBAL_TERRAIN_ALT_INT BODY_FRD BODY_FLU MOCAP_NED MOCAP_ENU VISION_NED "
+                "VISION_ENU ESTIM_NED ESTIM_ENU LOCAL_FRD LOCAL_FLU")
+LOCAL_FRD, LOCAL_FLU, BODY_FLU = (FRAMES.index(name) for name in ("LOCAL_FRD", "LOCAL_FLU", "BODY_FLU"))
+NED_WORLDS = tuple(map(FRAMES.index, ("LOCAL_NED", "MOCAP_NED", "VISION_NED", "ESTIM_NED")))
+ENU_WORLDS = tuple(map(FRAMES.index, ("LOCAL_ENU", "MOCAP_ENU", "VISION_ENU", "ESTIM_ENU")))
+FRD_BODIES = tuple(map(FRAMES.index, ("BODY_NED", "BODY_OFFSET_NED", "BODY_FRD")))  # the first two are deprecated and mean FRD
+
+
+def frame_text(frame: float) -> str:
+    """A MAV_FRAME with its name: "12 (BODY_FRD)"."""
+    return f"{frame:.0f}" + (f" ({FRAMES[int(frame)]})" if frame < len(FRAMES) else "")
 
 
 def _crc_of_byte(value: int) -> int:

@@ -9,8 +9,8 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 from ..geodesy import Geodetic
 from ..rotations import Quaternion, Vector3, quaternion_from_rpy, unit
-from .mavlink import (BODY_FLU, BODY_FRD, BODY_NED, LOCAL_ENU, LOCAL_FLU, LOCAL_FRD, LOCAL_NED, MESSAGES, SUBMARINE, Frame,
-                      fields_of, frame_length, read_frame)
+from .mavlink import (BODY_FLU, ENU_WORLDS, FRD_BODIES, LOCAL_FLU, LOCAL_FRD, MESSAGES, NED_WORLDS, SUBMARINE, Frame, fields_of,
+                      frame_length, frame_text, read_frame)
 from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, depth_source, track_of
 
 STAMP_BYTES = 8
@@ -64,10 +64,10 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
 
 def _is_supported(f: Dict[str, float]) -> bool:
     """Whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns only velocity; the body is FRD."""
-    bodies = (BODY_NED, BODY_FRD, BODY_FLU)
-    if f["frame_id"] in (LOCAL_NED, LOCAL_FRD):
+    bodies = (*FRD_BODIES, BODY_FLU)
+    if f["frame_id"] in (*NED_WORLDS, LOCAL_FRD):
         return f["child_frame_id"] in (*bodies, f["frame_id"])
-    return f["frame_id"] in (LOCAL_ENU, LOCAL_FLU) and f["child_frame_id"] in bodies
+    return f["frame_id"] in (*ENU_WORLDS, LOCAL_FLU) and f["child_frame_id"] in bodies
 
 
 def _of_frd(q: Quaternion) -> Quaternion:
@@ -79,7 +79,7 @@ def _in_ned(frame_id: float, q: Quaternion, p: Vector3) -> Tuple[Quaternion, Vec
     """Turns an attitude and a position from a local frame to NED: half a turn about the axis (1, 1, 0) from ENU, (1, 0, 0) from
     FLU."""
     w, x, y, z = q
-    if frame_id == LOCAL_ENU:
+    if frame_id in ENU_WORLDS:
         a = math.sqrt(0.5)
         return (-a * (x + y), a * (w + z), a * (w - z), a * (y - x)), (p[1], p[0], -p[2])
     if frame_id == LOCAL_FLU:
@@ -317,10 +317,10 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
             raise ConvertError(f"{path}: component {component} sends no poses; components: " +
                                (", ".join(map(str, there)) or "none"))
     if vehicle.unsupported:
-        warn("ODOMETRY with " + ", ".join(f"frame_id {world:.0f} and child_frame_id {body:.0f} ({n} messages)"
+        warn("ODOMETRY with " + ", ".join(f"frame_id {frame_text(world)} and child_frame_id {frame_text(body)} ({n} messages)"
                                           for (world, body), n in sorted(vehicle.unsupported.items())) +
-             " was omitted: supported are local NED, ENU, FRD and FLU (1, 4, 20, 21) with bodies in FRD (12, 8, or the world "
-             "frame of NED and FRD) or FLU (13)")
+             " was omitted: supported are frames fixed to the earth in NED, ENU, FRD and FLU (1, 4, 14 to 21) with bodies in FRD "
+             "(8, 9, 12, or the world frame of NED and FRD) or FLU (13)")
     choices = vehicle.choices()
     if choices:
         warn("several components send the same message; using the autopilot's, else the first, and another one "
