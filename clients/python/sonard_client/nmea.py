@@ -1,7 +1,7 @@
 """Parses NMEA 0183 sentences and derives poses from them, without sockets or clocks.
 
-HDT, THS, HDG: heading. PRDID: pitch, roll, heading. PHTRO: pitch and roll. GGA, RMC, GLL: position. DPT, DBT: depth of water below a
-transducer.
+HDT, THS, HDG: heading. PRDID, PASHR: pitch, roll, heading. PHTRO: pitch and roll. GGA, RMC, GLL: position. DPT, DBT: depth of
+water below a transducer.
 """
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from .rotations import Vector3
 DAY_S = 86400.0
 FIX_KINDS = ("GGA", "RMC", "GLL")  # in order of preference; the others repeat the fix
 TRUE_HEADINGS = {"HDT", "THS"}
-ATTITUDE_KINDS = (*TRUE_HEADINGS, "HDG", "PRDID", "PHTRO")
+WITH_HEADING = {"PRDID", "PASHR"}
+ATTITUDE_KINDS = (*TRUE_HEADINGS, "HDG", *WITH_HEADING, "PHTRO")
 DEPTH_KINDS = ("DPT", "DBT")
+NO_CHECKSUM = "checksum is missing"
+MOST_UNREAD = 12  # kinds of sentences to name
 
 
 class NmeaError(ValueError):
@@ -49,7 +52,7 @@ def parse_sentence(line: str, without_checksum: bool = False) -> Sentence:
         if not right:
             raise NmeaError(f"checksum is {given!r}, expected {checksum(body):02X}")
     elif not without_checksum:
-        raise NmeaError("checksum is missing")
+        raise NmeaError(NO_CHECKSUM)
     address, *fields = body.split(",")
     if len(address) < 3 or not address.isalnum():
         raise NmeaError(f"{address[:12]!r} is not a sentence type")
@@ -102,6 +105,7 @@ class Instruments:
         self.fix_time_s: Optional[float] = None  # time of day; exceeds 86400 after midnight
         self.water_below_m: Optional[float] = None
         self.received: Set[str] = set()
+        self.unread: Set[str] = set()  # other kinds of sentences
         self._fixes_by: Optional[str] = None
 
     def feed(self, sentence: Sentence) -> str:
@@ -113,6 +117,8 @@ class Instruments:
             return self._attitude(kind, fields)
         if kind in DEPTH_KINDS:
             return self._depth(kind, fields)
+        if len(self.unread) < MOST_UNREAD:
+            self.unread.add(kind)
         return ""
 
     def _fix(self, kind: str, fields: Tuple[str, ...]) -> str:
@@ -144,12 +150,16 @@ class Instruments:
         if kind in TRUE_HEADINGS and numbers and numbers[0] is not None and not (kind == "THS" and fields[1:2] == ("V",)):
             self.heading_deg = numbers[0]
         elif kind == "HDG" and (true := _true_heading(fields)) is not None:
-            if not self.received & {*TRUE_HEADINGS, "PRDID"}:
+            if not self.received & (TRUE_HEADINGS | WITH_HEADING):
                 self.heading_deg = true
         elif kind == "PRDID" and len(numbers) >= 3 and None not in numbers[:3]:
             self.pitch_deg, self.roll_deg = numbers[0], numbers[1]
             if not self.received & TRUE_HEADINGS:
                 self.heading_deg = numbers[2]
+        elif kind == "PASHR" and len(numbers) >= 5 and fields[2] == "T" and None not in numbers[3:5]:
+            self.roll_deg, self.pitch_deg = numbers[3], numbers[4]
+            if numbers[1] is not None and not self.received & TRUE_HEADINGS:
+                self.heading_deg = numbers[1]
         elif kind == "PHTRO" and len(numbers) >= 4 and numbers[0] is not None and numbers[2] is not None and \
                 fields[1] in ("M", "P") and fields[3] in ("B", "T"):
             self.pitch_deg = numbers[0] if fields[1] == "M" else -numbers[0]  # M: bow up
@@ -222,10 +232,10 @@ class NmeaPoses:
         if now.place is None:
             out.append("no position (a fix of GGA, RMC or GLL)" + (": --at is used" if assumed.north_east_m else ""))
         if now.heading_deg is None:
-            out.append("no heading (HDT, THS, PRDID, or HDG with the variation): --heading " +
+            out.append("no heading (HDT, THS, PRDID, PASHR, or HDG with the variation): --heading " +
                        ("is used" if assumed.heading_deg is not None else "DEG sets one"))
         if now.pitch_deg is None:
-            out.append("no pitch and roll (PRDID or PHTRO): 0 is used")
+            out.append("no pitch and roll (PRDID, PASHR or PHTRO): 0 is used")
         if now.water_below_m is None:
             out.append(f"no depth (DPT or DBT): {assumed.depth_m:g} m is used")
         elif not assumed.depth_is_vehicle and assumed.bottom_m is None:

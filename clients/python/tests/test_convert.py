@@ -3,6 +3,7 @@ import contextlib
 import io
 import math
 import random
+import re
 import unittest
 
 import made_logs as made
@@ -72,6 +73,24 @@ class Nmea(WithFolder):
         self.assertRegex(self.warned[0], r"at byte 0: checksum is '..', expected ..; lines omitted: [2-4]")
         with self.assertRaisesRegex(ConvertError, "no heading"):
             self.convert(made.nmea_log(kinds=("GGA",)))
+
+    def test_lines_without_a_checksum_are_accepted_on_request(self):
+        log = re.sub(r"\*..", "", made.nmea_log())
+        with self.assertRaises(ConvertError):
+            self.convert(log)
+        self.assertEqual(self.warned[0], "at byte 0: checksum is missing (--without-checksum accepts such lines); lines omitted: 80")
+        track = self.convert(log, origin=HERE, assumed=self.assumed(bottom_m=20), without_checksum=True)
+        self.assertEqual(self.warned, [])
+        self.assert_track(track, range(20), t0=43200, radians=1e-6)
+
+    def test_sentences_that_are_not_read_are_named(self):
+        self.convert(made.sentence("GPVTG,1,T,,M,2.0,N") + made.nmea_log() + made.sentence("YXXDR,A,1,D,PITCH"))
+        self.assertEqual(self.warned[0], "sentences that are not read: VTG, XDR")
+
+    def test_comments_in_utf8(self):
+        self.assertEqual(format_of(self.file("# Küste\n" + made.nmea_log())), "nmea")
+        with self.assertRaisesRegex(ConvertError, "AIS messages, without attitudes"):
+            self.convert("!AIVDM,1,1,,A,13HOI:0P0000VOHLCnHQKwvL05Ip,0*23\r\n")
 
 
 class Corrupted(WithFolder):

@@ -57,10 +57,19 @@ class Signs(unittest.TestCase):
             self.assertEqual((now.pitch_deg, now.roll_deg), (pitch, roll), letters)
         now = self.after("PRDID,-002.00,+003.00,123.40")
         self.assertEqual((now.pitch_deg, now.roll_deg, now.heading_deg), (-2, 3, 123.4))
+        now = self.after("PASHR,123519.00,123.40,T,+03.00,-02.00,+0.10,0.02,0.02,0.05,2,1")
+        self.assertEqual((now.pitch_deg, now.roll_deg, now.heading_deg), (-2, 3, 123.4))
+        for other in ("PASHR,123519.00,123.40,T,,-02.00", "PASHR,POS,0,08,123519", "PASHR,1,2"):
+            self.assertEqual((self.after(other).pitch_deg, self.after(other).received), (None, set()), other)
+
+    def test_sentences_that_are_not_read(self):
+        now = self.after("YXXDR,A,1.5,D,PITCH", "HEHDT,10.0,T", "PIXSE,ATITUD,-1.6,-0.4", "YXXDR,A,1.5,D,PITCH")
+        self.assertEqual(now.unread, {"XDR", "PIXSE"})
 
     def test_hdt_is_preferred_to_prdid(self):
         self.assertEqual(self.after("HEHDT,10.0,T", "PRDID,0,0,50.0").heading_deg, 10)
         self.assertEqual(self.after("PRDID,0,0,50.0", "HEHDT,10.0,T").heading_deg, 10)
+        self.assertEqual(self.after("HEHDT,10.0,T", "PASHR,1,50.0,T,0,0").heading_deg, 10)
 
     def test_other_headings(self):
         self.assertEqual(self.after("GPTHS,77.5,A").heading_deg, 77.5)

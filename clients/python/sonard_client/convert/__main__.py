@@ -38,6 +38,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--bottom", type=float, metavar="M", help="NMEA: depth of the bottom; the vehicle is DPT or DBT above it")
     parser.add_argument("--depth-is-vehicle", action="store_true", help="NMEA: DPT and DBT give the vehicle's own depth")
     parser.add_argument("--heading", type=float, metavar="DEG", help="NMEA: heading, used until one is received")
+    parser.add_argument("--without-checksum", action="store_true",
+                        help="NMEA: accept sentences without a checksum; wrong checksums are always rejected")
     return parser
 
 
@@ -91,7 +93,7 @@ def _run(options: argparse.Namespace) -> None:
     assumed = Assumptions(heading_deg=options.heading, depth_m=options.depth, depth_is_vehicle=options.depth_is_vehicle,
                           bottom_m=options.bottom)
     track = convert(options.file, kind, options.source, options.topic, origin, options.system, assumed, warn,
-                    options.component, _place(options.at), options.frame)
+                    options.component, _place(options.at), options.frame, options.without_checksum)
     if options.dead_reckon is not None:
         if not track.held:
             raise ValueError(f"--dead-reckon is for logs without horizontal position: {track.source} has one")

@@ -22,6 +22,7 @@ from .ulog import read_ulog
 FORMATS = ("dataflash", "tlog", "mcap", "rosbag", "db3", "ulog", "nmea")
 RECORDINGS = ("mcap", "rosbag", "db3")  # their positions are metres in an unknown frame
 _HEAD_BYTES = 4096
+_SENTENCE = re.compile(rb"\$(P[A-Z]{3,4}|[A-Z]{2}[A-Z0-9]{3}),")
 _WRITE = "write poses as CSV, in metres: sonard_client.geodesy converts degrees (docs/poses.md)"
 # Common formats that cannot be read: first bytes, name of the format, advice; {} is the file.
 _OTHERS = (
@@ -42,6 +43,7 @@ _OTHERS = (
     (b"\xd4\xc3\xb2\xa1", "a capture of packets; give the log of the vehicle"),
     (b"\n\r\r\n", "a capture of packets; give the log of the vehicle"),
     (b"{", "JSON; " + _WRITE),
+    (b"!AIVD", "AIS messages, without attitudes and seconds; give the log of the vehicle's own instruments"),
     (b"\xff\xfe", "text in UTF-16; save it as UTF-8"),
     (b"MATLAB 5.0", "a MATLAB file; write its poses as CSV (docs/poses.md)"),
 )
@@ -85,7 +87,7 @@ def format_of(path: pathlib.Path) -> str:
             return name
     if frame_length(head, STAMP_BYTES) is not None or (path.suffix == ".tlog" and not _described(path, head)):
         return "tlog"
-    if b"$" in head and b"," in head and all(byte < 128 for byte in head):
+    if (b"$" in head and b"," in head and all(byte < 128 for byte in head)) or (_SENTENCE.search(head) and min(head) >= 9):
         return "nmea"
     described = _described(path, head)
     if described:
@@ -97,11 +99,11 @@ def format_of(path: pathlib.Path) -> str:
 def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source: Optional[str] = None,
             topic: Optional[str] = None, origin: Optional[Geodetic] = None, system: Optional[int] = None,
             assumed: Assumptions = Assumptions(), warn: Warn = lambda text: None, component: Optional[int] = None,
-            at: Optional[Place2] = None, frame: Optional[str] = None) -> Track:
+            at: Optional[Place2] = None, frame: Optional[str] = None, without_checksum: bool = False) -> Track:
     """Reads the track of one vehicle. kind: one of FORMATS; default: detected. source: messages of an autopilot's log.
     topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. at: north and east [m]
     of a vehicle whose log has a depth but no horizontal position. frame: axes of a recording, "ENU_FLU" or "NED_FRD"; default:
-    as the recording says. Raises ConvertError and OSError."""
+    as the recording says. without_checksum: accept NMEA sentences without one. Raises ConvertError and OSError."""
     file = recording_at(pathlib.Path(path))
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {
@@ -111,7 +113,7 @@ def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source
         "rosbag": lambda: read_rosbag(file, warn, topic, frame),
         "db3": lambda: read_rosbag2(file, warn, topic, frame),
         "ulog": lambda: read_ulog(file, warn, source, origin, at),
-        "nmea": lambda: read_nmea(file, warn, origin, assumed)}
+        "nmea": lambda: read_nmea(file, warn, origin, assumed, without_checksum)}
     if chosen not in readers:
         raise ValueError(f"format is {chosen!r}: it must be one of {', '.join(FORMATS)}")
     if origin is not None and chosen in RECORDINGS:

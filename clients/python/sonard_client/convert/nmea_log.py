@@ -5,13 +5,15 @@ import pathlib
 from typing import List, Optional
 
 from ..geodesy import Geodetic
-from ..nmea import Assumptions, NmeaError, NmeaPoses, parse_sentence
+from ..nmea import NO_CHECKSUM, Assumptions, NmeaError, NmeaPoses, parse_sentence
 from ..rotations import quaternion_from_rpy
 from .track import ConvertError, Row, Track, Warn, rising
 
 
-def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None, assumed: Assumptions = Assumptions()) -> Track:
-    """Reads a track in NED_FRD, seconds of the day. `assumed` determines the depth from DPT and DBT."""
+def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None, assumed: Assumptions = Assumptions(),
+              without_checksum: bool = False) -> Track:
+    """Reads a track in NED_FRD, seconds of the day. `assumed` determines the depth from DPT and DBT. without_checksum: accept
+    sentences without a checksum."""
     poses = NmeaPoses(assumed._replace(origin=origin))
     rows: List[Row] = []
     refused, first_refused, too_early, at = 0, "", 0, 0
@@ -20,7 +22,7 @@ def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None,
         if not line.strip():
             continue
         try:
-            changed = poses.feed(parse_sentence(line.decode("latin-1")))
+            changed = poses.feed(parse_sentence(line.decode("latin-1"), without_checksum))
         except NmeaError as error:
             refused += 1
             first_refused = first_refused or f"at byte {begin}: {error}"
@@ -33,7 +35,10 @@ def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None,
         else:
             rows.append(Row(poses.instruments.fix_time_s, pose[0], quaternion_from_rpy(*pose[1])))
     if refused:
-        warn(f"{first_refused}; lines omitted: {refused}")
+        way_out = " (--without-checksum accepts such lines)" if first_refused.endswith(NO_CHECKSUM) else ""
+        warn(f"{first_refused}{way_out}; lines omitted: {refused}")
+    if poses.instruments.unread:
+        warn(f"sentences that are not read: {', '.join(sorted(poses.instruments.unread))}")
     if not rows:
         raise ConvertError(f"{path}: no poses: {'; '.join(poses.unknown()[:2]) or 'no fix with a time'}")
     if too_early:
