@@ -280,9 +280,32 @@ class Mounts(WithNode):
         self.assertEqual((front.header.frame_id, front.child_frame_id, left.child_frame_id), ("rov", "front", "left"))
         self.assertEqual((front.transform.translation.x, front.transform.rotation.w, front.transform.rotation.x), (0.3, 1, 0))
         self.assertEqual((front.header.stamp.sec, front.header.stamp.nanosec), (2, 500000000))
-        ros.node.on_mounts([world, self.mount(turn=(HALF, 0.0, HALF, 0.0)), self.mount("left")])
+        ros.node.on_mounts([world, self.mount(x=0.4, turn=(HALF, 0.0, HALF, 0.0)), self.mount("left")])
         self.assertEqual([m.child_frame_id for m in ros.static[1]], ["front", "left"])  # all: latched is the last message alone
         self.assertEqual(ros.static[1][0].transform.rotation.y, HALF)
+
+    def test_heads_that_turn_are_sent_each_time(self):
+        ros = self.bridge(base_frame="base_link")
+        away = [(math.cos(half), 0.0, 0.0, math.sin(half)) for half in (0, 0.1, 0.2, 0.2)]
+        for turn in away:
+            ros.node.on_mounts([self.mount(), self.mount("head", turn=turn)])
+        self.assertEqual([[m.child_frame_id for m in message] for message in ros.static], [["front", "head"], ["front"]])
+        moved = [message.transforms for message in ros.published["/tf"]]
+        self.assertEqual([[m.child_frame_id for m in message] for message in moved], 3 * [["head"]])
+        self.assertEqual([message[0].transform.rotation.z for message in moved], [turn[3] for turn in away[1:]])
+        self.assertEqual((moved[0][0].header.frame_id, moved[0][0].header.stamp.sec), ("base_link", 2))
+        ros.node.on_mounts([self.mount(x=0.5), self.mount("head", turn=away[0])])
+        self.assertEqual([m.child_frame_id for m in ros.static[2]], ["front"])
+        ros.node.on_mounts([self.mount(x=0.5)])  # the head is removed: nothing is left to turn
+        self.assertEqual((len(ros.static), len(ros.published["/tf"])), (3, 4))
+
+    def test_the_parent_changes_with_the_number_of_vehicles(self):
+        ros = self.bridge(base_frame="base_link")
+        ros.node.on_mounts([self.mount(), self.mount("mast", "boat")])
+        ros.node.on_mounts([self.mount(), self.mount("mast", "boat", turn=(HALF, 0.0, 0.0, HALF))])
+        ros.node.on_mounts([self.mount()])
+        self.assertEqual([{m.child_frame_id: m.header.frame_id for m in message} for message in ros.static],
+                         [{"front": "rov", "mast": "boat"}, {"front": "rov"}, {"front": "base_link"}])
 
     def test_their_parent(self):
         both = [self.mount(), self.mount("mast", "boat")]

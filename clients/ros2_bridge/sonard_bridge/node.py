@@ -7,7 +7,7 @@ import math
 import socket
 import sys
 import time
-from typing import Dict, Optional, Tuple
+from typing import Dict, Optional, Sequence, Set, Tuple
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TransformStamped
@@ -36,9 +36,17 @@ def set_stamp(stamp, ns: int) -> None:
     stamp.sec, stamp.nanosec = divmod(ns, 10**9)
 
 
+def is_near(a: Sequence[float], b: Sequence[float]) -> bool:
+    return all(abs(x - y) <= SAME for x, y in zip(a, b))
+
+
 def is_same(a: live_view.Transform, b: live_view.Transform) -> bool:
-    return a.parent == b.parent and all(
-        abs(x - y) <= SAME for x, y in zip((*a.position, *a.orientation), (*b.position, *b.orientation)))
+    return a.parent == b.parent and is_near((*a.position, *a.orientation), (*b.position, *b.orientation))
+
+
+def has_turned(before: live_view.Transform, now: live_view.Transform) -> bool:
+    """Returns true if the sonar looks elsewhere from the same place, as the head of a scanning sonar does with every line."""
+    return before.parent == now.parent and is_near(before.position, now.position) and not is_same(before, now)
 
 
 class Bridge(Node):
@@ -160,13 +168,16 @@ class Bridge(Node):
 
     def look(self) -> None:
         wanted = self.settings
-        self.mounts: Dict[str, live_view.Transform] = {}
+        self.mounts: Dict[str, live_view.Transform] = {}  # the last ones received
+        self.fixed: Dict[str, live_view.Transform] = {}  # those last published on /tf_static
+        self.turning: Set[str] = set()  # sonars whose heads turn
         self.of_sonars = {}  # publishers, by topic
         self.last_clock_ns = -1
         if wanted["tf_static"]:
             # Subscribers that come later get the last message. The StaticTransformBroadcaster of Jazzy ignores changes of a known frame.
             latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             self.static = self.create_publisher(TFMessage, "/tf_static", latched)
+            self.moving = self.create_publisher(TFMessage, "/tf", 10)
         if wanted["clock"]:
             self.clock_topic = self.create_publisher(Clock, "/clock", 10)
         endings = [ending for name, ending in (("clouds", "/cloud"), ("scans", "/truth")) if wanted[name]]
@@ -197,23 +208,29 @@ class Bridge(Node):
             self.clock_topic.publish(message)
 
     def on_mounts(self, transforms) -> None:
+        """Publishes mounts on /tf_static when one changes, and those of turning heads on /tf each time."""
         now = {t.child: t for t in transforms if t.parent != "world" and self.vehicle in ("", t.parent)}
-        if now.keys() == self.mounts.keys() and all(is_same(now[name], self.mounts[name]) for name in now):
-            return
-        self.mounts = now
+        before, self.mounts = self.mounts, now
+        self.turning = {name for name in now if name in self.turning or (name in before and has_turned(before[name], now[name]))}
         base = self.settings["base_frame"] or self.settings["tf_child"]
         base = base if len({t.parent for t in now.values()}) == 1 else ""
-        messages = []
-        for t in now.values():
-            message = TransformStamped()
-            set_stamp(message.header.stamp, t.stamp_ns)
-            message.header.frame_id = base or t.parent
-            message.child_frame_id = t.child
-            place, turn = message.transform.translation, message.transform.rotation
-            place.x, place.y, place.z = t.position
-            turn.x, turn.y, turn.z, turn.w = xyzw(t.orientation)
-            messages.append(message)
-        self.static.publish(TFMessage(transforms=messages))
+        fixed = {name: t._replace(parent=base or t.parent) for name, t in now.items() if name not in self.turning}
+        if fixed.keys() != self.fixed.keys() or not all(is_same(t, self.fixed[name]) for name, t in fixed.items()):
+            self.fixed = fixed
+            self.static.publish(TFMessage(transforms=list(map(self.mount, fixed.values()))))
+        if self.turning:
+            self.moving.publish(TFMessage(transforms=[self.mount(now[name]._replace(parent=base or now[name].parent))
+                                                      for name in sorted(self.turning)]))
+
+    @staticmethod
+    def mount(t: live_view.Transform) -> TransformStamped:
+        message = TransformStamped()
+        set_stamp(message.header.stamp, t.stamp_ns)
+        message.header.frame_id, message.child_frame_id = t.parent, t.child
+        place, turn = message.transform.translation, message.transform.rotation
+        place.x, place.y, place.z = t.position
+        turn.x, turn.y, turn.z, turn.w = xyzw(t.orientation)
+        return message
 
     def publisher_of(self, kind, topic: str, ending: str):
         name = f"~/{name_in_topic(topic.split('/')[1])}/{ending}"
