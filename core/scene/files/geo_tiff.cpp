@@ -67,6 +67,15 @@ double half_number(std::uint16_t bits) {
   return (bits & 0x8000) != 0 ? -size : size;
 }
 
+/// A whole number of some bits that may begin within a byte. Its first bit is the most significant one, in files of both byte
+/// orders: GDAL writes them so (NBITS), also those of 24 bits.
+double packed_number(std::span<const std::byte> bytes, std::size_t first_bit, std::size_t bits) {
+  std::uint32_t value = 0;
+  for (std::size_t bit = first_bit; bit < first_bit + bits; ++bit)
+    value = value << 1 | (std::to_integer<std::uint32_t>(bytes[bit / 8]) >> (7 - bit % 8) & 1u);
+  return value;
+}
+
 class GeoTiffReader {
  public:
   GeoTiffReader(TIFF* tiff, const std::filesystem::path& file, const HeightOptions& options)
@@ -160,14 +169,14 @@ class GeoTiffReader {
                        picture_.columns, picture_.rows));
     const bool whole = picture_.format == SAMPLEFORMAT_UINT || picture_.format == SAMPLEFORMAT_INT;
     const bool known =
-        whole ? picture_.bits == 8 || picture_.bits == 16 || picture_.bits == 32
+        whole ? picture_.bits == 8 || picture_.bits == 16 || picture_.bits == 32 || is_packed()
               : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 16 || picture_.bits == 32 || picture_.bits == 64);
     const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
     if (grey && picture_.samples == 1 && !known)
       return bad(std::string("has ") + (whole ? "whole" : "floating-point") + " numbers of " + std::to_string(picture_.bits) +
                  " bits, which are not read; write them otherwise: gdal_translate -ot Float32");
     if (!grey || !known || picture_.samples > most_bands ||
-        (picture_.samples != 1 && picture_.bits == 8 && planes == PLANARCONFIG_CONTIG))
+        (picture_.samples != 1 && picture_.bits <= 8 && planes == PLANARCONFIG_CONTIG))
       return bad("not one band of heights but a picture; choose a band of numbers: gdal_translate -b 1 -ot Float32");
     if (planes == PLANARCONFIG_CONTIG) picture_.bands = picture_.samples;
     if (auto r = find_alpha(); !r) return r;
@@ -241,7 +250,14 @@ class GeoTiffReader {
     std::memcpy(&value, at, sizeof value);
     return static_cast<double>(value);
   }
-  double value_at(const std::byte* at) const {
+  bool is_packed() const {
+    return picture_.format == SAMPLEFORMAT_UINT && picture_.bits < 32 && picture_.bits % 16 != 0 && picture_.bits != 8;
+  }
+
+  /// The value with this number in a row of a block.
+  double value_at(std::span<const std::byte> row, std::size_t number) const {
+    if (is_packed()) return packed_number(row, number * picture_.bits, picture_.bits);
+    const std::byte* const at = row.data() + number * picture_.value_bytes();
     const bool sign = picture_.format == SAMPLEFORMAT_INT;
     if (picture_.format == SAMPLEFORMAT_IEEEFP && picture_.bits == 16) {
       std::uint16_t half = 0;
@@ -256,13 +272,12 @@ class GeoTiffReader {
 
   /// Stores `width` heights of one row, from a block's bytes, at a column and row of the grid.
   Result<void> take(std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width) {
-    const std::size_t size = picture_.value_bytes() * picture_.bands;
     if (bytes.empty()) return {};
-    if (bytes.size() < size * width) return bad("has blocks that are shorter than its cells");
+    if (bytes.size() < picture_.bytes_of(width)) return bad("has blocks that are shorter than its cells");
     for (std::uint32_t i = 0; i < width; ++i) {
-      const std::byte* const cell = bytes.data() + size * i;
-      if (picture_.alpha && value_at(cell + *picture_.alpha * picture_.value_bytes()) == 0) continue;
-      const double value = value_at(cell);
+      const std::size_t cell = std::size_t{i} * picture_.bands;
+      if (picture_.alpha && value_at(bytes, cell + *picture_.alpha) == 0) continue;
+      const double value = value_at(bytes, cell);
       const auto height = values_.height_of(value);
       if (!height) return bad(text::format("the height %g in row %u, column %u is beyond 1e7 m", value, row + 1, column + i + 1));
       raw_.z[std::size_t{row} * picture_.columns + column + i] = *height;
