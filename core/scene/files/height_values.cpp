@@ -69,18 +69,18 @@ bool are_arc_seconds(double cell) {
   return is_whole(cell * ninths_in_a_degree) && !is_whole(cell * 1e5);
 }
 
-/// Whether the ground would be absurdly steep if coordinates were metres: read from degrees, a slope of 1 in 100 becomes 1000
-/// to 1.
-bool shows_degrees(const RawHeights& raw) {
+/// True if the ground would be absurdly steep if coordinates were metres: read from degrees, a slope of 1 in 100 becomes 1000
+/// to 1. `height_m`: metres per unit of `raw.z`.
+bool shows_degrees(const RawHeights& raw, double height_m) {
   const std::size_t columns = raw.x.size();
   const double cell = (raw.x.back() - raw.x.front()) / static_cast<double>(columns - 1);
-  constexpr double small_cell_deg = 0.1, large_cell_deg = 1, steep = 10;
-  if (!could_be_degrees(raw) || cell >= large_cell_deg) return false;
+  constexpr double small_cell_deg = 0.1, steep = 10;
+  if (!could_be_degrees(raw)) return false;
   double rise = 0;
   std::size_t steps = 0, steep_steps = 0;
   for (std::size_t k = 1; k < raw.z.size(); ++k)
     if (k % columns != 0 && !std::isnan(raw.z[k]) && !std::isnan(raw.z[k - 1])) {
-      const double step = std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1]));
+      const double step = height_m * std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1]));
       rise += step, ++steps, steep_steps += step > steep * cell;
     }
   // Large cells are more likely in metres, so a few wrong heights must not decide.
@@ -196,7 +196,7 @@ void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodeti
 }
 
 /// Adds a note if large cells may be in degrees although the ground is flat: the coordinates are possible on Earth, and the
-/// grid neither begins nor has its middle at 0, 0, as local grids usually do.
+/// grid neither begins nor has its middle at 0, 0, as local grids usually do, or is deeper than wide.
 void hint_at_degrees(HeightGrid& grid) {
   constexpr double least_cell = 0.05, all_around = 300;
   const double cell = grid.x[1] - grid.x[0], near = cell;
@@ -204,7 +204,10 @@ void hint_at_degrees(HeightGrid& grid) {
     return std::abs(axis.front()) <= near || std::abs(axis.back()) <= near || std::abs(axis.front() + axis.back()) <= near;
   };
   if (cell < least_cell || grid.x.front() < -180 || grid.x.back() > 360 || grid.y.front() < -90 || grid.y.back() > 90) return;
-  if (is_local(grid.x) && is_local(grid.y) && grid.x.back() - grid.x.front() + cell < all_around) return;
+  const double width = std::max(grid.x.back() - grid.x.front(), grid.y.back() - grid.y.front()) + cell;
+  const bool is_deep =
+      std::any_of(grid.z_m.begin(), grid.z_m.end(), [&](float z) { return std::abs(static_cast<double>(z)) > width; });
+  if (is_local(grid.x) && is_local(grid.y) && width < all_around && !is_deep) return;
   grid.notes.push_back(
       text::format("its coordinates (%.6g, %.6g, cells of %.6g) are read as metres; write geographic: true if they "
                    "are degrees, or false",
@@ -226,8 +229,8 @@ Result<void> set_origin_of_degrees(HeightGrid& grid, const HeightOptions& option
                                std::abs(grid.y.front() - from_latitude), std::abs(grid.y.back() - from_latitude)});
   if (far > farthest_deg)
     return failure(ErrorKind::bad_data,
-                   text::format("the grid, in degrees, reaches %.3g degrees from the origin (%s); at most 5: cut a part out, or "
-                                "set origin",
+                   text::format("the grid, in degrees, reaches %.3g degrees from the origin (%s); at most 5: cut a part out "
+                                "(gdal_translate -projwin WEST NORTH EAST SOUTH IN OUT.tif), or set origin",
                                 far, place_text(*grid.origin).c_str()));
   if (std::max(std::abs(grid.y.front()), std::abs(grid.y.back())) > nearest_pole_deg)
     return failure(ErrorKind::bad_data, "the grid, in degrees, reaches within 1 degree of a pole; project it to metres");
@@ -335,7 +338,9 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   apply_scale(raw, grid.notes);
   if (raw.system.web_mercator && options.geographic.value_or(true)) convert_web_mercator(raw, grid.notes);
   const bool said = options.geographic.has_value() || raw.system.geographic.has_value();
-  const bool geographic = options.geographic.value_or(raw.system.geographic.value_or(!said && shows_degrees(raw)));
+  const double z_scale = options.z_scale * raw.system.height_unit_m;
+  const bool geographic =
+      options.geographic.value_or(raw.system.geographic.value_or(!said && shows_degrees(raw, std::abs(z_scale))));
   if (!geographic) convert_to_metres(raw, options.z_scale, grid.notes);
   if (geographic && !raw.system.web_mercator) convert_to_degrees(raw, grid.notes);
   if (raw.system.height_unit_m != 1)
@@ -363,7 +368,6 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
   grid.x = std::move(raw.x);
   grid.y = std::move(raw.y);
   grid.z_m = std::move(raw.z);
-  const double z_scale = options.z_scale * raw.system.height_unit_m;
   for (float& z : grid.z_m) z = static_cast<float>(static_cast<double>(z) * z_scale);
   if (geographic) {
     if (auto set = set_origin_of_degrees(grid, options, !said); !set) return tl::make_unexpected(set.error());
@@ -374,7 +378,7 @@ Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options) 
                          "; set origin: {lat, lon}, or world.origin in the configuration, to place it by latitude and longitude");
   } else {
     if (options.world_origin && !options.geographic) hint_at_zone(grid, *options.world_origin);
-    if (!said && !zone && !options.centred) hint_at_degrees(grid);
+    if (!said && !zone) hint_at_degrees(grid);
   }
   return grid;
 }

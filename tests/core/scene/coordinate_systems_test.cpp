@@ -262,11 +262,10 @@ TEST_F(UnknownSystem, EastingsMayBeginWithTheirZone) {
 
 TEST(UnnamedSystem, ANoteTellsOfMetresThatCouldBeDegrees) {
   TemporaryFiles files;
-  const auto notes = [&](const std::string& corner, const std::string& cell, const HeightOptions& options = {}) {
-    const auto grid =
-        read_esri_heights(files.write("g.asc", "# made by hand\nncols 4\nnrows 2\n" + corner + "\ncellsize " + cell +
-                                                   "\n# heights\n-30 -30.1 -30.2 -30.1\n-30 -30.1 -30 -30\n"),
-                          options);
+  const auto notes = [&](const std::string& corner, const std::string& cell, const HeightOptions& options = {},
+                         const std::string& heights = "-30 -30.1 -30.2 -30.1\n-30 -30.1 -30 -30\n") {
+    const std::string header = "# made by hand\nncols 4\nnrows 2\n" + corner + "\ncellsize " + cell + "\n# heights\n";
+    const auto grid = read_esri_heights(files.write("g.asc", header + heights), options);
     if (!grid) return grid.error().text;
     return grid->notes.empty() ? std::string() : grid->notes.back();
   };
@@ -274,8 +273,12 @@ TEST(UnnamedSystem, ANoteTellsOfMetresThatCouldBeDegrees) {
               HasSubstr("are read as metres; write geographic: true if they are degrees"));
   EXPECT_THAT(notes("xllcorner -180\nyllcorner -60", "90"), HasSubstr("are read as metres"));
   EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25", {.geographic = false}), "");
-  EXPECT_EQ(notes("xllcorner 0\nyllcorner 0", "0.25"), "") << "a pool";
-  EXPECT_EQ(notes("xllcorner -0.5\nyllcorner -0.25", "0.25"), "") << "about its middle";
+  const std::string pool = "-1 -1 -1 -0.9\n-1 -1 -1 -0.9\n", at_0 = "xllcorner 0\nyllcorner 0";
+  EXPECT_EQ(notes(at_0, "0.25", {}, pool), "");
+  EXPECT_EQ(notes("xllcorner -0.5\nyllcorner -0.25", "0.25", {}, pool), "") << "about its middle";
+  EXPECT_THAT(notes(at_0, "0.25"), HasSubstr("are read as metres")) << "1 m wide and 30 m deep";
+  EXPECT_EQ(notes(at_0, "0.25", {.z_scale = 0.001}), "") << "1 m wide and 30 mm deep";
+  EXPECT_THAT(notes("xllcorner 4\nyllcorner 52", "0.25", {.centred = true}), HasSubstr("are read as metres"));
   EXPECT_EQ(notes("xllcorner 400\nyllcorner 52", "0.25"), "");
   files.write("g.prj", "PROJCS[\"mine\"]");
   EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25").find("read as metres;"), std::string::npos);
@@ -283,12 +286,18 @@ TEST(UnnamedSystem, ANoteTellsOfMetresThatCouldBeDegrees) {
 
 TEST(UnnamedSystem, CoarseCellsAreDegreesIfMostStepsAreSteep) {
   TemporaryFiles files;
-  const auto said = [&](const std::string& rows) {
-    const std::string header = "ncols 4\nnrows 3\nxllcorner 4\nyllcorner 52\ncellsize 0.25\n";
-    const auto grid = read_esri_heights(files.write("g.asc", header + rows), {});
+  const auto said = [&](const std::string& rows, const std::string& cell = "0.25", const HeightOptions& options = {}) {
+    const std::string header = "ncols 4\nnrows 3\nxllcorner 4\nyllcorner 52\ncellsize " + cell + "\n";
+    const auto grid = read_esri_heights(files.write("g.asc", header + rows), options);
     return !grid ? grid.error().text : grid->origin ? "degrees" : "metres";
   };
-  EXPECT_EQ(said("-10 -40 -25 -60\n-12 -55 -40 -90\n-30 -35 -70 -20"), "degrees");
+  const std::string steep = "-10 -40 -25 -60\n-12 -55 -40 -90\n-30 -35 -70 -20";
+  EXPECT_EQ(said(steep), "degrees");
+  EXPECT_EQ(said(steep, "1"), "degrees");
+  EXPECT_EQ(said(steep, "10"), "metres");
+  EXPECT_EQ(said(steep, "0.25", {.z_scale = 0.001}), "metres") << "heights in millimetres";
+  EXPECT_THAT(said("-1000 -4000 -2500 -6000\n-1200 -5500 -4000 -900\n-3000 -3500 -7000 -2000", "9"),
+              HasSubstr("at most 5: cut a part out (gdal_translate -projwin WEST NORTH EAST SOUTH IN OUT.tif), or set origin"));
   EXPECT_EQ(said("-10 -10.2 -500 -10.1\n-10 -10.2 -10.3 -10.1\n-10 -10.2 -10.3 -10.1"), "metres") << "one false height";
 }
 
