@@ -364,9 +364,9 @@ TEST_F(GeoTiff, NumbersThatAreNotWholeBytes) {
   EXPECT_EQ(shown[2], 0x123);
   TiffFile with_sign = tiff(12, twelve, 3).without(339);
   with_sign.shorts(339, {2});
-  EXPECT_THAT(read(with_sign).error().text,
-              HasSubstr("whole numbers of 12 bits, which are not read; write them otherwise: gdal_tr"));
-  EXPECT_THAT(read(tiff(12, {1, 2, 3}, 3)).error().text, HasSubstr("cannot be read")) << "shorter than its rows";
+  const auto refused = read(with_sign);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("whole numbers of 12 bits, which are not read; write them otherwise: gdal_tr"));
 }
 
 TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
