@@ -1,4 +1,4 @@
-// Vectors of floats aligned to cache lines, as loops over whole vector registers require.
+// A vector of floats whose memory is aligned to cache lines, for loops over whole vector registers.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// Runs one of our programs as a child process, for work that may crash. The child's standard streams are files in memory; it
-// inherits no other open files.
+// Runs one of our programs as a child process, for work that may crash. The standard streams of the child are files in memory.
+// The child inherits no other open files.
 #pragma once
 
 #include <filesystem>
@@ -27,12 +27,12 @@ class MemoryFile {
 
 struct ChildEnd {
   int signal = 0;     // signal that ended the program; 0 = it exited
-  int exit_code = 0;  // -1: unknown, because this process ignores its children
+  int exit_code = 0;  // exit code of the program; -1: unknown, because this process ignores its children
 };
 
-/// Runs the program and waits for its end. The program gets `arguments`, the environment and working folder of this process,
-/// and the three files as its standard streams. It inherits no other descriptor and no blocked or ignored signal, and has its
-/// own process group.
+/// Runs the program and waits until it ends. The program gets `arguments`, the environment and working folder of this process,
+/// and the three files as its standard streams. It inherits no other descriptors and no blocked or ignored signals. It runs in
+/// its own process group.
 Result<ChildEnd> run_child(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                            const MemoryFile& input, const MemoryFile& output, const MemoryFile& errors);
 

@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// From now on open_regular() opens only files whose real path is below `folder`. Call it once, before threads start.
+/// After this call, open_regular() opens only files whose real path is below `folder`. Call it once, before threads start.
 void confine_reads(const std::filesystem::path& folder);
 /// The folder passed to confine_reads(); empty if every file may be read.
 const std::filesystem::path& readable_folder();

@@ -1,4 +1,4 @@
-// Finds enum values by name. An array beside each such enum has the names, in the order of the values.
+// Finds enum values by name. Each such enum has an array of names beside it, in the order of the values.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// The value that has this name.
+/// Returns the value that has this name.
 template <class Enum, std::size_t n>
 std::optional<Enum> enum_from(std::string_view name, const std::array<std::string_view, n>& names) {
   const auto it = std::find(names.begin(), names.end(), name);

@@ -10,12 +10,12 @@ namespace sonar {
 
 struct Geodetic {
   double latitude_rad = 0, longitude_rad = 0;
-  double altitude_m = 0;  // above the ellipsoid, or above any other level that is the same for all places
+  double altitude_m = 0;  // above the ellipsoid, or above another level that is the same for all positions
   bool operator==(const Geodetic&) const = default;
 };
 
 inline constexpr double earth_semi_major_m = 6378137.0;        // WGS84 (NIMA TR8350.2, table 3.1)
-inline constexpr double earth_flattening = 1 / 298.257223563;  // the same
+inline constexpr double earth_flattening = 1 / 298.257223563;  // source: the same table
 inline constexpr double earth_eccentricity_squared = earth_flattening * (2 - earth_flattening);
 
 /// Earth-centred, earth-fixed [m]: x through latitude 0 longitude 0, z through the north pole.
@@ -27,14 +27,14 @@ inline Vec3d ecef_from(const Geodetic& place) {
           (normal_m * (1 - earth_eccentricity_squared) + place.altitude_m) * s};
 }
 
-/// The axes east, north, up at a place, expressed in earth-centred ones.
+/// The axes east, north, up at a position, expressed in earth-centred axes.
 inline Pose enu_in_ecef(const Geodetic& place) {
   const Quatd about_z = turned_by({0, 0, place.longitude_rad + pi / 2});  // x turns east
   const Quatd about_x = turned_by({pi / 2 - place.latitude_rad, 0, 0});   // z turns up
   return {ecef_from(place), about_z * about_x};
 }
 
-/// The axes east, north, up at `place`, expressed in those at `origin`: position, and the small rotation between the two.
+/// The pose of the axes east, north, up at `place`, expressed in the axes at `origin`. Its rotation is small.
 inline Pose enu_in_enu_of(const Geodetic& origin, const Geodetic& place) {
   return compose(inverse(enu_in_ecef(origin)), enu_in_ecef(place));
 }

@@ -9,10 +9,10 @@
 
 namespace sonar {
 
-struct Vec3 {  // directions, and places near an origin, such as the vertices of a mesh [m]
+struct Vec3 {  // directions, and positions near an origin, such as the vertices of a mesh [m]
   float x = 0, y = 0, z = 0;
 };
-struct Vec3d {  // places in the world [m], velocities, directions
+struct Vec3d {  // positions in the world [m], velocities, directions
   double x = 0, y = 0, z = 0;
 };
 struct Quatd {
@@ -23,11 +23,11 @@ struct Pose {
   Vec3d position_m;
   Quatd orientation;
 };
-/// A rotation matrix, row-major, for code that rotates many vectors by one quaternion.
+/// A rotation as a row-major matrix, for code that rotates many vectors by one quaternion.
 struct Rotation {
   double m[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 };
-/// Intrinsic Z-Y-X angles: yaw, then pitch, then roll, about the axes of the frames between which the quaternion rotates.
+/// Intrinsic Z-Y-X angles: yaw about z first, then pitch about the new y, then roll about the new x.
 struct RollPitchYaw {
   double roll_rad = 0, pitch_rad = 0, yaw_rad = 0;
 };
@@ -57,7 +57,7 @@ SONAR_HD constexpr Vec3d operator*(double s, Vec3d a) { return {s * a.x, s * a.y
 SONAR_HD constexpr double dot(Vec3d a, Vec3d b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 SONAR_HD constexpr Vec3d cross(Vec3d a, Vec3d b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 SONAR_HD inline double length(Vec3d a) { return std::sqrt(dot(a, a)); }
-/// The zero vector stays zero.
+/// Returns a vector of length 1. The zero vector stays zero.
 SONAR_HD inline Vec3d unit_vector(Vec3d a) {
   const double l = length(a);
   return l > 0 ? (1 / l) * a : a;
@@ -72,7 +72,7 @@ SONAR_HD constexpr Quatd operator*(Quatd a, Quatd b) {
 }
 SONAR_HD constexpr Quatd conjugate(Quatd q) { return {q.w, -q.x, -q.y, -q.z}; }
 SONAR_HD constexpr double norm_squared(Quatd q) { return q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z; }
-/// q must not be zero; callers that take q from outside check that first.
+/// Returns q with length 1. q must not be zero: callers check values from outside first.
 SONAR_HD inline Quatd normalized(Quatd q) {
   const double s = 1.0 / std::sqrt(norm_squared(q));
   return {q.w * s, q.x * s, q.y * s, q.z * s};
@@ -123,7 +123,7 @@ SONAR_HD constexpr Rotation transposed(const Rotation& r) {
   return t;
 }
 
-/// The rotation about the vector's direction; the vector's length is the angle [rad].
+/// The rotation about the direction of the vector by its length [rad].
 SONAR_HD inline Quatd turned_by(Vec3d rotation_rad) {
   const double angle = length(rotation_rad);
   const double part = angle > 0 ? std::sin(angle / 2) / angle : 0.5;
@@ -142,11 +142,11 @@ SONAR_HD inline RollPitchYaw rpy_from_quat(Quatd q) {
           std::atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))};
 }
 
-/// North-East-Down to East-North-Up: its own inverse.
+/// Converts North-East-Down to East-North-Up, and back.
 SONAR_HD constexpr Vec3d enu_from_ned(Vec3d ned) { return {ned.y, ned.x, -ned.z}; }
-/// Forward-Right-Down to Forward-Left-Up: its own inverse.
+/// Converts Forward-Right-Down to Forward-Left-Up, and back.
 SONAR_HD constexpr Vec3d flu_from_frd(Vec3d frd) { return {frd.x, -frd.y, -frd.z}; }
-/// Converts the orientation of a body's FRD axes in NED to that of the same body's FLU axes in ENU.
+/// Converts an orientation of FRD axes in NED to the orientation of the same body's FLU axes in ENU.
 SONAR_HD inline Quatd enu_flu_from_ned_frd(Quatd frd_in_ned) {
   const double h = std::sqrt(0.5);
   const Quatd ned_in_enu{0, h, h, 0};
@@ -156,7 +156,7 @@ SONAR_HD inline Quatd enu_flu_from_ned_frd(Quatd frd_in_ned) {
 SONAR_HD inline Pose enu_flu_from_ned_frd(const Pose& p) {
   return {enu_from_ned(p.position_m), enu_flu_from_ned_frd(p.orientation)};
 }
-/// Converts the pose of an FRD frame in an FRD frame, such as a mount, to that of the same frames with FLU axes.
+/// Converts the pose of one FRD frame in another, such as a mount, to the pose between the same frames with FLU axes.
 SONAR_HD inline Pose flu_from_frd(const Pose& p) {
   return {flu_from_frd(p.position_m), Quatd{p.orientation.w, p.orientation.x, -p.orientation.y, -p.orientation.z}};
 }

@@ -1,4 +1,4 @@
-// Marks functions that run on the host and on a CUDA device alike. Every module may include it.
+// Marks functions that are compiled for the host and for CUDA devices. Every module may include it.
 #pragma once
 
 #if defined(__CUDACC__)

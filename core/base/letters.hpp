@@ -15,7 +15,7 @@ inline std::string small_letters(std::string_view text) {
   return small;
 }
 
-/// Whether both texts are equal, ignoring the case of ASCII letters.
+/// True if both texts are equal when the case of ASCII letters is ignored.
 inline bool same_letters(std::string_view a, std::string_view b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) { return small_letter(x) == small_letter(y); });
 }

@@ -1,4 +1,5 @@
-// The current step of a long load. Code that reads and builds scenes sets it; the console shows it. The process has only one.
+// The current step of a long load. Code that reads and builds scenes sets the step; the console shows it. The process has only
+// one such step at a time.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +9,11 @@ namespace sonar {
 
 struct LoadStep {
   std::string what;  // "reading wreck.ply"; empty before the first step and during short steps
-  double part = 0;   // fraction that is done, 0 to 1; 0 = unknown
+  double part = 0;   // fraction of the step that is done, 0 to 1; 0 = unknown
 };
 
-/// Any thread may call it. `triangles` is the approximate size of the step; a step of fewer than 300,000 is short and leaves
-/// `what` empty.
+/// Sets the step. Any thread may call it. `triangles` is the approximate size of the step. For fewer than 300,000 triangles the
+/// step is short and `what` stays empty.
 void begin_load_step(std::string what, std::uint64_t triangles);
 void load_step_reached(double part);
 LoadStep load_step();

@@ -1,5 +1,5 @@
-// Determines how much more memory this process may use before the system ends it: the free memory of the computer and of the
-// control groups of the process. A load that needs more is refused before it affects other programs.
+// Determines how much more memory this process may use before the system ends it. The value follows from the free memory of the
+// computer and of the control groups of the process. A load that needs more is refused before it affects other programs.
 #pragma once
 
 #include <cstdint>

@@ -9,7 +9,8 @@ namespace sonar {
 
 class Parallel {
  public:
-  /// `threads` counts the calling thread; 1 runs everything in place. `nice` is added to the workers' niceness.
+  /// `threads` includes the calling thread; with 1, the calling thread does all work. `nice` is added to the niceness of the
+  /// workers.
   explicit Parallel(int threads = 1, int nice = 0);
   ~Parallel();
   Parallel(const Parallel&) = delete;
@@ -17,8 +18,9 @@ class Parallel {
 
   int threads() const { return threads_; }
 
-  /// Calls body(item, worker) once for every item in [0, count) and returns when all are done; worker is in [0, threads()).
-  /// Only one thread may call it at a time. The first exception of a body ends the loop, and the caller gets it afterwards.
+  /// Calls body(item, worker) once for every item in [0, count), and returns when all calls are done; worker is in [0,
+  /// threads()). Only one thread may call it at a time. The first exception of a body ends the loop and is then thrown to the
+  /// caller.
   template <class Body>
   void for_each(std::size_t count, Body&& body) {
     using Plain = std::remove_reference_t<Body>;

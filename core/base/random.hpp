@@ -1,6 +1,6 @@
-// Counter-based random numbers: every draw is a function of its key and counter, so it does not depend on the order of draws,
-// on threads or on the device. Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3" (Philox4x32-10);
-// known-answer vectors in tests.
+// Counter-based random numbers: every draw is a function of its key and counter. Therefore it does not depend on the order of
+// draws, on threads or on the device. Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"
+// (Philox4x32-10). Tests contain its known-answer vectors.
 #pragma once
 
 #include <cmath>
@@ -43,21 +43,21 @@ enum class Domain : std::uint32_t {
   cells = 0,                // speckle and positions of surface cells; the counter's last word is the level
   cell_blocks = 0x6e6574u,  // positions within blocks of cells; combined with the key's low word
   texture = 0x74657874u,    // combined with the index of the object
-  grain = 0x67726169u,      // the same
+  grain = 0x67726169u,      // combined with the index of the object
   noise_table = 0x6e6f6973u,
   noise_place = 0x706c6163u,
-  leak = 0x6c65616bu,           // with noise_place; combined with the sonar's number
-  fixed_fan = 0x66616eu,        // a hit of the fixed fan
-  paper_speckle = 0x50323521u,  // a hit of the modes paper and raster
-  // Phase and carrier offset of another sonar; with the key's words swapped, those of each of its pulses.
+  leak = 0x6c65616bu,           // used with noise_place; combined with the sonar's number
+  fixed_fan = 0x66616eu,        // speckle of a hit of the fixed fan
+  paper_speckle = 0x50323521u,  // speckle of a hit in the modes paper and raster
+  // Phase and carrier offset of another sonar. With the words of the key swapped: those of each of its pulses.
   other_sonar = 0x6f746872u,
   range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the hit point of the ray
   range_noise = 0x726e6f69u,      // noise of a pixel in range images
   relief_value = 0x76616c75u,     // seabed and rocks; used as the key's high word, combined with the stream
-  relief_gradient = 0x67726164u,  // likewise, not combined
+  relief_gradient = 0x67726164u,  // seabed and rocks; used as the key's high word, not combined
 };
 
-/// The key of one stream of draws.
+/// Makes the key of one stream of draws.
 struct RandomKey {
   std::uint32_t low = 0, high = 0, domain = 0;
 };

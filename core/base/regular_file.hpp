@@ -1,5 +1,5 @@
-// Opens the files that configurations, scenes and users name, only if they are regular files. Opening a FIFO can block forever;
-// reading a device may never end, or may start an action. Recordings (protocol/recorded/byte_source.cpp) have the same rule.
+// Opens files named by configurations, scenes and users, but only regular files. Opening a FIFO can block forever. Reading a
+// device may never end, or may start an action. Recordings (protocol/recorded/byte_source.cpp) follow the same rule.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
-// Result<T>: a value or an error. Functions that can fail for an outside cause return it. See docs/architecture.md, "Errors".
+// Result<T>: a value or an error. It is the return type of functions that can fail for an outside cause. See
+// docs/architecture.md, "Errors".
 #pragma once
 
 #include <string>
@@ -9,10 +10,10 @@ namespace sonar {
 
 /// Kinds of errors. Their values are the exit codes of the programs, as in sysexits.h.
 enum class ErrorKind : int {
-  usage = 64,     // arguments
-  bad_data = 65,  // a scene, a mesh, a recording
+  usage = 64,     // wrong arguments of a command
+  bad_data = 65,  // a damaged or invalid scene, mesh or recording
   missing_file = 66,
-  unavailable = 69,  // a port, an interface, a device
+  unavailable = 69,  // a port, interface or device that cannot be used
   bug = 70,          // a mistake in sonard
   io = 74,
   config = 78

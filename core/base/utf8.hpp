@@ -1,4 +1,4 @@
-// UTF-8: where a well-formed character ends.
+// Measures UTF-8 characters.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// Length in bytes of the character at the start of `rest`. 0: it is not well-formed (Unicode 15, table 3-7).
+/// Length in bytes of the character at the start of `rest`; 0 if the character is not well-formed (Unicode 15, table 3-7).
 inline std::size_t utf8_length(std::string_view rest) {
   const auto at = [&](std::size_t i) { return i < rest.size() ? static_cast<unsigned char>(rest[i]) : 0u; };
   const auto follows = [&](std::size_t i, unsigned low = 0x80, unsigned high = 0xbf) { return at(i) >= low && at(i) <= high; };

@@ -1,4 +1,4 @@
-// Checks, without writing, whether files can be created in a folder that a user named.
+// Checks whether files can be created in a folder that a user named. The check writes nothing.
 #pragma once
 
 #include <filesystem>
@@ -6,7 +6,8 @@
 
 namespace sonar {
 
-/// The reason why files cannot be created there, for an error after the folder's name: "is not a folder". Empty = they can be.
+/// The reason why files cannot be created in the folder, such as "is not a folder". It follows the folder's name in an error.
+/// Empty = files can be created.
 std::string why_no_files_in(const std::filesystem::path& folder);
 
 }  // namespace sonar
