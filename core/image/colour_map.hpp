@@ -31,7 +31,7 @@ struct ColourMap {
 
 std::span<const ColourMap> colour_maps();
 std::string colour_map_names();  // "gray, copper, ..."
-/// The colour map of this name; the error lists the valid names.
+/// Returns the colour map of this name. The error lists the valid names.
 Result<ColourMap> find_colour_map(std::string_view name);
 
 }  // namespace sonar

@@ -1,6 +1,6 @@
 // Draws the rows and beams of a ping as a fan: the sonar is at the bottom, range increases upwards, port is on the left. For a
-// sonar that looks down, the sonar is at the top. It uses the direction of each beam, and averages over the footprint of each
-// pixel, so that no sample is skipped.
+// sonar that looks down, the sonar is at the top. The direction of each beam is used. Each pixel is the average over its
+// footprint, so that no sample is skipped.
 #pragma once
 
 #include <cmath>
@@ -24,7 +24,7 @@ struct FanStyle {
 
 enum class Opens { upwards, downwards };  // direction of increasing range
 
-/// Relation of metres to pixels in the picture: the sonar is at (apex_x, apex_y), y increases downwards.
+/// Relation between metres and pixels: the sonar is at (apex_x, apex_y), and y increases downwards.
 struct FanLayout {
   int width = 0, height = 0;
   double apex_x = 0, apex_y = 0, metres_per_pixel = 1;
@@ -33,14 +33,14 @@ struct FanLayout {
   double x_of(double azimuth, double range_m) const { return apex_x - range_m / metres_per_pixel * std::sin(azimuth); }
   double y_of(double azimuth, double range_m) const { return apex_y - up * range_m / metres_per_pixel * std::cos(azimuth); }
 };
-/// Layout of the fan of an image that draw_fan accepts.
+/// The layout of the fan for an image that draw_fan accepts.
 FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens = Opens::upwards);
 
-/// Error if the image has no rows or beams, or if its bearings do not decrease from port to starboard or span more than a
-/// circle.
+/// Draws the image. Error if it has no rows or beams, if its bearings do not decrease from port to starboard, or if they span
+/// more than a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
-/// Draws a series of pings like draw_fan, but in a third of the time: it reuses the footprint of each pixel until the number of
+/// Draws a series of pings like draw_fan, in a third of the time. It reuses the footprints of the pixels until the number of
 /// rows or beams, the bearings or the direction change. It needs 32 bytes per pixel.
 class FanPainter {
  public:
@@ -59,7 +59,7 @@ class FanPainter {
   static float mean(const PolarImage& image, const Footprint& of);
 
   FanStyle style_;
-  PolarImage shape_;  // shape of the images for which footprints_ were made; without samples
+  PolarImage shape_;  // shape of the images for which footprints_ were made; has no samples
   FanLayout layout_;
   std::vector<Footprint> footprints_;  // [height][width]
 };

@@ -1,4 +1,4 @@
-// Draws every kind of sonar_picture.hpp.
+// Draws all kinds of pictures that sonar_picture.hpp defines.
 #pragma once
 
 #include <utility>
@@ -8,12 +8,12 @@
 
 namespace sonar {
 
-/// Pictures of points are those of multibeam echo sounders, which look down.
+/// Pictures of points come from multibeam echo sounders, which look down.
 inline Opens opens_of(const SonarPicture& picture) {
   return picture.kind == PictureKind::points ? Opens::downwards : Opens::upwards;
 }
 
-/// Height of the picture in pixels, for the width in `style`. PicturePainter must accept the picture.
+/// Height of the picture in pixels, for the width in `style`. The picture must be one that PicturePainter accepts.
 int picture_height(const SonarPicture& picture, const FanStyle& style);
 
 /// Draws a series of pictures. If rings are on, it also draws the head direction of a sweep, and axes in pictures that are not
@@ -21,7 +21,7 @@ int picture_height(const SonarPicture& picture, const FanStyle& style);
 class PicturePainter {
  public:
   explicit PicturePainter(FanStyle style) : style_(style), fan_(std::move(style)) {}
-  /// Errors: as draw_fan.
+  /// Draws the picture. Errors: as draw_fan.
   Result<Raster> draw(const SonarPicture& picture);
 
  private:

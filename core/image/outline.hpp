@@ -1,4 +1,4 @@
-// Computes outlines of regions of a picture, along the edges of pixels, for polygons of labels.
+// Computes outlines of regions of a picture, along the edges of pixels. They become polygons of labels.
 #pragma once
 
 #include <functional>

@@ -9,9 +9,9 @@
 
 namespace sonar {
 
-/// How linear samples with a large range of values become brightness. Makes that send such samples set it.
+/// Options that convert linear samples with a large range of values to brightness. Makes with such samples set them.
 struct Shades {
-  std::size_t per_mille = 999;  // this many of a thousand samples are within the colour map; brighter ones saturate
+  std::size_t per_mille = 999;  // thousandths of the samples that are within the colour map; brighter samples saturate
   float gamma = 1;              // brightness is (code / full scale)^gamma
 };
 
@@ -21,7 +21,7 @@ struct PolarImage {
   std::vector<double> azimuth_rad;  // [beams], positive to port, strictly falling
   std::vector<float> samples;       // [rows][beams], codes as sent
   float full_scale = 255;           // the code with the brightest colour
-  double start_m = 0;               // there are no samples nearer than this
+  double start_m = 0;               // range at which the samples begin
   Shades shades = {};
 
   float at(std::size_t row, std::size_t beam) const { return samples[row * beams + beam]; }

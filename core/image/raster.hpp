@@ -1,5 +1,5 @@
 // A picture in memory: RGB pixels, row 0 at the top, and functions that draw lines and texts on it. write_png writes either a
-// complete file or none.
+// complete file or no file.
 #pragma once
 
 #include <cstddef>
@@ -26,22 +26,22 @@ struct Raster {
   const Rgb& at(int x, int y) const { return const_cast<Raster*>(this)->at(x, y); }
 };
 
-/// Mixes `colour` over a pixel; places outside the picture are ignored.
+/// Mixes `colour` over a pixel. Pixels outside the picture are ignored.
 void blend(Raster& raster, int x, int y, Rgb colour, float opacity);
 
 /// Draws digits, '.', '-' and 'm' in a 3 x 5 font, with dots of `scale` pixels; other characters are blank.
 void draw_text(Raster& raster, int left, int top, std::string_view text, Rgb colour, int scale);
 int text_width(std::string_view text, int scale);
 
-/// The bytes of a PNG file.
+/// Returns the bytes of a PNG file.
 Result<std::vector<std::byte>> encode_png(const Raster& raster);
 
-/// Writes the parts to a temporary file and renames it, so that `file` is always complete. Of a symbolic link, the target is
-/// replaced, not the link; devices and pipes are written directly. On an error (io, with the file and the system's reason) the
-/// temporary file is removed.
+/// Writes the parts to a temporary file and renames it, so that `file` is always complete. If `file` is a symbolic link, its
+/// target is replaced and the link stays. Devices and pipes are written directly. On an error (io, with the file and the
+/// system's reason) the temporary file is removed.
 Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts);
 
-/// Writes a PNG file by write_whole_file(). Makes its folder if needed.
+/// Writes a PNG file by write_whole_file(), and makes its folder if needed.
 Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
 
 }  // namespace sonar

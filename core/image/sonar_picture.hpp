@@ -1,6 +1,6 @@
-// The picture that viewers show of a sonar: for most products a fan of the last ping, for others made of several pings.
-// protocol/<vendor>/host.cpp makes it; PicturePainter (draw_picture.hpp) draws it for `sonarctl view`, the live view and other
-// viewers.
+// The picture that viewers show of a sonar. For most products it is a fan of the last ping, for others it is made of several
+// pings. protocol/<vendor>/host.cpp makes it. PicturePainter (draw_picture.hpp) draws it for `sonarctl view`, the live view and
+// other viewers.
 #pragma once
 
 #include <array>
@@ -17,8 +17,8 @@ enum class PictureKind {
   fan,          // the last ping, by bearing and range
   points,       // points by bearing and range, drawn on a fan
   sweep,        // a fan or a full circle that a rotating head scans beam by beam
-  range_image,  // a pixel for each azimuth and elevation: near is bright
-  waterfall,    // one beam: a row for each ping, the newest on top, by range
+  range_image,  // a pixel for each azimuth and elevation; near pixels are bright
+  waterfall,    // one beam over time: a row for each ping, the newest on top; a column for each range
 };
 inline constexpr std::array<std::string_view, 5> picture_kind_names = {"fan", "points", "sweep", "range image", "waterfall"};
 inline constexpr std::string_view name_of(PictureKind kind) { return picture_kind_names[static_cast<std::size_t>(kind)]; }
@@ -31,7 +31,7 @@ struct SonarPicture {
   double head_rad = 0;       // sweep: direction of the head, positive to port
   double elevation_rad = 0;  // range image: elevation of the highest row; the lowest row has the negative value
   std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
-  enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: it is empty
+  enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: `image` is empty
 
   bool is_polar() const { return kind == PictureKind::fan || kind == PictureKind::points || kind == PictureKind::sweep; }
   /// Far end of the shown ranges [m].
@@ -41,7 +41,7 @@ struct SonarPicture {
   }
 };
 
-/// Largest number of rows of a waterfall, and smallest number of rows of its picture; rows without a ping are empty.
+/// Largest number of rows of a waterfall, and smallest number of rows in its picture. Rows without a ping are empty.
 inline constexpr std::size_t waterfall_rows = 300, waterfall_fewest_rows = 100;
 
 }  // namespace sonar
