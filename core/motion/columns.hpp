@@ -1,5 +1,5 @@
-// Converts a line of a trajectory file to a pose. The header or the format of the file decides the meaning of columns.
-// trajectory_file.cpp uses it, after it has split the file into lines and words.
+// Converts a line of a trajectory file to a pose. The header or the format of the file defines the meaning of the columns.
+// trajectory_file.cpp splits the file into lines and words and then uses this class.
 #pragma once
 
 #include <array>
@@ -30,24 +30,24 @@ std::string in_quotes(std::string_view word);
 
 class Columns {
  public:
-  /// Returns an error without its beginning "file:line: ", or nullopt.
+  /// Returns an error without the prefix "file:line: ", or nullopt.
   static std::optional<std::string> refuse_header(const Words& header, Columns& out);
   static Columns tum();
-  /// 8 words: without velocity; 11: with velocity; 17: with velocity and the biases of an IMU, which are ignored.
+  /// Number of words: 8 without velocity, 11 with velocity, 17 with velocity and the biases of an IMU, which are ignored.
   static Columns euroc(std::size_t words);
-  /// Twelve numbers and no time: the first three rows of the matrix that converts points from the body's axes to the world's.
+  /// Twelve numbers and no time: the first three rows of the matrix that converts points from body axes to world axes.
   static Columns kitti();
 
   std::size_t count() const { return count_; }
-  /// If the header does not name the unit: whole numbers too large for seconds are read as milliseconds, microseconds or
-  /// nanoseconds since 1970. `words`: the first line with values.
+  /// Guesses the unit of the stamps if the header does not name it. Whole numbers that are too large for seconds are read as
+  /// milliseconds, microseconds or nanoseconds since 1970. `words`: the first line with values.
   void guess_unit(const Words& words);
-  /// False if the file does not state the unit; the unit is then that of the format, 10^power() ns.
+  /// False if the file does not state the unit. The unit is then that of the format, 10^power() ns.
   bool says_unit() const { return says_unit_ || matrix_; }
   int power() const { return power_; }
   void set_power(int power) { power_ = power; }
-  /// Reads stamp, position and body of a line before the unit is known; the stamp is as written. False if a word is not a
-  /// number.
+  /// Reads stamp, position and body of a line before the unit is known. The stamp stays a number of the unknown unit. False if
+  /// a word is not a number.
   bool peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const;
   /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;

@@ -1,5 +1,5 @@
 // Converts clock time to time in a trajectory, with start, speed, loop, pause and seek. It uses integer nanoseconds and
-// millionths, so that a stepped run can be repeated exactly. daemon/emulator/world has one object per body.
+// millionths, so that a stepped run can be repeated exactly. daemon/emulator/world has one Playback for each body.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct Speed {
 struct PlaybackRules {
   Speed speed;
   bool loop = false;
-  Ns start{0};  // time in the trajectory at which playing begins; if negative, playing waits this long at the first pose
+  Ns start{0};  // trajectory time at which playing begins; if negative, the body waits this long at the first pose
   bool operator==(const PlaybackRules&) const = default;
 };
 
@@ -38,7 +38,7 @@ struct Plan {
   double largest_angle_rad = 0;  // as in TrajectoryFile::Body
   explicit operator bool() const { return trajectory != nullptr; }
 };
-/// Whether both plans have the same points and the same rules.
+/// True if both plans have the same points and the same rules.
 bool is_same(const Plan& a, const Plan& b);
 
 class Playback {
@@ -51,15 +51,15 @@ class Playback {
     Ns at{0};         // time in the trajectory, 0 to its duration
     double rate = 0;  // seconds of the trajectory per second of the clock: 0 while paused, before the start, after the end
   };
-  /// A round of a loop lasts as long as the file: the end of one round is the start of the next.
+  /// A round of a loop lasts as long as the file. The end of a round is the start of the next one.
   Place place(Time clock) const;
 
-  /// Pauses from `clock` on. After this call, place() may return other results for earlier times.
+  /// Pauses from the time `clock` on. After this call, place() may return different results for earlier times.
   void pause(Time clock);
   void resume(Time clock);
   void seek(Time clock, Ns to);  // 0 to duration
   void use_speed(Time clock, Speed speed);
-  /// Call it when the clock jumps ahead by `by`: the place in the trajectory then does not change.
+  /// Call it when the clock jumps ahead by `by`. The position in the trajectory then does not change.
   void skip(Ns by) { clock_at_ += by; }
 
   bool paused() const { return paused_; }
@@ -68,13 +68,13 @@ class Playback {
   const PlaybackRules& rules() const { return rules_; }
 
  private:
-  /// Time in the trajectory, not limited to its ends and not wrapped by loops.
+  /// Time in the trajectory before it is limited to the ends or wrapped by loops.
   Ns line(Time clock) const;
   void begin_anew(Time clock);
 
   Ns duration_{0};
   PlaybackRules rules_;
-  Time clock_at_{};  // time of the clock at which the place was place_at_
+  Time clock_at_{};  // clock time at which the trajectory time was place_at_
   Ns place_at_{0};
   bool paused_ = false;
 };

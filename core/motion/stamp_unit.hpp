@@ -7,15 +7,15 @@
 
 namespace sonar::motion {
 
-/// The stamps, as numbers of an unknown unit, and the positions [m] of the first lines of one body.
+/// The first lines of one body: the stamps, in an unknown unit, and the positions [m].
 struct FirstLines {
   std::vector<double> stamps;
   std::vector<Vec3d> positions;
 };
 
-/// The unit is 10^N ns; returns N: 9, 6, 3 or 0. `usual` is the N of the file's format: 9 (seconds) or 0 (nanoseconds). It is
-/// kept unless lines would be implausibly far apart in time, or, with seconds, the body would move slower than 5 mm/s. If the
-/// body rests, ten or more lines are assumed to be a log, whose steps are short.
+/// Returns N, 9, 6, 3 or 0, for a unit of 10^N ns. `usual` is the N of the file's format: 9 (seconds) or 0 (nanoseconds). The
+/// result is `usual`, unless lines would then be implausibly far apart in time, or the unit is seconds and the body would move
+/// slower than 5 mm/s. If the body rests, a file of ten or more lines is assumed to be a log, whose steps are short.
 int unit_by_steps(const FirstLines& lines, int usual);
 
 }  // namespace sonar::motion

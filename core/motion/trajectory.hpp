@@ -1,5 +1,6 @@
-// The trajectory of one body: poses at known times. Computes the pose and motion at any time between them. trajectory_file.hpp
-// reads it from files; playback.hpp plays it by a clock. It uses neither clocks nor files.
+// The trajectory of one body: poses at known times. The class computes the pose and motion at any time between them.
+// trajectory_file.hpp reads trajectories from files, playback.hpp plays them by a clock. This class uses neither clocks nor
+// files.
 #pragma once
 
 #include <chrono>
@@ -12,7 +13,7 @@ namespace sonar::motion {
 
 using Ns = std::chrono::nanoseconds;
 
-/// The motion of a body; the default is at rest.
+/// The motion of a body. The default means that the body rests.
 struct Motion {
   Vec3d velocity_mps;            // world axes
   Vec3d angular_velocity_radps;  // body axes
@@ -22,8 +23,8 @@ struct Moment {
   Motion moves;
 };
 
-/// Poses in order of time, with velocities if the file has them. `times` count from the start of the file, which is the same
-/// for all its bodies; the first pose of a body may be later than the start, and its last pose earlier than the end.
+/// Poses in order of time, with velocities if the file has them. `times` count from the start of the file, which all its bodies
+/// share. The first pose of a body may be later than the start, and its last pose earlier than the end.
 struct Points {
   std::vector<Ns> times;                        // times, not negative, in increasing order
   std::vector<Pose> poses;                      // one for each time
@@ -35,18 +36,18 @@ struct Points {
 
 class Trajectory {
  public:
-  /// Needs at least one point. `duration` is that of the whole file, not less than the last time.
+  /// Needs at least one point. `duration` is the duration of the whole file, at least the last time.
   explicit Trajectory(Points points, Ns duration = Ns{0});
 
-  /// Between points the body moves in a straight line (lerp) and turns at constant rate (slerp); before the first and after the
-  /// last point it rests. The motion is interpolated from the file's velocities; without these it is the mean motion of the
-  /// interval. At a point the interval is the one that begins there; at the last point, the one that ends there.
+  /// Between points the body moves in a straight line (lerp) and turns at constant rate (slerp). Before the first and after the
+  /// last point it rests. The motion is interpolated from the file's velocities; without velocities it is the mean motion of
+  /// the interval. At a point, the interval that begins there counts; at the last point, the one that ends there.
   Moment at(Ns time) const;
 
   Ns duration() const { return duration_; }
   std::size_t size() const { return points_.times.size(); }
   const Points& points() const { return points_; }
-  /// Whether all points are exactly equal.
+  /// True if all points are exactly equal.
   bool operator==(const Trajectory&) const = default;
 
  private:

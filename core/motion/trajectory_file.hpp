@@ -1,5 +1,5 @@
-// Reads trajectory files: our CSV with a header, TUM, EuRoC CSV and KITTI matrices (docs/poses.md). The result is in our
-// frames, with times from the start of the file.
+// Reads trajectory files: CSV with our header, TUM, EuRoC CSV and KITTI matrices (docs/poses.md). The result has our axes (ENU,
+// FLU) and times from the start of the file.
 #pragma once
 
 #include <filesystem>
@@ -20,7 +20,7 @@ std::string_view name_of(Format format);
 std::string_view name_of(Frame frame);
 
 struct ReadOptions {
-  Format format = Format::automatic;   // found from the first line with numbers or names
+  Format format = Format::automatic;   // automatic: recognised from the first line with numbers or names
   std::optional<Frame> frame = {};     // required if the file does not state it; an error if the file states a different one
   std::optional<double> rate_hz = {};  // lines per second; only for KITTI files, which have no times
   bool operator==(const ReadOptions&) const = default;
@@ -36,16 +36,17 @@ struct TrajectoryFile {
   Format format = Format::csv;
   Frame frame = Frame::enu_flu;
   Ns begins_at{0};                    // the earliest stamp, which is time 0 in the trajectories
-  Ns duration{0};                     // time from the earliest to the latest stamp
+  Ns duration{0};                     // time from the earliest to the latest stamp of the file
   std::size_t replaced = 0;           // poses that were replaced by a later line with the same stamp
   std::string_view unit = "seconds";  // unit of the stamps in the file
   bool unit_by_steps = false;         // neither the file nor its format names the unit: it is guessed from the steps
 };
 
-/// A comment in the file can state the frame: `# frame: NED_FRD`. Errors: "name:line: reason".
+/// Reads a trajectory file. A comment in the file can state the frame: `# frame: NED_FRD`. Errors: "name:line: reason".
 Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::string& name, const ReadOptions& options);
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options);
-/// Trajectory of the body with this name; for an empty name, of the only body. Errors list the names of bodies.
+/// Returns the trajectory of the body with this name, or of the only body if the name is empty. Errors list the names of the
+/// bodies.
 Result<std::shared_ptr<const Trajectory>> trajectory_of(const TrajectoryFile& file, const std::string& name,
                                                         const std::string& body);
 

@@ -15,7 +15,7 @@ inline Vec3d rotation_between(Quatd a, Quatd b) {
   return {factor * d.x, factor * d.y, factor * d.z};
 }
 
-/// Orientation on the shortest rotation from a (u = 0) to b (u = 1), at constant rate.
+/// The orientation at fraction u of the shortest rotation from a (u = 0) to b (u = 1).
 inline Quatd slerp(Quatd a, Quatd b, double u) { return normalized(a * turned_by(u * rotation_between(a, b))); }
 
 }  // namespace sonar::motion
