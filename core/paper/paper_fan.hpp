@@ -12,7 +12,7 @@
 
 namespace sonar::paper {
 
-/// Default number of rays per column: that of the paper's model, and the number of rows of its raster run.
+/// Default number of rays per column: the number in the paper's model, and the number of rows in its raster run.
 inline constexpr int default_rays = 300, default_raster_rows = 11;
 
 /// Directions of the rays, with one column per beam. Fan (paper): uniform in azimuth and elevation. Grid (raster): uniform on an
@@ -23,7 +23,7 @@ struct PaperFan {
   std::vector<double> column_width;    // [columns] of azimuth [rad]; perspective: of the tangent
   double first_row = 0, row_step = 0;  // elevation [rad] of row 0; perspective: its tangent over the horizontal x axis
   int rows = 0;
-  std::vector<Vec3d> ahead;         // [columns]: part of the direction that depends on the column
+  std::vector<Vec3d> ahead;         // [columns]: the part of the direction that depends on the column
   std::vector<double> level, rise;  // [rows]: parts of the direction that depend on the row
 
   int columns() const { return static_cast<int>(azimuth_rad.size()); }
@@ -40,12 +40,12 @@ struct PaperFan {
 /// for 20), like the paper's model.
 PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays);
 
-/// The surface that a ray hit.
+/// The hit of a ray on a surface.
 struct PaperHit {
   int column = 0, row = 0;
   double range_m = 0;
   double elevation_rad = 0;
-  double cosine = 0;  // cosine of the incidence, with the normal of the triangle
+  double cosine = 0;  // cosine of the angle of incidence, with the normal of the triangle
   double solid_angle_sr = 0;
   std::uint32_t object = 0, triangle = 0;
 };

@@ -12,7 +12,7 @@
 
 namespace sonar::paper {
 
-/// Values of one model with one set of settings, kept from ping to ping.
+/// Values for one model with one set of settings, kept from ping to ping.
 struct Prepared {
   Prepared(const PingRequest& request, FrequencySum sum);
   bool serves(const PingRequest& request) const;
@@ -21,28 +21,28 @@ struct Prepared {
   PingPlan plan;
   PaperFan fan;
   PaperSpectrum spectrum;
-  std::unique_ptr<spectral::FrequencySums> fast;  // null: sums term by term
+  std::unique_ptr<spectral::FrequencySums> fast;  // null: the sums are computed term by term
   InverseTransform inverse;
   std::unique_ptr<PulsePower> pulse_power;    // in expected power only
-  std::unique_ptr<BeamTransformTables> even;  // the beam correction for even azimuths; null: uses `correction`
+  std::unique_ptr<BeamTransformTables> even;  // the beam correction for uniform azimuths; null: `correction` is used
   std::vector<float> correction;              // panels of the beam correction, see panels_of
   std::vector<double> pattern;                // D(phi) of each row of a fan
   double elevation_per_sine = 0;              // D(phi) = sinc(elevation_per_sine sin phi); 0 = no pattern
 };
 
-/// D(phi) at an elevation.
+/// D(phi) at an elevation phi.
 double elevation_pattern(const Prepared& prepared, double elevation_rad);
 
-/// Adds the echo of a scatterer with a known cross-section; false if it lies outside the record.
+/// Adds the echo of a scatterer with a known cross-section. Returns false if the echo lies outside the record.
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& prepared,
               const PingScalars& scalars, PaperEchoes& echoes);
 
-/// Makes echoes of one column's hits by eq. (2) and eq. (1), without the sum. `mu`: by material. Hits outside the record are
-/// dropped, as in the reference code.
+/// Makes echoes of the hits of one column by eq. (2) and eq. (1), without the sum. `mu`: by material. Hits outside the record
+/// are dropped, as in the reference code.
 void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& prepared,
                const PingScalars& scalars, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes);
 
-/// The caller must have set the poses of moving bodies.
+/// Computes the ping. The caller must have set the poses of moving bodies.
 Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared& prepared, const simd::Kernels& kernels,
               Parallel& pool, double (*now_s)(), PingStatistics& statistics);
 

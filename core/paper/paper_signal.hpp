@@ -1,6 +1,6 @@
-// Computes beams from hits as printed in Choi 2025 (Sensors 25(5):1516, "P25"): eq. (1)-(4) per column, the beamforming of the
-// reference code, an inverse transform. Second stage of core/paper; docs/acoustics.md, section 8, lists the differences from
-// the canonical model.
+// Computes beams from hits as printed in Choi 2025 (Sensors 25(5):1516, "P25"): eq. (1)-(4) for each column, the beamforming of
+// the reference code, and an inverse transform. Second stage of core/paper. docs/acoustics.md, section 8, lists the differences
+// from the canonical model.
 #pragma once
 
 #include <complex>
@@ -17,7 +17,7 @@
 
 namespace sonar::paper {
 
-/// How eq. (1) is summed over the scatterers: term by term, or by a non-uniform transform (relative error 1e-7).
+/// Method for the sum of eq. (1) over the scatterers: term by term, or by a non-uniform transform (relative error 1e-7).
 enum class FrequencySum { fast, direct };
 
 /// Eq. (2) without xi: mu cos^2(incidence) r^2 dOmega [m^2], the printed footprint. Lambert's law would have cos^1 here.
@@ -28,7 +28,7 @@ inline double printed_cross_section_m2(double mu, double cosine, double range_m,
 /// A scatterer in the record of one column. The record is one period long: `turns` = delay / record length.
 struct PaperEcho {
   double turns = 0;
-  spectral::Complex amplitude;  // [uPa] e^{-i 2 pi f_c tau} included; in expected power the power [uPa^2]
+  spectral::Complex amplitude;  // [uPa], includes e^{-i 2 pi f_c tau}; in expected power, the power [uPa^2]
 };
 /// The scatterers of one column, as a structure of arrays.
 struct PaperEchoes {
@@ -38,13 +38,13 @@ struct PaperEchoes {
   PaperEcho operator[](std::size_t i) const { return {turns[i], {re[i], im[i]}}; }
   void push_back(const PaperEcho& e);
 };
-/// Buffers of sum_frequencies, one set per worker.
+/// Buffers of sum_frequencies, one for each worker.
 struct SumScratch {
   std::vector<spectral::Complex> grid, sums;
 };
 
-/// The frequencies of eq. (4), f_m = f_min + m df with df = 1 / T and M = b T, and the spectrum of eq. (3) at them. S_0 is set so
-/// that the peak of a single echo on a sample has the echo's amplitude.
+/// The frequencies of eq. (4), f_m = f_min + m df with df = 1 / T and M = b T, and the spectrum of eq. (3) at these
+/// frequencies. S_0 is chosen so that the peak of a single echo on a sample has the echo's amplitude.
 struct PaperSpectrum {
   int samples = 0;             // samples in the record T
   int count = 0;               // M
@@ -54,15 +54,15 @@ struct PaperSpectrum {
 };
 PaperSpectrum make_spectrum(const PingPlan& plan);
 
-/// P_j(f_m) of one column: sum over echoes times |S|. `fast` (of width 8) null = term by term.
+/// Computes P_j(f_m) of one column: the sum over echoes, times |S|. `fast` has width 8; null = term by term.
 void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
                      const simd::Kernels& kernels, SumScratch& scratch, std::span<std::complex<float>> out);
 
-/// "As coded" (P25 does not print it): V_jk = |sin y / y|, y = pi 0.884 / spacing sin(theta_j - theta_k), over the root of the
-/// sum of all V^2. `squared` for expected power. [beams][columns]
+/// The weights "as coded" (P25 does not print them): V_jk = |sin y / y|, y = pi 0.884 / spacing sin(theta_j - theta_k), divided
+/// by the root of the sum of all V^2. `squared`: V_jk^2, for expected power. [beams][columns]
 std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared);
 
-/// The correction for uniform azimuths, where V depends only on the difference of two azimuths; not squared. Null if the
+/// The correction for uniform azimuths, for which V depends only on the difference of two azimuths; not squared. Null if the
 /// azimuths are not uniform.
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad);
 /// out[j][...] = sum_k V_jk in[k][...] by these tables; rows have `values` floats, a multiple of 32.
@@ -71,15 +71,15 @@ void correct(const BeamTransformTables& even, std::span<const float> in, int val
 
 /// The weights of four beams side by side, [(beams + 3) / 4][columns][4]: in the kernels' layout.
 std::vector<float> panels_of(std::span<const float> weights, int beams, int columns);
-/// out[j] = sum_k weights[j][k] in[k], rows of `values` floats; `panels` of those weights.
+/// out[j] = sum_k weights[j][k] in[k]. Rows have `values` floats; `panels` holds the weights.
 void correct(std::span<const float> panels, int beams, int columns, std::span<const float> in, int values,
              const simd::Kernels& kernels, Parallel& pool, std::span<float> out);
 
-/// s[n] = sum_m P(f_m) e^{i 2 pi (f_m - f_c) t_n}: the record's samples from its spectrum.
+/// s[n] = sum_m P(f_m) e^{i 2 pi (f_m - f_c) t_n}: the samples of the record from its spectrum.
 class InverseTransform {
  public:
   explicit InverseTransform(const PaperSpectrum& spectrum);
-  /// `spectrum`: [M]; `out`: [samples], interleaved complex. Thread-safe, the caller owns `work`.
+  /// `spectrum`: [M]; `out`: [samples], interleaved complex. Thread-safe if each thread passes its own `work`.
   void run(std::span<const std::complex<float>> spectrum, std::vector<spectral::Complex>& work, float* out) const;
 
  private:
