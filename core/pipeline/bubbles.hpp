@@ -22,7 +22,7 @@ struct BubbleLayer {
   }
   bool present() const { return thickness_m > 0 && loss_np_per_m > 0; }
 
-  /// Pressure factor e^{-2 b l} (docs/acoustics.md, eq. 16), there and back over a straight path between two heights.
+  /// Pressure factor e^{-2 b l} (docs/acoustics.md, eq. 16) for the way out and back along a straight path between two heights.
   double two_way(double from_z_m, double to_z_m, double path_m) const {
     const double low = std::min(from_z_m, to_z_m), high = std::max(from_z_m, to_z_m), bottom = -thickness_m;
     const double inside = high - low > 1e-6 ? std::clamp((high - bottom) / (high - low), 0.0, 1.0) : low > bottom ? 1.0 : 0.0;

@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// A sentence with the reason why a request cannot be simulated; empty if it can.
+/// Returns the reason, one sentence, why a request cannot be simulated; empty if it can be simulated.
 std::string why_invalid(const PingRequest& request);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Refines fans of rays: an interval between two directions of a column is halved until both ends are on a surface that can be
-// interpolated, or until the interval counts as an edge. Used for direct views (trace_fan) and views via mirrors
+// Refines fans of rays. An interval between two directions of a column is halved until both ends are on a surface that can be
+// interpolated, or until the interval counts as an edge. Used for direct views (trace_fan) and for views via mirrors
 // (multipath_trace).
 #pragma once
 
@@ -15,12 +15,12 @@
 
 namespace sonar {
 
-/// A ray's hit at one stage of its path. Ranges are measured along the whole path, across mirrors.
+/// The hit of a ray at one stage of its path. Ranges are measured along the whole path, including the parts before mirrors.
 struct SurfaceHit {
   std::uint32_t object = RayPacket::miss;
   float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = no hit
   Vec3 normal;                       // normal of the facet, of any length, in world axes as seen along the last leg of the path
-  float offset = 0;                  // the facet's plane is normal . p = offset, p from the sonar's last image
+  float offset = 0;                  // the facet's plane is normal . p = offset; p is relative to the sonar's last image
   Vec3 direction;                    // unit direction of the last leg, in the same axes
 
   /// Hit of a ray after `range_m` along the whole path; `forward`: x of the unit direction in which the path left the sonar.
@@ -52,7 +52,7 @@ struct FanInterval {
 };
 
 /// Sample: a FanSample with `int stages() const`, `const SurfaceHit& surface_at(int stage) const` and `bool same_mirrors(b)
-/// const`: whether both hit the same number of surfaces via the same mirrors.
+/// const`. same_mirrors: true if both hit the same number of surfaces via the same mirrors.
 template <class Sample>
 class FanRefinement {
  public:
@@ -81,8 +81,9 @@ class FanRefinement {
       std::swap(open_, halves_);
     }
   }
-  /// The elevation at which an interval is halved. If it contains an edge: the middle. Within one surface: near the middle, but
-  /// different between columns, because rays in equal steps could hit only the crests of ripples, which would then look flat.
+  /// The elevation at which an interval is halved. If the interval contains an edge, it is the middle. Within one surface it is
+  /// near the middle, but different in each column. Rays in equal steps could hit only the crests of ripples, which would then
+  /// look flat.
   float middle_rad(const FanInterval& v) {
     const float below = at(v.below).elevation_rad, above = at(v.above).elevation_rad;
     if (!hit_the_same(at(v.below), at(v.above))) return 0.5f * (below + above);
@@ -94,11 +95,12 @@ class FanRefinement {
  private:
   // Edges are located to 1/16 of a base interval. A surface that cannot be interpolated even then counts as an edge.
   static constexpr int deepest = 4;
-  // A surface deviates from the straight line between two hits by about a quarter of the maximum that its slopes allow, here
-  // half a pulse width. The middle may deviate by one pulse width more: together the 1.5 of PingPlan::depth_tolerance_m. With
-  // larger slopes a middle on the line proves nothing, because the rays may hit equal phases of ripples.
+  // A surface deviates from the straight line between two hits by about a quarter of the maximum that its slopes allow, which
+  // is half a pulse width here. The middle may deviate by one pulse width more. The sum is the 1.5 of
+  // PingPlan::depth_tolerance_m. With larger slopes a middle on the line proves nothing, because the rays may hit equal phases
+  // of ripples.
   static constexpr float slope_tolerance_in_pulses = 2;
-  static constexpr float golden_turn = 0.61803399f;  // its multiples fill a turn evenly
+  static constexpr float golden_turn = 0.61803399f;  // the multiples of this fraction of a turn are evenly distributed
   static constexpr float widest_skew = 0.15f;        // fraction of an interval, to either side of its middle
 
   Sample& at(std::int32_t i) { return samples_[static_cast<std::size_t>(i)]; }
@@ -110,7 +112,8 @@ class FanRefinement {
     return true;
   }
 
-  /// Opens an interval if its middle must be traced. It is an edge if its ends hit different surfaces, or at the largest depth.
+  /// Adds an interval to `list` if its middle must be traced. An interval is an edge if its ends hit different surfaces, or if
+  /// it has the largest depth.
   void consider(std::int32_t below, std::int32_t above, std::int32_t column, int depth, std::vector<FanInterval>& list) {
     Sample &a = at(below), &b = at(above);
     const bool same = hit_the_same(a, b);
@@ -146,7 +149,7 @@ class FanRefinement {
     }
     return true;
   }
-  /// Whether the plane of each hit crosses the ray of the other near the other's hit.
+  /// True if the plane of each hit crosses the ray of the other hit near that hit.
   bool planes_agree(const SurfaceHit& a, const SurfaceHit& b) const {
     const float most = slope_tolerance_in_pulses * tolerance_m_;
     return std::abs(a.offset / dot(a.normal, b.direction) - b.range_m) <= most &&

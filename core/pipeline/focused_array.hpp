@@ -1,4 +1,4 @@
-// Response of an array of channels of alternating signs, focused at a range, to a signal that they share: sums over its
+// Response of a focused array to a signal that all its channels share with alternating signs. The response is a sum over the
 // channels (docs/acoustics.md, eq. 47).
 #pragma once
 
@@ -9,11 +9,11 @@
 
 namespace sonar {
 
-/// Sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}, where d is the delay of a channel at x relative to the array's
-/// middle, from a point at a range and sine u. The parts are groups of channels, which overlap by half and whose w^2 add to 1 in
-/// every channel; the last part is all channels with equal weights.
+/// Sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}. Here d is the delay of a channel at x relative to the array's
+/// middle, from a point at a range and sine u. The parts are groups of channels. Neighbouring groups overlap by half, and their
+/// w^2 add to 1 in every channel. The last part is all channels with equal weights.
 ///
-/// Half a group is short, so its sum hardly changes with the sine, apart from the delay of its middle. Therefore the sum is
+/// Half a group is short, so its sum hardly changes with the sine, except for the delay of its middle. Therefore the sum is
 /// computed at a few Chebyshev points of a segment of beams and interpolated. The error is 1e-5 of the largest value, like that
 /// of rounded phases.
 class FocusedArray {
@@ -22,13 +22,13 @@ class FocusedArray {
   int parts() const { return parts_; }
   std::size_t beams() const { return u_.size(); }
   void focus(double range_in_wavelengths);
-  /// [parts][2][beams], real and imaginary parts.
+  /// The sums, [parts][2][beams], real and imaginary parts.
   const std::vector<float>& sums() const { return sums_; }
   /// The largest change of a channel's phase between two focal ranges, in turns.
   double turns_between(double range, double other_range) const;
 
  private:
-  /// Neighbouring beams, and the sines at which sums are computed for them: those of the beams if these are few.
+  /// A segment of neighbouring beams, and the sines at which its sums are computed: the sines of the beams if there are few.
   struct Segment {
     std::size_t first_beam = 0, beams = 0, first_node = 0, nodes = 0, weights = 0;  // weights: [nodes][beams] from there on
     bool is_direct() const { return nodes == beams; }
@@ -42,16 +42,16 @@ class FocusedArray {
   std::vector<Segment> segments_;
   std::vector<float> sums_;     // [parts][2][beams]
   std::vector<float> at_node_;  // [weightings][2][nodes]
-  std::vector<float> length_;   // scratch: from the middle of a half; then cosines and sines of a channel
+  std::vector<float> length_;   // buffers: delays from the middle of a half; then cosines and sines of a channel
   int channels_, half_, halves_, parts_;
   double d_;  // spacing of the channels, in wavelengths
   double widest_ = 0;
 };
 
-/// Chebyshev's points of [from, to], and weights of polynomials through values at them: [points][places].
+/// Chebyshev points of [from, to], and the weights that interpolate values at these points: [points][places].
 std::vector<double> chebyshev_points(double from, double to, int count);
 std::vector<double> chebyshev_weights(const std::vector<double>& points, const std::vector<double>& places);
-/// Number of points for an error below about 5e-6, if the phase changes by `radians` to either side of the middle.
+/// Number of points for an error below about 5e-6 if the phase changes by `radians` on either side of the middle.
 int chebyshev_count(double radians);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Stage four: beams from columns (docs/acoustics.md, section 6, eq. 9): s_j[n] = sum_k W_jk g_k[n]. Weights are signed and not
-// normalised. Works on a window of samples, so that inputs and outputs stay in cache.
+// Stage four: forms beams from columns (docs/acoustics.md, section 6, eq. 9): s_j[n] = sum_k W_jk g_k[n]. Weights are signed
+// and not normalised. The stage works on a window of samples, so that inputs and outputs stay in the cache.
 #pragma once
 
 #include <span>
@@ -11,22 +11,23 @@
 
 namespace sonar {
 
-/// Buffers of form_beams, one per worker.
+/// Buffers of form_beams, one object for each worker.
 struct BeamScratch {
   std::vector<float> window;  // copies of the samples of all columns, for panels of weights
   AlignedFloats transform;    // working memory of a beam transform
 };
 
-/// Fills the window of samples for which `out` has been shaped.
+/// Computes the samples of the window for which `out` has been shaped.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out);
-/// Forms only some beams; the others are undefined. `heard`: columns_of() these beams, the only columns that are read.
+/// Forms only some beams; the others are undefined. `heard`: columns_of() these beams; no other columns are read.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, BeamChoice wanted,
                 std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out);
 
 /// The part of the point's pulse that lies within the samples [from, to).
 SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from, int to);
-/// Adds point echoes to the beams, each at its exact direction. In expected power they are summed coherently with each other.
+/// Adds point echoes to the beams, each in its exact direction. In expected power, the point echoes of a beam are summed
+/// coherently with each other.
 void add_points(std::span<const PointEcho> points, const PingPlan& plan, BeamSignals& out);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Finds tiles that a ping can skip, from the boxes around their cells, before any cell is loaded. A tile is skipped only if
-// simd/cells.inl would drop all of its cells, so no echo changes.
+// Finds the tiles that a ping can skip, from the boxes around their cells. This happens before any cell is loaded. A tile is
+// skipped only if simd/cells.inl would drop all of its cells, so echoes do not change.
 #pragma once
 
 #include <cstdint>
@@ -19,24 +19,25 @@ struct PreparedTile {
   int first_column = 0, last_column = 0;  // half-open; empty if no cell is in view
   // First and last bin of the depth map with which its cells are compared.
   int first_bin = 0, last_bin = 0;
-  float nearest = 0;  // if the map's 1 / x is larger than this, all cells are hidden [1/m]; infinity: unknown
+  float nearest = 0;  // all cells are hidden if the 1 / x of the map exceeds this [1/m]; infinity: unknown
 };
 
-/// Finds the columns and bins that the cells of a prepared tile can reach. `sonar_from_object`, `from_sonar_m`: the tile's centre
-/// in the axes of reception; `seen_from_object`, `seen_from_sonar_m`: in the axes in which rays are traced.
+/// Finds the columns and bins that the cells of a prepared tile can reach. `sonar_from_object` and `from_sonar_m` are the
+/// rotation and the position of the tile's centre in the axes of reception; `seen_from_object` and `seen_from_sonar_m` are the
+/// same in the axes in which rays are traced.
 void find_reach(const PingContext& context, const Rotation& sonar_from_object, Vec3d from_sonar_m,
                 const Rotation& seen_from_object, Vec3d seen_from_sonar_m, PreparedTile& tile);
 
-/// The farthest hits of blocks of a depth map.
+/// The farthest hit in each block of a depth map.
 class FarthestSeen {
  public:
   void shape(const DepthMap& map);
-  /// Keeps, in order, the requested tiles that may have visible cells in the columns of the group.
+  /// Lists the tiles of `wanted` that may have visible cells in the columns of the group, in the same order.
   void leave_out_hidden(const std::vector<PreparedTile>& tiles, std::span<const std::uint32_t> wanted,
                         const simd::GroupView& group, std::vector<std::uint32_t>& in_sight) const;
 
  private:
-  /// Whether the map hides every cell of the tile in columns [first, last). `beside`: GroupView::columns_beside.
+  /// True if the map hides every cell of the tile in columns [first, last). `beside`: GroupView::columns_beside.
   bool hides(const PreparedTile& tile, int first, int last, int beside) const;
 
   static constexpr int columns_a_block = 4, bins_a_block = 16;

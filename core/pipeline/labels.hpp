@@ -16,7 +16,7 @@
 
 namespace sonar {
 
-/// The reason why samples of such pings cannot have labels; empty if they can.
+/// The reason why samples of such pings cannot have labels; empty if they can have labels.
 std::string why_unlabelled(const PingRequest& request, const Scene& scene);
 /// Labels of a ping that receives nothing.
 PingLabels no_labels(const PingRequest& request, const Scene& scene);
@@ -27,14 +27,14 @@ class LabelWork {
   /// `context`, `tiles` and `by_group` must live until finish().
   void begin(const PingContext& context, const std::vector<PreparedTile>& tiles,
              const std::vector<std::vector<std::uint32_t>>& by_group, int group_columns);
-  /// Stores the shadows in columns [first, last), which `fan` has traced. Any thread may call it, once for each column.
+  /// Stores the shadows in columns [first, last). `fan` has traced them. Any thread may call it, once for each column.
   void note_shadows(const FanScratch& fan, int first, int last);
-  /// Makes room for the group that begins at `group.first_column`. Any thread may call it, once for each group.
+  /// Prepares the group that begins at `group.first_column`. Any thread may call it, once for each group.
   void begin_group(const simd::GroupView& group);
   /// Adds the energy of cells in the picture from Echoes::power, and clears the list of their tiles. It may be called several
   /// times for a group.
   void add_cells(const simd::GroupView& group, Echoes& echoes);
-  /// Adds the energy that the group's objects with a label would send if nothing hid them. Call it after the last add_cells().
+  /// Adds the energy that labelled objects of the group would send if nothing hid them. Call it after the last add_cells().
   void finish_group(const simd::GroupView& group, Echoes& scratch);
   PingLabels finish(std::span<const PointEcho> points);
 
@@ -46,7 +46,7 @@ class LabelWork {
     int first_sample = 0, last_sample = 0;     // half-open
     int first_row = 0, rows = 0;               // multiples of `window`
     std::vector<float> power = {};             // [columns][rows], spread over the length of the pulse
-    std::vector<double> seen = {}, open = {};  // energy of objects with a label, by column; `open`: if nothing hid them
+    std::vector<double> seen = {}, open = {};  // energy of labelled objects, by column; `open`: if nothing hid them
   };
   struct Gap {  // samples of a column that lie in an object's shadow and have no echo
     float from = 0, to = 0;
@@ -72,14 +72,14 @@ class LabelWork {
   int group_columns_ = 1;
   BeamWeights weights_;  // weights of powers, for these columns and beams
   std::vector<double> beam_sine_;
-  std::vector<std::pair<Taper, double>> beam_widths_;  // taper and aperture of each
+  std::vector<std::pair<Taper, double>> beam_widths_;  // taper and aperture of each beam
   double first_sine_ = 0, spacing_ = 0;
   std::vector<float> pulse_;  // |p|^2 at whole samples, the peak in the middle
   struct Group {
     std::vector<Part> parts;                    // the first `used` belong to this ping; all keep their memory
     std::vector<std::vector<float>> by_sample;  // values of each part: [columns][samples], before the pulse
     std::size_t used = 0;
-    std::vector<std::size_t> part_of;  // by object; SIZE_MAX: none
+    std::vector<std::size_t> part_of;  // index into `parts`, by object; SIZE_MAX: none
     std::span<const Part> of_this_ping() const { return std::span(parts).first(used); }
   };
   std::vector<Group> groups_;

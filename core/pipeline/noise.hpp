@@ -1,5 +1,5 @@
-// Receiver noise: white complex Gaussian noise per column, shaped in range like the pulse. It is added before beamforming, so
-// that neighbouring beams share it as in a real array (docs/acoustics.md, section 5). It is read from a filtered table at
+// Receiver noise: white complex Gaussian noise for each column, shaped in range like the pulse. It is added before beamforming,
+// so that neighbouring beams share noise as in a real array (docs/acoustics.md, section 5). It is read from a filtered table at
 // hashed positions.
 #pragma once
 
@@ -16,16 +16,17 @@ namespace sonar {
 
 class NoiseTable {
  public:
-  /// Makes a new table if seed or filter changed, or shares the table of one of `others` with the same seed and filter.
-  /// E|n|^2 = 1 per sample.
+  /// Makes a new table if the seed or the filter has changed. If one of `others` has a table with the same seed and filter,
+  /// that table is shared instead. E|n|^2 = 1 per sample.
   void prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others = {});
   /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). It depends only on (seed, sonar, ping, column, n).
   void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
-  /// Like add(), but replaces the values of the column.
+  /// Like add(), but replaces the values of the column by the noise.
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return *shaped_; }
-  /// Size of the table in memory, without memory in `counted`, which other tables share; adds its own to `counted`.
+  /// Size of the table in memory. Memory in `counted`, which other tables share, does not count; the function adds its own
+  /// memory to `counted`.
   std::size_t bytes(std::set<const void*>& counted) const;
 
  private:

@@ -1,4 +1,4 @@
-// Inputs of the steps that make the echoes of a scene: the scene at the time of the ping, and values of one ping.
+// Inputs of the steps that make the echoes of a scene: the scene at the time of the ping, and the values of one ping.
 #pragma once
 
 #include <span>

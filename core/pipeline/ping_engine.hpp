@@ -47,13 +47,14 @@ inline void add(PingStatistics& to, const PingStatistics& more) {
 class Interruption {
  public:
   virtual ~Interruption() = default;
-  /// Whether another ping is likely to be requested; the present one is then computed in smaller parts.
+  /// True if another ping is likely to be requested. The present ping is then computed in smaller parts.
   virtual bool expected() const = 0;
-  /// Called between two parts, on the thread of run(). It may call run() of the same engine, which then does not call it again.
+  /// Called between two parts, on the thread of run(). It may call run() of the same engine. That run() does not call
+  /// run_other().
   virtual void run_other() = 0;
 };
 
-/// The device that an engine needs has failed, and the options allow no replacement.
+/// Thrown if the device that an engine needs has failed and the options allow no other device.
 class EngineUnavailable : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -62,20 +63,20 @@ class EngineUnavailable : public std::runtime_error {
 class PingEngine {
  public:
   virtual ~PingEngine() = default;
-  /// A request that cannot be simulated (why_invalid in core/pipeline/check_request.hpp) throws std::invalid_argument with the
-  /// reason. Only one thread may call it at a time.
+  /// Computes the pings. Throws std::invalid_argument with the reason if a request cannot be simulated (why_invalid in
+  /// core/pipeline/check_request.hpp). Only one thread may call it at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
-  /// submit() and collect() are the two halves of run(): an engine with a device works on the requests while its caller uses the
-  /// pings of an earlier submit(). Requests are copied. collect() throws the exceptions that run() would throw.
+  /// submit() and collect() are the two halves of run(). An engine with a device works on the requests while the caller uses
+  /// the pings of an earlier submit(). Requests are copied. collect() throws the exceptions that run() would throw.
   virtual void submit(std::span<const PingRequest> requests) { submitted_.emplace_back(requests.begin(), requests.end()); }
-  /// The pings of the oldest submit() that has not been collected; there must be one.
+  /// Returns the pings of the oldest submit() that has not been collected. There must be one.
   virtual std::vector<Ping> collect() {
     const std::vector<PingRequest> requests = std::move(submitted_.front());
     submitted_.pop_front();
     return run(requests);
   }
-  /// Largest number of requests like these two that one run() computes faster than several runs. 1: one run is not faster, or
-  /// delays one of the two too much.
+  /// Largest number of requests like these two that one run() computes faster than several runs. 1: a common run is not faster,
+  /// or delays one of the two too much.
   virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
     return static_cast<void>(a), static_cast<void>(b), 1;
   }

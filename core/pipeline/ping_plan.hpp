@@ -1,5 +1,5 @@
 // All values of a ping that depend only on the model and the client's settings: columns, sample grid, pulse and beamforming
-// tables, noise filter, gains. They are computed when settings change; all stages use them.
+// tables, noise filter, gains. They are computed when settings change. All stages use them.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 
 namespace sonar {
 
-/// Directions of the rays: angles about the array axis, and the tangent axis of the depth map.
+/// Directions of the rays: angles about the array axis, and the tangents that form an axis of the depth map.
 struct Fan {
   double half_angle_rad = 0;  // half the angle of the main part; the fixed fan and mirror paths cover only this part
   double reach_rad = 0;       // half the angle with the side lobes
@@ -28,26 +28,27 @@ struct Fan {
   int bins = 0;
   std::vector<float> tangent;        // tangents of the lower edge of every bin, and of the end: bins + 1
   std::vector<float> elevation_rad;  // the base fan, from bottom to top
-  // Number of elevations at each end that lie in side lobes; these are not refined, and side_columns columns share them.
+  // Number of elevations at each end that lie in side lobes. They are not refined, and side_columns neighbouring columns share
+  // their rays.
   int side_elevations = 0;
   bool is_side(int interval) const {
     return interval < side_elevations || interval + 1 >= static_cast<int>(elevation_rad.size()) - side_elevations;
   }
 };
 
-/// A ray of the fixed fan: its elevation about the array axis. weight: pattern times the root of the solid angle; for flat beams
-/// without the factor that depends on the column.
+/// A ray of the fixed fan: its elevation about the array axis. weight: pattern times the root of the solid angle. For flat
+/// beams it excludes the factor that depends on the column.
 struct FixedFanRay {
   float elevation_rad = 0, cosine = 1, sine = 0, weight = 0;
 };
 
-/// Weights of four neighbouring beams over the columns they share.
+/// Weights of four neighbouring beams for the columns that they share.
 struct BeamPanel {
   int first_beam = 0;  // the four beams first_beam .. +3; those past the last beam have zero weights
   int first_column = 0, count = 0;
   std::size_t weights = 0;  // offset into BeamWeights::weights, count x 4 values
 };
-/// Options of the sums of columns that form beams.
+/// Options for the sums of columns that form beams.
 struct BeamWeightOptions {
   double dropped_energy = 1e-4;  // fraction of energy outside the band: -40 dB
   bool transform = true;         // use a transform instead of a band if the beams allow it and it is faster
@@ -56,7 +57,7 @@ struct BeamWeights {
   int half_band = 0;  // number of columns on either side that a beam sums
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
-  std::shared_ptr<const BeamTransformTables> transform;  // if set, replaces panels: sums all columns at less cost
+  std::shared_ptr<const BeamTransformTables> transform;  // if set, used instead of panels: it sums all columns faster
   double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
@@ -84,7 +85,7 @@ struct PingPlan {
   std::vector<double> beam_sine;             // true sines; all sines here are true, except in tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
-  // The sample grid: sample n lies at the device range (n + sample_offset) sample_spacing_m.
+  // The sample grid. Sample n lies at the device range (n + sample_offset) sample_spacing_m.
   int samples = 0;  // rows * samples_per_row
   double sample_spacing_m = 0;
   double start_samples = 0;    // device range of the picture's near edge, in spacings
@@ -109,22 +110,22 @@ struct PingPlan {
   std::vector<std::uint32_t> row_gain;   // when settings.format.row_gains
   std::vector<float> beam_power_factor;  // per beam: gain of its channel, squared; empty = all equal
 
-  /// Direction of a place in the sonar's axes, for conical beams (about the array's axis) or flat ones.
+  /// Direction of a point in the sonar's axes, for conical beams (about the array's axis) or flat ones.
   ConicalDirection direction_of(Vec3d from_sonar) const {
     return switches.conical ? conical_from_sonar(from_sonar) : flat_from_sonar(from_sonar);
   }
   /// nullopt: the direction is outside the fan, or farther than half_angle_rad from its middle.
   std::optional<std::size_t> column_of(const ConicalDirection& direction, double half_angle_rad) const;
-  /// A cell is visible up to this distance behind the depth map, because the map is interpolated linearly between rays.
+  /// A cell counts as visible up to this distance behind the depth map, because the map is interpolated linearly between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
   static constexpr float depth_tolerance_in_pulses = 1.5f;  // docs/acoustics.md, section 3
-  /// Largest angle about the array's axis in a fan with this half angle. With flat beams it exceeds the half angle:
-  /// away from the middle, the same elevation is a larger angle about the axis.
+  /// Largest angle about the array's axis in a fan with this half angle. For flat beams it exceeds the half angle, because away
+  /// from the middle the same elevation is a larger angle about the axis.
   double widest_about_axis_rad(double half_angle_rad) const;
-  /// The column that is traced for a column in the side lobes.
+  /// Number of the column whose rays are used for this column in the side lobes.
   int side_column(int k) const { return std::min(k - k % side_columns + side_columns / 2, columns.count - 1); }
   static constexpr int side_columns = 4;
-  /// Sets the values of `view` that describe the fan and the levels of cells.
+  /// Sets the members of `view` that describe the fan and the levels of cells.
   void aim(CellView& view) const;
   bool truncates() const { return switches.truncation && mode.receiver.truncates; }
   simd::PulseRows pulse() const { return {pulse_rows.data(), taps, pulse_steps}; }
@@ -136,9 +137,9 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
 PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches, double bearing_scale = 1);
 /// Wavelength of the centre frequency, at the sound speed that the device assumes [m].
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
-/// Changes only the client's gain, which may differ in every ping.
+/// Changes only the client's gain, because the gain may differ in every ping.
 void set_gain(PingPlan& plan, float gain_db);
-/// Whether the plan is valid for this request, except for the gain.
+/// True if the plan is valid for this request. The gain is not compared.
 bool serves(const PingPlan& plan, const PingRequest& request);
 
 // Functions that make parts of a plan.

@@ -7,11 +7,11 @@
 
 namespace sonar {
 
-/// Geometry of one echo for a moving sonar: the pulse reaches the target at half the echo's time of flight. The direction of
-/// the echo is measured in the sonar's axes at reception.
+/// Geometry of one echo for a moving sonar. The pulse reaches the target after half of the echo's time of flight. The direction
+/// of the echo is measured in the sonar's axes at reception.
 struct EchoGeometry {
   Vec3d from_sonar_m;  // sonar axes at reception
-  Vec3d moved_m;       // movement of the sonar until reception, in the axes of PingScalars::seen_from
+  Vec3d moved_m;       // movement of the sonar until reception, axes of PingScalars::seen_from
   Rotation turn;       // from the axes of seen_from to those at reception
 };
 
@@ -20,30 +20,30 @@ struct PingScalars {
   double absorption_np_per_m = 0;  // one way, true
   double source_upa = 1;           // amplitude at 1 m
   double max_range_m = 0;          // true range from which echoes still reach the last sample
-  double min_range_m = 0;          // true range from `seen_from`: nearer echoes end before the first sample
+  double min_range_m = 0;          // true range from `seen_from`; echoes from nearer points end before the first sample
   double samples_per_m = 0;        // fractional sample of a true range r: r * samples_per_m - sample_offset
   double sample_offset = 0.5;      // PingPlan::sample_offset
   double turns_per_m = 0;          // carrier turns per metre of one-way range, 2 f / c
   Rotation world_from_sonar;
   Vec3 position_in_scene;  // relative to RayScene::origin() [m]
 
-  // Origin of rays and cells, and its motion. An echo from range r bounces at r / c and returns at 2 r / c.
+  // The origin of rays and cells, and its motion. An echo from range r is reflected at r / c and received at 2 r / c.
   Pose seen_from;        // the sonar in the world at the middle of the ping; the pose of firing if it does not move
   double seen_at_s = 0;  // after firing
   bool moves = false;
   Twist twist;
   double doppler_m_per_mps = 0;  // added to the range of an echo that approaches by 1 m/s (docs/acoustics.md, section 4)
 
-  /// Geometry of the echo of a place in the axes of `seen_from`.
+  /// Geometry of the echo of a point in the axes of `seen_from`.
   EchoGeometry echo_geometry(Vec3d from_sonar_m) const;
-  /// Largest number of columns between the column in which a point is traced and that in which its echo is received.
+  /// Largest distance, in columns, between the column in which a point is traced and the column in which its echo is received.
   int columns_turned(const PingPlan& plan) const;
-  /// The number of samples by which the Doppler shift of a sweep delays the echo from a place in the sonar's axes.
+  /// Number of samples by which the Doppler shift of a sweep delays the echo from a point in the sonar's axes.
   double doppler_samples(Vec3d from_sonar_m) const;
   double sample_of(double range_m) const { return range_m * samples_per_m - sample_offset; }
 };
 
-/// The sonar's pose `seconds` after `pose`.
+/// The pose of the sonar `seconds` after `pose`.
 Pose propagate(const Pose& pose, const Twist& twist, double seconds);
 
 PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d scene_origin);

@@ -1,4 +1,4 @@
-// Tables in a plan: for beamforming by a transform, for mixing beams, and for noise that channels share. beam_transform.cpp,
+// Tables of a plan: for beamforming by a transform, for mixing beams, and for noise that channels share. beam_transform.cpp,
 // beam_mix.cpp and shared_noise.cpp make and use them.
 #pragma once
 
@@ -18,14 +18,16 @@ namespace sonar {
 
 struct PingPlan;
 
-/// Forms all beams of all columns at once. Columns are uniform in the sine, so that the sum over columns (form_beams.hpp) is a
-/// convolution, which a Fourier transform of twice the length computes exactly. Beams between columns are interpolated by a few
-/// weights, since the aperture limits how fast the response changes. form_beams() uses it in place of wide bands of weights.
+/// Forms all beams from all columns at once. Columns are uniform in the sine, so the sum over columns (form_beams.hpp) is a
+/// convolution. A Fourier transform of twice the length computes it exactly. Beams between columns are interpolated by a few
+/// weights, because the aperture limits how fast the response changes. form_beams() uses this class instead of wide bands of
+/// weights.
 class BeamTransformTables {
  public:
-  /// The relative error of the interpolation is at most 2e-6 for columns up to 0.35 of a beam apart (single precision: 1e-6).
+  /// Makes the tables. The relative error of the interpolation is at most 2e-6 for columns up to 0.35 of a beam apart (single
+  /// precision: 1e-6).
   BeamTransformTables(const ReceivePattern& pattern, const Columns& columns, const std::vector<double>& beam_sines);
-  /// One beam on each column. The weight of columns d away is of_distance[d].
+  /// Makes the tables for one beam on each column. The weight of columns d away is of_distance[d].
   explicit BeamTransformTables(const std::vector<double>& of_distance);
   BeamTransformTables(const BeamTransformTables&) = delete;
   BeamTransformTables& operator=(const BeamTransformTables&) = delete;
@@ -35,7 +37,7 @@ class BeamTransformTables {
   std::size_t work_floats() const { return static_cast<std::size_t>(4 * tables_.quarter) * 32; }
 
   std::size_t bytes() const;
-  /// Vector operations for a group of sixteen samples, to compare with those of a band.
+  /// Number of vector operations for a group of sixteen samples, for a comparison with a band of weights.
   double cost() const;
 
  private:
@@ -51,15 +53,15 @@ class BeamTransformTables {
   std::vector<std::int32_t> first_column_;
 };
 
-/// Value at a sine of a product's table (BeamProfile), linear between the table's values. `top`: sine of the sector's edge.
+/// Value of a product's table (BeamProfile) at a sine; linear between the table's values. `top`: sine of the sector's edge.
 double at_sine(const std::vector<float>& table, double sine, double top);
 
-/// Mixes neighbouring beams: near the sonar, because the array is focused only for broadside, and everywhere by a fitted fraction
-/// (docs/acoustics.md, section 6). It depends only on the plan.
+/// Mixes neighbouring beams. Near the sonar they are mixed because the array is focused only for broadside; at all ranges a
+/// fitted fraction of the neighbours is added (docs/acoustics.md, section 6). The tables depend only on the plan.
 class BeamMix {
  public:
   BeamMix() = default;
-  /// Empty if beams are not uniform in the sine.
+  /// Leaves the tables empty if beams are not uniform in the sine.
   explicit BeamMix(const PingPlan& plan);
   bool blurs() const { return !turn_m_.empty(); }
   bool blends() const { return !own_.empty(); }
@@ -70,7 +72,7 @@ class BeamMix {
   const std::vector<float>& share() const { return share_; }
   BeamMixView view() const;
   std::size_t bytes() const;
-  /// Both work in place; `scratch` keeps its memory. Does nothing if blurs() or blends() is false.
+  /// blur() and blend() work in place; `scratch` keeps its memory. They do nothing if blurs() or blends() is false.
   void blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector<float>& scratch) const;
   void blend(BeamSignals& beams, std::vector<float>& scratch) const;
 
@@ -89,26 +91,26 @@ class SharedNoiseTable {
  public:
   static constexpr std::size_t block_samples = 32;  // samples that are stored or omitted together
   SharedNoiseTable() = default;
-  /// Empty if the receiver has no shared noise. Needs the plan's columns and the level of their noise.
+  /// Leaves the table empty if the receiver has no shared noise. Needs the plan's columns and the level of their noise.
   SharedNoiseTable(const PingPlan& plan, Parallel& pool);
   bool is_audible() const { return samples_ > 0; }
   bool has_leak() const { return !leak_upa_.empty(); }
-  int samples() const { return samples_; }  // first samples that have it; later, it falls outside the sector
+  int samples() const { return samples_; }  // number of samples with shared noise; later, it lies outside the sector
   std::size_t parts() const { return parts_; }
-  /// Real and imaginary part, [parts][beams][2][samples], of the response to a signal of amplitude 1 in the channels of a group;
-  /// in the last part, in all channels.
+  /// Real and imaginary part, [parts][beams][2][samples], of the response to a signal of amplitude 1. The signal is in the
+  /// channels of one group; in the last part, in all channels.
   std::vector<float> response() const;
   std::size_t bytes() const {
     return sizeof(float) * (heard_.capacity() + noise_upa_.capacity() + steady_upa_.capacity() + leak_upa_.capacity()) +
            sizeof(std::uint32_t) * at_.capacity();
   }
-  // Levels in a channel: rms [samples] of the noise that differs between pings and groups, amplitude [samples] of the noise that
-  // does not, and amplitude of the leak [up to its last sample].
+  // Levels in a channel by sample: noise_upa, rms of the noise that differs between pings and groups; steady_upa, amplitude of
+  // the noise that does not; leak_upa, amplitude of the leak, up to its last sample.
   const std::vector<float>& noise_upa() const { return noise_upa_; }
   const std::vector<float>& steady_upa() const { return steady_upa_; }
   const std::vector<float>& leak_upa() const { return leak_upa_; }
   double noise_power(std::size_t beam, std::size_t sample) const;  // [uPa^2]; 0 beyond the samples
-  /// Draws the shared part of one ping's channels, [parts][2][samples], or its rms; without the noise, or without the leak.
+  /// Draws the shared part of one ping's channels, [parts][2][samples], or its rms. `noise` and `leak` select what is drawn.
   void draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const;
   /// Adds the shared signals to the beams.
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;

@@ -1,5 +1,5 @@
-// The ping of a sonar that reports ranges (core/sonar/range_image.hpp): it traces rays through the cell of each beam, sums the
-// power within a beam's pattern for each range cell, and reports the strongest or the nearest detected cell.
+// The ping of a sonar that reports ranges (core/sonar/range_image.hpp). Rays are traced through the cell of each beam. For each
+// range cell, the power within a beam's pattern is summed. The beam reports the strongest or the nearest detected cell.
 #pragma once
 
 #include "core/base/parallel.hpp"
@@ -8,8 +8,9 @@
 
 namespace sonar {
 
-/// `wanted` must belong to the request; RayScene::place() must have been called. The bytes do not depend on the number of
-/// threads. Not simulated: motion while the sound travels, mirrors (specular echoes, multipath), texture, volume, other sonars.
+/// Computes the ping. `wanted` must belong to the request; RayScene::place() must have been called. The bytes do not depend on
+/// the number of threads. Not simulated: motion while the sound travels, mirrors (specular echoes, multipath), texture, volume,
+/// other sonars.
 Ping make_range_image(const RayScene& scene, const PingRequest& request, const RangeImageSettings& wanted, Parallel& pool);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// The returns of a range image (core/pipeline/range_image.hpp): one ray is traced through the middle of each cell of the beam
-// grid and of a few cells around it, and many rays through cells with objects thinner than a cell.
+// The returns of a range image (core/pipeline/range_image.hpp). One ray is traced through the middle of each cell of the beam
+// grid and of a few cells around the grid. Many rays are traced through cells with objects that are thinner than a cell.
 #pragma once
 
 #include <cstddef>
@@ -22,11 +22,12 @@ struct RangeReturn {
   ComplexNormal speckle{1, 0};
   std::uint32_t draw = 0;  // draw for the speckle of its range cells, see RangeReturns::speckle_in()
   std::uint32_t object = BeamTruth::nothing;
-  // Power in the range cells `first` to `last`: of_first in the first, of_last in the last (if different), of_each in the
-  // others.
+  // Power in the range cells `first` to `last`: of_first in the first cell, of_last in the last (if it is another cell),
+  // of_each in the others.
   std::int32_t first = 0, last = 0;
   double of_first = 0, of_each = 0, of_last = 0;
-  // The patch of surface: cosine of the incidence, spread of its ranges about range_m, number of the cell's rays that hit it.
+  // Properties of the patch of surface: cosine of the incidence, spread of its ranges about range_m, number of the cell's rays
+  // that hit it.
   double cosine = 0, spread_m = 0;
   int rays = 0;
 
@@ -39,7 +40,7 @@ struct PointReturn : RangeReturn {
   double azimuth_rad = 0, elevation_rad = 0;
 };
 
-// Half of the longest interval of ranges that the patch of one ray can have, at grazing incidence.
+// Half of the longest range interval that the patch of one ray can have, at grazing incidence [m].
 constexpr double longest_return_half_m = 0.5;
 
 class RangeReturns {
@@ -58,7 +59,7 @@ class RangeReturns {
   }
   /// Returns of the point targets that are not hidden.
   std::vector<PointReturn> of_points() const;
-  /// Speckle of a return in one range cell for one block of rows, if each cell has its own speckle.
+  /// Speckle of a return in one range cell, for one block of rows. For images in which each range cell has its own speckle.
   ComplexNormal speckle_in(const RangeReturn& r, std::ptrdiff_t cell, int block) const {
     const std::uint32_t of_cell = static_cast<std::uint32_t>(cell) * 389u + static_cast<std::uint32_t>(block) * 1543u;
     return draws_[(r.draw + of_cell) % static_cast<std::uint32_t>(draws_.size())];
@@ -78,7 +79,7 @@ class RangeReturns {
     int column = 0, row = 0;
     bool operator==(const Cell&) const = default;
   };
-  /// Number of rays across a cell and up, which are uniform over the cell.
+  /// Number of rays across a cell in azimuth and in elevation. The rays are uniform over the cell.
   struct Lattice {
     int across = 1, up = 1;
   };

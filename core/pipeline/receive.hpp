@@ -1,4 +1,4 @@
-// Last stage: envelope, time-varied gain, range rows, quantised samples (docs/acoustics.md, section 7).
+// Last stage: computes the envelope, time-varied gain, range rows and quantised samples (docs/acoustics.md, section 7).
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace sonar {
 
-/// Buffers of receive, one per worker.
+/// Buffers of receive, one object for each worker.
 struct ReceiveScratch {
   std::vector<float> power;  // [rows][beams rounded up]
   std::vector<float> codes;  // codes of a row
@@ -18,7 +18,7 @@ struct ReceiveScratch {
 
 /// Sets the sizes of the parts of the ping that receive() fills.
 void shape_ping(const PingPlan& plan, const Switches& switches, Ping& ping);
-/// Fills the rows in the window of `beams`, which must begin and end on whole rows.
+/// Computes the rows in the window of `beams`. The window must begin and end on whole rows.
 void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels& kernels, ReceiveScratch& scratch, Ping& ping);
 
 }  // namespace sonar

@@ -1,6 +1,5 @@
 // A material's scattering law at the frequency of a ping: the backscattering strength of a unit of surface for each cosine of
-// incidence. Lambert's law needs one number, other laws need a table for the kernels (docs/acoustics.md,
-// section 3).
+// incidence. Lambert's law needs one number. For other laws the kernels need a table (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>
@@ -21,12 +20,12 @@ struct LawTable {
   float root_strength(float cosine) const;
 };
 
-/// A surface is smooth if its roughness k h [rad of phase] is below this: it reflects a part of the energy and scatters the
-/// rest.
+/// A surface is smooth if its roughness k h [rad of phase] is below this limit. A smooth surface reflects a part of the energy
+/// and scatters the rest.
 inline constexpr double smooth_below_kh = 1.5;
 
-/// sigma_b [1/sr] of a material at a frequency, cosine in [0, 1]. `specular`: the reflected energy is subtracted from the diffuse
-/// part.
+/// sigma_b [1/sr] of a material at a frequency, cosine in [0, 1]. `specular`: true subtracts the reflected energy from the
+/// diffuse part.
 double scattering_strength(const Material& material, double cosine, double centre_hz, double sound_speed_mps, bool specular);
 LawTable make_law(const Material& material, double centre_hz, double sound_speed_mps, bool specular);
 

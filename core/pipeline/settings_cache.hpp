@@ -1,4 +1,4 @@
-// Tables of settings that are kept from ping to ping, because several sonars take turns and clients return to earlier settings.
+// Tables of settings that are kept from ping to ping, because several sonars alternate and clients return to earlier settings.
 #pragma once
 
 #include <cstddef>
@@ -26,12 +26,13 @@ struct PreparedSettings {
 
 class SettingsCache {
  public:
-  /// Enough for about eight of the largest tables (M1200d with 512 beams), or for hundreds of small ones.
+  /// Largest size of all tables. It is enough for about eight of the largest (M1200d with 512 beams) or for hundreds of small
+  /// ones.
   static constexpr std::size_t usual_bytes = std::size_t{64} << 20;
   explicit SettingsCache(std::size_t most_bytes = usual_bytes) : most_bytes_(most_bytes) {}
 
-  /// Returns the tables of a request, making them if needed. Drops least recently used ones until all fit. The result is valid
-  /// until the next call.
+  /// Returns the tables of a request, and makes them if needed. If there are too many tables, those that were not used for
+  /// longest are dropped. The result is valid until the next call.
   PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool);
   /// Approximate size of all tables.
   std::size_t bytes() const;

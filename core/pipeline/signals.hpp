@@ -11,8 +11,8 @@
 
 namespace sonar {
 
-/// Columns of constant direction sine u = y / r, cones about the array axis (flat beams: sine of azimuth), falling from port to
-/// starboard like the beams.
+/// Columns of constant direction sine u = y / r, which are cones about the array axis (flat beams: sine of azimuth). They fall
+/// from port to starboard like the beams.
 struct Columns {
   int count = 0;
   double first_sine = 0;        // centre of column 0
@@ -21,8 +21,8 @@ struct Columns {
   double sine(int column) const { return first_sine - column * spacing; }
 };
 
-/// Hits of the rays, column by column: 1 / x (x = forward coordinate in the sonar's frame) against the tangent z / x. For flat
-/// beams (conical off) x is the horizontal distance.
+/// Hits of the rays, column by column: 1 / x against the tangent z / x; x is the forward coordinate in the sonar's frame. For
+/// flat beams (conical off) x is the horizontal distance.
 struct DepthMap {
   int first_column = 0, columns = 0, bins = 0;
   bool has_upper_marks = false;
@@ -50,7 +50,7 @@ struct FanHit {
 struct Echoes {
   explicit Echoes(int capacity = 0) { reserve(capacity); }
   void reserve(int capacity);
-  int capacity() const { return static_cast<int>(column.size()) - 16; }  // kernels may write one vector past the end
+  int capacity() const { return static_cast<int>(column.size()) - 16; }  // kernels may write up to one vector past the end
   simd::EchoArrays at(int index) {
     return {sample.data() + index, re.data() + index, im.data() + index, column.data() + index,
             keeps_power ? power.data() + index : nullptr};
@@ -61,7 +61,7 @@ struct Echoes {
   std::vector<float> sample, re, im;
   std::vector<std::int32_t> column;
 
-  // For labels, if keeps_power is set: the expected power of each echo, and the tile of its cell.
+  // For labels, if keeps_power is set: the expected power of each echo, and the end of each tile's echoes.
   struct Run {
     std::uint32_t tile;
     int end;  // index after the last echo of the tile
@@ -71,7 +71,7 @@ struct Echoes {
   std::vector<Run> runs;
 };
 
-/// An echo without a surface. Beams receive it from its exact direction, not from that of a column.
+/// An echo without a surface. Beams receive it from its exact direction, not from the direction of a column.
 struct PointEcho {
   double sine = 0;  // y / r
   double sample = 0;
@@ -88,9 +88,9 @@ struct SampledPulse {
 /// Complex signals per column at the sample centres, interleaved; in expected power, re is a power.
 struct ColumnSignals {
   int columns = 0, samples = 0;
-  int lead = 0;               // number of samples before sample 0, for pulses that begin earlier
+  int lead = 0;               // number of samples before sample 0; pulses may begin there
   std::ptrdiff_t stride = 0;  // floats from column to column
-  AlignedFloats data;         // every column is aligned to a cache line, too
+  AlignedFloats data;         // every column is aligned to a cache line
 
   void shape(int column_count, int sample_count, int taps);
   float* column(int k) { return data.data() + k * stride; }
@@ -103,7 +103,7 @@ struct BeamSignals {
   std::ptrdiff_t stride = 0;  // floats from beam to beam
   std::vector<float> data;
 
-  /// Sets the size for samples [first, first + count); rows consist of whole vectors.
+  /// Sets the size for samples [first, first + count). Rows consist of whole vectors.
   void shape(int beam_count, int first, int count);
   const float* beam(int j) const { return data.data() + j * stride; }
   float* beam(int j) { return data.data() + j * stride; }

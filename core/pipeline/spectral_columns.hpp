@@ -1,5 +1,5 @@
 // Synthesis of columns via the spectrum, for pulses without a table of real values and for the exact mode (docs/acoustics.md,
-// section 4): echoes -> sums over frequencies -> times P(nu) -> values at the sample centres. It replaces `synthesize`.
+// section 4). Steps: echoes -> sums over frequencies -> times P(nu) -> values at the sample centres. It replaces `synthesize`.
 #pragma once
 
 #include "core/pipeline/pulses/pulse.hpp"
@@ -14,24 +14,25 @@ struct SpectralScratch {
   std::vector<spectral::Complex> sums, folded;
 };
 
-/// The period is the record plus the reach of the pulse on both sides, so that pulses beyond one end do not appear at the other
-/// end. The frequencies are the multiples of 1 / period in the pulse's band. The period is a whole number of samples; the
-/// spectrum is folded to as many values, so that the inverse transform gives the samples themselves. The error is that of
-/// FrequencySums at width 6, 1e-5.
+/// The period is the record plus the length of the pulse on both sides, so that pulses beyond one end do not appear at the
+/// other end. The frequencies are the multiples of 1 / period in the pulse's band. The period is a whole number of samples, and
+/// the spectrum is folded to this number of values. Therefore the inverse transform gives the samples themselves. The error is
+/// that of FrequencySums at width 6, 1e-5.
 class SpectralColumns {
  public:
-  /// `taps`: number of samples of a pulse, as in PingPlan::taps. Any pulse is possible; real ones are faster by `synthesize`.
+  /// `taps`: number of samples of a pulse, as in PingPlan::taps. Every pulse is possible, but `synthesize` is faster for real
+  /// ones.
   SpectralColumns(const Pulse& pulse, double sample_time_s, int samples, int taps);
 
   int period_samples() const { return period_; }
   int frequencies() const { return sums_.count(); }
   const spectral::FrequencySums& sums() const { return sums_; }
-  /// Factor of every sum: the pulse's spectrum divided by the period.
+  /// Factor of every sum: spectrum of the pulse divided by the period.
   std::span<const spectral::Complex> response() const { return response_; }
   std::size_t bytes() const;  // approximate
 
   void begin(int columns, SpectralScratch& scratch) const;
-  /// Adds the echoes to the grids; their columns must lie in [first_column, first_column + columns of begin()).
+  /// Adds the echoes to the grids. Their columns must lie within the columns passed to begin(), from first_column on.
   void add(Echoes& echoes, int first_column, SpectralScratch& scratch) const;
   /// Adds the resulting samples to columns [first, last) of `signals`.
   void finish(int first, int last, SpectralScratch& scratch, ColumnSignals& signals) const;

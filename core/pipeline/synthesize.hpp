@@ -1,5 +1,5 @@
 // Stage three: sums pulses in time for each column, at the sample centres (docs/acoustics.md, section 4). The pulse has a
-// formula, so that it is evaluated only at samples, without sums over frequencies or a transform.
+// formula, so it is evaluated only at samples. No sums over frequencies and no transform are needed.
 #pragma once
 
 #include "core/pipeline/noise.hpp"
@@ -8,11 +8,11 @@
 
 namespace sonar {
 
-/// Zeroes columns [first, last).
+/// Sets columns [first, last) to zero.
 void clear_columns(ColumnSignals& signals, int first, int last);
 
-/// Sets columns [first, last) to zero, or to the noise where the transmitter's pattern is 1, which saves a second pass over these
-/// columns.
+/// Sets columns [first, last) to zero, or to the noise where the transmitter's pattern is 1. Such columns need no second pass
+/// for the noise.
 void begin_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals);
 /// Adds the pulses of the echoes, whose columns must lie in [first_column, ...) of `signals`.
 void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernels& kernels, ColumnSignals& signals);

@@ -1,5 +1,5 @@
-// Stage one: a sparse fan of rays from the aperture finds the visible surfaces. The result is a depth map per column. Scatterers
-// belong to the surfaces (scatter.hpp), so that rays decide shadows only.
+// Stage one: a sparse fan of rays from the aperture finds the visible surfaces. The result is a depth map for each column.
+// Scatterers belong to the surfaces (scatter.hpp), so rays only determine shadows.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct FanScratch {
   std::vector<FanInterval> open, halves;
 };
 
-/// Traces columns [first, last) and draws them into the map, which has been shaped to hold them. Returns the number of rays.
+/// Traces columns [first, last) and draws them into the map, which must already have its shape. Returns the number of rays.
 std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                       FanScratch& scratch, DepthMap& seen);
 

@@ -1,4 +1,4 @@
-// Ground truth for a picture: the first hit of each beam, from rays that the picture needs, too.
+// Ground truth for a picture: the first hit of each beam, from the rays that were traced for the picture.
 #pragma once
 
 #include <span>
@@ -12,12 +12,12 @@ namespace sonar {
 /// Half the -3 dB width of the two-way elevation pattern.
 float truth_half_width_rad(const PingPlan& plan);
 
-/// The nearest hit within the -3 dB elevation width of every column of [first, last), which `fan` has traced.
+/// The nearest hit within the -3 dB elevation width in every column of [first, last). `fan` has traced these columns.
 void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int last, std::span<BeamTruth> by_column);
 /// The same from the fixed fan's hits.
 void note_first_hits(std::span<const FanHit> hits, const PingPlan& plan, std::span<BeamTruth> by_column);
 
-/// Each beam gets the first hit of the column nearest to it.
+/// Gives each beam the first hit of the column nearest to it.
 std::vector<BeamTruth> truth_of_beams(const PingPlan& plan, std::span<const BeamTruth> by_column);
 
 }  // namespace sonar

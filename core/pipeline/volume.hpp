@@ -1,5 +1,5 @@
-// Reverberation of the water: its particles scatter a little everywhere, up to the first solid surface. It is added to the
-// column signals between synthesis and beamforming (docs/acoustics.md, section 3).
+// Reverberation of the water: particles scatter a little everywhere up to the first solid surface. It is added to the column
+// signals between synthesis and beamforming (docs/acoustics.md, section 3).
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct VolumeScratch {
 /// Solid angle of a column per radian about the array.
 double volume_column_width(const PingPlan& plan, int column);
 
-/// The volume reverberation of one ping. It has no effect in clear water, and if it is switched off.
+/// The volume reverberation of one ping. It is absent in clear water and if it is switched off.
 class Volume {
  public:
   Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars);
@@ -33,13 +33,13 @@ class Volume {
   };
 
   bool is_audible() const { return !open_power_.empty(); }
-  /// Adds to columns [first, last), before the transmitter's pattern is applied. `seen`: the depth map of these columns; null
-  /// = no surface ends the fan. It differs for every (seed, sonar, ping); in expected power the mean is added, and `noise` is not
-  /// used.
+  /// Adds the reverberation to columns [first, last), before the transmitter's pattern is applied. `seen`: the depth map of
+  /// these columns; null = no surface ends the fan. The reverberation differs for every (seed, sonar, ping). In expected power
+  /// its mean is added, and `noise` is not used.
   void add(const DepthMap* seen, const PingNoise& noise, int first, int last, VolumeScratch& scratch,
            ColumnSignals& signals) const;
 
-  // The data of add(), for engines that compute the same on a device.
+  // The data of add(), for engines that compute the same values on a device.
   const std::vector<Slice>& slices() const { return slices_; }
   double open_fan() const { return open_fan_; }
   const std::vector<double>& open_power_upa2() const { return open_power_; }

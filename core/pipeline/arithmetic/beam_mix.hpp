@@ -8,14 +8,14 @@
 
 namespace sonar {
 
-/// The tables of BeamMix; a null table means that its part is off. Signals are complex [beams][stride / 2], interleaved; in
+/// The tables of BeamMix. A null table means that its part is off. Signals are complex [beams][stride / 2], interleaved. In
 /// expected power, re is a power, and taps and shares are squared.
 struct BeamMixView {
-  const float* turn_m;                          // [beams]: phase error at the aperture's ends times range [rad m]
-  const float* taps;                            // complex [sets][2 reach + 1], beams j - reach to j + reach
-  const std::int32_t* reach;                    // [sets]: number of taps on either side that are not 0
-  const float *own, *share;                     // [beams]: weight of the beam, and of each neighbour
-  std::int32_t beams, sets, widest, step;       // widest: largest reach; step: distance of neighbours in beams
+  const float* turn_m;                     // [beams]: phase error at the aperture's ends times range [rad m]
+  const float* taps;                       // complex [sets][2 reach + 1], beams j - reach to j + reach
+  const std::int32_t* reach;               // [sets]: number of taps on either side that are not 0
+  const float *own, *share;                // [beams]: weight of the beam, and of each neighbour
+  std::int32_t beams, sets, widest, step;  // widest: largest reach; step: number of beams between two neighbours that are mixed
   float sets_per_rad, first_range_m, sample_m;  // range of sample 0; spacing
 };
 
@@ -45,7 +45,7 @@ SONAR_HD inline MixedSample refocused(const BeamMixView& v, const float* from, s
   return sum;
 }
 
-/// The sample with a fraction of both neighbouring beams; the outermost beams have one neighbour.
+/// The sample plus a fraction of both neighbouring beams. The outermost beams have only one neighbour.
 SONAR_HD inline MixedSample blended(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
                                     std::int32_t column) {
   const float* s = from + j * stride + 2 * static_cast<std::int64_t>(column);

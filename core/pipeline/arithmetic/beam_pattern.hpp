@@ -14,8 +14,8 @@ namespace sonar {
 /// Largest number of terms of a taper's cosine series.
 inline constexpr int taper_terms = 4;
 
-/// Aperture shading g(p) = 1 + 2 sum_m c[m] cos(2 pi m p), p = place on the aperture / its length; c[0] = 1.
-/// Its far-field amplitude is D(x) = sum_m c[|m|] sinc(x - m), x = aperture / wavelength * sine offset; D(0) = 1.
+/// Aperture shading g(p) = 1 + 2 sum_m c[m] cos(2 pi m p), p = position on the aperture / its length; c[0] = 1. Its far-field
+/// amplitude is D(x) = sum_m c[|m|] sinc(x - m), x = aperture / wavelength * sine offset; D(0) = 1.
 struct TaperSeries {
   double c[taper_terms] = {1, 0, 0, 0};
 };
@@ -66,7 +66,7 @@ SONAR_HD inline double beam_amplitude(Taper taper, double x) {
 
 /// The x > 0 on the main lobe at which D(x) falls to `level` (0 < level < 1).
 SONAR_HD inline double main_lobe_crossing(const TaperSeries& series, double level) {
-  double low = 0, high = 1;  // every taper here is below 0.7 at x = 1 and falls monotonically until then
+  double low = 0, high = 1;  // at x = 1, D of every taper here is below 0.7; up to there it falls monotonically
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
     (series_amplitude(series, middle) > level ? low : high) = middle;
@@ -79,7 +79,8 @@ SONAR_HD inline double width_factor(Taper taper) {
   return taper == Taper::unit ? 1.0 : 2 * main_lobe_crossing(taper_series(taper), std::sqrt(0.5));
 }
 
-/// Aperture in wavelengths for a -3 dB width [rad] at broadside: the beam spans +-sin(width / 2) (docs/acoustics.md, eq. 33).
+/// Aperture in wavelengths for a -3 dB width [rad] at broadside. The beam then spans +-sin(width / 2) (docs/acoustics.md, eq.
+/// 33).
 SONAR_HD inline double aperture_in_wavelengths(Taper taper, double width_rad) {
   return width_factor(taper) / (2 * std::sin(0.5 * width_rad));
 }
@@ -101,7 +102,7 @@ SONAR_HD inline ReceivePattern receive_pattern(const BeamPattern& pattern) {
           aperture_in_wavelengths(pattern.azimuth_taper, static_cast<double>(pattern.azimuth_width_rad))};
 }
 
-/// Pattern of beam `j`. Listed beams may have different widths w; in sine, w spans 2 sin(w / 2) cos(azimuth).
+/// Pattern of beam `j`. Listed beams may have different widths w; in the sine, w spans 2 sin(w / 2) cos(azimuth).
 inline ReceivePattern receive_pattern(const FrequencyMode& mode, std::size_t j) {
   ReceivePattern pattern = receive_pattern(mode.pattern);
   if (!mode.has_own_widths()) return pattern;
@@ -111,8 +112,8 @@ inline ReceivePattern receive_pattern(const FrequencyMode& mode, std::size_t j) 
   return pattern;
 }
 
-/// Integral of D^2 over u, the limit of sum_k W_jk^2 du_k: the width in sine space from which a beam collects scatterers.
-/// The terms of the series are orthonormal, so this is exact. Not defined for `unit`.
+/// Integral of D^2 over u, the limit of sum_k W_jk^2 du_k. It is the width in sine space from which a beam collects scatterers.
+/// The terms of the series are orthonormal, so this value is exact. Not defined for `unit`.
 SONAR_HD inline double effective_beam_width_u(Taper taper, double aperture_wavelengths) {
   const TaperSeries series = taper_series(taper);
   double sum = 1;
@@ -120,8 +121,8 @@ SONAR_HD inline double effective_beam_width_u(Taper taper, double aperture_wavel
   return sum / aperture_wavelengths;
 }
 
-/// Vertical aperture in wavelengths of each of the two equal sincs (transmit, receive). At half the data sheet's width to either
-/// side, one pattern (one_way) or the product of both (two_way) is at half power.
+/// Vertical aperture in wavelengths of each of the two equal sincs (transmit, receive). At half of the data sheet's width from
+/// the axis, one pattern (one_way) or the product of both (two_way) is at half power.
 SONAR_HD inline double elevation_aperture_in_wavelengths(const BeamPattern& pattern) {
   const double level = pattern.elevation_width_is == ElevationWidthIs::one_way ? std::sqrt(0.5) : std::sqrt(std::sqrt(0.5));
   const double half_width = 0.5 * static_cast<double>(pattern.elevation_width_rad);
@@ -134,13 +135,15 @@ SONAR_HD inline double elevation_two_way(double elevation_aperture_wavelengths, 
   const double d = sinc(elevation_aperture_wavelengths * std::sin(psi_rad));
   return d * d;
 }
-/// elevation_two_way() from the data sheet's widths. It solves for the aperture, so in loops compute the aperture once.
+/// Like elevation_two_way() for a known aperture, but from the data sheet's widths. It solves for the aperture, so loops should
+/// compute the aperture once.
 SONAR_HD inline double elevation_two_way(const BeamPattern& pattern, double psi_rad) {
   if (pattern.elevation_taper == Taper::unit) return std::fabs(psi_rad) < 0.5 * pi ? 1 : 0;
   return elevation_two_way(elevation_aperture_in_wavelengths(pattern), psi_rad);
 }
 
-/// |psi| at which Dtx * Erx has fallen to `level` (0 < level < 1, amplitude), which a fan must reach. pi / 2 for `unit`.
+/// The |psi| at which Dtx * Erx has fallen to `level` (0 < level < 1, amplitude). A fan must extend to this angle. pi / 2 for
+/// `unit`.
 SONAR_HD inline double elevation_reach_rad(const BeamPattern& pattern, double level) {
   if (pattern.elevation_taper == Taper::unit) return 0.5 * pi;
   const double sine = main_lobe_crossing(TaperSeries{}, std::sqrt(level)) / elevation_aperture_in_wavelengths(pattern);
@@ -159,7 +162,7 @@ SONAR_HD inline ConicalDirection flat_from_sonar(Vec3d direction_in_sonar) {
   const double h = std::sqrt(direction_in_sonar.x * direction_in_sonar.x + direction_in_sonar.y * direction_in_sonar.y);
   return {direction_in_sonar.y / h, std::atan2(direction_in_sonar.z, h)};
 }
-/// The inverse functions, which return unit vectors.
+/// The inverse functions. They return unit vectors.
 SONAR_HD inline Vec3d sonar_from_conical(const ConicalDirection& d) {
   const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
   return {across * std::cos(d.psi_rad), d.u, across * std::sin(d.psi_rad)};
@@ -168,8 +171,8 @@ SONAR_HD inline Vec3d sonar_from_flat(const ConicalDirection& d) {
   const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
   return {across * std::cos(d.psi_rad), d.u * std::cos(d.psi_rad), std::sin(d.psi_rad)};
 }
-/// The direction in float, from u, sqrt(1 - u^2), and the sine and cosine of psi. Float is sufficient for rays, which only
-/// decide about shadows.
+/// The direction in float, from u, sqrt(1 - u^2), and the sine and cosine of psi. Float is sufficient for rays, because rays
+/// only determine shadows.
 SONAR_HD constexpr Vec3 ray_in_sonar(bool conical, float u, float across, float cosine, float sine) {
   return {across * cosine, conical ? u : u * cosine, conical ? across * sine : sine};
 }

@@ -1,5 +1,5 @@
-// Fresnel integrals C(x) and S(x), from which the echo of a limited mirror follows (docs/acoustics.md, section 3). Only C++17
-// and the standard library.
+// Fresnel integrals C(x) and S(x), which give the echo of a limited mirror (docs/acoustics.md, section 3). Only C++17 and the
+// standard library.
 #pragma once
 
 #include <cmath>
@@ -9,12 +9,13 @@
 
 namespace sonar {
 
-/// C(x) = integral of cos(pi t^2 / 2) from 0 to x, S(x) that of the sine: the standard definition, 1/2 each at infinity.
+/// C(x) = integral of cos(pi t^2 / 2) from 0 to x, S(x) = integral of the sine. This is the standard definition; both are 1/2
+/// at infinity.
 struct FresnelPair {
   double c = 0, s = 0;
 };
 
-/// Sum of the power series: C + iS = sum_n (i pi / 2)^n x^(2n + 1) / (n! (2n + 1)). For small x; at 2.4 it loses 4 digits.
+/// Sum of the power series: C + iS = sum_n (i pi / 2)^n x^(2n + 1) / (n! (2n + 1)). For small x; at x = 2.4 it loses 4 digits.
 SONAR_HD inline FresnelPair fresnel_series(double x) {
   const double step = 0.5 * pi * x * x;
   FresnelPair sum;
@@ -40,8 +41,8 @@ SONAR_HD inline FresnelPair fresnel_series(double x) {
   return sum;
 }
 
-/// C + iS = (1 + i) / 2 (1 - erfc z), z = sqrt(pi) / 2 (1 - i) x, with the continued fraction of erfc
-/// (Abramowitz & Stegun 7.1.14) run backwards. For x of at least 2.4.
+/// C + iS = (1 + i) / 2 (1 - erfc z), z = sqrt(pi) / 2 (1 - i) x. The continued fraction of erfc (Abramowitz & Stegun 7.1.14)
+/// is evaluated backwards. For x of at least 2.4.
 SONAR_HD inline FresnelPair fresnel_fraction(double x) {
   const double zr = 0.5 * std::sqrt(pi) * x, zi = -zr;
   double fr = zr, fi = zi;

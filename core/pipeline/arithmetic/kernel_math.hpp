@@ -13,8 +13,9 @@ namespace sonar {
 
 /// Terms of the even polynomial that approximates the elevation pattern, in w = sin^2(elevation angle).
 inline constexpr int elevation_terms = 9;
-/// Each node of the depth map names its object: the last six bits of 1 / x hold the object's number modulo 64. If a scene has
-/// more than 64 objects, the last ten bits of the slope hold further bits of the number; the slope needs little precision.
+/// Each node of the depth map names its object. The last six bits of 1 / x hold the object's number modulo 64. If a scene has
+/// more than 64 objects, the last ten bits of the slope hold further bits of the number, because the slope needs little
+/// precision.
 inline constexpr int surface_mark_bits = 6;
 inline constexpr std::int32_t surface_marks = (1 << surface_mark_bits) - 1, upper_marks = 1023;
 SONAR_HD constexpr std::int32_t surface_mark(std::uint32_t object) { return static_cast<std::int32_t>(object & 0xFFFFu); }
@@ -22,12 +23,13 @@ SONAR_HD constexpr std::int32_t upper_mark(std::int32_t mark) { return mark >> s
 SONAR_HD constexpr bool has_upper_marks(std::size_t objects) { return objects > static_cast<std::size_t>(surface_marks) + 1; }
 /// A cell of another object is hidden if it lies more than contact_m [m] + contact_share * range behind the hit surface.
 inline constexpr float contact_m = 1e-3f, contact_share = 2e-5f;
-/// The axis of the depth map. Bins are uniform in the tangent: narrow ones between two edges, wide ones in the side lobes
-/// outside them.
+/// The axis of the depth map. Bins are uniform in the tangent: narrow between the two edges, wide in the side lobes outside
+/// them.
 struct TangentAxis {
   float middle_bin, edge_tangent, bins_per_tangent, side_bins_per_tangent;
 };
-/// Look-ups stay at least this far below the last bin's end, because a tangent just below the fan's edge may be rounded to it.
+/// Look-ups stay at least this far below the end of the last bin, because a tangent just below the fan's edge may be rounded up
+/// to the edge.
 inline constexpr float bin_rounding = 1.0f / 1024;
 /// Intervals of a tabulated scattering law; the table has law_steps + 2 values.
 inline constexpr int law_steps = 128;
@@ -52,7 +54,7 @@ SONAR_HD inline float tangent_of_bin(const TangentAxis& a, float bin) {
 SONAR_HD inline float with_last_bits(float x, std::int32_t bits, std::int32_t among) {
   return float_of((bits_of(x) & ~static_cast<std::uint32_t>(among)) | static_cast<std::uint32_t>(bits & among));
 }
-/// 0 means that nothing was hit, and stays 0.
+/// Marks a node with its object. A node of 0 means that nothing was hit, and stays 0.
 SONAR_HD inline float with_mark(float inverse_x, std::int32_t mark) {
   return inverse_x > 0 ? with_last_bits(inverse_x, mark, surface_marks) : inverse_x;
 }

@@ -1,4 +1,4 @@
-// Computes the start of a column's noise in the table of shaped noise, and the quarter turns by which the noise is rotated.
+// Computes where the noise of a column starts in the table of shaped noise, and by how many quarter turns it is rotated.
 // Receiver noise, the leak and the volume reverberation use it. Only C++17 and the standard library.
 #pragma once
 
@@ -11,7 +11,7 @@ namespace sonar {
 
 inline constexpr std::uint32_t noise_table_samples = 1u << 18;
 
-/// The leak has separate sonar numbers, and one ping number for its part that is the same in every ping.
+/// The leak has its own sonar numbers. Its steady part, which is the same in every ping, has one fixed ping number.
 SONAR_HD constexpr std::uint32_t leak_sonar(std::uint32_t sonar) { return sonar ^ static_cast<std::uint32_t>(Domain::leak); }
 inline constexpr std::uint32_t every_ping = 0xFFFFFFFFu;
 /// First column number of the volume reverberation; receiver noise has lower numbers.

@@ -14,7 +14,7 @@ namespace sonar {
 
 /// Thermal noise spectrum level, Mellen: -15 + 20 log10 f_kHz [dB re 1 uPa^2/Hz].
 SONAR_HD inline double thermal_noise_db(double centre_hz) { return -15 + 20 * std::log10(centre_hz * 1e-3); }
-/// DI = 10 log10(4 pi / (theta phi)) with the nominal -3 dB widths [rad].
+/// DI = 10 log10(4 pi / (theta phi)), the directivity index [dB], with the nominal -3 dB widths [rad].
 SONAR_HD inline double directivity_index_db(double azimuth_width_rad, double elevation_width_rad) {
   return 10 * std::log10(4 * pi / (azimuth_width_rad * elevation_width_rad));
 }
@@ -45,8 +45,9 @@ SONAR_HD inline double full_scale_factor(const ReceiverModel& law, double gain_d
   return std::pow(10.0, gain_db / 20) / static_cast<double>(law.full_scale_upa);
 }
 
-/// Power gain of a row in formats that send it: the power ratio of the row's TVG to the smallest TVG, rounded to an integer, at
-/// least 1. The amplitude is multiplied by exactly sqrt(row gain), so that sample / sqrt(gain) restores it.
+/// Power gain of a row in formats that send it: the row's TVG divided by the smallest TVG, as a power ratio, rounded to an
+/// integer, at least 1. The amplitude is multiplied by exactly sqrt(row gain), so that sample / sqrt(gain) restores the
+/// amplitude.
 SONAR_HD inline std::uint32_t row_power_gain(double row_tvg_db, double smallest_tvg_db) {
   const double gain = std::floor(std::pow(10.0, 0.1 * (row_tvg_db - smallest_tvg_db)) + 0.5);
   if (!(gain > 1)) return 1;

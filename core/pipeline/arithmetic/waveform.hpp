@@ -10,11 +10,11 @@
 
 namespace sonar {
 
-/// sqrt(ln 2 / 2) = 0.58871: b t at which the intensity p^2 has fallen to one half.
+/// sqrt(ln 2 / 2) = 0.58871: the value of b t at which the intensity p^2 has fallen to one half.
 inline constexpr double half_power_bt = 0.58870501125773734;
 
 /// b [1/s] of the pulse whose -3 dB intensity width is `pulse_width_m` in one-way range at sound speed c: 0.5887 c / width.
-/// Use the c with which the width was specified, because b is a property of the signal in time.
+/// Pass the c for which the width was specified, because b is a property of the signal in time.
 SONAR_HD inline double envelope_parameter_hz(double sound_speed_mps, double pulse_width_m) {
   return half_power_bt * sound_speed_mps / pulse_width_m;
 }
@@ -31,7 +31,7 @@ SONAR_HD inline double envelope_spectrum_s(double b_hz, double frequency_offset_
 }
 /// tau_eff = integral of p^2 dt [s].
 SONAR_HD inline double energy_width_s(double b_hz) { return std::sqrt(0.5 * pi) / b_hz; }
-/// B_n: bandwidth of the rectangular filter that passes as much white noise as the pulse's filter, |P|^2 / |P(0)|^2 [Hz].
+/// B_n [Hz]: bandwidth of the rectangular filter that passes as much white noise as the pulse's filter, |P|^2 / |P(0)|^2.
 SONAR_HD inline double noise_bandwidth_hz(double b_hz) { return b_hz / std::sqrt(2 * pi); }
 /// Complex sample rate of the fine grid, F_s = 2 b.
 SONAR_HD inline double native_sample_rate_hz(double b_hz) { return 2 * b_hz; }
@@ -54,9 +54,9 @@ SONAR_HD inline double tone_envelope_spectrum_s(double length_s, double frequenc
 /// -3 dB width in delay, divided by the tone's length: 2 - sqrt 2. As a range, the width is 0.293 c T.
 inline constexpr double tone_width_per_length = 0.58578643762690485;
 
-/// Linear sweep over B after its matched filter with a Hamming window: the transform of 0.54 + 0.46 cos(2 pi nu / B), side lobes
-/// at -42.6 dB and falling as 1 / t. They fade out between 24 / B and 48 / B; without the fade they would be at -60 dB at
-/// 48 / B.
+/// A linear sweep over the bandwidth B after its matched filter with a Hamming window. It is the transform of 0.54 + 0.46 cos(2
+/// pi nu / B). Its side lobes start at -42.6 dB and fall as 1 / t. They fade out between 24 / B and 48 / B; without the fade
+/// they would be at -60 dB at 48 / B.
 SONAR_HD inline double sweep_envelope(double bandwidth_hz, double time_s) {
   constexpr double fade_from = 24, over_at = 48, neighbour = 0.23 / 0.54;
   const double x = std::fabs(bandwidth_hz * time_s);

@@ -1,5 +1,5 @@
-// Calls the stages of a ping, which compute samples from a request and a scene. The result depends only on the arguments; state
-// between calls (Workspace, SurfaceCells) only saves time.
+// Calls the stages of a ping, which compute samples from a request and a scene. The result depends only on the arguments. The
+// state that is kept between calls (Workspace, SurfaceCells) only saves time.
 #pragma once
 
 #include <memory>
@@ -14,10 +14,10 @@
 
 namespace sonar {
 
-/// Values kept from ping to ping: tables of the settings and buffers. One ping at a time.
+/// Values that are kept from ping to ping: tables of the settings, and buffers. A Workspace computes one ping at a time.
 class Workspace {
  public:
-  explicit Workspace(double (*now_s)() = nullptr);  // a clock for the statistics
+  explicit Workspace(double (*now_s)() = nullptr);  // now_s: a clock for the statistics
   ~Workspace();
 
   /// Sets the interruption that is called between groups of columns; null = none. Must not be called during a ping.
@@ -32,9 +32,9 @@ class Workspace {
   std::unique_ptr<Buffers> buffers_;
 };
 
-/// `cells` must belong to the scene of `scene` and to the request's seed; RayScene::place() must have been called. If `labels`
-/// is not null, it is filled, which does not change the ping. If `beams` are not all beams, samples and truth of the others are
-/// undefined, and `labels` must be null.
+/// Computes one ping. `cells` must belong to the scene of `scene` and to the request's seed; RayScene::place() must have been
+/// called. If `labels` is not null, the labels are stored there; they do not change the ping. If `beams` does not contain all
+/// beams, samples and truth of the others are undefined, and `labels` must be null.
 Ping simulate(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
               Workspace& work, Parallel& pool, PingLabels* labels = nullptr, BeamChoice beams = {});
 

@@ -1,5 +1,5 @@
-// Multipath, off by default (Switches::multipath): computes all echoes via flat mirrors as column signals, which are added to the
-// direct ones. It runs once per ping, before the columns are simulated (docs/acoustics.md, section 3).
+// Multipath, off by default (Switches::multipath): computes all echoes via flat mirrors as column signals, which are added to
+// the direct ones. It runs once for each ping, before the columns are simulated (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>
@@ -10,13 +10,13 @@
 
 namespace sonar {
 
-/// Values kept from ping to ping. They belong to one scene.
+/// Values that are kept from ping to ping. They belong to one scene.
 struct MultipathWork {
   bool faces_found = false;
   FlatFaces faces;
   ImagePaths image_paths;
   ColumnSignals columns;                     // echoes via mirrors
-  bool has_echoes = false;                   // whether there are any
+  bool has_echoes = false;                   // false: `columns` has no echoes
   std::vector<std::vector<Echoes>> batches;  // echoes waiting, per batch of tiles and group of columns
   std::vector<SpectralScratch> spectral;     // per group of columns, if pulses are summed via the spectrum
 };
@@ -24,8 +24,8 @@ struct MultipathCounts {
   std::size_t rays = 0, echoes = 0;
 };
 
-/// Fills `work.columns` (before the transmitter's pattern and noise) and appends the ghosts of point targets to `points`.
-/// It calls SurfaceCells::in_view(), so that results of earlier calls become invalid.
+/// Computes `work.columns` (before the transmitter's pattern and noise) and appends the ghosts of point targets to `points`.
+/// The function calls SurfaceCells::in_view(), so the results of earlier calls become invalid.
 MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& work, std::vector<PointEcho>& points);
 
 /// Adds columns [first, last) of the multipath echoes to `signals`.

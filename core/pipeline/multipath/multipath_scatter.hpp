@@ -1,5 +1,5 @@
-// Echoes via mirrors: every pair of paths, one out and one back, between the sonar and a cell or a point target. Pairs that
-// differ only in direction have the same delay and phase, so they add coherently (docs/acoustics.md, section 3).
+// Echoes via mirrors. A path out and a path back form a pair between the sonar and a cell or a point target. Pairs that differ
+// only in direction have the same delay and phase, so they add coherently (docs/acoustics.md, section 3).
 #pragma once
 
 #include <span>
@@ -11,15 +11,16 @@
 
 namespace sonar {
 
-/// Inputs of one ping's echoes via mirrors.
+/// The inputs for the echoes of one ping via mirrors.
 struct ImagePaths {
   std::vector<FlatMirror> mirrors;
-  std::vector<Path> paths;  // paths with a part of the map; [0] is the straight one
+  std::vector<Path> paths;  // paths that a part of the map belongs to; [0] is the straight path
   BounceMap map;
   BubbleLayer bubbles;
 };
 
-/// Lengths of a path on which a ball around a place (axes of PingScalars::seen_from) is visible with a delay within the record.
+/// Lengths of a path on which a ball around a point is visible with a delay within the record. The point is in the axes of
+/// PingScalars::seen_from.
 class PathReach {
  public:
   PathReach(const Path& path, const ImagePaths& image_paths, const PingPlan& plan, const PingScalars& scalars);
@@ -32,11 +33,11 @@ class PathReach {
     double low_rad = 1, high_rad = -1;  // elevations; empty at first
   };
   const PingPlan& plan_;
-  double longest_m_;         // out and back together
-  std::vector<Span> spans_;  // spans of the path's windows, for each block of columns
+  double longest_m_;         // length of the ways out and back together
+  std::vector<Span> spans_;  // spans of the path's windows for each block of columns
 };
 
-/// Amplitude of one pattern, transmitter's or receiver's, at an elevation.
+/// Amplitude of one pattern, of the transmitter or the receiver, at an elevation.
 class OneWayPattern {
  public:
   explicit OneWayPattern(const BeamPattern& pattern);
@@ -46,7 +47,7 @@ class OneWayPattern {
   float aperture_ = 0;  // wavelengths, 0 = no pattern
 };
 
-/// Computes the echoes of tiles of cells via mirrors; one per worker and ping.
+/// Computes the echoes of tiles of cells via mirrors. Each worker has one object for each ping.
 class MultipathScatterer {
  public:
   static constexpr int group_columns = 64;  // echoes are sorted by groups of this many receiving columns
@@ -61,19 +62,19 @@ class MultipathScatterer {
     float from_sonar_object[3], from_sonar[3], turn[9];  // geometry of the tile's image, as in simd::TileSeen
     float range_m, sample_shift, half_turns, amplitude;
     float reflection, rough_normal[2][3];  // product of the mirrors' Rc; their normals times sqrt(2) k h, sonar axes
-    float lit_normal[3], lit_height;       // object axes; places with dot + height above 0 are lit by the last mirror
+    float lit_normal[3], lit_height;       // object axes; points with dot + height above 0 are lit by the last mirror
   };
-  struct Arrival {                      // one cell by one path
-    float range_m, sample_shift, size;  // size: pressure per source, root of the scattering law included
+  struct Arrival {                      // one cell seen by one path
+    float range_m, sample_shift, size;  // size: pressure per source, includes the root of the scattering law
     std::complex<float> carried;        // `size` with the carrier's phase
     float transmit, sine;
     int column;
-    bool front;  // the side of the surface
+    bool front;  // side of the surface
   };
   struct Cell {
     float x, y, z;  // relative to the tile's centre [m]
     float normal[3];
-    std::complex<float> weight;  // xi * root of the area * source; the root alone in expected power
+    std::complex<float> weight;  // xi * root of the area * source; in expected power only the root
   };
 
   TilePath look_at(const TileInView& tile, const Path& path) const;
@@ -102,10 +103,11 @@ class MultipathScatterer {
   bool direct_ = false;  // whether arrivals_[0] is the direct path
 };
 
-/// sum_k W(k) W(k + n) / sum_k W(k)^2 of the receive pattern over columns: the correlation of two columns n apart.
+/// sum_k W(k) W(k + n) / sum_k W(k)^2 of the receive pattern over columns: the correlation of two columns that are n columns
+/// apart.
 std::vector<float> beam_correlation_over_columns(const PingPlan& plan);
 
-/// Echoes of the point targets; appends to `points`.
+/// Computes the echoes of the point targets via mirrors and appends them to `points`.
 void multipath_of_points(const PingContext& context, const FlatFaces& faces, const ImagePaths& image_paths,
                          std::vector<PointEcho>& points);
 

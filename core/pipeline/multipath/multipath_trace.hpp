@@ -1,6 +1,5 @@
-// Traces the view via mirrors: the rays of a fan are followed via up to two flat mirrors. Each direction has one
-// sequence of mirrors, so that one map is enough for all paths. multipath_scatter looks up in this map which points each path
-// reaches.
+// Traces the view via mirrors: the rays of a fan are followed via up to two flat mirrors. Each direction has one sequence of
+// mirrors, so one map is enough for all paths. multipath_scatter uses this map to find the points that each path reaches.
 #pragma once
 
 #include <array>
@@ -14,8 +13,8 @@
 
 namespace sonar {
 
-/// Directions in which echoes via mirrors leave and arrive. Columns are those of PingPlan. Elevations are wider than for direct
-/// echoes, because only one of the two paths may be far off the axis: they extend to 0.1 of the one-way pattern.
+/// Directions in which echoes via mirrors leave and arrive. Columns are those of PingPlan. Elevations extend farther than for
+/// direct echoes, to 0.1 of the one-way pattern, because only one of the two paths may be far off the axis.
 struct BounceFan {
   double half_angle_rad = 0;
   float first_tangent = 0, bins_per_tangent = 0;
@@ -24,7 +23,7 @@ struct BounceFan {
 };
 BounceFan make_bounce_fan(const PingPlan& plan);
 
-/// The part of a block of columns that belongs to a path; may be empty.
+/// The part of a block of columns that belongs to one path. It may be empty.
 struct PathWindow {
   int first_bin = std::numeric_limits<int>::max(), last_bin = -1;  // inclusive
   bool empty() const { return last_bin < first_bin; }
@@ -34,7 +33,7 @@ struct PathWindow {
 struct BounceMap {
   static constexpr std::uint8_t no_mirror = 0xFF;
   struct Node {
-    /// [n]: 1 / x of the surface hit after n bounces (0: none); x runs along the unfolded path, as in DepthMap.
+    /// [n]: 1 / x of the surface that is hit after n bounces (0: none). x is measured along the unfolded path, as in DepthMap.
     float inverse_x[3];
     std::uint8_t mirror[2];  // index of the first and the second mirror, or no_mirror
   };
@@ -53,11 +52,11 @@ struct BounceMap {
   bool owns_nothing(const Path& path) const;
 };
 
-/// Returns the number of rays.
+/// Traces the fan. Returns the number of rays.
 std::size_t trace_bounces(const PingContext& context, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,
                           BounceMap& map);
 
-/// Follows a path via its mirrors to a place, and returns whether no surface blocks it.
+/// Follows a path via its mirrors to a point, and returns true if no surface blocks the path.
 bool reaches(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors,
              const Path& path, Vec3d place);
 

@@ -1,5 +1,5 @@
 // The pulse of one ping: the receiver's output for one point echo, as a function of time and of frequency, for all shapes
-// (docs/acoustics.md, section 4); and the tables of the pulse that synthesis and noise use.
+// (docs/acoustics.md, section 4). Also the tables of the pulse that synthesis and noise use.
 #pragma once
 
 #include <complex>
@@ -14,7 +14,7 @@ namespace sonar {
 class Pulse {
  public:
   Pulse() = default;
-  /// `width_s`: -3 dB width of |p|^2 in delay, 2 / c times the one in range. A measured pulse ignores it.
+  /// `width_s`: -3 dB width of |p|^2 in delay, 2 / c times the width in range. A measured pulse ignores it.
   Pulse(const Waveform& waveform, double width_s);
 
   Waveform::Shape shape() const { return shape_; }
@@ -27,8 +27,8 @@ class Pulse {
   double width_s() const { return width_s_; }
   /// p is zero beyond this delay (Gaussian: below 2e-10).
   double reach_s() const { return reach_s_; }
-  /// Width of the band about zero outside of which P is negligible: below 1e-6 of its peak; for a tone, whose corners need an
-  /// unlimited band, 4e-4; for a measured pulse 1e-4.
+  /// Width of the band about zero outside which P is negligible: below 1e-6 of its peak; for a measured pulse, below 1e-4. A
+  /// tone has corners, which need an unlimited band; its limit is 4e-4.
   double band_hz() const { return band_hz_; }
   /// tau_eff = integral of |p|^2 dt.
   double energy_width_s() const { return energy_width_s_; }
@@ -54,13 +54,13 @@ std::string why_invalid(const Waveform& waveform, double sample_time_s);
 /// The sweep's bandwidth for a -3 dB width of the compressed pulse in delay.
 double sweep_bandwidth_hz(double width_s);
 
-/// simd::PulseRows of the real part of p, or of |p|^2, on a grid of this sample time.
+/// Makes simd::PulseRows of the real part of p, or of |p|^2, on a grid with this sample time.
 std::vector<float> make_pulse_rows(const Pulse& pulse, double sample_time_s, int taps, int steps, bool squared);
 /// Number of taps of such rows, a multiple of 8.
 int taps_of(const Pulse& pulse, double sample_time_s);
 
-/// Real taps h with sum_n h_n h_{n+k} = Re correlation(k sample times), h_n h_n summing to 1: white noise filtered by h has the
-/// pulse's correlation on this grid. (For a complex pulse, this is the mean of its spectrum and the mirrored spectrum.)
+/// Real taps h for which sum_n h_n h_{n+k} = Re correlation(k sample times), and h_n h_n sums to 1. White noise filtered by h
+/// has the pulse's correlation on this grid. (For a complex pulse, this is the mean of its spectrum and the mirrored spectrum.)
 std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s);
 
 }  // namespace sonar

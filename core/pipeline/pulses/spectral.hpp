@@ -27,37 +27,39 @@ struct Arrival {
   Complex amplitude;
 };
 
-/// F[m] = sum_i A_i e^{-i 2 pi f_m tau_i}, term by term in double: the test oracle. Needs no transform.
+/// F[m] = sum_i A_i e^{-i 2 pi f_m tau_i}, term by term in double. Tests compare with it. It needs no transform.
 std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid);
 
-/// The same sums by a non-uniform transform; relative L2 error about 8e-6 at width 6, see FrequencySums.
+/// The same sums by a non-uniform transform. The relative L2 error is about 8e-6 at width 6, see FrequencySums.
 std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width = 6);
 
-/// Non-uniform Fourier transform, type 1: every echo is spread over `width` points of a grid twice as fine as needed with the
-/// kernel exp(2.3 width (sqrt(1 - x^2) - 1)) (docs/acoustics.md, eq. 26), the grid is transformed, and the result is divided by
-/// the transform of the kernel. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9. Several threads
-/// may use one object, each with its own grid.
+/// Non-uniform Fourier transform, type 1. The grid is twice as fine as needed. Every echo is spread over `width` points of the
+/// grid with the kernel exp(2.3 width (sqrt(1 - x^2) - 1)) (docs/acoustics.md, eq. 26). The grid is transformed, and the result
+/// is divided by the transform of the kernel. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9.
+/// Several threads may use one object, each with its own grid.
 class FrequencySums {
  public:
   explicit FrequencySums(int count, int width = 6);
   int count() const { return count_; }
   /// Number of values in the grid, which the caller owns and sets to zero before the first add().
   int grid_points() const { return points_; }
-  /// Tables of add() and transform(), for an engine that computes the same on a device.
+  /// The tables of add() and transform(), for an engine that computes the same sums on a device.
   struct Tables {
     int width, terms, padded;
     std::span<const double> polynomial;  // [terms][padded], highest power first: the kernel at each of `width` points
     std::span<const double> correction;  // per sum: 1 / the kernel's transform
   };
   Tables tables() const { return {width_, terms_, padded_, polynomial_, correction_}; }
-  /// `turns`: delay times the frequency step, any finite number; delays that differ by whole turns give the same result.
+  /// Adds one echo. `turns`: delay times the frequency step, any finite number. Delays that differ by whole turns give the same
+  /// result.
   void add(double turns, Complex amplitude, Complex* grid) const;
-  /// Adds many echoes, each multiplied by e^{-i 2 pi turn_on turns} first; only with width 8. The grid needs room for `padding`
-  /// more values.
+  /// Adds many echoes, each multiplied by e^{-i 2 pi turn_on turns} first. Only for width 8. The grid must have room for
+  /// `padding` more values.
   void add(std::span<const double> turns, std::span<const double> re, std::span<const double> im, double turn_on,
            const simd::Kernels& kernels, Complex* grid) const;
   static constexpr int padding = simd::SpreadGrid::width;
-  /// sums[m] = sum_i A_i e^{-i 2 pi (m - count / 2) turns_i}, m in [0, count). The grid has no defined values afterwards.
+  /// sums[m] = sum_i A_i e^{-i 2 pi (m - count / 2) turns_i}, m in [0, count). The grid is used as working memory; its values
+  /// are undefined afterwards.
   void transform(Complex* grid, Complex* sums) const;
 
  private:

@@ -1,5 +1,5 @@
-// The discrete Fourier transform of the frequency-domain path (docs/acoustics.md, section 4): FFTW behind one class.
-// Its .cpp is the only file that includes FFTW; in a build without it (SONAR_FFTW=OFF) have_transform is false.
+// The discrete Fourier transform of the frequency-domain path (docs/acoustics.md, section 4): FFTW behind one class. Its .cpp
+// is the only file that includes FFTW. In a build without FFTW (SONAR_FFTW=OFF), have_transform is false.
 #pragma once
 
 #include <complex>
@@ -9,14 +9,14 @@ namespace sonar::spectral {
 
 using Complex = std::complex<double>;
 
-/// Whether this build has a transform. If not, Fft must not be constructed.
+/// True if this build has a transform. If it is false, Fft must not be constructed.
 extern const bool have_transform;
-/// The error for users in such a build: the reason and what to do.
+/// The error text of a build without a transform: the reason and the remedy.
 inline constexpr const char* no_transform =
     "this build has no Fourier transform: measured and exact pulses need one; install libfftw3-dev and build with SONAR_FFTW=ON";
 
 /// x[k] = sum_n x[n] e^{-+ i 2 pi k n / size}, in place, not scaled. Any number of threads may use one object. The result
-/// depends only on the input (plans are estimated, never measured).
+/// depends only on the input, because plans are estimated and never measured.
 class Fft {
  public:
   enum class Direction { forward, inverse };  // e^{-i ...}, e^{+i ...}

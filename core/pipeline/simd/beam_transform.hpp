@@ -1,4 +1,4 @@
-// The tables of a beam transform in the form that the kernels read: plain pointers into BeamTransformTables
+// The tables of a beam transform as the kernels read them: plain pointers into BeamTransformTables
 // (core/pipeline/plan_tables.hpp), which owns the tables.
 #pragma once
 

@@ -1,5 +1,5 @@
-// The hot loops of a ping, compiled from kernels.inl for each instruction set and chosen at run time. They read and write plain
-// arrays. Their callers (scatter, synthesize, form_beams, receive) explain the formulas.
+// The hot loops of a ping, compiled from kernels.inl for each instruction set and selected at run time. They read and write
+// plain arrays. The formulas are explained in their callers (scatter, synthesize, form_beams, receive).
 #pragma once
 
 #include <cstddef>
@@ -22,17 +22,17 @@ struct TileSeen {
   float range_m;               // range of the tile's centre
   float sample_shift;          // delay of its echoes by the Doppler effect
   float phase_turns;           // carrier phase of the tile centre, in [0, 1)
-  float amplitude;             // product of all factors that are constant over the tile, and of weight_unit
+  float amplitude;             // product of weight_unit and all factors that are constant over the tile
   const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine
-  float area_amplitude;        // like `amplitude`, with the cell size in place of the speckle (expected power)
+  float area_amplitude;        // like `amplitude`, with the cell size instead of the speckle (expected power)
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
-  // Tangents of its cells (absolute values): those of the fan's main part, or of the side lobes, where cells are coarser.
+  // Absolute values of the tangents of its cells: those of the fan's main part, or of the side lobes, where cells are coarser.
   float from_tangent, to_tangent;
   bool in_side_lobes;
   float tolerance_share;  // fraction of the range, in addition to GroupView::depth_tolerance_m
-  float turned_away;      // cells with normal * direction * turned_away > 0 scatter nothing; 0: all scatter
+  float turned_away;      // cells with normal * direction * turned_away > 0 scatter nothing; 0: all cells scatter
   std::int32_t mark;      // surface_mark of its object
-  bool moves;             // the sonar moves during the ping: look-ups in the depth map use positions in the axes of the rays
+  bool moves;             // the sonar moves during the ping: the depth map is read at positions in the axes of the rays
   float seen_turn[9], seen_place[3];  // position in these axes = seen_turn * position + seen_place; row-major
 };
 
@@ -41,7 +41,7 @@ struct CodeScale {
   float half_gamma, factor, rounding, max_code;
 };
 
-/// Values that hold for all tiles of one column group.
+/// Values that are the same for all tiles of one column group.
 struct GroupView {
   bool conical;  // cones about the array: u = y / r, t = z / x; else flat beams: u = y / h, t = z / h, h^2 = x^2 + y^2
   float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - u) * columns_per_sine
@@ -49,10 +49,10 @@ struct GroupView {
   TangentAxis axis;                         // axis t of the depth map
   int bins;                                 // values per column of the depth map; the map has bins + 1
   int map_first_column, fan_columns;        // first column of the depth map; number of columns of the fan
-  int columns_beside;                       // number of columns beside its own in which a cell is looked up if the sonar moves
-  const float* inverse_depth;               // DepthMap::inverse_x
-  const float* depth_slope;                 // DepthMap::per_column
-  bool has_upper_marks;                     // in depth_slope
+  int columns_beside;          // if the sonar moves: number of columns on either side in which a cell is also looked up
+  const float* inverse_depth;  // DepthMap::inverse_x
+  const float* depth_slope;    // DepthMap::per_column
+  bool has_upper_marks;        // in depth_slope
   float depth_tolerance_m;
   float turns_per_m;                                              // 2 f / c
   float decay_per_m;                                              // 2 alpha [Np/m]
@@ -68,10 +68,10 @@ struct EchoArrays {
   float* re;
   float* im;
   std::int32_t* column;    // absolute column
-  float* power = nullptr;  // expected value of |re + i im|^2, for labels; null: not needed, or already in re
+  float* power = nullptr;  // expected value of |re + i im|^2, for labels; null: not needed, or re has it
 };
 
-/// Rays that are scatterers. Each has its own complex Gaussian, which depends on its counters (core/base/random.hpp).
+/// Rays that are scatterers. Each ray has its own complex Gaussian, which depends on its counters (core/base/random.hpp).
 struct HitDraw {
   const std::uint32_t* counter[3];
   RandomKey key;
@@ -85,13 +85,14 @@ struct HitsToScatter {
   double turns_per_m;   // 2 f / c
 };
 
-/// The grid of a non-uniform transform (core/pipeline/pulses/spectral.hpp): `points` complex values, room for a kernel more.
+/// The grid of a non-uniform transform (core/pipeline/pulses/spectral.hpp): `points` complex values, and memory for one more
+/// kernel.
 struct SpreadGrid {
   static constexpr int width = 8;
   int points = 0, terms = 0;
   const double* polynomial = nullptr;  // [terms][width], highest first
 };
-/// Echoes to be spread, multiplied by e^{-i 2 pi turn_on turns} first.
+/// Echoes that are spread over the grid. Each is first multiplied by e^{-i 2 pi turn_on turns}.
 struct SpreadEchoes {
   const double *turns, *re, *im;
   double turn_on;
@@ -103,7 +104,7 @@ struct PulseRows {
   int taps, steps;
 };
 
-/// Complex taps of a beam's neighbours, which are the same on either side, and the number of neighbours.
+/// Complex taps of a beam's neighbours, and the number of neighbours. The taps are the same on either side.
 struct FocusTaps {
   const float* taps;
   int below, above;
@@ -111,7 +112,7 @@ struct FocusTaps {
 
 struct Kernels {
   const char* name;
-  /// Appends the visible cells of a tile; `out` has room for tile.count + 16 more. Returns how many were appended.
+  /// Appends the visible cells of a tile, and returns their number. `out` must have room for tile.count + 16 more.
   int (*scatter_tile)(const TileSeen&, const GroupView&, EchoArrays out);
   /// re + i im = weight * draw * exp(-decay_per_m range - i 2 pi turns_per_m range), for n <= HitsToScatter::most hits.
   void (*scatter_hits)(const HitsToScatter&, int n, float* re, float* im);
@@ -124,7 +125,7 @@ struct Kernels {
                      int lead);
   /// out[4][floats] = sum over k of panel[k][4] * in[k][floats]; floats is a multiple of 32.
   void (*form_beam_panel)(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats);
-  /// Makes beams of `floats` (a multiple of 32) interleaved values of each column, by a transform across the columns; `work`:
+  /// Makes beams from `floats` (a multiple of 32) interleaved values of each column, by a transform across the columns. `work`:
   /// BeamTransformTables::work_floats(), 64-byte aligned.
   void (*transform_beams)(const BeamTransform&, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,
                           std::ptrdiff_t out_stride);
@@ -142,8 +143,8 @@ struct Kernels {
                           int n);
 };
 
-/// The kernels of a level; `automatic` means the level in the environment variable SONARD_SIMD, else the best of this
-/// processor. If the processor lacks the level, the next lower one is used (on ARM, NEON in place of AVX). Throws
+/// The kernels of a level. `automatic` means the level in the environment variable SONARD_SIMD, else the best level of this
+/// processor. If the processor lacks the level, the next lower one is used (on ARM, NEON instead of AVX). Throws
 /// std::runtime_error if SONARD_SIMD is not the name of a level.
 const Kernels& kernels_for(SimdLevel level);
 

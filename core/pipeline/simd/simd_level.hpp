@@ -1,4 +1,4 @@
-// The instruction sets of the hot loops.
+// Names of the instruction sets for the hot loops.
 #pragma once
 
 #include <array>

@@ -15,14 +15,14 @@
 
 namespace sonar {
 
-/// Pressure reflected coherently at normal incidence: reflection times exp(-2 k^2 h^2), 0 for rough surfaces
-/// (smooth_below_kh) and if the result is less than a hundredth.
+/// Pressure that a surface reflects coherently at normal incidence: reflection times exp(-2 k^2 h^2). It is 0 for rough
+/// surfaces (smooth_below_kh) and for results below a hundredth.
 double coherent_reflection(const Material& material, double wavelength_m);
 
-/// Values kept between pings: all meshes with smooth materials, which are prepared when they first come into view.
+/// Values that are kept between pings: all meshes with smooth materials, prepared when they are first in view.
 class SpecularEchoes {
  public:
-  /// Appends the specular echoes of those surfaces that rays find visible.
+  /// Appends the specular echoes of the surfaces that rays find visible.
   void find(const PingContext& context, std::vector<PointEcho>& echoes);
   /// Drops meshes that no scene uses.
   void forget_unused();
@@ -33,7 +33,7 @@ class SpecularEchoes {
     std::vector<std::uint16_t> materials;  // materials of the mesh
     Vec3d centre_m;
     double radius_m = 0;
-    /// The part of the mesh that reflects. It depends on the frequency; there is one for every set of reflecting materials, so
+    /// The part of the mesh that reflects. It depends on the frequency. There is one for every set of reflecting materials, so
     /// that a ping does not depend on earlier pings.
     struct Surface {
       std::vector<bool> mirrors;  // by material

@@ -1,5 +1,5 @@
-// Computes the part of a mirror's echo that reaches the sonar if the surface is finite and partly hidden: Fresnel integrals over
-// the visible part (docs/acoustics.md, section 3). Used by specular.
+// Computes how much of a mirror's echo reaches the sonar if the surface is finite and partly hidden: Fresnel integrals over the
+// visible part (docs/acoustics.md, section 3). Used by specular.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace sonar {
 
-/// Divides the extent into cells around the place that contributes most, to find hidden parts. The outermost cells reach to the
+/// Divides the extent into cells around the point that contributes most, to find hidden parts. The outermost cells reach to the
 /// edge.
 struct SpecularWindow {
   static constexpr std::size_t cells = 16;
@@ -20,15 +20,15 @@ struct SpecularWindow {
 };
 SpecularWindow make_window(const SpecularPoint& point, double wavelength_m);
 
-/// K_1 K_2 of eq. 7 with its phase: 1 for an infinite mirror, a factor i for each focus on the way (time convention e^{+i 2 pi f
-/// t}).
+/// K_1 K_2 of eq. 7 with its phase: 1 for an infinite mirror, a factor i for each focus on the path (time convention e^{+i 2 pi
+/// f t}).
 std::complex<double> specular_factor(const SpecularPoint& point, double wavelength_m);
-/// The same without the cells that are hidden.
+/// The same factor without the cells that are hidden.
 std::complex<double> specular_factor(const SpecularPoint& point, double wavelength_m, const SpecularWindow& window);
 
-/// Whether a place in the tangent plane belongs to the surface.
+/// True if a point in the tangent plane belongs to the surface.
 bool on_surface(const SpecularPoint& point, double x, double y);
-/// The place of the surface that is nearest to the foot of the perpendicular from the sonar.
+/// The point of the surface that is nearest to the foot of the perpendicular from the sonar.
 std::array<double, 2> nearest_on_surface(const SpecularPoint& point);
 
 }  // namespace sonar
