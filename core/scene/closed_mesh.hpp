@@ -1,4 +1,4 @@
-// Determines whether a mesh is the closed surface of a body, whose far faces are then invisible.
+// Determines whether a mesh is the closed surface of a body. The far faces of such a body are invisible.
 #pragma once
 
 #include "core/base/geometry.hpp"
@@ -12,11 +12,11 @@ struct Skin {
   double area_m2 = 0;
 };
 
-/// A mesh is closed if every edge belongs to two triangles with opposite directions along it (vertices at the same place count as
-/// one), and if the volumes of all parts have the same sign. Time: about 0.3 us per triangle.
+/// A mesh is closed if every edge belongs to two triangles that have it in opposite directions, and if the volumes of all parts
+/// have the same sign. Vertices at the same position count as one. Time: about 0.3 us per triangle.
 Skin skin_of(const Mesh& mesh);
 
-/// Whether a place (object axes) lies within a closed mesh, by its winding number. Time: about 30 ns per triangle.
+/// True if a point (object axes) lies within a closed mesh, by its winding number. Time: about 30 ns per triangle.
 bool encloses(const Mesh& mesh, Vec3d place);
 
 }  // namespace sonar

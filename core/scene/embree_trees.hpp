@@ -1,4 +1,4 @@
-// Embree's handles, and trees that change from scene to scene. Only embree_scene.cpp may include it.
+// Embree's handles, and trees that change from scene to scene. Only embree_scene.cpp may include this file.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +20,8 @@
 
 namespace sonar::embree {
 
-// SONARD_EMBREE_ISA limits Embree to a lower instruction set than the processor's, so that tests can run the code of other
-// machines.
+// SONARD_EMBREE_ISA limits Embree to a lower instruction set than that of the processor, so that tests can run the code of
+// other machines.
 inline std::string device_settings(int threads) {
   std::string settings = "threads=" + std::to_string(threads);
   const char* isa = std::getenv("SONARD_EMBREE_ISA");
@@ -30,7 +30,8 @@ inline std::string device_settings(int threads) {
   if (std::find(std::begin(known), std::end(known), isa) == std::end(known))
     throw std::runtime_error(std::string("SONARD_EMBREE_ISA: unknown instruction set \"") + isa +
                              "\"; use sse2, sse4.2, avx, avx2 or avx512");
-  // avx512 is passed as no limit, because Embree's name for it differs between versions, and an unknown name means SSE2.
+  // For avx512 no limit is passed, because Embree's name for it differs between versions, and Embree uses SSE2 for an unknown
+  // name.
   return isa == std::string_view("avx512") ? settings : settings + ",max_isa=" + isa;
 }
 
@@ -54,7 +55,7 @@ struct Device {
     const RTCError error = rtcGetDeviceError(handle);
     if (error != RTC_ERROR_NONE) throw std::runtime_error("the ray tracer (Embree) cannot build the scene" + why_not(error));
   }
-  // The widest packet of rays for which Embree has code on this processor. Embree traces wider packets as a stream, which is
+  // The widest packet of rays for which Embree has code on this processor. Embree traces wider packets as a stream. A stream is
   // slower, and Embree 3.13 then also reads rays that `valid` excludes.
   int widest_packet() const {
     if (rtcGetDeviceProperty(handle, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0) return 16;
@@ -75,7 +76,7 @@ struct SceneHandle {
   }
 };
 
-/// The corners in the coordinates of rays.
+/// Computes the corners in the coordinates of rays.
 inline void place_vertices(const Mesh& mesh, const Pose& placed, float* to) {
   const Rotation turn = rotation_from(placed.orientation);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
@@ -94,7 +95,7 @@ class ChangingGroup {
  public:
   struct Wanted {
     std::shared_ptr<const Mesh> mesh;
-    std::shared_ptr<const std::vector<float>> vertices;  // placed
+    std::shared_ptr<const std::vector<float>> vertices;  // corners in the coordinates of rays
     std::uint32_t object = 0;
   };
 
@@ -109,14 +110,14 @@ class ChangingGroup {
     for (const Standing& s : standing_) sum += s.mesh->triangles.size();
     return sum;
   }
-  /// Number of triangles of `wanted` that already exist.
+  /// Number of triangles of `wanted` whose tree already exists.
   std::size_t there(const std::vector<Wanted>& wanted) const {
     std::size_t triangles = 0;
     for (const Wanted& w : wanted)
       if (std::ranges::any_of(standing_, [&](const Standing& s) { return s.is(w); })) triangles += w.mesh->triangles.size();
     return triangles;
   }
-  /// Returns the object of each geometry's number.
+  /// Changes the structure to the wanted geometries. Returns the object of each geometry by geometry number.
   std::vector<std::uint32_t> become(const Device& device, const std::vector<Wanted>& wanted) {
     for (Standing& s : standing_) s.object = RayPacket::miss;
     std::vector<const Wanted*> missing;
@@ -164,7 +165,7 @@ class ChangingGroup {
     device.check();
   }
 
-  std::vector<Standing> standing_;  // must outlive the geometries, which read it
+  std::vector<Standing> standing_;  // must outlive the geometries, because they read it
   SceneHandle scene_;
 };
 

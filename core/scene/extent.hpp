@@ -1,5 +1,5 @@
-// The box around points or meshes, and limits for sizes that suggest a mistake. `sonarctl scene` and
-// daemon/emulator/world/plausibility use it to check scenes and poses.
+// The box around points or meshes, and limits for sizes that are probably mistakes. `sonarctl scene` and
+// daemon/emulator/world/plausibility check scenes and poses with them.
 #pragma once
 
 #include <algorithm>
@@ -40,7 +40,7 @@ struct Extent {
 /// The box in the axes of the mesh.
 Extent extent_of(const Mesh& mesh);
 
-/// A mesh longer than this was probably not written in metres.
+/// A mesh that is longer than this was probably not written in metres [m].
 inline constexpr double huge_mesh_m = 200;
 inline constexpr std::string_view huge_mesh_cure = "if the file is in centimetres or millimetres, set scale: 0.01 or 0.001";
 

@@ -16,7 +16,8 @@ inline const std::string& instance_name(const Scene& scene, std::size_t index) {
   return index < objects ? scene.objects[index].name : scene.point_targets.at(index - objects).name;
 }
 
-/// The label of the object, else that of its first material, else this material's name; "point" for points without a label.
+/// The label of the object, else the label of its first material, else the name of this material; "point" for points without a
+/// label.
 inline std::string instance_class(const Scene& scene, std::size_t index) {
   if (index >= scene.objects.size()) {
     const std::string& label = scene.point_targets.at(index - scene.objects.size()).label;

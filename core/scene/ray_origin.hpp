@@ -1,5 +1,5 @@
-// The world position to which float coordinates of rays are relative. It is separate from RayScene, so that after a change of
-// the scene unchanged objects keep exactly the same floats.
+// The world position to which float coordinates of rays are relative. It is separate from RayScene, so that unchanged objects
+// keep exactly the same floats after a change of the scene.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,7 @@
-// Traces rays through a scene, by a bounding-volume hierarchy (Embree, used only by embree_scene.cpp and embree_trees.hpp).
-// Static geometry is built once, relative to `origin()`; moving bodies are instances that are placed for each ping. A program can
-// replace the tracer at link time by defining the members of RayScene. Tests that trace analytic primitives under the thread
-// sanitizer do so (tests/core/pipeline/analytic_rays.cpp).
+// Traces rays through a scene by a bounding-volume hierarchy (Embree, used only by embree_scene.cpp and embree_trees.hpp).
+// Static geometry is built once, relative to `origin()`. Moving bodies are instances that are placed for each ping. A program
+// can replace the tracer at link time by defining the members of RayScene. Tests that trace analytic primitives under the
+// thread sanitizer do so (tests/core/pipeline/analytic_rays.cpp).
 #pragma once
 
 #include <cstdint>
@@ -35,22 +35,23 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// Replaces the scene. Static objects with the same mesh at the same place keep their trees, even if scenes alternate. The
+  /// Replaces the scene. Static objects with the same mesh at the same position keep their trees, even if scenes alternate. The
   /// hits equal those of a new RayScene.
   void change(std::shared_ptr<const Scene> scene);
   const Scene& scene() const;
   Vec3d origin() const;  // world position to which float coordinates are relative
-  /// Moves the bodies; called by the thread that owns the scene, before tracing. It takes no time if no body moved.
+  /// Moves the bodies. The thread that owns the scene calls it before it traces. It takes no time if no body has moved.
   void place(std::span<const Pose> bodies_in_world);
   /// Finds the first hits of the active lanes (bit i of `active`). Inactive lanes may have any values; their `object` becomes
-  /// miss. An active ray without a hit keeps `far` and gets the normal 0. Thread-safe between calls of place().
+  /// `miss`. An active ray without a hit keeps `far` and gets the normal 0. Several threads may call it between two calls of
+  /// place().
   void trace(RayPacket& rays, std::uint32_t active, bool coherent) const;
   /// Number of rays that are traced together on this processor: 16 with AVX-512, 8 with AVX, otherwise 4.
   int rays_at_once() const;
   static std::string version();  // "Embree 3.13.5"
 
-  /// From this number of triangles on, the static part and each body use a compact form: indices instead of copies of the
-  /// corners, which saves about 65 bytes per triangle. The hits are the same.
+  /// From this number of triangles on, the static part and each body are stored in a compact form: indices instead of copies of
+  /// the corners. This saves about 65 bytes per triangle. The hits are the same.
   static constexpr std::size_t compact_from_triangles = 2'000'000;
 
  private:
@@ -58,7 +59,7 @@ class RayScene {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether a surface lies between two points of the world; a surface at the far point does not count.
+/// True if a surface lies between two points of the world. A surface at the far point does not count.
 bool is_occluded(const RayScene& scene, Vec3d from, Vec3d place);
 
 }  // namespace sonar

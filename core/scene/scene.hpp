@@ -24,11 +24,12 @@ struct GsabLaw {
   bool operator==(const GsabLaw&) const = default;
 };
 
-/// Largest backscatter that conserves energy: a Lambert surface that scatters all it receives has mu = 1 / pi per steradian.
+/// Largest backscatter that conserves energy: a Lambert surface that scatters all the energy it receives has mu = 1 / pi per
+/// steradian.
 inline constexpr double largest_lambert = 1 / pi;
 inline constexpr double largest_lambert_db = -4.97;  // 10 log10 of largest_lambert, for scene files and messages
 
-/// Patches of stronger and weaker scattering, fixed to the surface: a Gamma field with mean 1. It makes echoes K-distributed.
+/// Patches of stronger and weaker scattering, fixed to the surface: a Gamma field with mean 1. The echoes become K-distributed.
 struct Texture {
   float shape = 0;  // nu: scintillation index 1 + 2 / nu; 0 = no texture
   float correlation_m = 0.5f;
@@ -59,7 +60,7 @@ struct Mesh {
   bool operator==(const Mesh&) const = default;
 };
 
-/// The exact surface from which a mesh was made, in the frame of the mesh. Specular echoes are computed from it.
+/// The exact surface that a mesh approximates, in the frame of the mesh. Specular echoes are computed from it.
 struct Primitive {
   enum class Kind { none, sphere, cylinder, box, plane };
   Kind kind = Kind::none;
@@ -69,7 +70,8 @@ struct Primitive {
   bool operator==(const Primitive&) const = default;
 };
 
-/// A mesh, placed in the world or on a moving body. Its index in Scene::objects is part of the key of its random speckle.
+/// A mesh that is placed in the world or on a moving body. Its index in Scene::objects is part of the key of its random
+/// speckle.
 struct Object {
   std::string name;
   std::shared_ptr<const Mesh> mesh;
@@ -107,11 +109,11 @@ struct WaterColumn {
   bool operator==(const WaterColumn&) const = default;
 };
 
-/// Another sonar nearby, whose pulses arrive at times independent of ours.
+/// Another sonar nearby. Its pulses arrive at times that are independent of our pings.
 struct OtherSonar {
   std::string name;
   Vec3d position_m;     // in the world
-  float level_upa = 0;  // amplitude at 1 m in a channel that points at it; falls as 1 / r and by absorption
+  float level_upa = 0;  // amplitude at 1 m in a channel in its direction; falls as 1 / r and by absorption
   float rate_hz = 7;
   float pulse_s = 1e-4f;
   bool operator==(const OtherSonar&) const = default;
@@ -128,7 +130,7 @@ struct Scene {
   WaterColumn water_column;
   std::vector<OtherSonar> other_sonars;
   std::optional<Vec3d> ray_origin;  // the origin to keep when a running scene is changed (core/scene/ray_origin.hpp)
-  std::vector<std::string> notes;   // sentences about decisions of the loader that the user should know
+  std::vector<std::string> notes;   // sentences for the user about decisions of the loader
 
   /// Returns the pose of an object in its body, or in the world if it is static.
   Pose in_body(const Object& object) const {

@@ -1,4 +1,4 @@
-// Numbers the vertices of a mesh, so that equal positions are one vertex.
+// Numbers the vertices of a mesh. Equal positions are one vertex.
 #pragma once
 
 #include <array>
@@ -10,11 +10,12 @@
 
 namespace sonar {
 
-/// A hash table of indices: 8 to 16 bytes per vertex. Places are compared by their bits, with -0 equal to 0. Because
-/// neighbouring triangles share vertices, a small table, which fits in the processor's cache, has the last ones found.
+/// A hash table of indices: 8 to 16 bytes per vertex. Positions are compared by their bits, with -0 equal to 0. Neighbouring
+/// triangles share vertices. Therefore a small table, which fits in the processor's cache, holds the vertices that were found
+/// last.
 class VertexTable {
  public:
-  /// New vertices are appended to `vertices`; only this table may do so. `expected` is their approximate number.
+  /// Appends new vertices to `vertices`. No other code may append to it. `expected` is their approximate number.
   VertexTable(std::vector<Vec3>& vertices, std::size_t expected)
       : vertices_(vertices), slots_(std::bit_ceil(2 * expected + 1), none) {}
 
@@ -64,7 +65,7 @@ class VertexTable {
   static constexpr int recent_bits = 15;
   std::vector<Vec3>& vertices_;
   std::vector<std::uint32_t> slots_;                                                                     // size is a power of two
-  std::vector<std::uint32_t> recent_ = std::vector<std::uint32_t>(std::size_t{1} << recent_bits, none);  // by the hash
+  std::vector<std::uint32_t> recent_ = std::vector<std::uint32_t>(std::size_t{1} << recent_bits, none);  // by hash
 };
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// The geometry of surface cells: triangles projected along the dominant axis of their normals, the half-open test that gives
-// every lattice point exactly one owner, and the cubes of tiles.
+// The geometry of surface cells: triangles projected along the dominant axis of their normals, the half-open test by which
+// every lattice point has exactly one owner, and the cubes of tiles.
 #pragma once
 
 #include <array>
@@ -51,8 +51,8 @@ inline Facet facet_of(const Mesh& mesh, std::uint32_t triangle, int axis) {
   return f;
 }
 
-/// Twice the signed area of (p, q, x), computed from the same operands in the same order for both directions of the edge, so
-/// that two triangles that share an edge get exactly opposite values.
+/// Twice the signed area of (p, q, x). Both directions of an edge use the same operands in the same order. Two triangles that
+/// share an edge therefore get exactly opposite values.
 inline double edge(double pu, double pv, double qu, double qv, double xu, double xv) {
   const bool forward = pu < qu || (pu == qu && pv < qv);
   if (forward) return (qu - pu) * (xv - pv) - (qv - pv) * (xu - pu);
@@ -79,7 +79,7 @@ inline double height(const Facet& f, double xu, double xv) {
   return f.w[0] - (f.nu * (xu - f.u[0]) + f.nv * (xv - f.v[0])) / f.nw;
 }
 
-/// Bounds of a facet, computed once for all its tests against cubes.
+/// Bounds of a facet. They are computed once for all tests with cubes.
 struct FacetBounds {
   double low[3], high[3];  // along u, v, w
   double u[3], v[3], du[3], dv[3], edge_reach[3];
@@ -108,8 +108,8 @@ inline FacetBounds bounds_of(const Facet& f) {
   return b;
 }
 
-/// Whether a facet may own points inside the cube. It can be true for a facet that owns none, but is never false for one that
-/// does.
+/// True if the facet may own points inside the cube. The result can be true for a facet that owns none, but is never false for
+/// a facet that owns one.
 inline bool may_touch(const FacetBounds& f, double cu, double cv, double cw, double half) {
   const double slack = half * 1e-6 + 1e-9;
   const double h = half + slack;
@@ -123,11 +123,11 @@ inline bool may_touch(const FacetBounds& f, double cu, double cv, double cw, dou
   return true;
 }
 
-/// Size of a cell, 2^-level; and the edge of a cube (and tile), 16 cells. |level| must be below 1000.
+/// Size of a cell, 2^-level, and the edge of a cube (and tile), 16 cells [m]. |level| must be below 1000.
 inline double cell_size_m(int level) { return std::bit_cast<double>(static_cast<std::uint64_t>(1023 - level) << 52); }
 inline double tile_edge_m(int level) { return 16 * cell_size_m(level); }
 
-/// Permuted coordinates back to object coordinates.
+/// Converts permuted coordinates back to object coordinates.
 inline Vec3d from_permuted(double u, double v, double w, int axis) {
   double xyz[3];
   xyz[u_axis(axis)] = u;

@@ -1,5 +1,5 @@
-// A tile of surface cells, and the function that builds it from the triangles that touch its cube. The same arguments give the
-// same bytes.
+// A tile of surface cells, and the function that builds it from the triangles that touch its cube. Equal arguments give equal
+// bytes.
 #pragma once
 
 #include <cstddef>
@@ -15,16 +15,16 @@ namespace sonar {
 
 class TextureField;
 
-/// Up to 16 x 16 cells (more where patches overlap) in a cube of the lattice, in one allocation of int16 columns.
-/// Positions are relative to the cube's centre. Padding cells have zero weight.
+/// Up to 16 x 16 cells (more if patches overlap) in a cube of the lattice, as int16 columns in one allocation. Positions are
+/// relative to the cube's centre. Padding cells have zero weight.
 struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
   Vec3d centre_m;                                     // object coordinates
   float half_edge_m = 0;                              // half an edge of the cube
-  Vec3 box_middle_m, box_half_m;                      // the box around its cells, from the centre, object axes
+  Vec3 box_middle_m, box_half_m;                      // the box around its cells, relative to the centre, object axes
   float position_unit_m = 0;
   float weight_unit = 0;           // xi * sqrt(cell area) [m] per count
-  std::uint64_t weights_hash = 0;  // hash of the first block; it detects that the memory of a tile was reused for another
+  std::uint64_t weights_hash = 0;  // hash of the first block; shows that the memory of a tile was reused for another tile
   int count = 0;                   // padded to a multiple of CellTile::block
   int stride = 0;                  // int16 values per column
   std::unique_ptr<std::int16_t[]> data;
@@ -33,7 +33,8 @@ struct CellTile {
   static constexpr float normal_unit = 1.0f / 32767.0f;
   enum Column { x, y, z, normal_x, normal_y, normal_z, weight_re, weight_im, columns };
   const std::int16_t* column(Column c) const { return data.get() + static_cast<std::ptrdiff_t>(c) * stride; }
-  /// Position of a cell in the middle of the tile, relative to the cube's centre, which may lie off the surface. Object axes.
+  /// Position of a cell in the middle of the tile, relative to the cube's centre, in object axes. The cube's centre may lie off
+  /// the surface.
   Vec3d middle_cell_m() const {
     const auto along = [this, unit = static_cast<double>(position_unit_m)](Column c) { return unit * column(c)[count / 2]; };
     return {along(x), along(y), along(z)};
@@ -49,12 +50,12 @@ struct TileAddress {
   std::int32_t i = 0, j = 0, k = 0;  // cube index along u, v, w (cell_lattice.hpp)
 };
 
-/// Statistics of the cells' weights: complex Gaussian; or constant magnitude with random phases, so that a few cells per sample
-/// have the statistics of many.
+/// Statistics of the cells' weights: complex Gaussian, or constant magnitude with random phases. With constant magnitude, a few
+/// cells per sample already have the statistics of many.
 enum class CellWeights { gaussian, of_one_magnitude };
 
-/// `data` is null if no cell lies in the cube. `texture`, `grain`: null = none. Cost: about 20 ns per cell, plus 60 ns for
-/// texture and for grain.
+/// Builds a tile. `data` is null if no cell lies in the cube. `texture`, `grain`: null = none. Cost: about 20 ns per cell, plus
+/// 60 ns for texture and 60 ns for grain.
 CellTile build_tile(const TileAddress& address, const Mesh& mesh, std::span<const std::uint32_t> triangles,
                     std::uint32_t texture_seed, Seed seed, const TextureField* texture = nullptr,
                     const TextureField* grain = nullptr, CellWeights weights = CellWeights::gaussian);

@@ -24,10 +24,10 @@ inline Cube cube_of(const TileAddress& a) {
 }
 inline bool may_touch(const lattice::FacetBounds& f, const Cube& c) { return lattice::may_touch(f, c.u, c.v, c.w, c.half); }
 
-/// A cube of the lattice: the triangles that may own points in it, the tile of its level once needed, and its eight child
-/// cubes.
+/// A cube of the lattice: the triangles that may own points in it, the tile of its level (built when needed), and its eight
+/// child cubes.
 struct CellNode {
-  // The fields that every visit reads come first, so that they are close in memory.
+  // The members that every visit reads come first, so that they are close in memory.
   TileAddress address;
   std::atomic<bool> divided = false;                      // true: other threads may use `children`
   bool built = false, side_built = false, alone = false;  // alone: made by SurfacePatch::raise(), without children
@@ -52,7 +52,7 @@ class SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
-  Texture texture, grain;  // texture and grain of the material, with its seed, for the tiles
+  Texture texture, grain;  // texture and grain of the material, seeded by the material, for the tiles
   std::uint32_t texture_seed = 0;
   int coarsest = 0;  // coarsest level that an object may have with exact_small
   std::shared_ptr<const Mesh> mesh;
@@ -63,19 +63,20 @@ class SurfacePatch {
   bool has_tiles_of(const Material& m) const {
     return texture == m.texture && grain == m.grain && texture_seed == m.texture_seed;
   }
-  /// Bytes of the mesh and of the roots without their tiles.
+  /// Size of the mesh and of the roots without their tiles [bytes].
   std::size_t fixed_bytes() const;
 
   void plant(const std::vector<std::uint32_t>& triangles);
   static constexpr int finest_root = 4;  // level
-  /// Adds roots one level coarser than the present coarsest ones, if those are finer than `level`. The new roots only have
-  /// tiles; finer cubes belong to the first roots.
+  /// Adds roots that are one level coarser than the present coarsest ones, if those are finer than `level`. The new roots have
+  /// only tiles; finer cubes belong to the first roots.
   void raise(int level);
   /// Makes the child cubes of `node`. Returns their size in bytes.
   std::size_t divide(CellNode& node) const;
-  /// The level of cells for side lobes in a cube, for a sonar at `sonar_m` in the object's axes.
+  /// The level of cells for side lobes in a cube. The sonar is at `sonar_m` in the object's axes.
   int side_level(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
-  /// Whether this cube provides the cells for side lobes: its level is fine enough, and that of no larger cube is.
+  /// True if this cube provides the cells for side lobes: its level is fine enough, and no larger cube has a level that is fine
+  /// enough.
   bool has_side_cells(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
   /// Drops the tiles and keeps the cubes. Returns the number of bytes freed.
   std::size_t forget_tiles();

@@ -1,5 +1,5 @@
 // Patches of stronger and weaker scattering, fixed to a surface: a continuous Gamma field of mean 1 over object coordinates
-// (docs/acoustics.md, section 3). build_tile multiplies the cells' speckle by its root, which makes their echoes K-distributed.
+// (docs/acoustics.md, section 3). build_tile multiplies the cells' speckle by its root, so the echoes become K-distributed.
 #pragma once
 
 #include <array>
@@ -13,17 +13,18 @@
 
 namespace sonar {
 
-/// One material's field: a smooth Gaussian field of unit variance (normals on a cubic lattice of the correlation length, blended
-/// by quadratic splines) whose values are mapped to the Gamma distribution at equal quantiles.
+/// The field of one material: a smooth Gaussian field of unit variance, whose values are mapped to the Gamma distribution at
+/// equal quantiles. The Gaussian field consists of normal draws on a cubic lattice of the correlation length, blended by
+/// quadratic splines.
 class TextureField {
  public:
   /// texture.shape must be > 0. texture.correlation_m is the distance at which the correlation has fallen to about 1 / e.
   TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed, Domain domain = Domain::texture);
 
   double lattice_m() const { return lattice_m_; }
-  /// Standard normal of a lattice point. It depends only on (seed, texture seed, object, point).
+  /// The standard normal draw of a lattice point. It depends only on (seed, texture seed, object, point).
   float normal_at(int object, std::int32_t i, std::int32_t j, std::int32_t k) const;
-  /// Root of the Gamma variable (mean 1) at the same quantile as a standard normal.
+  /// The root of the Gamma variable (mean 1) at the quantile of a standard normal.
   float root_of(float normal) const;
 
  private:
@@ -32,12 +33,12 @@ class TextureField {
   std::vector<float> roots_;
 };
 
-/// Evaluates a field near one point of one object. It caches the lattice points that neighbouring cells share, so only one
-/// thread may use it.
+/// Evaluates a field near one point of one object. It caches the lattice points that neighbouring cells share. Therefore only
+/// one thread may use it.
 class TexturePatch {
  public:
   TexturePatch(const TextureField& field, int object);
-  /// Root of the field at a place in object coordinates: factor on amplitudes.
+  /// The root of the field at a point in object coordinates. It is a factor of amplitudes.
   float root_at(Vec3d place_m);
 
  private:

@@ -13,13 +13,14 @@ namespace sonar {
 inline constexpr std::size_t bytes_of_stl_triangle = 50;
 
 struct BinaryStl {
-  std::uint64_t triangles = 0;     // by its header
+  std::uint64_t triangles = 0;     // number in its header
   std::uint64_t bytes_behind = 0;  // bytes after the last triangle
 };
 
-/// nullopt: not a binary STL file, because it is too short for the number of triangles in its header (as every text is).
+/// Returns nullopt if the file is not a binary STL file: it is too short for the number of triangles in its header. This is
+/// true of every text.
 std::optional<BinaryStl> binary_stl(std::FILE* file);
-/// Passes `count` triangles of the file to `take`, with material 0. False: not all could be read.
+/// Passes `count` triangles of the file to `take`, with material 0. Returns false if a triangle could not be read.
 bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take);
 
 }  // namespace sonar

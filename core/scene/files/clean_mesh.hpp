@@ -11,7 +11,7 @@
 
 namespace sonar {
 
-/// A function that receives the corners of a triangle and its material.
+/// A function that receives the corners and the material of one triangle.
 using TriangleSink = std::function<void(std::span<const Vec3d, 3>, std::uint16_t)>;
 /// A function that passes every triangle to the sink. Each call passes the same triangles in the same order.
 using TriangleSource = std::function<void(const TriangleSink&)>;

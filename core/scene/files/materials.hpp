@@ -1,4 +1,4 @@
-// Finds materials by name while a scene is read: the scene's own first, then those of the library. Internal to the loader.
+// Finds materials by name while a scene is read: first in the scene, then in the library. Internal to the loader.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +21,9 @@ class MaterialTable {
   explicit MaterialTable(Scene& scene);
   /// Reads `materials: {name: {...}}`, which replace materials of the same name in the library.
   void read(text::Map materials);
-  /// Index into Scene::materials; the first use of a material adds it there.
+  /// Returns the index into Scene::materials. The first use of a material adds it there.
   std::optional<std::uint16_t> find(std::string_view name);
-  /// Like find(), but an unknown name is an error at the node.
+  /// Like find(), but reports an unknown name as an error at the node.
   std::uint16_t named(const text::Node& node);
   std::uint16_t add(Material material);
 

@@ -1,5 +1,5 @@
-// Keeps meshes of shapes for code that reads many similar scenes. Equal shapes share one mesh, so that values computed from it
-// can also be reused. Only one thread may use it at a time.
+// Keeps the meshes of shapes for code that reads many similar scenes. Equal shapes share one mesh, so that values computed from
+// the mesh can be reused, too. Only one thread may use the cache at a time.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ class ShapeCache {
   // While there are too many triangles, old shapes are removed, except those of the last `always_kept` calls of shape().
   static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;
 
-  /// Returns the shape of this key, and calls make() if it is not in the cache. A shape without a mesh is not cached.
+  /// Returns the shape of this key. Calls make() if the cache does not have it. A shape without a mesh is not cached.
   template <class Make>
   Shape shape(const std::string& key, const Make& make) {
     Kept& kept = shapes_[key];
@@ -38,7 +38,7 @@ class ShapeCache {
     }
     return shape;
   }
-  /// Mesh files that were read, by path and options. They are not read again if the files change.
+  /// Mesh files that were read, by path and options. They are not read again when a file changes.
   std::map<std::string, LoadedMesh>& mesh_files() { return mesh_files_; }
 
  private:

@@ -31,13 +31,13 @@ struct ShapeReader {
   std::set<std::string> noted = {};               // meshes whose lost triangles are already in the scene's notes
   std::map<std::string, Shape> files = {};        // meshes with materials; objects with equal keys share one
 
-  /// The allowed values of `type`, except "point".
+  /// The allowed values of `type`. The value "point" is not one of them.
   static const std::vector<std::string_view>& types();
   /// Reads the keys of this type, including `material`.
   Shape read(std::string_view type, text::Map& keys);
 
  private:
-  /// A shape of an earlier scene, or a new one.
+  /// Returns a shape of an earlier scene, or makes a new one.
   template <class Make>
   Shape known_or(const std::string& key, const Make& make) const {
     return cache != nullptr ? cache->shape(key, make) : make();

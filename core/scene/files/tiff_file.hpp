@@ -1,4 +1,5 @@
-// Reads TIFF files: the pictures in a file, and their cells, strip by strip or tile by tile. Internal to geo_tiff.cpp.
+// Reads TIFF files: the list of pictures in a file, and the cells of a picture strip by strip or tile by tile. Internal to
+// geo_tiff.cpp.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // Fast checks before the importer reads a mesh file. They reject files that would need much time or memory: counts that exceed
-// the file's size, and nodes that contain themselves, are nested too deep or are repeated too often. Time is linear in the
-// text; memory is needed for the nodes. The importer finds other faults.
+// the file's size, and nodes that contain themselves, are nested too deep or are repeated too often. The checks need time
+// linear in the size of the text, and memory for the nodes. The importer finds all other faults.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace sonar {
 /// The fault of a file, as a sentence without the file's name; nullopt: no fault was found.
 using MeshFault = std::optional<std::string>;
 
-/// Numbers of triangles that the text of a file with named parts lists.
+/// Numbers of triangles that the text of a file with named parts contains.
 struct ListedFaces {
   std::uint64_t shown = 0;   // triangles in the file's scene, counted as often as they are shown
   std::uint64_t hidden = 0;  // triangles of parts that the scene does not refer to

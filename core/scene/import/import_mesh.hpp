@@ -14,7 +14,7 @@ struct ImportHooks {
   std::function<void()> imported = [] {};                                    // called when the library has finished
 };
 
-/// Errors begin with the file's name.
+/// Imports a mesh file. Errors begin with the file's name.
 Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks = {});
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// The graph of the nodes of a mesh file. Its size shows, before an importer reads the file, whether the scene would become too
-// large.
+// The graph of the nodes of a mesh file. Its size shows whether the scene would become too large, before an importer reads the
+// file.
 #pragma once
 
 #include <cstddef>
@@ -22,11 +22,11 @@ class NodeGraph {
   }
   void contains(std::size_t parent, std::size_t child) { nodes_[parent].children.push_back(child); }
 
-  /// Returns the fault of the graph, as a text to put behind the file's name: a node contains itself, nodes are too deep, or they
-  /// are repeated too often below the roots. nullopt if there is no fault. Takes time linear in the number of edges.
+  /// Returns the fault of the graph as a text that follows the file's name: a node contains itself, nodes are nested too deep,
+  /// or they are repeated too often below the roots. nullopt if there is no fault. The time is linear in the number of edges.
   std::optional<std::string> fault(const std::vector<std::size_t>& roots) const;
 
-  /// The roots and the nodes below them, each as often as it is shown. The graph must have no fault.
+  /// Returns the roots and the nodes below them, each as often as it is shown. The graph must have no fault.
   std::vector<std::size_t> shown(std::vector<std::size_t> roots) const;
 
  private:

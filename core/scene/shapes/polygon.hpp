@@ -1,4 +1,5 @@
-// Cuts polygons of mesh files into triangles. The importer's own code is not used, because its asserts abort on unusual files.
+// Cuts polygons of mesh files into triangles. The importer's own code is not used, because its asserts end the program for
+// unusual files.
 #pragma once
 
 #include <array>
@@ -10,8 +11,9 @@
 
 namespace sonar {
 
-/// Ear clipping in the polygon's own plane, for concave polygons too; keeps the polygon's direction. Fewer than 3 corners: no
-/// triangles. Degenerate or self-crossing remainders, and polygons of more than 512 corners, are cut as a fan.
+/// Cuts a polygon by ear clipping in its own plane, also if it is concave. The triangles keep the direction of the polygon.
+/// Polygons with fewer than 3 corners give no triangles. Degenerate or self-crossing remainders, and polygons of more than 512
+/// corners, are cut as a fan.
 std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Vec3d> corners);
 
 }  // namespace sonar

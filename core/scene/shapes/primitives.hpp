@@ -1,5 +1,6 @@
-// Makes triangle meshes of solids and sheets, whose chords stay within a millimetre of the true surface. Object frame: axis of
-// revolution along z, centred on the origin; outward normals, closed (sheets excepted), material 0.
+// Makes triangle meshes of solids and sheets. Their chords stay within a millimetre of the true surface. In the object frame,
+// the axis of revolution is z and the centre is the origin. Normals point outward. Meshes are closed, except for sheets. The
+// material is 0.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@ namespace sonar {
 /// Number of segments of a circle with this radius [m] for which no chord is farther than a millimetre from it; 16..512.
 int segments_for(double radius_m);
 
-/// Patches along an edge of a plane or box. Longer edges have larger patches.
+/// Largest number of patches along an edge of a plane or box. Longer edges have larger patches.
 inline constexpr int most_patches = 400;
 /// A rectangle in the x-y plane, normals up, in patches of at most `patch_m`.
 Mesh make_plane(double length_x_m, double length_y_m, double patch_m = 1);
@@ -19,13 +20,13 @@ Mesh make_box(Vec3d size_m, double patch_m = 1);
 Mesh make_sphere(double radius_m, int segments);
 enum class Caps { both, bottom, none };
 Mesh make_cylinder(double radius_m, double length_m, int segments, Caps caps = Caps::both);
-/// `length_m` is the length of the straight part between the two half spheres.
+/// A cylinder with a half sphere at each end. `length_m` is the length of the straight part between them.
 Mesh make_capsule(double radius_m, double length_m, int segments);
-/// The base is at z = -length/2. With a top radius above zero it is a frustum.
+/// A cone with its base at z = -length/2. With a top radius above zero it is a frustum.
 Mesh make_cone(double base_radius_m, double top_radius_m, double length_m, int segments);
 /// A ring of `radius_m` (to the middle of the tube) in the x-y plane. `radius_m` must exceed `tube_radius_m`.
 Mesh make_torus(double radius_m, double tube_radius_m, int segments);
-/// A boulder: an ellipsoid with the given semi-axes and bumps of `bumpiness` (0..0.5) of its size, drawn from `seed`.
+/// A boulder: an ellipsoid with the given semi-axes. Its bumps are `bumpiness` (0..0.5) of its size and are drawn from `seed`.
 Mesh make_rock(Vec3d semi_axes_m, double bumpiness, std::uint32_t seed, int segments);
 
 }  // namespace sonar

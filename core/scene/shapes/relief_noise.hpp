@@ -11,14 +11,14 @@
 
 namespace sonar {
 
-/// Smooth value noise on the unit lattice in space, in -1..1. Fields of the same seed differ if their `stream` differs.
+/// Smooth value noise on the unit lattice in space, in -1..1. Two fields with the same seed differ if their `stream` differs.
 double value_noise(Vec3d p, std::uint32_t seed, std::uint32_t stream);
 
 /// Gradient noise over a rectangle of the plane, about -1..1, with features of one wavelength. The constructor draws the
 /// gradients of the lattice.
 class GradientField {
  public:
-  /// Covers |x| <= half_x, |y| <= half_y, in metres.
+  /// The field covers |x| <= half_x and |y| <= half_y [m].
   GradientField(double half_x_m, double half_y_m, double wavelength_m, std::uint32_t seed, std::uint32_t stream);
   double operator()(double x_m, double y_m) const;
 

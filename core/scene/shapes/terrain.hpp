@@ -1,5 +1,5 @@
-// Ground as heights over a rectangular grid, read from files (PNG, ESRI ASCII, XYZ, GeoTIFF) or generated from a seed.
-// Meshes are relative to their middle, whose coordinates may be large and are stored in double precision.
+// Ground as heights over a rectangular grid, read from files (PNG, ESRI ASCII, XYZ, GeoTIFF) or generated from a seed. Meshes
+// are relative to their middle. The coordinates of this middle may be large and are stored in double precision.
 #pragma once
 
 #include <array>
@@ -18,12 +18,13 @@ namespace sonar {
 
 inline constexpr std::size_t max_mesh_triangles = 20'000'000;
 
-/// Heights over the product of two rising coordinate lists; NaN = no ground there.
+/// Heights over all pairs of two rising coordinate lists; NaN = no ground there.
 struct HeightGrid {
   // Increasing, at least two each; metres, or degrees of longitude and latitude if an origin but no zone is set.
   std::vector<double> x, y;
   std::vector<float> z_m;  // [y][x]
-  /// If set, x and y are converted to the plane tangent to the ellipsoid here. Heights do not change, as if the sea were flat.
+  /// If set, x and y are converted to the plane that is tangent to the ellipsoid here. Heights do not change: the sea is
+  /// treated as flat.
   std::optional<Geodetic> origin = {};
   std::optional<UtmZone> zone = {};     // only with an origin: x and y are metres of this zone
   std::vector<std::string> notes = {};  // sentences about decisions of the reader that the scene's author should know
@@ -36,11 +37,11 @@ struct CentredMesh {
   std::size_t left_out = 0;  // triangles without area
 };
 
-/// Error if no four neighbouring heights exist, or if the mesh would exceed max_mesh_triangles.
+/// Makes the mesh. Error if no four neighbouring heights exist, or if the mesh would exceed max_mesh_triangles.
 Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
 
-/// Grey PNG of 8 or 16 bits, also stored as colours, over size_x by size_y metres about the origin; first row of the image =
-/// largest y. Black is low_m, white is high_m.
+/// Reads a grey PNG of 8 or 16 bits, which may be stored as colours. It covers size_x by size_y metres about the origin; the
+/// first row of the image has the largest y. Black is low_m, white is high_m.
 Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
                                     double high_m);
 
@@ -50,15 +51,16 @@ struct HeightOptions {
   std::optional<bool> geographic = {};  // coordinates in degrees; unset: from the file
   std::optional<UtmZone> utm = {};      // zone of coordinates in metres; unset: from the file, unless `geographic` is set
   std::optional<Geodetic> origin = {};  // origin of a grid in degrees or UTM
-  /// Used if `origin` is unset. Without both, degrees are relative to the middle of the grid, and UTM coordinates stay.
+  /// Used if `origin` is unset. Without both, degrees are relative to the middle of the grid, and UTM coordinates are used
+  /// unchanged.
   std::optional<Geodetic> world_origin = {};
-  bool centred = false;  // the caller places the middle of the grid, so its coordinates have no effect
+  bool centred = false;  // the caller positions the middle of the grid; the coordinates of the file have no effect
 };
-/// ESRI ASCII grid (.asc).
+/// Reads an ESRI ASCII grid (.asc).
 Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const HeightOptions& options);
-/// Lines "x y z" of a uniform grid (.xyz).
+/// Reads lines "x y z" of a uniform grid (.xyz).
 Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const HeightOptions& options);
-/// GeoTIFF (.tif): one band of numbers, not rotated. Error `unavailable` if sonard was built without libtiff.
+/// Reads a GeoTIFF (.tif): one band of numbers, not rotated. Error `unavailable` if sonard was built without libtiff.
 Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, const HeightOptions& options);
 
 struct Ripples {

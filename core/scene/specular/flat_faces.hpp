@@ -1,5 +1,6 @@
 // The flat faces of a scene that are large enough to be mirrors for sound: sides of boxes and tanks, planes, the still sea
-// surface. They are found once per scene; frequency and material decide in the pipeline which of them are mirrors.
+// surface. They are found once for each scene. The pipeline selects the mirrors among them, which depend on frequency and
+// material.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 
 namespace sonar {
 
-/// Coplanar triangles of one object and one material: the points with dot(normal, p) = offset_m, object coordinates.
+/// Coplanar triangles of one object and one material. Their points have dot(normal, p) = offset_m, object coordinates.
 struct FlatFace {
   int object = 0, material = 0;
   Vec3d normal;  // unit, either side
@@ -28,8 +29,8 @@ struct FlatFaces {
   }
 };
 
-/// Faces of at least 0.05 m^2 that have no narrow parts and are not facets of a round wall, whose neighbours meet at small
-/// angles. Materials that reflect less than `least_reflection` are ignored.
+/// Finds faces of at least 0.05 m^2 that have no narrow parts. Facets of a round wall, whose neighbours meet at small angles,
+/// are excluded. Materials that reflect less than `least_reflection` are ignored.
 FlatFaces find_flat_faces(const Scene& scene, double least_reflection);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Finds mirror points of triangle meshes. The mesh is prepared once: facets that meet at small angles form patches; a plane
-// patch becomes a face with an outline, any other patch a curved surface with normals and curvatures at its vertices.
+// Finds mirror points of triangle meshes. The mesh is prepared once: facets that meet at small angles form patches. A plane
+// patch becomes a face with an outline. Any other patch becomes a curved surface with normals and curvatures at its vertices.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-/// Facets that meet at a smaller angle than this approximate one smooth surface.
+/// Facets that meet at a smaller angle than this count as parts of one smooth surface.
 inline constexpr double smooth_edge_rad = 0.42;
 
 class SpecularMesh {
@@ -20,7 +20,7 @@ class SpecularMesh {
   /// Prepares the triangles whose material is set in `wanted` (indexed like Mesh::material).
   SpecularMesh(const Mesh& mesh, const std::vector<bool>& wanted);
 
-  /// Appends the mirror points that may be audible; the caller tests occlusion.
+  /// Appends the mirror points whose echoes may be strong enough. The caller tests whether they are hidden.
   void find(const SpecularQuery& query, std::vector<SpecularPoint>& out) const;
 
   std::size_t faces() const { return faces_.size(); }
@@ -44,14 +44,14 @@ class SpecularMesh {
     std::array<std::int32_t, 3> across{-1, -1, -1};  // the triangle across the edge opposite to each vertex; -1: the surface ends
     std::uint16_t material = 0;
   };
-  /// Node of a tree over the curved triangles, with a bounding ball of the triangles and a cone of their normals.
+  /// A node of a tree over the curved triangles. It has a ball around its triangles and a cone around their normals.
   struct Node {
     Vec3 centre, axis;
     float radius = 0, angle_rad = 0;
     std::uint32_t first = 0, count = 0;  // triangles of a leaf
     std::uint32_t second_child = 0;      // the first child follows its parent; 0 in a leaf
   };
-  /// The point of a triangle whose interpolated normal passes through the sonar.
+  /// The point of a triangle at which the interpolated normal passes through the sonar.
   struct Foot {
     std::array<double, 3> weight{};  // weights of the vertices; one is negative outside the triangle
     Vec3d normal;                    // on the side of the mesh's normals

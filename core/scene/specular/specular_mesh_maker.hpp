@@ -34,10 +34,10 @@ class SpecularMesh::Maker {
   void branch(std::vector<std::uint32_t>& order, std::uint32_t first, std::uint32_t last);
 
   SpecularMesh& out_;
-  std::vector<Vec3d> place_;  // welded vertices
+  std::vector<Vec3d> place_;  // vertices; equal positions are one
   std::vector<Facet> facets_;
-  std::vector<std::uint32_t> vertex_now_;   // by index in place_: the last vertex made for this place
-  std::vector<std::int32_t> triangle_now_;  // by index in facets_: the curved triangle made of the facet
+  std::vector<std::uint32_t> vertex_now_;   // by index in place_: the last vertex that was made for this position
+  std::vector<std::int32_t> triangle_now_;  // by index in facets_: the curved triangle that was made of the facet
   std::vector<Vec3> middle_;                // middles of the curved triangles, times three
 };
 

@@ -1,6 +1,6 @@
-// Points on smooth surfaces that reflect sound straight back, because the surface's normal passes through the sonar, with the
-// surface's curvatures and extent. specular_primitives and specular_mesh find them; core/pipeline/specular makes echoes of
-// them.
+// Points on smooth surfaces that reflect sound straight back, because the surface's normal passes through the sonar. Each has
+// the curvatures and the extent of its surface. specular_primitives and specular_mesh find them. core/pipeline/specular makes
+// echoes of them.
 #pragma once
 
 #include <array>
@@ -18,8 +18,8 @@ struct OutlineEdge {
   double x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 };
 
-/// The foot of the perpendicular from the sonar, in object coordinates. It may lie outside its surface; the echo
-/// then comes from the surface's edge.
+/// The foot of the perpendicular from the sonar, in object coordinates. If it lies outside its surface, the echo comes from the
+/// surface's edge.
 struct SpecularPoint {
   Vec3d foot_m;
   Vec3d normal;                       // unit, toward the sonar
@@ -43,24 +43,24 @@ struct SpecularPoint {
   }
 };
 
-/// Values of the sonar for the search for specular points.
+/// Values of the sonar that the search for specular points uses.
 struct SpecularQuery {
   Vec3d sonar_m;  // in object coordinates
   double wavelength_m = 1e-3;
   double max_range_m = 0;
-  // Only echoes from inside this cone are needed; by default there is no cone.
+  // A cone outside which no echoes are needed. By default the cone contains all directions.
   Vec3d ahead{1, 0, 0};
   double widest_rad = 4;
 };
 
-/// Surfaces whose nearest edge is farther from the foot than this many Fresnel units sqrt(lambda rho) / 2 are ignored: below
-/// -33 dB.
+/// Surfaces whose nearest edge is farther from the foot than this number of Fresnel units sqrt(lambda rho) / 2 are ignored.
+/// Their echoes are below -33 dB.
 inline constexpr double farthest_edge_in_units = 10;
 /// Surfaces more than about 30 degrees from the perpendicular are ignored, too.
 inline constexpr double farthest_edge_in_ranges = 0.6;
-/// sqrt(lambda rho) / 2 along a direction: the unit of length of the Fresnel integral.
+/// sqrt(lambda rho) / 2 along a direction. This is the unit of length of the Fresnel integral.
 double fresnel_unit_m(double wavelength_m, double range_m, double curvature_per_m);
-/// 1 + r / R, limited to an absolute value of at least 0.05, because ray theory is infinite at a focus.
+/// 1 + r / R. Its absolute value is at least 0.05 here, because ray theory is infinite at a focus.
 double bending(double range_m, double curvature_per_m);
 
 }  // namespace sonar

@@ -1,5 +1,5 @@
-// Computes mirror points of spheres, cylinders, boxes and planes in closed form, from outside and, for tanks, from inside.
-// So core/pipeline/specular gets exact radii and extents instead of facets.
+// Computes mirror points of spheres, cylinders, boxes and planes in closed form, from outside and, for tanks, from inside. So
+// core/pipeline/specular gets exact radii and extents instead of those of facets.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,8 @@
 
 namespace sonar {
 
-/// Appends the mirror points of the primitive that may be audible; the caller tests occlusion. Kind::none has no mirror points.
+/// Appends the mirror points of the primitive whose echoes may be strong enough. The caller tests whether they are hidden.
+/// Kind::none has no mirror points.
 void find_specular_points(const Primitive& primitive, const SpecularQuery& query, std::vector<SpecularPoint>& out);
 
 }  // namespace sonar
