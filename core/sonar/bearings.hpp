@@ -1,4 +1,5 @@
-// Directions of beams whose delays were computed for a sound speed other than that of the water (docs/acoustics.md, section 6).
+// Directions of beams whose delays were computed for a sound speed that is not that of the water (docs/acoustics.md, section
+// 6).
 #pragma once
 
 #include <algorithm>
@@ -18,7 +19,7 @@ inline double bearing_scale_of(const PingRequest& r) {
   return std::round(true_mps / static_cast<double>(r.settings.device_sound_speed_mps) * steps) / steps;
 }
 
-/// The true angle of a beam whose reported angle is given.
+/// The true angle of a beam with this reported angle.
 inline double true_angle_rad(double reported_rad, double bearing_scale) {
   return bearing_scale == 1 ? reported_rad : std::asin(std::clamp(bearing_scale * std::sin(reported_rad), -1.0, 1.0));
 }

@@ -9,15 +9,15 @@
 namespace sonar {
 
 struct Detection {
-  double azimuth_rad = 0;  // positive to port, like those of beams
-  double range_m = 0;      // as the device computes it
+  double azimuth_rad = 0;  // positive to port, as the azimuths of beams are
+  double range_m = 0;      // range that the device computes
 };
 
-/// At most one point for each of `directions` equal parts of the sector, from port to starboard. Samples must be logarithmic.
-/// An echo is at least `above_db` above the median of its beam. In each row, peaks across beams (-3 dB width `beam_width_rad`)
-/// are candidates; each part gets its strongest peak. A part without a peak that lies between parts with peaks gets the
-/// centroid of the echo in its own beams, if all of these beams have an echo. So a small target is one point, and a floor is
-/// one point in each part.
+/// Finds at most one point in each of `directions` equal parts of the sector, from port to starboard. Samples must be
+/// logarithmic. An echo is at least `above_db` above the median of its beam. In each row, peaks across beams (-3 dB width
+/// `beam_width_rad`) are candidates, and each part gets its strongest peak. A part without a peak that lies between parts with
+/// peaks gets the centroid of the echo in its own beams, if all of these beams have an echo. So a small target gives one point,
+/// and a floor gives one point in each part.
 std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db, double beam_width_rad);
 
 }  // namespace sonar

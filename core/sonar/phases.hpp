@@ -5,8 +5,8 @@
 
 namespace sonar {
 
-/// With vendor settings of this type a ping keeps the signals of its beams (Ping::beam_signal_upa), because the vendor's message
-/// has their phases.
+/// If a ping has vendor settings of this type, it keeps the signals of its beams (Ping::beam_signal_upa), because the vendor's
+/// message contains their phases.
 struct PhasedSettings : VendorSettings {};
 
 inline bool has_phases(const PingRequest& request) {

@@ -1,5 +1,4 @@
-// One ping: all its inputs (PingRequest) and its result (Ping). A ping is a pure function of its request and the
-// scene.
+// One ping: all its inputs (PingRequest) and its result (Ping). The result is a pure function of the request and the scene.
 #pragma once
 
 #include <array>
@@ -28,18 +27,18 @@ inline constexpr std::array<std::string_view, 3> mode_names = {"canonical", "pap
 
 inline constexpr std::string_view name_of(Mode mode) { return mode_names[static_cast<std::size_t>(mode)]; }
 
-/// Parts of the model that can be switched (docs/acoustics.md, section 8). The defaults are the canonical model.
+/// Parts of the model that can be switched on and off (docs/acoustics.md, section 8). The defaults are the canonical model.
 struct Switches {
   Mode mode = Mode::canonical;
-  bool expected_power = false;  // |sum a|^2 replaced by sum |a|^2: deterministic radiometry
+  bool expected_power = false;  // sum |a|^2 instead of |sum a|^2: the result has no randomness
   int fixed_fan = 0;            // n > 0: n uniform rays per column, one scatterer per ray, no cells
   bool keep_pressure = false;   // fill Ping::pressure_upa
   bool keep_beams = false;      // fill Ping::beam_signal_upa
   bool keep_truth = false;      // fill Ping::truth
   bool keep_labels = false;     // fill Ping::labels; only the CPU engine computes such pings
 
-  // The switches below have names for users, see named_switches. A part (volume, interference, leak, ...) has no effect, even
-  // when it is on, if the scene or the model has no data for it.
+  // The switches below have names for users, see named_switches. A part (volume, interference, leak, ...) that is on still has
+  // no effect if the scene or the model has no data for it.
   bool noise = true;
   bool specular = true;
   bool texture = true;
@@ -58,7 +57,7 @@ struct Switches {
   bool defocus = true;
   bool shared_noise = true;
   bool truncation = true;
-  bool interleave = false;  // computes each of the pings from which a picture is combined
+  bool interleave = false;  // computes each of the pings that form a picture
 
   bool operator==(const Switches&) const = default;
 };
@@ -91,7 +90,7 @@ inline constexpr std::array<NamedSwitch, 19> named_switches{{
     {"interleave", &Switches::interleave, "beams of one picture from successive pings, where the model has them; off: from one"},
 }};
 
-/// How the sonar moves while a ping is under way.
+/// Motion of the sonar during a ping.
 struct Twist {
   Vec3d velocity_mps;        // velocity of the sonar in world axes
   Vec3d angular_rate_radps;  // sonar axes
@@ -99,26 +98,27 @@ struct Twist {
 
 struct Ping;
 
-/// Base class of a device's findings in a ping, such as the points of a bottom. core does not read them.
+/// Base class of what a device finds in a ping, such as the points of a bottom. core does not read the contents.
 struct PingFindings {
   virtual ~PingFindings() = default;
 };
 
-/// Base class of settings that a vendor's protocol needs beside PingSettings, such as the client's request, because the message
-/// of a ping states the settings with which it was made. core reads only two derived types: RangeImageSettings
+/// Base class of settings that a vendor's protocol needs besides PingSettings, such as the client's request. The message of a
+/// ping states the settings with which the ping was made. core reads only two derived types: RangeImageSettings
 /// (core/sonar/range_image.hpp) makes the ping a range image, PhasedSettings (core/sonar/phases.hpp) keeps signals of beams.
 struct VendorSettings {
   virtual ~VendorSettings() = default;
-  /// Whether a client would see no difference between these settings and `other`, which must be of the same vendor.
+  /// True if clients see no difference between these settings and `other`, which must be of the same vendor.
   virtual bool equals(const VendorSettings& other) const = 0;
   /// The device's findings in a ping that was made with these settings; null if the device makes none.
   virtual std::shared_ptr<const PingFindings> look_at(const Ping&) const { return nullptr; }
 };
 
-/// Meaning of the reported angles if the sonar assumes another sound speed than that of the water (docs/acoustics.md, section 6).
+/// Meaning of the reported angles if the sonar assumes a sound speed that is not that of the water (docs/acoustics.md, section
+/// 6).
 enum class Bearings {
   are_true,             // beams point where the sonar reports them
-  follow_device_speed,  // the beamformer's delays are those of the device's sound speed
+  follow_device_speed,  // the beamformer uses delays for the device's sound speed
 };
 inline constexpr std::array<std::string_view, 2> bearings_names = {"true", "device_sound_speed"};
 
@@ -140,7 +140,7 @@ struct PingRequest {
   Switches switches;
 };
 
-/// First hit of a beam: the nearest of the rays in its column within the -3 dB elevation width.
+/// First hit of a beam: the nearest hit of the rays in its column within the -3 dB elevation width.
 struct BeamTruth {
   static constexpr std::uint32_t nothing = 0xFFFFFFFFu;
   float range_m = 0;               // true range, 0 = nothing
@@ -149,7 +149,7 @@ struct BeamTruth {
 
 struct PingLabels;  // core/sonar/ping_labels.hpp
 
-/// The result of a ping, for all vendors. Row 0 is the nearest; beam 0 is the one farthest to port (azimuth falls from + to -).
+/// The result of a ping, for all vendors. Row 0 is the nearest. Beam 0 is the one farthest to port: azimuths fall from + to -.
 struct Ping {
   PingRequest request;
   std::vector<float> beam_azimuth_rad;  // [beams], positive to port

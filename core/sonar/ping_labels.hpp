@@ -1,4 +1,5 @@
-// For each sample of a ping, the object whose echo it holds (docs/datasets.md); filled by core/pipeline/labels.hpp.
+// Labels of a ping: for each sample, the object whose echo it contains (docs/datasets.md). core/pipeline/labels.hpp computes
+// them.
 #pragma once
 
 #include <cstddef>

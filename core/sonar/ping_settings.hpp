@@ -1,12 +1,12 @@
 // Settings that a client may change between two pings, independent of the vendor. protocol/<vendor>/ computes them from the
-// settings of the vendor's protocol.
+// vendor's settings.
 #pragma once
 
 #include <cstdint>
 
 namespace sonar {
 
-/// How the amplitude v becomes a code. v is (pressure x TVG x gain) / full scale, so the linear scale saturates at v = 1
+/// Conversion of the amplitude v to a code. v is (pressure x TVG x gain) / full scale, so the linear scale saturates at v = 1
 /// (docs/acoustics.md, eq. 37, 40).
 struct SampleFormat {
   enum class Scale {
@@ -24,29 +24,29 @@ struct SampleFormat {
 };
 
 /// Ranges use the sound speed that the device assumes. Row i covers range_start_m + [i, i + 1) range_bin_m. The picture ends at
-/// range_start_m + range_bin_count * range_bin_m, which is range_m apart from the vendor's rounding to whole rows.
+/// range_start_m + range_bin_count * range_bin_m. This equals range_m, except for the vendor's rounding to whole rows.
 struct PingSettings {
   int mode = 0;  // index into SonarModel::modes
   int beam_count = 512;
-  int range_bin_count = 437;      // rows
-  double range_m = 10;            // the far end of the picture, as the device rounds it
-  double range_start_m = 0;       // the near edge of row 0, below range_m; nearer echoes show only the tails of their pulses
+  int range_bin_count = 437;  // rows
+  double range_m = 10;        // the far end of the picture, as the device rounds it
+  double range_start_m = 0;   // the near edge of row 0, below range_m; of nearer echoes only the tails of the pulses are visible
   double range_bin_m = 0.0229;    // row spacing; packets carry it exactly
-  double row_centre = 0.5;        // position of the samples' centre in a row, see range_of_row: 0 near edge, 1 far edge
+  double row_centre = 0.5;        // position of the samples in a row, see range_of_row: 0 near edge, 1 far edge
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)
-  int samples_per_row = 1;        // 1: a row is the sample at its centre; n: the mean power of n samples
+  int samples_per_row = 1;        // 1: a row is one sample; n: a row is the mean power of n samples
   float rate_hz = 10;             // 0 = standby
   double ping_interval_s = 0;     // between the pings of a picture, see FrequencyMode::interleaved_pings
   float gain_db = 0;
   bool gain_assist = false;              // the device changes the gain itself, starting at gain_db (core/sonar/gain_assist.hpp)
-  bool tvg = true;                       // false: no time-varied gain, G0 only (Oculus 32-bit "scientific" data)
+  bool tvg = true;                       // false: no time-varied gain, only G0 (Oculus 32-bit "scientific" data)
   float device_sound_speed_mps = 1500;   // sound speed that the device assumes
-  float device_absorption_db_per_m = 0;  // one way, as its TVG assumes
+  float device_absorption_db_per_m = 0;  // one way, assumed by its TVG
   bool triggered = false;                // one ping per request of the client
   bool transmit = true;                  // false: it receives noise only
   SampleFormat format;
 
-  /// Range of a row's samples as the device computes it [m]; `row` may lie between two rows.
+  /// Range of a row's samples as computed by the device [m]; `row` may lie between two rows.
   double range_of_row(double row) const { return range_start_m + (row + row_centre) * range_bin_m; }
 
   bool operator==(const PingSettings&) const = default;

@@ -11,7 +11,7 @@ namespace sonar {
 
 /// Aperture shading of the receive array; it determines the side lobes. `unit` switches the pattern off (1 everywhere).
 enum class Taper { uniform, taylor30, hamming, hann, unit };
-/// Whether the data sheet's vertical width is that of one pattern, or of the product of transmit and receive patterns
+/// Meaning of the data sheet's vertical width: the width of one pattern, or of the product of transmit and receive patterns
 /// (docs/acoustics.md, section 6).
 enum class ElevationWidthIs { one_way, two_way };
 enum class BeamSpacing {
@@ -28,38 +28,40 @@ struct BeamPattern {
   ElevationWidthIs elevation_width_is = ElevationWidthIs::two_way;
 };
 
-/// Measured differences between beams (docs/acoustics.md, sections 5 and 6). The values of each table are at uniform steps of
+/// Measured differences between beams (docs/acoustics.md, sections 5 and 6). Each table has values at uniform steps of the
 /// sine, from the port edge of the sector to its starboard edge; empty = no difference.
 struct BeamProfile {
   std::vector<float> noise_db;       // receiver noise re (30), far from the sonar
   std::vector<float> near_noise_db;  // the same at range 0; same length as noise_db
   float near_m = 0.2f;               // weight of noise_db at range r: 1 - e^{-r / near_m}
-  std::vector<float> blend;          // amplitude, re the beam's own, with which the neighbours half a beam width away are added
+  std::vector<float> blend;          // amplitude, re the beam's own, of the neighbours half a beam width away that are added
 };
 
 /// Noise that receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).
 struct SharedNoise {
   float level_db = -200;  // level of a channel, re the channel's own noise; below -150 = none
   int channels = 128;     // even
-  // Number of neighbours that share it, with weights that decrease to both ends; even; half of it divides `channels`.
+  // Number of neighbouring channels that share a signal; even; half of it divides `channels`. Their weights decrease to both
+  // ends.
   int group = 32;
-  float sine = 0.56f;    // sine of its apparent direction at long range: half a wavelength / channel spacing
-  float full_m = 0.25f;  // below this range its power is proportional to the range
+  float sine = 0.56f;    // sine of the apparent direction at long range: half a wavelength / channel spacing
+  float full_m = 0.25f;  // at shorter ranges its power is proportional to the range
   float steady = 0;      // fraction of its power that is the same in every ping and in phase in all channels
-  float focus_rows = 0;  // number of rows by which the array's focus lies behind the centre of a row
+  float focus_rows = 0;  // number of rows from the centre of a row to the array's focus, which is farther
   float nearest_focus_m = 0;
 };
 
-/// How the receiver turns pressure into samples (docs/acoustics.md, section 7); constants of the product.
+/// Conversion of pressure to samples in the receiver (docs/acoustics.md, section 7). The values are constants of the product.
 struct ReceiverModel {
   float tvg_slope_db = 30;  // X in X log10 r
   float tvg_minimum_range_m = 0.5f;
-  float tvg_ceiling_db = 80;  // infinity switches it off
+  float tvg_ceiling_db = 80;  // upper limit of the TVG; infinity: no limit
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
-  // -3 dB width of the noise filter divided by the pulse's; unused with a measured pulse, which is the filter.
+  // -3 dB width of the noise filter divided by the width of the pulse's filter. Unused for a measured pulse, because the pulse
+  // is then the filter.
   float noise_width = 1;
-  float crosstalk_db = -200;  // amplitude, re the channel, with which every channel is added to every beam; below -150 = none
+  float crosstalk_db = -200;  // amplitude, re the channel, of every channel in every beam; below -150 = none
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none
   float leak_decay_db_per_m = 30;
   std::vector<float>
@@ -67,14 +69,14 @@ struct ReceiverModel {
   float leak_ring_step_m = 0.003f;
   bool leak_is_shared = false;  // true: the channels share it, like shared_noise; false: each column has a random phase
   BeamProfile profile;
-  /// Gains of the receive channels, from port; each channel serves the same number of neighbouring beams. Empty = no
+  /// Gains of the receive channels, beginning at port. Each channel serves the same number of neighbouring beams. Empty = no
   /// difference.
   std::vector<float> channel_gain_db;
   SharedNoise shared_noise;
-  /// 0: receive beams are focused at every range and bearing. 1: all use the delays of broadside, so that other beams are blurred
-  /// at short range (docs/acoustics.md, section 6).
+  /// 0: receive beams are focused at every range and bearing. 1: all beams use the delays of broadside. Beams off broadside are
+  /// then blurred at short range (docs/acoustics.md, section 6).
   float defocus = 0;
-  /// Codes of a linear scale are floor((max_code + 1) v^gamma), not rounded (docs/acoustics.md, section 7).
+  /// True: codes of a linear scale are floor((max_code + 1) v^gamma), not rounded (docs/acoustics.md, section 7).
   bool truncates = false;
 };
 
@@ -86,14 +88,14 @@ struct FrequencyMode {
   float max_range_m = 0;
   float source_level_db = 0;  // dB re 1 uPa rms at 1 m
   BeamSpacing beam_spacing = BeamSpacing::uniform_in_sine;
-  /// listed: direction of each beam, positive to port and strictly falling, within +- horizontal_aperture_rad / 2 (the sector
-  /// that the transmitter lights). PingSettings::beam_count is their number.
+  /// For `listed`: direction of each beam, positive to port and strictly falling, within +- horizontal_aperture_rad / 2 (the
+  /// sector that the transmitter covers). PingSettings::beam_count is their number.
   std::vector<double> beam_azimuths_rad;
-  /// listed: -3 dB width of each beam in azimuth, in its own direction; empty = pattern.azimuth_width_rad at broadside for all,
-  /// which widens as 1 / cos(azimuth). The noise level is that of a beam of the pattern's width.
+  /// For `listed`: -3 dB width of each beam in azimuth, in its own direction. If empty, the width is pattern.azimuth_width_rad
+  /// at broadside for all beams and widens as 1 / cos(azimuth). The noise level is that of a beam of the pattern's width.
   std::vector<float> beam_widths_rad;
-  /// A picture combines this many successive pings; neighbouring beams come from them in turn, the last beam from the first
-  /// ping (docs/acoustics.md, section 6).
+  /// Number of successive pings that are combined to a picture. Neighbouring beams come from successive pings, the last beam
+  /// from the first ping (docs/acoustics.md, section 6).
   int interleaved_pings = 1;
   BeamPattern pattern;
   Waveform waveform;
@@ -104,7 +106,7 @@ struct FrequencyMode {
 
 struct SonarModel {
   std::string profile;  // the name in a configuration: "oculus-m1200d"
-  std::string name;     // for people: "Oculus M1200d"
+  std::string name;     // the name for users: "Oculus M1200d"
   std::uint16_t part_number = 0;
   std::vector<FrequencyMode> modes;
   float max_rate_hz = 40;

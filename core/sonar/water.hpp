@@ -1,5 +1,5 @@
-// Properties of the water, its sound speed and its absorption. The physics uses them, and so do emulated devices that compute
-// their assumed sound speed. Comments name formulae and sources; oracles 27 to 29 in tests/core/sonar test them. The code is
+// Properties of the water: its sound speed and its absorption. The physics uses them, and so do emulated devices that compute
+// their assumed sound speed. Comments name formulae and sources. Oracles 27 to 29 in tests/core/sonar test them. The code is
 // C++17 and uses only the standard library.
 #pragma once
 
@@ -18,7 +18,7 @@ constexpr bool operator==(const Water& a, const Water& b) {
 
 /// Francois & Garrison 1982. Frequency [Hz], depth [m]; one-way, dB/m.
 double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz);
-/// Ainslie & McColm 1998, to check Francois & Garrison. dB/m.
+/// Ainslie & McColm 1998, dB/m. Only for comparison with Francois & Garrison.
 double absorption_ainslie_mccolm_db_per_m(const Water& water, double depth_m, double frequency_hz);
 /// Mackenzie 1981. T 2..30 C, S 25..40, depth 0..8000 m.
 double sound_speed_mackenzie_mps(double temperature_c, double salinity_psu, double depth_m);
@@ -30,9 +30,9 @@ double sound_speed_fresh_mps(double temperature_c);
 double density_kg_per_m3(double temperature_c, double salinity_psu);
 /// Absolute pressure [bar] at a depth: 1.013 + 0.0981 depth rho / 1000; depth below 0 counts as 0.
 double absolute_pressure_bar(const Water& water, double depth_m);
-/// The true sound speed: Water::sound_speed_mps if it is given, else UNESCO at that depth.
+/// The true sound speed: Water::sound_speed_mps if it is not 0, else UNESCO at that depth.
 double true_sound_speed_mps(const Water& water, double depth_m);
-/// Depth of a place in the world: -z, at least 0, because z = 0 is the surface.
+/// Depth [m] of a position in the world: -z, at least 0, because the surface is at z = 0.
 inline double depth_from_z(double z_m) { return z_m < 0 ? -z_m : 0; }
 
 }  // namespace sonar
