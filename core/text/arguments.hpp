@@ -1,4 +1,5 @@
-// Command lines of sonard and sonarctl, parsed by CLI11: checks of values, and errors that suggest the nearest known word.
+// Command lines of sonard and sonarctl, parsed by CLI11. This file adds checks of values, and errors that suggest the nearest
+// known word.
 #pragma once
 
 #include <cstdint>
@@ -18,19 +19,19 @@ namespace sonar::text {
 CLI::Validator one_of(std::vector<std::string> names);
 CLI::Validator whole_number(std::uint64_t low = 0, std::uint64_t high = std::numeric_limits<std::uint64_t>::max());
 CLI::Validator number(double low = std::numeric_limits<double>::lowest(), double high = std::numeric_limits<double>::max());
-/// For transform(): ENU becomes enu.
+/// Converts ENU to enu. Pass it to transform().
 CLI::Validator in_small_letters();
 
-/// Like CLI::App::parse. CLI11 2.4 and later ignores a value of an environment variable that fails the option's check; here it is
-/// an error with every version.
+/// Like CLI::App::parse. If a value of an environment variable fails the option's check, CLI11 2.4 and later ignore the value.
+/// Here it is an error with every version.
 void parse(CLI::App& app, int argc, const char* const* argv);
 
-/// The error of a command line as one line that ends with where_help_is(): `unknown command "veiw"; did you mean
-/// "view"?` (options alike); for other errors, the parser's text. A value from an environment variable is reported under the
-/// variable's name. Empty for --help and --version without an unknown word. `words`: as typed, without the program.
+/// The error of a command line as one line that ends with where_help_is(). For unknown commands and options: `unknown command
+/// "veiw"; did you mean "view"?`. For other errors: the parser's text. For a value from an environment variable, the error
+/// names the variable. Empty for --help and --version without an unknown word. `words`: as typed, without the program.
 std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& words);
 
-/// " (sonarctl pose circle --help)": the help option of the innermost command that the parser has recognised.
+/// The help option of the innermost command that the parser has recognised: " (sonarctl pose circle --help)".
 std::string where_help_is(const CLI::App& app);
 
 }  // namespace sonar::text

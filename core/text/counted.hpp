@@ -7,7 +7,7 @@
 
 namespace sonar::text {
 
-/// "1 beam", "2 beams".
+/// Returns "1 beam" or "2 beams".
 template <std::integral N>
 std::string counted(N count, std::string_view what) {
   return std::to_string(count).append(" ").append(what).append(count == 1 ? "" : "s");

@@ -9,7 +9,7 @@ namespace sonar::text {
 /// Number of bytes that unusable_kind() needs.
 inline constexpr std::size_t kind_bytes = 64;
 
-/// "is compressed with gzip; unpack it": follows "FILE: ". Empty for other files.
+/// Returns, for example, "is compressed with gzip; unpack it". The text follows "FILE: ". Empty for other files.
 std::string_view unusable_kind(std::string_view begin);
 
 }  // namespace sonar::text

@@ -8,7 +8,7 @@ namespace sonar::text {
 /// Formats like std::printf; the text may have any length.
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...);
 
-/// Three significant digits: "750 kHz", "2.1 MHz".
+/// Formats three significant digits: "750 kHz", "2.1 MHz".
 std::string frequency_text(double hz);
 
 }  // namespace sonar::text

@@ -1,5 +1,5 @@
-// Makes text from outside printable on a terminal: bytes that move the cursor, change the terminal's state or are not
-// UTF-8 become \xNN.
+// Makes text from outside printable on a terminal. Bytes that are not UTF-8, move the cursor or change the terminal's state
+// become \xNN.
 #pragma once
 
 #include <string>

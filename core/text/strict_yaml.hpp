@@ -56,20 +56,20 @@ class Node {
   bool is_sequence() const;
   bool is_map() const;
 
-  /// The text of a scalar; must not be empty unless that is allowed. `max_length` is in bytes.
+  /// Returns the text of a scalar. An empty text is an error unless it is allowed. `max_length` is in bytes.
   std::string text(std::size_t max_length = 4096, bool allow_empty = false) const;
   std::string text_or(std::string fallback, std::size_t max_length = 4096) const;
-  /// Decimal only: no hexadecimal, no leading zeros (012), no digits grouped by _, not quoted.
+  /// Reads a decimal number: no hexadecimal, no leading zeros (012), no digits grouped by _, no quotes.
   double number(Range range = {}) const;
   double number_or(double fallback, Range range = {}) const;
   std::int64_t integer(std::int64_t min, std::int64_t max) const;
   std::int64_t integer_or(std::int64_t fallback, std::int64_t min, std::int64_t max) const;
   std::uint64_t unsigned_integer_or(std::uint64_t fallback, std::uint64_t max = std::numeric_limits<std::uint64_t>::max()) const;
-  /// Only the words true and false.
+  /// Accepts only the words true and false.
   bool boolean() const;
   bool boolean_or(bool fallback) const;
 
-  /// Index of one of the names; the error suggests the nearest name.
+  /// Returns the index of one of the names. The error suggests the nearest name.
   std::size_t choice_index(std::vector<std::string_view> names) const;
   template <class T>
   T choice(std::initializer_list<std::pair<std::string_view, T>> choices) const {
@@ -82,7 +82,7 @@ class Node {
     return present() ? choice<T>(choices) : fallback;
   }
 
-  /// A list of exactly N numbers.
+  /// Reads a list of exactly N numbers.
   template <std::size_t N>
   std::array<double, N> numbers(Range range = {}) const {
     std::array<double, N> out{};
@@ -95,9 +95,9 @@ class Node {
   }
   std::vector<std::string> texts(std::size_t min_count = 0, std::size_t max_count = 256) const;
 
-  /// Elements of a list; empty when absent or not a list.
+  /// Returns the elements of a list; empty if it is absent or not a list.
   std::vector<Node> items(std::size_t min_count = 0, std::size_t max_count = 100000) const;
-  /// The value as a map; an empty map when absent or not a map.
+  /// Returns the value as a map; an empty map if it is absent or not a map.
   Map map() const;
 
   /// Records an error at this value, e.g. `node.fail("is not an address; write it as 127.0.0.2")`. The first error wins.
@@ -126,7 +126,7 @@ class Map {
   bool has(std::string_view key) const;  // does not make the key valid
   Node required(std::string_view key);
   Node optional(std::string_view key);
-  /// All keys with their values, for maps whose keys are names chosen by the user.
+  /// Returns all keys with their values, for maps whose keys are names chosen by the user.
   std::vector<std::pair<std::string, Node>> entries();
   void fail(std::string_view what) const;
   std::string path() const;
@@ -148,9 +148,9 @@ class Document {
   ~Document();
 
   Map root() const;
-  /// The first error: wrong values come first, then unknown and missing keys of every map that was opened.
+  /// Returns the first error. Wrong values come first, then unknown and missing keys of every map that was opened.
   std::optional<Error> finish() const;
-  /// The first wrong value so far; unknown keys are not checked.
+  /// Returns the first wrong value so far. Unknown keys are not checked.
   std::optional<Error> error() const;
 
  private:
@@ -158,16 +158,16 @@ class Document {
 };
 
 struct YamlLimits {
-  // Kind of every error in the document; a file that cannot be opened is always missing_file.
+  // Kind of every error in the document. For a file that cannot be opened, the kind is always missing_file.
   ErrorKind error_kind = ErrorKind::config;
   std::size_t max_bytes = std::size_t{4} << 20;
   std::size_t max_nodes = 400000;
   int max_depth = 24;
 };
 
-/// `name` is the file name that errors start with.
+/// Parses a text. `name` is the file name with which errors start.
 Result<Document> parse_yaml(std::string_view text, std::string name, const YamlLimits& limits = {});
-/// Reads and parses; errors print the path as given.
+/// Reads and parses a file. Errors print the path as given.
 Result<Document> parse_yaml_file(const std::filesystem::path& file, const YamlLimits& limits = {});
 
 }  // namespace sonar::text

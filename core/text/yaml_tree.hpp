@@ -1,5 +1,5 @@
-// The tree of a parsed text, to which Node and Map refer. Because of it, only strict_yaml.cpp needs yaml-cpp. It is internal to
-// core/text; readers use strict_yaml.hpp.
+// The tree of a parsed text, to which Node and Map refer. With this tree, only strict_yaml.cpp needs yaml-cpp. It is internal
+// to core/text; readers use strict_yaml.hpp.
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ struct YamlNode {
   std::string scalar;
   std::vector<YamlNode*> children;
 
-  // Set while a reader reads this map.
+  // Set while a reader uses this map.
   bool opened = false;
   bool any_key = false;  // its keys are names chosen by the user
   std::vector<std::string> asked, missing;
