@@ -26,8 +26,8 @@ struct Actions {
 
 Result<MemoryFile> MemoryFile::make(const char* name) {
   const int any = ::memfd_create(name, MFD_CLOEXEC);
-  // The duplicate is numbered 3 or higher, because the standard streams may be closed here. In the child it becomes one of
-  // them.
+  // The duplicate gets a number of 3 or higher, because the standard streams may be closed in this process. In the child it
+  // becomes one of the standard streams.
   const int descriptor = any < 0 ? -1 : ::fcntl(any, F_DUPFD_CLOEXEC, 3);
   const int error = errno;
   if (any >= 0) ::close(any);

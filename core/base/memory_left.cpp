@@ -11,14 +11,14 @@ namespace {
 
 using std::filesystem::path;
 
-/// The number in a file that contains nothing else; nullopt for the word "max".
+/// The number in a file that contains only a number; nullopt for the word "max".
 std::optional<std::uint64_t> number_in(const path& file) {
   std::ifstream in(file);
   std::uint64_t number = 0;
   return in >> number ? std::optional(number) : std::nullopt;
 }
 
-/// The number that follows a word at the beginning of a line; 0 if there is no such line.
+/// The number that follows a word at the beginning of a line; 0 if no line begins with the word.
 std::uint64_t number_after(const path& file, const std::string& word) {
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {

@@ -17,7 +17,7 @@ struct Parallel::Pool {
   std::mutex mutex;
   std::condition_variable start, finished;
   std::vector<std::thread> workers;
-  int free_places = 0, busy = 0;  // workers of this call that may still join; workers that compute
+  int free_places = 0, busy = 0;  // workers that may still join the current call; workers that compute
   bool stop = false;
 
   std::atomic<std::size_t> next{0};
@@ -27,21 +27,22 @@ struct Parallel::Pool {
 
   std::exception_ptr fault;  // the first exception of a call
 
-  /// An exception in a worker thread would end the whole program. If memory runs out in a ping, only this ping must fail.
+  /// Runs the items of the current call. Exceptions are caught, because an exception in a worker thread would end the whole
+  /// program. If memory runs out in a ping, only this ping must fail.
   void run_items(int worker) {
     try {
       for (std::size_t i = next.fetch_add(1, std::memory_order_relaxed); i < count;
            i = next.fetch_add(1, std::memory_order_relaxed))
         call(body, i, worker);
     } catch (...) {
-      next.store(count, std::memory_order_relaxed);  // no more items for the others
+      next.store(count, std::memory_order_relaxed);  // the other workers get no more items
       std::lock_guard lock(mutex);
       if (!fault) fault = std::current_exception();
     }
   }
 
   void work(int worker, int nice_by) {
-    // On Linux, niceness belongs to the thread. A failure is ignored: other threads only run less smoothly.
+    // On Linux, niceness belongs to the thread. A failure is ignored, because it only makes other threads run less smoothly.
     if (nice_by != 0 && ::nice(nice_by) == -1) {
     }
     while (true) {
@@ -96,7 +97,7 @@ void Parallel::run(std::size_t count, void* body, Call call) {
   for (int i = 0; i < places; ++i) p.start.notify_one();
   p.run_items(0);
   std::unique_lock lock(p.mutex);
-  p.free_places = 0;  // all items are taken: workers that have not joined yet must not join
+  p.free_places = 0;  // all items are assigned: workers that have not joined yet must not join
   p.finished.wait(lock, [&] { return p.busy == 0; });
   if (p.fault) std::rethrow_exception(std::exchange(p.fault, nullptr));
 }

@@ -11,7 +11,7 @@
 namespace sonar {
 
 void open_closed_standard_streams() {
-  // open() returns the lowest free number, which is the one just found closed.
+  // open() returns the lowest free number, which is the number of the closed stream.
   for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; ++fd)
     if (::fcntl(fd, F_GETFD) == -1 && errno == EBADF && ::open("/dev/null", O_RDWR) != fd) return;
 }

@@ -9,14 +9,14 @@
 namespace sonar {
 namespace {
 
-// The northing is that of the southern hemisphere; the northern one has none.
+// False northing of the southern hemisphere [m]; the northern hemisphere has none.
 constexpr double scale = 0.9996, false_easting_m = 500'000, false_northing_m = 10'000'000;
 constexpr double n = earth_flattening / (2 - earth_flattening), n2 = n * n, n3 = n2 * n, n4 = n3 * n;
 constexpr double rectifying_m = earth_semi_major_m / (1 + n) * (1 + n2 / 4 + n4 / 64);
-/// Coefficients from the plane to the conformal sphere.
+/// Coefficients of the conversion from the plane to the conformal sphere.
 constexpr std::array<double, 4> to_sphere{n / 2 - n2 * 2 / 3 + n3 * 37 / 96 - n4 / 360, n2 / 48 + n3 / 15 - n4 * 437 / 1440,
                                           n3 * 17 / 480 - n4 * 37 / 840, n4 * 4397 / 161280};
-/// Coefficients from conformal to geographic latitude.
+/// Coefficients of the conversion from conformal to geographic latitude.
 constexpr std::array<double, 4> to_latitude{2 * n - n2 * 2 / 3 - 2 * n3 + n4 * 116 / 45, n2 * 7 / 3 - n3 * 8 / 5 - n4 * 227 / 45,
                                             n3 * 56 / 15 - n4 * 136 / 35, n4 * 4279 / 630};
 constexpr double margin_m = 500'000;

@@ -14,8 +14,8 @@
 namespace sonar {
 namespace {
 
-/// File systems whose files the kernel makes or interprets. Even root cannot create ordinary files there.
-// From the kernel's sources.
+/// File systems whose files the kernel makes or interprets. Even root cannot create ordinary files in them.
+// The numbers are from the kernel's sources.
 constexpr unsigned long mqueue_magic = 0x19800202, configfs_magic = 0x62656570, fusectl_magic = 0x65735543;
 constexpr std::array<unsigned long, 19> kernels_own{PROC_SUPER_MAGIC, SYSFS_MAGIC,    CGROUP_SUPER_MAGIC, CGROUP2_SUPER_MAGIC,
                                                     DEBUGFS_MAGIC,    TRACEFS_MAGIC,  SECURITYFS_MAGIC,   DEVPTS_SUPER_MAGIC,
@@ -28,7 +28,7 @@ std::optional<dev_t> file_system_of(const char* file) {
   return ::stat(file, &status) == 0 ? std::optional(status.st_dev) : std::nullopt;
 }
 
-/// True for /dev and its folders, except those with their own file system, such as /dev/shm.
+/// True for /dev and its folders, except for folders with their own file system, such as /dev/shm.
 bool is_of_devices(const std::filesystem::path& folder) {
   const auto devices = file_system_of("/dev");
   return devices && devices != file_system_of("/") && devices == file_system_of(folder.c_str());
