@@ -10,8 +10,8 @@
 namespace sonar {
 namespace {
 
-/// The fractional position in the beam table; beam k spans [k - 0.5, k + 0.5]. nullopt outside the fan; a full circle has no
-/// outside.
+/// The fractional position in the table of beams; beam k spans [k - 0.5, k + 0.5]. nullopt outside the fan. If the fan is a
+/// full circle, every direction is in the fan.
 std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azimuth) {
   const auto next = std::lower_bound(azimuth_rad.begin(), azimuth_rad.end(), azimuth, std::greater<>());
   const auto right = std::clamp<std::ptrdiff_t>(next - azimuth_rad.begin(), 1, std::ssize(azimuth_rad) - 1);
@@ -27,14 +27,14 @@ std::optional<double> beam_at(const std::vector<double>& azimuth_rad, double azi
 struct Interval {
   double low = 0, high = 0;
 };
-/// A box of `width` around `centre`, limited to the existing cells.
+/// The cells of an interval of `width` around `centre`, limited to the existing cells.
 Interval box_around(double centre, double width, std::size_t cells) {
   const double limit = static_cast<double>(cells);
   const double low = std::clamp(centre - width / 2, 0.0, limit - 1e-6);
   return {low, std::clamp(centre + width / 2, low + 1e-6, limit)};
 }
 
-/// Cells [first, last] that an interval touches, weighted by their overlap.
+/// The cells [first, last] that an interval touches, weighted by their overlap.
 struct Span {
   double low, high;
   std::size_t first, last;
@@ -89,7 +89,7 @@ FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens
   FanLayout layout;
   layout.width = style.width_px;
   layout.metres_per_pixel = 2 * image.range_m() * std::sin(std::min(half_aperture, pi / 2)) / (style.width_px - 2 * margin);
-  // A very narrow fan would be very tall.
+  // Without this limit a very narrow fan would be very tall.
   layout.metres_per_pixel = std::max(layout.metres_per_pixel, image.range_m() / (4.0 * style.width_px));
   layout.apex_x = style.width_px / 2.0;
   const double ahead = image.range_m() / layout.metres_per_pixel;
@@ -108,7 +108,7 @@ double ring_spacing_m(double range_m) {
   return 2 * decade;
 }
 
-/// A footprint smaller than a cell becomes one cell wide, which interpolates linearly.
+/// A footprint that is smaller than a cell is widened to one cell. The picture is then interpolated linearly.
 FanPainter::Footprint FanPainter::footprint(const PolarImage& image, double x_m, double y_m, double pixel_m) {
   const double range = std::hypot(x_m, y_m);
   if (range < image.start_m || range >= image.range_m()) return {};

@@ -10,7 +10,7 @@ namespace sonar {
 namespace {
 
 constexpr Rgb head_colour{79, 184, 255};
-constexpr double waterfall_shape = 0.75;  // height over width
+constexpr double waterfall_shape = 0.75;  // height divided by width
 
 /// The cells [first, last) that pixel `at` covers when `cells` cells fill `pixels` pixels; at least one cell.
 std::pair<std::size_t, std::size_t> cells_under(int at, int pixels, std::size_t cells) {
@@ -25,7 +25,7 @@ float mean_of(const PolarImage& image, std::pair<std::size_t, std::size_t> rows,
   return sum / static_cast<float>((rows.second - rows.first) * (columns.second - columns.first));
 }
 
-/// A rectangle of cells; `rows` of them fill the height, and the image may have fewer.
+/// Draws a rectangle of cells. `rows` cells fill the height, even if the image has fewer rows.
 Raster draw_cells(const PolarImage& image, std::size_t rows, const FanStyle& style, int height) {
   Raster raster(style.width_px, height);
   for (int y = 0; y < height; ++y) {

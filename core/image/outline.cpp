@@ -11,13 +11,13 @@ std::vector<Outline> outlines(int x0, int y0, int x1, int y1, const std::functio
     return static_cast<std::size_t>(y - y0) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x - x0);
   };
   std::vector<bool> followed(static_cast<std::size_t>(width) * static_cast<std::size_t>(y1 - y0),
-                             false);  // upper edges of pixels
+                             false);  // true if a pixel's upper edge is already part of an outline
   std::vector<Outline> found;
   for (int y = y0; y < y1; ++y)
     for (int x = x0; x < x1; ++x) {
       if (!in(x, y) || in(x, y - 1) || followed[place(x, y)]) continue;
-      // Follows the edge with the region on the right. The tables have, for each direction, the pixels ahead of a corner on the
-      // right and left.
+      // Follows an edge with the region on its right. For each direction, the tables contain the pixels ahead of a corner, on
+      // the right and on the left.
       constexpr int dx[] = {1, 0, -1, 0}, dy[] = {0, 1, 0, -1};
       constexpr int right_x[] = {0, -1, -1, 0}, right_y[] = {0, 0, -1, -1}, left_x[] = {0, 0, -1, -1}, left_y[] = {-1, 0, 0, -1};
       Outline outline{{x, y}};

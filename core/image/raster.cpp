@@ -20,7 +20,7 @@
 namespace sonar {
 namespace {
 
-/// Five rows of three dots, top row in the highest bits.
+/// Each character has five rows of three dots. The top row is in the highest bits.
 std::uint16_t glyph(char c) {
   static constexpr std::array<std::uint16_t, 10> digits{
       0b111'101'101'101'111, 0b010'110'010'010'111, 0b111'001'111'100'111, 0b111'001'111'001'111, 0b101'101'111'001'001,
@@ -36,13 +36,13 @@ std::uint8_t mix(std::uint8_t under, std::uint8_t over, float opacity) {
   return static_cast<std::uint8_t>(std::lround(static_cast<float>(under) * (1 - opacity) + static_cast<float>(over) * opacity));
 }
 
-/// Opens an empty file and locks it, so that no other process or thread writes or renames it before it is closed. Failure: -1
-/// and errno.
+/// Opens an empty file and locks it, so that no other process or thread writes or renames it before it is closed. On failure,
+/// returns -1 and sets errno.
 int open_alone(const std::filesystem::path& file) {
   while (true) {
     const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
     if (descriptor < 0) return -1;
-    ::flock(descriptor, LOCK_EX);  // a file system without locks: continues without one
+    ::flock(descriptor, LOCK_EX);  // some file systems have no locks: the file is then written without one
     struct stat opened {
     }, named{};
     const bool is_named = ::fstat(descriptor, &opened) == 0 && ::stat(file.c_str(), &named) == 0 &&
@@ -55,9 +55,9 @@ int open_alone(const std::filesystem::path& file) {
   }
 }
 
-/// The target of symbolic links; it need not exist.
+/// The target of a symbolic link. The target need not exist.
 std::filesystem::path behind_links(std::filesystem::path file) {
-  constexpr int most_links = 40;  // as many as the system follows
+  constexpr int most_links = 40;  // the same limit as in the operating system
   std::error_code error;
   for (int i = 0; i < most_links && std::filesystem::is_symlink(file, error); ++i)
     file = file.parent_path() / std::filesystem::read_symlink(file, error);

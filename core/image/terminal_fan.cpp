@@ -10,12 +10,12 @@ namespace sonar {
 namespace {
 
 constexpr int label_columns = 7;  // " 100 m" and a gap
-constexpr int dots = 4;           // pixels of the drawn picture across a cell; a cell is twice as high as wide
+constexpr int dots = 4;           // pixels of the drawn picture across a cell; a cell is twice as high as it is wide
 constexpr int fewest_columns = 24, fewest_lines = 8;
 
 struct Cell {
   Rgb upper, lower;
-  bool outside = false;  // the whole cell lies outside the fan
+  bool outside = false;  // true if the whole cell lies outside the fan
   char letter = 0;       // if not 0: a character of a label, shown instead of the picture
 };
 struct Grid {
@@ -39,7 +39,8 @@ Rgb mean_colour(const Raster& raster, int left, int top) {
   return {static_cast<std::uint8_t>(r / count), static_cast<std::uint8_t>(g / count), static_cast<std::uint8_t>(b / count)};
 }
 
-/// The cells of the drawn picture. Its corner lies outside every fan, so cells of the corner's colour are outside.
+/// Makes the cells of the drawn picture. The corner of the picture lies outside every fan, so cells with the corner's colour
+/// are outside.
 Grid grid_from(const Raster& raster, int columns) {
   Grid grid;
   grid.columns = columns;
@@ -88,7 +89,7 @@ std::string colour_code(TerminalColours colours, Rgb c, bool foreground) {
   return code;
 }
 
-/// Writes cells and changes colours only where they change.
+/// Writes cells. A colour code is written only where the colour changes.
 class LineWriter {
  public:
   explicit LineWriter(TerminalColours colours) : colours_(colours) {}
