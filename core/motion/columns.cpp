@@ -13,7 +13,7 @@
 namespace sonar::motion {
 namespace {
 
-// Largest error of the norm of a quaternion or of a row of a matrix. Smaller errors are rounding, and are corrected.
+// Largest error of the norm of a quaternion or of a matrix row. Smaller errors are rounding errors, which are corrected.
 constexpr double norm_allowed = 0.01;
 constexpr double farthest = 1e8;  // m, m/s, rad/s
 constexpr std::array<std::pair<int, std::string_view>, 4> units{
@@ -27,7 +27,7 @@ Complaint not_a_number(std::string_view word, const char* what = "a number") {
   return in_quotes(word) + " is not " + what + std::string(text::number_hint(word));
 }
 
-/// A finite decimal number. Leading zeros are accepted: in tables they do not mean octal.
+/// Reads a finite decimal number. Leading zeros are accepted, because they do not mean octal in tables.
 std::optional<double> number(std::string_view word) {
   // from_chars accepts no plus sign.
   if (word.starts_with('+') && !word.starts_with("+-")) word.remove_prefix(1);
@@ -58,13 +58,13 @@ std::string plain_name(std::string_view word) {
   return name;
 }
 
-/// The largest absolute part, to compare all three with one bound.
+/// The largest absolute part, so that all three parts can be compared with one limit.
 double largest(Vec3d v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
-/// Quaternion of a rotation matrix, by its largest part, so that no divisor is small.
+/// Quaternion of a rotation matrix. It is computed from its largest part, so that no divisor is small.
 Quatd quat_from(const Rotation& r) {
   const auto& m = r.m;
-  // 1 + trace is 4 w^2; else the largest diagonal part gives 4 x^2, 4 y^2 or 4 z^2, each at least 1.
+  // 1 + trace is 4 w^2. If w is small, the largest diagonal part gives 4 x^2, 4 y^2 or 4 z^2, each at least 1.
   const double trace = m[0][0] + m[1][1] + m[2][2];
   if (trace > 0) return normalized({1 + trace, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]});
   if (m[0][0] >= m[1][1] && m[0][0] >= m[2][2])
@@ -74,7 +74,7 @@ Quatd quat_from(const Rotation& r) {
   return normalized({m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], 1 + m[2][2] - m[0][0] - m[1][1]});
 }
 
-/// Rows of length 1, at right angles, right-handed, within norm_allowed; mirrored frames are rejected.
+/// True if the rows have length 1 and are perpendicular and right-handed, within norm_allowed. Mirrored frames are rejected.
 bool is_rotation(const Rotation& r) {
   const Vec3d a{r.m[0][0], r.m[0][1], r.m[0][2]}, b{r.m[1][0], r.m[1][1], r.m[1][2]}, c{r.m[2][0], r.m[2][1], r.m[2][2]};
   for (const Vec3d& row : {a, b, c})
@@ -82,7 +82,7 @@ bool is_rotation(const Rotation& r) {
   return largest({dot(a, b), dot(b, c), dot(c, a)}) <= norm_allowed && dot(cross(a, b), c) > 0;
 }
 
-/// Whether a column has latitudes or longitudes, by its name in small letters.
+/// True if a column contains latitudes or longitudes, according to its name in small letters.
 bool is_of_degrees(std::string_view name) {
   if (name.ends_with("_deg")) name.remove_suffix(4);
   return name == "lat" || name == "lon" || name == "lng" || name == "latitude" || name == "longitude";
@@ -90,7 +90,7 @@ bool is_of_degrees(std::string_view name) {
 
 }  // namespace
 
-// Names in the order of enum Column. The long names state the unit; it also holds for the short names.
+// Names in the order of enum Column. The long names state the unit; the short names have the same unit.
 const std::array<std::string_view, Columns::columns> Columns::long_names{
     "t_s",       "t_ns",    "x_m",    "y_m",    "z_m",    "qw",       "qx",       "qy",       "qz",  "roll_deg",
     "pitch_deg", "yaw_deg", "vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps", "body"};
@@ -121,7 +121,7 @@ Columns Columns::euroc(std::size_t words) {
   c.put(std::array{t_ns, x, y, z, qw, qx, qy, qz});
   c.power_ = 0;
   if (words > c.count_) c.put(std::array{vx, vy, vz});
-  // The biases of an IMU are counted, not read.
+  // The biases of an IMU are counted as words and not read.
   c.count_ = std::max(c.count_, words);
   return c;
 }
@@ -168,7 +168,7 @@ Complaint Columns::refuse_set() const {
   if (has(t) && has(t_ns)) return "give the time once: t_s or t_ns";
   for (const Column c : {x, y, z})
     if (!has(c)) return "column " + std::string(long_names[c]) + " is missing";
-  // A file must have all parts of a vector or quaternion, or none.
+  // A file must have all parts of a vector or quaternion, or none of them.
   const auto of = [this](std::initializer_list<Column> group) {
     return std::count_if(group.begin(), group.end(), [this](Column c) { return has(c); });
   };
@@ -188,7 +188,7 @@ Complaint Columns::refuse_vector(const Words& words, Column first, const char* w
     if (!value) return not_a_number(text);
     *parts[i] = *value;
   }
-  // No scene is as large as the limit. At 1e8 m a double still resolves 1e-8 m.
+  // No scene is as large as this limit. At 1e8 m a double still resolves 1e-8 m.
   if (largest(out) > farthest) return std::string(what) + " is beyond 1e8";
   return std::nullopt;
 }
@@ -197,7 +197,7 @@ void Columns::guess_unit(const Words& words) {
   if (!has(t) || says_unit_) return;
   const std::string_view text = word(words, t);
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return;
-  // True for times after 1973; seconds with 12 or more digits would exceed every stamp.
+  // True for times after 1973. Such numbers of 12 or more digits cannot be seconds, because seconds would exceed every stamp.
   if (text.size() < 12) return;
   power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
 }
@@ -245,7 +245,7 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   }
   if (auto wrong = fill({qw, qx, qy, qz})) return wrong;
   const Quatd q{v[0], v[1], v[2], v[3]};
-  // Corrects a rounding error of the norm. A larger error means that the columns are not a quaternion.
+  // Corrects a rounding error of the norm. With a larger error the columns cannot be a quaternion.
   const double norm = std::sqrt(norm_squared(q));
   if (norm == 0) return "the quaternion is zero";
   if (!(std::abs(norm - 1) <= norm_allowed)) return "the quaternion's norm is " + std::to_string(norm) + ", it must be 1";

@@ -25,12 +25,12 @@ bool is_same(const Plan& a, const Plan& b) {
 
 Ns Playback::line(Time clock) const {
   if (paused_) return place_at_;
-  // 64 bits overflow after 2.5 hours at speed 1: nanoseconds times millionths.
+  // A 64-bit product of nanoseconds and millionths would overflow after 2.5 hours at speed 1.
   const Wide product = static_cast<Wide>((clock - clock_at_).count()) * rules_.speed.millionths;
   Wide passed = product / one;
-  if (product % one < 0) --passed;  // rounds downwards, also before clock_at_
+  if (product % one < 0) --passed;  // rounds down, also before clock_at_
   constexpr auto last_ns = static_cast<Wide>(std::numeric_limits<std::int64_t>::max());
-  // Limited to 292 years; stamps of a file are smaller.
+  // The result is limited to 292 years; stamps of a file are smaller.
   return Ns(static_cast<std::int64_t>(std::clamp(place_at_.count() + passed, -last_ns, last_ns)));
 }
 
@@ -40,15 +40,15 @@ Playback::Place Playback::place(Time clock) const {
   // Before the start the body rests at the first pose.
   if (reached < Ns{0}) return {Ns{0}, 0};
   if (duration_ == Ns{0}) return {Ns{0}, 0};
-  // The end of a round is the beginning of the next one.
+  // The end of a round is the start of the next one.
   if (rules_.loop) return {reached % duration_, rate};
   return reached > duration_ ? Place{duration_, 0} : Place{reached, rate};
 }
 
 void Playback::begin_anew(Time clock) {
-  // Later speeds and pauses count from this place, so that the place itself does not jump.
+  // Later speeds and pauses count from here, so the trajectory time does not jump.
   const Ns reached = line(clock);
-  place_at_ = reached < Ns{0} ? reached : place(clock).at;  // a remaining wait stays as it is
+  place_at_ = reached < Ns{0} ? reached : place(clock).at;  // a remaining wait is kept
   clock_at_ = clock;
 }
 
@@ -64,7 +64,7 @@ void Playback::resume(Time clock) {
 
 void Playback::seek(Time clock, Ns to) {
   clock_at_ = clock;
-  // Speed and pause do not change.
+  // The speed and the pause do not change.
   place_at_ = std::clamp(to, Ns{0}, duration_);
 }
 

@@ -17,13 +17,13 @@ std::uint64_t power_of_ten(int n) {
   return v;
 }
 
-/// A number and its power of ten. Digits after the nineteenth do not matter here.
+/// A number and its power of ten. Digits after the nineteenth are not needed here.
 struct Digits {
   std::uint64_t number = 0;
   int exponent = 0, count = 0;
 
   void take(char digit, bool fraction) {
-    // Leading zeros only move the decimal point; they do not count among the nineteen digits.
+    // Leading zeros only shift the decimal point. They do not count among the nineteen digits.
     if (count == 0 && digit == '0') {
       exponent -= fraction;
       return;
@@ -38,7 +38,7 @@ struct Digits {
       exponent += !fraction;
     }
   }
-  /// Rounds half up; nothing if the result is beyond the limit of a stamp.
+  /// Multiplies by a power of ten and rounds half up; nullopt if the result exceeds the limit of a stamp.
   std::optional<std::int64_t> scaled(int shift) const {
     // The value is number * 10^by.
     const int by = exponent + shift;
@@ -52,7 +52,7 @@ struct Digits {
       return rounded > farthest_stamp_ns ? std::nullopt : std::optional(static_cast<std::int64_t>(rounded));
     }
     const std::uint64_t unit = power_of_ten(by);
-    // Compares by division, because the product could overflow.
+    // The comparison uses a division, because the product could overflow.
     if (number > static_cast<std::uint64_t>(farthest_stamp_ns) / unit) return std::nullopt;
     return static_cast<std::int64_t>(number * unit);
   }
@@ -68,11 +68,11 @@ std::optional<std::int64_t> scaled_number(std::string_view text, int shift) {
     for (++i; i < text.size() && is_digit(text[i]); ++i, ++seen) digits.take(text[i], true);
   if (seen == 0) return std::nullopt;
   if (i < text.size() && (text[i] == 'e' || text[i] == 'E')) {
-    // from_chars accepts a minus sign, but no plus sign; "+-" is not a sign.
+    // from_chars accepts a minus sign but no plus sign; "+-" is not a sign.
     if (++i < text.size() && text[i] == '+' && ++i < text.size() && text[i] == '-') return std::nullopt;
     int exponent = 0;
     const auto end = std::from_chars(text.data() + i, text.data() + text.size(), exponent);
-    // Bounds on text and exponent keep their sum within an int.
+    // These limits on the text and the exponent keep their sum within an int.
     if (end.ec != std::errc{} || exponent < -1000 || exponent > 1000 || text.size() > 1000) return std::nullopt;
     digits.exponent += exponent;
     i = static_cast<std::size_t>(end.ptr - text.data());

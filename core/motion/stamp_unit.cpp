@@ -44,7 +44,7 @@ int unit_by_steps(const FirstLines& lines, int usual) {
   const auto moves = [&](double units_in_a_second) {
     return speed * units_in_a_second >= slowest_m_s && speed * units_in_a_second <= fastest_m_s;
   };
-  constexpr std::size_t lines_of_a_log = 10;  // a file written by hand for a body at rest is shorter
+  constexpr std::size_t lines_of_a_log = 10;  // a file that was written by hand for a resting body has fewer lines
   const bool is_log = lines.stamps.size() >= lines_of_a_log;
   const bool waits = speed == 0 && !is_log && step < longest_wait_s;
   if (step <= longest_step_s || waits || speed >= slowest_m_s) return usual;

@@ -15,7 +15,7 @@ Trajectory::Trajectory(Points points, Ns duration)
   assert(points_.angular_velocities_radps.empty() || points_.angular_velocities_radps.size() == points_.times.size());
 }
 
-/// Motion in the interval that ends at point `after`, at the fraction u of the interval.
+/// Motion in the interval that ends at point `after`, at fraction u of the interval.
 Motion Trajectory::between(std::size_t after, double u) const {
   const std::size_t before = after - 1;
   // The times of points increase, so there is no division by 0 s.
@@ -25,7 +25,7 @@ Motion Trajectory::between(std::size_t after, double u) const {
     return values[before] + u * (values[after] - values[before]);
   };
   Motion moves;
-  // If the file has no velocities, these are the mean ones of the interval: world axes [m/s], body axes [rad/s].
+  // If the file has no velocities, these are the mean velocities of the interval: world axes [m/s], body axes [rad/s].
   moves.velocity_mps =
       points_.velocities_mps.empty() ? per_s * (b.position_m - a.position_m) : interpolated(points_.velocities_mps);
   moves.angular_velocity_radps = points_.angular_velocities_radps.empty() ? per_s * rotation_between(a.orientation, b.orientation)
@@ -39,14 +39,14 @@ Moment Trajectory::at(Ns time) const {
   if (time < times.front()) return {points_.poses.front(), {}};
   if (time > times.back() || times.size() == 1) return {points_.poses.back(), {}};
   if (time == times.back()) return {points_.poses.back(), between(times.size() - 1, 1)};
-  // The first point later than `time`. The interval ends at this point.
+  // The first point later than `time`. The current interval ends at this point.
   const auto after = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), time) - times.begin());
   const Pose &a = points_.poses[after - 1], &b = points_.poses[after];
   // Fraction of the interval, in [0, 1); differences of whole nanoseconds are exact.
   const double u =
       static_cast<double>((time - times[after - 1]).count()) / static_cast<double>((times[after] - times[after - 1]).count());
   const Motion moves = between(after, u);
-  // At a point the pose is exactly that of the point.
+  // At the time of a point the pose is exactly the pose of the point.
   if (u == 0) return {a, moves};
   return {{a.position_m + u * (b.position_m - a.position_m), slerp(a.orientation, b.orientation, u)}, moves};
 }

@@ -16,7 +16,7 @@
 namespace sonar::motion {
 namespace {
 
-// Limits that stop the reader early if a file is not a trajectory.
+// Limits at which the reader stops early if a file is not a trajectory.
 constexpr std::size_t most_bodies = 256;
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 constexpr std::uint64_t memory_of_a_line = 200;  // bytes: a stamp, a pose and two velocities, twice while a vector grows
@@ -32,9 +32,9 @@ std::string_view trimmed(std::string_view s) {
   return s;
 }
 
-/// Splits a line into words. It is written by hand, because the search functions of strings are slow for words as short as
-/// numbers. `between` is a comma, a semicolon or a blank; a blank stands for any number of blanks and tabs. An empty last word is
-/// dropped.
+/// Splits a line into words. The search functions of strings are slow for words as short as numbers; therefore the loop is
+/// written by hand. `between` is a comma, a semicolon or a blank; a blank stands for any number of blanks and tabs. An empty
+/// last word is dropped.
 void split(std::string_view line, char between, Words& words) {
   const bool blanks = between == ' ';
   words.clear();
@@ -61,7 +61,7 @@ bool is_number(std::string_view word) {
 
 std::optional<Frame> frame_called(std::string_view word) {
   std::string upper(word.substr(0, 16));
-  // Converts ASCII only, because toupper depends on the locale.
+  // Converts only ASCII letters, because toupper() depends on the locale.
   std::transform(upper.begin(), upper.end(), upper.begin(),
                  [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c; });
   for (std::size_t i = 0; i < frame_names.size(); ++i)
@@ -69,7 +69,7 @@ std::optional<Frame> frame_called(std::string_view word) {
   return std::nullopt;
 }
 
-/// The points of one body while the file is read. Their times are still those of the file.
+/// The points of one body while the file is read. Their times are still the stamps of the file.
 struct Track {
   std::string body;
   Points points;
@@ -83,7 +83,7 @@ class Reader {
   Result<TrajectoryFile> run(std::string_view text) {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
     line_end_ = text.find('\n') == std::string_view::npos ? '\r' : '\n';
-    // Reads up to the first error, because later errors mostly follow from it.
+    // Reads up to the first error, because later errors are mostly its consequences.
     for (std::size_t at = 0; at < text.size() && wrong_.empty();) {
       const std::size_t end = std::min(text.find(line_end_, at), text.size());
       ++line_;
@@ -107,7 +107,7 @@ class Reader {
     if (columns_) {
       split(line, between_, words_);
     } else {
-      // The first line decides the separator and, through begin_table(), the format and the columns.
+      // The first line decides the separator. Through begin_table() it also decides the format and the columns.
       between_ = line.find(';') != line.npos ? ';' : line.find(',') != line.npos ? ',' : ' ';
       split(line, between_, words_);
       if (begin_table()) return;
@@ -150,12 +150,12 @@ class Reader {
       first.positions.push_back(position_m);
     }
     const int usual = columns_->power(), by_steps = first.stamps.empty() ? usual : unit_by_steps(first, usual);
-    columns_->guess_unit(words_);  // by the digits of the first stamp
+    columns_->guess_unit(words_);  // by the number of digits of the first stamp
     unit_by_steps_ = by_steps != usual && by_steps != columns_->power();
     if (unit_by_steps_) columns_->set_power(by_steps);
   }
 
-  /// Sets the columns. True if the line was a header; else it is a line of numbers, or there is an error.
+  /// Sets the columns. Returns true if the line is a header. If it returns false, the line has numbers, or there is an error.
   bool begin_table() {
     const bool numbers = is_number(words_.front());
     if (format_ == Format::automatic) format_ = guessed(numbers);
@@ -197,21 +197,21 @@ class Reader {
     return Format::tum;
   }
 
-  /// EuRoC has nanoseconds: whole numbers or, from some programs, 1.4e+18.
+  /// EuRoC stamps are nanoseconds: whole numbers or, from some programs, numbers such as 1.4e+18.
   static bool has_seconds(std::string_view word) {
-    constexpr std::int64_t least_ns = 100'000'000'000'000'000;  // 1973
+    constexpr std::int64_t least_ns = 100'000'000'000'000'000;  // in 1973
     return word.find('.') != word.npos && nanoseconds_of_nanoseconds(word).value_or(0) < least_ns;
   }
 
   void take_comment(std::string_view line) {
     const std::size_t word = line.find("frame:");
-    // Other comments are ignored.
+    // Comments without a frame are ignored.
     if (word == std::string_view::npos) return;
     Words words;
     split(line.substr(word + 6), ' ', words);
     const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
     if (!frame) return set_error("the frame must be ENU_FLU or NED_FRD");
-    // Frames that contradict each other are an error, because the frame of the file must not be ignored silently.
+    // Contradictory frames are an error, because the frame that the file states must not be ignored silently.
     if (frame_.value_or(*frame) != *frame) return set_error("an earlier comment names another frame; a file has one frame");
     if (asked_.frame.value_or(*frame) != *frame)
       return set_error("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +
@@ -226,7 +226,7 @@ class Reader {
     if (!p.times.empty() && Ns(row.stamp_ns) < p.times.back())
       return set_error("the time is earlier than the previous one" +
                        (row.body.empty() ? std::string() : " for " + in_quotes(row.body)));
-    // A pose replaces an earlier one of the same time, as with live poses. So no interval between poses has length 0.
+    // A pose replaces an earlier one with the same time, as for live poses. So no interval between poses has length 0.
     if (!p.times.empty() && Ns(row.stamp_ns) == p.times.back()) {
       ++replaced_;
       p.times.pop_back(), p.poses.pop_back();
@@ -276,7 +276,7 @@ class Reader {
     file.unit_by_steps = unit_by_steps_;
     for (Track& t : tracks_) {
       for (Ns& at : t.points.times) at -= first;
-      // Converts to ENU and FLU, which all other code uses (docs/glossary.md).
+      // Converts poses to ENU and FLU, which all other code uses (docs/glossary.md).
       if (file.frame == Frame::ned_frd) turn_to_enu_flu(t.points);
       file.bodies.push_back(
           {std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration), t.largest_angle_rad});
@@ -316,7 +316,8 @@ bool is_log(std::string_view text) {
   constexpr std::size_t beginning = 4096;
   std::string_view begin = text.substr(0, beginning);
   begin.remove_prefix(std::min(begin.find_first_not_of("\xef\xbb\xbf \t\r\n"), begin.size()));
-  // NMEA of a GPS, XML such as GPX and KML, and JSON: the converter reads them, or tells how to.
+  // NMEA sentences of a GPS, XML such as GPX and KML, and JSON. The converter reads some of them and explains how to convert
+  // the others.
   const bool other_text = begin.starts_with("$G") || begin.starts_with("<") || begin.starts_with("{");
   return other_text || begin.find('\0') != std::string_view::npos;
 }
