@@ -10,7 +10,7 @@ namespace sonar::paper {
 
 namespace {
 
-/// Delay divided by the record's length; the record begins at the near edge of the picture.
+/// The delay divided by the record's length. The record begins at the near edge of the picture.
 double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
   // The delay in periods of the record, because the sum over frequencies of P25 (its eq. 4) repeats after T.
   return (range_m * s.samples_per_m - p.plan.start_samples) / p.plan.samples;
@@ -19,19 +19,19 @@ double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
 }  // namespace
 
 double elevation_pattern(const Prepared& p, double elevation_rad) {
-  // One sinc of the quoted width, sinc(0.884 sin(phi) / width) (section 8).
+  // One sinc pattern of the quoted width, sinc(0.884 sin(phi) / width) (section 8).
   return p.elevation_per_sine > 0 ? sinc(p.elevation_per_sine * std::sin(elevation_rad)) : 1.0;
 }
 
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& p, const PingScalars& s,
               PaperEchoes& echoes) {
   const double turns = turns_of(range_m, p, s);
-  // The sum would fold an echo outside of the record back into it.
+  // An echo outside the record is dropped, because the sum would fold it back into the record.
   if (!(turns >= 0 && turns < 1)) return false;
   // Choi 2025, eq. 1: sqrt(cross-section) D(phi) e^{-2 a r} / r^2 times the source.
   const double amplitude =
       s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
-  // (39) in expected power; else the factor xi and the phase (12).
+  // In expected power: (39). Otherwise: the factor xi and the phase (12).
   if (p.plan.expected_power)
     echoes.push_back({turns, {amplitude * amplitude, 0}});
   else
@@ -46,7 +46,7 @@ void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const
     return p.pattern.empty() ? elevation_pattern(p, hit.elevation_rad) : p.pattern[static_cast<std::size_t>(hit.row)];
   };
   const auto mu_of = [&](const PaperHit& hit) { return mu[scene.objects[hit.object].mesh->material[hit.triangle]]; };
-  // The mean over speckle: |xi|^2 = 1, powers add.
+  // The mean over speckle: |xi|^2 = 1, and powers add.
   if (p.plan.expected_power) {
     for (const PaperHit& hit : hits)
       add_echo(hit.range_m, pattern_of(hit), printed_cross_section_m2(mu_of(hit), hit.cosine, hit.range_m, hit.solid_angle_sr),
@@ -64,7 +64,7 @@ void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const
                                 static_cast<float>(2 * s.absorption_np_per_m),
                                 s.turns_per_m};
   int n = 0;
-  // A full batch goes to the kernel: carrier, absorption and draw.
+  // A full batch goes to the kernel, which applies the carrier, the absorption and the draw.
   const auto send = [&] {
     kernels.scatter_hits(arguments, n, re, im);
     for (int i = 0; i < n; ++i) echoes.push_back({turns_of(static_cast<double>(range[i]), p, s), {re[i], im[i]}});

@@ -13,20 +13,21 @@
 namespace sonar {
 namespace {
 
-/// Pings in the modes paper and raster.
+/// Computes pings in the modes paper and raster.
 class ComparisonEngine {
  public:
   ComparisonEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options, paper::FrequencySum sum)
       : rays_(scene, pool.threads()), scene_(std::move(scene)), pool_(pool), options_(options), sum_(sum) {}
 
   Ping run(const PingRequest& asked) {
-    // At the sea surface, a ping is computed at a different pose from the requested one, which its result states.
+    // At the sea surface, a ping is computed at a pose that differs from the requested one. The result states the requested
+    // pose.
     std::vector<PingRequest> room;
     const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
-    // Kept until model or settings change: the tables cost more than a ping.
+    // The tables are kept until model or settings change, because they take longer than a ping.
     if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
     statistics_ = {};
     Ping ping = paper::simulate(rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);
@@ -67,7 +68,7 @@ class ModeRouter final : public PingEngine {
         requests = requests.subspan(1);
         continue;
       }
-      std::size_t n = 1;  // number of successive canonical requests, for engines that compute batches
+      std::size_t n = 1;  // number of successive canonical requests: engines compute them as a batch
       while (n < requests.size() && is_canonical(requests[n])) ++n;
       for (Ping& ping : canonical_->run(requests.first(n))) pings.push_back(std::move(ping));
       for (const PingStatistics& s : canonical_->statistics_of_each()) each.push_back(s);
@@ -106,8 +107,8 @@ class ModeRouter final : public PingEngine {
 
   std::unique_ptr<PingEngine> canonical_;
   std::function<std::unique_ptr<ComparisonEngine>()> make_comparison_;
-  std::unique_ptr<ComparisonEngine> comparison_;  // made for the first ping of its modes, because it needs its own ray scene
-  std::deque<bool> passed_on_;                    // for each submitted ping: whether the canonical engine has it
+  std::unique_ptr<ComparisonEngine> comparison_;  // made for the first ping of its modes, because it has its own ray scene
+  std::deque<bool> passed_on_;                    // for each submitted ping: true if it went to the canonical engine
   std::vector<PingStatistics> each_;              // statistics of the last run
   bool last_was_canonical_ = true;
 };

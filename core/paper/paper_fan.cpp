@@ -8,7 +8,7 @@ namespace {
 
 constexpr double widest_half_angle_rad = 1.48;  // 85 degrees: an image plane has no pixels at 90
 
-/// Widths: half the distance to either neighbour; the outermost have the width of their neighbours.
+/// Widths of columns: half the distance between both neighbours. The outermost columns have the width of their neighbours.
 std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
   const std::size_t n = centres.size();
   if (n < 2) return std::vector<double>(n, lone);
@@ -21,11 +21,11 @@ std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
 }
 
 void tabulate(PaperFan& fan) {
-  // A direction is computed from values of its column and values of its row.
+  // A direction is computed from the values of its column and of its row.
   for (const double azimuth : fan.azimuth_rad)
     fan.ahead.push_back(fan.perspective ? Vec3d{1, std::tan(azimuth), 0} : Vec3d{std::cos(azimuth), std::sin(azimuth), 0});
   for (int row = 0; row < fan.rows; ++row) {
-    // Elevation [rad], on the image plane its tangent.
+    // Elevation [rad], or its tangent on the image plane.
     const double up = fan.first_row + row * fan.row_step;
     fan.level.push_back(fan.perspective ? 1 : std::cos(up));
     fan.rise.push_back(fan.perspective ? up : std::sin(up));
@@ -38,11 +38,11 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
   PaperFan fan;
   fan.perspective = mode == Mode::raster;
   fan.rows = rays > 0 ? rays : fan.perspective ? default_raster_rows : default_rays;
-  // Half of the fan's angle, which is twice the quoted width, as in P25.
+  // Half of the fan's angle. The fan's angle is twice the quoted width, as in P25.
   const double vertical = std::min(static_cast<double>(plan.mode.pattern.elevation_width_rad), widest_half_angle_rad);
   const double top = fan.perspective ? std::tan(vertical) : vertical;
   fan.row_step = 2 * top / fan.rows;
-  // Rows lie at the middles of equal steps.
+  // Rows lie in the middle of equal steps.
   fan.first_row = -top + 0.5 * fan.row_step;
 
   const double aperture = static_cast<double>(plan.mode.horizontal_aperture_rad);
@@ -72,7 +72,7 @@ Vec3d PaperFan::direction(int column, int row) const {
 
 double PaperFan::solid_angle_sr(int column, int row) const {
   const double cell = column_width[static_cast<std::size_t>(column)] * row_step;
-  // P25's (2) as it is printed: dtheta dphi, without cos(phi) [sr].
+  // P25's (2) as printed: dtheta dphi, without cos(phi) [sr].
   if (!perspective) return cell;
   const double x = direction(column, row).x;  // a pixel of the plane x = 1 has the solid angle dy dz x^3
   return cell * x * x * x;

@@ -13,7 +13,7 @@ namespace sonar::paper {
 namespace {
 
 constexpr int sum_width = 8;              // width of the fast sum, for a relative error of 1e-7
-constexpr double width_constant = 0.884;  // P25's code, for sinc patterns: -3 dB width times aperture
+constexpr double width_constant = 0.884;  // from P25's code, for sinc patterns: -3 dB width times aperture
 
 /// The comparison modes have no motion within the ping.
 PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origin) {
@@ -23,7 +23,7 @@ PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origi
 
 std::vector<double> coefficients(const Scene& scene) {
   std::vector<double> mu;
-  // mu [1/sr] by material: P25 has only Lambert's law.
+  // mu [1/sr] by material. P25 has only Lambert's law.
   for (const Material& m : scene.materials) mu.push_back(lambert_coefficient(static_cast<double>(m.lambert_db)));
   return mu;
 }
@@ -33,7 +33,7 @@ struct PointInView {
   double range_m = 0, elevation_rad = 0, cross_section_m2 = 0;
 };
 
-/// P25 has no point targets. Here, visible ones are scatterers of their column, like hits of rays.
+/// P25 has no point targets. Here visible point targets are scatterers of their column, like hits of rays.
 std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p, const PingScalars& s,
                                         const PingRequest& request) {
   const std::vector<Pose>& bodies = request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world;
@@ -41,14 +41,14 @@ std::vector<PointInView> points_in_view(const RayScene& scene, const Prepared& p
   for (const PointTarget& target : scene.scene().point_targets) {
     const Vec3d in_world = scene.scene().in_world(target, bodies);
     const Vec3d at = transform(inverse(s.seen_from), in_world);
-    // 1e-9 m: a point in the sonar has no direction.
+    // A point within 1e-9 m of the sonar has no direction.
     const double range = length(at), azimuth = std::atan2(at.y, at.x), elevation = std::asin(at.z / std::max(range, 1e-9));
     int nearest = 0;
     const auto off = [&](int k) { return std::abs(p.fan.azimuth_rad[static_cast<std::size_t>(k)] - azimuth); };
     for (int k = 1; k < p.fan.columns(); ++k) {
       if (off(k) < off(nearest)) nearest = k;
     }
-    // The row whose ray passes nearest. Points outside the fan are not visible.
+    // The row whose ray passes nearest to the point. Points outside the fan are not visible.
     const double row = ((p.fan.perspective ? at.z / at.x : elevation) - p.fan.first_row) / p.fan.row_step;
     if (at.x <= 0 || off(nearest) > p.fan.column_width[static_cast<std::size_t>(nearest)] || row < -0.5 || row > p.fan.rows - 0.5)
       continue;
@@ -83,7 +83,7 @@ class PaperPing {
         now_s_(now_s),
         statistics_(statistics),
         work_(static_cast<std::size_t>(pool.threads())) {
-    // Number of floats: one per sample in expected power, else two per frequency. Beam kernels need multiples of 32.
+    // Number of floats: one per sample in expected power, else two per frequency. Kernels of beams need multiples of 32.
     values_ = static_cast<std::size_t>((p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count) + 31) / 32 * 32;
     columns_.resize(values_ * static_cast<std::size_t>(p_.fan.columns()));
     if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
@@ -128,7 +128,7 @@ void PaperPing::simulate_columns() {
   pool_.for_each(static_cast<std::size_t>(p_.fan.columns()), [&](std::size_t column, int worker) {
     simulate_column(static_cast<int>(column), work_[static_cast<std::size_t>(worker)]);
   });
-  // Each worker has counters of its own, so that no memory is shared.
+  // Each worker has its own counters, so that no memory is shared.
   for (const Work& work : work_) {
     const PingStatistics& share = work.statistics;
     for (std::size_t i = 0; i < share.seconds.size(); ++i) statistics_.seconds[i] += share.seconds[i];
@@ -142,7 +142,7 @@ void PaperPing::simulate_column(int column, Work& work) {
   const double begin = now();
   std::vector<PaperHit>& hits = work.hits;
   hits.clear();
-  // Rays of one column, then eq. 2 for each hit.
+  // Traces the rays of one column and applies eq. 2 to each hit.
   trace_column(scene_, p_.fan, s_, column, static_cast<float>(s_.max_range_m), hits);
   const double traced = now();
   if (!truth_.empty())
@@ -158,11 +158,11 @@ void PaperPing::simulate_column(int column, Work& work) {
   const double scattered = now();
   const std::span<float> out = std::span(columns_).subspan(static_cast<std::size_t>(column) * values_, values_);
   if (p_.plan.expected_power) {
-    // (39): the powers of pulses add, in time.
+    // Eq. 39: the powers of pulses add in time.
     for (std::size_t i = 0; i < echoes.size(); ++i)
       p_.pulse_power->add(echoes[i], out.first(static_cast<std::size_t>(p_.plan.samples)));
   } else {
-    // An array of complex numbers may be read as one of floats.
+    // An array of complex numbers may be read as an array of floats.
     // Eq. 1 for this column, times |S(f)|.
     sum_frequencies(echoes, p_.spectrum, p_.fast.get(), kernels_, work.sum,
                     {reinterpret_cast<std::complex<float>*>(out.data()), static_cast<std::size_t>(p_.spectrum.count)});
@@ -197,7 +197,7 @@ Ping PaperPing::image() {
   pool_.for_each(static_cast<std::size_t>(beams), [&](std::size_t j, int worker) {
     const float* in = beams_.data() + j * values_;
     float* out = signals.beam(static_cast<int>(j));
-    // In expected power the values are samples already.
+    // In expected power the values are already samples.
     if (p_.plan.expected_power)
       for (int n = 0; n < p_.plan.samples; ++n) out[2 * n] = in[n];
     else
@@ -215,9 +215,9 @@ Ping PaperPing::image() {
   return ping;
 }
 
-/// Envelope, gain and codes, a window of rows at a time.
+/// Computes envelope, gain and codes, one window of rows at a time.
 void PaperPing::receive_rows(const BeamSignals& signals, Ping& ping) {
-  // Rows per task, few enough to stay in cache from envelope to codes.
+  // Number of rows of a task, small enough to stay in the cache from envelope to codes.
   constexpr int rows_at_once = 64;
   struct Scratch {
     BeamSignals window;
@@ -251,7 +251,7 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   if (sum == FrequencySum::fast && spectral::have_transform)
     fast = std::make_unique<spectral::FrequencySums>(spectrum.count, sum_width);
   if (plan.expected_power) pulse_power = std::make_unique<PulsePower>(spectrum, inverse);
-  // With uniform azimuths the correction is a convolution, which a transform computes.
+  // If the azimuths are uniform, the correction is a convolution and is computed by a transform.
   const double spacing = static_cast<double>(plan.mode.horizontal_aperture_rad) / plan.settings.beam_count;
   if (!plan.expected_power) even = even_correction(fan.azimuth_rad, spacing);
   if (!even)
@@ -260,7 +260,7 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   // D(phi) = sinc(0.884 sin(phi) / width), one pattern of the quoted width (section 8).
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     elevation_per_sine = width_constant / static_cast<double>(plan.mode.pattern.elevation_width_rad);
-  // In a fan a row has one elevation; on an image plane it depends on the column.
+  // In a fan each row has one elevation. On an image plane the elevation also depends on the column.
   for (int row = 0; row < fan.rows && !fan.perspective; ++row)
     pattern.push_back(elevation_pattern(*this, fan.elevation_rad(0, row)));
 }

@@ -9,7 +9,8 @@ namespace {
 using spectral::Complex;
 using spectral::turned;
 
-// Steps between samples at which the power of a pulse is tabulated: fewer on long records, to bound the memory.
+// Number of steps between samples at which the power of a pulse is tabulated. Long records have fewer steps, to limit the
+// memory.
 constexpr std::size_t largest_power_table = std::size_t{1} << 22;  // values
 constexpr int most_steps = 64;
 
@@ -19,7 +20,7 @@ PaperSpectrum make_spectrum(const PingPlan& plan) {
   PaperSpectrum s;
   s.samples = plan.samples;
   s.sample_offset = plan.sample_offset - plan.start_samples;
-  // T [s], there and back.
+  // T [s], for the way out and back.
   const double record_s = plan.samples * 2 * plan.sample_spacing_m / static_cast<double>(plan.settings.device_sound_speed_mps);
   // Choi 2025, eq. 4: df = 1 / T, M = b T frequencies about the carrier.
   const double band = plan.envelope_hz * record_s;                  // b T, in units of df
@@ -45,11 +46,11 @@ void PaperEchoes::push_back(const PaperEcho& e) {
 void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
                      const simd::Kernels& kernels, SumScratch& scratch, std::span<std::complex<float>> out) {
   std::vector<Complex>& sums = scratch.sums;
-  // Eq. 1's sum over scatterers at every frequency: by a non-uniform transform, or term by term.
+  // The sum of eq. 1 over scatterers at every frequency, by a non-uniform transform or term by term.
   if (fast) {
     sums.resize(static_cast<std::size_t>(spectrum.count));
     scratch.grid.assign(static_cast<std::size_t>(fast->grid_points() + fast->padding), 0.0);
-    // FrequencySums counts from the middle frequency; carriers are in the amplitudes.
+    // FrequencySums counts from the middle frequency. The amplitudes already contain the carriers.
     const double middle = spectrum.first_frequency + spectrum.count / 2;
     fast->add(echoes.turns, echoes.re, echoes.im, middle, kernels, scratch.grid.data());
     fast->transform(scratch.grid.data(), sums.data());
@@ -66,7 +67,8 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
   double energy = 0;
   for (const double to : azimuth_rad)
     for (const double from : azimuth_rad) {
-      // The weights as in the authors' code: |sin y / y| of the angle between two beams, normalised by the energy of all weights.
+      // The weights as in the authors' code: |sin y / y| for the angle between two beams, normalised by the energy of all
+      // weights.
       const double y = pi * 0.884 / spacing_rad * std::sin(to - from);
       v.push_back(std::abs(y) < 1e-12 ? 1.0 : std::abs(std::sin(y) / y));
       energy += v.back() * v.back();
@@ -80,13 +82,13 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad) {
   const std::size_t n = azimuth_rad.size();
   if (n < 2) return nullptr;
-  // Azimuths must be uniform to 1e-9 rad, or the correction is not a convolution.
+  // Azimuths must be uniform to 1e-9 rad. Otherwise the correction is not a convolution.
   const double step = (azimuth_rad.back() - azimuth_rad.front()) / static_cast<double>(n - 1);
   std::vector<double> v;
   double energy = 0;
   for (std::size_t d = 0; d < n; ++d) {
     if (std::abs(azimuth_rad[d] - azimuth_rad[0] - static_cast<double>(d) * step) > 1e-9) return nullptr;
-    // The weight of make_correction(). Of n azimuths, n - d pairs are d apart in each direction.
+    // The weight of make_correction(). Among n azimuths, n - d pairs are d apart in each direction.
     const double y = pi * 0.884 / spacing_rad * std::sin(static_cast<double>(d) * step);
     v.push_back(d == 0 ? 1.0 : std::abs(std::sin(y) / y));
     energy += v.back() * v.back() * static_cast<double>(n - d) * (d == 0 ? 1 : 2);
@@ -116,7 +118,7 @@ std::vector<float> panels_of(std::span<const float> weights, int beams, int colu
 
 void correct(std::span<const float> panels, int beams, int columns, std::span<const float> in, int values,
              const simd::Kernels& kernels, Parallel& pool, std::span<float> out) {
-  constexpr int block = 128;  // values at a time: those of all columns stay in the second cache
+  constexpr int block = 128;  // number of values of a block: a block of all columns stays in the second-level cache
   const auto length = static_cast<std::size_t>(values), count = static_cast<std::size_t>(columns);
   std::vector<std::vector<float>> windows(static_cast<std::size_t>(pool.threads()));
   pool.for_each((length + block - 1) / block, [&](std::size_t b, int worker) {
@@ -146,7 +148,7 @@ InverseTransform::InverseTransform(const PaperSpectrum& spectrum) : grid_(spectr
 }
 
 void InverseTransform::run(std::span<const std::complex<float>> spectrum, std::vector<Complex>& work, float* out) const {
-  // Frequencies that differ by a multiple of the sample rate have the same samples, so that they share an element.
+  // Frequencies that differ by a multiple of the sample rate have the same samples. Therefore they share an element.
   const auto n = static_cast<std::size_t>(grid_.samples);
   work.assign(n, {});
   for (std::size_t m = 0; m < spectrum.size(); ++m) work[m % n] += Complex(spectrum[m]) * half_turn_[m];
@@ -158,7 +160,7 @@ void InverseTransform::run(std::span<const std::complex<float>> spectrum, std::v
       for (std::size_t m = 0; m < n; ++m) sums[i] += work[m] * root_[i * m % n];
     work.swap(sums);
   }
-  // The transform counts frequencies from 0: e^{i 2 pi f_1 t_n} puts the first one at its place.
+  // The transform counts frequencies from 0. The factor e^{i 2 pi f_1 t_n} shifts them to f_1.
   for (std::size_t i = 0; i < n; ++i) {
     const Complex s = work[i] * baseband_[i];
     out[2 * i] = static_cast<float>(s.real()), out[2 * i + 1] = static_cast<float>(s.imag());
@@ -173,7 +175,7 @@ PulsePower::PulsePower(const PaperSpectrum& spectrum, const InverseTransform& in
   std::vector<Complex> work;
   std::vector<float> signal(2 * n);
   SumScratch scratch;
-  for (int step = 0; step <= steps_; ++step) {  // an echo step / steps of a sample after sample 0
+  for (int step = 0; step <= steps_; ++step) {  // the echo lies step / steps of a sample after sample 0
     PaperEchoes echo;
     echo.push_back({(offset_ + static_cast<double>(step) / steps_) / samples_, {1, 0}});
     sum_frequencies(echo, spectrum, nullptr, simd::kernels_for(SimdLevel::automatic), scratch, lone);
