@@ -9,12 +9,12 @@
 namespace sonar {
 namespace {
 
-constexpr double set_rad = 0.5;  // phase step at the aperture's ends between sets of taps; the error is at most half of it
-constexpr double most_rad = 16;  // largest phase error; it does not grow at shorter ranges
+constexpr double set_rad = 0.5;  // phase step at the aperture's ends between sets of taps; the error is at most half of this
+constexpr double most_rad = 16;  // largest phase error; at shorter ranges it stays at this value
 constexpr int aperture_points = 512;
-constexpr double neighbour_in_beams = 0.56;  // distance of a neighbour in -3 dB widths: one of 256 beams of the M1200d
+constexpr double neighbour_in_beams = 0.56;  // distance of a neighbour in -3 dB widths; equals one of 256 beams of the M1200d
 
-/// The first sample from `n` on with another set of taps than `n`. Sets change with 1 / range.
+/// The first sample after `n` with another set of taps than `n`. Sets change with 1 / range.
 int end_of_set(const BeamMixView& v, int j, int first_sample, int n, std::int32_t set, int samples) {
   const float until_m = v.turn_m[j] * v.sets_per_rad / (static_cast<float>(set) - 0.5f);
   const float guess = std::clamp((until_m - v.first_range_m) / v.sample_m - static_cast<float>(first_sample),
@@ -62,8 +62,9 @@ BeamMix::BeamMix(const PingPlan& plan) {
   if (plan.switches.uneven && !mode.receiver.profile.blend.empty()) lay_out_blend(plan, spacing);
 }
 
-/// Delays of broadside leave, at the place x on the aperture L, the phase pi x^2 sin^2(theta) / (lambda r) (eq. 44). Beams even
-/// in the sine are samples of the aperture's transform, so that a factor on the aperture is a convolution across the beams.
+/// With the delays of broadside, the phase pi x^2 sin^2(theta) / (lambda r) remains at position x of the aperture L (eq. 44).
+/// Beams that are even in the sine are samples of the aperture's transform. Therefore a factor on the aperture is a convolution
+/// across the beams.
 void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   const double wavelengths = plan.beam_pattern[0].aperture_wavelengths;
   const double wavelength_m = device_wavelength_m(plan.mode, plan.settings);
@@ -73,14 +74,14 @@ void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   first_range_m_ = static_cast<float>(plan.sample_offset * plan.sample_spacing_m);
   sample_m_ = static_cast<float>(plan.sample_spacing_m);
   const int sets = static_cast<int>(most_rad / set_rad) + 1;
-  // The largest slope of the phase, 4 edge / L, displaces by 2 edge / (pi L) in sine.
+  // The largest slope of the phase, 4 edge / L, shifts the echo by 2 edge / (pi L) in the sine.
   const auto reach_of = [&](int set) {
     return set == 0 ? 0 : static_cast<int>(std::ceil(2 * set_rad * set / (pi * wavelengths * spacing))) + 2;
   };
   widest_ = reach_of(sets - 1);
   taps_.assign(2 * static_cast<std::size_t>(sets * (2 * widest_ + 1)), 0.0f);
-  // Sums over one period of positions that beams of this spacing can distinguish. Beyond the aperture, which has no signal, the
-  // phase is constant. The points lie on both sides of the middle, at odd multiples of 1 / circle.
+  // Sums over one period of the positions that beams of this spacing can distinguish. Beyond the aperture, where there is no
+  // signal, the phase is constant. The points lie on both sides of the middle, at odd multiples of 1 / circle.
   constexpr int half = aperture_points / 2, circle = 2 * aperture_points;
   std::vector<double> cosine, place2;
   for (int i = 0; i < circle; ++i) cosine.push_back(std::cos(2 * pi * i / circle));
@@ -111,7 +112,7 @@ void BeamMix::lay_out_blend(const PingPlan& plan, double spacing) {
   const ReceivePattern& pattern = plan.beam_pattern[0];
   const double width = 2 * std::sin(static_cast<double>(plan.mode.pattern.azimuth_width_rad) / 2);
   step_ = std::max(1, static_cast<std::int32_t>(std::lround(neighbour_in_beams * width / spacing)));
-  // gamma: correlation of a diffuse field between beams so far apart.
+  // gamma: correlation of a diffuse field between two beams that are this far apart.
   const auto common = [&](int apart) {
     double product = 0, power = 0;
     for (int k = -plan.columns.count; k <= plan.columns.count; ++k) {
@@ -161,7 +162,8 @@ void BeamMix::blur(const simd::Kernels& kernels, BeamSignals& beams, std::vector
   scratch.resize(beams.data.size() + vector);
   std::copy(beams.data.begin(), beams.data.end(), scratch.begin());
   for (int j = 0; j < beams.beams; ++j)
-    // Processes neighbouring samples with the same taps together. The set falls with the range to 0 and stays there.
+    // Processes neighbouring samples with the same taps together. The number of the set falls with the range to 0 and then
+    // stays 0.
     for (int n = 0; n < beams.samples;) {
       const std::int32_t set = focus_set(v, j, beams.first_sample + n);
       if (set == 0) break;

@@ -1,4 +1,4 @@
-// Forms beams of all columns at once: class BeamTransformTables of core/pipeline/plan_tables.hpp.
+// Forms the beams of all columns at once: class BeamTransformTables of core/pipeline/plan_tables.hpp.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -9,8 +9,9 @@
 namespace sonar {
 namespace {
 
-// The convolution s_j = sum_k W(u_j - u_k) g_k over uniform columns is a product of discrete Fourier transforms, across a line
-// padded to twice its length so that it does not wrap around. The passes themselves are in simd/transform.inl.
+// The convolution s_j = sum_k W(u_j - u_k) g_k over uniform columns is computed as a product of discrete Fourier transforms.
+// The line of columns is padded to twice its length, so that the convolution does not wrap around. simd/transform.inl has the
+// passes.
 /// The smallest size of at least n whose only prime factors are 2 and 3.
 int smooth_size(int n) {
   for (int size = std::max(n, 4);; ++size) {
@@ -31,7 +32,7 @@ void append_turns(int size, int count, int most, std::vector<float>& turns) {
     }
 }
 
-/// Solves a x = b, a symmetric and positive: Gauss without pivots.
+/// Solves a x = b for a symmetric, positive a, by Gauss's method without pivots.
 std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
   const std::size_t n = b.size();
   for (std::size_t k = 0; k < n; ++k)
@@ -47,10 +48,10 @@ std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
   return b;
 }
 
-/// Weights of `taps` values at 0, 1, ... for the value at `place` of any signal with a spectrum within +-band / 2 cycles per
-/// step, by least squares.
+/// Weights of `taps` values at 0, 1, ... that give the value at `place`, by least squares, for any signal whose spectrum lies
+/// within +-band / 2 cycles per step.
 std::vector<double> weights_between(int taps, double place, double band) {
-  constexpr double ridge = 1e-13;  // the matrix is nearly singular, which is also why few taps are enough
+  constexpr double ridge = 1e-13;  // the matrix is nearly singular; for the same reason a few taps are enough
   std::vector<double> matrix, right;
   for (int a = 0; a < taps; ++a) {
     for (int b = 0; b < taps; ++b) matrix.push_back(sinc(band * (a - b)) + (a == b ? ridge : 0));
@@ -63,7 +64,7 @@ std::vector<double> weights_between(int taps, double place, double band) {
 
 BeamTransformTables::BeamTransformTables(const ReceivePattern& pattern, const Columns& columns,
                                          const std::vector<double>& beam_sines) {
-  // W at every distance of whole columns, du = d * spacing.
+  // W at all distances of whole columns, du = d * spacing.
   lay_out(columns.count, static_cast<int>(beam_sines.size()));
   std::vector<double> of_distance;
   for (int d = 0; d < columns.count; ++d) of_distance.push_back(pattern(d * columns.spacing));
@@ -98,8 +99,8 @@ void BeamTransformTables::point_at_tables() {
 
 void BeamTransformTables::plan_passes() {
   append_turns(4 * tables_.quarter, tables_.quarter, 3, split_);
-  // The last pass has no factors and is combined with the first pass back. Radix 4 needs the fewest operations per value; radix 6
-  // replaces passes of 2 and 3, because loads and stores limit the speed of every pass.
+  // The last pass has no factors and is combined with the first inverse pass. Radix 4 needs the fewest operations per value.
+  // Radix 6 replaces passes of 2 and 3, because loads and stores limit the speed of every pass.
   const auto largest = [](int size, std::initializer_list<int> radices) {
     return *std::find_if(radices.begin(), radices.end(), [&](int radix) { return size % radix == 0; });
   };
@@ -122,7 +123,7 @@ void BeamTransformTables::weigh(const std::vector<double>& of_distance) {
   for (std::size_t d = 0; d < of_distance.size(); ++d) weight.push_back(of_distance[d] * (d == 0 ? 1 : 2));
   for (int k = 0; k < 4; ++k)
     for (int place = 0; place < tables_.quarter; ++place) {
-      // The passes leave frequencies in mixed-radix digit-reversed order; the response is stored in that order.
+      // The passes leave the frequencies in mixed-radix digit-reversed order. The response is stored in the same order.
       int frequency = 0, step = 1, rest = place;
       for (int l = 0; l < tables_.levels; ++l) {
         const int part = tables_.level[l].size / tables_.level[l].radix;
@@ -143,7 +144,7 @@ void BeamTransformTables::read_between(double aperture_in_spacings, const Column
   const auto place_of = [&](double sine) { return (columns.first_sine - sine) / columns.spacing; };
   const bool on_columns = std::all_of(beam_sines.begin(), beam_sines.end(),
                                       [&](double sine) { return std::abs(place_of(sine) - std::round(place_of(sine))) < 1e-6; });
-  // Beams between columns: interpolation by the fewest taps with the accuracy stated in the header.
+  // Beams between columns are interpolated by the fewest taps that have the accuracy stated in the header.
   tables_.taps = on_columns ? 1 : aperture_in_spacings < 0.25 ? 8 : 10;
   for (const double sine : beam_sines) {
     const double place = place_of(sine);
@@ -166,7 +167,7 @@ std::size_t BeamTransformTables::bytes() const {
 }
 
 double BeamTransformTables::cost() const {
-  // Operations counted from simd/transform.inl: two transforms, the product, and reading the beams.
+  // Number of operations in simd/transform.inl: two transforms, the product, and the interpolation of the beams.
   const double q = tables_.quarter;
   double pass = 0;
   for (int l = 0; l < tables_.levels; ++l) pass += q * (tables_.level[l].radix == 4 ? 7 : tables_.level[l].radix == 2 ? 4 : 9);

@@ -1,4 +1,4 @@
-// Makes the weights of beams over columns: a band of weights, or tables of a transform if that is faster.
+// Makes the weights of beams over columns: a band of weights, or the tables of a transform if a transform is faster.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -16,13 +16,13 @@ std::vector<ReceivePattern> receive_patterns(const FrequencyMode& mode, std::siz
 
 namespace {
 
-/// The smallest band of columns that drops less than the given part of the energy.
+/// The narrowest band of columns that drops at most the given part of the energy.
 struct Band {
   int half = 0;
   double energy = 0, total = 0;  // sum_k W_jk^2 over the band, and over all columns
 };
 Band band_of(const ReceivePattern& weight, const Columns& columns, double dropped_energy) {
-  // W at distances of whole columns; its square is the energy that a column adds to a beam.
+  // W at distances of whole columns. Its square is the energy that a column adds to a beam.
   std::vector<double> energy(static_cast<std::size_t>(columns.count));
   Band band;
   for (int h = 0; h < columns.count; ++h) {
@@ -52,7 +52,8 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
   // Beams with different widths have the same band, that of the widest beam.
   c.half_band = alike ? band.half : band_of(widest, columns, options.dropped_energy).half;
   c.weight_energy = band.energy;
-  // Sums of powers do not cancel. The rounding of a transform, relative to the largest value, would be visible in shadows.
+  // Sums of powers do not cancel. The rounding error of a transform is relative to the largest value and would be visible in
+  // shadows.
   if (options.transform && !squared && alike && !nominal.unit && beam_sines.size() > 1) {
     auto tables = std::make_shared<const BeamTransformTables>(nominal, columns, beam_sines);
     const double band_cost = static_cast<double>(beam_sines.size()) * std::min(2 * c.half_band + 1, columns.count);
@@ -63,7 +64,8 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
     }
   }
 
-  // A ping of several forms only some beams. Without weights beyond each beam's own band, it can leave out columns between them.
+  // One ping of several forms only some beams. If beams have no weights outside their own band, the ping can skip the columns
+  // between them.
   const bool own_bands = !alike && mode.interleaved_pings > 1;
   std::vector<int> half_bands(beam_sines.size(), c.half_band);
   for (std::size_t j = 0; own_bands && j < half_bands.size(); ++j)
@@ -82,7 +84,7 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
     const bool whole = last == first + 3;
     if (first == 0 || !same_for_all || !whole) {
       c.panels.push_back({first, clipped_from, clipped_to - clipped_from, c.weights.size()});
-      // The first panel keeps its unclipped weights, because the others share them.
+      // The weights of the first panel are not clipped, because the other panels share them.
       const int start = same_for_all && whole ? from : clipped_from, stop = same_for_all && whole ? to : clipped_to;
       if (start < clipped_from) c.panels.back().weights += 4 * static_cast<std::size_t>(clipped_from - start);
       for (int k = start; k < stop; ++k)

@@ -7,12 +7,12 @@ namespace sonar {
 
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {
   const int coarsest = static_cast<int>(std::ceil(-std::log2(pulse_width_m) - 1e-9));
-  constexpr double level_fade = 1.15;  // levels cross-fade over 15 % of range
-  constexpr double nearest_m = 0.2;    // no image begins nearer; all nearer cells have the same level
+  constexpr double level_fade = 1.15;  // levels cross-fade over 15 % of the range
+  constexpr double nearest_m = 0.2;    // no image begins at a shorter range; all nearer cells have the same level
   std::vector<CellLevel> levels;
   double coarser_begins = 2 * max_range_m;  // range at which the next coarser level begins
   for (int level = coarsest;; ++level) {
-    // A cell is at most a third of a beam wide from here on: 2^-level <= r theta / 3.
+    // From this range on, a cell is at most a third of a beam wide: 2^-level <= r theta / 3.
     const double begins = 3 * std::ldexp(1.0, -level) / beam_width_rad;
     const bool finest = begins < nearest_m || level - coarsest > 10;
     CellLevel l;

@@ -11,16 +11,16 @@ namespace sonar {
 namespace {
 
 constexpr double longest_pulse_in_samples = 1000;
-constexpr double shortest_exact_pulse_in_samples = 0.25;              // via the spectrum; tabulated pulses may be shorter
-constexpr double most_column_samples = 1 << 29;                       // limit for all columns, 4 GiB
-constexpr double most_frequencies = 1 << 20;                          // limit for a column via the spectrum
+constexpr double shortest_exact_pulse_in_samples = 0.25;  // for pulses via the spectrum; tabulated pulses may be shorter
+constexpr double most_column_samples = 1 << 29;           // limit for all columns, 4 GiB
+constexpr double most_frequencies = 1 << 20;              // limit for a column via the spectrum
 constexpr double tone_band_in_pulses = 20, other_band_in_pulses = 3;  // in 1 / width, at least Pulse::band_hz
 constexpr int most_fixed_rays = 100000, most_interleaved_pings = 64;
-constexpr double sector_slack_rad = 1e-6;  // slack between azimuths in double and an aperture in float
+constexpr double sector_slack_rad = 1e-6;  // tolerance, because azimuths are double and the aperture is float
 constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
 constexpr float widest_level_db = 300;
 
-/// Checks limits of pulses and buffers. No picture needs more, and memory would not suffice for more.
+/// Checks the limits of pulses and buffers. No picture needs more, and the memory would not be sufficient.
 std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
   const double samples = static_cast<double>(s.range_bin_count) * s.samples_per_row;
   const double pulse = static_cast<double>(s.pulse_width_m) / (s.range_bin_m / s.samples_per_row);  // in samples

@@ -13,7 +13,7 @@ constexpr int weightings = 3;  // weightings of a half: rising, as in the later 
 constexpr double most_radians = 3.5, interpolation_error = 4e-6;
 constexpr std::size_t most_beams = 128;  // limit for a segment
 
-/// Adding and subtracting it rounds to a whole number.
+/// Adding this number and subtracting it again rounds to a whole number.
 constexpr float whole = 12582912;
 
 /// e^{i 2 pi turns}
@@ -71,10 +71,11 @@ FocusedArray::FocusedArray(const std::vector<double>& beam_sines, const SharedNo
 
 double FocusedArray::middle(int half) const { return (half * half_ + 0.5 * (half_ - 1) - 0.5 * (channels_ - 1)) * d_; }
 
-/// `reach`: distance from the middle of a half to its last channel.
+/// `reach`: distance from the middle of a half to its last channel, in spacings.
 void FocusedArray::lay_out_segments(double reach) {
   const auto radians = [&](double a, double b) {
-    // Near the array the phase changes faster with the sine than far away, by (1 - q u) / (1 - 2 q u + q^2)^3/2, q = x / range.
+    // Near the array the phase changes faster with the sine than far away, by the factor (1 - q u) / (1 - 2 q u + q^2)^3/2, q =
+    // x / range.
     const double most = std::min(std::max(std::abs(a), std::abs(b)), 1.0);
     return pi * reach * std::abs(a - b) / std::max(1 - most * most, 1e-6);
   };

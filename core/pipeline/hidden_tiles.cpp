@@ -22,7 +22,8 @@ Span root_of_squares(Span a, Span b, Span c = {0, 0}) {
 }
 Span within(Span a, Span b) { return {std::max(a.low, b.low), std::min(a.high, b.high)}; }
 
-/// The box around a tile's cells, in the axes of a sonar. It has a margin, because cells are placed in single precision.
+/// The box around a tile's cells, in the axes of a sonar. It has a margin, because the positions of cells are in single
+/// precision.
 struct Box {
   Vec3d middle, half;
   double slack;
@@ -40,7 +41,7 @@ struct Box {
   Span z() const { return {middle.z - half.z, middle.z + half.z}; }
 };
 
-/// Directions u = y / r (y / h for flat beams) over a box that is small compared with its distance, where u is nearly linear.
+/// Directions u = y / r (y / h for flat beams) over a box that is small compared with its distance. There u is nearly linear.
 Span sines_by_slope(const CellTile& tile, const Box& box, const Rotation& turn, bool conical) {
   constexpr Span any{-2, 2};
   const Vec3d half = to_double(tile.box_half_m), c = box.middle;
@@ -57,7 +58,8 @@ Span sines_by_slope(const CellTile& tile, const Box& box, const Rotation& turn, 
   return {sine - spread, sine + spread};
 }
 
-/// Column k spans u = first_sine - (k -+ 1/2) spacing: rounded outwards, because one column too many takes little time.
+/// Column k spans u = first_sine - (k -+ 1/2) spacing. The columns are rounded outwards, because one column too many takes
+/// little time.
 void find_columns(Span sine, const Columns& columns, PreparedTile& tile) {
   const double from = (columns.first_sine - sine.high) / columns.spacing + 0.5;
   const double to = (columns.first_sine - sine.low) / columns.spacing + 1.5;
@@ -65,7 +67,8 @@ void find_columns(Span sine, const Columns& columns, PreparedTile& tile) {
   tile.last_column = static_cast<int>(std::clamp(std::ceil(to), 0.0, static_cast<double>(columns.count)));
 }
 
-/// Whether no cell is used at these ranges, by its level and the record, or at these tangents.
+/// True if no cell of the tile is used: its ranges are outside those of its level or of the record, or its tangents are outside
+/// those of the part of the fan to which it belongs.
 bool out_of_view(const PingContext& context, const simd::TileSeen& seen, Span range, Span tangent) {
   const PingPlan& plan = context.plan;
   const PingScalars& s = context.scalars;
@@ -83,7 +86,7 @@ bool out_of_view(const PingContext& context, const simd::TileSeen& seen, Span ra
 
 void find_reach(const PingContext& context, const Rotation& sonar_from_object, Vec3d from_sonar_m,
                 const Rotation& seen_from_object, Vec3d seen_from_sonar_m, PreparedTile& out) {
-  constexpr double nearest_m = 0.05;  // boxes nearer than this have no limits of directions
+  constexpr double nearest_m = 0.05;  // for boxes that are nearer, the directions are not limited
   const PingPlan& plan = context.plan;
   const simd::TileSeen& seen = out.seen;
   const CellTile& tile = *seen.tile;
@@ -96,7 +99,7 @@ void find_reach(const PingContext& context, const Rotation& sonar_from_object, V
   out.nearest = std::numeric_limits<float>::infinity();
 
   const auto beside_axis = [conical](const Box& box) { return conical ? box.x() : root_of_squares(box.x(), box.y()); };
-  // Computes in object axes, in which the box is smallest.
+  // The calculation is in object axes, in which the box is smallest.
   const Vec3 m = tile.box_middle_m, h = tile.box_half_m;
   const auto edges = [&](float from, float middle, float half) {
     const double c = static_cast<double>(from) + static_cast<double>(middle), reach = static_cast<double>(half) + here.slack;
@@ -120,7 +123,7 @@ void find_reach(const PingContext& context, const Rotation& sonar_from_object, V
     return std::clamp(static_cast<int>(bin_of_tangent(plan.fan.axis, static_cast<float>(t))) + more, 0, plan.fan.bins);
   };
   out.first_bin = bin(tangent.low, -1), out.last_bin = bin(tangent.high, 2);
-  // Compares like see_cells(): 1 / x with the map's tolerance.
+  // The same comparison as in see_cells(): 1 / x with the tolerance of the map.
   constexpr double rounding = 1e-5;
   const double tolerance = static_cast<double>(plan.depth_tolerance_m()) / range.low + static_cast<double>(seen.tolerance_share);
   out.nearest = static_cast<float>((1 + tolerance) * (1 + rounding) / forward.low);

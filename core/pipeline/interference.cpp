@@ -15,12 +15,12 @@ namespace {
 
 constexpr double no_crosstalk_db = -150;
 constexpr int most_pulses = 64;        // limit for one other sonar in one ping
-constexpr double edge_widths = 3;      // erf is 1 to 2e-5 there
+constexpr double edge_widths = 3;      // erf differs from 1 by 2e-5 there
 constexpr double widest_offset = 0.2;  // largest offset of another sonar's tone from our carrier, as a fraction of b
 
 double unit_uniform(std::uint32_t bits) { return static_cast<double>(bits) / 4294967296.0; }
 
-/// The Gaussian filter's step response, 0 to 1; `x` in b t.
+/// The step response of the Gaussian filter, 0 to 1; `x` is b t.
 double rise(double x) { return 0.5 * (1 + std::erf(x)); }
 
 }  // namespace
@@ -32,8 +32,8 @@ double Leak::reach_m(const ReceiverModel& law) {
   return most_leak_decay_db / static_cast<double>(law.leak_decay_db_per_m);
 }
 
-/// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20), or from a table, at a beam's output. That of a column is
-/// divided by sqrt(sum_k W_jk^2), like the noise.
+/// docs/acoustics.md, eq. 31: rms(r) = leak_upa 10^(-decay r / 20), or from a table, at a beam's output. The rms in a column is
+/// this value divided by sqrt(sum_k W_jk^2), like the noise.
 Leak::Leak(const PingPlan& plan, const Switches& switches) {
   const ReceiverModel& law = plan.mode.receiver;
   if (!switches.leak || !(law.leak_upa > 0)) return;
@@ -66,7 +66,7 @@ void Leak::add(const PingPlan& plan, const PingNoise& noise, int first, int last
       for (std::size_t i = 0; i < n; ++i) to[2 * i] += share * rms_upa_[i] * rms_upa_[i];
       continue;
     }
-    // A steady and a changing part, whose powers add to 1.
+    // The leak has a steady and a changing part, whose powers add to 1.
     std::fill(grain.begin(), grain.end(), 0.0f);
     const int count = static_cast<int>(n);
     if (steady_ > 0) noise.table->add(leak_sonar(noise.sonar), every_ping, k, steady_, count, grain.data());
@@ -91,13 +91,14 @@ std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, cons
   const std::vector<OtherSonar>& others = context.scene().other_sonars;
   for (std::size_t i = 0; i < others.size(); ++i) {
     const OtherSonar& other = others[i];
-    // Eq. 32: level / r e^{-a r} of the one-way path, and the root of the two-way elevation pattern.
+    // Eq. 32: level / r e^{-a r} of the one-way path, times the root of the two-way elevation pattern.
     const double range_m = length(other.position_m - request.sonar_in_world.position_m);
     if (!(other.rate_hz > 0) || !(other.level_upa > 0) || range_m < nearest_scatterer_m) continue;
     if (is_occluded(context.rays, request.sonar_in_world.position_m, other.position_m)) continue;
     const Random4 draw = philox(static_cast<std::uint32_t>(i), request.sonar_id, 0, key);
     const double rate_hz = static_cast<double>(other.rate_hz), travel_s = range_m / s.sound_speed_mps;
-    // Pulse number n, counted from time 0, arrives at (n + phase) / rate + travel; the first that may reach into the record:
+    // Pulse number n, counted from time 0, arrives at (n + phase) / rate + travel. `first` is the first pulse that may reach
+    // into the record.
     const double phase = unit_uniform(draw.v[0]), pulse_s = static_cast<double>(other.pulse_s);
     const double edge_samples = edge_widths / per_sample;
     const double earliest_s = (plan.start_samples - edge_samples) / samples_per_s - pulse_s;
@@ -113,13 +114,13 @@ std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, cons
       if (seen.x <= 0) continue;
       const ConicalDirection from = plan.direction_of(seen);
       const double both_ways =
-          elevation_two_way(plan.mode.pattern, from.psi_rad);  // two equal patterns, of which we use one: we only receive
+          elevation_two_way(plan.mode.pattern, from.psi_rad);  // two equal patterns; only the pattern of our receiver counts here
       pulse.sine = from.u;
       pulse.amplitude_upa = static_cast<double>(other.level_upa) / range_m * std::exp(-s.absorption_np_per_m * range_m) *
                             std::sqrt(std::max(both_ways, 0.0));
       const Random4 own = philox(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(static_cast<std::int64_t>(first) + p),
                                  request.sonar_id, of_pulses);
-      // Carrier phase at arrival and a carrier offset of up to widest_offset b: both hashed.
+      // The carrier phase at arrival, and a carrier offset of up to widest_offset b. Both are hashed.
       pulse.phase_turns = unit_uniform(own.v[0]);
       pulse.turns_per_sample = widest_offset * (2 * unit_uniform(draw.v[1]) - 1) * per_sample;
       pulse.edge_per_sample = per_sample;
@@ -135,7 +136,7 @@ SampledPulse tone_of(const ReceivedPulse& pulse, int from, int to) {
   tone.first_sample = std::max(from, static_cast<int>(std::ceil(std::max(pulse.from_sample - soft, 0.0))));
   const int end = static_cast<int>(std::min(std::floor(pulse.to_sample + soft) + 1, static_cast<double>(to)));
   for (int n = tone.first_sample; n < end; ++n) {
-    // A tone through the filter: it rises and falls with the step response at its two ends.
+    // A tone after the filter: its two ends have the shape of the step response.
     const double level =
         rise((n - pulse.from_sample) * pulse.edge_per_sample) * rise((pulse.to_sample - n) * pulse.edge_per_sample);
     const double turns = pulse.phase_turns + (n - pulse.from_sample) * pulse.turns_per_sample;
@@ -166,8 +167,9 @@ Crosstalk::Crosstalk(const PingPlan& plan, const Switches& switches) {
   const double level_db = static_cast<double>(plan.mode.receiver.crosstalk_db);
   if (!switches.crosstalk || level_db < no_crosstalk_db) return;
   amplitude_ = amplitude_from_db(level_db);
-  // Eq. 35: beam j becomes own s_j + e share sum_i s_i. For a single echo the sum over beams is its amplitude divided by `share`.
-  // The sum over all beams of a single echo in the middle of the sector: sum_j W_j, or in power sum_j W_j^2.
+  // Eq. 35: beam j becomes own s_j + e share sum_i s_i. For a single echo, the sum over beams is its amplitude divided by
+  // `share`.
+  // For a single echo in the middle of the sector, the sum over all beams is sum_j W_j, or in power sum_j W_j^2.
   const double middle = plan.beam_sine[plan.beam_sine.size() / 2];
   double sum = 0, squares = 0;
   for (std::size_t j = 0; j < plan.beam_sine.size(); ++j) {
@@ -180,14 +182,14 @@ Crosstalk::Crosstalk(const PingPlan& plan, const Switches& switches) {
 }
 
 Crosstalk::Mix Crosstalk::mix(bool expected_power) const {
-  // In power, the cross term of a beam with its own leakage is 2 e sum W / sum W^2, the leaked power e^2.
+  // In power, the cross term of a beam with its own leakage is 2 e sum W / sum W^2, and the leaked power is e^2.
   return {static_cast<float>(expected_power ? 1 + amplitude_ * own_in_power_ : 1.0),
           static_cast<float>((expected_power ? amplitude_ * amplitude_ : amplitude_) * share_)};
 }
 
 void Crosstalk::add(const PingPlan& plan, BeamSignals& beams) const {
   const auto floats = static_cast<std::size_t>(2 * beams.samples);
-  // Computes the sum over all beams for each sample, and then adds it to each beam.
+  // Computes the sum over all beams for each sample, and then adds the sum to each beam.
   std::vector<float> sum(floats, 0.0f);
   for (int j = 0; j < beams.beams; ++j) {
     const float* from = beams.beam(j);

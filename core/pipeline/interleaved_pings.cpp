@@ -11,7 +11,7 @@
 namespace sonar {
 namespace {
 
-/// Copies the values of a ping's beams; values are [rows][beams] with `size` elements each.
+/// Copies the values of the beams that a ping formed. Values are [rows][beams] with `size` elements each.
 template <class Values>
 void take_beams(const Values& from, std::size_t beams, BeamChoice own, std::size_t size, Values& to) {
   if (from.size() != to.size()) return;
@@ -45,7 +45,7 @@ std::vector<PingRequest> pings_of(const PingRequest& picture) {
 }
 
 BeamChoice beams_of(const PingRequest& picture, std::size_t p) {
-  // The last beam is of the first ping.
+  // The last beam comes from the first ping.
   const int count = pings_in(picture), last = picture.settings.beam_count - 1;
   return {(last + count - static_cast<int>(p)) % count, count};
 }

@@ -1,4 +1,4 @@
-// Shadows in LabelWork: gaps that rays found in a column, and their parts without echoes.
+// Shadows in LabelWork: the gaps that rays found in a column, and the parts of gaps without echoes.
 #include <algorithm>
 #include <cmath>
 
@@ -7,12 +7,12 @@
 namespace sonar {
 namespace {
 
-/// Samples of a column with a hit, from bottom to top.
+/// The samples of a column with a hit, from bottom to top.
 using Upwards = std::vector<const FanScratch::Sample*>;
 
-/// The straight line, 1 / x over the tangent, that approximates the surface hidden by the object at sample `of`. It goes from the
-/// last sample below the object to the first one above. If there is none above, the line continues from the lowest samples.
-/// Without a line low and high are equal.
+/// A straight line, 1 / x over the tangent, that approximates the surface hidden by the object at sample `of`. It connects the
+/// last sample below the object and the first one above. If there is none above, the line continues the lowest samples. If
+/// there is no line, low and high are equal.
 struct HiddenLine {
   std::size_t low = 0, high = 0;
   float tangent = 0, inverse_x = 0, slope = 0;
@@ -51,8 +51,8 @@ struct HiddenLine {
   }
 };
 
-/// Calls f(from_m, to_m, object) for the parts of a range behind sample `of`. Each part is in the shadow of the nearest object
-/// that hides it, which is the visible one in its direction.
+/// Calls f(from_m, to_m, object) for each part of the ranges from_m to to_m behind sample `of`. Each part lies in the shadow of
+/// the nearest object that hides it. This is the object that is visible in the direction of the part.
 template <class F>
 void for_each_caster(const Upwards& up, std::size_t of, float from_m, float to_m, F f) {
   const HiddenLine line(up, of);
@@ -83,17 +83,17 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   const auto end = static_cast<float>(plan.samples);
   struct Behind {
     std::uint32_t object;
-    float from_m;  // range from which the shadow extends; 0: from the object on
-    bool goes_on;  // whether a surface lies beyond it
+    float from_m;  // range at which the shadow begins; 0: at the object
+    bool goes_on;  // true if a surface lies beyond the shadow
   };
   std::vector<Behind> behind;
   Upwards up;
   for (int k = first; k < last; ++k) {
     std::vector<Gap>& gaps = gaps_[static_cast<std::size_t>(k)];
     const std::int32_t lowest = (k - first) * elevations;
-    // Goes from bottom to top. An object hides surfaces beyond it. The hidden part begins where such a surface is last visible,
-    // below the lower edge, and ends where it is visible again, above the upper edge. If the object stands on a surface, it
-    // begins at the object.
+    // Goes through the samples from bottom to top. An object hides surfaces beyond it. The hidden part begins where such a
+    // surface is last visible, below the lower edge of the object. It ends where the surface is visible again, above the upper
+    // edge. If the object stands on a surface, the hidden part begins at the object.
     behind.clear();
     up.clear();
     for (std::int32_t i = lowest; i >= 0; i = at(i).next)
@@ -133,8 +133,8 @@ void LabelWork::note_shadows(const FanScratch& fan, int first, int last) {
   }
 }
 
-/// Marks dark rows in the column's gaps, where the column has no echo above the noise. An echo may come from another elevation,
-/// or from the length of the pulse.
+/// Marks rows in the column's gaps as dark if the column has no echo above the noise there. An echo in a gap can come from
+/// another elevation, or from the length of a pulse.
 void LabelWork::find_dark(int column) {
   const PingPlan& plan = context_->plan;
   const int rows = plan.settings.range_bin_count, per_row = plan.settings.samples_per_row;

@@ -33,17 +33,16 @@ PingLabels no_labels(const PingRequest& request, const Scene& scene) {
 struct LabelWork::Point {
   std::size_t object = 0;
   int first_row = 0;
-  std::vector<float> rows;   // mean of |pulse|^2 in each [uPa^2]
+  std::vector<float> rows;   // mean of |pulse|^2 in each row [uPa^2]
   std::vector<float> beams;  // power pattern at its direction
 };
 
 namespace {
 
-/// The farthest side lobes of a beam, with this part of its energy, are left out, because the share of a label has steps of
-/// 1/255.
+/// Fraction of a beam's energy in its farthest side lobes, which are omitted. The share of a label has steps of 1/255.
 constexpr double dropped_energy = 1e-3;
 
-/// |p|^2 at whole samples from the peak, up to where it is negligible.
+/// |p|^2 at whole samples from the peak, up to the sample where it becomes negligible.
 std::vector<float> pulse_powers(const PingPlan& plan) {
   constexpr double least = 1e-6;
   const int reach = std::max(plan.taps / 2, 1);
@@ -73,7 +72,7 @@ void LabelWork::begin(const PingContext& context, const std::vector<PreparedTile
   find_noise();
 }
 
-/// Keeps the weights, because they take as long as a ping and change only with the sonar and its beams.
+/// The weights are kept, because their computation takes as long as a ping and they change only with the sonar and its beams.
 void LabelWork::keep_weights() {
   const PingPlan& plan = context_->plan;
   std::vector<std::pair<Taper, double>> widths;
@@ -87,7 +86,8 @@ void LabelWork::keep_weights() {
   first_sine_ = plan.columns.first_sine, spacing_ = plan.columns.spacing;
 }
 
-/// Finds the level of the receiver's noise at a beam's output, which echoes must exceed, even if the noise is switched off.
+/// Determines the level of the receiver's noise at a beam's output. Echoes must exceed this level, even if the noise is
+/// switched off.
 void LabelWork::find_noise() {
   const PingPlan& plan = context_->plan;
   noise_far_.assign(plan.beam_sine.size(), 0.0);
@@ -178,7 +178,7 @@ void LabelWork::add_cells(const simd::GroupView& group, Echoes& echoes) {
       const int n = static_cast<int>(sample);
       if (column < 0 || column >= part.columns || !(sample >= 0) || n + 1 >= samples) continue;
       if (!part.seen.empty()) part.seen[static_cast<std::size_t>(column)] += static_cast<double>(power);
-      // Divides the power between the two nearest samples; the pulse is applied later, at once for all echoes.
+      // Divides the power between the two nearest samples. The pulse is applied later to all echoes at once.
       float* place = mine.by_sample[which].data() + static_cast<std::ptrdiff_t>(column) * samples + n;
       const float later = power * (sample - static_cast<float>(n));
       place[0] += power - later;
@@ -214,7 +214,7 @@ void LabelWork::finish_group(const simd::GroupView& group, Echoes& scratch) {
   for (std::size_t i = 0; i < mine.used; ++i) spread(mine.parts[i], mine.by_sample[i]);
 }
 
-/// Eq. 8 in power: spreads echoes over the pulse, takes the mean of each row, and applies the transmitter's pattern.
+/// Eq. 8 in power: spreads the echoes over the pulse, computes the mean of each row, and applies the transmitter's pattern.
 void LabelWork::spread(Part& part, const std::vector<float>& by_sample) const {
   const PingPlan& plan = context_->plan;
   const int per_row = plan.settings.samples_per_row, half = static_cast<int>(pulse_.size()) / 2;
@@ -269,7 +269,7 @@ PingLabels LabelWork::finish(std::span<const PointEcho> points) {
     for (int n = from; n < to; ++n)
       point.rows[static_cast<std::size_t>(n / per_row - point.first_row)] +=
           static_cast<float>(std::norm(echo.amplitude * plan.pulse_shape.at(plan.sample_time_s * (n - echo.sample))) / per_row);
-    // The same side lobes as for cells.
+    // The side lobes are the same as for cells.
     const double reach = weights_.half_band * plan.columns.spacing;
     from_points_.resize(size);
     for (std::size_t j = 0; j < plan.beam_sine.size(); ++j) {
@@ -289,7 +289,7 @@ PingLabels LabelWork::finish(std::span<const PointEcho> points) {
   context_->pool.for_each(static_cast<std::size_t>(out.beams),
                           [&](std::size_t j, int) { find_shadows(static_cast<int>(j), out); });
 
-  // Adds in the order of columns, so that the sums do not depend on groups.
+  // The energies are added in the order of columns, so that the sums do not depend on groups.
   std::vector<double> seen(scene.objects.size(), 0.0), open(scene.objects.size(), 0.0);
   for (const Group& group : groups_)
     for (const Part& part : group.of_this_ping())
@@ -303,7 +303,7 @@ PingLabels LabelWork::finish(std::span<const PointEcho> points) {
   return out;
 }
 
-/// Computes eq. 9 in power for each object, and finds the largest.
+/// Computes eq. 9 in power for each object, and finds the object with the most energy.
 void LabelWork::label_window(std::size_t window_index, std::span<const Point> points, PingLabels& out) const {
   const PingPlan& plan = context_->plan;
   const int first_row = static_cast<int>(window_index) * window, last_row = std::min(first_row + window, out.rows);

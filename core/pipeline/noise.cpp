@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t table_samples = noise_table_samples;
 
-/// White complex Gaussians, E|z|^2 = 1; a draw of four words makes two of them.
+/// White complex Gaussians, E|z|^2 = 1. A draw of four words makes two of them.
 std::vector<float> white_noise(Seed seed) {
   std::vector<float> white(2 * table_samples);
   const RandomKey key = key_of(seed, Domain::noise_table);
@@ -30,8 +30,8 @@ void add_scaled(float by, const float* __restrict from, std::size_t count, float
   for (std::size_t i = 0; i < count; ++i) to[i] += by * from[i];
 }
 
-/// n[i] = sum_m h[m] w[i - m], h of unit energy (make_noise_filter): the variance stays 1. The filter is circular, so that
-/// reading may wrap around.
+/// n[i] = sum_m h[m] w[i - m], with h of unit energy (make_noise_filter), so the variance stays 1. The filter is circular, so
+/// that reading may wrap around.
 std::vector<float> filtered(const std::vector<float>& white, const std::vector<float>& filter) {
   const std::size_t n = white.size();
   std::vector<float> shaped(n, 0.0f);
@@ -46,7 +46,7 @@ std::vector<float> filtered(const std::vector<float>& white, const std::vector<f
 }  // namespace
 
 void NoiseTable::prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others) {
-  // The table is kept while seed and filter do not change.
+  // The table is kept until seed or filter change.
   const bool same_seed = white_ && seed == seed_;
   if (same_seed && filter == filter_) return;
   if (!same_seed) white_.reset();
@@ -83,14 +83,15 @@ void NoiseTable::read(std::uint32_t sonar, std::uint32_t ping, int column_index,
                       Put put) const {
   const NoisePlace place = noise_place(key_of(seed_, Domain::noise_place), sonar, ping, static_cast<std::uint32_t>(column_index));
   std::size_t at = place.first;
-  // The table from a hashed start, turned by one of four quarter turns: a function of (seed, sonar, ping, column).
+  // Reads the table from a hashed start, rotated by one of four quarter turns. Both are a function of (seed, sonar, ping,
+  // column).
   const float sign = place.negative ? -rms : rms;
-  // The table is periodic: after its end, reading continues at its beginning.
+  // The table is periodic. After its end, reading continues at its beginning.
   for (int done = 0; done < samples;) {
     const int run = static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(samples - done), table_samples - at));
     const float* __restrict from = shaped_->data() + 2 * at;
     float* __restrict to = column + 2 * static_cast<std::ptrdiff_t>(done);
-    // Times i: (re, im) -> (-im, re).
+    // Multiplication by i: (re, im) -> (-im, re).
     if (place.quarter)
       for (int i = 0; i < run; ++i) {
         put(to[2 * i], -sign * from[2 * i + 1]);

@@ -15,21 +15,22 @@ namespace sonar {
 namespace {
 
 constexpr double widest_column_in_beams = 0.35;  // docs/acoustics.md, section 2
-constexpr double margin_in_beams = 3.0;          // columns beyond the sector, without which beams at its edges would be too weak
+constexpr double margin_in_beams = 3.0;          // columns beyond the sector; without them, beams at its edges would be too weak
 constexpr double flat_margin_in_beams = 1.5;     // part of the margin with full transmitter amplitude
 constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double side_lobe_two_way = 5.62e-3;    // -45 dB: lower side lobes are left out
 constexpr double side_step_rad = 0.19;           // between rays in side lobes; planes are exact between rays
 constexpr int side_bins = 32;                    // bins of the depth map on either side
-// Least cells in the area that a beam and a pulse cover in side lobes; cells of a power of two have up to four times as many.
+// Least number of cells in the area that a beam and a pulse cover in side lobes. Cell sizes are powers of two, so there are up
+// to four times as many.
 constexpr double side_cells_of_speckle = 0.22, side_cells_of_expected_power = 16;
 constexpr double unit_fan_over_width = 2.3;  // width of the fan without a pattern
 constexpr double widest_fan_rad = 1.4;
 
 double half_aperture_sine(const FrequencyMode& mode) { return std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2); }
 
-/// -3 dB widths in the sine of the narrowest and the widest beam.
+/// -3 dB widths, in the sine, of the narrowest and the widest beam.
 struct BeamWidths {
   double narrowest, widest;
 };
@@ -48,8 +49,8 @@ double narrowest_beam_rad(const FrequencyMode& mode) {
   return mode.has_own_widths() ? beam_width_sines(mode).narrowest : static_cast<double>(mode.pattern.azimuth_width_rad);
 }
 
-/// The angle at which the peaks of the two-way pattern, 1 / (pi x)^2 at x = L_v / lambda sin psi, have fallen below
-/// side_lobe_two_way.
+/// The angle at which the peaks of the two-way pattern have fallen below side_lobe_two_way. The peaks are 1 / (pi x)^2 at x =
+/// L_v / lambda sin psi.
 double side_lobe_reach_rad(const BeamPattern& pattern) {
   const double sine = 1 / (pi * std::sqrt(side_lobe_two_way) * elevation_aperture_in_wavelengths(pattern));
   return sine < 1 ? std::min(std::asin(sine), widest_fan_rad) : widest_fan_rad;
@@ -79,7 +80,7 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
   fan.axis.middle_bin = static_cast<float>(fan.bins) / 2;
   for (int bin = 0; bin <= fan.bins; ++bin) fan.tangent.push_back(tangent_of_bin(fan.axis, static_cast<float>(bin)));
   for (int e = -fan.side_elevations; e < base_elevations + fan.side_elevations; ++e) {
-    // Moves rays off round angles, because a ray exactly on the edge between two triangles can miss both.
+    // Moves rays away from round angles, because a ray exactly on the edge between two triangles can miss both.
     const double nudge = e == 0 || e == base_elevations - 1 ? 0 : 0.0137;
     double angle = fan.half_angle_rad * (2 * (std::clamp(e, 0, base_elevations - 1) + nudge) / (base_elevations - 1) - 1);
     const double step = side_rad / std::max(fan.side_elevations, 1);
@@ -89,7 +90,7 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
   return fan;
 }
 
-/// Fits the pattern at Chebyshev points of the fan. It is an entire function of w = sin^2, so that few terms are enough.
+/// Fits the pattern at Chebyshev points of the fan. The pattern is an entire function of w = sin^2, so few terms are enough.
 std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_rad) {
   constexpr int n = elevation_terms;
   if (mode.pattern.elevation_taper == Taper::unit) {
@@ -100,7 +101,7 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   const double aperture = elevation_aperture_in_wavelengths(mode.pattern);
   // docs/acoustics.md, eq. 34: D_v(psi) = sinc^2((L_v / lambda) sin psi) as a polynomial in w = sin^2 psi.
   const double top = std::pow(std::sin(half_angle_rad), 2);
-  // Newton's divided differences at Chebyshev nodes of [0, top], then expanded to plain powers.
+  // Newton's divided differences at Chebyshev nodes of [0, top], which are then expanded to plain powers.
   std::array<double, n> node{}, coefficient{};
   for (int i = 0; i < n; ++i) {
     node[static_cast<std::size_t>(i)] = top * 0.5 * (1 - std::cos(pi * (i + 0.5) / n));
@@ -122,7 +123,8 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   return {power.begin(), power.end()};
 }
 
-/// Rounded to a millionth: settings whose rows differ only by rounding have the same filter, and share the draws of noise.
+/// The value is rounded to a millionth. Settings whose rows differ only by rounding then have the same filter and share the
+/// draws of noise.
 std::vector<float> rounded(std::vector<float> filter) {
   constexpr float steps = 1 << 20;
   for (float& tap : filter) tap = std::round(tap * steps) / steps;
@@ -168,7 +170,7 @@ void fill_row_gains(PingPlan& plan) {
       gain_db = static_cast<double>(s.gain_db) + smallest;
       extra = plan.row_gain.back();
     }
-    // Eq. 36 and 37: (gain TVG / full scale)^2, since the receiver works on powers.
+    // Eq. 36 and 37: (gain TVG / full scale)^2, because the receiver works on powers.
     const double factor = full_scale_factor(plan.mode.receiver, gain_db);
     plan.row_power_factor.push_back(static_cast<float>(factor * factor * extra));
   }
@@ -192,7 +194,7 @@ void lay_out_noise_profile(PingPlan& p) {
     p.noise_profile.far.push_back(static_cast<float>(far));
     p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
   }
-  // Smallest relevant difference near - far, less than 0.05 dB; the difference is at most about 10 dB.
+  // Smallest relevant difference near - far: less than 0.05 dB. The difference is at most about 10 dB.
   constexpr double least = 1e-3;
   for (int n = 0; n < p.samples && !profile.near_noise_db.empty(); ++n) {
     const double decay = std::exp(-(n + p.sample_offset) * p.sample_spacing_m / static_cast<double>(profile.near_m));
@@ -201,8 +203,8 @@ void lay_out_noise_profile(PingPlan& p) {
   }
 }
 
-/// Delays for another sound speed steer beams to proportionally different sines. Columns move with the beams; their transmit
-/// amplitudes do not change.
+/// If delays are computed for another sound speed, the sines of the beams change in proportion. Columns move with the beams;
+/// their transmit amplitudes do not change.
 void scale_beam_sines(PingPlan& p) {
   p.columns.first_sine *= p.bearing_scale, p.columns.spacing *= p.bearing_scale;
   for (double& u : p.beam_sine) u = std::clamp(u * p.bearing_scale, -1.0, 1.0);
@@ -217,7 +219,8 @@ void lay_out_fixed_fan(PingPlan& p) {
   for (int ray = 0; ray < p.fixed_fan; ++ray) {
     const double angle = (ray + 0.5) * step_rad - p.fan.half_angle_rad, cosine = std::cos(angle);
     const double pattern = has_pattern ? elevation_two_way(aperture, angle) : 1.0;
-    // dOmega = du dpsi for cones; flat beams: cos(psi) dtheta dpsi, whose column factor follows in scatter_hits.
+    // dOmega = du dpsi for cones. For flat beams it is cos(psi) dtheta dpsi; scatter_hits applies the factor that depends on
+    // the column.
     const double solid_angle = p.columns.spacing * step_rad * (p.switches.conical ? 1.0 : cosine);
     p.fixed_fan_rays.push_back({static_cast<float>(angle), static_cast<float>(cosine), static_cast<float>(std::sin(angle)),
                                 static_cast<float>(pattern * std::sqrt(solid_angle))});
@@ -245,7 +248,7 @@ std::vector<double> make_beam_sines(const FrequencyMode& mode, int beam_count) {
 Columns make_columns(const FrequencyMode& mode, int beam_count) {
   const double top = half_aperture_sine(mode);
   const auto [narrowest, width] = beam_width_sines(mode);
-  // Beams lie on column centres where they are uniform in the sine, so that one row of weights is enough for all.
+  // If beams are uniform in the sine, they lie on column centres, so that one row of weights is enough for all beams.
   // The column spacing divides the beam spacing, and is at most 0.35 of a beam width (docs/acoustics.md, section 2).
   const double beam_spacing = 2 * top / std::max(beam_count - 1, 1);
   const double per_beam = std::ceil(beam_spacing / (widest_column_in_beams * narrowest) - 1e-9);
@@ -257,7 +260,7 @@ Columns make_columns(const FrequencyMode& mode, int beam_count) {
   c.first_sine = top + margin * c.spacing;
   for (int k = 0; k < c.count; ++k) {
     const double beyond = (std::abs(c.sine(k)) - top) / width;
-    // T(u): cos^2 fall from 1.5 to 3 beam widths beyond the sector.
+    // T(u): falls as cos^2 from 1.5 to 3 beam widths beyond the sector.
     const double fall = std::clamp((beyond - flat_margin_in_beams) / (margin_in_beams - flat_margin_in_beams), 0.0, 1.0);
     c.transmit.push_back(std::abs(c.sine(k)) < 1 ? static_cast<float>(std::pow(std::cos(pi / 2 * fall), 2)) : 0.0f);
   }
@@ -284,7 +287,7 @@ void PingPlan::aim(CellView& view) const {
   if (fan.side_elevations == 0) return;
   view.main_elevation_rad = static_cast<float>(widest_about_axis_rad(fan.half_angle_rad));
   view.side_from_rad = static_cast<float>(fan.half_angle_rad);
-  // Few cells per sample are enough, except if no speckle hides the places of the cells.
+  // Few cells per sample are enough if speckle hides the positions of the cells.
   const double cells_a_sample = expected_power ? side_cells_of_expected_power : side_cells_of_speckle;
   view.side_area_per_range_m = static_cast<float>(narrowest_beam_rad(mode) * pulse_width_m / cells_a_sample);
   view.side_coarser = expected_power ? 0 : 2;
@@ -308,14 +311,15 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
   if (bearing_scale != 1) scale_beam_sines(p);
   p.beam_pattern = receive_patterns(mode, p.beam_sine.size());
-  FrequencyMode formed = mode;  // as one ping, if all beams are from one
+  FrequencyMode formed = mode;  // as for one ping, if all beams come from one ping
   if (!switches.interleave) formed.interleaved_pings = 1;
   p.beam_weights = make_beam_weights(formed, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);
   p.fan = make_fan(mode, settings, p.pulse_width_m, switches.side_lobes);
   lay_out_fixed_fan(p);
   p.elevation = fit_elevation(mode, p.fan.half_angle_rad);
-  // The mean over speckle does not hide the random places of the cells. With smaller cells they cause only a tenth of a decibel.
+  // The mean over speckle does not hide the random positions of the cells. Smaller cells reduce their effect to a tenth of a
+  // decibel.
   const double cell_scale = p.expected_power ? 0.4 : 1.0;
   p.levels = make_cell_levels(cell_scale * p.pulse_width_m, cell_scale * narrowest_beam_rad(mode), settings.range_m * 1.1);
   p.pulse_filter = p.noise_filter = rounded(make_noise_filter(p.pulse_shape, p.sample_time_s));
@@ -325,7 +329,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
     p.noise_filter = rounded(make_noise_filter(passed, p.sample_time_s));
     bandwidth_hz = passed.noise_bandwidth_hz();
   }
-  // A beam has sum_k W_jk^2 times the power of a column, which must be NL (eq. 30).
+  // A beam has sum_k W_jk^2 times the power of a column. This must equal NL (eq. 30).
   p.column_noise_upa = noise_rms_upa(mode, bandwidth_hz) / std::sqrt(p.beam_weights.weight_energy);
   lay_out_noise_profile(p);
   p.shared_noise = SharedNoiseTable(p, pool);
@@ -347,7 +351,7 @@ void set_gain(PingPlan& plan, float gain_db) {
 }
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
-  PingSettings asked = r.settings;  // the plan's settings, except those on which no table depends
+  PingSettings asked = r.settings;  // the plan's settings without those on which no table depends
   asked.rate_hz = plan.settings.rate_hz;
   asked.gain_db = plan.settings.gain_db;
   asked.gain_assist = plan.settings.gain_assist;

@@ -14,7 +14,7 @@ Pose propagate(const Pose& pose, const Twist& twist, double seconds) {
 
 EchoGeometry PingScalars::echo_geometry(Vec3d from_sonar_m) const {
   if (!moves) return {from_sonar_m, {}, {}};
-  // Eq. 29: scattered at r / c, received at 2 r / c after firing; seen_at_s is the time of `seen_from`.
+  // Eq. 29: the echo is scattered at r / c and received at 2 r / c after firing. seen_at_s is the time of `seen_from`.
   const double one_way_s = length(from_sonar_m) / sound_speed_mps;
   const Vec3d moved = (one_way_s - seen_at_s) * rotate(conjugate(seen_from.orientation), twist.velocity_mps);
   const Rotation turn = rotation_from(conjugate(turned_by((2 * one_way_s - seen_at_s) * twist.angular_rate_radps)));
@@ -23,8 +23,9 @@ EchoGeometry PingScalars::echo_geometry(Vec3d from_sonar_m) const {
 
 int PingScalars::columns_turned(const PingPlan& plan) const {
   if (!moves) return 0;
-  // Echoes return at 2 r / c. The time from `seen_from` to the last echo equals that from firing to `seen_from`; scattering
-  // happens within half of it. u changes at most as fast as the angle. Nearer than 1 m little can be hidden.
+  // Echoes are received at 2 r / c. The time from `seen_from` to the last echo equals the time from firing to `seen_from`; the
+  // scattering takes place within half of it. u changes at most as fast as the angle. At ranges below 1 m few surfaces can be
+  // hidden.
   constexpr double nearest_m = 1, most = 64;
   const double late_s = std::max(seen_at_s, 2 * max_range_m / sound_speed_mps - seen_at_s);
   const double sine = late_s * (length(twist.angular_rate_radps) + length(twist.velocity_mps) / nearest_m);
@@ -33,15 +34,15 @@ int PingScalars::columns_turned(const PingPlan& plan) const {
 
 double PingScalars::doppler_samples(Vec3d from_sonar_m) const {
   if (doppler_m_per_mps == 0) return 0;
-  // The component of the velocity toward the place shifts the pulse by (f / B) T v (docs/acoustics.md, eq. 27).
+  // The component of the velocity towards the point shifts the pulse by (f / B) T v (docs/acoustics.md, eq. 27).
   const Vec3d velocity = rotate(conjugate(seen_from.orientation), twist.velocity_mps);
   return doppler_m_per_mps * dot(velocity, from_sonar_m) / length(from_sonar_m) * samples_per_m;
 }
 
 namespace {
 
-/// The echo of a sweep that approaches at v has a frequency higher by df = 2 v f / c, so that its peak is earlier by df T / B,
-/// which is a range shorter by (f / B) T v.
+/// If a sweep approaches at v, the frequency of its echo is higher by df = 2 v f / c. Its peak is earlier by df T / B, which is
+/// a range shorter by (f / B) T v.
 double doppler_metres_per_mps(const PingPlan& plan) {
   const Waveform& w = plan.mode.waveform;
   if (w.shape != Waveform::Shape::lfm) return 0;  // the Doppler effect only changes the phase of other pulses
@@ -69,7 +70,7 @@ PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d
   if (s.doppler_m_per_mps != 0) s.max_range_m += std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
   s.moves = request.switches.motion && (length(s.twist.velocity_mps) > 0 || length(s.twist.angular_rate_radps) > 0);
   if (s.moves) s.seen_at_s = request.settings.range_m / static_cast<double>(request.settings.device_sound_speed_mps);
-  // A pulse reaches this far before the picture; the sonar moves between the echo's scattering and seen_at_s.
+  // A pulse reaches this far before the picture. The sonar moves between the scattering of the echo and seen_at_s.
   s.min_range_m =
       (plan.sample_offset - plan.taps) / s.samples_per_m - std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
   if (s.moves) s.min_range_m -= std::abs(s.seen_at_s - s.min_range_m / s.sound_speed_mps) * length(s.twist.velocity_mps);

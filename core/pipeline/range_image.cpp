@@ -12,15 +12,15 @@
 namespace sonar {
 namespace {
 
-constexpr double reach = 1.1;  // in beam widths: the pattern is -14 dB there, and 0 beyond
-/// Two-way power pattern: a Gaussian of this -3 dB width.
+constexpr double reach = 1.1;  // in beam widths; the pattern is -14 dB there, and 0 beyond
+/// Two-way power pattern: a Gaussian with this -3 dB width.
 double pattern(double angle_rad, double width_rad) {
   const double x = angle_rad / width_rad;
   return std::abs(x) > reach ? 0 : std::exp(-4 * std::log(2.0) * x * x);
 }
 
-/// Power of one beam in each range cell. finish() computes it, from differences between neighbouring cells or, with `as_heard`,
-/// from complex amplitudes with speckle.
+/// Power of one beam in each range cell. finish() computes it from differences between neighbouring cells. With `as_heard`, it
+/// computes it from complex amplitudes with speckle.
 class Profile {
  public:
   Profile(double cell_m, std::size_t cells, bool as_heard)
@@ -45,7 +45,7 @@ class Profile {
       im_[static_cast<std::size_t>(k)] += a * static_cast<double>(speckle.im);
     }
   }
-  /// Turns steps into powers.
+  /// Sums the steps to powers.
   void finish() {
     double sum = 0;
     for (std::ptrdiff_t k = first_; k <= last_; ++k) {
@@ -57,12 +57,12 @@ class Profile {
   std::ptrdiff_t first() const { return first_; }
   std::ptrdiff_t last() const { return last_; }
   double power(std::ptrdiff_t k) const { return k < first_ || k > last_ ? 0 : steps_[static_cast<std::size_t>(k)]; }
-  /// The strongest cell in [from, to], which lies within [first(), last()]; the first if several are equal.
+  /// The strongest cell in [from, to], which must lie within [first(), last()]. If several are equal, it is the first of them.
   std::ptrdiff_t strongest(std::ptrdiff_t from, std::ptrdiff_t to) const {
     const auto begin = steps_.begin();
     return std::max_element(begin + from, begin + to + 1) - begin;
   }
-  /// Centre of the cells around k that have at least half its power [m].
+  /// Centre [m] of the cells around k that have at least half of its power.
   double centre_m(std::ptrdiff_t k) const {
     const double half = power(k) / 2;
     double sum = 0, moment = 0;
@@ -73,7 +73,8 @@ class Profile {
     std::ptrdiff_t from = k, to = k;
     while (power(from - 1) > half) --from;
     while (power(to + 1) > half) ++to;
-    // Includes the next cell on either side: the place of an echo within a cell decides how much power these cells have.
+    // The next cell on either side is included, because the position of an echo within a cell determines how much power these
+    // cells have.
     for (std::ptrdiff_t i = from - 1; i <= to + 1; ++i) take(i);
     return sum > 0 ? moment / sum * cell_ : (static_cast<double>(k) + 0.5) * cell_;
   }
@@ -109,7 +110,7 @@ class RangeImager {
     cells_ = static_cast<std::size_t>(std::ceil((settings_.range_m + longest_return_half_m) / cell_m_)) + 2;
     first_wanted_ = static_cast<std::ptrdiff_t>(std::ceil(settings_.range_start_m / cell_m_ - 0.5));
     last_wanted_ = static_cast<std::ptrdiff_t>(std::floor(settings_.range_m / cell_m_ - 0.5));
-    FrequencyMode beam = mode_;  // the noise has the level of one beam
+    FrequencyMode beam = mode_;  // the noise level is that of one beam
     beam.pattern.elevation_width_rad = static_cast<float>(wanted.beam_height_rad);
     const double rms = noise_rms_upa(beam, true_mps / (2 * cell_m_));
     noise_power_ = rms * rms;
@@ -154,12 +155,12 @@ class RangeImager {
   }
 
  private:
-  /// Value of a pixel before it is quantised; power 0 = no return.
+  /// Value of a pixel before quantisation; power 0 = no return.
   struct Reported {
     double power = 0, range_m = 0;  // [uPa^2]; metres as the device computes them
     double shown_m = 0;             // the range after the filters
   };
-  /// Calls f(pixel) for each of the pixels around a pixel that has a return.
+  /// Calls f(pixel) for each neighbour of a pixel that has a return.
   template <class F>
   void for_each_neighbour(const std::vector<Reported>& all, int column, int row, F f) const {
     for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid_.rows - 1); ++r) {
@@ -170,8 +171,8 @@ class RangeImager {
       }
     }
   }
-  /// Calls change(before, column, row, pixel) for every pixel that has a return; `before` has the values of all pixels before the
-  /// first call.
+  /// Calls change(before, column, row, pixel) for every pixel that has a return. `before` contains the values that all pixels
+  /// had before the first call.
   template <class Change>
   void filter(std::vector<Reported>& all, Parallel& pool, Change change) const {
     const std::vector<Reported> before = all;
@@ -191,8 +192,8 @@ class RangeImager {
       if (confirming < wanted_.least_confirming) own = {};
     });
   }
-  /// Replaces each range by the median of the pixel and those around it. If their number is even, it is the lower of the two
-  /// middle ones, so that a reported range is always one that was measured.
+  /// Replaces each range by the median of the ranges of the pixel and its neighbours. If their number is even, the lower of the
+  /// two middle ones is used, so that every reported range was measured.
   void take_medians(std::vector<Reported>& all, Parallel& pool) const {
     filter(all, pool, [this](const std::vector<Reported>& before, int column, int row, Reported& own) {
       double ranges[9] = {own.shown_m};
@@ -202,7 +203,7 @@ class RangeImager {
       own.shown_m = ranges[(count - 1) / 2];
     });
   }
-  /// Calls f(return, power weight) for each return that a beam receives and for which `wanted` holds.
+  /// Calls f(return, power weight) for each return that a beam receives and for which `wanted` is true.
   template <class Wanted, class F>
   void for_each_return(int column, int row, Wanted wanted, F f) {
     const int first = std::max(column - column_reach_, 0), last = std::min(column + column_reach_, grid_.columns - 1);
@@ -222,14 +223,15 @@ class RangeImager {
     }
   }
 
-  /// Linear strength of an amplitude [uPa] from a range, in the unit of the pixels.
+  /// Linear strength of an amplitude [uPa] at a range, in the unit of the pixels.
   double strength(double amplitude, double range_m) const {
     const double gain_db = static_cast<double>(settings_.gain_db) +
                            (settings_.tvg ? tvg_db(mode_.receiver, range_m, settings_.device_absorption_db_per_m) : 0);
     return amplitude * full_scale_factor(mode_.receiver, gain_db) * static_cast<double>(settings_.format.max_code >> 16);
   }
   int block_of(int row) const { return wanted_.block_rows > 0 ? row / wanted_.block_rows : 0; }
-  /// Range of the loudest scatterer that a return has in a range cell: random, and the same for all beams that receive it.
+  /// Range of the strongest scatterer of a return in a range cell. It is random, and the same for all beams that receive the
+  /// return.
   double place_in_cell_m(const RangeReturn& r, std::ptrdiff_t k) const {
     const double from = std::max(center_of(k) - cell_m_ / 2, r.range_m - r.half_m),
                  to = std::min(center_of(k) + cell_m_ / 2, r.range_m + r.half_m);
@@ -242,7 +244,7 @@ class RangeImager {
     return power > least_power() && strength(std::sqrt(power), range_m) >= static_cast<double>(wanted_.least_strength);
   }
 
-  /// The cell that is reported, within the wanted ranges. If no cell there is detected, it is the strongest of them.
+  /// The cell that is reported, within the wanted ranges. If no cell is detected there, it is the strongest of them.
   std::ptrdiff_t chosen(const Profile& profile) const {
     const std::ptrdiff_t from = std::max(profile.first(), first_wanted_), to = std::min(profile.last(), last_wanted_);
     if (from > to) return profile.first();
@@ -269,7 +271,7 @@ class RangeImager {
       power = profile.power(k);
       range_m = profile.centre_m(k);
       if (!request_.switches.expected_power) {
-        // Rays are shared by neighbouring beams, and so is their speckle.
+        // Neighbouring beams share rays and therefore their speckle.
         double re = 0, im = 0, loudest_power = 0;
         const RangeReturn* loudest = nullptr;
         const auto is_in_cell = [k](const RangeReturn& r) { return r.first <= k && r.last >= k; };
@@ -293,7 +295,7 @@ class RangeImager {
       }
     }
     if (!is_detected(power, range_m) && request_.switches.noise && !request_.switches.expected_power) {
-      // The strongest of all cells of noise. If it is detected, it is a false alarm.
+      // The strongest of all cells with noise. If it is detected, it is a false alarm.
       const double cells = static_cast<double>(cells_);
       power = -noise_power_ * std::log(-std::expm1(std::log(static_cast<double>(uniform_open(bits.v[2]))) / cells));
       range_m = settings_.range_m * static_cast<double>(uniform_open(bits.v[3]));
@@ -312,7 +314,7 @@ class RangeImager {
             held(r.shown_m / wanted_.range_unit_m, RangePixel::most_range)};
   }
 
-  /// The nearest hit of each column's rays.
+  /// The nearest hit of the rays of each column.
   std::vector<BeamTruth> truth() const {
     std::vector<BeamTruth> nearest(static_cast<std::size_t>(grid_.columns));
     for (int column = 0; column < grid_.columns; ++column)

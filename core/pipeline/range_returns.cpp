@@ -12,30 +12,31 @@ namespace sonar {
 namespace {
 
 constexpr double speckle_cell_m = 0.02;  // a surface keeps its speckle while a beam's centre stays within a cell of this size
-constexpr std::uint32_t draws = 4096;    // number of draws, which the range cells of all returns share
-constexpr double least_blur = 0.5;       // least half length of an echo, in range cells
+constexpr std::uint32_t draws = 4096;    // number of draws; the range cells of all returns share them
+constexpr double least_blur = 0.5;       // least half length of an echo in range cells
 
-// Rays around the middle of a cell. An object that the middle ray misses is weighted by the part of the cell that it fills.
+// Number of rays around the middle of a cell. An object that the middle ray misses is weighted by the part of the cell that it
+// covers.
 constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up;
 constexpr int cells_a_packet = RayPacket::size / rays_around;
-// Objects hit by a smaller part than this of the rays in a cell and its eight neighbours are thin. They are followed from cell to
-// cell, and the cells that they cross get as many rays as `most_close_rays` allows for all of these cells, because the accuracy
-// of the part of a cell that a pole fills depends on the distance of rays.
+// If a smaller fraction of the rays in a cell and its eight neighbours hits an object, the object is thin. Thin objects are
+// followed from cell to cell. The cells that they cross get many rays, because the distance of rays determines how accurately
+// the covered part of a cell is known. `most_close_rays` limits the sum for all of these cells.
 constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
 constexpr std::size_t most_thin_cells = 512,
                       most_probed_cells = 2048;  // if a net covers the view, only the usual few rays are traced
 
-/// The place of a ray in a cell, -0.5 to 0.5, along an axis in one of `of` strata. Multiples of the golden ratio shift it from
-/// line to line of the grid, so that horizontal and vertical edges cross rays at all places of cells. The start of each line is
-/// random, so that no oblique edge stays between rays.
+/// The position of a ray in a cell, -0.5 to 0.5, along an axis in one of `of` strata. Multiples of the golden ratio shift it
+/// from line to line of the grid, so that rays meet horizontal and vertical edges at all positions in a cell. The start of each
+/// line is random, so that no oblique edge stays between rays.
 float place_in_cell(int stratum, int of, int line, int across_lines) {
   const auto n = static_cast<std::uint32_t>(across_lines),
              shift = static_cast<std::uint32_t>(line) * 0x9E3779B9u + n * n * 0x85EBCA6Bu;
   return (static_cast<float>(stratum) + static_cast<float>(shift >> 8) * 0x1p-24f) / static_cast<float>(of) - 0.5f;
 }
 
-/// Whether the cosine of the incidence is the given one within a twentieth.
+/// True if the cosine of incidence differs from the given one by less than a twentieth.
 bool is_inclined_alike(const RayPacket& p, int lane, double cosine) {
   const auto i = static_cast<std::size_t>(lane);
   const Vec3d normal = to_double({p.normal_x[i], p.normal_y[i], p.normal_z[i]});
@@ -132,14 +133,14 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
         RangeReturn& middle = middles[static_cast<std::size_t>(from + i)];
         middle = met(p, i, {1, 1});
         draw_speckle(p, i, middle);
-        middle.rays = 0;  // the rays around it are counted
+        middle.rays = 0;  // the rays around it are counted later
       }
   }
 }
 
-/// Aims rays of a cell's lattice, from `first_ray` on, by lanes of a packet.
+/// Sets lanes of a packet to the rays of a cell's lattice, from `first_ray` on.
 void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ray, int rays, RayPacket& p, int first_lane) const {
-  // Computed in the plane across the middle ray, which is accurate enough for a few tenths of a degree.
+  // The calculation in the plane across the middle ray is accurate enough for a few tenths of a degree.
   const auto [ca, sa] = azimuth_[static_cast<std::size_t>(column)];
   const Vec3d ahead = direction(column, row), to_port{-sa, ca, 0};
   const double width = column_step_rad_ * elevation_[static_cast<std::size_t>(row)].cosine;
@@ -155,8 +156,8 @@ void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ra
   }
 }
 
-/// Appends the returns of the rays of a cell. Rays that hit the same surface as the middle ray give one return, with the range of
-/// the middle ray.
+/// Appends the returns of the rays of a cell. Rays that hit the same surface as the middle ray form one return, which has the
+/// range of the middle ray.
 void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const {
   const std::size_t first = to.size();
   const double about_m = 1.25 * middle.spread_m + 2 * cell_m_;  // a patch is not exactly flat
@@ -181,7 +182,7 @@ void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int f
   if (power > 0) to.push_back(middle);
 }
 
-/// The echo of one ray of a cell's lattice.
+/// Computes the echo of one ray of a cell's lattice.
 RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) const {
   const auto i = static_cast<std::size_t>(lane);
   const Rotation sonar_from_world = transposed(world_from_sonar_);
@@ -197,7 +198,7 @@ RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) con
   const double width = column_step_rad_ * level / lattice.across, height = row_step_rad_ / lattice.up;
   const double area_m2 = footprint_area_m2(cosine, range_m, width * height);
   const double loss = two_way_transmission(range_m, absorption_np_);
-  // How the range changes over the patch of the ray: dr = -r (n . d') / (n . d) along both axes of the grid.
+  // Change of the range over the patch of the ray: dr = -r (n . d') / (n . d) along both axes of the grid.
   const Vec3d to_port{-along.y / level, along.x / level, 0};
   const Vec3d up{-along.z * along.x / level, -along.z * along.y / level, level};
   const double slope = std::abs(dot(normal, to_port)) * width + std::abs(dot(normal, up)) * height;
@@ -212,7 +213,7 @@ RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) con
   return r;
 }
 
-/// Sets the speckle of the place that a ray hit.
+/// Sets the speckle of the point that a ray hit.
 void RangeReturns::draw_speckle(const RayPacket& p, int lane, RangeReturn& r) const {
   const auto i = static_cast<std::size_t>(lane);
   const auto cell = [](float origin, float direction, float far) {
@@ -226,8 +227,8 @@ void RangeReturns::draw_speckle(const RayPacket& p, int lane, RangeReturn& r) co
   r.draw = bits.v[2];
 }
 
-/// Adds a return to those of one cell, which begin at `first`. Rays that hit the same object at about the same range give one
-/// return.
+/// Adds a return to the returns of one cell, which begin at `first`. Rays that hit the same object at about the same range form
+/// one return.
 void RangeReturns::add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to,
                        std::size_t first) const {
   if (!(r.power > 0)) return;
@@ -252,7 +253,7 @@ void RangeReturns::for_each_neighbour(Cell cell, F f) const {  // and for the ce
       f(Cell{column, row});
 }
 
-/// Cells in which rays hit a thin object, which is one that is thin in most of its cells.
+/// Cells in which rays hit a thin object. An object is thin if it is thin in most of its cells.
 std::vector<RangeReturns::Cell> RangeReturns::thin_cells(std::vector<std::uint8_t>& is_thin) const {
   struct Found {
     Cell cell;

@@ -27,7 +27,7 @@ class HitBatch {
         s_(context.scalars),
         kernels_(context.kernels),
         echoes_(echoes) {
-    // The draw is a function of (seed, object, column, ray): equal in every ping and on every thread count.
+    // The draw is a function of (seed, object, column, ray). It is equal in every ping and for every number of threads.
     const RandomKey key = key_of(seed, Domain::fixed_fan);
     arguments_.draw.counter[0] = object_, arguments_.draw.counter[1] = column_, arguments_.draw.counter[2] = ray_;
     arguments_.draw.key = key;
@@ -42,11 +42,11 @@ class HitBatch {
     double at_sample = s_.sample_of(r);
     if (s_.doppler_m_per_mps != 0)
       at_sample += s_.doppler_samples(direction_of_hit(hit, plan_.columns.sine(hit.column), plan_.switches.conical));
-    // The condition drops NaN, too.
+    // The condition also drops NaN.
     if (!(at_sample > -plan_.taps / 2 && at_sample < plan_.samples + plan_.taps / 2 - 1)) return;
     if (!(r >= nearest_scatterer_m && hit.cosine >= 0 && hit.cosine < 1.001f)) return;
     const Object& object = scene_.objects[hit.object];
-    // The weight is the source's pressure times sqrt(sigma) / r^2; the ray's own weight contains the root of its solid angle.
+    // The weight is the source's pressure times sqrt(sigma) / r^2. The weight of the ray contains the root of its solid angle.
     const float strength = laws_[object.mesh->material[hit.triangle]].root_strength(hit.cosine);
     // cosine_floor limits the footprint of a facet that is seen edge-on.
     const float slant = std::sqrt(std::max(hit.cosine, static_cast<float>(cosine_floor)));

@@ -26,15 +26,15 @@ double lambert_mu(const Material& m) { return lambert_coefficient(static_cast<do
 /// The strength at normal incidence, where every law is strongest.
 double strongest(const Material& m) { return m.law == ScatteringLaw::gsab ? gsab(m.gsab, 1) : lambert_mu(m); }
 
-/// 10^(trend decades / 10), decades from the reference frequency.
+/// 10^(trend decades / 10); decades are counted from the reference frequency.
 double trend(const Material& m, double centre_hz) {
   if (m.trend_db_per_decade == 0) return 1;
   const double decades = std::log10(centre_hz / static_cast<double>(m.trend_reference_hz));
-  // No surface backscatters more than the incident energy.
+  // The limit: no surface backscatters more than the incident energy.
   return std::min(power_from_db(static_cast<double>(m.trend_db_per_decade) * decades), largest_lambert / strongest(m));
 }
 
-/// k h, k = 2 pi f / c: the rms roughness in radians of phase.
+/// k h with k = 2 pi f / c: the rms roughness as a phase [rad].
 double phase_roughness(const Material& m, double centre_hz, double sound_speed_mps) {
   return 2 * pi * centre_hz / sound_speed_mps * static_cast<double>(m.roughness_m);
 }

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// The approximate memory of a plan.
+/// Approximate size of a plan in memory.
 std::size_t bytes_of(const PingPlan& p) {
   const auto of = [](const auto&... all) { return (... + (sizeof(all[0]) * all.capacity())); };
   std::size_t bytes = p.shared_noise.bytes() + p.beam_mix.bytes();
@@ -36,11 +36,11 @@ PreparedSettings& SettingsCache::prepared_for(const PingRequest& request, const 
   PreparedSettings& p = **it;
   p.last_used = ++uses_;
   set_gain(p.plan, request.settings.gain_db);
-  // Leak and volume have the pulse's correlation. A table is made again only for another seed or filter.
+  // Leak and volume have the pulse's correlation. A table is made again only if the seed or the filter changes.
   const bool volume = request.switches.volume && scene.water_column.has_volume();
   const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
   if (!p.plan.expected_power) {
-    std::vector<const NoiseTable*> drawn;  // settings that differ only in range have the same filter in samples
+    std::vector<const NoiseTable*> drawn;  // settings that differ only in range have the same filter, counted in samples
     for (const auto& other : prepared_) drawn.insert(drawn.end(), {&other->noise, &other->grains});
     if (request.switches.noise || ((leak || volume) && p.one_table())) p.noise.prepare(request.seed, p.plan.noise_filter, drawn);
     if ((leak || volume) && !p.one_table()) p.grains.prepare(request.seed, p.plan.pulse_filter, drawn);

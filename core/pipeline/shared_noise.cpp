@@ -17,23 +17,23 @@ namespace sonar {
 namespace {
 
 constexpr double none_db = -150;
-/// The part of the whole array leaves the sector at some range. The noise is followed up to `margin` times that range, and fades
-/// from `fades_from` times on. Without the fade, noise of groups would stay in the outer beams at all ranges. In the M1200d's
-/// high mode the range is 0.47 m (sine 0.5) and the fade ends at 1.41 m; the recording has no such noise at 1.75 m, and from 0.6
-/// m to there its bed hides it.
+/// Limits of the range of shared noise, as multiples of the range at which the part of the whole array leaves the sector. The
+/// noise fades from `fades_from` times this range on and ends at `margin` times. Without the fade, the noise of groups would
+/// stay in the outer beams at all ranges. In the M1200d's high mode this range is 0.47 m (sine 0.5) and the fade ends at 1.41
+/// m. The recording has no such noise at 1.75 m. Between 0.6 m and 1.75 m the recorded bed hides it.
 constexpr double margin = 3, fades_from = 2;
 
-/// A block of a part in a beam is left out if it is nowhere above this fraction of the channels' own noise (30), divided by the
-/// number of parts.
+/// A block of a part in a beam is omitted if its values are everywhere below this fraction of the channels' own noise (30),
+/// divided by the number of parts.
 constexpr double silent = 0.03;
 constexpr std::size_t block_samples = SharedNoiseTable::block_samples;
 
-constexpr int most_groups = 32;  // each has a table
-// Limits of a table's complex values (1 GiB) and of its sums (about 10 s).
+constexpr int most_groups = 32;  // each group has a table
+// Limits of the number of complex values of a table (1 GiB) and of the steps of its sums (about 10 s).
 constexpr double most_values = 1 << 27, most_steps = 1e9;
 
-/// Least mean power of the leak in the beams, re the sum of the channels' powers, for which the level of (31) is applied. Below
-/// it the beams point at nulls of the leak.
+/// Least mean power of the leak in the beams, re the sum of the channels' powers, at which the level of (31) is applied. At
+/// lower powers the beams point at nulls of the leak.
 constexpr double faint = 1e-3;
 
 bool has_noise(const SharedNoise& law) { return static_cast<double>(law.level_db) > none_db; }
@@ -43,12 +43,15 @@ double focus_m(const SharedNoise& law, const PingSettings& settings) {
   return static_cast<double>(law.focus_rows) * settings.range_bin_m;
 }
 
-/// The noise is followed to `end_m`. Over the last `fade_m` its power falls to 0.
+/// The range at which the shared noise ends is `end_m`. Over the last `fade_m` its power falls to 0.
 struct Reach {
   double end_m = 0, fade_m = 1;
-  double share(double range_m) const { return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0); }  // share of its power
+  double share(double range_m) const {
+    return std::clamp((end_m - range_m) / fade_m, 0.0, 1.0);
+  }  // fraction of the power that is left
 };
-/// Reach in a sector of beams with sines up to `widest`. If the part of the whole array never leaves it, the noise does not end.
+/// The range limits in a sector of beams with sines up to `widest`. If the part of the whole array never leaves the sector, the
+/// noise does not end.
 Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double widest) {
   const SharedNoise& law = mode.receiver.shared_noise;
   const double sine = static_cast<double>(law.sine), outside = sine - widest;
@@ -58,8 +61,8 @@ Reach reach_of(const FrequencyMode& mode, const PingSettings& settings, double w
   return {margin * leaves_m + std::max(0.0, -focus_m(law, settings)), (margin - fades_from) * leaves_m};
 }
 
-/// Responses of a block of samples, or of fewer focal ranges from which they are interpolated: Chebyshev points in the inverse
-/// range, in which phases are nearly linear.
+/// Responses of a block of samples. If interpolation is possible, they are computed at fewer focal ranges: Chebyshev points of
+/// the inverse range, in which phases are nearly linear.
 class Responses {
  public:
   /// `focal`: focal ranges of the samples, in wavelengths.
@@ -122,7 +125,7 @@ class Responses {
   }
 
   std::size_t beams_ = 0, samples_ = 0, ranges_ = 0;
-  std::vector<float> weights_;  // [ranges][block_samples]; empty: the ranges are the samples'
+  std::vector<float> weights_;  // [ranges][block_samples]; empty: the ranges are those of the samples
   std::vector<float> at_;       // [ranges][parts][2][beams]
   std::vector<float> most_;     // [parts][beams]: power at the ranges
   float most_weight_ = 1;
@@ -185,7 +188,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   std::size_t samples = 0;
   while (samples < all && (range_m(samples) < noise_reach.end_m || samples < leak_samples)) ++samples;
   samples_ = static_cast<int>(samples);
-  // A channel's own noise, by itself, is (30) at a beam's output.
+  // (30) is the level of a channel's own noise at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
   const auto steady = static_cast<double>(law.steady);
@@ -222,7 +225,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
         responses.of(parts_ - 1, j, re, im);
         for (std::size_t n = 0; n < to - from; ++n) power[n] += static_cast<double>(re[n] * re[n] + im[n] * im[n]);
       }
-      // Level (31) as a mean over the outputs of beams.
+      // (31) is the mean level at the outputs of beams.
       for (std::size_t n = from; n < std::min(to, leak_samples); ++n) {
         const double per_channel =
             std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams_) / std::max(power[n - from], least));

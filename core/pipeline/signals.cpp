@@ -5,7 +5,7 @@
 namespace sonar {
 
 void Echoes::reserve(int capacity) {
-  // One vector more, because kernels store whole vectors.
+  // One more vector is allocated, because kernels store whole vectors.
   const auto n = static_cast<std::size_t>(capacity) + 16;
   sample.resize(n);
   re.resize(n);
@@ -27,7 +27,7 @@ void ColumnSignals::shape(int column_count, int sample_count, int taps) {
   columns = column_count;
   samples = sample_count;
   lead = taps;
-  // Room for late pulses, and for tiles that read whole vectors past the last sample.
+  // Additional memory for late pulses, and for tiles that read whole vectors past the last sample.
   stride = 2 * (lead + samples + taps + 64);
   stride = (stride + 15) / 16 * 16;
   if (stride % 1024 == 0) stride += 16;  // columns that share cache sets would evict each other

@@ -9,15 +9,15 @@ namespace {
 // w of (26): relative L2 error 8e-6.
 constexpr int kernel_width = 6;
 
-/// Number of frequencies per sample of the period, as many as the pulse's band needs.
+/// Number of frequencies per sample of the period. The pulse's band determines it.
 int per_sample(const Pulse& pulse, double sample_time_s) {
   return std::max(1, static_cast<int>(std::ceil(pulse.band_hz() * sample_time_s)));
 }
 
 }  // namespace
 
-// The pulse of an echo up to half a pulse before the record extends into it, and that of one near its end extends half a pulse
-// beyond it. Padding of one pulse length separates the two.
+// An echo up to half a pulse before the record extends into it. The pulse of an echo near the end extends half a pulse beyond
+// it. Padding of one pulse length separates the two.
 SpectralColumns::SpectralColumns(const Pulse& pulse, double sample_time_s, int samples, int taps)
     : samples_(samples),
       period_(spectral::quick_size(samples + taps + 2)),
@@ -71,7 +71,7 @@ void SpectralColumns::finish(int first, int last, SpectralScratch& scratch, Colu
 }
 
 std::size_t SpectralColumns::bytes() const {
-  // A transform has about as many factors as values.
+  // A transform has about as many factors as it has values.
   const auto values = response_.capacity() + static_cast<std::size_t>(sums_.grid_points() + period_);
   return sizeof(spectral::Complex) * values + sizeof(double) * sums_.tables().correction.size();
 }

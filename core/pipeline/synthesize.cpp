@@ -18,7 +18,7 @@ void synthesize(Echoes& echoes, const simd::PulseRows& pulse, const simd::Kernel
 
 namespace {
 
-/// Whether the column's T(u) is 1: then noise can be added before T(u) is applied.
+/// True if the column's T(u) is 1. Then noise can be added before T(u) is applied.
 bool begins_with_noise(const PingPlan& plan, const PingNoise& noise, int column) {
   return noise.table && !plan.expected_power && plan.columns.transmit[static_cast<std::size_t>(column)] == 1.0f;
 }
@@ -44,7 +44,7 @@ void level_noise(const NoiseProfile& profile, int k, int count, float* noise) {
 }  // namespace
 
 void begin_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) {
-  // rms of one column: the level at a beam's output over sqrt(sum_k W_jk^2) (section 5).
+  // rms of one column: the level at a beam's output divided by sqrt(sum_k W_jk^2) (section 5).
   const auto rms = static_cast<float>(plan.column_noise_upa);
   for (int k = first; k < last; ++k) {
     float *at = signals.column(k), *end = at + signals.stride;
@@ -81,7 +81,7 @@ void finish_columns(const PingPlan& plan, const PingNoise& noise, int first, int
     levelled.assign(2 * static_cast<std::size_t>(signals.samples), rms);
     if (!plan.expected_power) noise.table->set(noise.sonar, noise.ping, k, rms, signals.samples, levelled.data());
     level_noise(plan.noise_profile, k, signals.samples, levelled.data());
-    // Expected power: E|n|^2 is the level's square in every sample.
+    // In expected power, E|n|^2 is the square of the level in every sample.
     for (int n = 0; n < 2 * signals.samples; ++n)
       samples[n] += !plan.expected_power ? levelled[static_cast<std::size_t>(n)]
                     : n % 2 == 0         ? levelled[static_cast<std::size_t>(n)] * levelled[static_cast<std::size_t>(n)]

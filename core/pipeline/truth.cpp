@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// Ranges [m] along the ray. The smaller range wins, so the order of the calls does not matter.
+/// Ranges along the ray [m]. The smaller range is kept, so the order of the calls has no effect.
 void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
   if (nearest.object != BeamTruth::nothing && nearest.range_m <= range_m) return;
   nearest = {range_m, object};
@@ -18,9 +18,9 @@ void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
 
 float truth_half_width_rad(const PingPlan& plan) {
   const BeamPattern& pattern = plan.mode.pattern;
-  // Without a pattern, the data sheet's width is the whole beam.
+  // Without a pattern, the beam is as wide as the data sheet's width.
   if (pattern.elevation_taper == Taper::unit) return pattern.elevation_width_rad / 2;
-  // D_v of (34) falls to sqrt(1/2) in amplitude, -3 dB, at this |psi| [rad].
+  // The |psi| [rad] at which D_v of (34) has fallen to sqrt(1/2) in amplitude, -3 dB.
   return static_cast<float>(elevation_reach_rad(pattern, std::sqrt(0.5)));
 }
 
@@ -29,7 +29,7 @@ void note_first_hits(const FanScratch& fan, const PingPlan& plan, int first, int
   const auto elevations = static_cast<std::int32_t>(plan.fan.elevation_rad.size());
   for (int k = first; k < last; ++k) {
     BeamTruth& nearest = by_column[static_cast<std::size_t>(k)];
-    // Samples are linked from bottom to top; the first of a column is its lowest base ray.
+    // Samples are linked from bottom to top. The first sample of a column is its lowest base ray.
     for (std::int32_t i = (k - first) * elevations; i >= 0; i = fan.samples[static_cast<std::size_t>(i)].next) {
       const FanScratch::Sample& s = fan.samples[static_cast<std::size_t>(i)];
       if (s.surface.object != RayPacket::miss && std::abs(s.elevation_rad) <= widest)
@@ -48,7 +48,7 @@ std::vector<BeamTruth> truth_of_beams(const PingPlan& plan, std::span<const Beam
   std::vector<BeamTruth> truth;
   truth.reserve(plan.beam_sine.size());
   for (const double sine : plan.beam_sine) {
-    // The column nearest to the beam in u; the clamp is for rounding at the last column.
+    // The column whose u is nearest to the beam. The clamp corrects rounding at the last column.
     const long column = std::lround((plan.columns.first_sine - sine) / plan.columns.spacing);
     truth.push_back(by_column[static_cast<std::size_t>(std::clamp<long>(column, 0, plan.columns.count - 1))]);
   }

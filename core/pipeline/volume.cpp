@@ -12,12 +12,12 @@
 namespace sonar {
 namespace {
 
-// Largest number of slices for the integral over psi in (17). Every column processes all of them for its shadows.
+// Largest number of slices for the integral over psi in (17). Every column processes all slices for its shadows.
 constexpr int most_slices = 256;
 
 }  // namespace
 
-// The width of a column in (17): du for cones; for flat beams dtheta = du / cos(theta), with u = sin(theta).
+// The width of a column in (17): du for cones. For flat beams it is dtheta = du / cos(theta), with u = sin(theta).
 double volume_column_width(const PingPlan& plan, int column) {
   const double u = plan.columns.sine(column), across = 1 - u * u;
   if (!(across > 0)) return 0;
@@ -27,7 +27,7 @@ double volume_column_width(const PingPlan& plan, int column) {
 Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars) : plan_(plan), scalars_(scalars) {
   if (!plan.switches.volume || !water.has_volume()) return;
   const Fan& fan = plan.fan;
-  // D_v of (34); without a pattern the factor is 1 in the whole fan.
+  // D_v of (34). Without a pattern the factor is 1 in the whole fan.
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
   const int bins_a_slice = std::max(1, fan.bins / most_slices);
@@ -35,14 +35,14 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
     const auto angle = [&](double bin) {
       return std::atan(static_cast<double>(tangent_of_bin(fan.axis, static_cast<float>(bin))));
     };
-    // D_v^2 dpsi [rad] by the midpoint rule; dOmega of flat beams has a further cos(psi).
+    // D_v^2 dpsi [rad] by the midpoint rule. For flat beams, dOmega has a further factor cos(psi).
     const double psi = angle(from + 0.5 * bins_a_slice), amplitude = has_pattern ? elevation_two_way(aperture, psi) : 1;
     const double solid = plan.switches.conical ? 1 : std::cos(psi);
     slices_.push_back(
         {from + bins_a_slice / 2, 1 / std::cos(psi), amplitude * amplitude * solid * (angle(from + bins_a_slice) - angle(from))});
     open_fan_ += slices_.back().weight;
   }
-  // docs/acoustics.md, eq. 17: sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff, its echo falls as r^-4.
+  // docs/acoustics.md, eq. 17: sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff. Its echo falls as r^-4.
   const double at_1_m = scalars.source_upa * scalars.source_upa * power_from_db(static_cast<double>(water.volume_db)) * 0.5 *
                         scalars.sound_speed_mps * plan.pulse_shape.energy_width_s();
   // [uPa^2] for Psi = 1: source^2 times sigma of (17), times e^{-4 a r} / r^4 for the way out and back.
@@ -57,11 +57,11 @@ void Volume::find_blocked(const DepthMap& seen, int column, std::vector<double>&
   const float* map = seen.inverse_x.data() + static_cast<std::ptrdiff_t>(column - seen.first_column) * (seen.bins + 1);
   const double u = plan_.columns.sine(column);
   const double per_x = plan_.switches.conical ? 1 / std::sqrt(std::max(1 - u * u, 1e-12)) : 1;  // r / x = per_x / cos(psi)
-  // A slice of the fan ends at the surface that rays hit: from that sample on its weight is subtracted.
+  // A slice of the fan ends at the surface that rays hit. From that sample on, its weight is subtracted.
   for (const Slice& slice : slices_) {
     const auto inverse_x = static_cast<double>(map[slice.bin]);
     if (!(inverse_x > 0)) continue;
-    // Surfaces nearer than the record block the slice from the first sample on.
+    // Surfaces that are nearer than the record block the slice from the first sample on.
     const double sample = scalars_.sample_of(per_x * slice.range_per_x / inverse_x);
     if (sample < static_cast<double>(blocked.size())) blocked[static_cast<std::size_t>(std::max(sample, 0.0))] += slice.weight;
   }
@@ -75,7 +75,7 @@ void Volume::add(const DepthMap* seen, const PingNoise& noise, int first, int la
   for (int k = first; k < last; ++k) {
     if (seen) find_blocked(*seen, k, scratch.blocked);
     const double width = volume_column_width(plan_, k);
-    // max(0): the weights that remain are a difference, which rounding could make negative.
+    // max(0): the remaining weights are a difference, which could become negative by rounding.
     double open = open_fan_;
     float* at = signals.column(k) + 2 * signals.lead;
     for (std::size_t n = 0; n < samples; ++n) {
@@ -88,7 +88,8 @@ void Volume::add(const DepthMap* seen, const PingNoise& noise, int first, int la
     }
     if (plan_.expected_power) continue;
     scratch.grains.assign(2 * samples, 0.0f);
-    // Grains have unit power and the pulse's correlation; their column numbers differ from those of the noise (noise_place.hpp).
+    // Grains have unit power and the pulse's correlation. Their column numbers differ from those of the noise
+    // (noise_place.hpp).
     noise.table->add(noise.sonar, noise.ping, static_cast<int>(first_volume_column) + k, 1, static_cast<int>(samples),
                      scratch.grains.data());
     for (std::size_t i = 0; i < 2 * samples; ++i) at[i] += scratch.rms[i / 2] * scratch.grains[i];

@@ -5,14 +5,14 @@
 namespace sonar {
 namespace {
 
-/// The height [m] by which the sonar rises until the time at which the scene is computed, PingScalars::seen_at_s.
+/// The height [m] by which the sonar rises until PingScalars::seen_at_s, the time at which the scene is computed.
 double rise_m(const PingRequest& r) {
   // Vertical speed times range / c, the time until half of the ping.
   return std::max(0.0, r.sonar_moves.velocity_mps.z) * r.settings.range_m /
          static_cast<double>(r.settings.device_sound_speed_mps);
 }
 
-/// Whether the sonar is higher above z = 0 than least_depth_m.
+/// True if the sonar is more than least_depth_m above z = 0.
 bool is_above(const Pose& sonar_in_world) { return sonar_in_world.position_m.z > least_depth_m; }
 bool is_to_change(const PingRequest& r) {
   return is_above(r.sonar_in_world) ? !r.blank : r.sonar_in_world.position_m.z + rise_m(r) > -least_depth_m;
@@ -37,7 +37,7 @@ bool is_in_air(const Pose& sonar_in_world, const Scene& scene) { return scene.se
 
 std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room) {
   if (!scene.sea_surface.present || std::none_of(requests.begin(), requests.end(), is_to_change)) return requests;
-  // Copies only when a request changes, which is rare.
+  // Requests are copied only if one changes, which is rare.
   room.assign(requests.begin(), requests.end());
   for (PingRequest& r : room)
     if (is_to_change(r)) change(r);
@@ -45,7 +45,7 @@ std::span<const PingRequest> in_water(std::span<const PingRequest> requests, con
 }
 
 void restore_requested_pose(std::span<const PingRequest> requests, std::span<Ping> pings) {
-  // The ping states the requested pose, not the one with which it was computed.
+  // The ping states the requested pose, not the pose with which it was computed.
   for (std::size_t i = 0; i < pings.size(); ++i) {
     pings[i].request.sonar_in_world = requests[i].sonar_in_world;
     pings[i].request.sonar_moves = requests[i].sonar_moves;

@@ -45,7 +45,7 @@ SONAR_HD inline MixedSample refocused(const BeamMixView& v, const float* from, s
   return sum;
 }
 
-/// The sample plus a fraction of both neighbouring beams. The outermost beams have only one neighbour.
+/// The weighted sum of the sample and of both neighbouring beams. The outermost beams have only one neighbour.
 SONAR_HD inline MixedSample blended(const BeamMixView& v, const float* from, std::int64_t stride, std::int32_t j,
                                     std::int32_t column) {
   const float* s = from + j * stride + 2 * static_cast<std::int64_t>(column);

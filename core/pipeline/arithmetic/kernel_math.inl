@@ -1,5 +1,5 @@
-// Formulas of the hot loops that scalar, device and vector code share. This file is included inside a namespace, once per
-// instruction set, because the linker must not merge inline functions compiled for different sets. The namespace must have
+// Formulas of the hot loops that scalar, device and vector code share. The file is included inside a namespace, once per
+// instruction set, because the linker must not merge inline functions compiled for different sets. The namespace must contain
 // bits_of and float_of and, for vectors, larger and smaller. V is a float or a vector of floats.
 
 SONAR_HD inline float larger(float a, float b) { return a > b ? a : b; }
@@ -51,8 +51,8 @@ SONAR_HD inline float exp2_of(float x) {
   return p * float_of(static_cast<std::uint32_t>(static_cast<std::int32_t>(whole) + 127) << 23);
 }
 
-/// Root of the scattering strength over that of mu at a cosine of incidence, from a tabulated law: linear in sqrt(1 - cosine)
-/// (LawTable, core/pipeline/scattering_law.hpp).
+/// Root of the scattering strength divided by the root of mu, at a cosine of incidence, from a table: linear in sqrt(1 -
+/// cosine) (LawTable, core/pipeline/scattering_law.hpp).
 SONAR_HD inline float law_root(const float* table, float cosine) {
   const float at = static_cast<float>(law_steps) * std::sqrt(larger(1.0f - cosine, 0.0f));
   const auto step = static_cast<std::int32_t>(at);
@@ -78,15 +78,15 @@ SONAR_HD inline V bin_of_tangent(const TangentAxis& a, V t) {
   return a.middle_bin + held * a.bins_per_tangent + (t - held) * a.side_bins_per_tangent;
 }
 
-/// Two-way elevation pattern in the side lobes: sinc^2 at x, the aperture in wavelengths times the sine of the angle, from sin(pi
-/// x).
+/// Two-way elevation pattern in the side lobes: sinc^2 at x, from sin(pi x). x is the aperture in wavelengths times the sine of
+/// the angle.
 template <class V>
 SONAR_HD inline V side_lobe_pattern(V x, V sine) {
   const V d = sine / (3.14159265f * x);
   return d * d;
 }
 
-/// Two-way elevation pattern: polynomial with coefficients e in w = sin^2 of the elevation.
+/// Two-way elevation pattern: a polynomial in w = sin^2 of the elevation, with coefficients e.
 template <class V>
 SONAR_HD inline V elevation_pattern(const float* e, V w) {
   V p = V{} + e[elevation_terms - 1];
@@ -94,7 +94,7 @@ SONAR_HD inline V elevation_pattern(const float* e, V w) {
   return p;
 }
 
-/// e^d for a small d: absorption from a tile's centre to its cells.
+/// e^d for a small d: the absorption between a tile's centre and its cells.
 template <class V>
 SONAR_HD inline V exp_near_0(V d) {
   return 1.0f + d * (1.0f + d * (0.5f + d * (1.0f / 6.0f + d * (1.0f / 24.0f))));

@@ -1,4 +1,4 @@
-// The ping engine of the CPU: it owns the scene for rays, the surface cells and the buffers, and calls simulate() for each
+// The ping engine of the CPU. It owns the scene for rays, the surface cells and the buffers, and calls simulate() for each
 // request.
 #include <array>
 #include <stdexcept>
@@ -14,7 +14,8 @@
 namespace sonar {
 namespace {
 
-/// Runs pings between the parts of another ping. Each ping has its own buffers; scene and cells are set before each of them.
+/// Runs pings between the parts of another ping. Each ping has its own buffers. The scene and the cells are set before each
+/// ping.
 class CpuEngine final : public ChangingEngine, private Interruption {
  public:
   CpuEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options)
@@ -81,7 +82,7 @@ class CpuEngine final : public ChangingEngine, private Interruption {
     ping.labels = std::move(labels);
     return ping;
   }
-  /// The ping between whose parts other pings may run.
+  /// The ping that other pings may interrupt.
   Ping run_outer(const PingRequest& request, PingLabels* labels, BeamChoice beams) {
     under_way_ = {&request, cells_, 0};
     struct Finish {
@@ -115,7 +116,7 @@ class CpuEngine final : public ChangingEngine, private Interruption {
   Interruption* interruption_ = nullptr;
   struct UnderWay {
     const PingRequest* request = nullptr;
-    std::shared_ptr<SurfaceCells> cells;  // a ping run in between may need other cells
+    std::shared_ptr<SurfaceCells> cells;  // an interrupting ping may need other cells
     std::uint64_t view = 0;               // the view whose tiles it uses
   } under_way_;
 };

@@ -24,7 +24,7 @@ namespace sonar {
 struct Workspace::Buffers {
   SettingsCache prepared;
   SpecularEchoes specular_echoes;
-  std::vector<LawTable> laws;  // tiles have pointers into it
+  std::vector<LawTable> laws;  // tiles contain pointers into it
   std::vector<float> turned_away;
   std::vector<PreparedTile> tiles;
   std::vector<std::vector<std::uint32_t>> tiles_by_group;
@@ -64,14 +64,14 @@ const PingStatistics& Workspace::statistics() const { return buffers_->statistic
 
 namespace {
 
-constexpr int most_traced_columns = 48;  // columns whose rays are refined together
+constexpr int most_traced_columns = 48;  // number of columns whose rays are refined together
 constexpr std::size_t group_bytes =
-    640 << 10;  // signals and depth maps of a worker from rays to sums, which stay in the second-level cache
-constexpr int least_groups_a_worker = 3;  // so that all workers end at about the same time
+    640 << 10;  // signals and depth maps of a worker, which stay in the second-level cache from rays to sums
+constexpr int least_groups_a_worker = 3;  // with at least this many, all workers end at about the same time
 constexpr int window_samples = 64;        // samples that a worker processes from beamforming to codes
 constexpr int echo_room = 16384;
 
-/// Adds the time since its construction, or the last lap, to a stage.
+/// Adds the time since its construction or since the last lap to a stage.
 class Stopwatch {
  public:
   Stopwatch(double (*now_s)(), PingStatistics& statistics)
@@ -91,7 +91,7 @@ class Stopwatch {
 
 }  // namespace
 
-/// The stages of one ping, and the data that they pass on.
+/// The stages of one ping, and the data that they exchange.
 class PingSimulation {
  public:
   PingSimulation(const RayScene& scene, SurfaceCells& cells, const PingRequest& request, const simd::Kernels& kernels,
@@ -136,7 +136,7 @@ class PingSimulation {
 
  private:
   bool ray_is_scatterer() const { return plan_.fixed_fan > 0; }
-  /// Columns that are traced together. Parts have nearly equal sizes, so that no small one remains.
+  /// The columns that are traced together. The parts have nearly equal sizes, so that no small part remains.
   int traced_columns() const {
     const int parts = (plan_.columns.count + most_traced_columns - 1) / most_traced_columns;
     return (plan_.columns.count + parts - 1) / parts;
@@ -164,18 +164,20 @@ class PingSimulation {
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
   const PingContext context_;
-  std::vector<ColumnRange> heard_, groups_;  // columns that the beams use; the same in parts that a worker computes at once
-  int group_columns_ = 0;                    // most columns of a group
+  std::vector<ColumnRange> heard_,
+      groups_;             // columns that the beams use; the same columns in parts that a worker computes at once
+  int group_columns_ = 0;  // most columns of a group
   std::vector<PointEcho> points_;
   std::vector<ReceivedPulse> other_sonars_;
   std::vector<float> shared_noise_;  // noise that the channels share in this ping
 };
 
-/// The number of columns in a worker's group. Each group processes the tiles that overlap it, so that larger groups need less
-/// work, as far as caches and workers allow. No result depends on it: a column's echoes are summed in the order of the tiles.
+/// The number of columns in a worker's group. Each group processes the tiles that overlap it, so larger groups need less work;
+/// caches and the number of workers limit the size. No result depends on the size, because the echoes of a column are summed in
+/// the order of the tiles.
 int PingSimulation::group_columns() const {
   const int traced = traced_columns();
-  // Small groups, because a ping of another sonar is to run between them.
+  // Groups are small here, because a ping of another sonar is to run between them.
   if (w_.between && w_.between->expected()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
   // Signals and depth maps of a group should fit a worker's share of the second-level cache.
@@ -187,10 +189,10 @@ int PingSimulation::group_columns() const {
   return std::max(1, std::min(in_cache / traced, (for_all + traced - 1) / traced)) * traced;
 }
 
-/// Finds surface cells that may be in view, sorted by their columns, and visible point echoes.
+/// Finds the surface cells that may be in view, sorted by column, and the visible point echoes.
 void PingSimulation::find_echo_sources() {
   if (request_.blank) return;
-  // Echoes without surface: point targets, other sonars, specular points (eq. 7).
+  // Echoes without a surface: point targets, other sonars, specular points (eq. 7).
   points_ = scatter_points(context_);
   other_sonars_ = receive_other_sonars(context_, request_);
   Stopwatch watch(w_.now_s, w_.statistics);
@@ -201,7 +203,7 @@ void PingSimulation::find_echo_sources() {
   w_.turned_away = turned_away_of(scene_.scene(), cells_.skins(), bodies_, scalars_.seen_from.position_m);
   if (request_.switches.multipath) find_multipath_echoes();
   watch.lap(Stage::multipath);
-  // Surface cells within range and fan; their level follows the distance.
+  // Surface cells within the range and the fan. Their level follows from the distance.
   CellView view;
   view.sonar_in_world = scalars_.seen_from;
   view.bodies_in_world = bodies_;
@@ -229,7 +231,7 @@ void PingSimulation::find_multipath_echoes() {
 
 /// Computes rays, echoes, pulses and noise, one group of columns at a time.
 void PingSimulation::simulate_columns() {
-  // All groups at once, or when an interruption is likely, as many as there are threads between two yield points.
+  // Runs all groups at once. If an interruption is likely, runs as many groups as there are threads between two yield points.
   const std::size_t all = groups_.size();
   const std::size_t at_once = w_.between && w_.between->expected() ? static_cast<std::size_t>(pool_.threads()) : all;
   for (std::size_t from = 0; from < all; from += at_once) {
@@ -242,11 +244,11 @@ void PingSimulation::simulate_columns() {
 void PingSimulation::simulate_group(std::size_t group, Workspace::Buffers::PerWorker& mine) {
   const auto [first, last] = groups_[group];
   Stopwatch watch(w_.now_s, mine.statistics);
-  // Draws depend only on (seed, sonar, ping, column), so that they are equal for every number of threads.
+  // Draws depend only on (seed, sonar, ping, column). Therefore they are equal for every number of threads.
   const PingNoise draws{prepared_.one_table() ? &prepared_.noise : &prepared_.grains, request_.sonar_id,
                         static_cast<std::uint32_t>(request_.number)};
   const PingNoise noise{request_.switches.noise ? &prepared_.noise : nullptr, draws.sonar, draws.ping};
-  // Order of a column's sums: noise, echoes, multipath, volume, T(u), leak; outside the sector the noise follows T(u).
+  // Order of the sums of a column: noise, echoes, multipath, volume, T(u), leak. Outside the sector the noise comes after T(u).
   begin_columns(plan_, noise, first, last, w_.columns);
   watch.lap(Stage::noise);
   if (plan_.spectral) plan_.spectral->begin(last - first, mine.spectral);
@@ -280,7 +282,7 @@ void PingSimulation::scatter_hits_of(int first, int last, Workspace::Buffers::Pe
 
 void PingSimulation::scatter_cells_of(std::size_t number, Workspace::Buffers::PerWorker& mine, Stopwatch& watch) {
   const auto [first, last] = groups_[number];
-  // A moving sonar may receive an echo in another column than that of the ray.
+  // If the sonar moves, an echo may be received in another column than that of its ray.
   const int beside = scalars_.columns_turned(plan_);
   const int map_first = std::max(first - beside, 0), map_last = std::min(last + beside, plan_.columns.count);
   mine.seen.shape(map_first, map_last, plan_.fan.bins);
@@ -290,7 +292,7 @@ void PingSimulation::scatter_cells_of(std::size_t number, Workspace::Buffers::Pe
   for (int from = first; from < last; from += traced_columns()) {
     // Rays draw the depth map of these columns (section 2).
     const int to = std::min(from + traced_columns(), last);
-    mine.statistics.rays += trace(from, to);  // rays of columns beside the group count in their own group
+    mine.statistics.rays += trace(from, to);  // the rays of columns beside the group count in the group of those columns
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);
     if (labels_) w_.labels.note_shadows(mine.fan, from, to);
   }
@@ -301,7 +303,7 @@ void PingSimulation::scatter_cells_of(std::size_t number, Workspace::Buffers::Pe
   mine.farthest.shape(mine.seen);
   mine.farthest.leave_out_hidden(w_.tiles, w_.tiles_by_group[number], group, mine.in_sight);
   if (labels_) w_.labels.begin_group(group);
-  // scatter() stops when its buffer is full; the tiles' order stays.
+  // scatter() stops when its buffer is full. The order of the tiles stays the same.
   for (std::size_t next = 0; next < mine.in_sight.size();) {
     next = scatter(w_.tiles, mine.in_sight, next, group, kernels_, mine.echoes);
     mine.statistics.echoes += static_cast<std::size_t>(mine.echoes.count);
@@ -313,7 +315,7 @@ void PingSimulation::scatter_cells_of(std::size_t number, Workspace::Buffers::Pe
   if (labels_) w_.labels.finish_group(group, mine.echoes);
 }
 
-/// Sums pulses in time if the pulse is real-valued and tabulated, otherwise via the spectrum.
+/// Sums pulses in time if the pulse is real and tabulated, otherwise via the spectrum.
 void PingSimulation::sum_pulses(int first, Workspace::Buffers::PerWorker& mine) {
   if (plan_.spectral)
     plan_.spectral->add(mine.echoes, first, mine.spectral);
@@ -335,7 +337,7 @@ Ping PingSimulation::image() {
     const int first = static_cast<int>(window) * rows_at_once;
     image_rows(first, std::min(first + rows_at_once, rows), w_.workers[static_cast<std::size_t>(worker)], ping);
   });
-  // Each worker has counters of its own, so that no memory is shared.
+  // Each worker has its own counters, so that no memory is shared.
   for (const Workspace::Buffers::PerWorker& worker : w_.workers) {
     for (std::size_t s = 0; s < w_.statistics.seconds.size(); ++s) w_.statistics.seconds[s] += worker.statistics.seconds[s];
     w_.statistics.rays += worker.statistics.rays;
@@ -347,11 +349,11 @@ Ping PingSimulation::image() {
 void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWorker& mine, Ping& ping) {
   Stopwatch watch(w_.now_s, mine.statistics);
   const int per_row = plan_.settings.samples_per_row;
-  // A window is 64 samples of whole rows: its beams stay in cache until they are codes.
+  // A window has 64 samples of whole rows. Its beams stay in the cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
   form_beams(w_.columns, plan_.beam_weights, beams_, heard_, kernels_, mine.beam_scratch, mine.beams);
-  // Points and pulses of other sonars are added to the beams at their exact directions; then the beams are mixed. The pulse of
-  // another sonar does not come from the range of its rows, so it is not blurred.
+  // Points and the pulses of other sonars are added to the beams in their exact directions. Then the beams are mixed. The pulse
+  // of another sonar does not come from the range of its rows, so it is not blurred.
   add_points(points_, plan_, mine.beams);
   plan_.beam_mix.blur(kernels_, mine.beams, mine.mixed);
   add_pulses(other_sonars_, plan_, mine.beams);

@@ -5,12 +5,12 @@
 namespace sonar {
 namespace {
 
-// A batch is the work of one task; a round limits the memory for echoes. Neither changes a sum.
+// A batch is the work of one task. A round limits the memory for echoes. The sums depend on neither of them.
 constexpr std::size_t tiles_a_batch = 16;
 constexpr std::size_t batches_a_round = 64;  // echoes of one round are stored and then summed
 
 std::vector<Path> paths_in_view(const std::vector<FlatMirror>& mirrors, const BounceMap& map) {
-  // The direct path, and those via one or two different mirrors that the traced map contains.
+  // The direct path, and the paths via one or two different mirrors that the traced map contains.
   std::vector<Path> paths{path_by(mirrors, -1)};
   const int n = static_cast<int>(mirrors.size());
   for (int a = 0; a < n; ++a)
@@ -19,7 +19,7 @@ std::vector<Path> paths_in_view(const std::vector<FlatMirror>& mirrors, const Bo
   return paths;
 }
 
-/// Selects cells at all places that a path via mirrors may reach. Their sizes follow the lengths of the paths; reach[0] is the
+/// Selects the cells that a path via mirrors may reach. Their sizes follow the lengths of the paths. reach[0] belongs to the
 /// straight path.
 CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pose> bodies, const std::vector<PathReach>& reach) {
   CellView view;
@@ -37,7 +37,7 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
       all->nearest_m = std::min(all->nearest_m, one->nearest_m);
       all->farthest_m = std::max(all->farthest_m, one->farthest_m);
     };
-    // The span of distances over all paths. The direct path is included only if another one reaches the place.
+    // The range of lengths of all paths. The direct path counts only if another path also reaches the point.
     for (std::size_t l = 1; l < reach.size(); ++l) join(reach[l]);
     if (all) join(reach[0]);
     return all;
@@ -45,15 +45,15 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
   return view;
 }
 
-/// Works in rounds. Batches of tiles become echoes, sorted by column group; then groups sum them, batch by batch. So each
-/// sum has the order of the tiles, for any assignment of threads.
+/// The work is divided into rounds. Batches of tiles become echoes, sorted by group of columns. Then the groups sum the echoes,
+/// batch by batch. So each sum has the order of the tiles, for any assignment of threads.
 class Rounds {
  public:
   Rounds(MultipathWork& work, const PingPlan& plan, const simd::Kernels& kernels, Parallel& pool)
       : work_(work), plan_(plan), kernels_(kernels), pool_(pool) {
     groups_ = static_cast<std::size_t>((plan.columns.count + MultipathScatterer::group_columns - 1) /
                                        MultipathScatterer::group_columns);
-    // Kept from ping to ping, so that buffers grow to the scene's needs once.
+    // The buffers are kept from ping to ping. They grow only once to the size that the scene needs.
     work.batches.resize(batches_a_round);
     for (auto& batch : work.batches) batch.resize(groups_);
     work.spectral.resize(groups_);
@@ -66,14 +66,14 @@ class Rounds {
     for (std::size_t first = 0; first < tiles.size(); first += tiles_a_batch * batches_a_round) {
       const std::size_t here = std::min(tiles.size() - first, tiles_a_batch * batches_a_round);
       const std::size_t batches = (here + tiles_a_batch - 1) / tiles_a_batch;
-      // Batches of tiles in parallel: each writes its own buffers, one for each group of columns.
+      // Batches of tiles run in parallel. Each writes its own buffers, one for each group of columns.
       pool_.for_each(batches, [&](std::size_t b, int worker) {
         const std::size_t from = first + b * tiles_a_batch, to = std::min(from + tiles_a_batch, tiles.size());
         for (std::size_t t = from; t < to; ++t) scatterers[static_cast<std::size_t>(worker)].scatter(tiles[t], work_.batches[b]);
       });
       for (std::size_t b = 0; b < batches; ++b)
         for (const Echoes& e : work_.batches[b]) echoes += static_cast<std::size_t>(e.count);
-      // Groups in parallel: each sums its buffers in the order of the batches.
+      // Groups run in parallel. Each sums its buffers in the order of the batches.
       pool_.for_each(groups_, [&](std::size_t g, int) {
         for (std::size_t b = 0; b < batches; ++b) sum_pulses(work_.batches[b][g], g);
       });
@@ -109,13 +109,14 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   const PingPlan& plan = context.plan;
   const PingScalars& s = context.scalars;
   work.has_echoes = false;
-  // Faces depend on the scene alone; which of them are mirrors depends on the ping.
+  // The faces depend only on the scene. The set of mirrors among them depends on the ping.
   if (!work.faces_found) {
     work.faces = find_flat_faces(context.scene(), least_reflectance);
     work.faces_found = true;
   }
   ImagePaths& image_paths = work.image_paths;
-  // Image method (docs/acoustics.md, section 3, eq. 10): mirrors, rays through them, then echoes of all pairs of paths.
+  // Image method (docs/acoustics.md, section 3, eq. 10): finds mirrors, traces rays via them, then adds the echoes of all pairs
+  // of paths.
   image_paths.bubbles = BubbleLayer(context.scene().sea_surface);
   image_paths.mirrors = mirrors_of(context, work.faces);
   MultipathCounts counts;
@@ -123,20 +124,20 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   counts.rays = trace_bounces(context, work.faces, image_paths.mirrors, image_paths.map);
   image_paths.paths = paths_in_view(image_paths.mirrors, image_paths.map);
   multipath_of_points(context, work.faces, image_paths, points);
-  // Only the straight path is left, because no mirror is visible.
+  // No mirror is visible; only the straight path is left.
   if (image_paths.paths.size() == 1) return counts;
 
   std::vector<PathReach> reach;
   for (const Path& path : image_paths.paths) reach.emplace_back(path, image_paths, plan, s);
   const CellView view = view_of(plan, s, context.bodies_in_world, reach);
   const std::vector<TileInView>& tiles = context.cells.in_view(view, context.pool);
-  // gamma of eq. 21: needed for the cross term of a pair ij, ji in expected power only.
+  // gamma of eq. 21. It is needed only in expected power, for the cross term of a pair ij, ji.
   const std::vector<float> correlation = plan.expected_power ? beam_correlation_over_columns(plan) : std::vector<float>{};
-  // One scatterer per worker, because it stores the arrivals of its current cell.
+  // Each worker has its own scatterer, because the scatterer stores the arrivals of its current cell.
   std::vector<MultipathScatterer> scatterers;
   for (int worker = 0; worker < context.pool.threads(); ++worker)
     scatterers.emplace_back(context, image_paths, reach, correlation);
-  // Separate columns, which are added before the transmitter's pattern and the noise.
+  // The echoes are in separate columns, which are added before the transmitter's pattern and the noise.
   work.columns.shape(plan.columns.count, plan.samples, plan.taps);
   clear_columns(work.columns, 0, plan.columns.count);
   counts.echoes = Rounds(work, plan, context.kernels, context.pool).run(scatterers, tiles);

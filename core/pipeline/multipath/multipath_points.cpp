@@ -8,10 +8,10 @@
 namespace sonar {
 namespace {
 
-/// A point target by one path.
+/// A point target seen by one path.
 struct PointArrival {
   double range_m = 0, sine = 0, transmit = 0, sample_shift = 0;
-  std::complex<double> carried;  // pressure per source, with the carrier's phase
+  std::complex<double> carried;  // pressure per source, includes the phase of the carrier
 };
 
 class PointMultipath {
@@ -23,7 +23,7 @@ class PointMultipath {
         plan_(context.plan),
         s_(context.scalars),
         pattern_(plan_.mode.pattern) {
-    // All pairs of mirrors, not only those in the sampled map, because each path of a point is traced.
+    // Uses all pairs of mirrors, not only those in the sampled map, because each path of a point is traced.
     const int n = static_cast<int>(image_paths.mirrors.size());
     paths_.push_back(path_by(image_paths.mirrors, -1));
     for (int a = 0; a < n; ++a) paths_.push_back(path_by(image_paths.mirrors, a));
@@ -32,9 +32,9 @@ class PointMultipath {
         if (a != b) paths_.push_back(path_by(image_paths.mirrors, a, b));
   }
 
-  /// Eq. 10 for a point: every pair of arrivals, one out and one back, except for the direct pair.
+  /// Eq. 10 for a point: all pairs of arrivals, one out and one back, except for the direct pair.
   void add(Vec3d place, double strength_m, std::vector<PointEcho>& points) const {
-    // In the order of the paths; [0] is the straight one if it arrives.
+    // The arrivals are in the order of the paths. [0] is the straight path if it arrives.
     std::vector<PointArrival> arrivals;
     bool direct = false;
     for (const Path& path : paths_) {
@@ -45,10 +45,10 @@ class PointMultipath {
     }
     for (std::size_t i = 0; i < arrivals.size(); ++i)
       for (std::size_t j = 0; j < arrivals.size(); ++j) {
-        // The direct pair is the echo of scatter_points.
+        // scatter_points() adds the echo of the direct pair.
         if (direct && i == 0 && j == 0) continue;
         const PointArrival &out = arrivals[i], &back = arrivals[j];
-        // (10): at the range (r_i + r_j) / 2 [m]; the bearing is that of the path back.
+        // Eq. 10: the echo is shown at the range (r_i + r_j) / 2 [m] and the bearing of the path back.
         const double sample = s_.sample_of(0.5 * (out.range_m + back.range_m)) + 0.5 * (out.sample_shift + back.sample_shift);
         if (sample <= -plan_.taps / 2 || sample >= plan_.samples + plan_.taps / 2 - 1) continue;
         points.push_back({back.sine, sample, s_.source_upa * strength_m * out.transmit * out.carried * back.carried});
@@ -58,7 +58,7 @@ class PointMultipath {
  private:
   std::optional<PointArrival> arrive(const Path& path, Vec3d place) const {
     if (!is_lit(path, image_paths_.mirrors, place)) return {};
-    // The path leaves in the direction of the image, so that (29) applies to the image.
+    // The path leaves in the direction of the image. Therefore (29) applies to the image.
     const Vec3d image = path.image_of(place);
     const Vec3d p = s_.echo_geometry(image).from_sonar_m;
     const double r = length(p);
@@ -66,9 +66,9 @@ class PointMultipath {
     const ConicalDirection direction = plan_.direction_of(p);
     const std::optional<std::size_t> column = plan_.column_of(direction, image_paths_.map.fan.half_angle_rad);
     if (!column) return {};
-    // This comes last, because it takes the most time.
+    // This test comes last, because it takes the most time.
     if (!reaches(scene_, s_, faces_, image_paths_.mirrors, path, place)) return {};
-    // m / r D(psi) e^{-a r}, and the carrier's phase of one way, -2 pi (f / c) r.
+    // m / r D(psi) e^{-a r}, and the carrier phase of one way, -2 pi (f / c) r.
     const double size = reflectance_of(path, image_paths_.mirrors, (1 / r) * p) * std::exp(-s_.absorption_np_per_m * r) / r *
                         static_cast<double>(pattern_(static_cast<float>(std::pow(std::sin(direction.psi_rad), 2))));
     return PointArrival{r, direction.u, static_cast<double>(plan_.columns.transmit[*column]), s_.doppler_samples(p),

@@ -17,7 +17,7 @@ void store(Vec3d v, float (&to)[3]) {
   to[0] = static_cast<float>(v.x), to[1] = static_cast<float>(v.y), to[2] = static_cast<float>(v.z);
 }
 
-/// The product without the checks for infinities that the library's product makes.
+/// The product without the checks for infinities that the standard library's product contains.
 std::complex<float> times(std::complex<float> a, std::complex<float> b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
@@ -37,19 +37,20 @@ PathReach::PathReach(const Path& path, const ImagePaths& image_paths, const Ping
     return std::atan(
         static_cast<double>(image_paths.map.fan.first_tangent + static_cast<float>(bin) / image_paths.map.fan.bins_per_tangent));
   };
-  // Adds one bin on either side, because cells between two nodes count, too.
+  // Adds one bin on either side, because cells between two nodes are included.
   for (std::size_t block = 0; block < image_paths.map.windows.size(); ++block) {
     const PathWindow& w = image_paths.map.window(block, path);
     spans_.push_back(w.empty() ? Span{} : Span{angle(w.first_bin - 1), angle(w.last_bin + 1)});
   }
 }
 
-/// A ball is in reach if its image lies within the record, on the lit side of the last mirror, and within the path's columns and
-/// elevations in the traced map.
+/// A ball is reachable if its image lies within the record, on the lit side of the last mirror, and within the columns and
+/// elevations of the path in the traced map.
 std::optional<DistanceSpan> PathReach::seen_between(Vec3d place, double radius) const {
   const Vec3d image = path_.image_of(place);
   const double r = length(image);
-  // The shortest pair has this path one way and the straight one the other way; the ball may be nearer by a radius on each.
+  // The shortest pair uses this path for one way and the straight path for the other. The surface of the ball may be nearer
+  // than its centre by one radius on each way.
   if (r + length(place) - 2 * radius > longest_m_) return {};
   if (path_.first >= 0) {
     const FlatMirror& last = image_paths_.mirrors[static_cast<std::size_t>(path_.second < 0 ? path_.first : path_.second)];
@@ -60,7 +61,7 @@ std::optional<DistanceSpan> PathReach::seen_between(Vec3d place, double radius) 
   const double from_axis = conical ? r : flat, blocks = static_cast<double>(spans_.size());
   double first_block = 0, last_block = blocks - 1;
   if (from_axis > 2 * radius) {
-    // u of the ball: that of its centre, and radius over its nearest distance from the array to either side.
+    // The range of u of the ball: u of its centre, plus and minus the radius divided by its shortest distance from the array.
     const double sine = image.y / from_axis, spread = radius / (from_axis - radius);
     const auto block = [&](double u) {
       return std::floor(((plan_.columns.first_sine - u) / plan_.columns.spacing + 0.5) / BounceMap::block_columns);
@@ -118,7 +119,7 @@ MultipathScatterer::TilePath MultipathScatterer::look_at(const TileInView& tile,
   tile_path.path = &path;
   const Rotation& sonar_from_object = cells_.sonar_from_object(tile.object);
   const EchoGeometry at = s_.echo_geometry(path.image_of(tile.from_sonar_m));
-  // The image of a tile is its reflection. The axes are reflected with it, and may become left-handed.
+  // The image of a tile is its reflection. Its axes are reflected, too, and may become left-handed.
   const Rotation turn = (s_.moves ? at.turn * path.turn : path.turn) * sonar_from_object;
   const double range = length(at.from_sonar_m);
   store(at.from_sonar_m, tile_path.from_sonar);
@@ -127,7 +128,7 @@ MultipathScatterer::TilePath MultipathScatterer::look_at(const TileInView& tile,
   tile_path.range_m = static_cast<float>(range);
   tile_path.sample_shift = static_cast<float>(s_.doppler_samples(at.from_sonar_m));
   tile_path.half_turns = static_cast<float>(fraction_of_turn(0.5 * range * s_.turns_per_m));
-  // One way: e^{-a r} of eq. 10 for the tile's centre; arrive() adds the rest per cell.
+  // One way: e^{-a r} of eq. 10 for the tile's centre. arrive() adds the rest for each cell.
   tile_path.amplitude = static_cast<float>(std::exp(-s_.absorption_np_per_m * range));
   if (image_paths_.bubbles.present())
     tile_path.amplitude *= static_cast<float>(bubble_factor(image_paths_.bubbles, path, image_paths_.mirrors, tile_middle_, s_));
@@ -135,7 +136,7 @@ MultipathScatterer::TilePath MultipathScatterer::look_at(const TileInView& tile,
   if (path.first >= 0) {
     const FlatMirror& first = image_paths_.mirrors[static_cast<std::size_t>(path.first)];
     tile_path.reflection = static_cast<float>(first.reflection);
-    // Normals times sqrt(2) k h: then a mirror's loss is e^{-(n . d)^2}, d the unit direction.
+    // Normals times sqrt(2) k h. With them the loss of a mirror is e^{-(n . d)^2}, d the unit direction.
     store(std::sqrt(first.twice_kh_squared) * first.normal, tile_path.rough_normal[0]);
     const FlatMirror& last = image_paths_.mirrors[static_cast<std::size_t>(path.second < 0 ? path.first : path.second)];
     const double side = path.beyond_front ? 1 : -1;
@@ -161,7 +162,7 @@ void MultipathScatterer::scatter(const TileInView& tile, std::vector<Echoes>& by
   away_ = turned_away_[static_cast<std::size_t>(tile.object)];
   const CellTile& t = *tile.tile;
   const LawTable& law = laws_[static_cast<std::size_t>(t.material)];
-  // Constant over a tile in (10): 10^(SL/20) sqrt(mu). Weights as in scatter.cpp.
+  // The factors of eq. 10 that are constant over a tile: 10^(SL/20) sqrt(mu). The weights are as in scatter.cpp.
   const double constant = s_.source_upa * std::sqrt(law.mu);
   const auto unit = static_cast<float>(constant * static_cast<double>(t.weight_unit));
   const auto root_area = static_cast<float>(constant * lattice::cell_size_m(t.level));
@@ -184,14 +185,14 @@ void MultipathScatterer::scatter(const TileInView& tile, std::vector<Echoes>& by
 
 void MultipathScatterer::scatter_cell(const Cell& cell, const LawTable& law, const CellLevel& level,
                                       std::vector<Echoes>& by_group) {
-  const auto offset_of = [&cell](const TilePath& w, float& range_m) {  // range, and range less that of the tile's centre
+  const auto offset_of = [&cell](const TilePath& w, float& range_m) {  // range, and range minus that of the tile's centre
     const float* q = w.from_sonar_object;
-    // r^2 = r0^2 + e, e from the cell's offset: no difference of large floats (section 1).
+    // r^2 = r0^2 + e, with e from the cell's offset. This avoids a difference of large floats (section 1).
     const float e = cell.x * (2 * q[0] + cell.x) + cell.y * (2 * q[1] + cell.y) + cell.z * (2 * q[2] + cell.z);
     range_m = std::sqrt(std::max(w.range_m * w.range_m + e, 1e-6f));
     return e / (w.range_m + range_m);
   };
-  // One-way arrivals of the cell on every path; the direct one first.
+  // One-way arrivals of the cell by each path; the direct path is the first.
   arrivals_.clear();
   Arrival arrival{};
   float range_m = 0;
@@ -228,7 +229,7 @@ bool MultipathScatterer::is_visible(const Path& path, int column, float bin, flo
   };
   if (!belongs(nearest)) return false;
   const int stage = path.first < 0 ? 0 : path.second < 0 ? 1 : 2;
-  const float share = up ? 1 - part : part;  // share of the other node
+  const float share = up ? 1 - part : part;  // weight of the other node
   const float at_nearest = nearest.inverse_x[stage];
   const float seen = belongs(other) ? at_nearest + share * (other.inverse_x[stage] - at_nearest) : at_nearest;
   return nearness >= seen;
@@ -253,10 +254,11 @@ bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, fl
   if (!is_visible(*w.path, out.column, bin, (1 + tolerance_m_ * inverse_r) / h)) return false;
 
   const float* q = w.from_sonar_object;
-  // cos(alpha) at the cell from the image's direction; its sign gives the side of the surface.
+  // cos(alpha) at the cell, from the image's direction. Its sign gives the side of the surface.
   const float along = cell.normal[0] * (q[0] + cell.x) + cell.normal[1] * (q[1] + cell.y) + cell.normal[2] * (q[2] + cell.z);
   if (along * away_ > 0) return false;
-  // One-way factor m_i / r_i D(psi_i) e^{-a r_i} (sigma_b)^(1/4): the product of two is the geometric mean of eq. 10.
+  // One-way factor m_i / r_i D(psi_i) e^{-a r_i} (sigma_b)^(1/4). The product of two such factors contains the geometric mean
+  // of eq. 10.
   out.range_m = r;
   out.sample_shift = w.sample_shift;
   out.front = along > 0;
@@ -267,7 +269,7 @@ bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, fl
   const float loss = std::exp(-first * first - second * second - absorption_np_per_m_ * offset);
   out.size = w.reflection * w.amplitude * loss * pattern_(z * z / (h * h + z * z)) *
              std::sqrt(law.relative_root(std::min(std::abs(along) * inverse_r, 1.0f))) * inverse_r;
-  // (12) of one way: the centre's turns, and the cell's in float.
+  // Eq. 12 for one way: the turns of the tile's centre, plus the turns of the cell in float.
   const float turns = w.half_turns + half_turns_per_m_ * offset;
   const float phase = static_cast<float>(-2 * pi) * (turns - static_cast<float>(static_cast<int>(turns)));
   out.carried = {out.size * std::cos(phase), out.size * std::sin(phase)};
@@ -275,38 +277,38 @@ bool MultipathScatterer::arrive(const TilePath& w, const Cell& cell, float r, fl
 }
 
 void MultipathScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoes>& by_group) const {
-  // The samples whose pulses reach into the record.
+  // The range of samples whose pulses reach into the record.
   const float per_m = static_cast<float>(s_.samples_per_m), from = static_cast<float>(s_.sample_offset);
   const auto first = static_cast<float>(-plan_.taps / 2), last = static_cast<float>(plan_.samples + plan_.taps / 2 - 1);
   for (std::size_t i = 0; i < arrivals_.size(); ++i)
     for (std::size_t j = 0; j <= i; ++j) {
       const Arrival &a = arrivals_[i], &b = arrivals_[j];
       if (i == 0 && direct_) continue;  // the direct pair is not a ghost
-      // A surface scatters to one side only.
+      // A surface scatters only to the side from which the sound arrives.
       if (a.front != b.front) continue;
-      // Shown at the range (r_i + r_j) / 2 and the bearing of the path back.
+      // The echo appears at the range (r_i + r_j) / 2 and at the bearing of the path back.
       const float sample = 0.5f * (a.range_m + b.range_m) * per_m - from + 0.5f * (a.sample_shift + b.sample_shift);
       if (sample <= first || sample >= last) continue;
       const auto add_arrival = [&](const Arrival& out, const Arrival& back, std::complex<float> amplitude) {
-        // finish_columns() multiplies by the transmitter's amplitude of the receiving column. Here the transmit path has another
-        // column.
+        // finish_columns() multiplies by the transmitter's amplitude in the receiving column. The transmit path of this pair
+        // lies in another column, which the factor here corrects.
         if (back.transmit < least_transmit || out.transmit == 0) return;
         const float lit = out.transmit / back.transmit;
         add(sample, amplitude * (plan_.expected_power ? lit * lit : lit), back.column, by_group);
       };
       if (!plan_.expected_power) {
-        // Levels cross-fade in power, so that amplitudes have the root.
+        // Levels cross-fade in power, so amplitudes are multiplied by the root.
         const std::complex<float> amplitude = times(times(std::sqrt(fade) * cell.weight, a.carried), b.carried);
         add_arrival(a, b, amplitude);
         if (i != j) add_arrival(b, a, amplitude);
         continue;
       }
-      // Mean power |A_ij|^2, and for the pair ij, ji the cross term 2 |A_ij A_ji| gamma (eq. 21) between their columns.
+      // Mean power |A_ij|^2. For the pair ij, ji the cross term 2 |A_ij A_ji| gamma (eq. 21) between their columns is added.
       const float root = cell.weight.real() * a.size * b.size, power = fade * root * root;
       add_arrival(a, b, power);
       if (i == j) continue;
       add_arrival(b, a, power);
-      // Both arrivals come from one scatterer at one time: in beams that receive both, amplitudes add (gamma = common).
+      // Both arrivals come from one scatterer at one time. In beams that receive both, the amplitudes add (gamma = common).
       const int between = (a.column + b.column) / 2;
       const float lit = plan_.columns.transmit[static_cast<std::size_t>(between)];
       const float common = beam_correlation(a, b);
@@ -325,7 +327,7 @@ void MultipathScatterer::add(float sample, std::complex<float> amplitude, int co
 }
 
 float MultipathScatterer::beam_correlation(const Arrival& a, const Arrival& b) const {
-  // Linear between whole columns.
+  // Interpolates linearly between whole columns.
   const float apart = std::abs(a.sine - b.sine) / static_cast<float>(plan_.columns.spacing);
   const auto n = static_cast<std::size_t>(apart);
   if (n + 1 >= beam_correlation_.size()) return 0;

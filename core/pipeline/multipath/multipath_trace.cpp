@@ -40,7 +40,7 @@ class ChainTracer {
   int count() const { return count_; }
   std::uint32_t all() const { return count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u; }
 
-  /// Follows the active rays to the next surface: `travelled` grows, or the ray's object is RayPacket::miss.
+  /// Follows the active rays to the next surface. `travelled` grows, or the ray's object becomes RayPacket::miss.
   void go(std::uint32_t active, bool coherent) {
     scene_.trace(packet, active, coherent);
     for (std::size_t i = 0; i < RayPacket::size; ++i) {
@@ -60,9 +60,9 @@ class ChainTracer {
     const Vec3 n = normals_[mirror];
     const Vec3 d{packet.direction_x[i], packet.direction_y[i], packet.direction_z[i]};
     const float along = dot(n, d);
-    // Rough mirrors reflect at grazing angles only: below least_reflectance the ray ends here.
+    // A rough mirror reflects only at grazing angles. Below least_reflectance the ray ends here.
     if (std::abs(mirrors_[mirror].reflectance(static_cast<double>(along))) <= least_reflectance) return BounceMap::no_mirror;
-    // d' = d - 2 (d . n) n, from a little off the mirror so that the ray does not hit it again.
+    // d' = d - 2 (d . n) n. The new ray starts slightly above the mirror, so that it does not hit the mirror again.
     const float lift = along > 0 ? -lift_m : lift_m;
     packet.origin_x[i] += packet.far[i] * d.x + lift * n.x;
     packet.origin_y[i] += packet.far[i] * d.y + lift * n.y;
@@ -70,7 +70,7 @@ class ChainTracer {
     packet.direction_x[i] = d.x - 2 * along * n.x;
     packet.direction_y[i] = d.y - 2 * along * n.y;
     packet.direction_z[i] = d.z - 2 * along * n.z;
-    // The limit applies to the length of the unfolded path, not to that of a leg [m].
+    // The limit applies to the length of the unfolded path, not to the length of one leg [m].
     packet.far[i] = far_[i] - travelled[i];
     return packet.far[i] > 0 ? mirror : BounceMap::no_mirror;
   }
@@ -90,7 +90,7 @@ class ChainTracer {
   int count_ = 0;
 };
 
-/// The sequence of surfaces in one direction.
+/// The sequence of surfaces that a ray in one direction hits.
 struct Chain : FanSample {
   SurfaceHit surface[3];
   std::uint8_t mirror[2] = {BounceMap::no_mirror, BounceMap::no_mirror};
@@ -100,7 +100,7 @@ struct Chain : FanSample {
   bool same_mirrors(const Chain& b) const { return std::equal(mirror, mirror + 2, b.mirror); }
 };
 
-/// Columns [first, last), at most a packet wide: samples refined where neighbours differ, then drawn into the map.
+/// Columns [first, last), at most one packet wide. Samples are refined where neighbours differ, and then drawn into the map.
 class ColumnsTracer {
  public:
   ColumnsTracer(ChainTracer& rays, const PingPlan& plan, float far_m, int first, int last, BounceMap& map)
@@ -128,10 +128,10 @@ class ColumnsTracer {
     chain.forward = conical ? across * cosine : cosine;
     rays_.add(ray_in_sonar(conical, along, across, cosine, sine), far_m_);
   }
-  /// Follows the packet; its lanes are the samples `index`.
+  /// Follows the packet. Its lanes are the samples `index`.
   void follow(const std::array<std::int32_t, RayPacket::size>& index) {
     std::uint32_t active = rays_.all();
-    // Up to two bounces: stage s is the surface hit after s mirrors.
+    // Up to two bounces: stage s is the surface that is hit after s mirrors.
     for (std::size_t stage = 0; stage < 3 && active; ++stage) {
       rays_.go(active, stage == 0);
       for (std::size_t i = 0; i < RayPacket::size; ++i) {
@@ -147,7 +147,7 @@ class ColumnsTracer {
   void trace_base() {
     const std::int32_t n = elevations();
     samples_.assign(static_cast<std::size_t>(columns()) * static_cast<std::size_t>(n), {});
-    // Lanes are columns, because neighbours at one elevation mostly hit the same mirror.
+    // Lanes are columns, because neighbouring columns at one elevation mostly hit the same mirror.
     std::array<std::int32_t, RayPacket::size> index{};
     for (std::int32_t e = 0; e < n; ++e) {
       rays_.clear();
@@ -161,7 +161,7 @@ class ColumnsTracer {
   }
 
   void refine() {
-    // The tolerance, one pulse width [m], holds for the unfolded path.
+    // The tolerance, one pulse width [m], applies to the unfolded path.
     FanRefinement<Chain> refinement(samples_, open_, halves_, static_cast<float>(plan_.pulse_width_m), first_);
     for (std::int32_t e = 0; e + 1 < elevations(); ++e)
       for (int k = 0; k < columns(); ++k) refinement.consider_base(k * elevations() + e, k * elevations() + e + 1, k);
@@ -192,12 +192,12 @@ class ColumnsTracer {
       }
     }
   }
-  /// Linear between hits of one chain of surfaces; across edges the farther surface of the nearer chain of mirrors.
+  /// Linear between hits of one sequence of surfaces. Across edges: the farther surface behind the nearer sequence of mirrors.
   void draw_node(const Chain& a, const Chain& b, float part, int column, int bin) {
     const std::size_t node =
         static_cast<std::size_t>(column) * static_cast<std::size_t>(map_.fan.bins + 1) + static_cast<std::size_t>(bin);
     const Chain& nearer = part < 0.5f ? a : b;
-    // If the mirrors at a stage differ, later stages are taken from the nearer sample.
+    // If the mirrors at a stage differ, the later stages are those of the nearer sample.
     bool same_mirrors = true;
     for (std::size_t stage = 0; stage < 3; ++stage) {
       float seen = nearer.surface[stage].inverse_x;
@@ -227,7 +227,7 @@ void find_windows(std::size_t block, BounceMap& map) {
   auto& windows = map.windows[block];
   windows.fill({});
   windows[BounceMap::index_of(-1, -1)] = {0, map.fan.bins};  // the direct path has no mirror that limits it
-  // Bounds over a block of columns let whole tiles be skipped (PathReach).
+  // The bounds over a block of columns allow whole tiles to be skipped (PathReach).
   const int row = map.fan.bins + 1, first = static_cast<int>(block) * BounceMap::block_columns;
   const auto number = [](std::uint8_t mirror) { return mirror == BounceMap::no_mirror ? -1 : static_cast<int>(mirror); };
   for (int k = first; k < std::min(first + BounceMap::block_columns, map.columns); ++k)
@@ -249,12 +249,12 @@ BounceFan make_bounce_fan(const PingPlan& plan) {
   fan.half_angle_rad = plan.fan.half_angle_rad;
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     fan.half_angle_rad = std::max(fan.half_angle_rad, std::min(elevation_reach_rad(plan.mode.pattern, fan_edge_two_way), 1.4));
-  // The same bins per tangent as the direct fan, over a wider angle.
+  // The number of bins per tangent is that of the direct fan, but the angle is wider.
   const double tangent = std::tan(fan.half_angle_rad);
   fan.bins_per_tangent = plan.fan.axis.bins_per_tangent;
   fan.bins = static_cast<int>(std::ceil(2 * tangent * static_cast<double>(fan.bins_per_tangent)));
   fan.first_tangent = static_cast<float>(-tangent);
-  // The fan is as dense in elevation as the direct fan.
+  // The density of elevations is that of the direct fan.
   const double step =
       2 * plan.fan.half_angle_rad / (static_cast<double>(plan.fan.elevation_rad.size()) - 2 * plan.fan.side_elevations);
   const int n = static_cast<int>(std::ceil(2 * fan.half_angle_rad / step)) + 1;
@@ -274,7 +274,7 @@ std::size_t trace_bounces(const PingContext& context, const FlatFaces& faces, co
   map.nodes.resize(nodes);
   const auto blocks = static_cast<std::size_t>((map.columns + BounceMap::block_columns - 1) / BounceMap::block_columns);
   map.windows.resize(blocks);
-  // One packet of columns per task; each task writes its own part of the map.
+  // Each task traces one packet of columns and writes its own part of the map.
   std::vector<std::size_t> traced(blocks);
   context.pool.for_each(blocks, [&](std::size_t block, int) {
     ChainTracer rays(context.rays, context.scalars, faces, mirrors);
@@ -298,7 +298,7 @@ bool reaches(const RayScene& scene, const PingScalars& scalars, const FlatFaces&
   const Vec3d image = path.image_of(place);
   const double range = length(image);
   ChainTracer ray(scene, scalars, faces, mirrors);
-  // Toward the image, and slightly shorter, so that the surface at the place does not block the ray.
+  // The ray points to the image and is slightly shorter, so that the surface at the target point does not block it.
   ray.add(to_float((1 / range) * image), static_cast<float>(range * 0.9999));
   for (const int wanted : {path.first, path.second}) {
     ray.go(1u, false);

@@ -14,10 +14,11 @@ using Shape = Waveform::Shape;
 
 constexpr double gaussian_reach_widths = 3.99;  // p falls to 2e-10 at this many -3 dB widths
 constexpr double gaussian_band_over_b = 2.5;    // P falls to 2e-7 at half of this
-constexpr double band_of_tone = 32;             // in 1 / length: P beyond it is at most 4e-4 of the peak, 1e-3 of p in L2
-constexpr double band_of_sweep = 1.5;           // in bandwidths: the fade of p leaves a small part outside
+constexpr double band_of_tone = 32;             // in 1 / length; beyond it P is at most 4e-4 of the peak, and 1e-3 of p in L2
+constexpr double band_of_sweep = 1.5;           // in bandwidths; the fade of p leaves a small part outside
 constexpr std::size_t most_samples = 65536;
-constexpr double worth_keeping = 1e-4;       // least fraction of a measured pulse's peak, in time and in frequency
+constexpr double worth_keeping =
+    1e-4;  // smaller values of a measured pulse, relative to its peak, are dropped, in time and in frequency
 constexpr double finest_rate_per_row = 256;  // samples of a measured pulse per sample of the grid
 constexpr double longest_in_rows = 8192;     // longest duration of a measured pulse in sample times of the grid
 constexpr int neighbours = 32;               // samples of a measured pulse used for interpolation
@@ -67,7 +68,7 @@ Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape),
 
 void Pulse::take_samples(const Waveform& waveform) {
   const std::vector<std::complex<float>>& all = waveform.samples;
-  // The peak, in the middle by definition, becomes p(0) = 1.
+  // The peak is in the middle by definition. It becomes p(0) = 1.
   const std::size_t peak = all.size() / 2;
   const Complex top(all[peak]);
   const auto kept = [&](std::size_t i) { return std::abs(Complex(all[i])) >= worth_keeping * std::abs(top); };
@@ -99,7 +100,7 @@ std::complex<double> Pulse::at(double time_s) const {
     case Shape::measured:
       break;
   }
-  // Between samples a windowed sinc: `neighbours`, `window_sharpness`.
+  // Interpolates between samples by a windowed sinc: `neighbours`, `window_sharpness`.
   const double place = middle_ + time_s * scale_hz_;
   const int near = static_cast<int>(std::floor(std::clamp(place, -1e9, 1e9)));
   const int from = std::max(near - neighbours / 2 + 1, 0);
@@ -119,7 +120,7 @@ std::vector<std::complex<double>> Pulse::spectrum_s(const spectral::FrequencyGri
     }
     return values;
   }
-  // Uses samples, which contain no frequencies beyond half their rate.
+  // Computes from the samples, which contain no frequencies above half of their rate.
   const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
   std::vector<spectral::Arrival> arrivals;
   if (shape_ == Shape::lfm)
@@ -136,7 +137,7 @@ std::vector<std::complex<double>> Pulse::spectrum_s(const spectral::FrequencyGri
   return values;
 }
 
-/// Computes the values without a formula, from samples in time and in frequency.
+/// Computes the values that have no formula, from samples in time and in frequency.
 void Pulse::integrate() {
   const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
   // tau_eff = integral of |p|^2 dt [s].
@@ -148,7 +149,7 @@ void Pulse::integrate() {
   const std::vector<Complex> spectrum = spectrum_s(grid);
   double highest = 0;
   for (const Complex& v : spectrum) highest = std::max(highest, std::abs(v));
-  // B_n [Hz]: by Parseval the integral of |P|^2 is tau_eff.
+  // B_n [Hz]. By Parseval's theorem the integral of |P|^2 is tau_eff.
   noise_bandwidth_hz_ = energy_width_s_ / (highest * highest);
   if (shape_ != Shape::measured) return;
   band_hz_ = 0;
@@ -170,7 +171,7 @@ std::complex<double> Pulse::correlation(double time_s) const {
     for (int k = -reach; k <= reach; ++k) sum += at(k / rate) * std::conj(at(k / rate - time_s));
     return sum / rate / energy_width_s_;
   }
-  // All samples have the same distance to their neighbours in the shifted pulse, so that one set of weights is enough.
+  // In the shifted pulse all samples have the same distance to their neighbours. Therefore one set of weights is enough.
   const double shift = time_s * scale_hz_;
   const int whole = static_cast<int>(std::floor(std::clamp(shift, -1e6, 1e6))), count = static_cast<int>(samples_.size());
   for (int j = -neighbours / 2 + 1; j <= neighbours / 2; ++j) {
@@ -203,7 +204,7 @@ std::string why_invalid(const Waveform& w, double sample_time_s) {
 }
 
 int taps_of(const Pulse& pulse, double sample_time_s) {
-  // A Gaussian ends long before the last tap, so that a twentieth of eight taps does not matter.
+  // A Gaussian ends well before the last tap. An error of a twentieth of the eight taps has no effect.
   const double slack = pulse.shape() == Shape::gaussian ? 0.05 : 0;
   return 8 * std::max(1, static_cast<int>(std::ceil(2 * pulse.reach_s() / sample_time_s / 8 - slack)));
 }
@@ -216,7 +217,7 @@ std::vector<float> make_pulse_rows(const Pulse& pulse, double sample_time_s, int
   std::vector<float> rows;
   std::vector<double> now, next;
   for (int tap = 0; tap < taps; ++tap) next.push_back(value(0, tap));
-  for (int step = 0; step <= steps; ++step) {  // one more than steps: a fraction may round up to a whole
+  for (int step = 0; step <= steps; ++step) {  // one more than steps, because a fraction may be rounded up to a whole
     now = next;
     for (int tap = 0; tap < taps; ++tap) next[static_cast<std::size_t>(tap)] = value(step + 1, tap);
     for (const double v : now) rows.push_back(static_cast<float>(v));
@@ -234,11 +235,12 @@ std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s) {
   const int order = std::min(wanted, longest);
   std::vector<double> r(static_cast<std::size_t>(order) + 1);
   for (int k = 0; k <= order; ++k) {
-    // A correlation that is cut short is no longer a valid correlation. With a window that is itself a correlation, it is valid.
+    // A truncated correlation is not a valid correlation. It becomes valid by multiplication with a window that is itself a
+    // correlation.
     const double window = wanted > longest ? parzen(static_cast<double>(k) / (order + 1)) : 1.0;
     r[static_cast<std::size_t>(k)] = window * pulse.correlation(k * sample_time_s).real();
   }
-  r[0] += 1e-5;  // keeps the factorisation definite on fine grids, whose spectrum falls to 0
+  r[0] += 1e-5;  // keeps the factorisation definite on fine grids; their spectrum falls to 0
   // Bauer's method: the rows of the Cholesky factor of the long banded Toeplitz matrix tend to the minimum-phase factor.
   const int n = 12 * order + 64;
   std::vector<std::vector<double>> band(static_cast<std::size_t>(n), std::vector<double>(static_cast<std::size_t>(order) + 1));

@@ -9,21 +9,22 @@
 namespace sonar::spectral {
 namespace {
 
-// (26): 2.3 per point of width on a grid twice as fine; errors by width: FrequencySums.
+// (26): 2.3 per point of width, on a grid twice as fine. FrequencySums lists the errors by width.
 constexpr int oversampling = 2;
 constexpr double sharpness_per_width = 2.3;
 constexpr int small_padding = 8, large_padding = 16;  // widths are padded, so that loops over them are whole vectors
 constexpr int extra_terms = 4;                        // terms of the polynomials beyond the width
-constexpr int restart_every = 256;                    // steps after which a phase is computed anew, because rounding accumulates
+constexpr int restart_every = 256;  // number of steps after which a phase is computed anew, because rounding errors accumulate
 
-double kernel(double x) {  // |x| <= 1 over its half width, times the width: see sharpness_per_width
-  // max(0): |x| may exceed 1 by rounding.
+double kernel(double x) {  // |x| <= 1 over half of its width; the exponent is multiplied by the width, see sharpness_per_width
+  // max(0) is needed because |x| may exceed 1 by rounding.
   return std::sqrt(std::max(0.0, 1 - x * x)) - 1;
 }
 
 /// Integral of the kernel times cos(2 pi f z) over z in [-width / 2, width / 2], z in grid points.
 double kernel_transform(int width, double f) {
-  // x = sin t makes the integrand smooth at its ends, where the midpoint rule is then as good as any.
+  // The substitution x = sin t makes the integrand smooth at its ends. There the midpoint rule is then as accurate as any
+  // other.
   const int steps = 20 * width + 60;
   double sum = 0;
   for (int i = 0; i < steps; ++i) {
@@ -34,7 +35,7 @@ double kernel_transform(int width, double f) {
   return sum * pi / steps * width / 2;
 }
 
-/// Coefficients, lowest first, of the polynomial through the Chebyshev points of [-1, 1]: as good as least squares.
+/// Coefficients, lowest first, of the polynomial through the Chebyshev points of [-1, 1]. It is as accurate as least squares.
 template <class Function>
 std::vector<double> fit(const Function& f, int terms) {
   const auto n = static_cast<std::size_t>(terms);
@@ -73,7 +74,8 @@ std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const Frequen
 std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width) {
   const FrequencySums fast(grid.count, width);
   std::vector<Complex> fine(static_cast<std::size_t>(fast.grid_points())), sums(static_cast<std::size_t>(grid.count));
-  // FrequencySums counts frequencies from the middle: so that each amplitude includes the phase of the middle one.
+  // FrequencySums counts frequencies from the middle. Therefore the phase of the middle frequency is included in each
+  // amplitude.
   const double middle_hz = grid.first_hz + (grid.count / 2) * grid.step_hz;
   for (const Arrival& a : arrivals) fast.add(grid.step_hz * a.delay_s, a.amplitude * turned(-middle_hz * a.delay_s), fine.data());
   fast.transform(fine.data(), sums.data());
@@ -87,7 +89,7 @@ FrequencySums::FrequencySums(int count, int width)
       padded_(width <= small_padding ? small_padding : large_padding),
       forward_(points_, Fft::Direction::forward),
       terms_(width + extra_terms) {
-  // A polynomial for point k of the kernel in t in [-1, 1], the place of the echo between two points.
+  // Point k of the kernel is a polynomial in t in [-1, 1]; t is the position of the echo between two points.
   polynomial_.assign(static_cast<std::size_t>(terms_ * padded_), 0.0);
   for (int k = 0; k < width; ++k) {
     const std::vector<double> fitted =
@@ -95,21 +97,21 @@ FrequencySums::FrequencySums(int count, int width)
     for (int term = 0; term < terms_; ++term)
       polynomial_[static_cast<std::size_t>(term * padded_ + k)] = fitted[static_cast<std::size_t>(terms_ - 1 - term)];
   }
-  // The grid is the echoes convolved with the kernel; in frequency, the kernel's transform is divided out.
+  // The grid is the convolution of the echoes with the kernel. In frequency, the result is divided by the kernel's transform.
   for (int m = 0; m < count; ++m)
     correction_.push_back(1 / kernel_transform(width, static_cast<double>(m - count / 2) / points_));
 }
 
 template <int padded>
 void FrequencySums::spread(double turns, Complex amplitude, Complex* grid) const {
-  // The delay in grid points: the grid is one turn long and periodic.
-  const double place = (turns - std::floor(turns)) * points_;  // may round up to points_; the wrap below allows that
+  // The delay in grid points. The grid is one turn long and periodic.
+  const double place = (turns - std::floor(turns)) * points_;  // may be rounded up to points_; the wrap below handles this case
   const double first = std::ceil(place - 0.5 * width_);
-  // The distance from the kernel's edge to the first point, 0 to 1 spacings, is the t of the polynomials.
+  // The distance from the kernel's edge to the first point, 0 to 1 spacings, gives the t of the polynomials.
   const double t = 2 * (first - place + 0.5 * width_) - 1;
   double value[padded];
   const double* c = polynomial_.data();
-  // Horner's scheme for all points side by side; those beyond the width are padding.
+  // Horner's scheme for all points in parallel; the points beyond the width are padding.
   for (int k = 0; k < padded; ++k) value[k] = c[k];
   for (int term = 1; term < terms_; ++term) {
     c += padded;
@@ -132,7 +134,7 @@ void FrequencySums::add(double turns, Complex amplitude, Complex* grid) const {
 
 void FrequencySums::add(std::span<const double> turns, std::span<const double> re, std::span<const double> im, double turn_on,
                         const simd::Kernels& kernels, Complex* grid) const {
-  // The vector form is compiled for one width, 8, that of the paper mode.
+  // The vector form is compiled only for width 8, which the paper mode uses.
   assert(width_ == simd::SpreadGrid::width && padded_ == small_padding);
   kernels.spread({points_, terms_, polynomial_.data()}, {turns.data(), re.data(), im.data(), turn_on},
                  static_cast<int>(turns.size()), reinterpret_cast<double*>(grid));

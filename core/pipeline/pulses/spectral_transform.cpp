@@ -29,7 +29,8 @@ const bool have_transform = true;
 struct Fft::Plan {
   Plan(int size, int sign) {
     const std::lock_guard<std::mutex> alone(planner());
-    // Estimated plans do not change the array and are the same in every run; unaligned ones can be used with any array.
+    // Estimated plans do not change the array and are the same in every run. Plans for unaligned arrays can be used for any
+    // array.
     Complex nothing;
     plan = fftw_plan_dft_1d(size, as_fftw(&nothing), as_fftw(&nothing), sign, FFTW_ESTIMATE | FFTW_UNALIGNED);
     assert(plan != nullptr);
@@ -62,7 +63,8 @@ void Fft::run(Complex*) const { assert(have_transform); }
 #endif
 
 int quick_size(int n) {
-  // Even, because FrequencySums counts frequencies from the middle; small factors, because FFTW is fast with them.
+  // The size is even, because FrequencySums counts frequencies from the middle. It has small factors, because FFTW is fast for
+  // them.
   for (int size = n + n % 2;; size += 2) {
     int rest = size;
     for (const int factor : {2, 3, 5, 7})

@@ -1,5 +1,6 @@
-// Converts the cells of a tile to echoes: positions, visibility by the depth map, amplitudes. Included once per instruction
-// set, after kernels.inl. Every value is a vector over cells. Hidden cells are dropped before amplitudes are computed.
+// Converts the cells of a tile to echoes: positions, visibility by the depth map, amplitudes. The file is included once per
+// instruction set, after kernels.inl. Every value is a vector over cells. Hidden cells are dropped before amplitudes are
+// computed.
 
 inline constexpr int chunk = 256;
 
@@ -8,7 +9,7 @@ struct Chunk {  // the visible cells of one part of a tile, packed
       weight_re[chunk + 16], weight_im[chunk + 16], area[chunk + 16];
 };
 
-/// Range limits of a tile's cells, by its level and by the record.
+/// Limits of the range of a tile's cells, from its level and from the record.
 struct RangeWindow {
   float from_m, to_m;
 };
@@ -18,14 +19,14 @@ inline RangeWindow range_window(const TileSeen& s, const GroupView& g) {
           smaller(s.fade_out_to_m, (g.last_sample + shift) / g.samples_per_m)};
 }
 
-/// Area of cells in lattice squares, which is larger on a slope: 1 / |normal along the dominant axis|; 0 for padding.
+/// Area of cells in lattice squares: 1 / |normal along the dominant axis|, which is larger on a slope; 0 for padding.
 inline Lanes area_of(const CellTile& t, int i, Lanes weight_re, Lanes weight_im) {
   const Lanes along = counts(t.column(static_cast<CellTile::Column>(CellTile::normal_x + t.axis)) + i);
   const Lanes weight2 = weight_re * weight_re + weight_im * weight_im;
   return choose(below(all(0), weight2), 1.0f / (magnitude(along) * CellTile::normal_unit), all(0));
 }
 
-/// The values of visible cells to keep: weights, areas, or both.
+/// The values of visible cells that are kept: weights, areas, or both.
 struct Wanted {
   bool weights, areas;
 };
@@ -37,18 +38,18 @@ inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i
   pack(c.weight_im + m, keep, im);
 }
 
-/// Whether cells that belong to another object than the one hit in their direction are hidden, that is, behind the hit facet
-/// extended to the cell's direction. `at`: index of the map; `nearness`: 1 / x of the cells with the tolerance for contact.
+/// True for cells behind the hit facet, extended to their direction. It is computed for cells of another object than the one
+/// hit in their direction. `at`: index into the map; `nearness`: 1 / x of the cells with the tolerance for contact.
 inline __attribute__((noinline)) LaneMask hidden(const GroupView& g, LaneNumbers at, Lanes seen, Lanes column, Lanes nearness) {
   const Lanes beside = column - as_floats(whole_part(column)) - 0.5f;
   return below(nearness, seen + beside * gather(g.depth_slope, at));
 }
 
-/// Whether both values of the map beside a cell, with the marks a and b, belong to other objects than the tile.
+/// True if both values of the map beside a cell, with the marks a and b, belong to other objects than the tile.
 inline LaneMask foreign_marks(std::int32_t mark, Lanes a, Lanes b) {
   return both(bits_differ(a, mark, surface_marks), bits_differ(b, mark, surface_marks));
 }
-/// Like foreign_marks(), if object numbers do not fit into the marks of 1 / x.
+/// Like foreign_marks(), for object numbers that do not fit into the marks of 1 / x.
 inline __attribute__((noinline)) LaneMask foreign_numbers(const GroupView& g, std::int32_t mark, LaneNumbers at, Lanes a,
                                                           Lanes b) {
   Lanes upper_a, upper_b;
@@ -57,8 +58,8 @@ inline __attribute__((noinline)) LaneMask foreign_numbers(const GroupView& g, st
               either(bits_differ(b, mark, surface_marks), bits_differ(upper_b, upper_mark(mark), upper_marks)));
 }
 
-/// Computes range, column, elevation and cosine of incidence of cells, and keeps those that lie in the group's window, do not
-/// face away, and are no farther than the depth map in their direction. Returns their number.
+/// Computes range, column, elevation and cosine of incidence of cells. Keeps the cells that lie in the group's window, do not
+/// face away, and are not behind the depth map in their direction. Returns their number.
 template <bool conical, bool moves>
 __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, Wanted what, int from, int n, Chunk& c) {
   const CellTile& t = *s.tile;
@@ -76,11 +77,13 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
               farthest = all(window.to_m);
   const int row = g.bins + 1;
   const Lanes last_bin = all(static_cast<float>(g.bins) - bin_rounding);
-  // Bounds of the cell's own column, not of the group, so that visibility does not depend on the grouping of columns.
+  // The bounds are those of the cell's own column, not of the group, so that visibility does not depend on the grouping of
+  // columns.
   const Lanes map_first = all(static_cast<float>(g.map_first_column)), last_in_fan = all(static_cast<float>(g.fan_columns - 1));
   const float beside = static_cast<float>(g.columns_beside);
   int m = 0;
-  // r^2 = r0^2 + e with e = d . (2 q + d), d the cell's offset from the tile's centre: no difference of large numbers.
+  // r^2 = r0^2 + e with e = d . (2 q + d), d the cell's offset from the tile's centre. This avoids a difference of large
+  // numbers.
   for (int i = from; i < from + n; i += lanes) {
     const Lanes dx = unit * counts(tx + i), dy = unit * counts(ty + i), dz = unit * counts(tz + i);
     const Lanes e = dx * (2 * qx0 + dx) + dy * (2 * qy0 + dy) + dz * (2 * qz0 + dz);
@@ -92,7 +95,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     // Reference of elevations.
     const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
     const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
-    // Direction of the cell from the origin of the rays; the sonar may have turned since.
+    // Direction of the cell from the origin of the rays. The sonar may have turned since the rays were traced.
     Lanes seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
     if (moves) {
       const float *w = s.seen_turn, *o = s.seen_place;
@@ -112,8 +115,8 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     keep = both(keep, below(all(1e-6f), x));
     if (!any(keep)) continue;
 
-    // Depth map between two bins, against the cell's own 1 / x with the tolerances of section 3.
-    // The parentheses select the function of this instruction set, not the one found by argument-dependent lookup.
+    // Compares the cell's own 1 / x with the depth map between two bins, with the tolerances of section 3.
+    // The parentheses select the function of this instruction set instead of the one that argument-dependent lookup would find.
     const Lanes bin_here = smaller((bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0))), last_bin);
     const LaneNumbers bin_below = whole_part(bin_here);
     const Lanes column_here = choose(keep, seen_column, map_first);
@@ -147,7 +150,8 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
   return m;
 }
 
-/// Replaces the cosines by the root of the material's scattering strength. Without a table it is the cosine (Lambert's law).
+/// Replaces the cosines by the root of the material's scattering strength. Without a table, this root is the cosine itself
+/// (Lambert's law).
 __attribute__((noinline)) void apply_law(const float* __restrict law, int n, Chunk& c) {
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) c.cosine[i] = law_root(law, c.cosine[i]);
@@ -161,19 +165,19 @@ inline Lanes sine_of_turns(Lanes turns) {
   return y + y * y2 * p;
 }
 
-/// Two-way pattern of cells at the squared sines w. In side lobes it is computed without a polynomial, which would need many
-/// terms.
+/// Two-way pattern of cells at the squared sines w. In side lobes no polynomial is used, because it would need many terms.
 inline Lanes pattern_of(const TileSeen& s, const GroupView& g, Lanes w) {
   if (!s.in_side_lobes) return elevation_pattern(g.elevation, w);
   const Lanes x = g.elevation_aperture * root_of(w);
   return side_lobe_pattern(x, sine_of_turns(0.5f * x));
 }
 
-/// Computes the amplitude and carrier of every visible cell, times its speckle.
+/// Computes the amplitude and the carrier of every visible cell, times its speckle.
 __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, EchoArrays out) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i), offset = load(c.offset + i), d = -g.decay_per_m * offset;
-    // Eq. 6 for a cell: level weight, law, D_v, absorption relative to the centre, 1 / r^2; then its phase and its xi.
+    // Eq. 6 for a cell: weight of its level, law, D_v, absorption relative to the tile's centre, 1 / r^2; then its phase and
+    // its xi.
     const Lanes amplitude = s.amplitude * root_of(level_weight(s, r)) * load(c.cosine + i) * pattern_of(s, g, load(c.sine2 + i)) *
                             exp_near_0(d) * reciprocal(r * r);
     const Lanes turns = -(s.phase_turns + g.turns_per_m * offset);
@@ -186,7 +190,7 @@ __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView&
   }
 }
 
-/// The same in expected power: |xi|^2 is 1, so only the cell's area counts and no carrier is needed.
+/// The same in expected power. |xi|^2 is 1, so only the cell's area is needed and no carrier.
 __attribute__((noinline)) void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, float* power) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i);

@@ -1,10 +1,10 @@
-// Computes the echoes of rays that are scatterers, with a random draw for each. Included by kernels.inl.
+// Computes the echoes of rays that are scatterers. Each ray has its own random draw. Included by kernels.inl.
 
 /// The draw of core/base/random.hpp, in a form that compilers vectorise.
 inline void philox_of(std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3, std::uint32_t k0, std::uint32_t k1,
                       std::uint32_t& a, std::uint32_t& b) {
 #pragma GCC unroll 10
-  // Philox 4x32 with ten rounds depends only on counters and key, so that draws do not depend on order or threads.
+  // Philox 4x32 with ten rounds. It depends only on counters and key, so draws do not depend on order or threads.
   for (int round = 0; round < 10; ++round) {
     const std::uint64_t p0 = std::uint64_t{0xD2511F53u} * c0, p1 = std::uint64_t{0xCD9E8D57u} * c2;
     const std::uint32_t n0 = static_cast<std::uint32_t>(p1 >> 32) ^ c1 ^ k0;
@@ -28,7 +28,7 @@ __attribute__((noinline)) void draw_hits(const HitDraw& d, int n, float* __restr
   for (int i = 0; i < n; ++i) {
     std::uint32_t a, b;
     philox_of(first[i], second[i], third[i], c3, k0, k1, a, b);
-    // Uses the upper 23 bits, centred, so that u is in (0, 1) and its logarithm is finite.
+    // Uses the upper 23 bits and the middle of each step, so that u is in (0, 1) and its logarithm is finite.
     const float u = (static_cast<float>(static_cast<std::int32_t>(a >> 9)) + 0.5f) * (1.0f / 8388608.0f);
     // Box-Muller: |z| = sqrt(-ln u), E|z|^2 = 1.
     radius[i] = std::sqrt(larger(-0.69314718f * log2_of(u), 0.0f));
@@ -36,7 +36,7 @@ __attribute__((noinline)) void draw_hits(const HitDraw& d, int n, float* __restr
   }
 }
 
-/// Computes carriers in double, modulo one turn, because a float resolves a range to a thousandth of a turn at best.
+/// Computes carriers in double, modulo one turn. A float would resolve a range at best to a thousandth of a turn.
 __attribute__((noinline)) void turn_carriers(const float* __restrict range, double turns_per_m, int n, float* __restrict turns) {
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {

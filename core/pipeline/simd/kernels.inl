@@ -1,7 +1,7 @@
-// Bodies of the hot loops, included once per instruction set in a separate namespace. They are plain loops over short arrays,
-// which the compiler converts to vector code of the width `lanes`.
+// The hot loops, included once per instruction set in a separate namespace. They are plain loops over short arrays, which the
+// compiler converts to vector code of the width `lanes`.
 // Loops that must become vector code are in separate functions, because compilers often fail to vectorise them after inlining.
-// The order of every sum is fixed, so that a result depends on the instruction set but never on threads.
+// The order of every sum is fixed. Therefore a result depends on the instruction set but never on threads.
 
 #include "core/pipeline/simd/lanes.inl"
 
@@ -12,7 +12,8 @@ inline float float_of(std::uint32_t bits) { return std::bit_cast<float>(bits); }
 template <int taps>
 void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                      int first_column, int lead) {
-  // (8) from the table of rows. The row depends on the echo's place between samples, linear between rows. Echoes add in order.
+  // Eq. 8 from the table of rows. The row follows from the echo's position between samples; values between rows are linear.
+  // Echoes are added in order.
   const float steps = static_cast<float>(pulse.steps);
   const int reach = (taps > 0 ? taps : pulse.taps) / 2 - 1;
   const int n_taps = taps > 0 ? taps : pulse.taps;
@@ -39,7 +40,7 @@ void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, flo
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
-  alignas(64) std::int32_t turned[8][lanes];  // taps, twice each, starting at a sample within the vector and wrapped around
+  alignas(64) std::int32_t turned[8][lanes];  // taps, repeated, from a sample within the vector on and wrapped around
   for (int begin = 0; begin < 8; ++begin)
     for (int l = 0; l < lanes; ++l) turned[begin][l] = (l / 2 - begin) & 7;
   const float steps = static_cast<float>(pulse.steps);
@@ -47,7 +48,7 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
     alignas(64) float part[lanes];
     alignas(64) std::int32_t row_at[lanes], sample_at[lanes];
     const int n = count - from < lanes ? count - from : lanes;
-    const auto there = static_cast<__mmask16>(0xFFFFu >> (lanes - n));  // values after the last are undefined
+    const auto there = static_cast<__mmask16>(0xFFFFu >> (lanes - n));  // values after the last echo are undefined
     const Lanes sample = Lanes(_mm512_maskz_loadu_ps(there, e.sample + from)), whole = Lanes(_mm512_floor_ps(native(sample)));
     const Lanes position = (sample - whole) * steps;
     const LaneNumbers step = whole_part(position);
@@ -73,9 +74,9 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
   }
 }
 #elif defined(__AVX2__)
-/// The same for vectors of four samples, of which a pulse overlaps three. Shifting a vector by a variable number of lanes is
-/// slow. Instead, the taps, twice each, are stored between zeros and loaded from the shifted place, for so many echoes at a time that
-/// the stores have finished before the loads.
+/// The same for vectors of four samples; a pulse overlaps three of them. Shifting a vector by a variable number of lanes is
+/// slow. Instead, the repeated taps are stored between zeros and loaded from the shifted position. This is done for so many
+/// echoes at a time that the stores have finished before the loads begin.
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
@@ -91,7 +92,7 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
     for (int i = 0; i < n; i += lanes) {
       alignas(32) float part[lanes];
       alignas(32) std::int32_t row_at[lanes];
-      // Values after the last are undefined.
+      // Values after the last echo are undefined.
       const LaneNumbers there = LaneNumbers{0, 1, 2, 3, 4, 5, 6, 7} < n - i;
       const Lanes sample = choose(there, load(e.sample + from + i), all(0)), whole = Lanes(_mm256_floor_ps(native(sample)));
       const Lanes position = (sample - whole) * steps;
@@ -137,9 +138,9 @@ void accumulate(const EchoArrays& e, int count, const PulseRows& pulse, float* c
 }
 
 void form_beam_panel(const float* in, std::ptrdiff_t in_stride, const float* panel, int count, float* out, int floats) {
-  constexpr int width = 2;  // vectors at a time: eight independent sums hide the latency of the multiply-add
+  constexpr int width = 2;  // number of vectors: eight independent sums hide the latency of the multiply-add
   for (int f = 0; f < floats; f += width * lanes) {
-    // (9): W_jk g_k, the columns of a panel in ascending order.
+    // Eq. 9: W_jk g_k, summed over the columns of a panel in ascending order.
     Lanes sum[4][width] = {};
     for (int k = 0; k < count; ++k) {
       const float* row = in + k * in_stride + f;
@@ -181,7 +182,7 @@ inline void refocus_block(const float* from, std::ptrdiff_t stride, const FocusT
 }
 
 void refocus(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int floats, float* to) {
-  constexpr int width = 2;  // vectors at a time: four independent sums
+  constexpr int width = 2;  // number of vectors: four independent sums
   const int both = t.below < t.above ? t.below : t.above;
   Lanes out[width];
   int f = 0;

@@ -1,6 +1,6 @@
-// A vector of `lanes` floats as a type, and the operations for loops over cells. It is included once per instruction set,
-// before all other files.
-// Reciprocals and roots use the fast estimates of an instruction set, if it has them, and a Newton step, with an error of two
+// The type of a vector of `lanes` floats, and the operations for loops over cells. The file is included once per instruction
+// set, before all other files.
+// Reciprocals and roots use the fast estimates of an instruction set, if it has them, and one Newton step. The error is two
 // units in the last place. Vector divisions would take longer than all other operations on a cell.
 
 typedef float Lanes __attribute__((vector_size(4 * lanes), aligned(4)));
@@ -49,7 +49,7 @@ inline Lanes counts(const std::int16_t* at) {
 inline Lanes gather(const float* table, LaneNumbers at) {
   return Lanes(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
 }
-/// table[at] and table[at + 1].
+/// Reads table[at] and table[at + 1].
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
   first = gather(table, at), second = gather(table + 1, at);
 }
@@ -63,7 +63,7 @@ inline Lanes inverse_root(Lanes x) {  // x > 0
   const Lanes guess = Lanes(_mm512_rsqrt14_ps(native(x)));
   return guess + 0.5f * guess * (1.0f - x * guess * guess);
 }
-// A Newton step corrects the estimate, so that the error is that of a division or a root.
+// A Newton step corrects the estimate. The error is then that of a division or a root.
 inline Lanes quotient(Lanes a, Lanes b) {
   const Lanes inverse = reciprocal(b), q = a * inverse;
   return q + inverse * (a - q * b);
@@ -74,9 +74,9 @@ inline Lanes root_and_inverse(Lanes x, Lanes& inverse) {  // x > 0
   return r + 0.5f * inverse * (x - r * r);
 }
 inline Lanes root_of(Lanes x) { return x * inverse_root(larger(x, all(1e-30f))); }  // x >= 0
-/// The lanes of the mask, packed, to `at`; writes a whole vector.
+/// Writes the lanes of the mask, packed, to `at`. It writes a whole vector.
 inline void pack(float* at, LaneMask m, Lanes v) {
-  // Compress in registers and store whole vectors: compressing stores are slow on some processors.
+  // Compresses in registers and stores whole vectors, because compressing stores are slow on some processors.
   _mm512_storeu_ps(at, _mm512_maskz_compress_ps(m, native(v)));
 }
 inline int count_of(LaneMask m) { return __builtin_popcount(m); }
@@ -115,7 +115,7 @@ inline Lanes counts(const std::int16_t* at) {
 inline Lanes gather(const float* table, LaneNumbers at) {
   return Lanes(_mm256_i32gather_ps(table, reinterpret_cast<__m256i>(at), 4));
 }
-/// table[at] and table[at + 1]. Eight loads of both take half as long as two gathers.
+/// Reads table[at] and table[at + 1]. Eight loads of both values take half as long as two gathers.
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
   alignas(32) std::int32_t place[lanes];
   *reinterpret_cast<LaneNumbers*>(place) = at;
@@ -136,7 +136,7 @@ constexpr PackOrders make_pack_orders() {
   return orders;
 }
 constexpr PackOrders pack_orders = make_pack_orders();
-/// The lanes of the mask, packed, to `at`; writes a whole vector.
+/// Writes the lanes of the mask, packed, to `at`. It writes a whole vector.
 inline void pack(float* at, LaneMask m, Lanes v) {
   const auto* order = reinterpret_cast<const __m256i*>(pack_orders.lane[bits_of(m)]);
   _mm256_storeu_ps(at, _mm256_permutevar8x32_ps(native(v), _mm256_load_si256(order)));
@@ -154,7 +154,7 @@ inline Lanes counts(const std::int16_t* at) { return Lanes(vcvtq_f32_s32(vmovl_s
 inline Lanes gather(const float* table, LaneNumbers at) {
   return Lanes{table[at[0]], table[at[1]], table[at[2]], table[at[3]]};
 }
-/// table[at] and table[at + 1], in one load.
+/// Reads table[at] and table[at + 1] in one load.
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
   const float32x4_t a = vcombine_f32(vld1_f32(table + at[0]), vld1_f32(table + at[1]));
   const float32x4_t b = vcombine_f32(vld1_f32(table + at[2]), vld1_f32(table + at[3]));
@@ -173,7 +173,7 @@ constexpr PackOrders make_pack_orders() {
   return orders;
 }
 constexpr PackOrders pack_orders = make_pack_orders();
-/// The lanes of the mask, packed, to `at`; writes a whole vector.
+/// Writes the lanes of the mask, packed, to `at`. It writes a whole vector.
 inline void pack(float* at, LaneMask m, Lanes v) {
   const std::uint32_t mask = vaddvq_u32(native(m & LaneNumbers{1, 2, 4, 8}));
   vst1q_f32(at, vreinterpretq_f32_u8(vqtbl1q_u8(vreinterpretq_u8_f32(native(v)), vld1q_u8(pack_orders.byte[mask]))));
@@ -207,11 +207,11 @@ inline Lanes gather(const float* table, LaneNumbers at) {
   for (int l = 0; l < lanes; ++l) v[l] = table[at[l]];
   return v;
 }
-/// table[at] and table[at + 1].
+/// Reads table[at] and table[at + 1].
 inline void gather_pairs(const float* table, LaneNumbers at, Lanes& first, Lanes& second) {
   for (int l = 0; l < lanes; ++l) first[l] = table[at[l]], second[l] = table[at[l] + 1];
 }
-/// The lanes of the mask, packed, to `at`; may write a whole vector.
+/// Writes the lanes of the mask, packed, to `at`. It may write a whole vector.
 inline void pack(float* at, LaneMask m, Lanes v) {
   for (int l = 0; l < lanes; ++l) {
     *at = v[l];

@@ -16,7 +16,7 @@ inline double sine_of_turns_exact(double turns) {  // accurate to 1e-11
 
 inline constexpr int spread_at_once = 64;
 
-/// Advances the echoes' phases; finds each echo's first grid point and its offset between grid points.
+/// Advances the phases of the echoes. Finds the first grid point of each echo and its offset between grid points.
 __attribute__((noinline)) void place_on_grid(const SpreadGrid& g, const SpreadEchoes& e, int from, int n, double* __restrict re,
                                              double* __restrict im, double* __restrict first, double* __restrict between) {
   const double* __restrict turns = e.turns + from;
@@ -30,7 +30,7 @@ __attribute__((noinline)) void place_on_grid(const SpreadGrid& g, const SpreadEc
     const double c = sine_of_turns_exact(phase - std::floor(phase) + 0.25), s = sine_of_turns_exact(phase - std::floor(phase));
     re[i] = in_re[i] * c - in_im[i] * s;
     im[i] = in_re[i] * s + in_im[i] * c;
-    // The delay in grid points. first and between give the kernel (26), as in FrequencySums::spread.
+    // The delay in grid points. `first` and `between` determine the kernel (26), as in FrequencySums::spread.
     const double place = (turns[i] - std::floor(turns[i])) * points;
     first[i] = std::ceil(place - 0.5 * SpreadGrid::width);
     between[i] = 2 * (first[i] - place + 0.5 * SpreadGrid::width) - 1;
@@ -52,7 +52,7 @@ void spread(const SpreadGrid& g, const SpreadEchoes& e, int count, double* grid)
         c += width;
         for (int k = 0; k < width; ++k) value[k] = value[k] * t + c[k];
       }
-      // The grid has room for a kernel beyond its end, so the loop need not wrap around.
+      // The grid has memory for one kernel beyond its end, so the loop need not wrap around.
       const int begin = static_cast<int>(first[i]);
       double* __restrict at = grid + 2 * (begin < 0 ? begin + g.points : begin);
       for (int k = 0; k < width; ++k) {

@@ -1,6 +1,7 @@
-// Makes beams of columns by a Fourier transform across the columns (tables: beam_transform.hpp). kernels.inl includes it once per
-// instruction set. Every value is a vector of `lanes` samples. The transform is in place, without reordering: forward passes
-// leave the frequencies in digit-reversed order, the response is stored in this order, and inverse passes undo it.
+// Makes beams from columns by a Fourier transform across the columns (tables: beam_transform.hpp). kernels.inl includes the
+// file once per instruction set. Every value is a vector of `lanes` samples. The transform is in place, without reordering:
+// forward passes leave the frequencies in digit-reversed order, the response is stored in this order, and inverse passes
+// restore the original order.
 
 /// A complex value of one column for each of `lanes` samples.
 struct ComplexLanes {
@@ -8,14 +9,14 @@ struct ComplexLanes {
 };
 inline ComplexLanes operator+(ComplexLanes a, ComplexLanes b) { return {a.re + b.re, a.im + b.im}; }
 inline ComplexLanes operator-(ComplexLanes a, ComplexLanes b) { return {a.re - b.re, a.im - b.im}; }
-// Multiplies by a factor w = {re, im} of the tables, or its conjugate, which is the same for all lanes.
+// Multiplies by a factor w = {re, im} of the tables, or by its conjugate. The factor is the same for all lanes.
 inline ComplexLanes times(ComplexLanes v, const float* w) { return {v.re * w[0] - v.im * w[1], v.re * w[1] + v.im * w[0]}; }
 inline ComplexLanes times_conjugate(ComplexLanes v, const float* w) {
   return {v.re * w[0] + v.im * w[1], v.im * w[0] - v.re * w[1]};
 }
 inline ComplexLanes times_i(ComplexLanes v) { return {-v.im, v.re}; }
 
-/// Orders of lanes between memory, (re, im, re, im ...), and ComplexLanes.
+/// Converts between the order of lanes in memory, (re, im, re, im ...), and ComplexLanes.
 struct Shuffles {
   LaneNumbers even, odd, low, high;
 };
@@ -53,7 +54,7 @@ inline __attribute__((always_inline)) void sums(ComplexLanes* v) {
     const ComplexLanes s = v[0] + v[2], t = v[0] - v[2], u = v[1] + v[3], across = times_i(v[1] - v[3]);
     v[0] = s + u, v[forward ? 3 : 1] = t + across, v[2] = s - u, v[forward ? 1 : 3] = t - across;
   } else {
-    // Good and Thomas: 6 = 2 x 3 without factors between, input (3 a + 2 b) mod 6, output (3 a + 4 b) mod 6.
+    // Good and Thomas: 6 = 2 x 3 without factors in between; input (3 a + 2 b) mod 6, output (3 a + 4 b) mod 6.
     static_assert(radix == 6);
     ComplexLanes even[3] = {v[0] + v[3], v[2] + v[5], v[4] + v[1]}, odd[3] = {v[0] - v[3], v[2] - v[5], v[4] - v[1]};
     sums<3, forward>(even);
@@ -62,8 +63,8 @@ inline __attribute__((always_inline)) void sums(ComplexLanes* v) {
   }
 }
 
-/// One pass over a block of n: n / radix butterflies, with (radix - 1) factors `w` each. Forward: decimation in frequency, first
-/// the sums, then the factors e^{-i 2 pi i m / n}. Inverse: the same in reverse order, with conjugate factors.
+/// One pass over a block of n: n / radix butterflies, with (radix - 1) factors `w` each. Forward (decimation in frequency):
+/// first the sums, then the factors e^{-i 2 pi i m / n}. Inverse: the reverse order, with conjugate factors.
 template <int radix, bool forward>
 inline void butterflies(ComplexLanes* x, int n, const float* w) {
   const int q = n / radix;
@@ -77,7 +78,7 @@ inline void butterflies(ComplexLanes* x, int n, const float* w) {
   }
 }
 
-/// The last forward pass, whose factors are all 1, the product with the response, and the first inverse pass.
+/// The last forward pass (all its factors are 1), the product with the response, and the first inverse pass.
 template <int radix>
 inline void weigh_values(ComplexLanes* x, int n, const float* response) {
   for (int i = 0; i < n; i += radix) {
@@ -106,7 +107,7 @@ inline void transform_pass(const BeamTransform& t, int level, ComplexLanes* bloc
   }
 }
 
-/// First pass: columns [0, count), followed by zeros in the second half of the line, into four quarters.
+/// First pass: reads columns [0, count), followed by zeros in the second half of the line, into four quarters.
 __attribute__((noinline)) void take_columns(const BeamTransform& t, const float* columns, std::ptrdiff_t stride, int count,
                                             ComplexLanes* x) {
   const int q = t.quarter;
@@ -128,7 +129,8 @@ __attribute__((noinline)) void take_columns(const BeamTransform& t, const float*
 __attribute__((noinline)) void weigh_quarter(const BeamTransform& t, const float* response, ComplexLanes* x) {
   const int last = t.levels - 1;
   for (int level = 0; level < last; ++level) transform_pass<true>(t, level, x);
-  // (9) over frequencies: times the transform of W, which is real because W is symmetric; it includes 1 / size of the inverse.
+  // Eq. 9 over frequencies: multiplies by the transform of W, which is real because W is symmetric. It includes 1 / size of the
+  // inverse.
   if (t.level[last].radix == 4)
     weigh_values<4>(x, t.quarter, response);
   else if (t.level[last].radix == 3)
@@ -138,14 +140,14 @@ __attribute__((noinline)) void weigh_quarter(const BeamTransform& t, const float
   for (int level = last; level-- > 0;) transform_pass<false>(t, level, x);
 }
 
-/// Last pass, which computes only the half of the line that belongs to columns.
+/// Last pass. It computes only the half of the line that belongs to columns.
 __attribute__((noinline)) void join_quarters(const BeamTransform& t, ComplexLanes* x) {
   const int q = t.quarter;
   const float* w = t.split;
   for (int i = 0; i < q; ++i, w += 6) {
     const ComplexLanes a = x[i], b = times_conjugate(x[i + q], w), c = times_conjugate(x[i + 2 * q], w + 2),
                        d = times_conjugate(x[i + 3 * q], w + 4);
-    // Outputs i + 2 q and i + 3 q would be beams beyond the columns.
+    // The outputs i + 2 q and i + 3 q are not computed, because they would be beams beyond the columns.
     x[i] = (a + c) + (b + d);
     x[i + q] = (a - c) + times_i(b - d);
   }
@@ -155,7 +157,7 @@ __attribute__((noinline)) void join_quarters(const BeamTransform& t, ComplexLane
 __attribute__((noinline)) void read_beams(const BeamTransform& t, const ComplexLanes* line, float* out,
                                           std::ptrdiff_t out_stride) {
   const Shuffles s = shuffles();
-  // Interpolation of an array's response, band-limited by its aperture; one tap of 1 where beams lie on columns.
+  // Interpolates an array's response, which is band-limited by the aperture. Beams on columns need only one tap of 1.
   const float* w = t.between;
   for (int j = 0; j < t.beams; ++j, w += t.taps, out += out_stride) {
     const ComplexLanes* at = line + t.first_column[j];
@@ -168,7 +170,7 @@ __attribute__((noinline)) void read_beams(const BeamTransform& t, const ComplexL
 void transform_beams(const BeamTransform& t, const float* columns, std::ptrdiff_t stride, int floats, float* work, float* out,
                      std::ptrdiff_t out_stride) {
   auto* x = reinterpret_cast<ComplexLanes*>(work);
-  // Processes a vector of samples at a time, whose line of 4 q complex values stays in cache through all passes.
+  // Processes one vector of samples at a time. Its line of 4 q complex values stays in the cache through all passes.
   for (int f = 0; f < floats; f += 2 * lanes) {
     take_columns(t, columns + f, stride, t.columns, x);
     for (int k = 0; k < 4; ++k) weigh_quarter(t, t.response + k * t.quarter, x + k * t.quarter);
@@ -180,7 +182,7 @@ void transform_beams(const BeamTransform& t, const float* columns, std::ptrdiff_
 /// Computes squared magnitudes, and transposes them from beams of rows to rows of beams, `lanes` of both at a time.
 void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width) {
   const Shuffles s = shuffles();
-  // Transposes a square tile: steps 1, 2, 4 ... exchange blocks of that size across the diagonal.
+  // Transposes a square tile: the steps 1, 2, 4 ... exchange blocks of that size across the diagonal.
   LaneNumbers keep[5], swap[5];
   int steps = 0;
   for (int step = 1; step < lanes; step *= 2, ++steps)
@@ -190,7 +192,7 @@ void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows,
     }
   for (int j = 0; j < beam_count; j += lanes)
     for (int row = 0; row < rows; row += lanes) {
-      // Beams or rows that do not fill a vector, at the edges.
+      // Handles beams or rows at the edges that do not fill a vector.
       if (j + lanes > beam_count || row + lanes > rows) {
         for (int n = row; n < rows && n < row + lanes; ++n)
           for (int k = j; k < beam_count && k < j + lanes; ++k) {
@@ -199,7 +201,7 @@ void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows,
           }
         continue;
       }
-      // |s|^2 [uPa^2]: rows lie side by side before the transposition, beams after it.
+      // |s|^2 [uPa^2]. Rows are neighbours before the transposition, beams after it.
       Lanes tile[lanes];
       for (int k = 0; k < lanes; ++k) {
         const ComplexLanes v = load_interleaved(beams + (j + k) * stride + 2 * row, s);

@@ -12,18 +12,18 @@ namespace {
 
 constexpr double least_reflection = 0.01;
 constexpr double least_factor = 0.01;   // least K_vis in eq. 7
-constexpr double sight_slack_m = 5e-3;  // distance of facets from the true surface, and overlap of touching objects
-constexpr double bent_slack = 0.1;      // the same, in radii of curvature
+constexpr double sight_slack_m = 5e-3;  // tolerance: distance of facets from the true surface, and overlap of touching objects
+constexpr double bent_slack = 0.1;      // the same tolerance in radii of curvature
 constexpr double most_bent_slack_m = 0.2;
 constexpr std::size_t most_surfaces_of_a_mesh = 4;
 
-/// Traces rays from the sonar to places of one object.
+/// Traces rays from the sonar to points of one object.
 class Sight {
  public:
   Sight(const RayScene& scene, const PingScalars& s, std::uint32_t object, const Pose& object_in_world)
       : scene_(scene), s_(s), object_(object), object_in_world_(object_in_world) {}
 
-  /// Bit i: place i of the point's surface is the first hit of a ray toward it. At most 16 places.
+  /// Bit i: point i of the surface is the first hit of a ray towards it. At most 16 points.
   std::uint32_t seen(const SpecularPoint& point, std::span<const std::array<double, 2>> places) const {
     // The distance of facets from the true surface grows with its curvature.
     double slack = sight_slack_m;
@@ -32,7 +32,7 @@ class Sight {
     RayPacket rays{};
     float expected[RayPacket::size] = {};
     for (std::size_t i = 0; i < places.size(); ++i) {
-      // A place is visible if the first hit of a ray to it is this object at this range.
+      // A point is visible if the first hit of a ray to it belongs to this object at this range.
       const Vec3d there = transform(object_in_world_, point.place(places[i][0], places[i][1])) - s_.seen_from.position_m;
       const double r = length(there);
       const Vec3 d = to_float((1 / r) * there);
@@ -56,14 +56,15 @@ class Sight {
   Pose object_in_world_;
 };
 
-/// A place near a cell's middle, because a ray along an edge between two triangles can miss both.
+/// A point near a cell's middle, because a ray along an edge between two triangles can miss both.
 double middle_of(const std::array<double, SpecularWindow::cells + 1>& edge, double cell) {
   const auto c = static_cast<std::size_t>(cell);
   const double part = cell - static_cast<double>(c) + 0.5137;
   return edge[c] + part * (edge[c + 1] - edge[c]);
 }
 
-/// Whether all, a part or none of the surface is visible, from rays along the two principal directions and between them.
+/// Determines whether all, a part or none of the surface is visible, from rays along the two principal directions and between
+/// them.
 enum class Part { none, some, all };
 Part glance(const SpecularPoint& point, const SpecularWindow& w, const Sight& sight) {
   constexpr std::size_t n = SpecularWindow::cells;
@@ -75,7 +76,7 @@ Part glance(const SpecularPoint& point, const SpecularWindow& w, const Sight& si
   }
   int looked = 0, met = 0;
   std::array<std::array<double, 2>, n> places{};
-  // 48 rays: along each principal direction, and over a 4 x 4 grid.
+  // 48 rays in all: along each principal direction, and over a 4 x 4 grid.
   for (int pattern = 0; pattern < 3; ++pattern) {
     std::size_t count = 0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -118,7 +119,7 @@ void hide(const SpecularPoint& point, SpecularWindow& w, const Sight& sight) {
 
 /// K_vis with its phase, for the visible part of the surface.
 std::complex<double> visible_factor(const SpecularPoint& point, double wavelength_m, const Sight& sight) {
-  // K_1 K_2 of eq. 7 and 19 over the whole extent; hidden cells are left out only where some are hidden.
+  // K_1 K_2 of eq. 7 and 19 over the whole extent. If cells are hidden, they are left out.
   const std::complex<double> whole = specular_factor(point, wavelength_m);
   if (point.outline.empty() && std::abs(whole) < least_factor) return 0;
   SpecularWindow window = make_window(point, wavelength_m);
@@ -131,7 +132,7 @@ std::complex<double> visible_factor(const SpecularPoint& point, double wavelengt
 
 /// Largest angle of columns from straight ahead; it is larger if the sonar turns during the ping.
 double widest_direction_rad(const PingPlan& plan) {
-  // Bearings are measured at reception, (29): a turning sonar receives echoes from farther aside, by at most this [rad].
+  // Bearings are measured at reception (29). A turning sonar receives echoes from farther aside, by at most this angle [rad].
   constexpr double while_turning_rad = 0.05;
   const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
   return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(plan.fan.reach_rad), pi / 2))) +
@@ -141,7 +142,7 @@ double widest_direction_rad(const PingPlan& plan) {
 }  // namespace
 
 double coherent_reflection(const Material& m, double wavelength_m) {
-  // Rc e^{-2 k^2 h^2} (docs/acoustics.md, eq. 18); rough from k h = 1.5 on.
+  // Rc e^{-2 k^2 h^2} (docs/acoustics.md, eq. 18). From k h = 1.5 on, the surface is rough.
   const double kh = 2 * pi / wavelength_m * static_cast<double>(m.roughness_m);
   if (!(kh < smooth_below_kh)) return 0;
   const double left = static_cast<double>(m.reflection) * std::exp(-2 * kh * kh);
@@ -166,7 +167,7 @@ SpecularEchoes::PreparedMesh& SpecularEchoes::prepared(std::size_t object, const
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  // A ball around the mesh, by which objects out of range are skipped without a search.
+  // A ball around the mesh. With it, objects out of range are skipped without a search.
   made.centre_m = 0.5 * (low + high);
   made.radius_m = 0.5 * length(high - low);
   return meshes_.emplace_back(std::move(made));
@@ -186,8 +187,8 @@ void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const 
   }
   mirrors_.assign(reflection_.size(), false);
   for (const std::uint16_t m : mesh.materials) mirrors_[m] = reflection_[m] != 0;
-  // Surfaces are kept by their set of reflecting materials, which depends on the frequency. So a ping does not depend on those
-  // before it.
+  // Surfaces are stored by their set of reflecting materials, because this set depends on the frequency. So a ping does not
+  // depend on earlier pings.
   auto at = std::find_if(mesh.surfaces.begin(), mesh.surfaces.end(),
                          [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
   if (at == mesh.surfaces.end()) {
@@ -204,7 +205,7 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
   SpecularQuery query;
   query.wavelength_m = s.sound_speed_mps / static_cast<double>(plan.mode.centre_hz);
   query.max_range_m = s.max_range_m;
-  // Feet outside this cone cannot reach a column.
+  // Feet outside this cone cannot be received in any column.
   query.widest_rad = widest_direction_rad(plan);
   reflection_.clear();
   for (const Material& m : scene.materials) reflection_.push_back(coherent_reflection(m, query.wavelength_m));
@@ -230,10 +231,10 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
       const Vec3d from_sonar = transform(world_in_sonar, transform(in_world, point.place(at[0], at[1])));
       const double r = length(from_sonar);
       // docs/acoustics.md, eq. 7, without the factors of point_echo (source, absorption, patterns, 1 / r^2, phase of its own
-      // range): strength = Rc r^2 / (2 r sqrt((1 + r / R1) (1 + r / R2))), times K_1 K_2 (visible_factor).
+      // range). The strength is Rc r^2 / (2 r sqrt((1 + r / R1) (1 + r / R2))), times K_1 K_2 (visible_factor).
       const double bends = bending(point.range_m, point.curvature[0]) * bending(point.range_m, point.curvature[1]);
       const double strength = reflection * r * r / (2 * point.range_m * std::sqrt(std::abs(bends)));
-      // point_echo() applies the phase of range r; (7) has that of the foot's range, and K the rest.
+      // point_echo() applies the phase of range r. (7) has the phase of the foot's range, and K has the rest.
       const double beside_turns = (r - point.range_m) * s.turns_per_m;
       std::optional<PointEcho> echo = point_echo(from_sonar, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
       if (!echo) continue;

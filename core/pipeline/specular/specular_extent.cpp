@@ -10,15 +10,17 @@ namespace sonar {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double window_in_units = 5.7;  // four Fresnel radii; beyond it only edges contribute, and little
+constexpr double window_in_units = 5.7;  // four Fresnel radii; beyond it only edges contribute, and they contribute little
 constexpr double window_in_radii = 0.5;
 constexpr int strips_per_cell = 4;
 
-/// One principal direction: the integral of exp(-i pi (q x)^2 / 2), 1 over all x; conjugate beyond a focus, then i over all x.
+/// One principal direction: the integral of exp(-i pi (q x)^2 / 2), which is 1 over all x. Beyond a focus the conjugate is
+/// integrated, which gives i over all x.
 struct Direction {
   double q = 1;
   bool focused = false;
-  /// F(q x) / (1 - i), F = C + iS (conjugate F before a focus): K_i of docs/acoustics.md, eq. 19, is the difference of two.
+  /// F(q x) / (1 - i), F = C + iS (conjugate F before a focus). K_i of docs/acoustics.md, eq. 19, is the difference of two such
+  /// values.
   Complex upto(double x) const {
     const FresnelPair f = fresnel(q * x);
     return Complex(f.c, focused ? f.s : -f.s) / Complex(1, -1);
@@ -31,7 +33,7 @@ Direction direction_of(const SpecularPoint& p, std::size_t k, double wavelength_
   return {1 / fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]), bending(p.range_m, p.curvature[k]) < 0};
 }
 
-/// Finds pairs of places at which the surface begins and ends along a line of constant y.
+/// Finds pairs of positions at which the surface begins and ends along a line of constant y.
 void crossings(const SpecularPoint& p, double y, std::vector<double>& x) {
   x.clear();
   if (p.outline.empty()) {
@@ -39,7 +41,7 @@ void crossings(const SpecularPoint& p, double y, std::vector<double>& x) {
     return;
   }
   for (const OutlineEdge& e : p.outline)
-    // Even-odd rule: sorted crossings pair up into intervals inside the outline.
+    // Even-odd rule: sorted crossings form pairs, which are the intervals inside the outline.
     if ((e.y0 > y) != (e.y1 > y)) x.push_back(e.x0 + (y - e.y0) / (e.y1 - e.y0) * (e.x1 - e.x0));
   std::sort(x.begin(), x.end());
 }
@@ -68,7 +70,7 @@ Complex along_strip(const Direction& d, const std::vector<double>& x, const Spec
 SpecularWindow make_window(const SpecularPoint& p, double wavelength_m) {
   SpecularWindow w;
   for (std::size_t k = 0; k < 2; ++k) {
-    // Four Fresnel radii around the foot, or around the nearest place of the surface.
+    // The window has four Fresnel radii around the foot, or around the nearest point of the surface.
     double reach = window_in_units * fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]);
     // Beyond half a radius of curvature [m] the surface is not a parabola, as (19) assumes.
     if (p.curvature[k] != 0) reach = std::min(reach, window_in_radii / std::abs(p.curvature[k]));
@@ -89,16 +91,16 @@ Complex specular_factor(const SpecularPoint& p, double wavelength_m, const Specu
   const Direction across = direction_of(p, 0, wavelength_m), up = direction_of(p, 1, wavelength_m);
   std::vector<double> x;
   Complex sum;
-  // K_1 K_2 as a sum over strips: the integral over y of one strip times the integral over its intervals in x.
+  // K_1 K_2 as a sum over strips. Each term is the integral over y of one strip times the integral over its intervals in x.
   const auto strip = [&](double from, double to, std::size_t row) {
     if (!(to > from)) return;
-    // An infinite strip has no middle, so that its extent is that at the foot.
+    // An infinite strip has no middle. Therefore its extent is the extent at the foot.
     const double middle = std::isinf(from) || std::isinf(to) ? 0 : 0.5 * (from + to);
     crossings(p, middle, x);
     sum += up.part(from, to) * along_strip(across, x, w, row);
   };
   const auto& edge = w.edge[1];
-  // Adds the part below the window, the rows of cells of the window in four strips each, and the part above it.
+  // Adds the part below the window, the rows of cells of the window in four strips each, and the part above the window.
   strip(p.from[1], edge.front(), 0);
   for (std::size_t row = 0; row < SpecularWindow::cells; ++row)
     for (int s = 0; s < strips_per_cell; ++s) {
@@ -126,7 +128,7 @@ std::array<double, 2> nearest_on_surface(const SpecularPoint& p) {
   for (const OutlineEdge& e : p.outline) {
     const double dx = e.x1 - e.x0, dy = e.y1 - e.y0;
     // Foot of the perpendicular on an edge.
-    // 1e-30 m^2: an edge without length is a point.
+    // 1e-30 m^2: an edge without length is treated as a point.
     const double t = std::clamp(-(e.x0 * dx + e.y0 * dy) / std::max(dx * dx + dy * dy, 1e-30), 0.0, 1.0);
     const std::array<double, 2> at{e.x0 + t * dx, e.y0 + t * dy};
     if (const double l = std::hypot(at[0], at[1]); l < nearest) nearest = l, best = at;
