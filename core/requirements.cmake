@@ -1,5 +1,6 @@
-# What the build needs, looked for before anything else: one message names all that is missing or too old, and what to install.
-# The versions are those of Ubuntu 22.04, the oldest system that the tree was compiled on; its folders find the libraries again.
+# Checks the build requirements first, so that one message names all that are missing or too old, and the packages to install.
+# The versions are those of Ubuntu 22.04, the oldest system on which the code was compiled. Folders that include this file find
+# the libraries again themselves.
 set(found_wanting)
 set(wanted_packages)
 
@@ -9,7 +10,7 @@ elseif(CMAKE_CXX_COMPILER_ID MATCHES "Clang" AND CMAKE_CXX_COMPILER_VERSION VERS
   list(APPEND found_wanting "Clang 14 or newer (this is ${CMAKE_CXX_COMPILER_VERSION}, another: -DCMAKE_CXX_COMPILER=clang++-14)")
 endif()
 
-# sonar_need(NAME VERSION PACKAGE [find_package arguments...])
+# sonar_need(NAME VERSION PACKAGE [find_package arguments...]): requires a library with a CMake description.
 macro(sonar_need name version package)
   find_package(${name} QUIET ${ARGN})
   if(NOT ${name}_FOUND)
@@ -20,7 +21,8 @@ macro(sonar_need name version package)
     list(APPEND wanted_packages ${package})
   endif()
 endmacro()
-# sonar_need_library(NAME LIBRARY HEADER PACKAGE): one without a description for CMake. Sets NAME_INCLUDE_DIR and NAME_LIBRARY.
+# sonar_need_library(NAME LIBRARY HEADER PACKAGE): requires a library without a CMake description. Sets NAME_INCLUDE_DIR and
+# NAME_LIBRARY.
 macro(sonar_need_library name library header package)
   find_path(${name}_INCLUDE_DIR ${header})
   find_library(${name}_LIBRARY ${library})
@@ -34,7 +36,7 @@ endmacro()
 sonar_need(assimp 5.2 libassimp-dev)
 sonar_need(Boost 1.74 libboost-dev CONFIG)
 sonar_need(CLI11 2.1 libcli11-dev)
-find_package(embree 4 QUIET)  # accepts requests for its own major version only, and 3.12 none without a version
+find_package(embree 4 QUIET)  # embree accepts only requests for its own major version, and 3.12 accepts none without a version
 if(NOT embree_FOUND)
   sonar_need(embree 3.12 libembree-dev 3)
 endif()
@@ -43,7 +45,7 @@ sonar_need(PNG 1.6 libpng-dev)
 sonar_need(Protobuf 3.12 "libprotobuf-dev;protobuf-compiler")
 sonar_need(spdlog 1.9 libspdlog-dev)
 find_package(tinyxml2 QUIET)
-if(NOT tinyxml2_FOUND)  # Ubuntu 22.04 has it without CMake's description
+if(NOT tinyxml2_FOUND)  # Ubuntu 22.04 has tinyxml2 without a CMake description
   sonar_need_library(TINYXML2 tinyxml2 tinyxml2.h libtinyxml2-dev)
   if(TINYXML2_FOUND)
     add_library(tinyxml2::tinyxml2 UNKNOWN IMPORTED)
@@ -62,7 +64,7 @@ if(BUILD_TESTING)
   sonar_need(GTest 1.11 "libgtest-dev;libgmock-dev")
   sonar_need(Eigen3 3.3 libeigen3-dev NO_MODULE)
 endif()
-# From version 22 on (4.22 in C++) it stands on Abseil and has neither its log handler nor its status.
+# From version 22 on (4.22 in C++) Protobuf needs Abseil and lacks the log handler and the status that this code uses.
 if(Protobuf_FOUND AND Protobuf_VERSION VERSION_GREATER_EQUAL 4)
   list(APPEND found_wanting "Protobuf before 22 (${Protobuf_VERSION} was found): name an older one with -DProtobuf_ROOT=FOLDER")
 endif()
@@ -82,7 +84,7 @@ set(NATS_FOUND OFF)
 if(SONAR_FARM)
   find_path(NATS_INCLUDE_DIR nats/nats.h)
   find_library(NATS_LIBRARY nats)
-  set(nats_version 3.3)  # of a header that does not say it
+  set(nats_version 3.3)  # for headers that do not contain their version
   if(NATS_INCLUDE_DIR AND EXISTS ${NATS_INCLUDE_DIR}/nats/version.h)
     file(STRINGS ${NATS_INCLUDE_DIR}/nats/version.h nats_version REGEX "define NATS_VERSION_STRING")
     string(REGEX MATCH "[0-9.]+" nats_version "${nats_version}")
