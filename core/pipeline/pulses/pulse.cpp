@@ -204,7 +204,7 @@ std::string why_invalid(const Waveform& w, double sample_time_s) {
 }
 
 int taps_of(const Pulse& pulse, double sample_time_s) {
-  // A Gaussian ends well before the last tap. An error of a twentieth of the eight taps has no effect.
+  // A Gaussian ends well before the last tap. Therefore up to a twentieth of a group of eight taps may be missing.
   const double slack = pulse.shape() == Shape::gaussian ? 0.05 : 0;
   return 8 * std::max(1, static_cast<int>(std::ceil(2 * pulse.reach_s() / sample_time_s / 8 - slack)));
 }
