@@ -13,7 +13,7 @@ namespace {
 
 using Index = std::uint32_t;
 
-/// For each vertex the first vertex at the same position, because files repeat vertices if normals or colours differ.
+/// For each vertex, the first vertex at the same position. Files repeat vertices if normals or colours differ.
 std::vector<Index> joined_vertices(const Mesh& mesh) {
   std::vector<Index> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -28,7 +28,7 @@ std::vector<Index> joined_vertices(const Mesh& mesh) {
   return first;
 }
 
-/// Returns whether every edge is used twice, once in each direction.
+/// Returns true if every edge is used twice, once in each direction.
 bool edges_match(const Mesh& mesh, const std::vector<Index>& joined) {
   std::vector<std::uint64_t> edges;  // lower vertex, higher vertex, direction
   edges.reserve(3 * mesh.triangles.size());
@@ -72,7 +72,8 @@ Skin skin_of(const Mesh& mesh) {
   Skin skin;
   if (mesh.triangles.empty()) return skin;
   skin.low = skin.high = to_double(mesh.vertices[mesh.triangles[0][0]]);
-  // Twice the sum of the areas as vectors. It is 0 for a closed mesh, so that the edges of terrain need no sorting.
+  // Twice the sum of the areas as vectors. It is 0 for a closed mesh. Thanks to this test the edges of terrain need not be
+  // sorted.
   Vec3d twice_area;
   for (const auto& t : mesh.triangles) {
     const Vec3d a = to_double(mesh.vertices[t[0]]), b = to_double(mesh.vertices[t[1]]), c = to_double(mesh.vertices[t[2]]);

@@ -39,7 +39,7 @@ void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit8& rays)
 void intersect(const int* valid, RTCScene scene, Query& query, RTCRayHit16& rays) { rtcIntersect16(valid, scene, &query, &rays); }
 #endif
 
-// One acceleration structure, for all static objects or one body, and the objects of its geometries.
+// One acceleration structure and the objects of its geometries. It holds all static objects, or one body.
 struct Group {
   SceneHandle scene;
   std::vector<std::uint32_t> objects;
@@ -57,7 +57,7 @@ void add_object(const Device& device, Group& group, const Mesh& mesh, const Pose
   rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_HIGH);
   auto* vertices = static_cast<float*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh.vertices.size()));
-  // The mesh is part of the scene, which outlives this geometry; Embree only reads it.
+  // The mesh belongs to the scene, which outlives this geometry. Embree only reads the mesh.
   static_assert(sizeof(mesh.triangles[0]) == 3 * sizeof(std::uint32_t));
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(mesh.triangles[0]), mesh.triangles.size());
@@ -84,7 +84,7 @@ struct RayScene::Impl {
   int rays_at_once;
   Vec3d origin;
   std::vector<Group> groups;  // [0] everything static, [1 + b] body b
-  SceneHandle top;            // instances of the groups; null when nothing moves
+  SceneHandle top;            // instances of the groups; null if nothing moves
   std::vector<RTCGeometry> instances;
   std::vector<Pose> placed;      // the last poses of bodies
   std::vector<Rotation> turned;  // their rotations, for normals
@@ -128,13 +128,13 @@ struct RayScene::Impl {
       if (!object.visible || object.mesh->triangles.empty()) continue;
       Pose placed_in_group = object.in_world;
       placed_in_group.position_m = placed_in_group.position_m - origin;
-      // Three numbers per corner, and one more, because Embree may read beyond the last.
+      // Three numbers per corner, and one additional number, because Embree may read beyond the last.
       auto vertices = std::make_shared<std::vector<float>>(3 * object.mesh->vertices.size() + 1);
       place_vertices(*object.mesh, placed_in_group, vertices->data());
       wanted.push_back({object.mesh, std::move(vertices), static_cast<std::uint32_t>(i)});
       triangles += object.mesh->triangles.size();
     }
-    // Finds the structure that already has most of these objects, if reusing it is worthwhile.
+    // Finds the structure that already contains most of these objects. Returns none if reuse would not save time.
     auto best = changing.end();
     std::size_t there = 0;
     for (auto group = changing.begin(); group != changing.end(); ++group)
@@ -175,7 +175,7 @@ struct RayScene::Impl {
       device.check();
     }
   }
-  // The static group becomes an instance, too, so that moving a body changes only a few boxes.
+  // The static group also becomes an instance, so that the motion of a body changes only a few boxes.
   void make_top() {
     top = SceneHandle(device);
     rtcSetSceneBuildQuality(top.handle, RTC_BUILD_QUALITY_LOW);
@@ -245,7 +245,7 @@ struct RayScene::Impl {
     std::memset(q.ray.mask, 0xFF, sizeof q.ray.mask);
     std::memset(q.hit.geomID, 0xFF, sizeof q.hit.geomID);
     std::memset(q.hit.instID, 0xFF, sizeof q.hit.instID);
-    // An inactive lane gets a ray that ends before it begins, so that Embree does not use its undefined values.
+    // An inactive lane gets a ray that ends before it begins. So Embree does not use its undefined values.
     for (int i = 0; i < lanes; ++i) {
       if (valid[i] != 0) continue;
       q.ray.org_x[i] = q.ray.org_y[i] = q.ray.org_z[i] = q.ray.dir_y[i] = q.ray.dir_z[i] = 0;

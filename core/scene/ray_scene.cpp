@@ -1,4 +1,4 @@
-// Queries that are the same for every tracer of rays.
+// Queries that are the same for every ray tracer.
 #include "core/scene/ray_scene.hpp"
 
 namespace sonar {

@@ -6,8 +6,8 @@
 
 #include "core/base/random.hpp"
 
-// The loops are compiled for three instruction sets, one of which is chosen when the program starts. This file is built without
-// fused multiply-add, so that rounding is the same in all of them.
+// The loops are compiled for three instruction sets, one of which is selected when the program starts. This file is built
+// without fused multiply-add, so that all three round in the same way.
 #if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
 #define SONAR_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
@@ -18,10 +18,10 @@
 namespace sonar::cell_lanes {
 namespace {
 
-constexpr int across = 4;  // blocks along a tile, and cells along a block
+constexpr int across = 4;  // number of blocks along a tile, and of cells along a block
 
-/// The quarter of its cell in which a point of a 4 x 4 block lies, from the cell's index along the block: two binary digits, each
-/// flipped by random bits that depend on the digits before it (nested scrambling).
+/// The quarter of a cell in which the point of the cell lies, from the index of the cell along its 4 x 4 block. It has two
+/// binary digits. Each is flipped by random bits that depend on the digits before it (nested scrambling).
 constexpr double quarter_of(int along, unsigned scramble) {
   const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
   const int half = (along & 1) ^ bit(along >> 1);
@@ -34,7 +34,7 @@ constexpr auto quarters = [] {
   return all;
 }();
 
-/// Sixteen draws of philox (core/base/random.hpp), computed together.
+/// Sixteen draws of philox (core/base/random.hpp), computed in parallel.
 struct Draws {
   alignas(64) std::uint32_t v[4][block];
 };
@@ -59,7 +59,7 @@ inline void draw(const DrawKey& key, const std::uint32_t* i, const std::uint32_t
   }
 }
 
-/// A number in (0, 1), like uniform_open(); the bits are a signed number, which vectors can convert.
+/// A number in (0, 1), like uniform_open(). The bits are a signed number, because vectors can convert signed numbers.
 inline float uniform(std::uint32_t bits) {
   return (static_cast<float>(static_cast<std::int32_t>(bits >> 9)) + 0.5f) * (1.0f / 8388608.0f);
 }
@@ -85,7 +85,7 @@ inline float minus_log(float x) {
   return -(f + y + 0.693359375f * e);
 }
 
-/// Rounds half away from zero, like lround; |x| must be below 2^23.
+/// Rounds half away from zero, like lround. |x| must be below 2^23.
 inline std::int32_t rounded(float x) { return static_cast<std::int32_t>(x + std::copysign(0x1.fffffep-2f, x)); }
 inline std::int32_t rounded(double x) { return static_cast<std::int32_t>(x + std::copysign(0x1.fffffffffffffp-2, x)); }
 
@@ -131,7 +131,7 @@ SONAR_CLONES void draw_points(const DrawKey& key, std::int32_t first_i, std::int
 
 SONAR_CLONES bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners,
                             BlockHeights& found) {
-  const FacetTest t = test;  // a local copy: the compiler knows that no store changes it
+  const FacetTest t = test;  // a local copy; with it the compiler knows that stores do not change it
   const auto& [e0, e1, e2] = t.edge;
   const double *at_u = in.u + which * block, *at_v = in.v + which * block;
   std::int64_t* owner = owners.facet + which * block;

@@ -27,15 +27,15 @@ struct OwnedAgain {
   double w;
 };
 
-/// The points that facets own in one cube.
+/// The points of one cube that facets own.
 struct Ownership {
   cell_lanes::Points points;
-  cell_lanes::Owners first;       // the first facet, for each point
-  std::vector<OwnedAgain> again;  // further facets, in the order of the facets
+  cell_lanes::Owners first;       // the first facet that owns each point
+  std::vector<OwnedAgain> again;  // further owners, in the order of the facets
   std::vector<FacetOfCells> facets;
 };
 
-/// Lattice columns (or rows) of this tile that an interval of the plane overlaps.
+/// Columns (or rows) of the lattice in this tile that an interval of the plane overlaps.
 struct CellRange {
   int from, to;
 };
@@ -49,7 +49,7 @@ std::int16_t normal_counts(double value) {
   return static_cast<std::int16_t>(std::lround(std::clamp(value * 32767, -32767.0, 32767.0)));
 }
 
-/// The tests lattice::owns and lattice::height, with all point-independent values precomputed.
+/// The tests lattice::owns and lattice::height. All values that do not depend on the point are computed in advance.
 cell_lanes::FacetTest test_of(const lattice::Facet& f, const TileAddress& a, CellRange cols, CellRange rows) {
   const double s = lattice::cell_size_m(a.level), edge = lattice::tile_edge_m(a.level), turn = f.nw > 0 ? 1.0 : -1.0;
   const auto border = [&](std::int32_t tile, int cell) { return (static_cast<double>(tile) * side + cell) * s; };
@@ -61,7 +61,7 @@ cell_lanes::FacetTest test_of(const lattice::Facet& f, const TileAddress& a, Cel
     const double sign = forward ? turn : -turn;
     const double du = turn * (f.u[j] - f.u[i]), dv = turn * (f.v[j] - f.v[i]);
     const bool with_its_points = dv < 0 || (dv == 0 && du > 0);
-    // Areas are zero or far above the smallest normal number, because coordinates are single precision.
+    // An area is zero or far above the smallest normal number, because coordinates are in single precision.
     t.edge[i] = {f.u[p], f.v[p], sign * (f.u[q] - f.u[p]), sign * (f.v[q] - f.v[p]),
                  with_its_points ? 0.0 : std::numeric_limits<double>::min()};
   }
@@ -103,7 +103,7 @@ void own(const lattice::Facet& f, const TileAddress& a, Ownership& all) {
     }
 }
 
-/// The cells of a tile in their order, padded to whole blocks with copies of the last cell that have a root of 0.
+/// The cells of a tile in their order. Copies of the last cell with a root of 0 fill the last block.
 struct CellList {
   explicit CellList(std::size_t most)
       : doubles(std::make_unique_for_overwrite<double[]>(4 * most)),
@@ -139,7 +139,8 @@ CellList list_cells(Ownership& all) {
   auto again = all.again.cbegin();
   int n = 0;
   for (int p = 0; p < cell_lanes::points; ++p) {
-    cells.put(n, all.points, p, all.first.facet[p], all.first.w[p]);  // the next point overwrites it if it has no owner
+    cells.put(n, all.points, p, all.first.facet[p],
+              all.first.w[p]);  // if the point has no owner, the next point overwrites this cell
     n += all.first.facet[p] >= 0;
     for (; again != all.again.cend() && again->point == p; ++again) cells.put(n++, all.points, p, again->facet, again->w);
   }
@@ -168,7 +169,7 @@ void find_roots(const Ownership& all, const TileAddress& a, const TextureField* 
   }
 }
 
-/// Scales the weights to the magnitude of their roots; returns the largest.
+/// Scales the weights to the magnitude of their roots. Returns the largest weight.
 float scale_to_one_magnitude(const CellList& cells) {
   double most = 0;
   for (int n = 0; n < cells.size; ++n) {

@@ -14,9 +14,9 @@
 namespace sonar {
 namespace {
 
-constexpr double fewest_cells = 3000;  // smallest number for an object, with CellView::exact_small
+constexpr double fewest_cells = 3000;  // smallest number of cells for an object, with CellView::exact_small
 
-/// The level of tiles for side lobes, where all cells of a place are in one cube.
+/// The level of tiles for side lobes. At each position, one cube contains all cells of this level.
 constexpr CellLevel at_all_ranges{.full_to_m = 1e9f, .fade_out_to_m = 1e9f};
 
 bool is_empty(const TileInView& t) { return t.tile->count == 0; }
@@ -27,7 +27,7 @@ int coarsest_wanted(const CellView& view) {
 
 }  // namespace
 
-/// Parts of earlier scenes, for later scenes that have the same parts.
+/// Parts of earlier scenes that later scenes with the same parts can use.
 struct SurfaceCells::Known {
   struct SkinOf {
     std::shared_ptr<const Mesh> mesh;
@@ -36,9 +36,9 @@ struct SurfaceCells::Known {
   std::map<const Mesh*, SkinOf> skins;
   struct Patch {
     std::unique_ptr<SurfacePatch> patch;
-    std::size_t bytes = 0;  // bytes of mesh and roots, which cached_bytes_ does not include
+    std::size_t bytes = 0;  // size of mesh and roots in bytes, not included in cached_bytes_
   };
-  std::vector<Patch> patches;  // in order of use, the last used at the end
+  std::vector<Patch> patches;  // in order of use, the last used patch at the end
   std::size_t bytes = 0;
 };
 
@@ -89,8 +89,8 @@ void SurfaceCells::lay_out() {
       if (!root->alone) roots_.push_back({patch.get(), root.get()});
 }
 
-/// Reuses the patches that an object had in earlier scenes: their cubes and, if the material is the same, their tiles. False if
-/// there are none.
+/// Reuses the patches that an object had in earlier scenes: their cubes and, if the material is the same, their tiles. Returns
+/// false if there are none.
 bool SurfaceCells::take_known(std::size_t o) {
   const Object& object = scene_->objects[o];
   const std::size_t before = patches_.size();
@@ -110,7 +110,7 @@ bool SurfaceCells::take_known(std::size_t o) {
 
 void SurfaceCells::plant(std::size_t o) {
   const Object& object = scene_->objects[o];
-  std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // material, axis, side
+  std::map<std::tuple<int, int, bool>, std::vector<std::uint32_t>> sorted;  // key: material, axis, side
   for (std::uint32_t t = 0; t < object.mesh->triangles.size(); ++t) {
     const Vec3d n = lattice::normal_of(*object.mesh, t);
     const int axis = lattice::dominant_axis(n);
@@ -130,7 +130,7 @@ void SurfaceCells::plant(std::size_t o) {
   }
 }
 
-/// Drops earlier scenes, the oldest first.
+/// Drops earlier scenes, beginning with the oldest.
 void SurfaceCells::forget_known() {
   std::size_t n = 0;
   const auto is_of_the_last = [&] {  // the patches of an object are added and dropped together
@@ -205,7 +205,7 @@ void SurfaceCells::visit(SurfacePatch& patch, CellNode& node, const Look& look, 
     const std::lock_guard lock(dividing_[reinterpret_cast<std::uintptr_t>(&node) / sizeof(CellNode) % dividing_.size()]);
     if (!node.divided.load(std::memory_order_relaxed)) found.new_bytes += patch.divide(node);
   }
-  // Prefetches all children before visiting the first, because they are scattered in memory.
+  // Prefetches all children before the first one is visited, because they are scattered in memory.
   for (const auto& child : node.children) {
     if (!child) continue;
     const auto* at = reinterpret_cast<const char*>(child.get());
@@ -216,12 +216,12 @@ void SurfaceCells::visit(SurfacePatch& patch, CellNode& node, const Look& look, 
     if (child) visit(patch, *child, look, found);
 }
 
-/// Adds coarser roots level by level, because cells for long pulses may be coarser than the first roots. With whole levels, the
-/// order of roots does not depend on earlier views.
+/// Adds coarser roots level by level, because cells for long pulses may be coarser than the first roots. Since whole levels are
+/// added, the order of the roots does not depend on earlier views.
 void SurfaceCells::raise_roots(const CellView& view) {
   for (; raised_ > coarsest_wanted(view); --raised_)
     for (auto& patch : patches_) {
-      patch->raise(raised_ - 1);  // a patch of an earlier scene may have them already
+      patch->raise(raised_ - 1);  // a patch of an earlier scene may already have them
       for (auto& root : patch->roots)
         if (root->alone && root->address.level == raised_ - 1) roots_.push_back({patch.get(), root.get()});
     }
@@ -273,7 +273,7 @@ void SurfaceCells::build(std::vector<Missing>& missing, Parallel& pool) {
 }
 
 const std::vector<TileInView>& SurfaceCells::in_view(const CellView& view, Parallel& pool) {
-  // Searches ranges of roots in parallel. The results of each range stay separate, so that the order does not depend on the
+  // Searches ranges of roots in parallel. The results of each range stay separate, so that their order does not depend on the
   // threads.
   constexpr std::size_t stretch = 16;
   raise_roots(view);
@@ -328,7 +328,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   pool.for_each(missing.empty() ? 0 : views.size(), [&](std::size_t v, int) { std::erase_if(found[v].tiles, is_empty); });
 }
 
-/// Drops the least recently used tiles. Tiles that are built again are identical.
+/// Drops the tiles that were not used for longest. If a dropped tile is built again, it is identical.
 void SurfaceCells::keep_within_budget() {
   if (cached_bytes_ > cache_bytes_) forget_known();
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {

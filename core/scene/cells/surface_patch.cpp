@@ -11,9 +11,9 @@ namespace {
 
 constexpr int most_roots_along_an_axis = 16;
 constexpr double most_steep = 4;      // largest ratio of cell areas at steep and at grazing incidence
-constexpr int few_in_side_lobes = 2;  // in levels: an object has at least a sixteenth of fewest_cells in side lobes
+constexpr int few_in_side_lobes = 2;  // in levels; an object has at least a sixteenth of fewest_cells in side lobes
 
-/// The finest level at which few enough cubes cover the triangles.
+/// The finest level at which the cubes that cover the triangles are few enough.
 int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, int finest) {
   Vec3 lo = mesh.vertices[mesh.triangles[triangles.front()][0]], hi = lo;
   for (const std::uint32_t t : triangles)
@@ -92,7 +92,7 @@ std::size_t SurfacePatch::divide(CellNode& node) const {
     a.k = a.k * 2 + (c >> 2 & 1);
     cubes[static_cast<std::size_t>(c)] = cube_of(a);
   }
-  std::vector<std::uint8_t> touched(node.triangles.size());  // cubes that each triangle touches, as bits
+  std::vector<std::uint8_t> touched(node.triangles.size());  // bit set of the cubes that each triangle touches
   std::array<std::size_t, 8> how_many{};
   for (std::size_t n = 0; n < touched.size(); ++n) {
     const lattice::FacetBounds f = lattice::bounds_of(lattice::facet_of(*mesh, node.triangles[n], axis));
@@ -123,13 +123,13 @@ int SurfacePatch::side_level(const TileAddress& address, Vec3d sonar_m, const Ce
   const Cube cube = cube_of(address);
   const Vec3d q = lattice::from_permuted(cube.u, cube.v, cube.w, axis) - sonar_m;
   const double along = axis == 0 ? q.x : axis == 1 ? q.y : q.z, range = length(q);
-  // A surface at right angles to the patch's axis has the grazing angle whose cosine is the distance from the axis over the
-  // range.
+  // The cosine of the grazing angle on a surface at right angles to the patch's axis is the distance from the axis divided by
+  // the range.
   const double aside = std::sqrt(std::max(range * range - along * along, 0.0));
   const double steep = range < most_steep * aside ? range / aside : most_steep;
   const double area = static_cast<double>(view.side_area_per_range_m) * steep * std::max(range - cube.radius() / 2, 0.0);
   const int finest = view.levels.back().level, coarsest_seen = view.levels.front().level - view.side_coarser;
-  // Cells of the level have that area at most: 2^-2 level <= area, whose exponent is exact.
+  // Cells of this level have at most that area: 2^-2 level <= area. The exponent of the area is exact.
   int exponent = 0;
   std::frexp(area, &exponent);
   const int by_area = area > 0 ? std::clamp((2 - exponent) >> 1, coarsest_seen, finest) : finest;
@@ -148,7 +148,7 @@ bool SurfacePatch::has_side_cells(const TileAddress& address, Vec3d sonar_m, con
 
 namespace {
 
-/// Adds the results of `of` for a cube and for the cubes inside it.
+/// Adds the results of `of` for a cube and for all cubes inside it.
 template <class CellNode, class Of>
 std::size_t sum_over(CellNode& node, const Of& of) {
   std::size_t sum = of(node);
@@ -179,7 +179,7 @@ std::size_t SurfacePatch::forget_below(CellNode& node, std::uint64_t then) {
     freed += forget_below(*child, then);
     stale = stale && child->last_visited < then;
   }
-  if (!stale) return freed;  // eight cubes are added or removed at a time, so that `divided` is correct
+  if (!stale) return freed;  // eight cubes are always added or removed together, so that `divided` is correct
   for (auto& child : node.children) {
     if (!child) continue;
     freed += child->own_bytes();

@@ -9,13 +9,13 @@ namespace {
 
 constexpr int quantiles = 256;       // intervals of the table of quantiles
 constexpr double widest_normal = 5;  // the table covers normals from -5 to 5
-constexpr double weakest = 1e-4;     // -40 dB; with lower values a cell could not be distinguished from an empty one
+constexpr double weakest = 1e-4;     // -40 dB; a cell with a lower value could not be distinguished from an empty cell
 constexpr int remembered_along = 16, remembered_up = 8;  // size of the cache of lattice points
 
 struct IncompleteGamma {
   double lower, upper;
 };
-/// P(a, x) and Q(a, x) = 1 - P, regularised: series below a + 1, continued fraction (Lentz) above.
+/// P(a, x) and Q(a, x) = 1 - P, regularised. Below a + 1 a series is used, above it a continued fraction (Lentz).
 IncompleteGamma incomplete_gamma(double a, double x, double log_gamma_a) {
   const double front = std::exp(a * std::log(x) - x - log_gamma_a);
   if (x < a + 1) {
@@ -39,10 +39,10 @@ IncompleteGamma incomplete_gamma(double a, double x, double log_gamma_a) {
   return {1 - front * h, front * h};
 }
 
-/// The Gamma variable of shape nu and mean 1 at the same quantile as a standard normal.
+/// The Gamma variable of shape nu and mean 1 at the quantile of a standard normal.
 double gamma_at_normal(double nu, double log_gamma_nu, double normal) {
   const double below = 0.5 * std::erfc(-normal / std::sqrt(2.0)), above = 0.5 * std::erfc(normal / std::sqrt(2.0));
-  // Bisection in log x: after 48 halvings the error is far below the rounding of the float results.
+  // Bisection in log x. After 48 halvings the error is far below the rounding error of the float results.
   double low = std::log(weakest * nu), high = std::log(nu + 40 * std::sqrt(nu) + 60);
   for (int i = 0; i < 48; ++i) {
     const double middle = 0.5 * (low + high);
@@ -114,7 +114,7 @@ float TexturePatch::normal_at(std::int32_t i, std::int32_t j, std::int32_t k) {
   return p.normal;
 }
 
-/// Loads the 27 points around a place, if they have changed; neighbouring cells have the same points.
+/// Loads the 27 points around a position if they have changed. Neighbouring cells mostly have the same points.
 void TexturePatch::load_points(std::int32_t i, std::int32_t j, std::int32_t k) {
   if (i == near_i_ && j == near_j_ && k == near_k_ && stands_) return;
   near_i_ = i, near_j_ = j, near_k_ = k;
@@ -126,7 +126,7 @@ void TexturePatch::load_points(std::int32_t i, std::int32_t j, std::int32_t k) {
 }
 
 float TexturePatch::root_at(Vec3d place_m) {
-  // Blend of 27 lattice normals; the weights' squares add to 1, so the result is again standard normal.
+  // Weighted sum of 27 lattice normals. The squares of the weights add to 1, so the result is again a standard normal.
   const double per_m = 1 / field_.lattice_m();
   const Blend x = blend_at(place_m.x * per_m), y = blend_at(place_m.y * per_m), z = blend_at(place_m.z * per_m);
   load_points(x.first, y.first, z.first);

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-// A triangle has an area if its height over its longest side exceeds rounding errors.
+// A triangle has an area if its height divided by its longest side exceeds rounding errors.
 bool has_area(Vec3 a, Vec3 b, Vec3 c) {
   const Vec3d ab = to_double(b) - to_double(a), ac = to_double(c) - to_double(a), bc = ac - ab;
   const double longest = std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)});
@@ -47,7 +47,7 @@ Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t mo
   VertexTable vertices(out.mesh.vertices, count / 2);  // number of vertices of a closed surface
   out.mesh.triangles.reserve(count);
   out.mesh.material.reserve(count);
-  // A file may change between the passes.
+  // The file may have changed between the passes.
   std::size_t again = 0;
   bool same = true;
   source([&](std::span<const Vec3d, 3> corners, std::uint16_t material) {

@@ -22,7 +22,7 @@
 namespace sonar {
 namespace {
 
-/// The path of the importer, relative to the programs as installed or built, so that an unpacked or moved installation works.
+/// The path of the importer, relative to the installed or built programs. With it, an unpacked or moved installation works.
 std::filesystem::path importer() {
   if (const char* given = std::getenv("SONARD_IMPORT_MESH"); given && *given) return given;
   std::error_code error;
@@ -126,7 +126,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   }
   opened->reset();
   if (auto room = check_import_memory(request, bytes); !room) return tl::make_unexpected(room.error());
-  // Bytes of a triangle in PLY; other formats take more.
+  // Size of a triangle in PLY [bytes]; other formats need more.
   begin_load_step("reading " + request.file.filename().string(), bytes / 20);
   return import_in_a_child(request);
 }

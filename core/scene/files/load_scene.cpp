@@ -11,7 +11,7 @@
 namespace sonar {
 namespace {
 
-// A file of more materials: {name: {...}}, as scenes/materials.yaml.
+// Reads a file of additional materials: {name: {...}}, as in scenes/materials.yaml.
 void read_material_library(const text::Node& node, const std::filesystem::path& folder, MaterialTable& materials) {
   if (!node.present()) return;
   const std::string name = node.text(1024);

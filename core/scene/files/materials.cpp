@@ -51,7 +51,7 @@ Texture read_texture(const text::Node& node, Texture texture, double shortest_m)
 
 MaterialTable::MaterialTable(Scene& scene) : scene_(scene), definitions_(library()) {}
 
-/// The library, parsed once, because data sets read thousands of scenes.
+/// The library is parsed only once, because data sets read thousands of scenes.
 const std::vector<Material>& MaterialTable::library() {
   static const std::vector<Material> materials = [] {
     auto document = text::parse_yaml(material_library_yaml, "materials.yaml", {.error_kind = ErrorKind::bug});

@@ -15,11 +15,11 @@ namespace {
 
 constexpr const char* version = "sonard-mesh-3";
 constexpr std::uint64_t magic = 0x3168'7365'6d64'7273;
-constexpr std::uint64_t most_text = std::uint64_t{256} << 20;  // limit in bytes for an error or the materials' names
+constexpr std::uint64_t most_text = std::uint64_t{256} << 20;  // limit in bytes of an error or of the names of materials
 
 struct Head {
   std::uint64_t magic = 0;
-  std::uint64_t error = 0;  // an ErrorKind; 0: a mesh
+  std::uint64_t error = 0;  // an ErrorKind; 0: the answer is a mesh
   std::uint64_t text = 0;   // bytes: the sentence, or names of materials with a zero after each
   std::uint64_t vertices = 0, triangles = 0, left_out = 0, lost = 0, hidden = 0;
   Vec3d centre_m{};
@@ -62,7 +62,7 @@ Result<LoadedMesh> broken() {
   return failure(ErrorKind::bug, "the program that imports meshes gave an invalid answer (this is a bug, please report it)");
 }
 
-/// Whether the mesh is valid, as every user of a mesh assumes.
+/// True if the mesh is valid. Every user of a mesh relies on this.
 bool is_sound(const LoadedMesh& mesh) {
   const Mesh& m = mesh.centred.mesh;
   return is_finite(mesh.centred.centre_m) &&

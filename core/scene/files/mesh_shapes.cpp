@@ -1,4 +1,4 @@
-// Mesh files named by a scene: reading them once, and giving every part of them a material.
+// Mesh files that a scene names: reads each of them once, and gives every part a material.
 #include <algorithm>
 #include <cstdio>
 
@@ -11,7 +11,8 @@ namespace sonar {
 using text::Map;
 using text::Node;
 
-// `materials: {name in file: ours}` first, then `material`, then a material of ours with the same name.
+// Chooses the material of a part: first from `materials: {name in file: our name}`, then `material`, then our material with the
+// name in the file.
 std::vector<std::uint16_t> ShapeReader::assign_materials(const std::vector<std::string>& names, const std::vector<bool>& used,
                                                          Map& keys) {
   std::vector<std::uint16_t> out(names.size(), 0);

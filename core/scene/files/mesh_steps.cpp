@@ -10,9 +10,9 @@
 namespace sonar {
 namespace {
 
-// Bytes for each byte of a file while the importer holds it; measured: 4 for PLY, 6 for OBJ.
+// Memory of the importer for each byte of a file; measured: 4 for PLY, 6 for OBJ.
 constexpr std::uintmax_t memory_of_a_byte = 8;
-constexpr std::uint64_t memory_of_a_triangle = 150;  // bytes, while they are cleaned, if no two of them share a corner
+constexpr std::uint64_t memory_of_a_triangle = 150;  // bytes during cleaning, if no two triangles share a corner
 
 Vec3d z_up_from_y_up(Vec3d p) { return {p.x, -p.z, p.y}; }
 

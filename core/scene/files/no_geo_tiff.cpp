@@ -1,4 +1,4 @@
-// Replaces geo_tiff.cpp if libtiff was not found.
+// Used instead of geo_tiff.cpp if libtiff was not found.
 #include "core/scene/shapes/terrain.hpp"
 
 namespace sonar {

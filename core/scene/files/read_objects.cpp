@@ -25,7 +25,7 @@ Pose pose_from(Map keys) {
   return pose;
 }
 
-// Reads the list in one pass; it stores the names in use, and which of them are bodies.
+// Reads the list in one pass. Stores the names in use, and which of them are bodies.
 class ObjectsReader {
  public:
   explicit ObjectsReader(ShapeReader& shapes) : shapes_(shapes), scene_(shapes.scene) {}
@@ -83,7 +83,7 @@ class ObjectsReader {
     return static_cast<int>(scene_.body_names.size()) - 1;
   }
 
-  // `pose` is relative to the body if there is one, else to the world.
+  // `pose` is relative to the body if the object has one, else to the world.
   void place(const Node& node, const Shape& shape, std::string name, const Pose& pose, int body, bool visible) {
     if (!shape.mesh) return;
     if (scene_.objects.size() >= max_objects) return node.fail("more than " + std::to_string(max_objects) + " objects");

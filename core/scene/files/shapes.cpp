@@ -30,7 +30,7 @@ Shape with_material(Mesh mesh, std::uint16_t material, const Primitive& primitiv
   return Shape{std::make_shared<const Mesh>(std::move(mesh)), {}, primitive};
 }
 
-/// A key that is equal for equal shapes; it contains all digits of the numbers.
+/// Makes a key. Keys are equal for equal shapes; a key contains all digits of the numbers.
 std::string shape_key(std::string_view type, std::uint16_t material, std::initializer_list<double> numbers) {
   std::string key(type);
   key += ' ' + std::to_string(material);
@@ -38,7 +38,7 @@ std::string shape_key(std::string_view type, std::uint16_t material, std::initia
   return key;
 }
 
-/// The usual extension of a grid, recognised by the first bytes of the file; empty if it is not a grid.
+/// The usual extension of a grid whose format the first bytes of the file show; empty if the file is not a grid.
 std::string grid_by_content(const std::filesystem::path& file) {
   auto head = read_regular(file, 64);
   if (!head) return {};
@@ -51,7 +51,7 @@ std::string grid_by_content(const std::filesystem::path& file) {
                                                                 "xllcenter", "yllcenter", "cellsize",  "nodata_value"};
   if (std::find(header_words.begin(), header_words.end(), word) != header_words.end()) return ".asc";
   const bool is_number = !word.empty() && word.find_first_not_of("0123456789+-.,;e") == word.npos;
-  return is_number && mesh_extension(file) == ".asc" ? ".xyz" : "";  // points in a file that some program named .asc
+  return is_number && mesh_extension(file) == ".asc" ? ".xyz" : "";  // some programs write points to files named .asc
 }
 
 constexpr std::uint64_t memory_of_a_height = 64;  // bytes, while a grid becomes a mesh
@@ -140,7 +140,7 @@ Shape ShapeReader::read_primitive(std::string_view type, Map& keys) {
     const auto v = keys.required(key).numbers<3>(a_size);
     return Vec3d{std::max(v[0], a_size.min), std::max(v[1], a_size.min), std::max(v[2], a_size.min)};
   };
-  // `numbers`: all that `make` depends on.
+  // `numbers`: all numbers on which `make` depends.
   const auto done = [&](std::initializer_list<double> numbers, const auto& make, const Primitive& primitive = {}) {
     return known_or(shape_key(type, material, numbers), [&] { return with_material(make(), material, primitive); });
   };

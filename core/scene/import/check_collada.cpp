@@ -43,7 +43,7 @@ Element parse_element(std::string_view tag) {
   return element;
 }
 
-/// The end of the tag that begins at `at`: its ">" outside of quotes.
+/// The end of the tag that begins at `at`: its ">" outside quotes.
 std::size_t end_of_tag(std::string_view text, std::size_t at) {
   for (char quote = 0; at < text.size(); ++at) {
     const char c = text[at];
@@ -56,7 +56,7 @@ std::size_t end_of_tag(std::string_view text, std::size_t at) {
   return none;
 }
 
-/// The elements that contain nodes, which are found like in the importer: in the library by id, else any node by id or name.
+/// The elements that contain nodes. Names are resolved as in the importer: in the library by id, else any node by id or name.
 struct Nodes {
   NodeGraph graph;
   std::vector<std::size_t> scenes;
@@ -88,7 +88,7 @@ std::uint64_t number_in(std::string_view text) {
   return n;
 }
 
-/// Reads the elements of geometries and counts triangles by the indices that primitives list, not by the counts that they
+/// Reads the elements of geometries. Triangles are counted by the indices that primitives list, not by the counts that they
 /// state.
 class Geometries {
  public:
@@ -143,7 +143,7 @@ MeshFault check_collada(std::string_view file, ListedFaces* faces) {
   constexpr std::size_t no_node = ~std::size_t{0};
   Nodes nodes;
   Geometries geometries;
-  std::vector<std::size_t> inside;  // for each open element, the node that it is in
+  std::vector<std::size_t> inside;  // for each open element, the node that contains it
   const auto after = [&](std::string_view end, std::size_t at) {
     const std::size_t found = file.find(end, at);
     return found == none ? none : found + end.size();

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t deepest_nesting = 200;
 using Json = nlohmann::json;
 
-/// Reads the text without storing it. Names of nodes are numbers, in glTF 1 words.
+/// Reads the text without storing it. Names of nodes are numbers; in glTF 1 they are words.
 class GltfWalk final : public Json::json_sax_t {
  public:
   MeshFault fault;
@@ -134,7 +134,7 @@ std::uint64_t triangles_of(const GltfWalk& walk, const GltfWalk::Primitive& prim
   return (primitive.mode == strip || primitive.mode == fan) && corners > 2 ? corners - 2 : 0;
 }
 
-/// Finds extensions that change surfaces or the storage of their data, which the importer would silently ignore.
+/// Finds extensions that change surfaces or the storage of their data. The importer would ignore them without an error.
 MeshFault unread_extension(const GltfWalk& walk) {
   const auto unread = [](const std::string& name) {
     return "needs the extension " + name.substr(0, 64) + ", which is not read; export it without";

@@ -26,14 +26,15 @@ std::uint64_t bytes_of_ply_head(std::string_view head) {
 }
 
 MeshFault check_ply(std::string_view file_head, std::uint64_t file_bytes) {
-  // Assimp 5.2 never returns if a header does not end.
+  // Assimp 5.2 never returns from reading a header that does not end.
   const std::size_t end = bytes_of_ply_head(file_head);
   if (end == 0) return "cannot be read: not a PLY file with a whole header, of lines that end with a line feed; export it again";
   const std::string head = small_letters(file_head.substr(0, end));
   std::istringstream lines(head);
   bool ascii = false;
   std::string element;
-  std::uint64_t count = 0, least = 0, all = 0;  // in bytes: `least` for one such element, `all` for the elements before it
+  std::uint64_t count = 0, least = 0,
+                all = 0;  // bytes; `least`: minimum of one such element; `all`: sum of the elements before it
   const auto holds = [&] {
     all = std::min<std::uint64_t>(all + count * std::max<std::uint64_t>(least, 1), std::uint64_t{1} << 62);
     return all <= file_bytes + 1;  // the last line end may be missing

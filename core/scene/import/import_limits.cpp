@@ -10,7 +10,8 @@
 
 #include "core/base/memory_left.hpp"
 
-// Shadow memory of sanitizers uses terabytes of address space, so with sanitizers their runtime applies the limit (main.cpp).
+// The shadow memory of sanitizers uses terabytes of address space. Therefore the runtime of the sanitizers applies the limit
+// instead (main.cpp).
 #ifdef SONAR_SANITIZED
 constexpr bool limits_addresses = false;
 #else

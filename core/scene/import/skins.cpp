@@ -14,7 +14,7 @@ namespace {
 using Matrix = aiMatrix4x4t<double>;
 using Places = std::map<std::string, Matrix>;
 
-/// The places of all nodes in the scene; of nodes with the same name, the first.
+/// The positions of all nodes in the scene. If nodes have the same name, the first one counts.
 void find_places(const aiNode& node, const Matrix& parent, unsigned depth, Places& places) {
   if (depth > NodeGraph::deepest) return;
   const Matrix here = parent * Matrix(node.mTransformation);

@@ -1,5 +1,5 @@
-// Generated ground: octaves of gradient noise, and sand ripples with bent crests that do not fork, on a grid whose spacing grows
-// outwards.
+// Generated ground: octaves of gradient noise, and sand ripples with bent crests that do not fork. The spacing of the grid
+// grows outwards.
 #include <algorithm>
 #include <cmath>
 
@@ -34,7 +34,7 @@ void widen(double from_m, double half_m, double spacing_m, Each&& each) {
 Axis make_axis(double size_m, double fine_m, double spacing_m) {
   const double half = size_m / 2, fine_half = std::min(fine_m / 2, half);
   const int n = fine_steps(fine_half, spacing_m);
-  std::vector<double> outwards;  // distances from the middle, beyond zero
+  std::vector<double> outwards;  // distances from the middle, without zero
   for (int i = 1; i <= n; ++i) outwards.push_back(fine_half * i / n);
   widen(fine_half, half, spacing_m, [&](double at) { outwards.push_back(at); });
   Axis axis;
@@ -48,10 +48,10 @@ Axis make_axis(double size_m, double fine_m, double spacing_m) {
   return axis;
 }
 
-// 1 where a wave has at least six points, 0 at three and fewer.
+// Weight of a wave: 1 if it has at least six grid points, 0 if it has three or fewer.
 double carried(double wavelength_m, double spacing_m) { return std::clamp(wavelength_m / spacing_m / 3 - 1, 0.0, 1.0); }
 
-// Rounded troughs, sharper crests, zero mean to a few per cent, -0.5..0.5.
+// Profile of a ripple, -0.5..0.5: rounded troughs, sharper crests, mean zero to a few per cent.
 double ripple_profile(double cycles) {
   const double c = std::cos(2 * pi * cycles);
   return 0.5 * (c + 0.25 * (c * c - 0.5)) / 1.125;

@@ -6,9 +6,9 @@
 namespace sonar {
 namespace {
 
-/// Computes east and north of every vertex of a grid. Coordinates in degrees or UTM give a point of the ellipsoid, which is
-/// projected into the plane that touches the ellipsoid at the origin; heights do not change. At a distance d from the origin,
-/// lengths along the ground become shorter by the fraction (d / R)^2 / 2.
+/// Computes east and north of every vertex of a grid. Coordinates in degrees or UTM give a point of the ellipsoid. This point
+/// is projected into the plane that touches the ellipsoid at the origin; heights do not change. At a distance d from the
+/// origin, lengths along the ground become shorter by the fraction (d / R)^2 / 2.
 class PlaneOf {
  public:
   explicit PlaneOf(const HeightGrid& grid) : grid_(grid) {

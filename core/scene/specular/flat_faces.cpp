@@ -12,10 +12,10 @@ namespace sonar {
 namespace {
 
 constexpr double least_area_m2 = 0.05;
-constexpr double least_width_m = 0.1;        // area / greatest extent; a mirror is many Fresnel zones wide
+constexpr double least_width_m = 0.1;        // least area divided by greatest extent; a mirror is many Fresnel zones wide
 constexpr double same_plane_m = 2e-4;        // an eighth of a wavelength at 1 MHz
 constexpr double same_normal = 1 - 1e-6;     // cosine
-constexpr double most_gentle_border = 0.25;  // share of a face's border
+constexpr double most_gentle_border = 0.25;  // fraction of a face's border
 
 using Triangles = std::vector<std::uint32_t>;
 
@@ -32,7 +32,7 @@ Vec3d area_vector(const Mesh& mesh, std::uint32_t t) {
   const Vec3d a = corner(mesh, t, 0);
   return cross(corner(mesh, t, 1) - a, corner(mesh, t, 2) - a);
 }
-/// Makes the normal's largest component positive, because both sides of a sheet are one mirror.
+/// Makes the normal's largest component positive. Both sides of a sheet are one mirror.
 Vec3d one_sided(Vec3d n) {
   const double x = std::abs(n.x), y = std::abs(n.y), z = std::abs(n.z);
   const double leading = z >= x && z >= y ? n.z : y >= x ? n.y : n.x;
@@ -46,12 +46,12 @@ struct Candidate {
   Triangles triangles;
 };
 
-/// Collects coplanar triangles. Planes are put into bins by rounded numbers. If a plane is close to the border of its bin, the
-/// neighbouring bin is searched as well.
+/// Collects coplanar triangles. Planes are sorted into bins by rounded numbers. If a plane is close to the border of its bin,
+/// the neighbouring bin is searched, too.
 class FaceSorter {
  public:
   void add(const Mesh& mesh, std::uint32_t t) {
-    // The plane of the largest triangle so far, where rounding matters least.
+    // The plane of the largest triangle so far, because its rounding error is smallest.
     const Vec3d twice = area_vector(mesh, t);
     const double area = 0.5 * length(twice);
     if (!(area > 0)) return;
@@ -75,7 +75,7 @@ class FaceSorter {
     const std::array<double, 4> x{p.normal.x * normal_steps, p.normal.y * normal_steps, p.normal.z * normal_steps,
                                   p.offset_m / same_plane_m};
     Key own{};
-    std::array<int, 4> beside{};  // the next bin, if that is close
+    std::array<int, 4> beside{};  // the next bin if its border is close
     for (std::size_t i = 0; i < 4; ++i) {
       own[i] = std::llround(x[i]);
       const double over = x[i] - static_cast<double>(own[i]);
@@ -131,7 +131,7 @@ class Edges {
   std::unordered_map<std::uint64_t, Triangles> sharing_;
 };
 
-/// Whether the face is a facet of a curved surface: neighbours along much of its border are at a small angle.
+/// True if the face is a facet of a curved surface: along much of its border its neighbours meet it at a small angle.
 bool curves_on(const Mesh& mesh, const Edges& edges, const Candidate& c) {
   const double gentle_bend = std::cos(smooth_edge_rad);
   double border_m = 0, gentle_m = 0;
@@ -176,7 +176,7 @@ FlatFaces find_flat_faces(const Scene& scene, double least_reflection) {
   }
   std::vector<std::size_t> order(found.faces.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  // Largest first: a ping uses the first most_mirrors of them.
+  // The largest faces come first, because a ping uses only the first most_mirrors of them.
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return found.faces[a].area_m2 > found.faces[b].area_m2; });
   FlatFaces sorted;

@@ -6,13 +6,13 @@
 namespace sonar {
 namespace {
 
-constexpr double bary_slack = 1e-6;     // normals are continuous across edges: a point must not fall between two triangles
+constexpr double bary_slack = 1e-6;     // tolerance: a point on an edge must not be lost between its two triangles
 constexpr double edge_units = 4;        // distance beyond the edge of a curved surface that is searched, in Fresnel units
 constexpr double twins_in_units = 0.5;  // mirror points nearer to each other than this count as one
 constexpr double walk_units = 16;       // an edge beyond this does not change the echo
-constexpr double trusted_units = 2;     // where the surface leaves its osculating arc farther out than this, no_owner notices
+constexpr double trusted_units = 2;     // beyond this distance the surface must not leave its osculating arc; no_owner reports it
 
-/// Whether the foot (0, 0) lies within the outline.
+/// True if the foot (0, 0) lies within the outline.
 bool within(const std::vector<OutlineEdge>& outline, Vec3d foot) {
   bool in = false;
   for (const OutlineEdge& e : outline)
@@ -32,7 +32,7 @@ double to_outline(const std::vector<OutlineEdge>& outline, Vec3d foot) {
 
 }  // namespace
 
-/// Finds points of flat faces in closed form, and of curved surfaces by a search in the tree of balls and normal cones.
+/// Finds points of flat faces in closed form, and points of curved surfaces by a search in the tree of balls and normal cones.
 void SpecularMesh::find(const SpecularQuery& query, std::vector<SpecularPoint>& out) const {
   find_on_faces(query, out);
   find_on_curves(query, out);
@@ -75,7 +75,7 @@ void SpecularMesh::find_on_curves(const SpecularQuery& q, std::vector<SpecularPo
     if (distance > radius) {
       const double off = std::acos(std::clamp(-dot(to_sonar, q.ahead) / distance, -1.0, 1.0));
       if (off - std::asin(radius / distance) > q.widest_rad) continue;
-      // Directions to the sonar fill a cone around to_sonar; those at the surface's edges may differ by a little more.
+      // Directions to the sonar fill a cone around to_sonar. At the surface's edges they may lie slightly outside.
       const double beside = 2 * edge_units * fresnel_unit_m(q.wavelength_m, distance, 0) / distance;
       const double spread = std::asin(radius / distance) + static_cast<double>(node.angle_rad) + beside;
       const double between = std::acos(std::clamp(std::abs(dot(to_sonar, to_double(node.axis))) / distance, 0.0, 1.0));
@@ -88,7 +88,7 @@ void SpecularMesh::find_on_curves(const SpecularQuery& q, std::vector<SpecularPo
     }
     for (std::uint32_t t = node.first; t < node.first + node.count; ++t) solve(t, q, out);
   }
-  // Two triangles may both have a point on their common edge. If they have different materials, each has half of the echo.
+  // Two triangles may both have a point on their common edge. If their materials differ, each has half of the echo.
   for (std::size_t i = first; i < out.size(); ++i) {
     const double apart = twins_in_units * std::min(fresnel_unit_m(q.wavelength_m, out[i].range_m, out[i].curvature[0]),
                                                    fresnel_unit_m(q.wavelength_m, out[i].range_m, out[i].curvature[1]));
@@ -99,7 +99,8 @@ void SpecularMesh::find_on_curves(const SpecularQuery& q, std::vector<SpecularPo
   }
 }
 
-// The place p0 + a e1 + b e2 of the triangle whose interpolated normal, t long, ends in the sonar: Newton's method.
+// Finds the point p0 + a e1 + b e2 of the triangle from which the interpolated normal, t long, ends at the sonar, by Newton's
+// method.
 std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle, Vec3d sonar_m) const {
   const Vertex &v0 = vertices_[triangle.vertex[0]], &v1 = vertices_[triangle.vertex[1]], &v2 = vertices_[triangle.vertex[2]];
   const Vec3d p0 = to_double(v0.position), e1 = to_double(v1.position) - p0, e2 = to_double(v2.position) - p0;
@@ -116,7 +117,7 @@ std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle
     if (!(std::abs(det) > 1e-12 * length(c1) * length(c2) * length(m))) return {};
     const double da = dot(cross(miss, c2), m) / det, db = dot(cross(c1, miss), m) / det, dt = dot(c12, miss) / det;
     a += da, b += db, t += dt;
-    // The problem is nearly linear, so that a place far outside does not converge to one inside.
+    // The problem is nearly linear. Therefore a point far outside the triangle does not converge to one inside.
     if (!(std::abs(a - 0.5) < most_sides && std::abs(b - 0.5) < most_sides)) return {};
     if (std::abs(da) + std::abs(db) < 1e-9) {
       const Vec3d normal = n0 + a * d1 + b * d2;
@@ -126,7 +127,7 @@ std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle
   return {};
 }
 
-// Principal directions and curvatures, from the tensor at the vertices; `weight` sums to one, `side` is -1 on the back.
+// Principal directions and curvatures, from the tensor at the vertices. `weight` sums to one; `side` is -1 on the back.
 void SpecularMesh::bend_at(const Triangle& triangle, const std::array<double, 3>& weight, double side, SpecularPoint& p) const {
   double s[6] = {};
   for (std::size_t k = 0; k < 3; ++k)
@@ -148,7 +149,7 @@ void SpecularMesh::solve(std::uint32_t index, const SpecularQuery& q, std::vecto
   const Triangle& triangle = triangles_[index];
   const std::optional<Foot> foot = foot_on(triangle, q.sonar_m);
   if (!foot) return;
-  // Outside the triangle the foot counts only if the surface ends there; the echo then comes from the edge.
+  // If the foot lies outside the triangle, it counts only if the surface ends there. The echo then comes from the edge.
   std::array<double, 3> held{};
   for (std::size_t k = 0; k < 3; ++k) {
     if (foot->weight[k] < -bary_slack && triangle.across[k] >= 0) return;
@@ -163,7 +164,7 @@ void SpecularMesh::solve(std::uint32_t index, const SpecularQuery& q, std::vecto
   p.normal = side * foot->normal;
   p.foot_m = q.sonar_m - p.range_m * p.normal;
   p.material = triangle.material;
-  // The curved surface lies above its facets by half of the height of the corners' planes above the place, to second order.
+  // To second order, the curved surface lies above its facet by half of the height of the corners' planes above this point.
   double bulge = 0;
   Vec3d entry;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -188,8 +189,8 @@ void SpecularMesh::solve(std::uint32_t index, const SpecularQuery& q, std::vecto
   out.push_back(std::move(p));
 }
 
-// Extent of the surface from a place on a triangle in a direction: to its edge, or infinite if the edge is too far to matter.
-// Parts beyond a deviation of a quarter wavelength from the osculating arc contribute nothing.
+// Extent of the surface from a point on a triangle in one direction: the distance to its edge, or infinite if the edge is too
+// far to matter. Parts that deviate from the osculating arc by more than a quarter wavelength contribute nothing.
 double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, const SpecularPoint& point, std::size_t axis,
                           double unit_m) const {
   constexpr double for_ever = std::numeric_limits<double>::infinity();
@@ -221,7 +222,7 @@ double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, cons
       const double s = std::max(share[k], 0.0) / -rate[k];
       if (s < leave) leave = s, through = k;
     }
-    if (through == 3) return for_ever;  // numerically stuck at a corner
+    if (through == 3) return for_ever;  // numerically caught at a corner
     from = from + leave * along;
     walked += leave;
     Vec3d normal;

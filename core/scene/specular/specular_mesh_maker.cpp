@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-constexpr double flat_rad = 0.003;    // facets of one plane may differ by this much: float coordinates
+constexpr double flat_rad = 0.003;    // facets of one plane may differ by this much, because coordinates are float
 constexpr std::uint32_t in_leaf = 8;  // triangles
 constexpr std::uint32_t no_owner = ~0u;
 
@@ -27,7 +27,7 @@ SpecularMesh::SpecularMesh(const Mesh& mesh, const std::vector<bool>& wanted) { 
 
 SpecularMesh::Maker::Maker(SpecularMesh& out, const Mesh& mesh, const std::vector<bool>& wanted) : out_(out) {
   std::unordered_map<std::array<float, 3>, std::uint32_t, VertexHash> known;
-  // Vertices at one place become one, so that facets that only touch become neighbours. + 0.0f turns -0 into 0.
+  // Vertices at one position become one vertex, so that facets that only touch become neighbours. + 0.0f turns -0 into 0.
   const auto weld = [&](std::uint32_t v) {
     const Vec3 p = mesh.vertices[v];
     const auto [at, is_new] = known.try_emplace({p.x + 0.0f, p.y + 0.0f, p.z + 0.0f}, static_cast<std::uint32_t>(place_.size()));
@@ -49,7 +49,7 @@ SpecularMesh::Maker::Maker(SpecularMesh& out, const Mesh& mesh, const std::vecto
 
 void SpecularMesh::Maker::make() {
   join_edges();
-  // Every facet belongs to one patch of smoothly joined facets: flat ones become polygons, others curved surfaces.
+  // Every facet belongs to one patch of smoothly joined facets. Flat patches become polygons, others curved surfaces.
   triangle_now_.resize(facets_.size(), -1);
   std::vector<std::uint32_t> patch;
   for (std::uint32_t f = 0; f < facets_.size(); ++f) {
@@ -63,7 +63,7 @@ void SpecularMesh::Maker::make() {
   if (!out_.triangles_.empty()) plant();
 }
 
-// Facets that share an edge are neighbours. An edge with more than two facets joins none.
+// Facets that share an edge are neighbours. An edge with more than two facets joins none of them.
 void SpecularMesh::Maker::join_edges() {
   struct Side {
     std::uint32_t a, b, facet, corner;
@@ -74,7 +74,7 @@ void SpecularMesh::Maker::join_edges() {
       const std::uint32_t p = facets_[f].vertex[(k + 1) % 3], q = facets_[f].vertex[(k + 2) % 3];
       sides.push_back({std::min(p, q), std::max(p, q), f, k});
     }
-  // Makes equal edges neighbours in the order.
+  // After this sort, equal edges are neighbours.
   std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
     return std::tie(x.a, x.b, x.facet, x.corner) < std::tie(y.a, y.b, y.facet, y.corner);
   });
@@ -89,7 +89,7 @@ void SpecularMesh::Maker::join_edges() {
   }
 }
 
-// Whether the two facets have opposite directions along their shared edge, like facets of one side.
+// True if the two facets have opposite directions along their shared edge. Facets with the same outer side have this property.
 bool SpecularMesh::Maker::same_side(const Facet& a, std::size_t corner, const Facet& b) const {
   const std::uint32_t p = a.vertex[(corner + 1) % 3], q = a.vertex[(corner + 2) % 3];
   for (std::size_t k = 0; k < 3; ++k)
@@ -125,7 +125,7 @@ void SpecularMesh::Maker::grow(std::uint32_t seed, std::vector<std::uint32_t>& p
 
 bool SpecularMesh::Maker::is_flat(const std::vector<std::uint32_t>& patch) const {
   Vec3d mean;
-  // Area-weighted mean normal; flat when all facets agree with it and lie in one plane.
+  // Area-weighted mean normal. The patch is flat if all facets agree with this normal and lie in one plane.
   for (const std::uint32_t f : patch) mean = mean + facets_[f].area * facets_[f].normal;
   mean = unit_vector(mean);
   const Vec3d at = place_[facets_[patch.front()].vertex[0]];
@@ -162,7 +162,7 @@ void SpecularMesh::Maker::add_face(const std::vector<std::uint32_t>& patch) {
   }
   if (sides.empty()) return;
   face.normal = unit_vector(face.normal);
-  // In-plane axes: along the longest edge, and across it.
+  // Axes in the plane: along the longest edge, and perpendicular to it.
   face.along[0] = unit_vector(face.along[0] - dot(face.along[0], face.normal) * face.normal);
   face.along[1] = cross(face.normal, face.along[0]);
   face.origin = sides.front().p;
@@ -190,7 +190,7 @@ void SpecularMesh::Maker::add_curved(const std::vector<std::uint32_t>& patch) {
     triangle.material = facets_[f].material;
     for (std::size_t k = 0; k < 3; ++k) {
       std::uint32_t& v = vertex_now_[facets_[f].vertex[k]];
-      if (v == no_owner || v < first_vertex) {  // the vertex belongs to another patch, and every patch has its own normals
+      if (v == no_owner || v < first_vertex) {  // the vertex belongs to another patch; every patch has its own normals
         v = static_cast<std::uint32_t>(out_.vertices_.size());
         out_.vertices_.push_back({to_float(place_[facets_[f].vertex[k]]), {}, {}});
       }
@@ -205,8 +205,8 @@ void SpecularMesh::Maker::add_curved(const std::vector<std::uint32_t>& patch) {
   set_bends(first_vertex, static_cast<std::uint32_t>(first_triangle));
 }
 
-// Computes the mean of the facets around a vertex, weighted by their angles there, so that it does not depend on the diagonals
-// of quads.
+// Computes the mean normal of the facets around a vertex. The weights are the angles of the facets at the vertex, so that the
+// result does not depend on the diagonals of quads.
 void SpecularMesh::Maker::set_normals(std::uint32_t first_vertex, std::uint32_t first_triangle) {
   // n_v = sum of angle_f n_f over the facets around the vertex.
   std::vector<Vec3d> sum(out_.vertices_.size() - first_vertex);
@@ -223,8 +223,8 @@ void SpecularMesh::Maker::set_normals(std::uint32_t first_vertex, std::uint32_t 
   for (std::size_t i = 0; i < sum.size(); ++i) out_.vertices_[first_vertex + i].normal = to_float(unit_vector(sum[i]));
 }
 
-// Computes the change of the normal over each triangle by least squares over its edges (Rusinkiewicz 2004), and its mean at
-// vertices, weighted by area.
+// Computes the change of the normal over each triangle by least squares over its edges (Rusinkiewicz 2004), and the mean of
+// these changes at the vertices, weighted by area.
 void SpecularMesh::Maker::set_bends(std::uint32_t first_vertex, std::uint32_t first_triangle) {
   const std::size_t vertices = out_.vertices_.size() - first_vertex;
   std::vector<std::array<double, 6>> sum(vertices);
@@ -302,7 +302,8 @@ void SpecularMesh::Maker::branch(std::vector<std::uint32_t>& order, std::uint32_
     axis = axis + to_double(v.normal);
   });
   const Vec3d centre = 0.5 * (low + high), size = high - low;
-  // Ball of places and cone of normals: a node can have a foot only if the direction to the sonar lies in the cone.
+  // Ball around the points and cone around the normals. A node can contain a foot only if the direction to the sonar lies in
+  // the cone.
   axis = unit_vector(axis);
   double cosine = length(axis) > 0.5 ? 1 : -1, radius = 0;
   each([&](const SpecularMesh::Vertex& v) {
@@ -320,7 +321,7 @@ void SpecularMesh::Maker::branch(std::vector<std::uint32_t>& order, std::uint32_
     const std::uint32_t middle = first + (last - first) / 2;
     const int k = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
     const auto place = [&](std::uint32_t t) { return k == 0 ? middle_[t].x : k == 1 ? middle_[t].y : middle_[t].z; };
-    // Split at the median along the longest side; ties by index, so that the tree is always the same.
+    // Splits at the median along the longest side. Equal values are sorted by index, so that the tree is always the same.
     std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last, [&](std::uint32_t a, std::uint32_t b) {
       const float pa = place(a), pb = place(b);
       return pa != pb ? pa < pb : a < b;

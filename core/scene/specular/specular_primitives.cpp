@@ -8,14 +8,14 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr int disc_edges = 96;
-constexpr double nearest_m = 1e-3;  // a sonar in the surface gets no echo from it
+constexpr double nearest_m = 1e-3;  // a sonar that is nearer to the surface gets no echo from it
 
 Vec3d axis(int k) { return {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0}; }
 double component(Vec3d v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 bool is_audible(const SpecularPoint& p, const SpecularQuery& q) {
   if (p.range_m < nearest_m || p.range_m > q.max_range_m) return false;
-  // Outside the surface the echo comes from its edge, and falls with the distance in Fresnel units.
+  // Outside the surface the echo comes from its edge. It falls with the distance in Fresnel units.
   double gap = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const double beside = std::max({p.from[k], -p.to[k], 0.0});
@@ -33,7 +33,7 @@ void sphere(const Primitive& shape, const SpecularQuery& q, std::vector<Specular
   const double d = length(q.sonar_m);
   if (d <= shape.radius_m) return;
   SpecularPoint p;
-  // The normal points from the centre to the sonar; both principal radii are that of the sphere.
+  // The normal points from the centre to the sonar. Both principal radii are the radius of the sphere.
   p.normal = (1 / d) * q.sonar_m;
   p.foot_m = shape.radius_m * p.normal;
   p.along[0] = std::abs(p.normal.z) < 0.9 ? cross(p.normal, Vec3d{0, 0, 1}) : cross(p.normal, Vec3d{1, 0, 0});
@@ -44,20 +44,20 @@ void sphere(const Primitive& shape, const SpecularQuery& q, std::vector<Specular
   keep(std::move(p), q, out);
 }
 
-/// A flat face across axis k at `place`, half extents along the two axes after it; `side`: direction of its outer side.
+/// A flat face across axis k at `place`, with half extents along the two axes after k. `side`: direction of its outer side.
 struct Face {
   int k = 2;
   double place = 0, side = 1;
   double half_u = 0, half_v = 0;
 };
 
-/// The face's mirror point, if the sonar is on the side `toward` of it (+1 or -1 along axis k).
+/// The face's mirror point, if the sonar is on its side `toward` (+1 or -1 along axis k).
 SpecularPoint of_face(const Face& f, double toward, const SpecularQuery& q) {
   const int u = (f.k + 1) % 3, v = (f.k + 2) % 3;
   SpecularPoint p;
   p.normal = toward * axis(f.k);
   p.along = {axis(u), axis(v)};
-  // The sonar's projection onto the face's plane; the face's bounds relative to it.
+  // The sonar's projection onto the face's plane, and the face's bounds relative to it.
   p.range_m = toward * (component(q.sonar_m, f.k) - f.place);
   p.foot_m = q.sonar_m - p.range_m * p.normal;
   const double at_u = component(q.sonar_m, u), at_v = component(q.sonar_m, v);
@@ -67,7 +67,7 @@ SpecularPoint of_face(const Face& f, double toward, const SpecularQuery& q) {
 }
 
 void add_disc(SpecularPoint& p, double radius_m) {
-  // A polygon of the circle's area.
+  // A polygon with the area of the circle.
   const double r = radius_m * std::sqrt(2 * pi / disc_edges / std::sin(2 * pi / disc_edges));
   const double x = 0.5 * (p.from[0] + p.to[0]), y = 0.5 * (p.from[1] + p.to[1]);
   for (int i = 0; i < disc_edges; ++i) {
@@ -93,7 +93,7 @@ void box(const Primitive& shape, const SpecularQuery& q, std::vector<SpecularPoi
 void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<SpecularPoint>& out) {
   const double a = shape.radius_m, half = shape.size_m.z / 2;
   const double d = std::hypot(q.sonar_m.x, q.sonar_m.y);
-  // Nearest wall along the radius through the sonar; R1 = the radius, R2 infinite.
+  // The nearest wall on the radius through the sonar. R1 is the radius, R2 infinite.
   const Vec3d outward = d > 1e-12 ? Vec3d{q.sonar_m.x / d, q.sonar_m.y / d, 0} : Vec3d{1, 0, 0};
   const auto wall = [&](Vec3d at, Vec3d normal, double range_m, double curvature) {
     SpecularPoint p;
@@ -102,7 +102,7 @@ void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<Specul
     p.along = {cross(Vec3d{0, 0, 1}, normal), {0, 0, 1}};
     p.curvature = {curvature, 0};
     p.range_m = range_m;
-    // A concave wall is a mirror over half of its circle; a convex one ends only by curving away.
+    // A concave wall is a mirror over half of its circle. A convex wall ends only where it curves away.
     p.from = {curvature < 0 ? -pi * a / 2 : -infinite, -half - q.sonar_m.z};
     p.to = {curvature < 0 ? pi * a / 2 : infinite, half - q.sonar_m.z};
     keep(std::move(p), q, out);
@@ -111,7 +111,7 @@ void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<Specul
   if (d > a) {
     wall(outward, outward, d - a, 1 / a);
   } else if (within || shape.inside) {
-    // From inside there are two mirror points: on the near wall and on the wall across the axis. Both walls are concave.
+    // Seen from inside there are two mirror points: on the near wall and on the wall across the axis. Both walls are concave.
     wall(outward, -1.0 * outward, a - d, -1 / a);
     wall(-1.0 * outward, outward, a + d, -1 / a);
   }
@@ -131,7 +131,7 @@ void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<Specul
 
 double bending(double range_m, double curvature_per_m) {
   constexpr double least = 0.05;
-  // 1 + r / R of eq. 7, kept away from 0 at a focus.
+  // 1 + r / R of eq. 7. It must not be 0, which it would be at a focus.
   const double f = 1 + range_m * curvature_per_m;
   return f >= 0 ? std::max(f, least) : std::min(f, -least);
 }
