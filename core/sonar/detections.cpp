@@ -12,16 +12,16 @@
 namespace sonar {
 namespace {
 
-/// A sample that is weaker than the loudest of its row by more than this may come from a side lobe: with Hamming weights side
-/// lobes are 42 dB below.
+/// If a sample is weaker than the strongest of its row by more than this, it may come from a side lobe. With Hamming weights
+/// side lobes are at -42 dB.
 constexpr double side_lobes_db = 30;
-/// A peak that is weaker than the loudest sample of its direction by more than this may be the tail of a pulse, or of an echo
-/// from another direction.
+/// If a peak is weaker than the strongest sample of its direction by more than this, it may be the tail of a pulse, or come
+/// from an echo in another direction.
 constexpr double tail_db = 12;
-/// Neighbours on a floor may differ by this much because of speckle.
+/// Neighbouring directions on a floor may differ by this much because of speckle [dB].
 constexpr double fill_db = 20;
 
-/// Levels [dB] of a picture. They increase with the codes of its samples, so that codes can be compared instead.
+/// Levels [dB] of a picture. They increase with the codes of its samples. Therefore codes can be compared instead of levels.
 class Levels {
  public:
   explicit Levels(const Ping& ping)
@@ -40,7 +40,7 @@ class Levels {
     return static_cast<double>(format_.floor_db) + span * code / format_.max_code;
   }
   double operator()(int row, int beam) const { return of(code(row, beam)); }
-  /// The lowest code of at least this level; one more than the highest code if there is none.
+  /// The lowest code of at least this level. If there is none, it is the highest code plus one.
   std::uint64_t least_code(double db) const {
     std::uint64_t low = 0, high = std::uint64_t{1} << (8 * bytes_);
     while (low < high) {
@@ -52,12 +52,12 @@ class Levels {
     }
     return low;
   }
-  /// By counting the bytes of codes, the highest first, which takes half the time of a partial sort.
+  /// The median is found by counting the bytes of codes, the highest byte first. This takes half the time of a partial sort.
   double median_of(int beam) const {
     std::vector<std::uint64_t> all(static_cast<std::size_t>(rows));
     for (int row = 0; row < rows; ++row) all[static_cast<std::size_t>(row)] = code(row, beam);
     std::uint64_t median = 0;
-    std::size_t rank = all.size() / 2;  // among the codes that begin like `median`
+    std::size_t rank = all.size() / 2;  // rank among the codes that begin like `median`
     for (std::size_t byte = bytes_; byte-- > 0;) {
       std::array<std::size_t, 256> count{};
       for (const std::uint64_t each : all)
@@ -77,7 +77,7 @@ class Levels {
   const SampleFormat& format_;
 };
 
-/// The place of the maximum of a parabola through three levels, relative to the middle one, within half a step.
+/// The position of the maximum of a parabola through three levels, relative to the middle one, within half a step.
 double top_of(double before, double middle, double after) {
   const double curve = before - 2 * middle + after;
   return curve < 0 ? std::clamp(0.5 * (before - after) / curve, -0.5, 0.5) : 0;
@@ -107,21 +107,21 @@ struct Fan {
   }
 };
 
-/// An echo whose direction follows from the levels of the row across the beams.
+/// An echo. Its direction follows from the levels of its row in neighbouring beams.
 struct Peak {
   double level_db;
   int row, beam;
   double azimuth_rad;
 };
 
-/// The azimuth of an echo that is loudest in this beam of its row; nothing if it is beyond the sector.
+/// The azimuth of an echo whose strongest beam in this row is `beam`; nullopt if the azimuth lies outside the sector.
 std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int row, int beam) {
   const double here = level(row, beam);
   if (beam > 0 && beam + 1 < level.beams) {
     const double shift = top_of(level(row, beam - 1), here, level(row, beam + 1));
     return fan.azimuth(beam) + std::abs(shift) * (fan.azimuth(shift < 0 ? beam - 1 : beam + 1) - fan.azimuth(beam));
   }
-  // At an edge only one side has a beam: the offset follows from the fall of the main lobe, 12 dB (offset / width)^2.
+  // At an edge only one side has a beam. The offset follows from the fall of the main lobe, 12 dB (offset / width)^2.
   const int inner = beam == 0 ? 1 : beam - 1;
   const double u = std::sin(fan.azimuth(beam)), v = std::sin(fan.azimuth(inner));
   const double sine = (u + v) / 2 + (here - level(row, inner)) * fan.width_sine * fan.width_sine / (24 * (u - v));
@@ -130,7 +130,7 @@ std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int r
   return azimuth;
 }
 
-/// Peaks across the beams, the loudest first. Side lobes of the loudest peak of a row are left out.
+/// Peaks across the beams, the strongest first. Side lobes of the strongest peak of a row are omitted.
 std::vector<Peak> peaks_in(const Fan& fan, const Levels& level, const std::vector<double>& least_db) {
   std::vector<std::uint64_t> least;
   for (const double db : least_db) least.push_back(level.least_code(db));
@@ -155,8 +155,8 @@ struct Found {
   double level_db;
 };
 
-/// The loudest peak of each direction. Left out are peaks within half a beam and two pulses of a louder peak, which may have
-/// caused them, and peaks far weaker than the loudest sample of their direction.
+/// The strongest peak of each direction. Two kinds of peaks are omitted: those within half a beam and two pulses of a stronger
+/// peak, which may have caused them, and those far weaker than the strongest sample of their direction.
 std::vector<std::optional<Found>> loudest_peaks(const Fan& fan, const Levels& level, const std::vector<double>& least_db,
                                                 double reach_m) {
   const PingSettings& settings = fan.ping.request.settings;
@@ -199,8 +199,8 @@ std::optional<double> range_between(const Detection& a, const Detection& b, doub
   return std::hypot(y + along * dy, x + along * dx);
 }
 
-/// Below the sonar the echo of a floor has the same range in several directions, and the row has one peak for all of them. If
-/// neighbours on both sides are on a floor, the point is the centroid of the amplitude near the range between them.
+/// Near the vertical, the echo of a floor has the same range in several directions, and its row has one peak for all of them.
+/// If the neighbours on both sides are on a floor, the point is the centroid of the amplitude near the range between them.
 std::optional<Found> by_amplitude(const Fan& fan, const Levels& level, const std::vector<double>& least_db, int direction,
                                   const Found& before, const Found& after, double reach_m) {
   const PingSettings& settings = fan.ping.request.settings;
@@ -235,7 +235,7 @@ std::vector<Detection> detect_points(const Ping& ping, int directions, double ab
   for (int b = 0; b < level.beams; ++b) least_db.push_back(level.median_of(b) + above_db);
   const double reach_m = 2 * std::max(static_cast<double>(settings.pulse_width_m), settings.range_bin_m);
   std::vector<std::optional<Found>> found = loudest_peaks(fan, level, least_db, reach_m);
-  // A floor has no holes: the directions between two points are filled if all of them can be.
+  // A floor has no holes. Therefore the directions between two points are filled if all of them can be filled.
   for (int d = 1; d < directions; ++d) {
     int end = d;
     while (end < directions && !found[static_cast<std::size_t>(end)]) ++end;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double saturated_level = 0.999;
 
-/// next_gain_db() assumes that codes are a power of the amplitude, which logarithmic samples are not.
+/// False for logarithmic samples: next_gain_db() assumes that codes are a power of the amplitude.
 bool is_assisted(const PingSettings& s) { return s.gain_assist && s.format.scale == SampleFormat::Scale::linear; }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Absorption, sound speed, density and pressure of the water, by published formulae with their published digits.
-// A ping uses them once per request; vendors use them for the values that their devices assume.
+// A ping uses them once. Vendors use them for the values that their devices assume.
 #include "core/sonar/water.hpp"
 
 #include <algorithm>
@@ -17,13 +17,13 @@ double polynomial(double x, const double (&c)[N]) {
   return sum;
 }
 
-/// One relaxation term f_r f^2 / (f_r^2 + f^2); all frequencies in the same unit.
+/// One relaxation term f_r f^2 / (f_r^2 + f^2). All frequencies have the same unit.
 double relaxation(double resonance, double f) { return resonance * f * f / (resonance * resonance + f * f); }
 
 }  // namespace
 
-// Francois & Garrison 1982, JASA 72(3) and 72(6). f in kHz, z in m, result of the sum in dB/km.
-// Data reach 1 MHz; above, only the viscous f^2 term of pure water matters, which is accurate to 3 MHz and beyond.
+// Francois & Garrison 1982, JASA 72(3) and 72(6). f in kHz, z in m, result in dB/km.
+// The data reach 1 MHz. Above, only the viscous f^2 term of pure water matters, which is accurate to 3 MHz and beyond.
 double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz) {
   const double t = water.temperature_c, s = std::max(water.salinity_psu, 0.0), z = std::max(depth_m, 0.0);
   const double f = frequency_hz * 1e-3;
