@@ -14,7 +14,7 @@
 namespace sonar::text {
 namespace {
 
-constexpr std::size_t short_list = 8;  // choices that an error lists
+constexpr std::size_t short_list = 8;  // number of choices that an error lists
 
 std::string in_quotes(std::string_view word) { return "\"" + std::string(word) + "\""; }
 
@@ -24,7 +24,7 @@ std::string joined(const std::vector<std::string>& words, const char* between) {
   return all;
 }
 
-/// Whether a word is a decimal number in any unambiguous form; CLI11 converts it afterwards.
+/// True if a word is a decimal number in any unambiguous form. CLI11 converts it afterwards.
 bool is_number(std::string_view given, double& value) {
   const std::string_view digits = given.starts_with('+') ? given.substr(1) : given;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
@@ -81,7 +81,8 @@ std::string error_of_unknown(const UnknownWord& unknown) {
   return "unexpected argument " + in_quotes(unknown.word);
 }
 
-/// The text of CLI11, except for missing commands and arguments: of these CLI11 names neither choices nor meaning.
+/// The error text of CLI11. If a command or argument is missing, that text contains neither choices nor meaning, so another
+/// text is returned.
 std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error) {
   if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::RequiredError)) return error.what();
   if (asked.get_require_subcommand_min() > 0) return "a command is required: " + joined(command_names(asked), ", ");
@@ -90,8 +91,8 @@ std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error)
   return error.what();
 }
 
-/// CLI11 names the option, except for hidden options. For a value from an environment variable the error names the variable.
-/// CLI11 reads the variables of all commands, not only of the requested one.
+/// CLI11 names the option in its error, except for hidden options. If the value came from an environment variable, the error
+/// must name the variable. CLI11 reads the variables of all commands, not only of the requested one.
 std::string with_its_source(const std::string& sentence, const CLI::App& app, const std::vector<std::string>& words) {
   for (const CLI::Option* option : app.get_options()) {
     const std::string variable = option->get_envname(), name = option->get_name();

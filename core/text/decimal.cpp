@@ -69,7 +69,7 @@ std::optional<double> parse_infinity(std::string_view s) {
   return negative ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::infinity();
 }
 
-// A number such as "012" is 10 in YAML 1.1, but people read it as 12. The hint says how to write it.
+// A number such as "012" is 10 in YAML 1.1, but people read it as 12. The hint explains how to write the number.
 std::string_view number_hint(std::string_view s) {
   if (s.starts_with('+') || s.starts_with('-')) s.remove_prefix(1);
   if (s.size() > 1 && s[0] == '0' && is_digit(s[1])) return "; remove the leading zero";

@@ -10,7 +10,7 @@ namespace sonar::text {
 namespace {
 
 std::string folded(std::string_view s) {
-  std::string out = small_letters(s.substr(0, 64));  // a longer name is not a typing error
+  std::string out = small_letters(s.substr(0, 64));  // a word that is longer than this is not a typing error
   for (char& c : out)
     if (c == '-' || c == ' ') c = '_';
   return out;
@@ -42,7 +42,7 @@ std::string_view nearest(std::string_view name, std::span<const std::string_view
   for (const std::string_view candidate : candidates) {
     const std::string c = folded(candidate);
     std::size_t d = distance(wanted, c);
-    // A missing suffix is a common mistake too: "xyz" for "xyz_m", "temperature" for "temperature_c".
+    // A missing suffix is also a common mistake: "xyz" for "xyz_m", "temperature" for "temperature_c".
     if (wanted.size() >= 3 && (c.starts_with(wanted + "_") || wanted.starts_with(c + "_"))) d = std::min<std::size_t>(d, 1);
     if (d < best_distance) {
       best_distance = d;

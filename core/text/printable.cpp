@@ -9,7 +9,7 @@
 namespace sonar::text {
 namespace {
 
-/// Number of bytes of the first character; 0 = invalid, or a control character.
+/// Number of bytes of the first character; 0 = it is invalid or a control character.
 std::size_t character_at(std::string_view text) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
   const unsigned first = byte(0);

@@ -21,7 +21,7 @@ struct Refused {  // thrown out of yaml-cpp's parser, caught in parse_yaml
   std::string path, what;
 };
 
-// Builds the tree while yaml-cpp parses, so that limits apply before memory grows, and aliases never expand.
+// Builds the tree while yaml-cpp parses. So limits apply before memory grows, and aliases are never expanded.
 class TreeBuilder final : public YAML::EventHandler {
  public:
   TreeBuilder(YamlTree& tree, const YamlLimits& limits) : tree_(tree), limits_(limits) {}
@@ -133,7 +133,7 @@ class TreeBuilder final : public YAML::EventHandler {
   std::vector<Level> stack_;
 };
 
-// yaml-cpp's scanner keeps a stack of open brackets; a file of brackets alone must not reach it.
+// yaml-cpp's scanner keeps a stack of open brackets. A file with nothing but brackets must not reach it.
 std::optional<Refused> check_characters(std::string_view text) {
   int line = 1, column = 1;
   for (std::size_t i = 0; i < text.size(); ++i) {

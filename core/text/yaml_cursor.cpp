@@ -267,7 +267,7 @@ std::optional<Error> Document::error() const { return tree_->first_error; }
 
 namespace {
 
-// An unknown key that is near a missing one explains more than the missing key does.
+// If an unknown key is near a missing key, the error about the unknown key explains more.
 std::optional<Error> check_keys(const YamlTree& tree, const YamlNode& map) {
   std::vector<std::string_view> valid(map.asked.begin(), map.asked.end());
   std::vector<std::string_view> missing(map.missing.begin(), map.missing.end());
