@@ -10,7 +10,7 @@ constexpr double bary_slack = 1e-6;     // tolerance: a point on an edge must no
 constexpr double edge_units = 4;        // distance beyond the edge of a curved surface that is searched, in Fresnel units
 constexpr double twins_in_units = 0.5;  // mirror points nearer to each other than this count as one
 constexpr double walk_units = 16;       // an edge beyond this does not change the echo
-constexpr double trusted_units = 2;     // beyond this distance the surface must not leave its osculating arc; no_owner reports it
+constexpr double trusted_units = 2;  // if the surface leaves its osculating arc farther out than this, the echo does not change
 
 /// True if the foot (0, 0) lies within the outline.
 bool within(const std::vector<OutlineEdge>& outline, Vec3d foot) {
