@@ -5,7 +5,7 @@
 namespace sonar::cuda {
 namespace {
 
-// In bytes: a multiple of lines of the device's memory, and enough for any vector load.
+// Alignment in bytes: a multiple of the lines of the device's memory, and sufficient for any vector load.
 constexpr std::size_t slice_alignment = 256;
 
 }  // namespace
@@ -28,7 +28,7 @@ Arena::Place Arena::allocate_bytes(std::size_t bytes) {
   auto it = std::find_if(chunks_.begin(), chunks_.end(), [&](const Chunk& c) { return c.size - c.used >= wanted; });
   if (it == chunks_.end()) {
     chunks_.push_back({});
-    Chunk& c = chunks_.back();  // owned from here on, so that it is released even if the second allocation fails
+    Chunk& c = chunks_.back();  // the chunk is owned from here on, so that it is released even if the second allocation fails
     const std::size_t size = apart ? wanted : std::max(chunk_bytes_, wanted);
     if (where_ != Where::host) c.device = static_cast<std::byte*>(machine_.allocate(size));
     if (where_ != Where::device) c.host = static_cast<std::byte*>(machine_.allocate_host(size));
@@ -57,7 +57,7 @@ void Arena::download(int lane) {
 
 void Arena::clear() {
   if (machine_.pieces_apart()) return give_back();
-  // Keeps the memory, because the next batch needs about as much.
+  // The memory is kept, because the next batch needs about as much.
   for (Chunk& c : chunks_) c.used = 0;
 }
 

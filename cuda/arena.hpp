@@ -1,6 +1,6 @@
-// Memory of one batch of pings: pieces are allocated one by one and released all at once. It is on the device, on the host, or on
-// both with the same layout, so that one copy sends many small tables. Pieces do not move before clear(). Several threads may
-// allocate at once.
+// Memory of one batch of pings. Pieces are allocated one by one and released all at once. The memory is on the device, on the
+// host, or on both with the same layout, so that one copy transfers many small tables. Pieces do not move before clear().
+// Several threads may allocate at the same time.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +19,8 @@ class Arena {
   enum class Where { device, host, both };
   static constexpr int not_cleared = -1;
   /// `clear_lane`: lane on which both copies of new memory are set to zero; only with Where::both. A copy of whole chunks
-  /// includes the gaps between pieces; without this, compute-sanitizer's initcheck would report that it reads memory that was
-  /// never written.
+  /// includes the gaps between pieces. If these were not set, compute-sanitizer's initcheck would report reads of memory that
+  /// was never written.
   Arena(Machine& machine, Where where, std::size_t chunk_bytes, int clear_lane = not_cleared)
       : machine_(machine), where_(where), chunk_bytes_(chunk_bytes), clear_lane_(clear_lane) {}
   ~Arena();
@@ -29,8 +29,8 @@ class Arena {
 
   template <class T>
   struct Slice {
-    T* device = nullptr;  // null on Where::host
-    T* host = nullptr;    // null on Where::device
+    T* device = nullptr;  // null with Where::host
+    T* host = nullptr;    // null with Where::device
     std::size_t count = 0;
   };
   /// Allocates without initialising; null for a count of 0.
@@ -41,7 +41,7 @@ class Arena {
     const Place at = allocate_bytes(count * sizeof(T));
     return {static_cast<T*>(at.device), static_cast<T*>(at.host), count};
   }
-  /// The device's copy of `values`, which upload() will send. Where::both only.
+  /// Returns the device's copy of `values`, which upload() will transfer. Only with Where::both.
   template <class T>
   T* put(std::span<const T> values) {
     const Slice<T> slice = allocate<T>(values.size());
@@ -53,10 +53,10 @@ class Arena {
     return put(std::span<const T>(values));
   }
 
-  void upload(int lane);    // all pieces; Where::both only
-  void download(int lane);  // the same
+  void upload(int lane);    // all pieces; only with Where::both
+  void download(int lane);  // all pieces; only with Where::both
   void clear();
-  void give_back();  // releases the memory; no queued work may still use it
+  void give_back();  // releases the memory; no queued work may use it any more
   std::size_t taken_bytes() const;
 
  private:

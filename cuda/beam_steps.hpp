@@ -1,5 +1,5 @@
 // Kernel bodies that compute codes from columns: the receive pattern, the pulses of points and of other sonars, crosstalk,
-// envelope, gain and quantisation. They compute the same as form_beams, interference and receive (core/pipeline).
+// envelope, gain and quantisation. They compute the same values as form_beams, interference and receive (core/pipeline).
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace sonar::cuda {
 
-// The device loads such a struct by one instruction.
+// The device loads such a struct with one instruction.
 struct alignas(8) Pair {
   float re, im;
 };
@@ -94,7 +94,8 @@ SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::i
   im += sum_im;
 }
 
-/// Sums of one sample over columns, for the beams of `panels` panels that use the same columns. `weight`: weights of each panel.
+/// Sums of one sample over columns, for the beams of `panels` panels that have the same columns. `weight`: weights of each
+/// panel.
 template <std::uint32_t panels>
 SONAR_HD inline void sum_over_columns(const float* const* weight, const float* column, std::int64_t stride, std::int32_t count,
                                       float* re, float* im) {
@@ -111,8 +112,8 @@ SONAR_HD inline void sum_over_columns(const float* const* weight, const float* c
   }
 }
 
-/// Sample `i` of [pairs of panels][samples], for the eight beams of two panels. These mostly use the same columns, so that each
-/// sample is read once for all of them.
+/// Sample `i` of [pairs of panels][samples], for the eight beams of two panels. The two panels mostly have the same columns, so
+/// that each sample is read once for all eight beams.
 SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
   const std::uint32_t panels = (beams + beams_a_panel - 1) / beams_a_panel;
@@ -175,7 +176,7 @@ SONAR_HD inline void blend(const PingView& p, std::uint32_t i) {
   to[1] = s.im;
 }
 
-/// Sample `n`: the sum over all beams.
+/// Computes the sum over all beams of sample `n`.
 SONAR_HD inline void crosstalk_sum(const PingView& p, std::uint32_t n) {
   float re = 0, im = 0;
   for (int j = 0; j < p.beams; ++j) {
@@ -186,7 +187,7 @@ SONAR_HD inline void crosstalk_sum(const PingView& p, std::uint32_t n) {
   p.crosstalk[2 * n] = re;
   p.crosstalk[2 * n + 1] = im;
 }
-/// Sample `i` of [beams][samples].
+/// Adds crosstalk to sample `i` of [beams][samples].
 SONAR_HD inline void crosstalk_add(const PingView& p, std::uint32_t i) {
   const std::uint32_t n = i % static_cast<std::uint32_t>(p.samples);
   float* s = p.beam_signals + 2 * static_cast<std::int64_t>(i);
@@ -194,7 +195,7 @@ SONAR_HD inline void crosstalk_add(const PingView& p, std::uint32_t i) {
   s[1] = p.crosstalk_own * s[1] + p.crosstalk_leaked * p.crosstalk[2 * n + 1];
 }
 
-/// Sample `i` of [rows][beams].
+/// Computes sample `i` of [rows][beams].
 SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
   const auto beams = static_cast<std::uint32_t>(p.beams);
   const std::uint32_t row = i / beams, j = i % beams;
@@ -212,12 +213,13 @@ SONAR_HD inline void receive(const PingView& p, std::uint32_t i) {
   if (p.pressure != nullptr) p.pressure[i] = std::sqrt(power);
   if (p.beam_power_factor != nullptr) power *= p.beam_power_factor[j];
   const auto max_code = static_cast<float>(p.max_code);
-  // Eq. 37 and 40, the same as codes_of and quantise_levels (core/pipeline/simd/quantise.inl).
+  // Eq. 37 and 40, as in codes_of and quantise_levels (core/pipeline/simd/quantise.inl).
   const float octaves = log2_of(larger(power * p.row_power_factor[row], 1e-30f));
   const float code = p.logarithmic != 0
                          ? std::floor(smaller(larger(p.per_octave * octaves + (p.at_full_scale + 0.5f), 0.0f), max_code))
                          : smaller(std::floor(exp2_of(p.half_gamma * octaves) * p.code_factor + p.code_rounding), max_code);
-  // 2^32 - 1 is not a float, so the comparison comes before the conversion, which could overflow.
+  // 2^32 - 1 is not representable as a float. The comparison comes before the conversion, because the conversion could
+  // overflow.
   const std::uint32_t whole = code >= max_code ? p.max_code : static_cast<std::uint32_t>(code);
   std::uint8_t* out = p.codes + static_cast<std::int64_t>(i) * p.bytes_a_sample;
   for (int b = 0; b < p.bytes_a_sample; ++b) out[b] = static_cast<std::uint8_t>(whole >> (8 * b) & 0xFFu);

@@ -9,11 +9,11 @@
 namespace sonar::cuda {
 namespace {
 
-// Surface-area rule: the probability that a ray hits a box is proportional to its area, so that a split costs area times
-// triangles.
+// Surface-area rule: the probability that a ray hits a box is proportional to its area. Therefore the cost of a part is its
+// area times its number of triangles.
 constexpr int bins = 16;
 constexpr std::size_t most_in_leaf = 4;
-constexpr int deepest_by_area = 32;  // below this depth, items are halved by number, which ends within another 32 levels
+constexpr int deepest_by_area = 32;  // below this depth, items are halved by number; this takes at most 32 more levels
 constexpr float node_cost = 1.2f;    // cost of a node, in triangle tests
 
 void grow(Box& box, const Box& by) {
@@ -27,7 +27,7 @@ float half_area(const Box& b) {
   const float x = b.high[0] - b.low[0], y = b.high[1] - b.low[1], z = b.high[2] - b.low[2];
   return x < 0 ? 0 : x * y + y * z + z * x;
 }
-/// Twice the centre; only the order and the ratios of centres matter.
+/// Twice the centre. Only the order and the ratios of centres are used.
 float twice_centre(const Box& b, int axis) { return b.low[axis] + b.high[axis]; }
 
 struct Split {
@@ -44,7 +44,7 @@ class Builder {
 
   std::int32_t run() {
     const auto root = static_cast<std::int32_t>(nodes_.size());
-    if (index_.size() <= most_in_leaf) {  // the root must be a node, so that a single leaf becomes its child
+    if (index_.size() <= most_in_leaf) {  // the root must be a node; a single leaf becomes its child
       nodes_.push_back({});
       const Box all = bounds(0, index_.size());
       set_child(root, 0, all, index_.empty() ? 0 : leaf(0, index_.size()));
@@ -73,11 +73,11 @@ class Builder {
     return bvh_link({first, static_cast<std::uint32_t>(to - from)});
   }
 
-  /// Splits [from, to), which has too many items for a leaf. Returns the node.
+  /// Splits [from, to), which has too many items for a leaf. Returns the new node.
   std::int32_t split(std::size_t from, std::size_t to, int depth) {
     const auto node = static_cast<std::int32_t>(nodes_.size());
     nodes_.push_back({});
-    // Halving by number bounds the depth, and with it the stack of a ray (bvh.hpp).
+    // Halving by number limits the depth, and therefore the stack of a ray (bvh.hpp).
     const std::size_t middle = depth < deepest_by_area ? divide(from, to) : halve(from, to);
     const std::size_t ends[3] = {from, middle, to};
     for (int side = 0; side < 2; ++side) {
@@ -91,7 +91,7 @@ class Builder {
 
   std::size_t halve(std::size_t from, std::size_t to) const { return from + (to - from) / 2; }
 
-  /// Splits at the cheapest of the planes between bins; if all centres are equal, by number.
+  /// Splits at the cheapest of the planes between bins. If all centres are equal, splits by number.
   std::size_t divide(std::size_t from, std::size_t to) {
     Box centres = no_box;
     for (std::size_t i = from; i < to; ++i)
@@ -105,7 +105,7 @@ class Builder {
     if (best.axis < 0) return halve(from, to);
     const auto first = index_.begin() + static_cast<std::ptrdiff_t>(from),
                last = index_.begin() + static_cast<std::ptrdiff_t>(to);
-    // A stable partition, so that the order of triangles, and the choice between equal hits, is the same in every build.
+    // The partition is stable, so that the order of triangles, and the choice between equal hits, is the same in every build.
     const auto middle =
         std::stable_partition(first, last, [&](std::uint32_t i) { return bin_of(items_[i], centres, best.axis) <= best.bin; });
     return static_cast<std::size_t>(middle - index_.begin());
@@ -115,7 +115,7 @@ class Builder {
     return std::clamp(static_cast<int>(part * bins), 0, bins - 1);
   }
   void consider(std::size_t from, std::size_t to, const Box& centres, int axis, Split& best) const {
-    // If all centres lie in one plane, avoids a division by a length of 0.
+    // If all centres lie in one plane, a split along its normal would divide by a length of 0.
     if (!(centres.high[axis] > centres.low[axis])) return;
     std::array<Box, bins> box;
     box.fill(no_box);
@@ -126,7 +126,7 @@ class Builder {
       grow(box[b], item);
       ++count[b];
     }
-    // The cost of all bins above each plane, then that of all bins below it.
+    // First computes the cost of all bins above each plane, then that of all bins below it.
     std::array<float, bins> above{};
     Box all = no_box;
     std::size_t number = 0;

@@ -1,6 +1,6 @@
-// Kernel bodies between the depth map and the columns' signals: each cell in view gives one echo or none; echoes are sorted into
-// columns in the order of tiles and cells; each column adds its echoes in this order. So the additions have the same order as
-// on the CPU, and need no atomic operations on floats.
+// Kernel bodies between the depth map and the columns' signals. Each cell in view gives one echo or none. The echoes are sorted
+// into columns in the order of tiles and cells. Each column adds its echoes in this order. So the additions have the same order
+// as on the CPU, and need no atomic operations on floats.
 #pragma once
 
 #include <cmath>
@@ -18,7 +18,7 @@ SONAR_HD inline float cell_value(const TileView& t, int column, int cell) {
   return static_cast<float>(t.cells[static_cast<std::int64_t>(column) * t.count + cell]);
 }
 
-/// The position of a cell, and whether it is visible to the sonar.
+/// Computes the position of a cell, and whether it is visible to the sonar.
 struct CellPlace {
   float range, offset, cosine, sine2, sample;
   std::int32_t column;
@@ -28,7 +28,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float dx = t.position_unit_m * cell_value(t, cell_x, cell), dy = t.position_unit_m * cell_value(t, cell_y, cell),
               dz = t.position_unit_m * cell_value(t, cell_z, cell);
   const float qx = t.from_sonar_object[0], qy = t.from_sonar_object[1], qz = t.from_sonar_object[2];
-  // The same as see_cells (core/pipeline/simd/cells.inl): r^2 = r0^2 + e, without a difference of large numbers.
+  // As in see_cells (core/pipeline/simd/cells.inl): r^2 = r0^2 + e, which avoids a difference of large numbers.
   const float e = dx * (2 * qx + dx) + dy * (2 * qy + dy) + dz * (2 * qz + dz);
   const float r = std::sqrt(larger(t.range_m * t.range_m + e, 1e-6f));
   const float inverse_r = 1.0f / r;
@@ -38,7 +38,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float h = g.conical != 0 ? x : std::sqrt(x * x + y * y);
   const float inverse_h = 1.0f / larger(h, 1e-6f);
   const float column = (g.first_edge_sine - y * (g.conical != 0 ? inverse_r : inverse_h)) * g.columns_per_sine;
-  // Direction of the cell from the origin of the rays; the sonar may have turned since.
+  // Direction of the cell from the origin of the rays. The sonar may have turned since the rays were traced.
   float seen_column = column, seen_z = z, seen_inverse_h = inverse_h;
   if (t.moves != 0) {
     const float *w = t.seen_turn, *o = t.seen_place;
@@ -58,7 +58,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
         x > 1e-6f && sample > g.first_sample && sample < g.last_sample && r >= t.fade_in_from_m && r < t.fade_out_to_m))
     return false;
   at.column = static_cast<std::int32_t>(column);
-  // Depth map between two bins, with the tolerances of docs/acoustics.md, section 3.
+  // Compares with the depth map between two bins, with the tolerances of docs/acoustics.md, section 3.
   const float bin = smaller(bin_of_tangent(g.axis, tangent), static_cast<float>(g.bins) - bin_rounding);
   const auto below = static_cast<std::int32_t>(bin);
   const auto map_column = static_cast<std::int32_t>(seen_column);
@@ -70,7 +70,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float along = cell_value(t, cell_normal_x, cell) * (qx + dx) + cell_value(t, cell_normal_y, cell) * (qy + dy) +
                       cell_value(t, cell_normal_z, cell) * (qz + dz);
   if (!(along * t.turned_away <= 0)) return false;
-  // The plane of another object's facet, extended from the ray's place in the column to that of the cell.
+  // The plane of another object's facet, extended from the ray's position in the column to that of the cell.
   const float* slope = p.depth_slope + map_at;
   const auto differs = [&](std::int32_t i) {
     const auto in_map = static_cast<std::int32_t>(bits_of(map[i])), in_slope = static_cast<std::int32_t>(bits_of(slope[i]));
@@ -95,7 +95,7 @@ SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell
   CellPlace at{};
   if (!place_cell(p, t, cell, at)) return echo;
   const SeaView& g = p.sea;
-  // Eq. 6 of docs/acoustics.md, the same as in scatter_cells.
+  // Eq. 6 of docs/acoustics.md, as in scatter_cells.
   const float law = t.law != nullptr ? law_root(t.law, at.cosine) : at.cosine;
   const float re = cell_value(t, cell_weight_re, cell), im = cell_value(t, cell_weight_im, cell);
   const float x = g.elevation_aperture * std::sqrt(at.sine2);
@@ -105,7 +105,7 @@ SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell
   echo.column = at.column;
   if (g.expected_power != 0) {
     const float slope = std::fabs(cell_value(t, cell_normal_x + t.axis, cell)) * cell_normal_unit;
-    const float per_area = re != 0 || im != 0 ? 1.0f / slope : 0.0f;  // cells that are padding have no echo
+    const float per_area = re != 0 || im != 0 ? 1.0f / slope : 0.0f;  // padding has no echo
     const float amplitude = t.area_amplitude * law * pattern * std::exp(-g.decay_per_m * at.offset) / (at.range * at.range);
     echo.re = amplitude * amplitude * level_weight(t, at.range) * per_area;
     return echo;
@@ -120,7 +120,7 @@ SONAR_HD inline Echo scatter_cell(const PingView& p, const TileView& t, int cell
   return echo;
 }
 
-/// The tile of slot `i`.
+/// Finds the tile of slot `i`.
 SONAR_HD inline std::uint32_t tile_of(const PingView& p, std::uint32_t i) {
   std::uint32_t low = 0, high = p.tile_count;
   while (high - low > 1) {
@@ -138,7 +138,7 @@ SONAR_HD inline void scatter(const PingView& p, std::uint32_t i) {
   p.echoes[i] = scatter_cell(p, p.tiles[tile], static_cast<int>(i - p.tile_first_slot[tile]));
 }
 
-/// Counts the slots of a chunk in the same column: those before slot `i`, and all of them.
+/// Counts the slots of a chunk in the same column: the slots before slot `i`, and all slots.
 SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
   const std::int32_t column = p.echoes[i].column;
   if (column < 0) return;
@@ -149,10 +149,11 @@ SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
   add_count(p.in_chunk[chunk * static_cast<std::uint32_t>(p.sea.columns) + static_cast<std::uint32_t>(column)], 1u);
 }
 
-/// Column `k`: replaces the count of each chunk by the sum of the counts of earlier chunks.
+/// For column `k`: replaces the count of each chunk by the sum of the counts of earlier chunks.
 SONAR_HD inline void scan_chunks(const PingView& p, std::uint32_t k) {
   const auto columns = static_cast<std::uint32_t>(p.sea.columns);
-  constexpr std::uint32_t at_once = 8;  // values that are read before any is written: the device waits only once for memory
+  constexpr std::uint32_t at_once =
+      8;  // number of values that are read before any is written, so that the device waits only once for memory
   std::uint32_t before = 0;
   for (std::uint32_t from = 0; from < p.chunks; from += at_once) {
     const std::uint32_t some = p.chunks - from < at_once ? p.chunks - from : at_once;
@@ -184,13 +185,13 @@ SONAR_HD inline void sum_columns(const PingView& p, std::uint32_t i) {
   const std::uint32_t k = i / sum_parts;
   const int part = static_cast<int>(i % sum_parts);
   constexpr int parts = static_cast<int>(sum_parts);
-  // Copies, because the compiler must assume that the sums below can change the view.
+  // These values are copied, because the compiler must assume that the sums below can change the view.
   const int samples = p.samples, taps = p.taps;
   const float* const pulse_rows = p.pulse_rows;
   float* const signal = p.signals + 2 * static_cast<std::int64_t>(k) * samples;
   for (int n = part; n < samples; n += parts) signal[2 * n] = signal[2 * n + 1] = 0;
   if (p.slots == 0) return;
-  // Eq. 8: the row of the pulse table for the position of the echo between two samples.
+  // Eq. 8: selects the row of the pulse table from the position of the echo between two samples.
   const int reach = taps / 2 - 1;
   const float steps = static_cast<float>(p.pulse_steps);
   const Echo* echo = p.sorted + p.column_at[k];

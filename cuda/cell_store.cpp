@@ -7,8 +7,8 @@ namespace sonar::cuda {
 namespace {
 
 constexpr std::size_t chunk_bytes = 16u << 20;
-constexpr std::size_t tiles_at_once = 256;  // tiles that one worker looks up
-constexpr std::size_t ahead = 8;            // tiles
+constexpr std::size_t tiles_at_once = 256;  // number of tiles that one worker looks up
+constexpr std::size_t ahead = 8;            // number of tiles
 constexpr std::size_t most_values_a_copy = (2u << 20) / sizeof(std::int16_t);
 
 std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride) * CellTile::columns; }
@@ -16,7 +16,7 @@ std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride
 }  // namespace
 
 std::size_t CellStore::Table::first_place(const std::int16_t* data) const {
-  // The upper bits of a product with 2^64 over the golden ratio are spread evenly.
+  // The upper bits of a product with 2^64 divided by the golden ratio are spread evenly.
   const std::uint64_t spread = reinterpret_cast<std::uintptr_t>(data) * 0x9E3779B97F4A7C15u;
   return static_cast<std::size_t>(spread >> 32) & (places_.size() - 1);
 }
@@ -46,7 +46,7 @@ CellStore::CellStore(Machine& machine, std::size_t budget_bytes)
 const CellStore::Held* CellStore::held(const CellTile& t) const {
   const Held& h = tiles_.at(t.data.get());
   if (!h.data) return nullptr;
-  // Another tile may have the memory of a dropped one; the other fields distinguish them.
+  // Another tile may use the memory of a dropped tile. The other fields distinguish the two.
   const bool same = h.weights_hash == t.weights_hash && h.object == t.object && h.axis == t.axis && h.level == t.level &&
                     h.count == t.count && h.centre_m.x == t.centre_m.x && h.centre_m.y == t.centre_m.y &&
                     h.centre_m.z == t.centre_m.z;
@@ -54,7 +54,7 @@ const CellStore::Held* CellStore::held(const CellTile& t) const {
 }
 
 void CellStore::clear() {
-  // The tiles are not in use: the caller has waited for the device.
+  // No tile is in use, because the caller has waited for the device.
   tiles_.clear();
   memory_.clear();
 }
@@ -97,8 +97,8 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
   return true;
 }
 
-/// Sends the next few missing tiles in one copy, because allocating large pieces of memory for fast copies is slow. Returns the
-/// index after the last of them.
+/// Sends the next few missing tiles in one copy, because allocation of large pieces of memory for fast copies is slow. Returns
+/// the index after the last tile sent.
 std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,
                                  std::vector<const std::int16_t*>& cells) {
   const std::size_t most = machine_.pieces_apart() ? 1 : most_values_a_copy;

@@ -1,6 +1,6 @@
-// The tiles of surface cells that are stored on the device. Each is sent once, when it first comes into view. They are copies of
-// the CPU's bytes (core/scene/cells), so that positions and speckle are the same. A hash of the weights detects that the CPU
-// has reused the memory of a tile for another.
+// The tiles of surface cells that are stored on the device. Each tile is sent once, when it is first in view. The stored tiles
+// are copies of the CPU's bytes (core/scene/cells), so positions and speckle are the same. A hash of the weights shows when the
+// CPU has reused the memory of a tile for another tile.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,13 @@ namespace sonar::cuda {
 
 class CellStore {
  public:
-  /// `budget_bytes`: limit of the device's memory in use; the tiles of a single ping may exceed it.
+  /// `budget_bytes`: limit of the device's memory. The tiles of a single ping may exceed it.
   CellStore(Machine& machine, std::size_t budget_bytes);
 
-  /// Returns the address on the device of each tile's cells, in the order of `tiles`. Copies of tiles that are not there yet are
-  /// queued on `lane`; `staging` has their bytes and must stay unchanged until they have been copied. False: there is no room;
-  /// call clear() when no unfinished ping needs the stored tiles, then call again. Several threads may call it at once, each
-  /// with its own staging or with one that locks itself.
+  /// Finds the address on the device of each tile's cells, in the order of `tiles`. Copies of missing tiles are queued on
+  /// `lane`; `staging` contains their bytes and must not change until they have been copied. Returns false if there is no room:
+  /// call clear() when no unfinished ping needs the stored tiles, then call again. Several threads may call it at the same
+  /// time, each with its own `staging` or with one that has a lock.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
   void give_back();  // releases the memory, too
@@ -37,10 +37,11 @@ class CellStore {
     Vec3d centre_m;
     const std::int16_t* device = nullptr;
   };
-  /// Tiles by their addresses on the CPU. A look-up reads few cache lines, because a ping needs thousands of look-ups.
+  /// A hash table of tiles by their addresses on the CPU. A look-up reads few cache lines, because a ping needs thousands of
+  /// look-ups.
   class Table {
    public:
-    const Held& at(const std::int16_t* data) const { return places_[place_of(data)]; }  // a free entry if there is none
+    const Held& at(const std::int16_t* data) const { return places_[place_of(data)]; }  // a free entry if the tile is missing
     void put(const Held& held);
     void clear();
     bool empty() const { return taken_ == 0; }

@@ -1,5 +1,5 @@
-// Kernel bodies that complete the columns' signals: multipath, volume reverberation, the transmitter's pattern, receiver
-// noise and leak. simulate() (core/pipeline/cpu/simulate.cpp) begins with the noise, so that sums differ by rounding.
+// Kernel bodies that complete the columns' signals: multipath, volume reverberation, the transmitter's pattern, receiver noise
+// and leak. simulate() (core/pipeline/cpu/simulate.cpp) adds the noise first; therefore its sums differ from these by rounding.
 #pragma once
 
 #include <cmath>
@@ -38,7 +38,7 @@ SONAR_HD inline void add_multipath(const PingView& p, std::uint32_t i) {
   p.signals[2 * static_cast<std::int64_t>(i) + 1] += from[1];
 }
 
-/// Column `k`: from sample to sample, the fan loses the slices that end at a surface.
+/// For column `k`: removes from sample to sample the slices of the fan that end at a surface.
 SONAR_HD inline void volume(const PingView& p, std::uint32_t k) {
   const SeaView& s = p.sea;
   const auto columns = static_cast<std::int64_t>(s.columns);
@@ -51,7 +51,7 @@ SONAR_HD inline void volume(const PingView& p, std::uint32_t k) {
     const VolumeSlice& slice = p.slices[i];
     const auto inverse_x = static_cast<double>(map[slice.bin]);
     if (!(inverse_x > 0)) continue;
-    // The sample at which this slice of the fan ends at a surface.
+    // Computes the sample at which this slice of the fan ends at a surface.
     const double sample = per_x * slice.range_per_x / inverse_x * p.volume_samples_per_m - p.volume_sample_offset;
     if (sample < static_cast<double>(p.samples))
       blocked[static_cast<std::int64_t>(sample > 0 ? sample : 0.0) * columns] += slice.weight;

@@ -10,7 +10,7 @@ Result<std::unique_ptr<PingEngine>> make_cuda_engine(std::shared_ptr<const Scene
                                                      const EngineOptions& options, cuda::DeviceEngineOptions device_options) {
   auto machine = cuda::open_cuda_machine();
   if (!machine) return failure(ErrorKind::unavailable, "no CUDA engine (CUDA: " + machine.error().text + ")");
-  // Sends the tables of the scene, so that a device without memory for them fails at once.
+  // The tables of the scene are sent now, so that a device without memory for them fails immediately.
   try {
     return cuda::make_device_engine(std::move(scene), pool, options, *std::move(machine), std::move(device_options));
   } catch (const std::runtime_error& e) {

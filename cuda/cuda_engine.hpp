@@ -1,5 +1,5 @@
-// Makes the CUDA engine, an implementation of the interface in core/pipeline/ping_engine.hpp, if there is a device.
-// device_engine.hpp explains how it works; docs/cuda.md lists the parts that it computes and those that the CPU computes.
+// Makes the CUDA engine, an implementation of core/pipeline/ping_engine.hpp, if there is a device. device_engine.hpp explains
+// how the engine works. docs/cuda.md lists the parts that the engine computes and those that the CPU computes.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// Error `unavailable`: no module, no driver, no device, or not enough memory on it. The pool must outlive the engine.
+/// Error `unavailable`: no module, no driver, no device, or not enough memory on the device. The pool must outlive the engine.
 Result<std::unique_ptr<PingEngine>> make_cuda_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
                                                      const EngineOptions& options = {},
                                                      cuda::DeviceEngineOptions device_options = {});

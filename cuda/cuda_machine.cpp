@@ -1,4 +1,4 @@
-// A machine that uses the CUDA module, which is searched for beside the program and where packages install it.
+// A machine that uses the CUDA module. The module is searched for beside the program and in the folder where it is installed.
 #include <dlfcn.h>
 
 #include <algorithm>
@@ -17,12 +17,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Only SONARD_CUDA_MODULE if it is set; else beside the program, then in the lib folder of the installation.
+/// Paths of the module: only SONARD_CUDA_MODULE if it is set; else beside the program, then the lib folder of the installation.
 std::vector<fs::path> module_places() {
   if (const char* given = std::getenv("SONARD_CUDA_MODULE")) return {given};
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  // Without /proc, uses the search path of the loader.
+  // Without /proc, the search path of the loader is used.
   if (error) return {module_file};
   const fs::path folder = program.parent_path();
   return {folder / module_file, folder.parent_path() / "lib" / "sonard" / module_file};
@@ -33,7 +33,7 @@ struct Loaded {
   std::string why_not;  // "not installed", or the fault of the module
 };
 
-/// Loads the module. If it is loaded already, this takes little time.
+/// Loads the module. If it is already loaded, this takes little time.
 Loaded load() {
   for (const fs::path& place : module_places()) {
     std::error_code error;
@@ -43,7 +43,7 @@ Loaded load() {
     if (!library) return {nullptr, std::string("not loadable: ") + dlerror()};
     const auto entry = reinterpret_cast<CudaModuleEntry>(dlsym(library, module_entry));
     const CudaModule* module = entry ? entry() : nullptr;
-    // Structs are passed as bytes, so that their sizes must agree, not only the version.
+    // Structs are passed as bytes. Therefore their sizes must agree, not only the version.
     if (!module || module->version != module_version || module->view_bytes != sizeof(PingView) ||
         module->tile_bytes != sizeof(TileView) || module->steps != static_cast<std::uint32_t>(Step::steps))
       return {nullptr, place.string() + " belongs to another version of sonard"};
@@ -92,7 +92,7 @@ class CudaMachine final : public Machine {
     check(module_.allocate(at_, &device, bytes));
     return device;
   }
-  // An error here was reported by the call in which it occurred.
+  // The error was already reported by the call in which it occurred.
   void release(void* device) override { static_cast<void>(module_.release(at_, device)); }
   void* allocate_host(std::size_t bytes) override {
     void* host = nullptr;
@@ -123,7 +123,7 @@ class CudaMachine final : public Machine {
   void wait(int lane) override { check(module_.wait(at_, lane)); }
 
  private:
-  /// An error of the device ends its use: DeviceEngine reports it and may continue on the CPU.
+  /// After an error of the device, the machine is not used again. DeviceEngine reports the error and may continue on the CPU.
   void check(int code) const {
     if (code == 0) return;
     const std::string why = name_ + ": " + module_.reason(code);

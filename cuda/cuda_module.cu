@@ -1,5 +1,5 @@
-// The CUDA module: a kernel for every step, whose body is in cuda/steps.hpp, and functions that call the CUDA runtime. It
-// contains no code for scenes.
+// The CUDA module: one kernel for each step, whose body is in cuda/steps.hpp, and functions that call the CUDA runtime. The
+// module contains no code for scenes.
 #include <cuda_runtime.h>
 
 #include <chrono>
@@ -33,16 +33,16 @@ struct Lane {
   cudaStream_t stream = nullptr;
   cudaEvent_t done = nullptr;
   GraphShelf<cudaGraphExec_t> graphs;
-  std::vector<Transform> transforms;  // the last used first; each lane has its own, since a plan runs one transform at a time
+  std::vector<Transform> transforms;  // the last used first; each lane has its own, because a plan runs one transform at a time
   cudaEvent_t begin[timed_things] = {}, end[timed_things] = {};  // made when a launch is first timed
   bool timed[timed_things] = {};                                 // since the last call of step_seconds
   bool timing = false;                                           // the last launch was timed
 };
 struct Opened {
   Lane lane[lanes];
-  bool graphs_work = true;  // false once a graph has failed: launches use no graphs from then on
-  // A wait took too long. A further call that waits for the device might never return, so none is made, and no memory is
-  // released.
+  bool graphs_work = true;  // false once a graph has failed; launches then use no graphs
+  // True if a wait took too long. A further call that waits for the device might never return. Therefore no such call is made,
+  // and no memory is released.
   bool hung = false;
 };
 Opened& opened(void* machine) { return *static_cast<Opened*>(machine); }
@@ -129,21 +129,21 @@ int open(void** machine) {
     if (error == cudaSuccess) error = cudaStreamCreateWithFlags(&l.stream, cudaStreamNonBlocking);
     if (error == cudaSuccess) error = cudaEventCreateWithFlags(&l.done, cudaEventDisableTiming);
   }
-  // A kernel that this build has no code for fails here and not in the first ping.
+  // If this build has no code for the device, a kernel fails here and not in the first ping.
   cudaFuncAttributes attributes;
   if (error == cudaSuccess) error = cudaFuncGetAttributes(&attributes, kernel<Step::receive>);
   if (error != cudaSuccess) {
     close(m);
     return error;
   }
-  // Measurements switch graphs off: a graph makes launches cheaper, but a launch that differs needs a new capture.
+  // Only for measurements: switches graphs off. A graph makes launches faster, but a launch that differs needs a new capture.
   const char* graphs = std::getenv("SONARD_CUDA_GRAPHS");
   m->graphs_work = !graphs || std::strcmp(graphs, "0") != 0;
   *machine = m;
   return cudaSuccess;
 }
 
-/// Returns `error` and clears the last error of the thread, which the runtime would report again for the next launch.
+/// Returns `error` and clears the last error of the thread. Otherwise the runtime would report it again for the next launch.
 cudaError_t cleared(cudaError_t error) {
   if (error != cudaSuccess) cudaGetLastError();
   return error;
@@ -175,11 +175,11 @@ cudaError_t launch_plainly(cudaStream_t stream, const GraphKey& what) {
   return error;
 }
 
-/// Captures the launch as a graph; null if that fails. The stream has ended its capture in either case.
+/// Captures the launch as a graph; null if the capture fails. In either case the capture of the stream has ended.
 cudaGraphExec_t capture(cudaStream_t stream, const GraphKey& what) {
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t made = nullptr;
-  // Captures this thread only, because other engines may allocate on their threads meanwhile.
+  // Captures only this thread, because other engines may allocate on their threads at the same time.
   if (cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal) == cudaSuccess) {
     const cudaError_t launched = launch_plainly(stream, what);
     const cudaError_t ended = cudaStreamEndCapture(stream, &graph);
@@ -187,7 +187,7 @@ cudaGraphExec_t capture(cudaStream_t stream, const GraphKey& what) {
       made = nullptr;
   }
   if (graph) cudaGraphDestroy(graph);
-  if (!made) cudaGetLastError();  // the launch that follows must not report it
+  if (!made) cudaGetLastError();  // clears the error, so that the next launch does not report it
   return made;
 }
 
@@ -198,7 +198,7 @@ cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
     if (const cudaError_t error = wait_for_stream(m, lane.stream)) return error;  // the device may still use it
     cudaGraphExecDestroy(dropped);
   }
-  // A capture must not load kernels. Earlier launches without a graph have loaded them all.
+  // A capture must not load kernels. Therefore earlier launches without a graph must have loaded all of them.
   if (!entry.graph && entry.seen > 1) {
     entry.graph = capture(lane.stream, what);
     m.graphs_work = entry.graph != nullptr;
@@ -206,7 +206,7 @@ cudaError_t launch_by_graph(Opened& m, Lane& lane, const GraphKey& what) {
   return entry.graph ? cudaGraphLaunch(entry.graph, lane.stream) : launch_plainly(lane.stream, what);
 }
 
-/// Begins the timing of a step or of the transforms, unless it has begun already.
+/// Begins the timing of a step or of the transforms, unless it has already begun.
 cudaError_t begin_timing(Lane& lane, int what) {
   cudaError_t error = cudaSuccess;
   if (!lane.begin[what]) error = cudaEventCreate(&lane.begin[what]);
@@ -245,8 +245,8 @@ int transforms(char* name, std::size_t room) {
   return cufft().loaded() ? 1 : 0;
 }
 
-/// The lane's plan for this size, which becomes the last used. A plan is made once, because that allocates memory and may wait
-/// for the device.
+/// The lane's plan for this size, which becomes the last used one. A plan is made only once, because it allocates memory and
+/// may wait for the device.
 int transform_for(Opened& m, Lane& lane, int size, int rows, CufftLibrary::Handle* plan) {
   std::vector<Transform>& all = lane.transforms;
   std::size_t i = 0;

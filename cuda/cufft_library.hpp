@@ -1,4 +1,5 @@
-// Loads cuFFT by name. Without it the module still loads, and the CPU computes exact pulses. Used only by cuda_module.cu.
+// Loads cuFFT by name. If it is missing, the module still loads, and the CPU computes exact pulses. Only cuda_module.cu uses
+// it.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -26,7 +27,8 @@ class CufftLibrary {
   using Handle = cufftHandle;
 
   CufftLibrary() {
-    // Searches for the version of the header used here: first where the loader searches, then beside the compiler of the toolkit.
+    // Searches for the version of the header that is used here: first where the loader searches, then beside the toolkit's
+    // compiler.
     void* library = dlopen(SONAR_CUFFT_NAME(CUFFT_VER_MAJOR), RTLD_NOW | RTLD_LOCAL);
     if (!library) return;
     bool all = true;
@@ -42,7 +44,7 @@ class CufftLibrary {
     loaded_ = all;
   }
   bool loaded() const { return loaded_; }
-  /// "cuFFT 12.0.0", or which file is missing.
+  /// "cuFFT 12.0.0", or the name of the missing file.
   void describe(char* text, std::size_t room) const {
     int version = 0;
     if (loaded_ && version_(&version) == CUFFT_SUCCESS)
@@ -50,7 +52,7 @@ class CufftLibrary {
     else
       std::snprintf(text, room, "no %s", SONAR_CUFFT_NAME(CUFFT_VER_MAJOR));
   }
-  /// `rows` transforms of `size` values, one row after the other, on `stream`.
+  /// Plans transforms on `stream`: `rows` transforms of `size` values each, row after row.
   int make(Handle* plan, int size, int rows, cudaStream_t stream) const {
     // Without embedding, rows follow each other without gaps.
     const cufftResult made = plan_many_(plan, 1, &size, nullptr, 1, size, nullptr, 1, size, CUFFT_Z2Z, rows);
@@ -110,7 +112,7 @@ class CufftLibrary {
 
 #endif
 
-/// The library, which the first call loads. It stays loaded.
+/// The library. The first call loads it; it stays loaded.
 inline const CufftLibrary& cufft() {
   static const CufftLibrary library;
   return library;

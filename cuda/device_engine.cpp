@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t most_plans = 8;
 constexpr int keeping_lane = 2;  // lane for data that stay on the device: plans and cells; rooms have lanes 0 and 1
 
-/// Whether neither ping has to wait long for the other in one batch: no multipath, and about the same size.
+/// True if neither ping has to wait long for the other in one batch: no multipath, and about the same size.
 bool are_alike(const PingRequest& a, const PingRequest& b) {
   const auto values = [](const PingSettings& s) {
     return static_cast<double>(s.beam_count) * s.range_bin_count * s.samples_per_row;
@@ -33,7 +33,7 @@ bool are_alike(const PingRequest& a, const PingRequest& b) {
   return !a.switches.multipath && !b.switches.multipath && more <= 2 * less;
 }
 
-/// The options, with budgets that fit on the device. The rest of its memory is for kernels, other programs and the scene.
+/// The options with budgets that fit on the device. The rest of its memory is for kernels, other programs and the scene.
 DeviceEngineOptions fitted(DeviceEngineOptions options, std::size_t free_bytes) {
   options.cell_bytes = std::min(options.cell_bytes, free_bytes / 5 * 2);
   options.work_bytes = std::min(options.work_bytes, free_bytes / 5);
@@ -74,7 +74,7 @@ class DeviceEngine final : public PingEngine {
     for (const PingRequest& request : in_water(call.pings, *scene_, room)) wanted_.push_back({request});
     try {
       on_device([this] { begin_open(); });
-    } catch (...) {  // collect() tries again, and throws if it has to
+    } catch (...) {  // collect() tries again, and throws if it fails, too
     }
   }
   std::vector<Ping> collect() override { return take_pings(0); }
@@ -84,7 +84,7 @@ class DeviceEngine final : public PingEngine {
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
   std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
-    // The number of pings that are prepared at the same time, so that a ping waits only for the others' steps on the device.
+    // The number of pings that are prepared in parallel. With it, a ping waits only for the steps of the others on the device.
     const std::size_t most = std::min(batch_, static_cast<std::size_t>(pool_.threads()));
     return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? most : 1;
   }
@@ -94,11 +94,11 @@ class DeviceEngine final : public PingEngine {
  private:
   using State = WantedPing::State;
   struct Call {
-    std::vector<PingRequest> pictures, pings;  // the requested pictures; the pings of which they are made
-    std::string invalid;                       // reason, if a request is invalid; then no ping of the call is computed
+    std::vector<PingRequest> pictures, pings;  // the requested pictures; the pings that form them
+    std::string invalid;                       // reason if a request is invalid; no ping of the call is then computed
   };
 
-  /// Takes the pings of the first or the last call.
+  /// Removes the first or the last call and returns its pings.
   std::vector<Ping> take_pings(std::size_t which) {
     const Call call = std::move(calls_[which]);
     calls_.erase(calls_.begin() + static_cast<std::ptrdiff_t>(which));
@@ -136,7 +136,7 @@ class DeviceEngine final : public PingEngine {
   void complete(std::deque<WantedPing>::iterator begin, std::deque<WantedPing>::iterator end) {
     const auto is_open = [&] { return std::any_of(begin, end, [](const WantedPing& w) { return w.state != State::done; }); };
     on_device([&] {
-      begin_open();  // needed after lack of memory; else all has been launched
+      begin_open();  // needed only after lack of memory, otherwise all pings have been launched
       for (const std::size_t older : {which_, 1 - which_})
         if (is_open()) finish(rooms_[older]);
     });
@@ -146,8 +146,7 @@ class DeviceEngine final : public PingEngine {
     for (auto it = begin; it != end; ++it) compute_by_cpu(*it);
   }
 
-  /// Does the work. If the device's memory is full, it tries again with smaller batches, unless the device fails. After an error,
-  /// pings that were under way are open again.
+  /// Does the work. If memory is full, repeats it with smaller batches. After an error, unfinished pings are open again.
   template <class Work>
   void on_device(const Work& work) {
     if (!failed_) try {
@@ -157,16 +156,16 @@ class DeviceEngine final : public PingEngine {
         failed_ = std::string("the CUDA engine stopped: ") + e.what();
         for (BatchRoom& room : rooms_) empty(room);
         if (device_options_.cpu_after_failure) say(*failed_ + "; from here on the CPU computes");
-      } catch (...) {  // host memory is full, or the program has a fault: drops the work that was begun
+      } catch (...) {  // host memory is full, or the program has a fault: drops unfinished work
         for (int lane = 0; lane < Machine::lanes; ++lane) try_to_wait(lane);
         for (BatchRoom& room : rooms_) empty(room);
         preparer_.forget_cells();
-        plans_.clear();  // a plan may have been sent in part
+        plans_.clear();  // a plan may have been sent incompletely
         throw;
       }
   }
 
-  /// False: the device's memory was full. The memory has been released, and work that is not done may be tried again.
+  /// Returns false if the device's memory was full. The memory has then been released, and unfinished work may be tried again.
   template <class Work>
   bool has_room_for(const Work& work) {
     try {
@@ -191,8 +190,8 @@ class DeviceEngine final : public PingEngine {
     }
   }
 
-  /// Launches all open pings. Two rooms alternate: while the device computes the batch of one, the CPU prepares the other, or the
-  /// caller uses the pings of an earlier call.
+  /// Launches all open pings. Two rooms alternate: while the device computes the batch of one room, the CPU prepares the other,
+  /// or the caller uses the pings of an earlier call.
   void begin_open() {
     for (std::size_t i = 0; i < wanted_.size();) {
       if (wanted_[i].state != State::open) {
@@ -232,8 +231,8 @@ class DeviceEngine final : public PingEngine {
     if (!one_room_) which_ = 1 - which_;
   }
 
-  /// The next requests, from `first` on, that can be prepared together and fit in the room: by number, and by memory if the
-  /// memory of a ping is known.
+  /// The next requests, from `first` on, that can be prepared together and fit in the room. The limits are their number and, if
+  /// the memory of a ping is known, their memory.
   std::vector<AskedPing> some_from(std::size_t first, const BatchRoom& room) {
     place(wanted_[first].request);
     std::vector<AskedPing> some{{&wanted_[first], plan_for(wanted_[first].request)}};
@@ -251,18 +250,19 @@ class DeviceEngine final : public PingEngine {
     return some;
   }
 
-  /// Why the CPU must compute this ping; empty if the device can.
+  /// The reason why the CPU must compute this ping; empty if the device can compute it.
   std::string why_by_cpu(const PingRequest& request) const {
     if (const std::string why = why_not_on_device(request); !why.empty()) return why + " are computed by the CPU";
     const std::string without = why_not_on_device(request, false);
-    const std::string missing = without.empty() ? "" : machine_->why_no_transforms();  // only if needed: loads a library
+    const std::string missing =
+        without.empty() ? "" : machine_->why_no_transforms();  // only if needed, because the call loads a library
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
   }
   static CellFields fields_of(const PingRequest& request) { return {request.switches.texture, request.switches.grain}; }
-  /// Places the scene of this request, for device and CPU.
+  /// Sets the scene of this request to its poses, for device and CPU.
   void place(const PingRequest& request) {
     if (!cells_ || !cells_->serves(request.seed, fields_of(request)))
-      // Weights of cells depend on the seed, so that another seed needs other tiles.
+      // Weights of cells depend on the seed. Therefore another seed needs other tiles.
       cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, fields_of(request));
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
@@ -280,7 +280,7 @@ class DeviceEngine final : public PingEngine {
       std::rotate(plans_.begin(), it, it + 1);  // newest first
       return plans_.front();
     }
-    // Drops the least recently used plan; batches under way have their own reference.
+    // Drops the plan that was not used for longest. Batches in work have their own reference to it.
     if (plans_.size() >= most_plans) plans_.pop_back();
     plans_.insert(plans_.begin(), std::make_shared<PlanTables>(*machine_, keeping_lane, request));
     return plans_.front();
@@ -288,13 +288,13 @@ class DeviceEngine final : public PingEngine {
 
   void launch(BatchRoom& room) {
     if (room.pings.empty()) return;
-    // This lane begins after the copies of plans and cells that were sent before.
+    // This lane waits for the copies of plans and cells that were queued before.
     machine_->order(room.lane, keeping_lane);
     Launch launch;
     launch.views = room.upload();
     launch.pings = static_cast<std::int32_t>(room.views.size());
     launch.timed = options_.now_s != nullptr ? 1 : 0;
-    // A launch covers the largest ping of the batch; for smaller pings the other threads are idle.
+    // A launch has the size of the largest ping of the batch. For smaller pings the other threads are idle.
     for (int step = 0; step < step_count; ++step)
       for (const PingView& view : room.views)
         launch.largest[step] = std::max(launch.largest[step], step_size(static_cast<Step>(step), view));
@@ -310,7 +310,7 @@ class DeviceEngine final : public PingEngine {
       machine_->run(room.lane, launch);
       launch.from = to;
     };
-    // (25): transform of the grids before fold, inverse transform before unfold.
+    // (25): the transform of the grids comes before fold, the inverse transform before unfold.
     if (launch.largest[static_cast<int>(Step::spread)] > 0) {
       for (const bool inverse : {false, true}) {
         run_to(static_cast<int>(inverse ? Step::unfold : Step::fold));
@@ -332,7 +332,7 @@ class DeviceEngine final : public PingEngine {
     pool_.for_each(room.pings.size(), [&](std::size_t i, int) { take_results(room.pings[i], room.views[i]); });
     empty(room);
   }
-  /// Empties a room; arenas keep their memory.
+  /// Empties a room. Its arenas keep their memory.
   static void empty(BatchRoom& room) {
     for (const BatchRoom::Ping& ping : room.pings)
       if (ping.wanted->state == State::under_way) ping.wanted->state = State::open;
@@ -348,7 +348,7 @@ class DeviceEngine final : public PingEngine {
   void try_to_wait(int lane) const {
     try {
       machine_->wait(lane);
-    } catch (const std::exception&) {  // the device has failed, so that its work does not matter
+    } catch (const std::exception&) {  // the device has failed, so its work is not needed
     }
   }
 
@@ -372,8 +372,8 @@ class DeviceEngine final : public PingEngine {
   std::set<std::string> reported_;
   PingStatistics statistics_;
   std::vector<PingStatistics> each_;   // statistics of the last call that was collected
-  bool one_room_ = false;              // true after lack of memory: no batch is prepared while the device computes
-  bool all_given_back_ = false;        // whether all memory has been released since the last run that had enough
+  bool one_room_ = false;              // true after lack of memory: no batch is prepared while the device is busy
+  bool all_given_back_ = false;        // true if all memory has been released since the last run that had enough
   std::optional<std::string> failed_;  // reason of the device's failure
 };
 

@@ -1,5 +1,5 @@
-// The ping engine that computes on a device. It processes requests in batches, two of them at a time, and copies only finished
-// images back. It works with any Machine; with host loops the same engine runs without a device.
+// The ping engine that computes on a device. It processes requests in batches, two at a time, and copies only finished images
+// back. It works with any Machine. With host loops the same engine runs without a device.
 #pragma once
 
 #include <cstddef>
@@ -12,27 +12,27 @@
 
 namespace sonar::cuda {
 
-/// Sizes are upper limits. Of the device's memory that is free at the start, cells get at most two fifths and each of the two
-/// batches at most a fifth. If memory is full nevertheless, the engine releases all of it and halves the batches, down to one
-/// batch of one ping; it fails if that does not fit.
+/// Sizes are upper limits. At most two fifths of the device memory that is free at the start are used for cells, and at most a
+/// fifth for each of the two batches. If memory is full nevertheless, the engine releases all of it and halves the batches,
+/// down to one batch of one ping. If this batch does not fit, the engine fails.
 struct DeviceEngineOptions {
   std::size_t cell_bytes = std::size_t{2} << 30;  // device memory for surface cells; a single ping may exceed it
   int batch = 0;                                  // pings that are launched together; 0 = 8, more with more threads, at most 32
-  std::size_t work_bytes = std::size_t{1} << 30;  // memory of a batch on the device: if pings are large, a batch has fewer
-  bool cpu_after_failure = true;                  // false: run() throws EngineUnavailable when the device fails
-  /// Called with a text for users when the CPU computes pings in place of the device, once for each reason. May be empty.
+  std::size_t work_bytes = std::size_t{1} << 30;  // device memory of a batch; if pings are large, a batch has fewer
+  bool cpu_after_failure = true;                  // false: run() throws EngineUnavailable if the device fails
+  /// Called with a text for users when the CPU computes pings instead of the device, once for each reason. May be empty.
   std::function<void(const std::string&)> say = {};
 };
 
-/// The pool must outlive the engine. The CPU computes pings that the device cannot compute (why_not_on_device). After a failure
-/// of the device it computes the pings that were lost and all later ones, unless the options say otherwise. With a clock in
-/// `options` the device measures the time of every step, which takes a little time itself. Throws std::runtime_error if the scene
-/// does not fit on the device.
+/// Makes the engine. The pool must outlive it. The CPU computes pings that the device cannot compute (why_not_on_device). After
+/// a failure of the device, the CPU computes the lost pings and all later ones, unless the options state otherwise. With a
+/// clock in `options` the device measures the time of every step, which itself takes a little time. Throws std::runtime_error
+/// if the scene does not fit on the device.
 std::unique_ptr<PingEngine> make_device_engine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options,
                                                std::unique_ptr<Machine> machine, DeviceEngineOptions device_options = {});
 
-/// The part of the request's model that only the CPU can compute, as the beginning of a sentence ("pings of a fixed fan"); empty
-/// if there is none. `transforms`: whether the machine has Fourier transforms. docs/cuda.md lists these parts.
+/// The part of the request's model that only the CPU can compute, as the beginning of a sentence ("pings of a fixed fan");
+/// empty if there is none. `transforms`: true if the machine has Fourier transforms. docs/cuda.md lists these parts.
 std::string why_not_on_device(const PingRequest& request, bool transforms = true);
 
 }  // namespace sonar::cuda

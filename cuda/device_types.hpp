@@ -1,5 +1,5 @@
-// Structs in the device's memory: plain, filled by the host and read by the kernel bodies. C++17 and fixed-width members
-// only; both sides are compiled from this file, and cuda_module.hpp checks that they agree on it.
+// Structs in the device's memory. They are plain; the host fills them and the kernel bodies read them. Only C++17 and
+// fixed-width members. Both sides are compiled from this file, and cuda_module.hpp checks that they agree.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,13 @@ namespace sonar::cuda {
 inline constexpr std::uint32_t no_object = 0xFFFFFFFFu;  // the object of a ray that hits nothing
 inline constexpr std::uint32_t slots_a_chunk = 256;      // cells that are sorted into columns together
 inline constexpr std::uint32_t counters_a_ping = 2;
-inline constexpr std::uint32_t beams_a_panel = 4;   // equals the beams of BeamPanel
-inline constexpr std::uint32_t sum_parts = 8;       // threads that share the sum of one column; a pulse has about as many taps
-inline constexpr std::uint32_t spread_parts = 32;   // threads that share the grid of one column
-inline constexpr std::uint32_t panels_at_once = 2;  // panels that one thread sums
+inline constexpr std::uint32_t beams_a_panel = 4;  // equals the beams of BeamPanel
+inline constexpr std::uint32_t sum_parts =
+    8;  // number of threads that share the sum of one column; a pulse has about as many taps
+inline constexpr std::uint32_t spread_parts = 32;   // number of threads that share the grid of one column
+inline constexpr std::uint32_t panels_at_once = 2;  // number of panels that one thread sums
 
-/// Boxes of both children; one cache line. bvh_link says what links are.
+/// The boxes of both children, in one cache line. bvh_link explains the links.
 struct alignas(64) BvhNode {
   float low[2][3], high[2][3];
   std::int32_t link[2];
@@ -129,7 +130,7 @@ struct PulseInBeams {
   std::int32_t from, to;
 };
 
-/// Tables of spectral_steps.hpp; grids null = pulses come from pulse_rows.
+/// Tables of spectral_steps.hpp. If grids is null, pulse_rows is used instead.
 struct SpectralView {
   double* grids;             // complex [columns][points]
   double* folded;            // complex [columns][period]
@@ -144,7 +145,7 @@ struct NoiseKey {
   std::uint32_t sonar, ping;
 };
 
-/// Everything about one ping. Pointers into the device's memory; null = that part is absent.
+/// All values of one ping. Pointers refer to the device's memory; null = the part is absent.
 struct PingView {
   TracerView tracer;
   SeaView sea;

@@ -1,7 +1,7 @@
-// Kernel bodies of the fan of rays. They compute the same as trace_fan, in another order: one thread refines the interval
-// between two base rays from bottom to top and draws it into the depth map immediately. So no samples are stored, and results
-// do not depend on the order of threads. FanRefinement (core/pipeline/fan_refinement.hpp) has the rule for refining; tests
-// compare the two.
+// Kernel bodies of the fan of rays. They compute the same values as trace_fan, in another order: one thread refines the
+// interval between two base rays from bottom to top and draws it into the depth map immediately. So no samples are stored, and
+// results do not depend on the order of threads. FanRefinement (core/pipeline/fan_refinement.hpp) contains the rule for
+// refining. Tests compare the two.
 #pragma once
 
 #include <cmath>
@@ -18,7 +18,7 @@ inline constexpr int deepest = 4;  // equals that of FanRefinement
 inline constexpr float slope_tolerance_in_pulses = 2, golden_turn = 0.61803399f, widest_skew = 0.15f;
 }  // namespace fan
 
-/// Sine and cosine are rounded from double, so that they are the same on host and device.
+/// Sine and cosine are rounded from double. So they are the same on host and device.
 SONAR_HD inline BaseElevation elevation_at(float angle_rad) {
   const auto angle = static_cast<double>(angle_rad);
   return {angle_rad, static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle))};
@@ -52,7 +52,7 @@ SONAR_HD inline void trace_base(const PingView& p, std::uint32_t i) {
   const std::uint32_t columns = static_cast<std::uint32_t>(p.sea.columns);
   const auto e = static_cast<std::int32_t>(i / columns), sides = p.sea.side_elevations, step = p.sea.side_columns;
   auto column = static_cast<std::int32_t>(i % columns);
-  // In the side lobes a few columns share a ray.
+  // In the side lobes a few columns share one ray.
   if (e < sides || e >= p.sea.elevations - sides) {
     column = column - column % step + step / 2;
     if (column >= p.sea.columns) column = p.sea.columns - 1;
@@ -84,7 +84,7 @@ SONAR_HD inline bool interpolates(const FanRay& a, const FanRay& m, const FanRay
   return planes_agree(a, m, tolerance_m) && planes_agree(b, m, tolerance_m);
 }
 
-/// The same as FanTracer::per_column (core/pipeline/trace_fan.cpp).
+/// As in FanTracer::per_column (core/pipeline/trace_fan.cpp).
 SONAR_HD inline float per_column(const SeaView& s, const FanRay& a, ColumnSine column) {
   if (a.object == no_object || a.offset == 0) return 0;
   const float* m = s.world_from_sonar;
@@ -94,7 +94,7 @@ SONAR_HD inline float per_column(const SeaView& s, const FanRay& a, ColumnSine c
   return -s.column_spacing * (to_port - forward * column.along / column.across) / a.offset;
 }
 
-/// Draws one column's depth map from bottom to top.
+/// Draws the depth map of one column from bottom to top.
 struct DepthPen {
   const SeaView* sea;
   ColumnSine column;
@@ -139,7 +139,7 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   struct Above {
     FanRay ray;
     int depth;
-    bool settled;  // can be interpolated from the ray below
+    bool settled;  // true: can be interpolated from the ray below
   };
   Above above[fan::deepest + 2];
   int waiting = 1;
@@ -177,7 +177,7 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   if (rays > 0) add_count(p.counters[0], rays);
 }
 
-/// Column `i`: the nearest hit of its intervals; the lower one if two are equally near.
+/// For column `i`: the nearest hit of its intervals; if two are equally near, the lower one.
 SONAR_HD inline void first_hits(const PingView& p, std::uint32_t i) {
   FirstHit nearest{0, no_object};
   for (int e = 0; e + 1 < p.sea.elevations; ++e) {

@@ -13,7 +13,7 @@ namespace sonar::cuda {
 void PingPreparer::place_fan(Making& m) {
   const PingPlan& plan = m.plan;
   const PingScalars& s = m.scalars;
-  // One group of all columns; the CPU divides columns into groups only because of its caches.
+  // One group contains all columns. The CPU divides columns into groups only because of its caches.
   DepthMap all_columns;
   all_columns.columns = plan.columns.count;
   all_columns.bins = plan.fan.bins;
@@ -58,7 +58,7 @@ void PingPreparer::place_fan(Making& m) {
   m.view.tracer.top = m.room.tables.put(places.top);
   m.view.tracer.bodies = m.room.tables.put(places.bodies);
   m.view.tracer.body_count = static_cast<std::int32_t>(places.bodies.size());
-  // Base rays of all columns; each interval between two is refined separately, so that no list is needed.
+  // Base rays of all columns. Each interval between two rays is refined separately, so no list is needed.
   const auto elevations = static_cast<std::size_t>(sea.elevations);
   m.view.fan_rays = m.room.work.allocate<FanRay>(elevations * m.columns()).device;
   m.view.depth_slope = m.room.work.allocate<float>(m.columns() * static_cast<std::size_t>(sea.bins + 1)).device;
@@ -99,7 +99,8 @@ void PingPreparer::add_receiver(Making& m) {
   if (leak.is_audible() && !m.request().blank) {
     view.leak_rms = m.room.tables.put(leak.rms_upa());
     view.leak_samples = static_cast<std::int32_t>(leak.rms_upa().size());
-    // (31): powers of the fixed and the changing part add up to 1. If the leak is shared, its fixed part is added to the beams.
+    // (31): powers of the steady and the changing part add up to 1. If the leak is shared, its steady part is added to the
+    // beams.
     view.leak_steady = leak.steady();
     view.shared_leak_samples = static_cast<std::int64_t>(m.plan.shared_noise.leak_upa().size());
     view.leak_changing = static_cast<float>(Leak::changing_part);
@@ -114,9 +115,9 @@ void PingPreparer::add_receiver(Making& m) {
   }
   if (m.plan.beam_mix.blurs() || m.plan.beam_mix.blends())
     view.mixed = m.room.work.allocate<float>(2 * m.samples() * m.beams()).device;
-  // (36), (37): gain TVG / full scale, squared, since the receiver works on powers.
+  // (36), (37): gain TVG / full scale, squared, because the receiver works on powers.
   view.row_power_factor = m.room.tables.put(m.plan.row_power_factor);
-  // Complex: columns before beamforming, beams after it [uPa].
+  // Complex values: columns before beamforming, beams after it [uPa].
   view.signals = m.room.work.allocate<float>(2 * m.samples() * m.columns()).device;
   view.beam_signals = m.room.work.allocate<float>(2 * m.samples() * m.beams()).device;
 }

@@ -20,7 +20,7 @@ struct Bounds {
 };
 
 void add_object(const Mesh& mesh, const Pose& placed, std::uint32_t object, std::vector<FlatTriangle>& triangles) {
-  // Computed in double up to the place, then in float relative to the origin of rays [m].
+  // Computed in double up to the position, then in float relative to the origin of rays [m].
   const Rotation turn = rotation_from(placed.orientation);
   std::vector<std::array<float, 3>> corners;
   corners.reserve(mesh.vertices.size());
@@ -48,7 +48,8 @@ Box box_of(const FlatTriangle& t) {
   return bounds.box;
 }
 
-/// The box around a rotated body's box. It is slightly larger, because rays are converted to the body's axes in float.
+/// The box around a rotated body's box. It is slightly larger than necessary, because rays are converted to the body's axes in
+/// float.
 Box box_in_world(const Box& own, const PlacedBody& body) {
   Bounds bounds;
   for (int corner = 0; corner < 8; ++corner) {
@@ -60,7 +61,7 @@ Box box_in_world(const Box& own, const PlacedBody& body) {
     bounds.add(at);
   }
   for (int k = 0; k < 3; ++k) {
-    // 1 mm, and the rounding of float at that distance [m]: a ray that hits the body must also hit the box.
+    // 1 mm plus the rounding error of float at that distance [m]. A ray that hits the body must also hit the box.
     const float slack = 1e-3f + 1e-5f * std::max(std::abs(bounds.box.low[k]), std::abs(bounds.box.high[k]));
     bounds.box.low[k] -= slack;
     bounds.box.high[k] += slack;
@@ -71,7 +72,8 @@ Box box_in_world(const Box& own, const PlacedBody& body) {
 }  // namespace
 
 FlatScene::FlatScene(const Scene& scene) : origin_(ray_origin_of(scene)), bodies_(scene.bodies_in_world) {
-  // Group 0 has the fixed objects in world axes; group b + 1 is body b in its own axes, so that a moved body needs no new tree.
+  // Group 0 contains the fixed objects in world axes. Group b + 1 contains body b in its own axes, so that a moved body needs
+  // no new tree.
   std::vector<std::vector<FlatTriangle>> of_group(scene.bodies_in_world.size() + 1);
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const Object& object = scene.objects[i];
@@ -121,7 +123,7 @@ BodyPlaces FlatScene::place(std::span<const Pose> bodies_in_world) const {
   }
   if (bodies.empty()) return places;
   std::vector<std::uint32_t> order;
-  // A small tree over the bodies, made for every ping.
+  // A small tree over the bodies is made for every ping.
   build_bvh(boxes, places.top, order);
   for (const std::uint32_t i : order) places.bodies.push_back(bodies[i]);
   return places;

@@ -1,5 +1,6 @@
-// The scene for rays on the device: triangles and hierarchies of boxes in plain arrays, made once, and the poses of the bodies,
-// set for every ping. core/scene/embree_scene.cpp does the same for the CPU, with the same floats relative to the same origin.
+// The scene for rays on the device: triangles and hierarchies of boxes in plain arrays, which are made once, and the poses of
+// the bodies, which are set for every ping. core/scene/embree_scene.cpp does the same for the CPU. Both use the same floats
+// relative to the same origin.
 #pragma once
 
 #include <cstdint>
@@ -43,7 +44,7 @@ class FlatScene {
   std::vector<FlatTriangle> triangles_;
 };
 
-/// A view with pointers into host memory: for tests and host loops.
+/// A view with pointers into host memory, for tests and host loops.
 TracerView host_view(const FlatScene& scene, const BodyPlaces& places);
 
 }  // namespace sonar::cuda

@@ -1,5 +1,5 @@
-// Decides which launches get a captured graph, and which graph serves a launch. It needs no device, so that it can be tested.
-// cuda_module.cu captures and launches.
+// Decides which launches get a captured graph, and which graph is used for a launch. The code needs no device, so it can be
+// tested. cuda_module.cu captures and launches.
 #pragma once
 
 #include <cstddef>
@@ -12,9 +12,9 @@ namespace sonar::cuda {
 
 inline constexpr std::uint32_t threads_a_block = 128;
 
-/// Number of blocks for a step's indices. It is rounded up, by at most an eighth or to 8 or 16, so that pings with slightly
-/// different numbers of cells or points have the same launch: threads beyond the step_size of a ping return at once. It is never
-/// so large that an index could overflow.
+/// Number of blocks for the indices of a step. It is rounded up by at most an eighth, or to 8 or 16. So pings with slightly
+/// different numbers of cells or points have the same launch; threads beyond the step_size of a ping return at once. The number
+/// is never so large that an index could overflow.
 inline std::uint32_t blocks_for(std::uint32_t largest) {
   constexpr std::uint64_t most = (std::uint64_t{1} << 32) / threads_a_block;
   const std::uint64_t blocks = (std::uint64_t{largest} + threads_a_block - 1) / threads_a_block;
@@ -25,7 +25,7 @@ inline std::uint32_t blocks_for(std::uint32_t largest) {
   return static_cast<std::uint32_t>(rounded < most ? rounded : most);
 }
 
-/// The values of a launch that its graph depends on.
+/// The values on which the graph of a launch depends.
 struct GraphKey {
   const PingView* views = nullptr;
   std::int32_t pings = 0, from = 0, to = 0;
@@ -42,8 +42,8 @@ struct GraphKey {
   }
 };
 
-/// The last launches on one lane, newest first, with the graphs of those that occurred twice: a capture takes longer than a graph
-/// saves in one launch. `Graph` is a pointer.
+/// The last launches on one lane, newest first, with the graphs of launches that occurred twice. A capture takes longer than a
+/// graph saves in one launch. `Graph` is a pointer.
 template <class Graph>
 class GraphShelf {
  public:
@@ -53,7 +53,7 @@ class GraphShelf {
     Graph graph = nullptr;
     int seen = 0;
   };
-  /// The entry of this launch, which becomes the newest. `dropped` gets the graph of the entry that it replaces, or null.
+  /// The entry of this launch, which becomes the newest. `dropped` gets the graph of the entry that was replaced, or null.
   Entry& look_up(const GraphKey& key, Graph& dropped) {
     dropped = nullptr;
     std::size_t i = 0;

@@ -15,7 +15,7 @@ namespace {
 
 using Loop = void (*)(const PingView&, std::uint32_t size, LoopOrder order);
 
-/// A stride that reaches every index once: about the golden ratio of their number.
+/// A stride that reaches every index once: about the number of indices divided by the golden ratio.
 std::uint64_t stride_over(std::uint64_t size) {
   // The stride must be coprime to the size.
   std::uint64_t stride = size * 5 / 8 + 1;
@@ -25,7 +25,7 @@ std::uint64_t stride_over(std::uint64_t size) {
 
 template <Step step>
 void loop(const PingView& p, std::uint32_t size, LoopOrder order) {
-  // The indices of a step must not depend on each other, so that results are equal in every order.
+  // The indices of a step must not depend on each other. Then results are equal in every order.
   if (order == LoopOrder::forwards)
     for (std::uint32_t i = 0; i < size; ++i) run_step<step>(p, i);
   if (order == LoopOrder::backwards)
@@ -40,7 +40,7 @@ constexpr std::array<Loop, sizeof...(step)> loops_of(std::index_sequence<step...
 }
 constexpr auto loops = loops_of(std::make_index_sequence<static_cast<std::size_t>(Step::steps)>());
 
-constexpr std::align_val_t host_alignment{256};  // the same as on the device
+constexpr std::align_val_t host_alignment{256};  // as on the device
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -50,7 +50,7 @@ class HostLoops final : public Machine {
   std::string name() const override { return "host loops"; }
   void* allocate(std::size_t bytes) override {
     void* const at = ::operator new(bytes, host_alignment);
-    // NaN in every float, so that reading before writing is visible in results.
+    // Every float is set to NaN, so that a read before a write is visible in results.
     if (order_ != LoopOrder::forwards) std::memset(at, 0xFF, bytes);
     return at;
   }
@@ -73,7 +73,7 @@ class HostLoops final : public Machine {
     const double begin = now_s();
     using spectral::Fft;
     const auto [at, made] = fft_.try_emplace({size, inverse}, size, inverse ? Fft::Direction::inverse : Fft::Direction::forward);
-    for (int row = 0; row < rows; ++row)  // an array of complex numbers may be read as an array of their parts, and vice versa
+    for (int row = 0; row < rows; ++row)  // an array of complex numbers may be read as an array of floats, and vice versa
       at->second.run(reinterpret_cast<spectral::Complex*>(values) + static_cast<std::ptrdiff_t>(row) * size);
     seconds_[static_cast<std::size_t>(lane)].transforms += now_s() - begin;
   }

@@ -1,15 +1,16 @@
-// Waits for a device that may never answer. It needs no device, so that it can be tested.
+// Waits for a device that may never answer. The code needs no device, so it can be tested.
 #pragma once
 
 namespace sonar::cuda {
 
-// Seconds. A batch takes milliseconds; a service's watchdog ends the program after 30 s (daemon/systemd/sonard.service).
+// Longest wait [s]. A batch takes milliseconds. A service's watchdog ends the program after 30 s
+// (daemon/systemd/sonard.service).
 inline constexpr double longest_wait_s = 20;
-// During this time the device is queried without pauses, because a sleep would lengthen every ping.
+// During this time [s] the device is queried without pauses, because a sleep would lengthen every ping.
 inline constexpr double busy_wait_s = 0.02;
 
-/// Calls `answer` until it returns something else than `not_yet`, and returns that; after longest_wait_s it returns `hung`. `now`
-/// is a clock [s]; `rest` sleeps for a short time.
+/// Calls `answer` until its result is not `not_yet`, and returns that result. After longest_wait_s it returns `hung`. `now` is
+/// a clock [s]; `rest` sleeps for a short time.
 template <class Code, class Answer, class Now, class Rest>
 Code wait_for(Code not_yet, Code hung, const Answer& answer, const Now& now, const Rest& rest) {
   Code code = answer();

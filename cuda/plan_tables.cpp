@@ -19,7 +19,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
       memory_(machine, Arena::Where::both, 1u << 20),
       noise_memory_(machine, Arena::Where::both, 0) {
   const PingPlan& p = plan_;
-  // (11): u and sqrt(1 - u^2) in float for the rays, which decide shadows only; u in double for the beams.
+  // (11): u and sqrt(1 - u^2) in float for the rays, which only determine shadows; u in double for the beams.
   std::vector<ColumnSine> sines;
   std::vector<double> u;
   for (int k = 0; k < p.columns.count; ++k) {
@@ -29,7 +29,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   // Elevations about the array axis [rad] (section 2).
   std::vector<BaseElevation> base;
   for (const float angle : p.fan.elevation_rad) base.push_back({angle, std::cos(angle), std::sin(angle)});
-  // (9): bands of weights, four beams per panel. The device has no beam transform.
+  // (9): bands of weights, four beams for each panel. The device does not use the beam transform.
   std::vector<BeamWeightRow> rows;
   for (const BeamPanel& panel : p.beam_weights.panels)
     rows.push_back({panel.first_column, panel.count, static_cast<std::uint32_t>(panel.weights), 0});
@@ -80,7 +80,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.mix.reach = memory_.put(p.beam_mix.reach());
   if (p.beam_mix.blends()) view_.mix.own = memory_.put(p.beam_mix.own());
   view_.mix.share = memory_.put(p.beam_mix.share());
-  // Pulses without a table of rows, (25).
+  // Tables for pulses without a table of rows, (25).
   if (p.spectral) add_spectrum(*p.spectral);
   memory_.upload(lane);
 }
@@ -91,7 +91,7 @@ void PlanTables::add_spectrum(const SpectralColumns& s) {
   v.points = s.sums().grid_points();
   v.period = s.period_samples();
   v.frequencies = s.frequencies();
-  // Width of (26), terms of its polynomials, and their padding to whole vectors.
+  // The width of (26), the number of terms of its polynomials, and their padding to whole vectors.
   v.width = t.width, v.terms = t.terms, v.padded = t.padded;
   v.kernel = memory_.put(t.polynomial);
   v.correction = memory_.put(t.correction);
@@ -102,12 +102,12 @@ void PlanTables::add_spectrum(const SpectralColumns& s) {
 }
 
 bool PlanTables::serves(const PingRequest& request) const {
-  // The seed matters because of the noise table.
+  // The tables depend on the seed because of the noise table.
   return model_ == request.model && seed_ == request.seed && sonar::serves(plan_, request);
 }
 
 void PlanTables::need_noise(int lane) {
-  // The tables are made for the first ping that needs them, and stay on the device with the plan.
+  // The tables are made when a ping first needs them. They stay on the device with the plan.
   if (view_.noise_table) return;
   noise_.prepare(seed_, plan_.noise_filter);
   view_.noise_table = view_.grain_table = noise_memory_.put(noise_.shaped());

@@ -1,5 +1,5 @@
-// The tables of a plan on the device (core/pipeline/ping_plan.hpp). They depend on product, settings and seed; they are sent once
-// and used by every ping with the same values.
+// The tables of a plan on the device (core/pipeline/ping_plan.hpp). They depend on product, settings and seed. They are sent
+// once, and every ping with the same values uses them.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace sonar::cuda {
 
 class PlanTables {
  public:
-  /// Queues copies of the tables on `lane`. They are valid while this object lives.
+  /// Queues copies of the tables on `lane`. The tables are valid while this object lives.
   PlanTables(Machine& machine, int lane, const PingRequest& request);
 
   bool serves(const PingRequest& request) const;

@@ -9,9 +9,9 @@
 namespace sonar::cuda {
 namespace {
 
-// Sizes of the arenas' chunks in bytes, large enough that a batch needs few. Chunks are kept from batch to batch.
+// Sizes of the arenas' chunks in bytes. They are so large that a batch needs few chunks. Chunks are kept from batch to batch.
 constexpr std::size_t table_chunk = 4u << 20, work_chunk = 16u << 20, result_chunk = 4u << 20, cell_chunk = 8u << 20;
-constexpr std::size_t tiles_per_part = 256;  // tiles that one worker writes
+constexpr std::size_t tiles_per_part = 256;  // number of tiles that one worker writes
 
 }  // namespace
 
@@ -25,7 +25,7 @@ BatchRoom::BatchRoom(Machine& machine, int which_lane, std::size_t most_pings)
       view_table_(view_memory_.allocate<PingView>(most_pings)) {}
 
 const PingView* BatchRoom::upload() {
-  // One table for all pings of a batch, because a step is launched once for all of them.
+  // All pings of a batch share one table, because a step is launched once for all of them.
   std::copy(views.begin(), views.end(), view_table_.host);
   view_memory_.upload(lane);
   tables.upload(lane);
@@ -43,7 +43,7 @@ PingPreparer::PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene,
       scene_memory_(machine, Arena::Where::both, 0),
       store_(machine, cell_bytes),
       workers_(static_cast<std::size_t>(pool.threads())) {
-  // The scene is sent to the device once; each ping adds the poses of its bodies.
+  // The scene is sent to the device once. Each ping adds the poses of its bodies.
   tracer_.nodes = scene_memory_.put(flat_.nodes());
   tracer_.triangles = scene_memory_.put(flat_.triangles());
   tracer_.still_root = flat_.still_root();
@@ -56,7 +56,7 @@ bool PingPreparer::may_go_together(const AskedPing& a, const AskedPing& b) {
   const auto same_places = [](const std::vector<Pose>& x, const std::vector<Pose>& y) {
     return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(Pose)) == 0);
   };
-  // All threads compute multipath echoes together.
+  // All threads compute the multipath echoes of one ping together.
   const PingRequest &x = a.wanted->request, &y = b.wanted->request;
   return !x.switches.multipath && !y.switches.multipath && (a.plan != b.plan || x.settings.gain_db == y.settings.gain_db) &&
          same_places(x.bodies_in_world, y.bodies_in_world);
@@ -75,7 +75,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
     }
     return {rays_, cells, m.bodies, m.laws, m.turned_away, m.plan, m.scalars, kernels_, pool};
   };
-  // Multipath echoes need other cells, whose view comes before this one.
+  // Multipath echoes need other cells. Their view must come before this one.
   if (alone) find_points(all[0], context_of(all[0]), workers_[0]);
   look(all, cells);
   pool_.for_each(all.size(), [&](std::size_t i, int thread) {
@@ -99,11 +99,11 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   return left;
 }
 
-/// The part that only one thread may run: the plan's gain and noise, and the number of the view.
+/// The part that must not run in parallel: the plan's gain and noise, and the number of the view.
 PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, BatchRoom& room) {
   const PingRequest& request = asked.wanted->request;
   PlanTables& plan = *asked.plan;
-  // Leak and volume read a table of shaped noise, too: that of the noise, or one with the pulse's correlation (section 5).
+  // Leak and volume also read a table of shaped noise: that of the noise, or one with the pulse's correlation (section 5).
   const bool leak = request.switches.leak && plan.plan().mode.receiver.leak_upa > 0;
   const bool wants_noise = request.switches.noise || leak || (request.switches.volume && scene_->water_column.has_volume());
   set_gain(plan.plan(), request.settings.gain_db);
@@ -115,7 +115,8 @@ PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, Batch
   return m;
 }
 
-/// Finds cells within range and fan, the same as PingSimulation::find_echo_sources and in the same order, which is that of sums.
+/// Finds cells within range and fan, as PingSimulation::find_echo_sources does. Their order is the same, because it is the
+/// order of sums.
 void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
   const double begin = now();
   std::vector<CellView> views;
@@ -142,7 +143,7 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
   std::size_t next = 0;
   for (Making& m : all) {
     if (m.request().blank) continue;
-    m.looks_at = std::move(views[next]);  // tiles have pointers to its levels, whose addresses do not change
+    m.looks_at = std::move(views[next]);  // tiles contain pointers to its levels, whose addresses do not change
     m.seen = &found[next++];
     m.ping.statistics.cell_bytes = cells.cached_bytes();
     m.seconds(m.seen->built > 0 ? Stage::build_cells : Stage::cull) += took;
@@ -159,7 +160,7 @@ void PingPreparer::complete(Making& m, const PingContext& context, int lane, Wor
     add_water(m);
     if (m.plan.spectral) {
       SpectralView& v = m.view.spectral;
-      // Complex values of all columns: the fine grids of (25), and the spectra folded to one value a sample.
+      // Number of complex values of all columns: the fine grids of (25), and the spectra folded to one value per sample.
       v.grids = m.room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.points)).device;
       v.folded = m.room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.period)).device;
     }
@@ -172,7 +173,7 @@ void PingPreparer::complete(Making& m, const PingContext& context, int lane, Wor
 void PingPreparer::find_points(Making& m, const PingContext& context, Worker& worker) {
   if (m.request().blank) return;
   const double begin = now();
-  // The CPU computes these few echoes, which need many branches. The device adds their pulses to the beams.
+  // The CPU computes these few echoes, because they need many branches. The device adds their pulses to the beams.
   std::vector<PointEcho> points = scatter_points(context);
   const std::vector<ReceivedPulse> pulses = receive_other_sonars(context, m.request());
   if (m.request().switches.specular) worker.specular_echoes.find(context, points);
@@ -181,7 +182,7 @@ void PingPreparer::find_points(Making& m, const PingContext& context, Worker& wo
     m.ping.statistics.rays += counts.rays;
     m.ping.statistics.echoes += counts.echoes;
     if (multipath_.has_echoes) {
-      // After the lead, because the device adds from sample 0 on.
+      // The pointer skips the lead, because the device adds from sample 0 on.
       m.view.multipath = m.room.tables.put(multipath_.columns.data) + 2 * multipath_.columns.lead;
       m.view.multipath_stride = multipath_.columns.stride;
     }
@@ -210,13 +211,13 @@ void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std:
   for (const ReceivedPulse& pulse : pulses) add(pulse.sine, tone_of(pulse, 0, plan.samples));
   m.view.pulse_count = static_cast<std::int32_t>(in_beams.size());
   m.view.pulses = m.room.tables.put(in_beams);
-  // W of every beam at every point's exact direction; the device computes it.
+  // W of every beam at every point's exact direction. The device computes it.
   m.view.point_weights =
       m.room.work.allocate<double>(static_cast<std::size_t>(m.view.point_count + m.view.pulse_count) * m.beams()).device;
 }
 
 bool PingPreparer::find_tiles(Making& m, const PingContext& context, int lane, Worker& worker) {
-  // False: the store is full. The caller lets the device finish, empties it and begins this ping again.
+  // Returns false if the store is full. The caller then waits for the device, empties the store and begins this ping again.
   if (!store_.find(m.seen->tiles, lane, m.room.cells, worker.tile_cells, context.pool)) return false;
   prepare_tiles(context, m.seen->tiles, m.seen->sonar_from_object, worker.tiles);
   m.ping.statistics.tiles = m.seen->tiles.size();
@@ -262,14 +263,14 @@ TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t*
   return t;
 }
 
-/// Arranges the tiles one after the other; every cell has a slot.
+/// Arranges the tiles one after the other. Every cell gets a slot.
 void PingPreparer::lay_out_tiles(Making& m, const Worker& worker, Parallel& pool) {
   const std::vector<PreparedTile>& prepared = worker.tiles;
-  // sqrt(sigma_b / mu) of a material, an empty table for Lambert's cosine.
+  // sqrt(sigma_b / mu) of a material. For Lambert's cosine the table is empty.
   std::vector<const float*> law_on_device;
   for (const LawTable& law : m.laws) law_on_device.push_back(m.room.tables.put(law.root));
   const auto tiles = m.room.tables.allocate<TileView>(prepared.size());
-  // Sums of the tiles' counts: finds the tile of a slot by bisection.
+  // Sums of the tiles' counts. With them, the tile of a slot is found by bisection.
   const auto first_slot = m.room.tables.allocate<std::uint32_t>(prepared.size() + 1);
   pool.for_each((prepared.size() + tiles_per_part - 1) / tiles_per_part, [&](std::size_t part, int) {
     const std::size_t end = std::min(prepared.size(), (part + 1) * tiles_per_part);
@@ -277,7 +278,7 @@ void PingPreparer::lay_out_tiles(Making& m, const Worker& worker, Parallel& pool
       tiles.host[i] =
           view_of(prepared[i], worker.tile_cells[i], law_on_device[static_cast<std::size_t>(prepared[i].seen.tile->material)]);
   });
-  // Slots have the order of the tiles, because the number of a slot is the place of its echo in sums.
+  // Slots have the order of the tiles. The number of a slot is the position of its echo in sums.
   std::uint32_t slots = 0;
   for (std::size_t i = 0; i < prepared.size(); ++i) {
     first_slot.host[i] = slots;
@@ -292,7 +293,7 @@ void PingPreparer::lay_out_tiles(Making& m, const Worker& worker, Parallel& pool
   view.slots = slots;
   view.chunks = (slots + slots_a_chunk - 1) / slots_a_chunk;
   Arena& work = m.room.work;
-  // Echoes by slot, then sorted by column: ranks within chunks and counts of chunks keep the order of slots in a column.
+  // Echoes by slot, then sorted by column. Ranks within chunks and counts of chunks keep the order of slots in a column.
   view.echoes = work.allocate<Echo>(slots).device;
   view.sorted = work.allocate<Echo>(slots).device;
   view.rank = work.allocate<std::uint32_t>(slots).device;

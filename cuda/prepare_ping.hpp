@@ -1,5 +1,5 @@
 // The part of a device ping that the CPU computes: the tiles in view and their values for this ping, point echoes, multipath
-// echoes, and a few hundred values of the water and the receiver. It fills a PingView. Only multipath is slow:
+// echoes, and a few hundred values of the water and the receiver. The results are stored in a PingView. Only multipath is slow:
 // core/pipeline/multipath sums its echoes, which are sent as columns.
 #pragma once
 
@@ -21,7 +21,7 @@
 
 namespace sonar::cuda {
 
-/// A requested ping, from its request until its result has been taken.
+/// A requested ping, from its request until its result has been returned.
 struct WantedPing {
   enum class State { open, under_way, done };
   PingRequest request;
@@ -52,7 +52,7 @@ struct BatchRoom {
 
   /// All arenas that a batch uses.
   std::array<Arena*, 4> arenas() { return {&tables, &work, &results, &cells}; }
-  /// Queues copies of views and tables. The views have the same addresses as in the previous batch, so that a captured graph
+  /// Queues copies of views and tables. The views have the same addresses as in the previous batch. Therefore a captured graph
   /// (cuda_module.cu) can be reused.
   const PingView* upload();
 
@@ -73,16 +73,16 @@ class PingPreparer {
   PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays, const simd::Kernels& kernels,
                Parallel& pool, std::size_t cell_bytes, double (*now_s)());
 
-  /// Adds the pings to the room: one thread per ping if there are several (all of which may_go_together()), else all threads.
-  /// Bodies must have been placed; `cells` must serve the requests. `lane` is that of the tables and cells that stay on the
-  /// device. Returns the pings for whose tiles there is no room: finish the running batches, call forget_cells(), and add these
-  /// again.
+  /// Adds the pings to the room. Several pings, all of which may_go_together(), use one thread each; a single ping uses all
+  /// threads. Bodies must have been placed; `cells` must serve the requests. `lane` is the lane of the tables and cells that
+  /// stay on the device. Returns the pings for whose tiles there is no room. For these, finish the running batches, call
+  /// forget_cells(), and add them again.
   std::vector<AskedPing> add(std::span<const AskedPing> pings, SurfaceCells& cells, int lane, BatchRoom& room);
-  /// Whether the pings can be prepared together, because none changes what the other needs: poses of bodies, gain of a plan,
+  /// True if the pings can be prepared together, because neither changes values of the other: poses of bodies, gain of a plan,
   /// mirrors.
   static bool may_go_together(const AskedPing& a, const AskedPing& b);
   void forget_cells() { store_.clear(); }
-  /// Like forget_cells(), and releases the memory.
+  /// Like forget_cells(), but also releases the memory.
   void give_back() { store_.give_back(); }
 
  private:
@@ -107,7 +107,7 @@ class PingPreparer {
     std::size_t samples() const { return static_cast<std::size_t>(plan.samples); }
     std::size_t beams() const { return static_cast<std::size_t>(plan.settings.beam_count); }
   };
-  struct Worker {  // buffers of one thread, kept between pings
+  struct Worker {  // buffers of one thread, kept from ping to ping
     SpecularEchoes specular_echoes;
     std::vector<PreparedTile> tiles;
     std::vector<const std::int16_t*> tile_cells;

@@ -1,6 +1,6 @@
-// Kernel bodies of pulses without a table of real values: they spread echoes on a grid, multiply its transform by the spectrum of
-// the pulse, fold the product, and make samples of its inverse transform (core/pipeline/spectral_columns.hpp). The Machine
-// computes the two transforms between these steps.
+// Kernel bodies for pulses without a table of real values. They spread echoes on a grid, multiply the grid's transform by the
+// spectrum of the pulse, fold the product, and make samples from its inverse transform (core/pipeline/spectral_columns.hpp).
+// The Machine computes the two transforms between these steps.
 #pragma once
 
 #include <cmath>
@@ -9,8 +9,8 @@
 
 namespace sonar::cuda {
 
-/// Adds a column's echoes at the grid's points = part modulo spread_parts, where i = column * spread_parts + part, in the same
-/// order as the CPU.
+/// Adds a column's echoes at the grid's points = part modulo spread_parts, where i = column * spread_parts + part. The order is
+/// that of the CPU.
 SONAR_HD inline void spread(const PingView& p, std::uint32_t i) {
   const SpectralView& s = p.spectral;
   const std::uint32_t k = i / spread_parts;
@@ -39,7 +39,7 @@ SONAR_HD inline void spread(const PingView& p, std::uint32_t i) {
   }
 }
 
-/// Value `i` of [columns][period]: the sum of all frequencies that fold to it, the lowest first.
+/// Value `i` of [columns][period]: the sum of all frequencies that are folded to it, the lowest first.
 SONAR_HD inline void fold(const PingView& p, std::uint32_t i) {
   const SpectralView& s = p.spectral;
   const auto period = static_cast<std::uint32_t>(s.period);

@@ -1,5 +1,5 @@
-// The steps of a ping: the number of indices of each, and its body. Both the CUDA module and the host loops call run_step for
-// every index below step_size; a step begins when the step before it in Step has ended.
+// The steps of a ping: the number of indices of each step, and its body. Both the CUDA module and the host loops call run_step
+// for every index below step_size. A step begins when the previous step in Step has ended.
 #pragma once
 
 #include "cuda/beam_steps.hpp"
@@ -69,7 +69,7 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
   return 0;
 }
 
-/// The body of a step, chosen at compile time, so that each kernel contains only one body.
+/// The body of a step. It is selected at compile time, so that each kernel contains only one body.
 template <Step step>
 SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
   if constexpr (step == Step::clear) clear(p, i);

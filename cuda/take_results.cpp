@@ -44,10 +44,10 @@ void take_results(BatchRoom::Ping& from, const PingView& view) {
         if (from.truth.host[k].object != no_object) by_column[k] = {from.truth.host[k].range_m, from.truth.host[k].object};
     ping.truth = truth_of_beams(from.plan->plan(), by_column);
   }
-  // Rays and echoes are counted on the device; base rays are known beforehand.
+  // Rays and echoes are counted on the device. The number of base rays is known in advance.
   if (view.has_scene != 0) {
     const SeaView& sea = view.sea;
-    // Rays of the side lobes serve several columns.
+    // A ray of the side lobes serves several columns.
     const int sides = 2 * sea.side_elevations, shared = (sea.columns + sea.side_columns - 1) / sea.side_columns;
     from.statistics.rays +=
         from.counters.host[0] + static_cast<std::size_t>(sea.columns * (sea.elevations - sides) + shared * sides);

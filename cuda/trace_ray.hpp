@@ -1,5 +1,5 @@
-// Finds the first surface that a ray hits: in the hierarchy of fixed objects, then in those of the bodies in its way. It runs on
-// host and device, for one ray at a time. Rounding cannot make a ray pass between two adjacent triangles.
+// Finds the first surface that a ray hits: first in the hierarchy of fixed objects, then in those of the bodies on the ray's
+// way. The code runs on host and device, for one ray at a time. Rounding cannot make a ray pass between two adjacent triangles.
 #pragma once
 
 #include <cmath>
@@ -17,8 +17,8 @@ struct RayHit {
   Vec3 normal;  // geometric, world axes, any length, either side
 };
 
-/// Values of a ray that the descent uses, computed once. A direction component of exactly 0 becomes a tiny one, so that all
-/// quotients are defined.
+/// Values of a ray that the descent needs, computed once. If a component of the direction is exactly 0, it becomes a tiny
+/// number, so that all quotients are defined.
 struct Descent {
   float from[3], per[3];
   int upper[3];  // 1 where the ray enters boxes by their high side
@@ -35,8 +35,9 @@ SONAR_HD inline Descent descent_of(const Ray& ray) {
   return d;
 }
 
-/// The range at which the ray enters a child's box; negative if it does not do so before `far_m`. The range at which it leaves is
-/// increased by the rounding error of the quotients (Ize 2013), so that flat boxes and shared sides are never missed.
+/// The range at which the ray enters a child's box; negative if it does not enter the box before `far_m`. The range at which it
+/// leaves the box is increased by the rounding error of the quotients (Ize 2013). So flat boxes and shared sides are never
+/// missed.
 SONAR_HD inline float enters(const BvhNode& node, int side, const Descent& d, float far_m) {
   float in = 0, out = far_m;
   for (int k = 0; k < 3; ++k) {
@@ -49,7 +50,7 @@ SONAR_HD inline float enters(const BvhNode& node, int side, const Descent& d, fl
   return in <= out * 1.0000005f ? in : -1.0f;
 }
 
-/// Calls leaf(leaf, far_m) for the leaves in the ray's way, nearer ones first. The call may decrease far_m.
+/// Calls leaf(leaf, far_m) for the leaves on the ray's way, nearer ones first. The call may decrease far_m.
 template <class Leaf>
 SONAR_HD inline void descend(const BvhNode* nodes, std::int32_t root, const Descent& d, float& far_m, Leaf& leaf) {
   struct Waiting {
@@ -85,8 +86,8 @@ SONAR_HD inline void descend(const BvhNode* nodes, std::int32_t root, const Desc
   }
 }
 
-/// The side on which the ray passes the edge from `p` to `q`, both relative to the ray's origin. If the ends are exchanged, only
-/// the sign changes, so that a ray at the edge of two triangles hits one of them.
+/// The side on which the ray passes the edge from `p` to `q`, both relative to the ray's origin. If the ends are exchanged,
+/// only the sign changes. So a ray at the edge of two triangles hits one of them.
 SONAR_HD inline float passes(Vec3 p, Vec3 q, Vec3 along) { return dot(cross(q - p, p + q), along); }
 
 SONAR_HD inline float largest(Vec3 v) { return std::fmax(std::fabs(v.x), std::fmax(std::fabs(v.y), std::fabs(v.z))); }
@@ -104,7 +105,8 @@ struct TriangleTest {
                c = Vec3{t.c[0], t.c[1], t.c[2]} - from;
     const float u = passes(a, b, along), v = passes(b, c, along), w = passes(c, a, along);
     const Vec3 ab = b - a, ac = c - a;
-    // At a corner, rounding could let a ray miss all triangles that meet there. A tolerance of a few micrometres prevents this.
+    // At a corner, rounding could make a ray miss all triangles that meet there. A tolerance of a few micrometres prevents
+    // this.
     const float grace = 5e-7f * std::fabs(dot(a, along)) * (largest(ab) + largest(ac));
     if (!((u >= -grace && v >= -grace && w >= -grace) || (u <= grace && v <= grace && w <= grace))) return;
     const Vec3 normal = cross(ab, ac);
@@ -112,7 +114,7 @@ struct TriangleTest {
     if (speed == 0) return;
     const float range_m = dot(normal, a) / speed;
     if (!(range_m >= 0 && range_m <= far_m)) return;
-    // If two hits have exactly the same range, the same one is chosen in any order.
+    // If two hits have exactly the same range, the choice between them does not depend on their order.
     if (range_m == hit.range_m && hit.object != no_object &&
         (t.object > hit.object || (t.object == hit.object && t.triangle >= hit.triangle)))
       return;
