@@ -1,5 +1,5 @@
-// Oracles 14 to 16 at formula level: receive widths, side lobes and the two-way elevation product, from sampled patterns;
-// and oracle 46's geometry: which beam a point off the horizontal appears in.
+// Oracles 14 to 16 at the level of formulas: receive widths, side lobes and the two-way elevation product, from sampled
+// patterns. Also the geometry of oracle 46: the beam in which a point off the horizontal appears.
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "tests/oracles/record.hpp"
 
@@ -15,7 +15,7 @@ namespace {
 
 constexpr Taper shaped[] = {Taper::uniform, Taper::taylor30, Taper::hamming, Taper::hann};
 
-/// Full width between the half-power points of a pattern that falls from 1 at 0, found by walking, not by its formula.
+/// Full width between the half-power points of a pattern that falls from 1 at 0. It is found by small steps, not by a formula.
 double half_power_width(const std::function<double(double)>& amplitude, double step) {
   double x = 0;
   while (amplitude(x) * amplitude(x) > 0.5) x += step;
@@ -93,7 +93,7 @@ TEST(BeamPattern, Oracle16_TwoWayElevationProduct) {
     pattern.elevation_width_is = ElevationWidthIs::one_way;
     test::record_oracle(16, "two-way over one-way width", 0.720, half_power_width(product, 1e-5) / rad_from_deg(width_deg),
                         0.02 * 0.720, "");
-    // One of the two equal sincs has the quoted width itself.
+    // The width of one of the two equal sincs is the quoted width.
     const auto one_of_two = [&](double psi) { return std::sqrt(elevation_two_way(pattern, psi)); };
     EXPECT_NEAR(half_power_width(one_of_two, 1e-5) / rad_from_deg(width_deg), 1, 0.001) << width_deg;
     pattern.elevation_width_is = ElevationWidthIs::two_way;

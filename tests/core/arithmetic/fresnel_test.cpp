@@ -1,4 +1,4 @@
-// Fresnel integrals against their definition and against tabled values.
+// Compares Fresnel integrals with their definition and with tabulated values.
 #include "core/pipeline/arithmetic/fresnel.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ TEST(Fresnel, TabledValues) {  // Abramowitz & Stegun, table 7.7
 }
 
 TEST(Fresnel, IntegratesItsDefinition) {
-  // Simpson's rule from 0, compared at every tenth.
+  // Simpson's rule from 0, compared at every tenth step.
   FresnelPair sum;
   const double step = 1e-3;
   for (int i = 0; i < 9000; ++i) {

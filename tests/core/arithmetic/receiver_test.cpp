@@ -1,4 +1,5 @@
-// Oracles 41 and 42 at formula level, the noise level of the specification's own sanity figures, and the edges of quantisation.
+// Oracles 41 and 42 at the level of formulas, the noise level of the figures in the specification, and the limits of
+// quantisation.
 #include "core/pipeline/arithmetic/receiver.hpp"
 
 #include <gtest/gtest.h>
@@ -104,7 +105,7 @@ TEST(Receiver, TvgClampAndCeiling) {
   EXPECT_EQ(tvg_db(law, 60, 1), 80);
   law.tvg_slope_db = 40;
   law.tvg_ceiling_db = std::numeric_limits<float>::infinity();
-  EXPECT_NEAR(tvg_db(law, 30, 0.4954), 88.8, 0.1);  // what LF at 30 m would want
+  EXPECT_NEAR(tvg_db(law, 30, 0.4954), 88.8, 0.1);  // gain that LF at 30 m would need
 }
 
 TEST(Receiver, FullScale) {

@@ -1,4 +1,4 @@
-// Lambert cross-sections, spreading and carrier phase: the obliquity, and the inputs that must not blow up.
+// Lambert cross-sections, spreading and carrier phase: oblique incidence, and inputs that must not give infinite results.
 #include "core/pipeline/arithmetic/scattering.hpp"
 
 #include <gtest/gtest.h>
@@ -16,8 +16,8 @@ constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 TEST(Scattering, SolidAngleFormIsMuTimesOneCosine) {
   const auto sigma = [](double cosine) { return lambert_per_area(0.1, cosine) * footprint_area_m2(cosine, 3, 1e-4); };
   EXPECT_NEAR(sigma(0.5), 0.1 * 0.5 * 9 * 1e-4, 1e-15);
-  EXPECT_NEAR(sigma(-0.5), 0.1 * 0.5 * 9 * 1e-4, 1e-15);  // two-sided
-  // At and below the floor the area is held: falls with cos^2, never grows.
+  EXPECT_NEAR(sigma(-0.5), 0.1 * 0.5 * 9 * 1e-4, 1e-15);  // the law is two-sided
+  // At and below the lower limit of the cosine the area stays constant: the result falls with cos^2 and never grows.
   EXPECT_NEAR(footprint_area_m2(0, 1, 1e-4), 1e-4 / cosine_floor, 1e-12);
   EXPECT_EQ(sigma(0), 0);
 }

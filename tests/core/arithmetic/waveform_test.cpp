@@ -1,4 +1,4 @@
-// Oracle 17 at formula level, and the integrals of the pulse against sums.
+// Oracle 17 at the level of formulas, and the integrals of the pulse compared with sums.
 #include "core/pipeline/arithmetic/waveform.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ TEST(Waveform, Oracle17_PulseWidth) {
   for (const double width_m : {0.0025, 0.0254, 0.1}) {
     for (const double c : {1482.4, 1500.0}) {
       const double b = envelope_parameter_hz(c, width_m);
-      double range_m = 0;  // walk out to half power in range
+      double range_m = 0;  // searches in small steps for half power in range
       while (std::pow(envelope(b, 2 * range_m / c), 2) > 0.5) range_m += width_m * 1e-4;
       EXPECT_NEAR(2 * range_m / width_m, 1, 0.001);
     }

@@ -1,4 +1,4 @@
-// Programs that may fail: their exit is reported, and they inherit three files and nothing else from this process.
+// Programs that may fail. Their exit is reported. They inherit three files and nothing else from this process.
 #include "core/base/child_process.hpp"
 
 #include <gmock/gmock.h>
@@ -69,7 +69,8 @@ TEST(ChildProcess, InheritsNoBlockedOrIgnoredSignal) {
   const Outcome done = shell("grep -E '^Sig(Blk|Ign):' /proc/self/status | tail -c 8; grep '^SigBlk:' /proc/self/status");
   ::signal(SIGPIPE, handler);
   ::pthread_sigmask(SIG_SETMASK, &before, nullptr);
-  EXPECT_EQ(done.output, "0000000\nSigBlk:\t0000000000000000\n");  // ignored: of the first 28; the C library has its own above
+  EXPECT_EQ(done.output,
+            "0000000\nSigBlk:\t0000000000000000\n");  // none of the first 28 signals is ignored; the C library uses some above
 }
 
 TEST(ChildProcess, AProgramThatIsNotThereIsNamed) {

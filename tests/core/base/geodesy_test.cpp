@@ -1,4 +1,5 @@
-// Places on the ellipsoid against closed forms: the axes of the earth, radii of curvature, and the turn of the tangent planes.
+// Compares positions on the ellipsoid with closed forms: the axes of the earth, radii of curvature, and the rotation between
+// tangent planes.
 #include "core/base/geodesy.hpp"
 
 #include <gtest/gtest.h>
@@ -6,12 +7,12 @@
 namespace sonar {
 namespace {
 
-constexpr double semi_minor_m = 6356752.314245;  // WGS84, as tables print it
+constexpr double semi_minor_m = 6356752.314245;  // WGS84, as printed in tables
 
 Geodetic at_deg(double latitude, double longitude, double altitude_m = 0) {
   return {rad_from_deg(latitude), rad_from_deg(longitude), altitude_m};
 }
-/// Radii of curvature along the meridian and across it.
+/// Radii of curvature along the meridian and across it [m].
 double meridian_m(double latitude_rad) {
   const double s = std::sin(latitude_rad), e2 = earth_eccentricity_squared;
   return earth_semi_major_m * (1 - e2) / std::pow(1 - e2 * s * s, 1.5);
@@ -53,13 +54,13 @@ TEST(Geodesy, ItsAxesAreEastNorthAndUp) {
 TEST(Geodesy, SmallStepsFollowTheRadiiOfCurvature) {
   for (const double latitude : {-33.8, 0.0, 47.6, 69.6}) {
     const Geodetic origin = at_deg(latitude, -122.33, 20);
-    const double step_rad = 1e-6;  // some metres
+    const double step_rad = 1e-6;  // a few metres on the ground
     const auto from_origin = [&](double north, double east, double up) {
       return enu_in_enu_of(origin, {origin.latitude_rad + north, origin.longitude_rad + east, origin.altitude_m + up}).position_m;
     };
     const double north_m = (meridian_m(origin.latitude_rad) + 20) * step_rad;
     const double east_m = (normal_m(origin.latitude_rad) + 20) * std::cos(origin.latitude_rad) * step_rad;
-    expect_near(from_origin(step_rad, 0, 0), {0, north_m, 0}, 1e-5);  // the ground falls away by 3 um
+    expect_near(from_origin(step_rad, 0, 0), {0, north_m, 0}, 1e-5);  // the ground is 3 um below the plane here
     expect_near(from_origin(0, step_rad, 0), {east_m, 0, 0}, 1e-5);
     expect_near(from_origin(0, 0, -12.5), {0, 0, -12.5}, 1e-7);
   }
@@ -71,7 +72,8 @@ TEST(Geodesy, FarAwayTheGroundFallsAndNorthTurns) {
   const double along_m = length(place.position_m);
   EXPECT_NEAR(along_m, normal_m(origin.latitude_rad) * 0.5 * rad_from_deg(0.1), 0.01);
   EXPECT_NEAR(place.position_m.z, -along_m * along_m / (2 * normal_m(origin.latitude_rad)), 0.01);
-  // Meridians converge by the sine of the latitude: north of a place to the east points to the left of ours.
+  // Meridians converge by the sine of the latitude. At a point in the east, north is therefore to the left of north at the
+  // origin.
   const Vec3d north = rotate(place.orientation, {0, 1, 0});
   EXPECT_NEAR(std::atan2(-north.x, north.y), rad_from_deg(0.1) * std::sin(origin.latitude_rad), 1e-6);
 }

@@ -1,4 +1,4 @@
-// Rotations, poses and frame conversions against Eigen, which shares no code and no convention choice with ours.
+// Compares rotations, poses and frame conversions with Eigen, which shares no code and no convention with ours.
 #include "core/base/geometry.hpp"
 
 #include <gtest/gtest.h>
@@ -67,10 +67,11 @@ TEST_F(Geometry, RollPitchYawIsIntrinsicZYX) {
     EXPECT_NEAR(back.pitch_rad, angles.pitch_rad, 1e-9);
     EXPECT_NEAR(back.yaw_rad, angles.yaw_rad, 1e-9);
   }
-  EXPECT_NEAR(rpy_from_quat(quat_from_rpy({0, pi / 2, 0})).pitch_rad, pi / 2, 1e-7);  // gimbal lock stays finite
+  EXPECT_NEAR(rpy_from_quat(quat_from_rpy({0, pi / 2, 0})).pitch_rad, pi / 2, 1e-7);  // at gimbal lock the result stays finite
 }
 
-// NED to ENU swaps the first two axes and turns the third; FRD to FLU turns the last two. As matrices, not as our quaternions.
+// NED to ENU swaps the first two axes and reverses the third. FRD to FLU reverses the last two. Here as matrices, independent
+// of our quaternions.
 TEST_F(Geometry, NorthEastDownConversions) {
   Eigen::Matrix3d enu_from_ned_axes, flu_from_frd_axes;
   enu_from_ned_axes << 0, 1, 0, 1, 0, 0, 0, 0, -1;
@@ -83,7 +84,7 @@ TEST_F(Geometry, NorthEastDownConversions) {
         enu_from_ned_axes * eigen(frd_in_ned.orientation).toRotationMatrix() * flu_from_frd_axes.transpose();
     EXPECT_LT((eigen(flu_in_enu.orientation).toRotationMatrix() - expected).norm(), 1e-12);
 
-    // A mount stated in the body's FRD axes: the same lever arm and rotation in its FLU axes.
+    // A mount in the body's FRD axes has the same lever arm and rotation in its FLU axes.
     const Pose mount = flu_from_frd(frd_in_ned);
     EXPECT_LT((eigen(mount.position_m) - flu_from_frd_axes * eigen(frd_in_ned.position_m)).norm(), 1e-12);
     const Eigen::Matrix3d mount_expected =
@@ -95,7 +96,8 @@ TEST_F(Geometry, NorthEastDownConversions) {
   }
 }
 
-// A vehicle that heads east, nose 10 degrees up, right side 20 degrees down, in ArduPilot's convention and in ours.
+// A vehicle that heads east, with its nose 10 degrees up and its right side 20 degrees down, in ArduPilot's convention and in
+// ours.
 TEST_F(Geometry, AttitudeOfAVehicleInBothConventions) {
   const Quatd frd_in_ned = quat_from_rpy({rad_from_deg(20), rad_from_deg(10), rad_from_deg(90)});
   const Quatd flu_in_enu = enu_flu_from_ned_frd(frd_in_ned);

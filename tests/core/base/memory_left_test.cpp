@@ -1,4 +1,4 @@
-// Memory that the computer and the control groups leave, read from a tree of files that stands for /.
+// Memory that the computer and the control groups leave to the process. It is read from a folder of files that replaces /.
 #include "core/base/memory_left.hpp"
 
 #include <gmock/gmock.h>
@@ -56,7 +56,7 @@ TEST_F(MemoryLeft, OfGroupsOfVersion2AndThoseAboveThem) {
 
 TEST_F(MemoryLeft, OfGroupsOfVersion1) {
   write("proc/self/cgroup", "12:cpu,cpuacct:/x\n9:memory:/docker/ab\n0::/docker/ab\n");
-  write("sys/fs/cgroup/memory/memory.limit_in_bytes", "3000000\n");  // what is seen from inside of it
+  write("sys/fs/cgroup/memory/memory.limit_in_bytes", "3000000\n");  // the value visible from inside the group
   write("sys/fs/cgroup/memory/memory.usage_in_bytes", "1000000\n");
   write("sys/fs/cgroup/memory/memory.stat", "inactive_file 7\ntotal_inactive_file 500000\n");
   EXPECT_EQ(memory_left_bytes(), 2500000u);

@@ -1,4 +1,5 @@
-// The compute pool: every item exactly once, worker numbers in range, usable again and again, for any number of threads.
+// The compute pool: it processes every item exactly once, worker numbers are in range, and it can be used repeatedly, with any
+// number of threads.
 #include "core/base/parallel.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Philox4x32-10 against the known-answer vectors published with Random123, and the statistics of the normal draws.
+// Compares Philox4x32-10 with the known-answer vectors published with Random123, and tests the statistics of the normal draws.
 #include "core/base/random.hpp"
 
 #include <gtest/gtest.h>
@@ -64,7 +64,7 @@ TEST(Random, ComplexNormalIsCircularWithUnitPower) {
   EXPECT_NEAR(neighbour / n, 0, 5 * sd);
 }
 
-// Kolmogorov-Smirnov at 1 %: |z| is Rayleigh.
+// Kolmogorov-Smirnov test at 1 %: |z| has a Rayleigh distribution.
 TEST(Random, ComplexNormalMagnitudeIsRayleigh) {
   const int n = 20000;
   std::vector<int> bins(2000);  // bins of the cumulative probability 1 - exp(-|z|^2)

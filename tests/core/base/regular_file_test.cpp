@@ -1,4 +1,4 @@
-// Only regular files are opened: the error names any other kind, and opening never waits for it.
+// Only regular files are opened. The error names any other kind of file, and opening never waits for a file of another kind.
 #include "core/base/regular_file.hpp"
 
 #include <fcntl.h>

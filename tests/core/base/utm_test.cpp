@@ -1,5 +1,5 @@
-// Universal Transverse Mercator against its definition: angles are preserved everywhere, and the meridian in the middle of a zone
-// has 0.9996 times its length.
+// Compares Universal Transverse Mercator with its definition: angles are preserved everywhere, and the meridian in the middle
+// of a zone has 0.9996 times its length.
 #include "core/base/utm.hpp"
 
 #include <gtest/gtest.h>
@@ -33,10 +33,10 @@ TEST(Utm, TheMiddleOfAZoneHasItsMeridian) {
     EXPECT_NEAR(deg_from_rad(south.latitude_rad), -latitude_deg, 1e-10);
     EXPECT_NEAR(deg_from_rad(south.longitude_rad), -177, 1e-12);
   }
-  EXPECT_NEAR(scale * meridian_arc_m(rad_from_deg(60.0)), 6'651'411.19, 0.01);  // as tables have it
+  EXPECT_NEAR(scale * meridian_arc_m(rad_from_deg(60.0)), 6'651'411.19, 0.01);  // the value printed in tables
 }
 
-// Together with the meridian this leaves one map only.
+// Only one projection has this property together with the meridian.
 TEST(Utm, IsTrueToAngles) {
   for (const double easting_m : {166'000.0, 300'000.0, 500'000.0, 780'000.0, 1'200'000.0})
     for (const double northing_m : {0.0, 1'500'000.0, 5'200'000.0, 8'700'000.0}) {

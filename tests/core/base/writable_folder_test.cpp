@@ -1,4 +1,5 @@
-// Folders in which no file can be written, whatever their permissions say to the superuser, are known without an attempt.
+// Folders in which no file can be created, even if the superuser has the permission. They are recognised without an attempt to
+// write.
 #include "core/base/writable_folder.hpp"
 
 #include <gmock/gmock.h>
