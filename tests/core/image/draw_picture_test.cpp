@@ -1,4 +1,4 @@
-// Pictures other than the fan of one ping: positions of what is drawn, and refusals.
+// Pictures other than the fan of one ping: positions of the drawn samples, and errors.
 #include "core/image/draw_picture.hpp"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ PolarImage cells(std::size_t rows, std::size_t columns) {
   return image;
 }
 
-/// A full turn, one bright beam.
+/// A full circle with one bright beam.
 SonarPicture sweep(std::size_t bright) {
   SonarPicture picture{.kind = PictureKind::sweep, .image = cells(100, 40)};
   for (std::size_t beam = 0; beam < 40; ++beam)

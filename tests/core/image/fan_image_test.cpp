@@ -1,4 +1,4 @@
-// The fan: port must be left, far must be up, and no sample may be missing in the pixels.
+// The fan: port must be on the left, far ranges at the top, and each sample must be visible in the pixels.
 #include "core/image/draw_fan.hpp"
 
 #include <fcntl.h>
@@ -93,7 +93,7 @@ TEST(Fan, ShowsNothingNearerThanItsStart) {
   EXPECT_EQ(grey_at(5.1).b, 50);
 }
 
-/// One step from the last bearing leads to the first: of a head that turns on and on.
+/// One step from the last bearing leads to the first one, as for a head that keeps turning.
 PolarImage full_turn(std::size_t beams, double first_rad) {
   PolarImage image = black_fan(10, beams, 180);
   for (std::size_t i = 0; i < beams; ++i)
@@ -114,7 +114,7 @@ TEST(Fan, AFullTurnHasNoGap) {
     }
   }
   PolarImage gap = full_turn(16, pi);
-  for (double& azimuth : gap.azimuth_rad) azimuth *= 0.9;  // 36 degrees are missing, less the half beams
+  for (double& azimuth : gap.azimuth_rad) azimuth *= 0.9;  // 36 degrees are missing, minus the half beams
   const Raster fan = *draw_fan(gap, plain_gray());
   EXPECT_EQ(fan.at(195, fan.height - 10).b, outside_colour.b) << "a sector stays one";
 }
@@ -193,7 +193,7 @@ TEST(Png, LinksAndPipesStayWhatTheyAre) {
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder / "pictures");
   std::filesystem::create_symlink("pictures/real.png", folder / "link.png");
-  for (int i = 0; i < 2; ++i) {  // at first the link leads nowhere
+  for (int i = 0; i < 2; ++i) {  // at first the target of the link does not exist
     ASSERT_TRUE(write_png(Raster(4, 4), folder / "link.png"));
     EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.png"));
     EXPECT_GT(std::filesystem::file_size(folder / "pictures/real.png"), 8u);
@@ -223,7 +223,7 @@ TEST(Png, SeveralWritersOfOneFileDoNotMeet) {
   for (int i = 0; i < 50; ++i) {
     std::ifstream in(file, std::ios::binary);
     const std::string there{std::istreambuf_iterator<char>(in), {}};
-    if (there.empty()) continue;  // not yet
+    if (there.empty()) continue;  // the file does not exist yet
     const auto writer = static_cast<std::size_t>(there[0]);
     EXPECT_EQ(there, std::string(2 * (100'000 + 1000 * writer), there[0]));
   }

@@ -1,4 +1,4 @@
-// The fan as text: the positions of echoes, in letters and in colours, and the size.
+// The fan as text: positions of echoes, in letters and in colours, and the size of the picture.
 #include "core/image/terminal_fan.hpp"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-/// 60 degrees wide, 10 m; the nearest half bright to port, the farthest half bright to starboard.
+/// A fan of 60 degrees and 10 m. The nearest half is bright to port, the farthest half to starboard.
 PolarImage two_patches() {
   PolarImage image;
   image.rows = 40;
@@ -78,7 +78,7 @@ TEST(TerminalFan, FitsItsRoomAndKeepsItsShape) {
     std::size_t widest = 0;
     for (const std::string& line : *lines) widest = std::max(widest, line.size());
     EXPECT_LE(widest, static_cast<std::size_t>(columns));
-    // 10 m high and 10 m wide at the far end; a cell is twice as high as wide.
+    // The fan is 10 m high and 10 m wide at the far end. A cell is twice as high as it is wide.
     EXPECT_NEAR(static_cast<double>(widest) / static_cast<double>(lines->size()), 2.0, 0.6) << columns << " x " << rows;
   }
 }
