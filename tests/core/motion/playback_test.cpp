@@ -1,4 +1,4 @@
-// The position of a playback at a time: exact in nanoseconds, over loops, pauses and seeks.
+// Position of a playback at a given time: exact in nanoseconds, also with loops, pauses and seeks.
 #include "core/motion/playback.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ TEST(Playback, RunsOnceAndStaysAtTheEnd) {
   const Playback p(seconds(10), {}, at(100));
   EXPECT_EQ(shown(p, 100), seconds(0));
   EXPECT_EQ(shown(p, 104.5), milliseconds(4500));
-  EXPECT_EQ(p.place(at(110)).rate, 1);  // the last pose was reached moving
+  EXPECT_EQ(p.place(at(110)).rate, 1);  // the body moved until it reached the last pose
   EXPECT_EQ(shown(p, 111), seconds(10));
   EXPECT_EQ(p.place(at(111)).rate, 0);
   EXPECT_EQ(shown(p, 99), seconds(0));
@@ -31,7 +31,8 @@ TEST(Playback, RunsOnceAndStaysAtTheEnd) {
 }
 
 TEST(Playback, SpeedIsExactForYears) {
-  const Playback p(seconds(10), looped(0.1), Time{});  // 0.1 is not exact in binary: a thousand days would show it
+  const Playback p(seconds(10), looped(0.1),
+                   Time{});  // 0.1 is not exact in binary; after a thousand days the error would be visible
   const Ns late = std::chrono::hours(24 * 1000) + Ns(10);
   EXPECT_EQ(p.place(Time{} + late).at, (std::chrono::hours(2400) + Ns(1)) % Ns(seconds(10)));
   EXPECT_FALSE(Speed::from(0));
@@ -70,7 +71,7 @@ TEST(Playback, PausesAndGoesOnWhereItStood) {
   EXPECT_EQ(p.place(at(60)).rate, 0);
   p.resume(at(100));
   EXPECT_EQ(shown(p, 101), seconds(4));
-  p.resume(at(102));  // a second time has no effect
+  p.resume(at(102));  // a second resume has no effect
   EXPECT_EQ(shown(p, 102), seconds(5));
 }
 
@@ -79,7 +80,7 @@ TEST(Playback, SeeksAndChangesSpeedWithoutAStep) {
   p.use_speed(at(2), *Speed::from(3));
   EXPECT_EQ(shown(p, 2), seconds(2));
   EXPECT_EQ(shown(p, 4), seconds(8));
-  p.seek(at(50), seconds(1));  // it had ended
+  p.seek(at(50), seconds(1));  // the playback had ended
   EXPECT_EQ(shown(p, 51), seconds(4));
   EXPECT_EQ(p.place(at(51)).rate, 3);
   p.pause(at(51));

@@ -1,4 +1,4 @@
-// Time stamps keep every nanosecond, however they are written.
+// Time stamps keep every nanosecond in all notations.
 #include "core/motion/stamp.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ TEST(Stamp, ReadsWhatPeopleWrite) {
   EXPECT_EQ(nanoseconds_of_seconds("0.000000000000000000000000000000001"), 0);
   EXPECT_EQ(nanoseconds_of_seconds("0.1000000000000000055511151231257827"), 100'000'000);
   EXPECT_EQ(nanoseconds_of_seconds("1e-9"), 1);
-  EXPECT_EQ(nanoseconds_of_seconds("0.0000000005"), 1);  // the half goes up
+  EXPECT_EQ(nanoseconds_of_seconds("0.0000000005"), 1);  // a half is rounded up
   EXPECT_EQ(nanoseconds_of_seconds("0.00000000049999"), 0);
   EXPECT_EQ(nanoseconds_of_seconds("0e1000"), 0);
 }

@@ -1,4 +1,4 @@
-// Files of trajectories: all formats mean the same, errors name their line, an hour of poses is read quickly.
+// Trajectory files: all formats give the same poses, errors name their line, and an hour of poses is read quickly.
 #include "core/motion/trajectory_file.hpp"
 
 #include <gmock/gmock.h>
@@ -99,11 +99,11 @@ TEST(TrajectoryFile, StepsTellTheUnitOfStampsThatBeginAtZero) {
     expect("t_s x y z qx qy qz qw\n" + lines(0.1, 1e-3, 0.5), "seconds", seconds(4900), false);
     expect(lines(0.1, unit_s, 0.5, true), unit, milliseconds(4900), unit_s != 1e-9);
   }
-  expect(lines(0.1, 1, 0.5, true), "seconds", milliseconds(4900), true);  // EuRoC's own unit is the nanosecond
+  expect(lines(0.1, 1, 0.5, true), "seconds", milliseconds(4900), true);  // EuRoC stamps are nanoseconds by definition
   expect(lines(0.1, 1, 0.5), "seconds", milliseconds(4900), false);
-  expect(lines(60, 1, 0.5), "seconds", seconds(49 * 60), false);                                        // the corners of a course
-  expect("0 0 0 -3 0 0 0 1\n60 0 0 -3 0 0 0 1\n120 0 0 -3 0 0 0 1\n", "seconds", seconds(120), false);  // it waits there
-  for (const double m_s : {0.0, 1e-4})  // a vehicle that stands still or drifts: by the rate of its log
+  expect(lines(60, 1, 0.5), "seconds", seconds(49 * 60), false);                                        // corners of a course
+  expect("0 0 0 -3 0 0 0 1\n60 0 0 -3 0 0 0 1\n120 0 0 -3 0 0 0 1\n", "seconds", seconds(120), false);  // the body waits there
+  for (const double m_s : {0.0, 1e-4})  // a vehicle at rest or adrift: the rate of its log decides
     for (const double step_s : {0.02, 0.1}) {
       expect(lines(step_s, 1e-3, m_s), "milliseconds", milliseconds(static_cast<int>(49e3 * step_s + 0.5)), true);
       expect(lines(step_s, 1e-6, m_s), "microseconds", milliseconds(static_cast<int>(49e3 * step_s + 0.5)), true);
@@ -113,7 +113,7 @@ TEST(TrajectoryFile, StepsTellTheUnitOfStampsThatBeginAtZero) {
   expect(lines(1, 1, 0), "seconds", seconds(49), false);
   expect("0 0 0 -3 0 0 0 1\n", "seconds", milliseconds(0), false);
   expect("5000000000000 0 0 -3 0 0 0 1\n5000100000000 0.05 0 -3 0 0 0 1\n", "nanoseconds", milliseconds(100),
-         true);  // since a start
+         true);  // time since a start
   expect("1.403636580838555e+18,0,0,0,1,0,0,0\n1.403636580838556e+18,1,0,0,1,0,0,0\n", "nanoseconds", milliseconds(0), false);
 }
 
@@ -177,7 +177,7 @@ TEST(TrajectoryFile, MatricesOfAllTurnsBecomeQuaternions) {
 }
 
 TEST(TrajectoryFile, TakesTheFrameFromTheFileOrFromWhoAsks) {
-  const std::string line = "t,x,y,z,yaw_deg\n0,10,20,3,90\n";  // north 10, east 20, 3 deep, heading east
+  const std::string line = "t,x,y,z,yaw_deg\n0,10,20,3,90\n";  // 10 m north, 20 m east, 3 m deep, heading east
   for (const TrajectoryFile& file :
        {parsed("# frame: NED_FRD\n" + line, {}), parsed(line + "# and the frame: ned_frd", {}),
         parsed(line, {.frame = Frame::ned_frd}), parsed("# frame: NED_FRD\n" + line, {.frame = Frame::ned_frd})}) {
@@ -337,7 +337,7 @@ TEST(TrajectoryFile, PosesThatTheMemoryDoesNotSufficeForAreRefused) {
   EXPECT_TRUE(read);
 }
 
-/// Reads the examples of the page: every block that is marked with a format.
+/// Reads the examples of the page: all blocks that are marked with a format.
 TEST(TrajectoryFile, TheManualsExamplesAreRead) {
   std::ifstream in(std::string(SONARD_SOURCE_DIR) + "/docs/poses.md");
   std::string line, block, format;
@@ -350,7 +350,7 @@ TEST(TrajectoryFile, TheManualsExamplesAreRead) {
       block.clear();
     } else {
       if (format != "csv" && format != "tum" && format != "euroc" && format != "kitti") continue;
-      ReadOptions options;  // the frame is said by the example
+      ReadOptions options;  // the example states the frame
       if (format == "kitti") options.rate_hz = 10;
       const TrajectoryFile file = parsed(block, options);
       EXPECT_EQ(name_of(file.format), format) << block;
@@ -361,7 +361,7 @@ TEST(TrajectoryFile, TheManualsExamplesAreRead) {
   EXPECT_EQ(read, (std::vector<std::string>{"csv", "csv", "tum", "euroc", "kitti"}));
 }
 
-/// An hour at 100 Hz; the deadline is about twenty times the time of a slow computer.
+/// An hour at 100 Hz. The deadline is about twenty times the time that a slow computer needs.
 TEST(TrajectoryFile, AnHourIsReadInNoTime) {
   constexpr int lines = 360000;
   const std::string name = testing::TempDir() + "hour" + std::to_string(getpid()) + ".tum";

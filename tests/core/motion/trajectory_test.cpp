@@ -22,7 +22,7 @@ void expect_near(Vec3d a, Vec3d b, double tolerance = 1e-9) {
 Quatd yawed(double deg) { return quat_from_rpy({0, 0, rad_from_deg(deg)}); }
 Vec3d ahead(const Moment& m) { return rotate(m.body_in_world.orientation, Vec3d{1, 0, 0}); }
 
-/// Ahead and turning to port for 2 s, then straight on for 1 s.
+/// Moves ahead and turns to port for 2 s, then moves straight ahead for 1 s.
 Points bend() {
   return {
       {seconds(1), seconds(3), seconds(4)}, {{{0, 0, 0}, yawed(0)}, {{1, 0, -2}, yawed(90)}, {{1, 3, -2}, yawed(90)}}, {}, {}};
@@ -35,8 +35,8 @@ TEST(Trajectory, GoesStraightAndTurnsEvenly) {
   expect_near(ahead(half), {std::sqrt(0.5), std::sqrt(0.5), 0});
   expect_near(half.moves.velocity_mps, {0.5, 0, -1});
   expect_near(half.moves.angular_velocity_radps, {0, 0, pi / 4});
-  expect_near(way.at(seconds(3)).moves.velocity_mps, {0, 3, 0});  // at a point: what follows
-  expect_near(way.at(seconds(4)).moves.velocity_mps, {0, 3, 0});  // at the last one: what went before
+  expect_near(way.at(seconds(3)).moves.velocity_mps, {0, 3, 0});  // at a point: the motion of the next interval
+  expect_near(way.at(seconds(4)).moves.velocity_mps, {0, 3, 0});  // at the last point: the motion of the previous interval
 }
 
 TEST(Trajectory, HoldsItsEnds) {
@@ -58,7 +58,7 @@ TEST(Trajectory, BelievesVelocitiesOfTheFile) {
   const Trajectory way(points);
   expect_near(way.at(seconds(2)).moves.velocity_mps, {2, 0, 0});
   expect_near(way.at(seconds(2)).moves.angular_velocity_radps, {0, 0, 1.5});
-  expect_near(way.at(seconds(2)).body_in_world.position_m, {0.5, 0, -1});  // places stay on the straight line
+  expect_near(way.at(seconds(2)).body_in_world.position_m, {0.5, 0, -1});  // positions stay on the straight line
 }
 
 TEST(Trajectory, MotionIsThatOfItsPoses) {
