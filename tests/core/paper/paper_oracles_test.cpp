@@ -1,5 +1,4 @@
-// The comparison modes through the whole engine: oracles 9 and 46 for them, levels, determinism, and that
-// canonical pings do not change.
+// The comparison modes through the whole engine: oracles 9 and 46, levels, and determinism. Canonical pings must not change.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,7 +19,7 @@ Vec3d at(double range_m, double azimuth_deg, double elevation_deg) {
           range_m * std::sin(elevation)};
 }
 
-/// An engine of every mode over one scene; the request starts as the tests of the pipeline have it.
+/// An engine of all modes over one scene. Its request starts with the values of the pipeline's tests.
 struct Comparison {
   Comparison(std::shared_ptr<const Scene> scene, const FrequencyMode& mode, const PingSettings& settings, int threads = 2,
              paper::FrequencySum sum = paper::FrequencySum::fast)
@@ -43,12 +42,12 @@ std::size_t loudest(const Ping& ping) {
   return static_cast<std::size_t>(std::max_element(ping.pressure_upa.begin(), ping.pressure_upa.end()) -
                                   ping.pressure_upa.begin());
 }
-/// Azimuth of the loudest sample.
+/// Azimuth of the sample with the highest level.
 double loudest_azimuth_deg(const Ping& ping) {
   return deg_from_rad(static_cast<double>(ping.beam_azimuth_rad[loudest(ping) % ping.beam_azimuth_rad.size()]));
 }
 
-/// 60 inches of a narrow sector: quick.
+/// A range of 60 inches in a narrow sector, which is fast.
 PingSettings small_settings(int beams = 64) {
   PingSettings s = native_rows(4, 0.0254);
   s.beam_count = beams;
@@ -58,7 +57,7 @@ PingSettings small_settings(int beams = 64) {
   return s;
 }
 
-// The record begins where the window does: echoes from outside the window are left out, with their side lobes.
+// The record begins at the window. Echoes outside the window are omitted together with their side lobes.
 TEST(PaperWindow, ShowsAPointInItsRow) {
   constexpr int skipped = 40;
   for (const Mode mode : {Mode::paper, Mode::raster}) {
@@ -74,7 +73,7 @@ TEST(PaperWindow, ShowsAPointInItsRow) {
 }
 
 TEST(PaperOracles, Oracle09_SphereInPaperMode) {
-  // sum mu cos^2 r^2 dOmega over the disc that a far sphere shows: (pi / 2) mu a^2; Lambert's own is (2 pi / 3) mu a^2.
+  // sum mu cos^2 r^2 dOmega over the disc of a distant sphere: (pi / 2) mu a^2. Lambert's own law gives (2 pi / 3) mu a^2.
   constexpr double radius = 0.1, distance = 100;
   FrequencyMode mode = p900();
   mode.horizontal_aperture_rad = static_cast<float>(2.4 * radius / distance);
@@ -107,8 +106,8 @@ TEST(PaperOracles, Oracle09_SphereInPaperMode) {
 TEST(PaperOracles, Oracle46_APointAppearsAtItsAzimuthUnlessBeamsAreCones) {
   const auto scene = SceneMaker().add_point(at(3, 45, -20), 0).make();
   FrequencyMode mode = p900();
-  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(100));     // the point must be in the sector
-  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(45));  // and be heard
+  mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(100));     // the point must lie in the sector
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(45));  // and within the elevation width
   PingSettings settings = small_settings(512);
   Comparison c(scene, mode, settings);
   const double cone = deg_from_rad(std::asin(std::cos(rad_from_deg(20)) * std::sin(rad_from_deg(45))));
@@ -120,7 +119,7 @@ TEST(PaperOracles, Oracle46_APointAppearsAtItsAzimuthUnlessBeamsAreCones) {
 }
 
 TEST(PaperEngine, APointsLevelIsThePrintedOneOverTheCorrectionsNorm) {
-  // One beam: the correction is 1. Two equal ones far apart: 1 over the root of 2, times the rest of |sinc|.
+  // For one beam the correction is 1. For two equal, distant beams it is 1 over the root of 2, times the rest of |sinc|.
   PingSettings settings = small_settings(1);
   const double range = (60 + settings.row_centre) * settings.range_bin_m;
   const auto scene = SceneMaker().add_point({range, 0, 0}, -12).make();
@@ -164,7 +163,7 @@ TEST(PaperEngine, ACanonicalPingIsTheCpuEnginesToTheByte) {
   EXPECT_EQ(pings[3].samples, s.last().samples);
   EXPECT_EQ(pings[1].samples, pings[2].samples);
   EXPECT_NE(pings[1].samples, pings[0].samples);
-  // Submits in two ways: results of both kinds of calls come back in order.
+  // Submits in two ways. The results of both kinds of calls come back in order.
   const std::span<const PingRequest> all(batch);
   for (const std::size_t first : {0u, 1u, 3u}) c.engine->submit(all.subspan(first, 1));
   c.engine->submit(all);

@@ -1,4 +1,4 @@
-// The arithmetic of the comparison modes, piece by piece: spectrum, frequency sum, inverse transform, beam correction, rays.
+// The arithmetic of the comparison modes in parts: spectrum, frequency sum, inverse transform, beam correction, rays.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +24,7 @@ FrequencyMode p900() {
   return mode;
 }
 
-/// b = 29.5 kHz and rows of one inch, as the paper means them.
+/// b = 29.5 kHz and rows of one inch, as in the paper.
 PingPlan paper_plan(int beams = 512) {
   PingSettings s;
   s.beam_count = beams;
@@ -61,9 +61,9 @@ TEST(PaperSpectrum, ALoneEchoOnASamplePeaksAtItsAmplitudeAndHasTheGaussiansWidth
   const auto level = [&](std::size_t n) { return std::hypot(out[2 * n], out[2 * n + 1]); };
   EXPECT_NEAR(out[400], 3, 1e-4);
   EXPECT_NEAR(out[401], 4, 1e-4);
-  // b times one row = 1: the neighbour lies at exp(-1), or close by, because the spectrum is cut at +-b / 2.
+  // b times one row is 1. The neighbour is at about exp(-1); the difference comes from the cut of the spectrum at +-b / 2.
   EXPECT_NEAR(level(201) / 5, std::exp(-1.0), 0.05);
-  EXPECT_GT(level(210), 1e-3f);  // the cut makes side lobes that a Gaussian does not have
+  EXPECT_GT(level(210), 1e-3f);  // the cut causes side lobes, which a Gaussian does not have
 }
 
 TEST(PaperSum, FastAndDirectAgreeAndFollowTheDefinition) {
@@ -164,9 +164,9 @@ TEST(PaperCorrection, IsTheReferenceCodes) {
   double energy = 0, row = 0;
   for (const float w : v) energy += static_cast<double>(w) * static_cast<double>(w);
   for (int k = 0; k < 512; ++k) row += static_cast<double>(v[static_cast<std::size_t>(255 * 512 + k)] / v[255 * 512 + 255]);
-  EXPECT_NEAR(energy, 1, 1e-4);                                                       // D8: over the whole matrix
+  EXPECT_NEAR(energy, 1, 1e-4);                                                       // D8: energy of the whole matrix
   EXPECT_NEAR(20 * std::log10(v[255 * 512 + 256] / v[255 * 512 + 255]), -17.8, 0.1);  // D6: width = spacing
-  EXPECT_NEAR(20 * std::log10(static_cast<double>(v[0])), -27.2, 0.5);  // -27.6 dB by 512 alone, less the neighbours
+  EXPECT_NEAR(20 * std::log10(static_cast<double>(v[0])), -27.2, 0.5);  // -27.6 dB by 512 alone, minus the neighbours
   EXPECT_GT(row, 2);                                                    // D5: |sinc| adds its side lobes in phase
   const std::vector<float> squared = make_correction(fan.azimuth_rad, spacing, true);
   EXPECT_NEAR(squared[1], v[1] * v[1], 1e-9);
@@ -206,7 +206,7 @@ TEST(PaperFan, GridIsUniformOnAnImagePlaneAndCoversItsSolidAngle) {
   double sum = 0;
   for (int column = 0; column < fine.columns(); ++column)
     for (int row = 0; row < fine.rows; ++row) sum += fine.solid_angle_sr(column, row);
-  // Half sides of a rectangle, whose solid angle is 4 asin(...).
+  // Half sides of a rectangle. Its solid angle is 4 asin(...).
   const double side = std::tan(rad_from_deg(45)), top = std::tan(rad_from_deg(20));
   EXPECT_NEAR(sum, 4 * std::atan(side * top / std::sqrt(1 + side * side + top * top)), 1e-4);
 }

@@ -1,5 +1,6 @@
-// The rod of Choi 2025's tank alone: the echo in the beam towards it for each of the three interpretations of "turned by 15
-// degrees", against an integration of eq. (5) and (6) made outside this program, in 2.5 mm bins (docs/validation.md).
+// Only the rod of Choi 2025's tank: the echo in the beam towards the rod for each of the three interpretations of "turned by 15
+// degrees". It is compared with an integration of eq. (5) and (6) that was made outside this program, in 2.5 mm bins
+// (docs/validation.md).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +16,7 @@ namespace {
 
 constexpr double lambert_db = -10;  // mu 0.1
 
-/// Its front is at 0.5 m if it is not turned; 4 x 7 inches.
+/// The front of the rod is at 0.5 m if it is not turned. Its size is 4 x 7 inches.
 std::shared_ptr<const Scene> rod(const std::string& rpy_deg) {
   const std::string yaml =
       "name: rod\n"
@@ -30,22 +31,23 @@ std::shared_ptr<const Scene> rod(const std::string& rpy_deg) {
   return *scene;
 }
 
-/// The oracle's receive array has no taper; its axis beam looks straight ahead.
+/// The oracle's receive array has no taper. Its axis beam looks straight ahead.
 FrequencyMode untapered(FrequencyMode mode) {
   mode.pattern.azimuth_taper = Taper::uniform;
   return silent(mode);  // no absorption
 }
 
-/// Whole energy of the echo on the axis beam, as sum of sigma D^2 / (mu r^4) [dB re 1 / m^2].
+/// Energy of the whole echo in the axis beam, as the sum of sigma D^2 / (mu r^4) [dB re 1 / m^2].
 double total_db(const std::string& rpy_deg, const FrequencyMode& mode) {
   PingSettings settings = native_rows(1, 0.0025);
-  settings.beam_count = 513;  // one of them at azimuth 0
+  settings.beam_count = 513;  // one of these beams is at azimuth 0
   Sounding s(rod(rpy_deg), mode, settings);
   s.request.switches.expected_power = true;
   s.ping();
   double sum = 0;
   for (int row = 0; row < s.rows(); ++row) sum += s.power(row, 256);
-  // Rows stand half a pulse apart or closer: their sum times the spacing is the integral of the pulses' energy.
+  // The row spacing is at most half a pulse. Therefore the sum over rows times the spacing is the integral of the pulses'
+  // energy.
   const double energy_width_m = energy_width_s(s.envelope_hz()) * 1500 / 2;
   const double power = sum * settings.range_bin_m / energy_width_m;
   return 10 * std::log10(power) - static_cast<double>(mode.source_level_db) - lambert_db;
