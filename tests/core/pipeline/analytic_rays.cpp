@@ -1,6 +1,6 @@
-// RayScene over the true planes, boxes, spheres and cylinders of a scene, in place of Embree: a program that is linked with this
-// file contains no ray tracer of third parties, so that the thread sanitizer sees all code. Objects of other shapes are invisible
-// to rays. It is slow and simple on purpose.
+// Implements RayScene with the exact planes, boxes, spheres and cylinders of a scene instead of Embree. A program that is
+// linked with this file contains no third-party ray tracer, so that the thread sanitizer sees all code. Objects of other shapes
+// are invisible to rays. The code is intentionally simple and slow.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,7 +17,7 @@ struct Hit {
   double distance_m = HUGE_VAL;
   Vec3d normal;       // object axes
   int axis = 0;       // normal of a flat face
-  double at_m = NAN;  // where that face lies on its axis; NaN on what is curved
+  double at_m = NAN;  // position of that face on its axis; NaN for curved surfaces
 };
 
 double along(Vec3d v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
@@ -28,7 +28,7 @@ struct Ray {
   Vec3d at(double t) const { return from + t * direction; }
 };
 
-/// The face of an axis, if `covers` is true there.
+/// The face across an axis, if `covers` is true there.
 template <class Covers>
 void try_face(const Ray& ray, int axis, double at_m, Hit& best, Covers&& covers) {
   const double speed = along(ray.direction, axis);
@@ -37,7 +37,7 @@ void try_face(const Ray& ray, int axis, double at_m, Hit& best, Covers&& covers)
   if (t > 0 && t < best.distance_m && covers(ray.at(t))) best = {t, unit(axis), axis, at_m};
 }
 
-/// A sphere, or a cylinder's side when the z of both vectors is left out.
+/// A sphere. If the z of both vectors is omitted, the side of a cylinder.
 template <class Covers>
 void try_round(const Ray& ray, Vec3d from, Vec3d direction, double radius_m, Hit& best, Covers&& covers) {
   const double a = dot(direction, direction), b = dot(from, direction), c = dot(from, from) - radius_m * radius_m;
@@ -80,7 +80,7 @@ Hit hit(const Primitive& shape, const Ray& ray) {
   return best;
 }
 
-/// The first triangle of the mesh in each flat face that rays may hit: callers use a triangle only for its material or its face.
+/// For each flat face, the first triangle of the mesh in that face. Callers use a triangle only for its material or its face.
 struct Faces {
   struct Face {
     int axis = 0;

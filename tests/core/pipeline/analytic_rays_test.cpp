@@ -1,5 +1,5 @@
-// The whole CPU pipeline over analytic rays: the tracer's own closed forms, and pings that agree for any number of threads.
-// Linked with analytic_rays.cpp instead of Embree; tests/tools/long_checks.sh runs it under the thread sanitizer.
+// The whole CPU pipeline with analytic rays: closed forms of the tracer, and pings that are equal for any number of threads.
+// Linked with analytic_rays.cpp instead of Embree. tests/tools/long_checks.sh runs it with the thread sanitizer.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -98,7 +98,7 @@ TEST(AnalyticRays, PingsAreTheSameForAnyNumberOfThreads) {
     const Ping a = one->run({&r, 1}).at(0), b = four->run({&r, 1}).at(0);
     EXPECT_TRUE(a.samples == b.samples) << "ping " << number;
     EXPECT_EQ(0, std::memcmp(a.pressure_upa.data(), b.pressure_upa.data(), a.pressure_upa.size() * sizeof(float)));
-    // The crate's near side, 4 m ahead, is among the loudest of the middle beam.
+    // The near side of the box, 4 m ahead, is among the strongest echoes of the middle beam.
     const auto at = [&](int row) { return a.pressure_upa[static_cast<std::size_t>(row * 64 + 32)]; };
     float before = 0, there = 0;
     for (int row = 66; row < 72; ++row) before = std::max(before, at(row));  // 3.3 to 3.6 m: water

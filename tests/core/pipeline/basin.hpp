@@ -1,5 +1,5 @@
-// A basin that uses every part of the model, and requests of two sonars, each with one change, which together use every setting.
-// Used by tests that compare whole pings.
+// A basin that uses every part of the model, and requests of two sonars. Each request has one change, and together they use
+// every setting. Tests use them to compare whole pings.
 #pragma once
 
 #include <functional>
@@ -83,7 +83,7 @@ inline PingRequest low() {
   return r;
 }
 
-/// Like basin(), with beams three times as wide, which need a ninth of the cells and so much less time.
+/// Like basin(), but with beams three times as wide. These need a ninth of the cells and therefore much less time.
 inline PingRequest with_wide_beams(PingRequest r) {
   SonarModel model = *r.model;
   model.modes[0].pattern.azimuth_width_rad *= 3;
@@ -92,7 +92,7 @@ inline PingRequest with_wide_beams(PingRequest r) {
   return r;
 }
 
-/// Requests of both sonars, alternating: first with everything on, then each with one change, finally with everything on again.
+/// Requests of both sonars, alternating: first with all parts on, then each with one change, finally with all parts on again.
 inline std::vector<std::pair<std::string, PingRequest>> turns() {
   std::vector<std::pair<std::string, PingRequest>> all;
   const auto both = [&all](const std::string& what, const std::function<void(PingRequest&)>& change) {
@@ -137,7 +137,7 @@ inline std::vector<std::pair<std::string, PingRequest>> turns() {
     r.bodies_in_world = {{{2.8, -0.3, -0.9}, quat_from_rpy({0, 0.4, 0})}};
     r.settings.gain_db = 6;
   });
-  for (std::size_t i = 0; i < named_switches.size(); ++i) {  // switches of one sonar and the other in turn
+  for (std::size_t i = 0; i < named_switches.size(); ++i) {  // switches of the two sonars, alternating
     const NamedSwitch& part = named_switches[i];
     PingRequest r = i % 2 == 0 ? high() : low();
     r.switches.*part.is_on = !(r.switches.*part.is_on);

@@ -1,5 +1,5 @@
-// Effects of a receiver's profile and focus on beams: widths and noise against closed forms and sums over the array, and no
-// effect where they are off or not given (docs/acoustics.md, sections 5 and 6).
+// Effects of a receiver's profile and focus on beams. Widths and noise are compared with closed forms and with sums over the
+// array. If the parts are off or not given, they have no effect (docs/acoustics.md, sections 5 and 6).
 #include "core/pipeline/plan_tables.hpp"
 
 #include <gtest/gtest.h>
@@ -33,8 +33,8 @@ Sounding with(const std::function<void(ReceiverModel&)>& change, const SceneMake
   return {maker.make(), mode, settings};
 }
 
-/// Response of a beam at sine `beam` to a point at sine `u`: the sum over the aperture, whose phase is wrong by
-/// edge_rad (2 x / L)^2.
+/// Response of a beam at sine `beam` to a point at sine `u`: the sum over the aperture with a phase error of edge_rad (2 x /
+/// L)^2.
 double array_sum(const ReceivePattern& pattern, double u, double beam, double edge_rad) {
   constexpr int elements = 2000;
   std::complex<double> sum = 0;
@@ -89,7 +89,7 @@ TEST(Defocus, LeavesBroadsideAndFarEchoesAsTheyAre) {
   }
 }
 
-// Vectors of samples that share their taps, against the definition one sample at a time (refocused).
+// Compares vectors of samples that share their taps with the definition, one sample at a time (refocused).
 TEST(Defocus, IsTheSumOverItsTapsInEveryInstructionSet) {
   Sounding s = with([](ReceiverModel& law) { law.defocus = 1; }, {}, 4, 300, 90);
   const PingPlan plan = make_plan(s.mode(), s.request.settings, s.request.switches);
@@ -119,7 +119,7 @@ TEST(Defocus, IsTheSumOverItsTapsInEveryInstructionSet) {
     }
 }
 
-/// Correlation of two beams' complex noise, mean over all pairs so far apart.
+/// Correlation of the complex noise of two beams, as a mean over all pairs with this distance.
 double beam_correlation(const Sounding& s, int apart) {
   const auto& signal = s.last().beam_signal_upa;
   std::complex<double> product = 0;
@@ -149,7 +149,7 @@ TEST(Blend, CorrelatesNeighboursAsItsShareSays) {
       return product / power;
     };
     const double b = static_cast<double>(share);
-    const auto blended = [&](int n) {  // [b 1 b] twice
+    const auto blended = [&](int n) {  // [b 1 b] applied twice
       return (1 + 2 * b * b) * plain(n) + 2 * b * (plain(n - 1) + plain(n + 1)) + b * b * (plain(n - 2) + plain(n + 2));
     };
     for (const int apart : {1, 2})

@@ -1,4 +1,4 @@
-// Checks that are not in the table of oracles: thin objects never vanish, relief and shadows agree with brute force, a world far
+// Checks beyond the table of oracles: thin objects never vanish, relief and shadows agree with brute force, the world is far
 // from its origin, and speckle at long range.
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ Mesh pole(double radius_m, double half_height_m, int sides) {
   return mesh;
 }
 
-// 2 cm at 8 m is a seventh of a P900's beam and thinner than the distance of two rays.
+// 2 cm at 8 m is a seventh of a P900's beam and less than the distance of two rays.
 TEST(Truths, AThinPoleIsInEveryFrame) {
   const double radius = 0.01, half_height = 1;
   SceneMaker maker;
@@ -71,7 +71,7 @@ TEST(Truths, AThinPoleIsInEveryFrame) {
   }
 }
 
-/// Heights on a grid with linear interpolation, as in the mesh, for quick access.
+/// Heights on a grid with linear interpolation, as in the mesh. Look-ups are fast.
 class Relief {
  public:
   Relief(double x0, double x1, double y0, double y1, double step_m, const std::function<double(double, double)>& z)
@@ -97,7 +97,7 @@ class Relief {
   std::vector<double> heights_;
 };
 
-/// A relief by brute force: every square of a fine grid is a scatterer with a shadow ray of its own, in double.
+/// Brute force for a relief: every square of a fine grid is a scatterer with its own shadow ray, in double.
 struct BruteForce {
   Vec3d sonar;
   double tilt_rad, lambert_db;
@@ -135,9 +135,10 @@ struct BruteForce {
 };
 
 /// The difference of a ping from brute force, sample by sample. Samples in shadow, 20 dB below the smooth bed, contain only the
-/// leak of beams and pulses, and are judged by their mean. Samples at the edge of a shadow, 10 to 20 dB below, are not judged.
+/// leakage of beams and pulses. For these the mean is compared. Samples at the edge of a shadow, 10 to 20 dB below, are not
+/// compared.
 struct Difference {
-  double rms_db = 0, within_1_db = 0, shadow_re_bed = 0;  // the last: mean power over the smooth bed's
+  double rms_db = 0, within_1_db = 0, shadow_re_bed = 0;  // the last: mean power divided by that of the smooth bed
   int lit = 0, shadowed = 0;
 };
 Difference compare(const Sounding& s, const BruteForce& relief, const std::vector<reference::Scatterer>& points, int every_beam,
@@ -177,7 +178,7 @@ FrequencyMode narrow_p900() {
   return mode;
 }
 
-// 0.4 and 0.45 m: somewhere along the bed, even steps of the fan's refinement hit only crests.
+// With wavelengths of 0.4 and 0.45 m, equal steps of the fan's refinement would hit only crests somewhere on the bed.
 TEST(Truths, ARippledBottomIsAsBruteForceSeesIt) {
   for (const double period_m : {0.5, 0.45, 0.4}) {
     const auto ripples = [period_m](double x, double) { return 0.01 * std::cos(2 * pi * x / period_m); };
@@ -198,7 +199,7 @@ TEST(Truths, ARippledBottomIsAsBruteForceSeesIt) {
   }
 }
 
-// One shadow ray a scatterer, where a ridge hides part of what lies behind it.
+// One shadow ray for each scatterer, at a ridge that hides a part of the bed behind it.
 TEST(Truths, ShadowsOnReliefAreThoseOfOneRayForEveryCell) {
   const auto rough = rough_relief(0.015, 40);
   const Relief relief(2, 11, -2, 2, 0.02, rough);

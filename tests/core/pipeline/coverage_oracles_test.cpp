@@ -1,4 +1,4 @@
-// Oracles on the picture of a bed sample by sample, in expected power: no holes for any shipped sonar, relief that agrees with
+// Oracles on the picture of a bed, sample by sample, in expected power: no holes for any shipped sonar, relief that agrees with
 // brute force, and the speckle's statistics at long range, where few cells share a sample.
 #include <gtest/gtest.h>
 
@@ -33,7 +33,8 @@ struct Coverage {
   double share() const { return static_cast<double>(within_1_db) / samples; }
 };
 
-/// The closed form averaged over the pulse's energy: where the fan's edge or the first return is near it changes within a pulse.
+/// The closed form, averaged over the pulse's energy. Near the fan's edge and near the first return the closed form changes
+/// within a pulse.
 double expected_db(const reference::SeabedLevel& bed, double range_m, double sine, double dr) {
   double sum = 0, weights = 0;
   for (int i = -6; i <= 6; ++i) {
@@ -44,8 +45,8 @@ double expected_db(const reference::SeabedLevel& bed, double range_m, double sin
   return db(sum / weights);
 }
 
-/// Every sample of every beam within 40 degrees between the first and last return of a bed, 2 dr inside both ends, where the
-/// two-way pattern is above -20 dB: against the closed form.
+/// Compares with the closed form every sample of every beam within 40 degrees, between the first and the last return of a bed,
+/// 2 dr inside both ends, where the two-way pattern is above -20 dB.
 Coverage coverage_of(const FrequencyMode& mode, const PingSettings& settings, double height, double tilt, double yaw) {
   const double lambert_db = -27, dr = static_cast<double>(settings.pulse_width_m);
   Sounding s(flat_bed(settings.range_m * 1.15, lambert_db), mode, settings);
@@ -82,14 +83,14 @@ TEST(CoverageOracles, Oracle32_FlatBedIsFilled) {
                                              std::tuple{oculus_high(), default_rows(10, 437), "M1200d HF 10 m, 437 rows"},
                                              std::tuple{oculus_low(), default_rows(30, 720), "M1200d LF 30 m, 720 rows"}})
     record_coverage(what, coverage_of(mode, settings, 2, 0.25, 0), 50000);
-  // Along the diagonal of the lattice.
+  // Looks along the diagonal of the lattice.
   record_coverage("M1200d HF 10 m, 437 rows, 45 degrees round", coverage_of(oculus_high(), default_rows(10, 437), 2, 0.25, 0.785),
                   50000);
 }
 
-// Each distinct beam and pulse of the products, at its greatest range and as its vendor lays out the rows.
+// Each different pair of beam and pulse of the products, at its greatest range, with the rows of its vendor.
 TEST(CoverageOracles, Oracle32_EveryShippedSonarFillsAFlatBed) {
-  std::set<std::tuple<float, float, double, double>> seen;  // sectors and carriers do not matter here
+  std::set<std::tuple<float, float, double, double>> seen;  // sectors and carriers have no influence here
   const auto is_new = [&](const FrequencyMode& m, double range_m, double pulse_m) {
     return seen.insert({m.pattern.azimuth_width_rad, m.pattern.elevation_width_rad, range_m, pulse_m}).second;
   };

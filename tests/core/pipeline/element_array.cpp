@@ -7,7 +7,7 @@
 namespace sonar::reference {
 namespace {
 
-/// Way from a place at range r and direction sine u to an element at y, less r.
+/// Distance between a point at range r and direction sine u and an element at y, minus r.
 double detour_m(double range_m, double sine, double element_y_m) {
   const double way = std::sqrt(range_m * range_m - 2 * range_m * sine * element_y_m + element_y_m * element_y_m);
   return (element_y_m * element_y_m - 2 * range_m * sine * element_y_m) / (way + range_m);
@@ -23,7 +23,7 @@ ElementArray::ElementArray(const FrequencyMode& mode, double sound_speed_mps, do
   const int count = static_cast<int>(std::lround(aperture / pitch_wavelengths));
   double sum = 0;
   for (int i = 0; i < count; ++i) {
-    const double p = (i + 0.5 - 0.5 * count) * pitch_wavelengths / aperture;  // place on the aperture
+    const double p = (i + 0.5 - 0.5 * count) * pitch_wavelengths / aperture;  // position on the aperture
     double shading = 1;
     for (int m = 1; m < taper_terms; ++m) shading += 2 * series.c[m] * std::cos(2 * pi * m * p);
     place_m_.push_back(p * aperture * sound_speed_mps / turns_per_s_);
@@ -37,7 +37,8 @@ std::vector<std::vector<Complex>> ElementArray::beams(std::span<const PlacedScat
                                                       std::span<const double> beam_sines, const Grid& grid, const Envelope& p,
                                                       double reach_s) const {
   std::vector<std::vector<Complex>> s(beam_sines.size(), std::vector<Complex>(static_cast<std::size_t>(grid.samples)));
-  const double across_s = std::abs(place_m_.front()) / sound_speed_mps_ * 2;  // elements may receive earlier or later by so much
+  const double across_s =
+      std::abs(place_m_.front()) / sound_speed_mps_ * 2;  // elements may receive earlier or later by this time
   for (std::size_t j = 0; j < beam_sines.size(); ++j)
     for (const PlacedScatterer& scatterer : scatterers) {
       const double r = length(scatterer.in_sonar), sine = scatterer.in_sonar.y / r, delay_s = 2 * r / grid.sound_speed_mps;
@@ -46,7 +47,7 @@ std::vector<std::vector<Complex>> ElementArray::beams(std::span<const PlacedScat
         if (std::abs(off_s) > reach_s + across_s) continue;
         Complex sum;
         for (std::size_t e = 0; e < place_m_.size(); ++e) {
-          // The rest of the detour to this element after the beam's own delay.
+          // The rest of the path difference of this element after the beam's own delay.
           const double left_s =
               (detour_m(r, sine, place_m_[e]) - detour_m(focus_m, beam_sines[j], place_m_[e])) / sound_speed_mps_;
           sum += weight_[e] * p(off_s - left_s) * std::polar(1.0, -2 * pi * turns_per_s_ * left_s);

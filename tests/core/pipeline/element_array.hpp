@@ -1,5 +1,5 @@
-// A receive array element by element: every echo delayed to every element, shaded, focused and summed in double. The slow
-// reference for eq. (9), which uses only the far-field pattern of an array (docs/acoustics.md, section 6).
+// A receive array, element by element: every echo is delayed to every element, shaded, focused and summed in double. It is the
+// slow reference for eq. (9), which uses only the far-field pattern of an array (docs/acoustics.md, section 6).
 #pragma once
 
 #include <functional>
@@ -19,7 +19,8 @@ struct PlacedScatterer {
 
 class ElementArray {
  public:
-  /// Elements along y, `pitch_wavelengths` apart, on the aperture of the pattern's azimuth width, shaded by its taper.
+  /// Makes elements along y, `pitch_wavelengths` apart. They cover the aperture of the pattern's azimuth width and are shaded
+  /// by its taper.
   ElementArray(const FrequencyMode& mode, double sound_speed_mps, double pitch_wavelengths = 0.5);
   int elements() const { return static_cast<int>(place_m_.size()); }
 

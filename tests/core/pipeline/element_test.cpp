@@ -1,5 +1,5 @@
-// Eq. (9) against an array element by element: what beams receive from a handful of points, near and far, through the engine's
-// point path and through columns and beamforming; and where such an array has grating lobes.
+// Compares eq. (9) with an array element by element: the signals that beams receive from a few points, near and far, through
+// the engine's path for points and through columns and beamforming. Also the angle at which such an array has grating lobes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -38,7 +38,7 @@ Agreement compare(const Signals& got, const Signals& truth) {
   return {std::sqrt(error / power), 10 * std::log10(got_power / power)};
 }
 
-/// The engine's complex beam signals of its last ping.
+/// The complex beam signals of the engine's last ping.
 Signals beam_signals(const Sounding& s) {
   Signals out(static_cast<std::size_t>(s.beams()), std::vector<Complex>(static_cast<std::size_t>(s.rows())));
   for (std::size_t j = 0; j < out.size(); ++j)
@@ -59,7 +59,7 @@ std::vector<Vec3d> places(double nearest_m, double farthest_m) {
   return all;
 }
 
-// A pulse as long as this crosses the array as a whole; the near field is focused away, range by range.
+// A pulse of this length crosses the array as a whole. The near field is removed by focusing at each range.
 TEST(Elements, PointsThroughTheEngineMatchTheArray) {
   for (const FrequencyMode& mode : {p900(), oculus_high()})
     for (const double nearest : {0.7, 4.0}) {
@@ -83,14 +83,14 @@ TEST(Elements, PointsThroughTheEngineMatchTheArray) {
           scatterers, sines, grid, [&](double t) { return pulse.at(t); }, pulse.reach_s());
       const Agreement a = compare(beam_signals(s), truth);
       const std::string what = std::to_string(array.elements()) + " elements, points from " + (nearest < 1 ? "0.7" : "4") + " m";
-      // At eight apertures, where no far field is, side lobes are no longer those of the far field.
+      // At eight apertures there is no far field, and the side lobes are no longer those of the far field.
       record_below(no_number, "eq. 9 against " + what + ", relative L2 of the beams", nearest < 1 ? 0.12 : 0.05, a.relative_l2,
                    "");
       record_oracle(no_number, "eq. 9 against " + what + ", level", 0, a.level_db, 0.1, "dB");
     }
 }
 
-// The same by columns and the banded beamforming, with the points in the middle of columns.
+// The same through columns and the banded beamforming, with the points in the middle of columns.
 TEST(Elements, ColumnsAndBeamWeightsMatchTheArray) {
   FrequencyMode mode = p900();
   mode.beam_spacing = BeamSpacing::uniform_in_sine;
@@ -135,7 +135,7 @@ TEST(Elements, ColumnsAndBeamWeightsMatchTheArray) {
   record_oracle(no_number, "columns and coupling against the array's elements, level", 0, a.level_db, 0.1, "dB");
 }
 
-/// Loudest echo of a point at azimuth 45 degrees, dB re its own beam, over beams farther than 0.1 from it in the sine.
+/// Highest level of a point at azimuth 45 degrees, dB re its own beam, in beams whose sine differs by more than 0.1.
 double loudest_elsewhere_db(double pitch_wavelengths, double& at_sine) {
   const FrequencyMode mode = p900();
   const ElementArray array(mode, 1500, pitch_wavelengths);
@@ -144,7 +144,7 @@ double loudest_elsewhere_db(double pitch_wavelengths, double& at_sine) {
   for (double other = -0.95; other < 0.95; other += 0.002)
     if (std::abs(other - u) > 0.1) sines.push_back(other);
   const std::vector<PlacedScatterer> point{{{r * u, r * u, 0}, 1}};
-  // An endless tone shows the pattern alone, without the effect of a short pulse's travel across the array.
+  // An endless tone shows only the pattern, without the time that a short pulse needs to cross the array.
   const Signals s = array.beams(
       point, sines, {1500, 1, r, 1, 1}, [](double) { return Complex(1); }, 1);
   double loudest = 0;
@@ -160,7 +160,7 @@ TEST(Elements, HalfAWavelengthApartTheyHaveNoGratingLobes) {
   double at_sine = 0;
   record_below(no_number, "array of half-wavelength pitch steered to 45 degrees, loudest elsewhere", -30,
                loudest_elsewhere_db(0.5, at_sine), "dB");
-  // The counter-check: 0.8 wavelengths apart there is one at -33 degrees, as loud as the beam itself.
+  // Control: at a spacing of 0.8 wavelengths there is a grating lobe at -33 degrees with the level of the beam itself.
   EXPECT_GT(loudest_elsewhere_db(0.8, at_sine), -0.5);
   EXPECT_NEAR(deg_from_rad(std::asin(at_sine)), -32.9, 0.3);
 }

@@ -1,5 +1,5 @@
-// Every part of the model at once: two sonars take turns in one engine, and the bytes of each ping depend neither on the thread
-// that computes it nor on earlier pings. A part that is switched off has the same effect as missing data.
+// All parts of the model together: two sonars alternate in one engine. The bytes of each ping depend neither on the thread that
+// computes it nor on earlier pings. A part that is switched off has the same effect as missing data.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -57,7 +57,7 @@ TEST(Everything, IsTheSameBytesForAnyNumberOfThreadsAndWhateverCameBefore) {
   }
 }
 
-// The counter-check: each part is in those bytes.
+// Control: each part changes these bytes.
 TEST(Everything, LacksSomethingWithoutAnyOneOfItsParts) {
   Engine engine(basin());
   for (const PingRequest& whole : {with_wide_beams(high()), with_wide_beams(low())}) {

@@ -1,4 +1,5 @@
-// Data of a ping beside its picture: the first hit of every beam, and the complex signal behind the magnitudes.
+// Data of a ping besides its picture: the first hit of every beam, and the complex signal from which the magnitudes are
+// computed.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,7 +10,7 @@
 namespace sonar::test {
 namespace {
 
-/// A box to port at 4 m in front of a wall at 6 m that covers the port half only.
+/// A box to port at 4 m in front of a wall at 6 m. The wall covers only the port half.
 std::shared_ptr<const Scene> box_before_half_a_wall() {
   return SceneMaker().add(box({0.5, 0.5, 3}), -20, {4.5, 1.5, 0}).add(wall(10, 10), -20, {6, 10, 0}).make();
 }

@@ -1,5 +1,5 @@
-// Tiles of a ping, one by one: no cell of a tile that is left out as hidden may echo, and labels get the same energy from the
-// echoes as from a ping in expected power.
+// Tiles of a ping, one by one. No cell of a tile that is skipped as hidden may echo. Labels get the same energy from the echoes
+// as from a ping in expected power.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@
 namespace sonar::test {
 namespace {
 
-/// A bed 2 m below the sonar, a box that hides boxes behind it, and a sphere near by.
+/// A bed 2 m below the sonar, a box that hides other boxes, and a sphere nearby.
 std::shared_ptr<const Scene> crowded_scene() {
   SceneMaker scene;
   scene.add(height_field(-2, 12, -8, 8, 0.2, rough_relief(0.1, 20)), -25, {0, 0, -2});
@@ -40,7 +40,7 @@ struct Counts {
   std::size_t tiles = 0, left_out = 0, echoes = 0;
 };
 
-/// Calls f(kernels, group, tile, whether it is left out) for every tile in view of a group of columns.
+/// Calls f(kernels, group, tile, is_skipped) for every tile in view of a group of columns.
 template <class F>
 void for_each_tile(const Case& c, const Pose& pose, int first, int last, const F& f) {
   Sounding sounding(crowded_scene(), oculus_low(), default_rows(8, 300));

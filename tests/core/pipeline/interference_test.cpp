@@ -1,5 +1,5 @@
-// The transmitter's leak, other sonars' pulses and crosstalk, through the whole engine: level by definition, position, and no
-// effect when switched off or not given.
+// The transmitter's leak, the pulses of other sonars and crosstalk, through the whole engine: their levels by definition, their
+// positions, and no effect if they are switched off or not given.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -54,7 +54,7 @@ TEST(Leak, FallsFromItsLevelByItsDecay) {
     EXPECT_NEAR(db(mean_row_power(s, row)), expected, 0.1) << row;
   }
   EXPECT_EQ(s.power(699, 100), 0) << "forgotten";
-  // With speckle: the mean over beams and pings of many rows, each re its expectation.
+  // With speckle: the mean of many rows over beams and pings, each divided by its expected value.
   s.request.switches.expected_power = false;
   double ratio = 0;
   int n = 0;
@@ -99,7 +99,7 @@ TEST(Leak, IsSilentWhenOffOrNotGiven) {
 TEST(Leak, IsNotInABlankPing) {
   Sounding s(SceneMaker().make(), oculus_high(), default_rows(2, 700));
   give_receiver(s, leaking());
-  s.request.blank = true;  // no scene, noise only; also how a transmitter that is switched off is pinged
+  s.request.blank = true;  // no scene, only noise; a sonar with its transmitter off pings in the same way
   s.ping();
   EXPECT_EQ(mean_row_power(s, 0), 0);
   s.request.switches.noise = true;
@@ -156,7 +156,7 @@ const Ping& ping_at(Sounding& s, double after_s) {
   return s.ping();
 }
 
-/// Fires every 2 ms until a streak lies well inside the record.
+/// Fires every 2 ms until a pulse lies completely inside the record.
 double find_streak(Sounding& s) {
   for (double t = 0; t < 0.4; t += 0.002) {
     ping_at(s, t);
@@ -189,28 +189,28 @@ TEST(Interference, IsAStreakOfItsPulseAtItsBearingAndLevel) {
   const double row_m = s.range_of_row(1) - s.range_of_row(0);
   EXPECT_NEAR(static_cast<double>(loud.size()) * row_m, 1500 * 4e-4 / 2, 2 * row_m) << "as long as the pulse";
   const int middle = (loud.front() + loud.back()) / 2;
-  // One way: 1e6 uPa at 1 m over 25 m and its absorption, met by the beam that looks nearly at it.
+  // One way: 1e6 uPa at 1 m over 25 m with absorption, in the beam that looks almost exactly at it.
   const double weight = receive_pattern(s.mode().pattern)(std::sin(azimuth) - s.beam_sine(beam));
   const double expected = 120 - 20 * std::log10(range) -
                           range * absorption_db_per_m(s.request.water, 0, static_cast<double>(s.mode().centre_hz)) +
                           20 * std::log10(weight);
   EXPECT_NEAR(db(s.power(middle, beam)), expected, 0.3);
   EXPECT_EQ(s.loudest_beam(middle), beam);
-  // Side lobes: far from it, the level of the pattern, -30 dB and less.
+  // Side lobes: far from the sonar's direction, the level is that of the pattern, -30 dB and less.
   const int aside = s.beam_at(rad_from_deg(10.9));
   const double lobe = receive_pattern(s.mode().pattern)(std::sin(azimuth) - s.beam_sine(aside));
   EXPECT_NEAR(s.pressure(middle, aside), std::abs(lobe / weight) * s.pressure(middle, beam), 1e-3 * s.pressure(middle, beam));
-  // 10 us later it comes 10 us earlier.
+  // If the ping is fired 10 us later, the pulse appears 10 us earlier.
   ping_at(s, fired_s + 1e-4);
   std::vector<int> later;
   for (int row = 0; row < s.rows(); ++row)
     if (s.pressure(row, beam) > 0.5 * top) later.push_back(row);
   ASSERT_FALSE(later.empty());
   EXPECT_NEAR((loud.front() - later.front()) * row_m, 1500 * 1e-4 / 2, 1.5 * row_m);
-  // Its own rate: one period later the record is the same but for the phase.
+  // Its own rate: one period later the record is the same except for the phase.
   ping_at(s, fired_s + 1.0 / 7);
   EXPECT_NEAR(db(s.power(middle, beam)), expected, 0.3);
-  // Mean power instead of the tone.
+  // Expected power: the mean power instead of the tone.
   s.request.switches.expected_power = true;
   ping_at(s, fired_s);
   EXPECT_NEAR(db(s.power(middle, beam)), expected, 0.3);
@@ -272,7 +272,7 @@ TEST(Crosstalk, PutsALoneEchoIntoAllBeamsAtItsLevel) {
       EXPECT_LT(far_before, alone - 55);
       give_receiver(s, talking(-40));
       s.ping();
-      // The nearest beam looks up to half a spacing past the point; correct for that.
+      // The nearest beam looks up to half a spacing past the point. This is corrected.
       const double off = receive_pattern(s.mode().pattern)(0.2 / std::hypot(3, 0.2) - s.beam_sine(beam));
       double mean = 0;
       for (int j = 0; j < 20; ++j) mean += s.power(row, j) / 20;
@@ -281,14 +281,14 @@ TEST(Crosstalk, PutsALoneEchoIntoAllBeamsAtItsLevel) {
 }
 
 TEST(Crosstalk, OfADiffuseSceneIsItsTotalPowerWhateverTheBeamCount) {
-  // A wall all around in expected power: every beam gets e^2 times the power of all columns.
+  // A wall all around, in expected power: every beam gets e^2 times the power of all columns.
   const auto added = [](int beam_count) {
     PingSettings settings = default_rows(5, 700);
     settings.beam_count = beam_count;
     Sounding s(SceneMaker().add(wall(6, 6), -20, {3, 0, 0}).make(), oculus_high(), settings);
     s.request.switches.expected_power = true;
     s.ping();
-    const int row = static_cast<int>(s.row_of_range(3.1));  // ahead the wall is there, at that beam it is farther
+    const int row = static_cast<int>(s.row_of_range(3.1));  // the wall is at this range ahead; in that beam it is farther away
     const double before = s.power(row, 3);
     give_receiver(s, talking(-40));
     s.ping();

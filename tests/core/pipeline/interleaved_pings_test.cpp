@@ -1,4 +1,4 @@
-// Pictures made of several pings: each beam is as its own ping found it, noise is each ping's own, and channels have gains.
+// Pictures made of several pings: each beam equals that of its own ping, each ping has its own noise, and channels have gains.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +16,7 @@ namespace {
 constexpr int beams = 96, rows = 120, pings = 3;
 constexpr double interval_s = 0.03;
 
-/// Over a bed, 2 m above it; beams as wide as they are apart.
+/// A sonar 2 m above a bed. The beams are as wide as their spacing.
 Sounding over_bed(int interleaved, std::vector<float> channel_gain_db = {}) {
   FrequencyMode mode = p900();
   mode.interleaved_pings = interleaved;
@@ -34,7 +34,7 @@ Sounding over_bed(int interleaved, std::vector<float> channel_gain_db = {}) {
   return s;
 }
 
-/// Mean of s_j conj(s_j+1) over the mean power, of beams whose first is `of` modulo the pings.
+/// Mean of s_j conj(s_j+1) divided by the mean power, for beams j equal to `of` modulo the number of pings.
 double correlation_with_next(const Ping& ping, int of) {
   std::complex<double> sum = 0;
   double power = 0;
@@ -84,7 +84,7 @@ TEST(InterleavedPings, EachBeamIsAsItsOwnPingFoundIt) {
   }
 }
 
-/// Beams of widths of their own, of eight pings: between a ping's beams there are columns that none of them uses.
+/// Beams with different widths, from eight pings. Between the beams of one ping there are columns that none of them uses.
 Sounding of_eight_pings(int threads) {
   FrequencyMode mode = p900();
   mode.interleaved_pings = 8;
@@ -111,7 +111,7 @@ Sounding of_eight_pings(int threads) {
 
 TEST(InterleavedPings, LeaveOutWhatTheirBeamsDoNotHear) {
   Sounding all = of_eight_pings(2);
-  all.request.switches.keep_labels = true;  // these are of whole pings
+  all.request.switches.keep_labels = true;  // labels belong to whole pings
   all.ping();
   for (const int threads : {1, 3}) {
     Sounding some = of_eight_pings(threads);
@@ -125,7 +125,7 @@ TEST(InterleavedPings, LeaveOutWhatTheirBeamsDoNotHear) {
   }
 }
 
-/// A beam's band holds all of its energy but 1e-4; one ping's beams have weights beyond it.
+/// A beam's band contains all of its energy except 1e-4. The beams of one ping have weights beyond this band.
 TEST(InterleavedPings, BeamsOfTheFirstPingAreThoseOfOnePing) {
   Sounding s = of_eight_pings(2);
   s.request.switches.noise = false;
@@ -161,7 +161,7 @@ TEST(InterleavedPings, NeighboursShareNoNoise) {
   }
 }
 
-/// Speckle of a bed that a sonar passes over is another one at each ping.
+/// If a sonar passes over a bed, the speckle of the bed differs from ping to ping.
 TEST(InterleavedPings, NeighboursShareNoSpeckleOnceTheSonarMoves) {
   Sounding s = over_bed(pings);
   s.ping();
@@ -184,7 +184,7 @@ TEST(InterleavedPings, ChannelsHaveTheirGains) {
                                      .max_code = 255,
                                      .scale = SampleFormat::Scale::logarithmic,
                                      .floor_db = -150,
-                                     .ceiling_db = -22.5f};  // half a decibel a code
+                                     .ceiling_db = -22.5f};  // half a decibel per code
     each->ping();
   }
   EXPECT_EQ(s.last().pressure_upa, even.last().pressure_upa) << "pressure is what arrives";
@@ -210,7 +210,7 @@ TEST(InterleavedPings, ImpossibleOnesAreRefused) {
   Sounding late = over_bed(pings);
   late.request.settings.ping_interval_s = -1;
   EXPECT_NE(why_invalid(late.request), "");
-  Sounding many = over_bed(7);  // the number of beams is not a multiple of it
+  Sounding many = over_bed(7);  // the number of beams is not a multiple of this number
   EXPECT_EQ(why_invalid(many.request), "");
   EXPECT_EQ(many.ping().samples.size(), static_cast<std::size_t>(2 * rows * beams));
 }

@@ -1,5 +1,5 @@
-// Pings computed between the parts of another one: both have the same bytes as alone, for any bodies, settings and tiles; and the
-// allocations of a warm ping.
+// Pings that are computed between the parts of another ping. Both have the same bytes as without the interruption, for any
+// bodies, settings and tiles. Also the allocations of a ping after the first.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -15,7 +15,7 @@ thread_local std::size_t allocations = 0;
 
 }  // namespace
 
-// Every way to the heap of this program: counted. (GCC takes the inlined pair for a mismatch.)
+// Counts every allocation of this program. (GCC mistakes the inlined pair for a mismatch.)
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 void* operator new(std::size_t size) {
   ++allocations;
@@ -53,7 +53,7 @@ PingRequest seen_from(double y_m, double body_y_m, int number, const FrequencyMo
   return r;
 }
 
-/// Lets in the request as often as it may.
+/// Runs the request as often as it is allowed.
 class Other final : public Interruption {
  public:
   Other(PingEngine& engine, PingRequest request) : engine_(engine), request_(std::move(request)) {}
@@ -77,7 +77,7 @@ TEST_P(Interrupted, PingsAreAsTheyAreAlone) {
     return make_cpu_engine(scene, pool)->run({&request, 1}).at(0).samples;
   };
   Parallel pool(GetParam());
-  // There is room for hardly one tile, so unused tiles are evicted at once.
+  // The budget holds hardly one tile, so unused tiles are evicted immediately.
   const auto engine = make_cpu_engine(scene, pool, {.cell_cache_bytes = 1 << 12});
   Other other(*engine, quick);
   engine->set_interruption(&other);

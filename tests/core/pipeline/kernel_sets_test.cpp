@@ -1,4 +1,4 @@
-// The hot loops with every instruction set: all give the same picture, and simple loops also the picture of their definition.
+// The hot loops with every instruction set: all give the same picture. Simple loops also give the picture of their definition.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,7 +21,7 @@
 namespace sonar::test {
 namespace {
 
-// They agree to the rounding of a float.
+// The results agree within the rounding of a float.
 TEST(KernelSets, AgreeOnAPing) {
   SceneMaker maker;
   maker.add(height_field(-2, 14, -10, 10, 0.1, rough_relief(0.03, 40)), -20).add(sphere(0.4, 3), -10, {5, 1, 0.4});
@@ -66,7 +66,7 @@ TEST(KernelSets, AgreeOnAPing) {
   }
 }
 
-// A ray of the fixed fan: an echo of sqrt(sigma) e^{-2 alpha r} / r^2 D(psi), with a draw and a carrier of its own.
+// A ray of the fixed fan: an echo of sqrt(sigma) e^{-2 alpha r} / r^2 D(psi) with its own draw and carrier.
 TEST(KernelSets, HitsOfTheFixedFanScatterAsDefined) {
   Material smooth;
   smooth.lambert_db = -15;
@@ -127,7 +127,7 @@ TEST(KernelSets, HitsOfTheFixedFanScatterAsDefined) {
   }
 }
 
-// A column's last packet of rays may hold one ray or all but one, and the tracer may take 4, 8 or 16 as one.
+// The last packet of a column may contain one ray or all but one. The tracer may process 4, 8 or 16 rays together.
 TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
   SceneMaker maker;
   maker.add(height_field(-2, 14, -10, 10, 0.5, rough_relief(0.03, 40)), -20);
@@ -151,7 +151,7 @@ TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
   }
 }
 
-// SONARD_SIMD limits every engine without an explicit level, those of the tests included.
+// SONARD_SIMD limits every engine without an explicit level, including those of the tests.
 TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
   for (const auto& [name, level] : {std::pair{"portable", SimdLevel::portable},
                                     {"avx2", SimdLevel::avx2},
@@ -167,7 +167,7 @@ TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
   EXPECT_THROW(simd::kernels_for(SimdLevel::automatic), std::runtime_error);
 }
 
-// A level falls back only to one of the processor's own family.
+// If a level is missing, only a level of the processor's own family replaces it.
 TEST(KernelSets, NeonIsOfArmProcessorsAlone) {
 #if defined(__aarch64__)
   for (const SimdLevel level : {SimdLevel::neon, SimdLevel::avx2, SimdLevel::avx512})

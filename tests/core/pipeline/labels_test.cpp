@@ -1,4 +1,4 @@
-// Labels of samples against geometry: the arc of a sphere, the rest of an occluded object, the positions of shadows.
+// Compares labels of samples with geometry: the arc of a sphere, the visible part of a hidden object, the positions of shadows.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@
 namespace sonar::test::labels_test {
 namespace {
 
-/// A scene of these with a label for every object but the first.
+/// A scene of these objects. Each has a label except the first.
 std::shared_ptr<const Scene> labelled(const SceneMaker& maker) {
   auto scene = std::make_shared<Scene>(*maker.make());
   for (std::size_t i = 1; i < scene->objects.size(); ++i) scene->objects[i].label = "thing";
@@ -64,9 +64,9 @@ TEST(Labels, ThePingIsTheSameWithThem) {
 TEST(Labels, ASphereOnSandIsTheArcThatGeometrySays) {
   Labelled l(sphere_on_sand(), 2);
   const PingLabels& labels = l.run();
-  (void)l.s.ping();  // the bearings of the beams
+  (void)l.s.ping();  // sets the bearings of the beams
   ASSERT_EQ(labels.rows, l.s.rows());
-  // The front of the sphere, where the line of sight is normal to it, and the largest bearing of its limb.
+  // The front of the sphere, where the line of sight is normal to it, and the largest bearing of its edge.
   const double distance = std::hypot(sphere_x_m, height_m - radius_m);
   const double first_m = distance - radius_m, limb_m = std::sqrt(distance * distance - radius_m * radius_m);
   const double half_sine = radius_m / distance;
@@ -79,8 +79,7 @@ TEST(Labels, ASphereOnSandIsTheArcThatGeometrySays) {
       first_row = std::min(first_row, row), last_row = std::max(last_row, row);
       first_beam = std::min(first_beam, j), last_beam = std::max(last_beam, j);
     }
-  // The pulse is there half its width before the echo, and the beam half of its own beside it: a strong sphere is seen so much
-  // sooner.
+  // A strong sphere appears earlier than its front by half a pulse width, and half a beam width beside its edge.
   const double pulse_rows = 0.0254 / l.s.request.settings.range_bin_m;
   EXPECT_NEAR(first_row, l.s.row_of_range(first_m) - pulse_rows, pulse_rows + 1);
   EXPECT_LE(last_row, l.s.row_of_range(limb_m) + 2 * pulse_rows + 1);
@@ -99,7 +98,8 @@ TEST(Labels, TheShadowLiesBehindTheSphereAndNamesIt) {
   Labelled l(sphere_on_sand(), 2);
   const PingLabels& labels = l.run();
   const auto beams = static_cast<std::size_t>(labels.beams), middle = beams / 2;
-  // The ray over the top of the sphere meets the bed again: tangent from (0, height) to the circle in the plane y = 0.
+  // The ray over the top of the sphere hits the bed behind it. It is the tangent from (0, height) to the circle in the plane y
+  // = 0.
   const double distance = std::hypot(sphere_x_m, height_m - radius_m);
   const double down = std::atan2(height_m - radius_m, sphere_x_m) - std::asin(radius_m / distance);
   const double end_m = height_m / std::sin(down), limb_m = std::sqrt(distance * distance - radius_m * radius_m);
@@ -111,7 +111,8 @@ TEST(Labels, TheShadowLiesBehindTheSphereAndNamesIt) {
   EXPECT_EQ(labels.instance[after], 1);
 }
 
-/// A sphere in front of a box, on sand: which of the two a straight line from the sonar to a point of the bed hits first.
+/// A sphere in front of a box, on sand. The expected object is the first that a straight line from the sonar to a point of the
+/// bed hits.
 struct SphereBeforeBox {
   static constexpr double box_x_m = 8, box_half_m[3] = {0.2, 1.5, 0.6};
 
@@ -168,7 +169,7 @@ TEST(Labels, OfTwoThingsInTheWayTheNearerCastsTheShadow) {
 }
 
 TEST(Labels, OpenWaterBehindASphereInMidWaterIsNoShadow) {
-  constexpr double small_m = 0.1, sphere_m = 2, deep_m = 3.5;  // the bed is farther than the sphere everywhere
+  constexpr double small_m = 0.1, sphere_m = 2, deep_m = 3.5;  // the bed is farther than the sphere in every direction
   const Vec3d middle{sphere_m * std::cos(tilt_rad), 0, height_m - sphere_m * std::sin(tilt_rad)};
   Labelled l(labelled(SceneMaker().add(flat_bed(), -27, {0, 0, height_m - deep_m}).add(sphere(small_m, 5), -27, middle)), 2, 17);
   const PingLabels& labels = l.run();
@@ -225,7 +226,7 @@ TEST(Labels, APointTargetIsAnInstance) {
 }
 
 TEST(Labels, EchoesBelowTheNoiseThatChannelsShareHaveNone) {
-  // Share of a point at the edge of the sector, where that noise is loud near the sonar.
+  // Share of a point at the edge of the sector. Near the sonar the noise is strong there.
   const auto share = [](float level_db) {
     FrequencyMode mode = p900();
     mode.receiver.shared_noise.level_db = level_db;
@@ -266,7 +267,7 @@ TEST(Labels, CostLessThanTwoAndAHalfPings) {
   double without_s = HUGE_VAL, with_s = HUGE_VAL;
   const auto time = [&](bool labels, double& fastest_s) {
     l.s.request.switches.keep_labels = labels;
-    const std::clock_t begin = std::clock();  // time of this process, so that other programs do not count
+    const std::clock_t begin = std::clock();  // processor time of this process, so that other programs have no influence
     (void)l.engine->run({&l.s.request, 1});
     fastest_s = std::min(fastest_s, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
   };

@@ -1,4 +1,4 @@
-// Oracles on levels of surfaces, in expected power: absolute, against range, against sampling, behind a box.
+// Oracles on levels of surfaces, in expected power: absolute, as a function of range and of sampling, and behind a box.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +27,7 @@ double beam_energy(const Sounding& s, int beam, int from, int to) {
   return sum * 2 * s.request.settings.range_bin_m / 1500;
 }
 
-/// Mean over the beams within `azimuth_deg` of ahead.
+/// Mean over the beams within `azimuth_deg` of straight ahead.
 template <class Value>
 double mean_over_beams(const Sounding& s, double azimuth_deg, Value&& value) {
   double sum = 0;
@@ -42,7 +42,7 @@ double mean_over_beams(const Sounding& s, double azimuth_deg, Value&& value) {
 
 TEST(LevelOracles, Oracle05_WallEnergyFallsAs20LogR) {
   const FrequencyMode mode = silent(p900());
-  const double half_fan = 2.3 * rad_from_deg(10);  // beyond, the pattern has nothing left to add: under 0.05 dB
+  const double half_fan = 2.3 * rad_from_deg(10);  // beyond this angle the pattern adds less than 0.05 dB
   std::vector<double> level;
   for (const double d : {1.0, 2.0, 4.0, 8.0}) {
     Sounding s(SceneMaker().add(wall(30, 30), -20, {d, 0, 0}).make(), mode, native_rows(1.3 * d + 0.3, 0.0254));
@@ -64,8 +64,8 @@ struct BedCase {
   double tilt_rad;
 };
 
-// Blocks of rows and a few beams are averaged: in one sample the cells' own jitter shows (about half a dB), and it is not the
-// level.
+// Blocks of rows and a few beams are averaged. In one sample the random positions of the cells would cause about half a dB,
+// which is not a part of the level.
 TEST(LevelOracles, Oracle08_AbsoluteSeabedLevel) {
   const double height = 2, lambert_db = -27;
   for (const BedCase& c : {BedCase{p900(), native_rows(10, 0.0254), 0.25}, BedCase{p900(), native_rows(10, 0.0254), 0.0},
@@ -96,15 +96,15 @@ TEST(LevelOracles, Oracle08_AbsoluteSeabedLevel) {
   }
 }
 
-/// The sum of sigma_i / r_i^4, from the beams of a whole ping: the sum of E|s|^2 over rows and beams counts every echo
-/// theta_eff tau_eff times.
+/// The sum of sigma_i / r_i^4 from the beams of a whole ping. The sum of E|s|^2 over rows and beams counts every echo theta_eff
+/// tau_eff times.
 double echo_per_m2(const Sounding& s) {
   double sum = 0;
   for (int j = 0; j < s.beams(); ++j) sum += beam_energy(s, j, 0, s.rows());
   const Taper taper = s.mode().pattern.azimuth_taper;
   const double theta =
       effective_beam_width_u(taper, aperture_in_wavelengths(taper, static_cast<double>(s.mode().pattern.azimuth_width_rad)));
-  const double du = s.beam_sine(0) - s.beam_sine(1);  // uniform in the sine
+  const double du = s.beam_sine(0) - s.beam_sine(1);  // the spacing is uniform in the sine
   const double source = s.medium().source_upa;
   return sum * du / (theta * energy_width_s(s.envelope_hz()) * source * source);
 }
@@ -128,7 +128,7 @@ TEST(LevelOracles, Oracle09_LambertSphere) {
   }
 }
 
-/// Mean power of a ping between two ranges, beams within 30 degrees.
+/// Mean power of a ping between two ranges, in beams within 30 degrees.
 double mean_power(const Sounding& s, double from_m, double to_m) {
   const int from = static_cast<int>(s.row_of_range(from_m)), to = static_cast<int>(s.row_of_range(to_m));
   return mean_over_beams(s, 30, [&](int j) { return beam_energy(s, j, from, to); });
@@ -170,7 +170,7 @@ TEST(LevelOracles, Oracle22_EnergyDoesNotDependOnBeams) {
   }
 }
 
-// The transmitter lights the sector evenly and a beam's skirt beyond it; farther out it is dark.
+// The transmitter covers the sector evenly and one beam's skirt beyond it. Farther out there is no sound.
 TEST(LevelOracles, EdgeBeamsAreNotDimAndNothingComesFromBeyond) {
   const double height = 2, lambert_db = -27, tilt = 0.25;
   for (const FrequencyMode& mode : {p900(), oculus_high()}) {
@@ -203,17 +203,17 @@ TEST(LevelOracles, EdgeBeamsAreNotDimAndNothingComesFromBeyond) {
   }
 }
 
-// The shadow may contain the leak of the rest of the bed through side lobes and pulse, and 1 dB more.
+// The shadow may contain the leakage of the rest of the bed through side lobes and pulse, plus 1 dB.
 TEST(LevelOracles, Oracle33_ShadowBehindABox) {
   const double height = 2, lambert_db = -20;
-  const Vec3d half{0.3, 0.6, 0.6}, place{4, 0.8, 0.6};  // to port: a mirrored shadow would lie elsewhere
+  const Vec3d half{0.3, 0.6, 0.6}, place{4, 0.8, 0.6};  // to port; a mirrored shadow would be elsewhere
   SceneMaker maker;
   maker.add(height_field(-2, 40, -40, 40, 2, [](double, double) { return 0.0; }), lambert_db).add(box(half), -20, place);
   Sounding s(maker.make(), p900(), native_rows(10, 0.0254));
   s.request.switches.expected_power = true;
   s.ping_from({0, 0, height}, {0, 0.25, 0});
 
-  // The bed as points of equal area, without the part that the box hides from the sonar (by the slab test).
+  // The bed as points of equal area, without the part that the box hides from the sonar (slab test).
   const auto hidden = [&](Vec3d p) {
     const Vec3d from{0, 0, height}, step = p - from;
     double enter = 0, leave = 1;
@@ -236,7 +236,8 @@ TEST(LevelOracles, Oracle33_ShadowBehindABox) {
       points.push_back(reference::scatterer_at(s.mode(), s.medium(), in_sonar, sigma, 1));
     }
   }
-  // Rows wholly behind the box, before its shadow ends: the box's top edge throws it to x = 4.3 * 2 / 0.8 m.
+  // Rows completely behind the box and before the end of its shadow. The box's top edge casts the shadow up to x = 4.3 * 2 /
+  // 0.8 m.
   const int from = static_cast<int>(s.row_of_range(5.3)), to = static_cast<int>(s.row_of_range(7.0));
   reference::Grid grid{1500, s.envelope_hz(), s.range_of_row(from), s.request.settings.range_bin_m, to - from};
   std::vector<int> beams;
@@ -252,7 +253,7 @@ TEST(LevelOracles, Oracle33_ShadowBehindABox) {
       open += s.power(n, s.beam_at(rad_from_deg(-11)));
     }
     record_below(33, "level in the shadow over the prediction", 1, db(got / expected), "dB");
-    EXPECT_GT(db(got / expected), -3) << b;  // the leak itself is there: the prediction is not beside the point
+    EXPECT_GT(db(got / expected), -3) << b;  // the leakage itself is present, so the prediction applies
     EXPECT_LT(db(got / open), -20) << b;
   }
 }

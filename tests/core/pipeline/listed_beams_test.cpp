@@ -1,5 +1,5 @@
-// Beams by a list of azimuths, with widths of their own: against the even spacing, the place of a target, and its fall by the
-// width.
+// Beams at listed azimuths, with their own widths: the position of a target compared with that of uniform beams, and the fall
+// of its level with the width.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ std::vector<double> even_azimuths(int count) {
   for (const double u : make_beam_sines(p900(), count)) azimuths.push_back(std::asin(u));
   return azimuths;
 }
-/// a x + b x^3, twice as dense in the middle as at the edges.
+/// a x + b x^3: twice as dense in the middle as at the edges.
 std::vector<double> uneven_azimuths() {
   std::vector<double> azimuths;
   for (int j = 0; j < beams; ++j) {
@@ -65,7 +65,7 @@ TEST(ListedBeams, PutATargetInTheBeamThatLooksAtIt) {
     Mesh ball = sphere(0.05, 2);
     const Vec3d at{3 * std::cos(azimuths[j]), 3 * std::sin(azimuths[j]), 0};
     Sounding s(SceneMaker().add(std::move(ball), -10, at).make(), with_list(p900(), azimuths), settings());
-    s.request.switches.expected_power = true;  // the draws of a neighbour may be stronger if the ball is wider than a beam
+    s.request.switches.expected_power = true;  // with speckle, a neighbour may be stronger if the ball is wider than a beam
     s.ping();
     int best = 0;
     double most = 0;
@@ -78,7 +78,7 @@ TEST(ListedBeams, PutATargetInTheBeamThatLooksAtIt) {
   }
 }
 
-// A point half the beam's own width off the axis is 3 dB down, both through columns (cells) and in its exact direction.
+// A point at half of the beam's width off the axis is at -3 dB, both through columns (cells) and in its exact direction.
 TEST(ListedBeams, HaveWidthsOfTheirOwn) {
   const std::vector<double> azimuths = uneven_azimuths();
   std::vector<float> widths;

@@ -1,4 +1,4 @@
-// Things that move, are hidden or lie on top of the water, through the whole engine: what the echo and the shadow do.
+// Objects that move, are hidden or float on the water, through the whole engine: their echoes and shadows.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ Mesh bed() {
   return height_field(-2, 30, -20, 20, 2, [](double, double) { return 0.0; });
 }
 
-/// Mean power of the beams about `azimuth_deg` between two ranges.
+/// Mean power of the beams around `azimuth_deg` between two ranges.
 double mean_power(const Sounding& s, double from_m, double to_m, double azimuth_deg = 0) {
   double sum = 0;
   int n = 0;
@@ -32,7 +32,7 @@ std::vector<double> intensities(const Sounding& s) {
   return all;
 }
 
-/// Returns the pose after a turn about the vertical axis through the origin and then a move.
+/// Returns the pose after a rotation about the vertical axis through the origin and a subsequent translation.
 Pose carried(const Pose& by, const Pose& pose) {
   return {by.position_m + rotate(by.orientation, pose.position_m), by.orientation * pose.orientation};
 }
@@ -54,7 +54,7 @@ TEST(Moving, SonarAndBodyCarriedTogetherSeeTheSame) {
   ASSERT_GT(*std::max_element(here.begin(), here.end()), 0);
   for (const Pose& by : {Pose{{1000.123, -2000.456, 0}, {}}, Pose{{3, 4, 0}, quat_from_rpy({0, 0, 2.1})}})
     EXPECT_GT(correlation(here, ping_carried_by(by)), 0.99) << by.position_m.x;
-  // The counter-check: the sonar moved alone sees another picture.
+  // Control: if only the sonar moves, the picture is different.
   s.request.sonar_in_world.position_m = s.request.sonar_in_world.position_m + Vec3d{0, 0, 0.3};
   s.ping();
   EXPECT_LT(correlation(here, intensities(s)), 0.9);
@@ -70,23 +70,23 @@ TEST(Moving, ABodyFartherAwayEchoesFartherAndTakesItsShadowAlong) {
     s.ping_from({0, 0, 1.5}, {0, 0.2, 0});
   };
   look(4);
-  const auto row_of_face = [&] {  // the loudest row ahead, of the box's face, not of the bed before it
+  const auto row_of_face = [&] {  // the strongest row ahead, which belongs to the box's face, not to the bed before it
     return s.range_of_row(s.loudest_row(s.beam_at(0)));
   };
   const double near_face_m = row_of_face(), shadow_near = mean_power(s, 5.0, 6.2), open_near = mean_power(s, 5.0, 6.2, 20);
   EXPECT_LT(shadow_near, 0.02 * open_near);
   look(5);
   EXPECT_NEAR(row_of_face() - near_face_m, 1, 0.06);
-  // 4.0 m is before the box now; the bed that lay in shadow is as bright as the bed beside it.
+  // Now 4.0 m is before the box. The bed that lay in shadow is as bright as the bed beside it.
   const double before = mean_power(s, 4.2, 4.6), beside = mean_power(s, 4.2, 4.6, 20);
   EXPECT_NEAR(10 * std::log10(before / beside), 0, 1.5);
   EXPECT_LT(mean_power(s, 6.2, 7.4), 0.02 * mean_power(s, 6.2, 7.4, 20));
-  // And with the box far outside, the old shadow is gone too.
+  // If the box is far outside, the old shadow is also gone.
   look(25);
   EXPECT_NEAR(10 * std::log10(mean_power(s, 5.0, 6.2) / open_near), 0, 1);
 }
 
-/// A scene file's objects in front of a sonar at z = -2 that looks level along +x, 90 degrees wide.
+/// The objects of a scene file in front of a sonar at z = -2 that looks level along +x, 90 degrees wide.
 Sounding sounding_of(const std::string& objects, double height_m = -2) {
   auto scene = parse_scene(objects, "test.yaml", {});
   EXPECT_TRUE(scene) << scene.error().text;
@@ -111,7 +111,7 @@ TEST(Moving, AnInvisibleObjectHasNeitherEchoNorShadow) {
 TEST(Moving, TheSeaSurfaceIsASheetAtZeroSeenFromBelow) {
   const auto with_surface = [](double lambert_db) {
     Sounding s = sounding_of("sea_surface: {size_m: [60, 60], lambert_db: " + std::to_string(lambert_db) + "}\nobjects: []\n");
-    s.ping_from({0, 0, -1}, {0, -0.3, 0});  // bow up, a metre below
+    s.ping_from({0, 0, -1}, {0, -0.3, 0});  // nose up, one metre below
     return s;
   };
   const Sounding rough = with_surface(-20), rougher = with_surface(-10);

@@ -1,4 +1,4 @@
-// Ghosts of surfaces: the cells of what stands before a mirror, against closed forms and against scenes built from the images.
+// Ghosts of surfaces: the cells of objects before a mirror, compared with closed forms and with scenes that contain the images.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,7 +29,7 @@ std::shared_ptr<Scene> with_mirrors(const SceneMaker& maker, std::size_t count, 
   return scene;
 }
 
-/// Sum of |s|^2 over beams [from, to) and the rows of a stretch of range.
+/// Sum of |s|^2 over beams [from, to) and over the rows of a range interval.
 double energy(const Sounding& s, double from_m, double to_m, int first_beam, int last_beam) {
   double sum = 0;
   for (int n = static_cast<int>(s.row_of_range(from_m)); n <= static_cast<int>(s.row_of_range(to_m)); ++n)
@@ -38,8 +38,8 @@ double energy(const Sounding& s, double from_m, double to_m, int first_beam, int
 }
 
 TEST(MultipathCells, LevelOfTheGhostsOfALambertSphere) {
-  // A Lambert sphere seen by one way and lit by another, an angle b apart: (sin b + (pi - b) cos b) / pi of what it sends
-  // straight back. Amplitudes of the two ways round add.
+  // A Lambert sphere that is seen by one path and lit by another, with the angle b between them, scatters (sin b + (pi - b) cos
+  // b) / pi of its echo straight back. The amplitudes of the two directions add.
   const double sonar_depth = 1, depth = 1.5, distance = 8, radius = 0.04;
   Sounding s(with_mirrors(SceneMaker().add(sheet(40, 40), silent_db).add(sphere(radius, 5), -20, {distance, 0, -depth}), 1),
              silent(without_elevation_pattern(p900())), native_rows(12, 0.0254));
@@ -59,7 +59,7 @@ TEST(MultipathCells, LevelOfTheGhostsOfALambertSphere) {
                 10 * std::log10(energy_at(mirrored) / direct), 0.3, "dB");
 }
 
-/// Something with corners and slopes, not symmetric in any way.
+/// An object with corners and slopes and without any symmetry.
 SceneMaker& add_things(SceneMaker& maker, double wall_y, bool mirrored) {
   const double side = mirrored ? -1 : 1;
   const auto at = [&](double x, double y, double z) { return Vec3d{x, wall_y + side * y, z}; };
@@ -69,7 +69,7 @@ SceneMaker& add_things(SceneMaker& maker, double wall_y, bool mirrored) {
 }
 
 TEST(MultipathCells, ViewInAMirrorIsThatOfTheMirroredScene) {
-  // A baffle hides the things from the sonar, which sees them in a side wall alone: as if they stood behind the wall.
+  // A baffle hides the objects from the sonar. The sonar sees them only in a side wall, as if they were behind the wall.
   const double wall_y = 2.5;
   SceneMaker real, image;
   real.add(sheet(40, 40), silent_db, {0, wall_y, 0}, quat_from_rpy({pi / 2, 0, 0}));
@@ -91,13 +91,14 @@ TEST(MultipathCells, ViewInAMirrorIsThatOfTheMirroredScene) {
       whole += plain.power(n, j);
       wrong += std::abs(with.power(n, j) - plain.power(n, j));
     }
-  EXPECT_LT(wrong / whole, 0.08);  // cells are drawn anew in the mirrored objects, and shadows have edges
+  EXPECT_LT(wrong / whole, 0.08);  // cells of the mirrored objects have other draws, and shadows have edges
   const double level_db = 10 * std::log10(energy(with, 4, 9, 0, 512) / energy(plain, 4, 9, 0, 512));
   record_oracle(no_number, "energy of what is seen in a mirror alone over that of the mirrored scene", 0, level_db, 0.15, "dB");
 }
 
 TEST(MultipathCells, ARippledBedHasNoDarkBandsInAMirror) {
-  // Rays fall in step with ripples; a bed that is seen in a ceiling alone must be as evenly lit as one that is seen straight on.
+  // Rays can hit equal phases of ripples. A bed that is seen only in a ceiling must be as evenly lit as a bed that is seen
+  // directly.
   const double ceiling_z = 0.5, bed_z = -1, image_z = 2 * ceiling_z - bed_z;
   const auto ripples = [](double x) { return -0.01 * std::sin(2 * pi * x / 0.55); };
   SceneMaker real, image;
@@ -110,7 +111,7 @@ TEST(MultipathCells, ARippledBedHasNoDarkBandsInAMirror) {
   settings.beam_count = 48;
   std::vector<std::unique_ptr<Sounding>> both;
   for (SceneMaker* maker : {&real, &image}) {
-    maker->add(box({0.02, 2, 1}), silent_db, {1, 0, -0.95});  // hides the bed itself
+    maker->add(box({0.02, 2, 1}), silent_db, {1, 0, -0.95});  // hides the bed from direct view
     both.push_back(std::make_unique<Sounding>(with_mirrors(*maker, maker == &real ? 1 : 0), mode, settings));
     both.back()->request.switches.expected_power = true;
     both.back()->request.switches.multipath = true;
@@ -124,13 +125,13 @@ TEST(MultipathCells, ARippledBedHasNoDarkBandsInAMirror) {
       ASSERT_GT(expected, 0);
       close += std::abs(10 * std::log10(seen / expected)) < 1;
     }
-  EXPECT_GT(close, 0.99 * all);  // 0.95 where rays may fall in step
+  EXPECT_GT(close, 0.99 * all);  // 0.95 if rays hit equal phases
 }
 
 TEST(MultipathCells, SpeckleOfTheTwoWaysRoundIsOne) {
-  // A narrow strip right ahead under a still surface: both ways round come from the same bearing and add in amplitude, whatever
-  // speckle the cells draw. Expected power must say the same as the mean over many draws (in power alone it would be 1.8 dB
-  // less).
+  // A narrow strip straight ahead under a still surface. Both directions of a pair come from the same bearing and add in
+  // amplitude, for any speckle of the cells. Expected power must equal the mean over many draws (a sum of powers would be 1.8
+  // dB less).
   SceneMaker maker;
   maker.add(sheet(40, 40), silent_db).add(sheet(3, 0.04), -15, {6.5, 0, -1.35}, quat_from_rpy({0, -0.1, 0}));
   PingSettings settings = native_rows(9, 0.0254);
@@ -155,7 +156,7 @@ TEST(MultipathCells, SpeckleOfTheTwoWaysRoundIsOne) {
                 10 * std::log10(mean / expected), 0.3, "dB");
 }
 
-/// Six smooth walls, two things.
+/// Six smooth walls and two objects.
 std::shared_ptr<const Scene> tank() {
   SceneMaker maker;
   maker.add(make_box({6, 5, 3}, 5), -25).add(sphere(0.3, 4), -20, {1.5, 0.4, 0.2}).add(box({0.2, 0.3, 0.4}), -20, {1, -1, -0.6});
@@ -190,7 +191,7 @@ TEST(MultipathCells, ATankRingsOnBehindItsWalls) {
   const double by_cones = energy(on, 2, 11.5, 0, 512);
   for (int n = 0; n < on.rows(); ++n)
     for (int j = 0; j < on.beams(); ++j) ASSERT_TRUE(std::isfinite(on.pressure(n, j)));
-  on.request.switches.conical = false;  // flat beams sort the same echoes otherwise
+  on.request.switches.conical = false;  // flat beams sort the same echoes in another way
   on.ping();
   EXPECT_NEAR(10 * std::log10(energy(on, 2, 11.5, 0, 512) / by_cones), 0, 1);
 }
@@ -218,7 +219,7 @@ TEST(MultipathCells, PulsesByWayOfTheSpectrumGiveTheSameEchoes) {
 }
 
 TEST(MultipathCells, MovingMirrorsAreFoundWhereTheyAre) {
-  // The wall is a moving body: its ghosts follow.
+  // The wall is a moving body. Its ghosts move with it.
   SceneMaker maker;
   maker.add_body(sheet(20, 20), silent_db, {{0, 3, 0}, quat_from_rpy({pi / 2, 0, 0})}).add_point({8, 1, 0}, -20);
   Sounding s(with_mirrors(maker, 1), p900(), native_rows(12, 0.0254));
@@ -227,7 +228,7 @@ TEST(MultipathCells, MovingMirrorsAreFoundWhereTheyAre) {
     s.request.bodies_in_world = {{{0, wall_y, 0}, quat_from_rpy({pi / 2, 0, 0})}};
     s.ping();
     const double y = 2 * wall_y - 1, range = std::hypot(8, y);
-    // In the beam that looks at the image the way back alone is by the mirror, or both are: the former is louder.
+    // In the beam towards the image, either only the way back is via the mirror or both ways are. The former is stronger.
     const double by_one = 0.5 * (range + std::hypot(8, 1));
     EXPECT_NEAR(s.loudest_row(s.beam_at(std::atan2(y, 8))), s.row_of_range(by_one), 1) << wall_y;
   }
@@ -254,7 +255,8 @@ TEST(FlatFaces, CurvedAndNarrowThingsHaveNone) {
   EXPECT_TRUE(faces_of(make_sphere(1, 64)).empty());
   EXPECT_TRUE(faces_of(height_field(-5, 5, -5, 5, 0.5, rough_relief(0.05, 32))).empty());
   EXPECT_TRUE(faces_of(make_box({4, 0.05, 0.05}, 1)).empty());
-  EXPECT_EQ(faces_of(make_cylinder(1.17, 1.22, segments_for(1.17), Caps::bottom)).size(), 1u);  // a round tank: its floor alone
+  EXPECT_EQ(faces_of(make_cylinder(1.17, 1.22, segments_for(1.17), Caps::bottom)).size(),
+            1u);  // only the floor of a round tank is a face
 }
 
 TEST(FlatFaces, WhatHardlyReflectsIsNoFace) {

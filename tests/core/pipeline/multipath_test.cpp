@@ -1,4 +1,4 @@
-// Tests paths via flat mirrors through the whole engine: positions and levels of the ghosts of points, and ghosts that must not
+// Paths via flat mirrors through the whole engine: positions and levels of the ghosts of points, and ghosts that must not
 // appear.
 #include <gtest/gtest.h>
 
@@ -11,12 +11,12 @@
 namespace sonar::test::multipath_test {
 namespace {
 
-constexpr double silent_db = -80;  // diffuse echoes of the mirrors themselves, out of the way
+constexpr double silent_db = -80;  // makes the diffuse echoes of the mirrors themselves negligible
 
 Mesh sheet(double length_x_m, double length_y_m) {
   return height_field(-length_x_m / 2, length_x_m / 2, -length_y_m / 2, length_y_m / 2, 5, [](double, double) { return 0.0; });
 }
-Quatd upright_along_x() { return quat_from_rpy({pi / 2, 0, 0}); }  // turns a level sheet into a side wall, normal along y
+Quatd upright_along_x() { return quat_from_rpy({pi / 2, 0, 0}); }  // turns a level sheet into a side wall with its normal along y
 
 struct SpecularMaterial {
   float reflection = -1, roughness_m = 0;
@@ -54,7 +54,7 @@ double loudest_within(const Sounding& s, double from_m, double to_m, int beam) {
   return most;
 }
 
-/// A still surface at z = 0 and a point; the sonar looks along +x.
+/// A still surface at z = 0 and a point. The sonar looks along +x.
 struct UnderSurface {
   double sonar_depth_m, point_depth_m, distance_m;
   double direct_m() const { return std::hypot(distance_m, point_depth_m - sonar_depth_m); }
@@ -136,7 +136,7 @@ TEST(Multipath, ARoughSurfaceHasNoGhosts) {
     without.request.switches.multipath = false;
     EXPECT_EQ(with.ping().pressure_upa, without.ping().pressure_upa) << kh;
   }
-  // In between, by exp(-2 k^2 h^2 cos^2) at the angle in question.
+  // Between the extremes the reflectance is exp(-2 k^2 h^2 cos^2) at this angle.
   const double cosine = (1.5 + 1.2) / u.mirrored_m(), kh = 1.5;
   Sounding smooth = u.sounding(p900()), rougher = u.sounding(p900(), {.roughness_m = static_cast<float>(kh / wave_number)});
   smooth.ping(), rougher.ping();
@@ -146,7 +146,7 @@ TEST(Multipath, ARoughSurfaceHasNoGhosts) {
 }
 
 TEST(Multipath, GhostsOfASideWallAppearWhereTheyArriveFrom) {
-  const Vec3d point{8, 1, 0}, image{8, 5, 0};  // wall at y = 3
+  const Vec3d point{8, 1, 0}, image{8, 5, 0};  // the wall is at y = 3
   const double r = length(point), mirrored_m = length(image), both = 0.5 * (r + mirrored_m);
   Sounding s(mirrored(SceneMaker().add(sheet(40, 40), silent_db, {0, 3, 0}, upright_along_x()).add_point(point, -20), 1), p900(),
              native_rows(12, 0.0254));
@@ -155,7 +155,7 @@ TEST(Multipath, GhostsOfASideWallAppearWhereTheyArriveFrom) {
   const int direct_beam = s.beam_at(std::atan2(point.y, point.x)), mirror_beam = s.beam_at(std::atan2(image.y, image.x));
   EXPECT_EQ(s.loudest_beam(static_cast<int>(std::lround(s.row_of_range(r)))), direct_beam);
   EXPECT_EQ(s.loudest_beam(static_cast<int>(std::lround(s.row_of_range(mirrored_m)))), mirror_beam);
-  // Out by the mirror and back directly, and the other way round: one range, two bearings.
+  // Out via the mirror and back directly, and the reverse: one range, two bearings.
   const double by_mirror = peak_near(s, both, mirror_beam).height, directly = peak_near(s, both, direct_beam).height;
   EXPECT_NEAR(by_mirror / directly, 1, 0.02);
   EXPECT_NEAR(directly / peak_near(s, r, direct_beam).height,
@@ -165,7 +165,7 @@ TEST(Multipath, GhostsOfASideWallAppearWhereTheyArriveFrom) {
 }
 
 TEST(Multipath, TwoWallsMakeImagesOfImages) {
-  // Surface at z = 0, wall at y = 3: the corner's image of the point lies across both.
+  // Surface at z = 0, wall at y = 3. The corner's image of the point lies across both.
   const Vec3d point{7, 1, -1}, sonar{0, 0, -0.8};
   SceneMaker maker;
   maker.add(sheet(40, 40), silent_db).add(sheet(40, 40), silent_db, {0, 3, 0}, upright_along_x()).add_point(point, -20);
@@ -178,7 +178,7 @@ TEST(Multipath, TwoWallsMakeImagesOfImages) {
   const int beam = s.beam_at(std::asin((corner.y - sonar.y) / range));
   EXPECT_NEAR(peak_near(s, range, beam).offset, s.row_of_range(range), 1);
   EXPECT_GT(peak_near(s, range, beam).height, 0.1 * peak_near(s, r, s.beam_at(std::asin(point.y / r))).height);
-  // One way straight, the other by both.
+  // One way is straight, the other is via both mirrors.
   const double mixed = 0.5 * (range + r);
   EXPECT_NEAR(peak_near(s, mixed, beam).offset, s.row_of_range(mixed), 1);
 }
@@ -198,9 +198,9 @@ TEST(Multipath, WhatHidesTheMirrorHidesTheGhost) {
   };
   const double bounce_x = u.distance_m * u.sonar_depth_m / (u.sonar_depth_m + u.point_depth_m);
   const double free = ghost({bounce_x, 4, -0.1});
-  EXPECT_LT(ghost({bounce_x, 0, -0.1}), 0.01 * free);               // under the place of the bounce
-  EXPECT_LT(ghost({0.5 * bounce_x, 0, -0.5}), 0.01 * free);         // on the way there
-  EXPECT_LT(ghost({0.5 * (bounce_x + 8), 0, -0.75}), 0.01 * free);  // on the way on
+  EXPECT_LT(ghost({bounce_x, 0, -0.1}), 0.01 * free);               // below the point of reflection
+  EXPECT_LT(ghost({0.5 * bounce_x, 0, -0.5}), 0.01 * free);         // on the way to the mirror
+  EXPECT_LT(ghost({0.5 * (bounce_x + 8), 0, -0.75}), 0.01 * free);  // on the way from the mirror
   EXPECT_NEAR(ghost({4, 0, -3}), free, 1e-6 * free);                // elsewhere
 }
 

@@ -1,4 +1,4 @@
-// The filter that gives white noise the pulse's correlation, on every grid a sonar may ask for.
+// The filter that gives white noise the pulse's correlation, on every grid that a sonar may request.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +11,7 @@
 namespace sonar {
 namespace {
 
-class NoiseFilter : public ::testing::TestWithParam<double> {};  // samples per -3 dB pulse width
+class NoiseFilter : public ::testing::TestWithParam<double> {};  // parameter: samples per -3 dB pulse width
 
 double correlation(const std::vector<float>& h, std::size_t lag) {
   double sum = 0;
@@ -51,7 +51,7 @@ TEST(NoiseTable, SharesDrawsAndTablesWithOthersOfItsSeed) {
   alone_other_seed.prepare(Seed{4}, filter);
   EXPECT_EQ(other_seed.shaped(), alone_other_seed.shaped());
   EXPECT_NE(other_seed.shaped(), first.shaped());
-  first.prepare(Seed{4}, filter);  // what others share of it stays
+  first.prepare(Seed{4}, filter);  // the part that others share stays unchanged
   EXPECT_EQ(same.shaped().size(), first.shaped().size());
   EXPECT_NE(same.shaped(), first.shaped());
 }

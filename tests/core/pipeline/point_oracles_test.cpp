@@ -1,4 +1,4 @@
-// Oracles on point targets, through the whole engine: where they appear, how strong, how wide.
+// Oracles on point targets, through the whole engine: their positions, levels and widths.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,7 @@ Vec3d at(double range_m, double azimuth_rad, double elevation_rad = 0) {
           range_m * std::sin(elevation_rad)};
 }
 
-/// The loudest row within 5 of `row` in a beam.
+/// The row with the highest level within 5 rows of `row` in a beam.
 int loudest_near(const Sounding& s, double row, int beam) {
   int best = static_cast<int>(std::lround(row));
   for (int n = best - 5; n <= std::lround(row) + 5; ++n) {
@@ -29,7 +29,7 @@ int loudest_near(const Sounding& s, double row, int beam) {
   return best;
 }
 
-/// Fractional row and height of the loudest echo near `row` in a beam.
+/// Fractional row and height of the strongest echo near `row` in a beam.
 Peak peak_near(const Sounding& s, double row, int beam) {
   const int best = loudest_near(s, row, beam);
   Peak p = log_parabola(s.pressure(best - 1, beam), s.pressure(best, beam), s.pressure(best + 1, beam));
@@ -37,7 +37,7 @@ Peak peak_near(const Sounding& s, double row, int beam) {
   return p;
 }
 
-/// Azimuth of the middle beam, in which the targets of most tests lie.
+/// Azimuth of the middle beam. The targets of most tests lie in it.
 double middle_azimuth(const FrequencyMode& mode, const PingSettings& settings) {
   Sounding empty(SceneMaker().make(), mode, settings);
   return static_cast<double>(empty.ping().beam_azimuth_rad[static_cast<std::size_t>(settings.beam_count / 2)]);
@@ -56,7 +56,7 @@ TEST(PointOracles, Oracle01_RangeOfAPoint) {
       const double row = s.row_of_range(r);
       const Peak peak = peak_near(s, row, settings.beam_count / 2);
       record_oracle(1, "peak by log-parabola, off its range", 0, peak.offset - row, 0.1, "rows");
-      // The sample that holds the range: half a row is where two samples are equally loud.
+      // The sample that contains the range. At half a row, two samples have equal levels.
       record_oracle(1, "loudest row, off its range", 0, loudest_near(s, row, settings.beam_count / 2) - row, 0.5 + 0.01, "rows");
     }
   }
@@ -148,7 +148,7 @@ TEST(PointOracles, Oracle04_SlopeOfAPointWithoutAbsorption) {
 }
 
 TEST(PointOracles, Oracle14_WidthOfAPointAcrossBeams) {
-  // Fine beam spacing: a narrow sector with many beams.
+  // Finely spaced beams: a narrow sector with many beams.
   for (FrequencyMode mode : {p900(), oculus_low(), oculus_high()}) {
     const double width = static_cast<double>(mode.pattern.azimuth_width_rad);
     mode.horizontal_aperture_rad = static_cast<float>(8 * width);
@@ -157,7 +157,7 @@ TEST(PointOracles, Oracle14_WidthOfAPointAcrossBeams) {
     s.ping();
     const int row = static_cast<int>(std::lround(s.row_of_range(3)));
     const double half = s.pressure(row, s.loudest_beam(row)) * std::sqrt(0.5);
-    const auto crossing = [&](int step) {  // azimuth at which the level passes half power, between two beams
+    const auto crossing = [&](int step) {  // azimuth between two beams at which the level passes half power
       int j = s.loudest_beam(row);
       while (s.pressure(row, j + step) > half) j += step;
       const double a = s.pressure(row, j), b = s.pressure(row, j + step), part = (a - half) / (a - b);
@@ -185,7 +185,7 @@ TEST(PointOracles, Oracle15_SideLobesOfAPointAcrossBeams) {
 TEST(PointOracles, Oracle17_WidthOfAPointInRange) {
   for (const double width : {0.0254, 0.01}) {
     PingSettings settings = native_rows(3, width);
-    settings.range_bin_m /= 8;  // finer than the pulse needs, to see its shape
+    settings.range_bin_m /= 8;  // finer than the pulse needs, so that its shape is visible
     settings.range_bin_count *= 8;
     const double azimuth = middle_azimuth(p900(), settings);
     Sounding s(SceneMaker().add_point(at(2, azimuth), -15).make(), p900(), settings);
@@ -239,7 +239,7 @@ TEST(PointOracles, Oracle43_EchoesBeyondTheRecordDoNotWrap) {
   s.ping();
   const auto loudest = [](const Ping& ping) { return static_cast<double>(*std::ranges::max_element(ping.pressure_upa)); };
   record_oracle(43, "points at 1.05 to 2 R_max: greatest sample", 0, loudest(s.last()), 0, "uPa");
-  // A surface out there does no harm either, with one ray a scatterer or with cells.
+  // A surface beyond the range has no effect either, neither with one scatterer per ray nor with cells.
   for (const int fan : {0, 64}) {
     Sounding w(SceneMaker().add(wall(20, 20), -10, {13, 0, 0}).make(), p900(), settings);
     w.request.switches.fixed_fan = fan;
@@ -270,11 +270,11 @@ TEST(PointOracles, Oracle46_ConicalShift) {
   }
 }
 
-// Port is left: targets on the left, up and near must come back on the left, up and near.
+// Port is left: targets on the left, above and near must appear on the left, above and near.
 TEST(PointOracles, AsymmetricTargetsLandWhereTheyStand) {
   const PingSettings settings = native_rows(8, 0.0254);
   const Vec3d sonar{1000, -2000, -50};
-  const RollPitchYaw attitude{0, 0, pi / 2};  // looks along world +y; port is world -x
+  const RollPitchYaw attitude{0, 0, pi / 2};  // looks along world +y, so port is world -x
   SceneMaker maker;
   maker.add_point(sonar + Vec3d{0, 5, 0}, -15).add_point(sonar + Vec3d{-2, 5, 0}, -15).add_point(sonar + Vec3d{0, 7, 0}, -15);
   Sounding s(maker.make(), p900(), settings);

@@ -1,4 +1,5 @@
-// Pulses of every shape through the whole engine: widths, levels, noise, Doppler, and that no path but the intended one matters.
+// Pulses of all shapes through the whole engine: widths, levels, noise and Doppler. Only the intended path may have an
+// influence.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -46,7 +47,7 @@ INSTANTIATE_TEST_SUITE_P(Pulses, EveryShape, ::testing::ValuesIn(all_shapes()),
 
 TEST_P(EveryShape, Oracle17_WidthOfAPointInRange) {
   PingSettings settings = native_rows(3, 0.0254);
-  settings.range_bin_m /= 8;  // finer than the pulse needs, to see its shape
+  settings.range_bin_m /= 8;  // finer than the pulse needs, so that its shape is visible
   settings.range_bin_count *= 8;
   settings.beam_count = 65;
   Sounding s(SceneMaker().add_point({2, 0, 0}, -15).make(), with(oculus_high(), waveform_of(GetParam())), settings);
@@ -64,10 +65,10 @@ TEST_P(EveryShape, Oracle17_WidthOfAPointInRange) {
   EXPECT_NEAR(s.range_of_row(top), 2, settings.range_bin_m);
 }
 
-// Fitted through the peak: the level of a point whatever the pulse.
+// Level of a point, fitted through the peak. It does not depend on the pulse.
 TEST_P(EveryShape, Oracle3_LevelOfAPoint) {
   PingSettings settings = native_rows(3, 0.0254);
-  settings.range_bin_m = 2.0 / 200.5;  // row 200 lies on the point
+  settings.range_bin_m = 2.0 / 200.5;  // row 200 lies at the point
   settings.range_bin_count = 300;
   settings.beam_count = 65;
   Sounding s(SceneMaker().add_point({2, 0, 0}, -15).make(), with(oculus_high(), waveform_of(GetParam())), settings);
@@ -76,7 +77,7 @@ TEST_P(EveryShape, Oracle3_LevelOfAPoint) {
   record_oracle(3, name_of(GetParam()) + ", level of a point", expected, 20 * std::log10(s.pressure(200, 32)), 0.1, "dB");
 }
 
-// Expected power of a flat bed follows from the pulse's energy, O8 with another tau_eff.
+// Expected power of a flat bed follows from the pulse's energy: oracle 8 with another tau_eff.
 TEST_P(EveryShape, Oracle8_LevelOfABed) {
   const FrequencyMode mode = without_elevation_pattern(p900_with(GetParam()));
   PingSettings settings = native_rows(9, 0.0254);
@@ -96,7 +97,7 @@ TEST_P(EveryShape, Oracle8_LevelOfABed) {
   }
 }
 
-// The mean of many pings of speckle has the level of expected power: both ways of summing agree.
+// The mean of many pings with speckle has the level of expected power. So both kinds of sums agree.
 TEST_P(EveryShape, SpeckleHasTheExpectedPower) {
   Sounding s(flat_bed(), p900_with(GetParam()), default_rows(8, 300));
   const auto mean_power = [&](bool expected) {
@@ -143,7 +144,7 @@ TEST_P(EveryShape, Oracle31_NoiseCorrelationOfNeighbours) {
     const double wa = directivity(Taper::taylor30, aperture, u - ua), wb = directivity(Taper::taylor30, aperture, u - ub);
     product += wa * wb, square += wa * wa;
   }
-  // For complex Gaussian noise the intensities correlate as the square of the fields.
+  // For complex Gaussian noise the correlation of intensities is the square of that of the fields.
   const auto coherence = [](double c) { return std::sqrt(std::max(0.0, c)); };
   record_oracle(31, name_of(GetParam()) + ", noise of beams two apart", std::abs(product / square),
                 coherence(correlation(here, beside)), 0.05, "");
@@ -197,11 +198,12 @@ TEST(PulseOracles, ExactIsTheSamePictureByAnotherWay) {
     }
     record_below(18, name_of(shape) + " through the engine, spectrum against time, relative L2", 1e-4, std::sqrt(error / power),
                  "");
-    EXPECT_EQ(ping(false, true), ping(true, true));  // expected power has one way only
+    EXPECT_EQ(ping(false, true), ping(true, true));  // expected power has only one path
   }
 }
 
-/// Where a point at 5 m dead ahead shows when the sonar moves so; motion within the ping off, so that only Doppler shifts it.
+/// Range at which a point 5 m straight ahead appears while the sonar moves. Motion within the ping is off, so that only Doppler
+/// shifts it.
 double apparent_range(const Waveform& waveform, const Twist& twist, bool doppler, int fixed_fan = 0, bool motion = false) {
   PingSettings settings = native_rows(8, 0.0254);
   settings.beam_count = 65;
@@ -241,14 +243,14 @@ TEST(PulseOracles, ASweepsEchoIsShiftedByDoppler) {
     EXPECT_EQ(apparent_range(waveform_of(Shape::gaussian), closing, true),
               apparent_range(waveform_of(Shape::gaussian), {}, true));
     EXPECT_EQ(apparent_range(waveform_of(Shape::cw), closing, true), apparent_range(waveform_of(Shape::cw), {}, true));
-    // Scatterers of the ray fan as well as points, and with motion within the ping on top: 5 m of flight, a bounce at 3.3 ms.
+    // Scatterers of the ray fan and points, now with motion within the ping: 5 m of travel, reflection at 3.3 ms.
     EXPECT_NEAR((apparent_range(rising, closing, true, 40) - apparent_range(rising, {}, true, 40)) / shift, 1, 0.05);
     EXPECT_NEAR(apparent_range(rising, closing, true, 0, true) - resting, shift - speed * 5 / 1500, 0.05 * std::abs(shift));
   }
-  EXPECT_NEAR(apparent_range(rising, {{0, 2, 1}, {}}, true), resting, 1e-4);  // sideways: no closing, no shift
+  EXPECT_NEAR(apparent_range(rising, {{0, 2, 1}, {}}, true), resting, 1e-4);  // sideways motion: no range rate, no shift
 }
 
-// Cells take the shift tile by tile: a wall of cells moves as the point does.
+// Cells are shifted tile by tile: a wall of cells moves as the point does.
 TEST(PulseOracles, ASweepsSurfacesAreShiftedByDoppler) {
   const auto range_of_wall = [](double speed) {
     PingSettings settings = native_rows(8, 0.0254);

@@ -1,4 +1,4 @@
-// Pulses of every shape: widths, side lobes and integrals against sums, the tables made of them, and what is refused.
+// Pulses of all shapes: widths, side lobes and integrals compared with sums, the tables made from them, and rejected pulses.
 #include "core/pipeline/pulses/pulse.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 using Shape = Waveform::Shape;
 using Complex = std::complex<double>;
 
-constexpr double width_s = 2 * 0.0254 / 1500;  // width for the shapes that have a choice
+constexpr double width_s = 2 * 0.0254 / 1500;  // width for the shapes whose width can be chosen
 
 class EveryPulse : public ::testing::TestWithParam<Shape> {
  protected:
@@ -92,7 +92,7 @@ TEST_P(EveryPulse, RowsAreTheRealPartOrThePower) {
       const std::vector<float> rows = make_pulse_rows(p, step, taps, steps, squared);
       ASSERT_EQ(rows.size(), static_cast<std::size_t>(2 * taps * (steps + 1)));
       double worst = 0;
-      for (const double place : {0.0, 0.13, 0.5, 0.87654, 0.9999}) {  // an echo so far past a sample
+      for (const double place : {0.0, 0.13, 0.5, 0.87654, 0.9999}) {  // offset of an echo after a sample
         const int row = static_cast<int>(place * steps);
         const double part = place * steps - row;
         double kept = 0, all = 0;
@@ -134,7 +134,7 @@ TEST(Pulse, Oracle15_SideLobesOfASweep) {
   for (; t < p.reach_s(); t += width_s * 1e-3) highest = std::max(highest, std::abs(p.at(t)));
   record_oracle(15, "Hamming-weighted sweep, highest side lobe in range", -42.6, 20 * std::log10(highest), 0.5, "dB");
   EXPECT_NEAR(p.width_s() * sweep_bandwidth_hz(width_s), 1.30, 0.01);
-  // At the end of its reach, where the fade begins, the pulse is at -60 dB.
+  // At the end of the pulse, where the fade begins, the level is -60 dB.
   double cut = 0;
   for (double x = 0.98 * p.reach_s(); x < p.reach_s(); x += width_s * 1e-3) cut = std::max(cut, std::abs(p.at(x)));
   EXPECT_LT(20 * std::log10(cut), -60);

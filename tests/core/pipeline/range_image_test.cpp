@@ -1,4 +1,5 @@
-// Range images against closed forms: where a plane, a sphere and a point are, which side is which, levels, sound speed, threads.
+// Compares range images with closed forms: positions of a plane, a sphere and a point, orientation, levels, sound speed,
+// threads.
 #include "core/sonar/range_image.hpp"
 
 #include <gmock/gmock.h>
@@ -24,7 +25,7 @@ struct Wanted final : RangeImageSettings {
   bool equals(const VendorSettings&) const override { return true; }
 };
 
-/// 256 x 64 beams of 1.5 degrees over 90 x 40 degrees, to 15 m.
+/// 256 x 64 beams of 1.5 degrees over 90 x 40 degrees, up to 15 m.
 class RangeImageSounding {
  public:
   explicit RangeImageSounding(std::shared_ptr<const Scene> scene, int threads = 2)
@@ -90,7 +91,7 @@ class RangeImageSounding {
 
 std::shared_ptr<const Scene> plane_ahead(double x_m) { return SceneMaker().add(wall(40, 40), -20, {x_m, 0, 0}).make(); }
 
-/// Share of the pixels with a return that lie on the plane x = `x_m`, to 3 cm.
+/// Share of the pixels with a return that lie on the plane x = `x_m`, within 3 cm.
 double share_on_plane(RangeImageSounding& s, double x_m) {
   int valid = 0, on = 0;
   for (int row = 0; row < 64; ++row)
@@ -123,13 +124,13 @@ TEST(RangeImage, SphereIsWhereItIs) {
   EXPECT_NEAR(s.range_m(static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))), length(centre) - 0.5, 0.02);
 }
 
-/// A pole straight ahead; `turn_rad` makes it upright, level or oblique.
+/// A pole straight ahead. `turn_rad` makes it upright, level or oblique.
 struct Pole {
   double radius_m = 0, length_m = 0, turn_rad = 0, range_m = 0;
 };
 constexpr double pole_lambert_db = -8;
 
-/// The power [uPa^2] by Lambert's law that a beam receives from the pole when its axis points at the pole.
+/// The power [uPa^2], by Lambert's law, that a beam receives from the pole when its axis points at the pole.
 double power_of(const Pole& pole, const PingRequest& request) {
   constexpr int along = 200, around = 200;
   const double alpha_db = absorption_db_per_m(request.water, 0, 1.2e6);
@@ -137,8 +138,8 @@ double power_of(const Pole& pole, const PingRequest& request) {
   for (int i = 0; i < along; ++i)
     for (int j = 0; j < around; ++j) {
       const double t = ((i + 0.5) / along - 0.5) * pole.length_m, angle = ((j + 0.5) / around - 0.5) * std::numbers::pi;
-      // `angle` is that of the surface normal, 0 where the surface faces the sonar. `t` is the position along the pole, which is
-      // perpendicular to the direction of the sonar.
+      // `angle` is the angle of the surface normal, 0 where the surface faces the sonar. `t` is the position along the pole,
+      // which is perpendicular to the direction of the sonar.
       const Vec3d place{pole.range_m - pole.radius_m * std::cos(angle), pole.radius_m * std::sin(angle), t};
       const double r = length(place), cosine = dot(Vec3d{std::cos(angle), -std::sin(angle), 0}, place) / r;
       if (cosine > 0) sum += cosine * cosine * std::pow(r, -4) * std::pow(10, -2 * alpha_db * r / 10);
@@ -150,7 +151,7 @@ double power_of(const Pole& pole, const PingRequest& request) {
 /// Compares the power that all beams receive from the pole with Lambert's law summed over its surface, for 16 positions of the
 /// sonar within one cell of the beam grid.
 TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
-  // The sum of the weights of the beams around a point; each beam is at -3 dB 0.75 degrees off its axis.
+  // The sum of the weights of the beams around a point. Each beam is at -3 dB at 0.75 degrees off its axis.
   const auto weights = [](double step_rad) {
     double sum = 0;
     for (int n = -20; n <= 20; ++n) {
@@ -159,7 +160,7 @@ TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
     }
     return sum;
   };
-  for (const double range_m : {2.5, 4.5, 8.5, 12.5})  // the centres of range cells
+  for (const double range_m : {2.5, 4.5, 8.5, 12.5})  // centres of range cells
     for (const double diameter_m : {0.005, 0.02, 0.1})
       for (const double turn_rad : {0.0, std::numbers::pi / 2, 0.6}) {
         const Pole pole{diameter_m / 2, std::min(2.0, 0.4 * range_m), turn_rad, range_m};
@@ -275,15 +276,15 @@ TEST(RangeImage, NoiseAloneHasFewFalseAlarms) {
   int alarms = 0;
   for (int i = 0; i < 16384; ++i) alarms += range_pixel(s.last(), static_cast<std::size_t>(i)).range != 0;
   EXPECT_LT(alarms, 16);
-  // A pixel has the loudest of about 777 range cells. In each, noise exceeds 8 times its mean with probability e^-8: about a
-  // quarter of the pixels report a false alarm.
+  // A pixel reports the strongest of about 777 range cells. In each, noise exceeds 8 times its mean with probability e^-8.
+  // Therefore about a quarter of the pixels report a false alarm.
   s.wanted->detection = 8;
   s.ping();
   for (int i = alarms = 0; i < 16384; ++i) alarms += range_pixel(s.last(), static_cast<std::size_t>(i)).range != 0;
   EXPECT_NEAR(alarms / 16384.0, 1 - std::pow(1 - std::exp(-8), 777), 0.02);
 }
 
-/// A picture of noise: a quarter of the pixels report ranges that mean nothing.
+/// A picture of noise: a quarter of the pixels report random ranges.
 RangeImageSounding of_noise() {
   RangeImageSounding s(SceneMaker().make());
   s.request().switches.noise = true;
@@ -312,7 +313,7 @@ TEST(RangeImage, MediansEndAtTheEdgesOfBlocks) {
   RangeImageSounding s = of_noise();
   s.wanted->detection = 4;
   s.wanted->median_passes = 2;
-  const auto equal = [&s](int row) {  // to the row above
+  const auto equal = [&s](int row) {  // compared with the row above
     int n = 0;
     for (int column = 0; column < 256; ++column)
       n += s.at(column, row).range != 0 && s.at(column, row).range == s.at(column, row + 1).range;
@@ -347,7 +348,7 @@ TEST(RangeImage, FiltersAndSpeckleLeaveAPlaneWhereItIs) {
 TEST(RangeImage, BeamsThatHearTheSameScattererReportItsRange) {
   RangeImageSounding s(plane_ahead(5));
   s.wanted->chosen_as_heard = true;
-  const auto equal = [&s] {  // share of ranges that are equal to the one beside them
+  const auto equal = [&s] {  // share of ranges that are equal to that of the neighbour
     s.ping();
     double same = 0, n = 0;
     for (int row = 20; row < 44; ++row)

@@ -1,5 +1,5 @@
-// Pictures that begin at a range: PingSettings::range_start_m through the whole engine. The oracle is the picture from range 0,
-// whose rows the window must repeat.
+// Pictures that begin at a range: PingSettings::range_start_m through the whole engine. The oracle is the picture from range 0.
+// The window must repeat its rows.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -45,7 +45,7 @@ double apart(const Both& b) {
   return std::sqrt(apart / all);
 }
 
-// Cells, points, specular echoes, mirrors, motion, another sonar, truth: all that is not drawn by the sample.
+// Cells, points, specular echoes, mirrors, motion, another sonar, truth: all parts without draws for each sample.
 TEST(RangeWindow, RepeatsTheRowsOfTheWholePicture) {
   Parallel pool(2);
   const auto engine = make_cpu_engine(basin(), pool, {});
@@ -61,7 +61,7 @@ TEST(RangeWindow, RepeatsTheRowsOfTheWholePicture) {
   }
 }
 
-// Noise, leak and volume as well, as mean powers.
+// Noise, leak and volume, too, as mean powers.
 TEST(RangeWindow, ExpectsTheSamePowers) {
   Parallel pool(2);
   const auto engine = make_cpu_engine(basin(), pool, {});
@@ -95,7 +95,7 @@ TEST(RangeWindow, BeginsAtItsRangeAndHearsTailsFromBefore) {
   const auto inside = loudest_at(1.5), edge = loudest_at(-0.2), before = loudest_at(-10);
   EXPECT_GT(inside[1], 2 * inside[0]);
   EXPECT_GT(inside[1], 2 * inside[2]);
-  // exp(-(b t)^2) at 0.7 rows from the middle of row 0; half power is at 0.45 rows.
+  // exp(-(b t)^2) at 0.7 rows from the middle of row 0. Half power is at 0.45 rows.
   EXPECT_NEAR(edge[0] / inside[1] * std::pow(range_of(-0.2) / range_of(1.5), 2), std::exp2(-0.5 * std::pow(0.7 / 0.45, 2)), 0.01);
   EXPECT_GT(edge[0], 5 * edge[1]);
   EXPECT_EQ(*std::max_element(before.begin(), before.end()), 0);

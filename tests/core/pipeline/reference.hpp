@@ -1,4 +1,4 @@
-// The slow reference: eq. (8) and (9) of the acoustic model summed directly in double, and closed forms of the levels to expect.
+// The slow reference: eq. (8) and (9) of the acoustic model summed directly in double, and closed forms of the expected levels.
 // It shares the formulae of core/pipeline/arithmetic with the engine, but not its tables, grids and float arithmetic.
 #pragma once
 
@@ -35,34 +35,34 @@ struct Grid {
   double sample_rate_hz() const { return sound_speed_mps / (2 * spacing_m); }
 };
 
-/// Eq. (6) for a scatterer of cross-section sigma at a place in the sonar's frame.
+/// Eq. (6) for a scatterer of cross-section sigma at a point in the sonar's frame.
 Scatterer scatterer_at(const FrequencyMode& mode, const Medium& medium, Vec3d in_sonar, double sigma_m2, Complex xi);
 
 /// Eq. (8): g[n] = sum_i A_i p(t_n - tau_i).
 std::vector<Complex> signal_in_time(std::span<const Scatterer> scatterers, const Grid& grid);
 /// Eq. (8) by the discrete spectrum: P(nu_m) = P_hat(nu_m) sum_i A_i e^{-i 2 pi nu_m tau_i}, inverse transform, scaled by the
-/// sample rate. Equal to signal_in_time for delays of at least 4 / b from both ends (it wraps pulse tails).
+/// sample rate. It wraps the tails of pulses. Therefore it equals signal_in_time only for delays of at least 4 / b from both
+/// ends.
 std::vector<Complex> signal_in_frequency(std::span<const Scatterer> scatterers, const Grid& grid);
 
-/// Eq. (9): s_j[n] = sum_i D(u_i - u_j) A_i p(t_n - tau_i), every scatterer at its own exact sine. [beams][samples]
+/// Eq. (9): s_j[n] = sum_i D(u_i - u_j) A_i p(t_n - tau_i), with the exact sine of each scatterer. [beams][samples]
 std::vector<std::vector<Complex>> beams(std::span<const Scatterer> scatterers, std::span<const double> beam_sines,
                                         const BeamPattern& pattern, const Grid& grid);
 /// E|s_j[n]|^2 = sum_i D^2 |A_i|^2 p^2 for independent scatterers of unit mean power.
 std::vector<std::vector<double>> expected_power(std::span<const Scatterer> scatterers, std::span<const double> beam_sines,
                                                 const BeamPattern& pattern, const Grid& grid);
 
-// Closed forms, all as expected power E|s|^2 in dB re 1 uPa^2 unless stated otherwise.
+// Closed forms. All are expected power E|s|^2 in dB re 1 uPa^2 unless stated otherwise.
 
-/// Oracle 8: flat seabed at `height_m` below the sonar, Lambert 10 log10 mu, conical columns, range r:
-/// SL - 40 log r - 2 alpha r + S_b + 10 log10(theta_eff r (c / 2) tau_eff F), sin g = h / r, F = 1 / cos g at azimuth 0 and
-/// r / sqrt(r^2 (1 - u^2) - h^2) in a beam of sine u; plus the two-way elevation pattern there (tilt: sonar's nose down,
-/// positive).
+/// Oracle 8: flat seabed at `height_m` below the sonar, Lambert 10 log10 mu, conical columns, range r: SL - 40 log r - 2 alpha
+/// r + S_b + 10 log10(theta_eff r (c / 2) tau_eff F), sin g = h / r. F = 1 / cos g at azimuth 0 and r / sqrt(r^2 (1 - u^2) -
+/// h^2) in a beam of sine u. The two-way elevation pattern is added (tilt: nose of the sonar down is positive).
 class SeabedLevel {
  public:
   SeabedLevel(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double lambert_db, double height_m,
               double tilt_rad);
   double db(double range_m, double sine = 0) const;
-  /// The angle about the array axis at which that beam sees the bottom at that range, and the two-way pattern there.
+  /// The angle about the array axis at which a beam sees the bottom at a range, and the two-way pattern at this angle.
   double psi_rad(double range_m, double sine = 0) const;
   double pattern(double range_m, double sine = 0) const;
 
@@ -73,13 +73,13 @@ class SeabedLevel {
   double elevation_aperture_;
 };
 
-/// Oracle 5, absolute: integral of E|s|^2 dt over an infinite wall straight ahead at `distance_m`, alpha = 0, beam at azimuth 0,
-/// elevations up to `half_fan_rad`. [uPa^2 s]
+/// Oracle 5, absolute: integral of E|s|^2 dt over an infinite wall straight ahead at `distance_m`, alpha = 0, beam at azimuth
+/// 0, elevations up to `half_fan_rad`. [uPa^2 s]
 double wall_energy(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double mu, double distance_m,
                    double half_fan_rad);
 
-/// Oracle 9: sum sigma_i / r_i^4 [1/m^2] over the visible cap of a Lambert sphere, radius a, centre at d. The exact integral;
-/// to first order it is (2 pi / 3) mu a^2 (1 + 1.5 a / d) / d^4.
+/// Oracle 9: sum sigma_i / r_i^4 [1/m^2] over the visible cap of a Lambert sphere of radius a with its centre at d. This is the
+/// exact integral; to first order it is (2 pi / 3) mu a^2 (1 + 1.5 a / d) / d^4.
 double sphere_echo_per_m2(double mu, double radius_m, double distance_m);
 
 }  // namespace sonar::reference

@@ -1,4 +1,4 @@
-// The reference must be right before it judges: its two ways of summing agree, and its closed forms agree with sums over points.
+// Tests of the reference: its two kinds of sums agree, and its closed forms agree with sums over points.
 #include "tests/core/pipeline/reference.hpp"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,8 @@ TEST(Reference, OnePointHasItsLevelAndRange) {
   EXPECT_LT(std::abs(signal[0][99]), std::abs(signal[0][100]));
 }
 
-// The closed forms against brute force: points of equal area over the surface, each with its own range, sine and incidence.
+// Compares the closed forms with brute force: points of equal area over the surface, each with its own range, sine and
+// incidence.
 TEST(Reference, SeabedClosedFormAgainstPoints) {
   FrequencyMode mode = p900();
   const Medium medium{1500, 0, 1};
@@ -84,7 +85,7 @@ TEST(Reference, SeabedClosedFormAgainstPoints) {
 
 TEST(Reference, WallEnergyClosedFormAgainstPoints) {
   FrequencyMode mode = p900();
-  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(3));  // coarser points will do
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(3));  // coarser points are sufficient
   const double mu = 0.01, d = 3, step = 0.03, half_fan = 0.3;
   const double b = envelope_parameter_hz(1500, 0.0254);
   const double aperture = aperture_in_wavelengths(Taper::taylor30, rad_from_deg(3));

@@ -1,5 +1,5 @@
-// Smooth ripples without shadows show no false dark arcs: at any wavelength, phase and heading, the mean power of each row over
-// 18 degrees equals a sum over the surface in double precision.
+// Smooth ripples without shadows must not have false dark arcs. At any wavelength, phase and heading, the mean power of each
+// row over 18 degrees must equal a sum over the surface in double precision.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,21 +17,21 @@ namespace sonar::test::ripples_test {
 namespace {
 
 constexpr double height = 2, tilt = 0.25, lambert_db = -20, from_m = 4.8, to_m = 7.6;
-// Half the sonar's sector; half the sector of the mean. Radians.
+// Half of the sonar's sector, and half of the sector of the mean [rad].
 constexpr double half_sector = 0.1745, half_mean = 0.9 * half_sector;
 
 struct Ripples {
   double wavelength, phase, heading;
   double along(double x, double y) const { return 2 * pi / wavelength * (x * std::cos(heading) + y * std::sin(heading)) + phase; }
   double z(double x, double y) const { return 0.02 * wavelength * std::cos(along(x, y)); }
-  /// Upwards, not of unit length.
+  /// Points upwards and has any length.
   Vec3d normal(double x, double y) const {
     const double slope = -0.02 * 2 * pi * std::sin(along(x, y));
     return {-slope * std::cos(heading), -slope * std::sin(heading), 1};
   }
 };
 
-/// sinc^2 of transmitter and receiver with half of the two-way power at half the quoted width, as a power.
+/// sinc^2 of transmitter and receiver as a power. At half of the quoted width the two-way power is one half.
 double two_way_power(const FrequencyMode& mode, double psi_rad) {
   const double x = 0.31888 * std::sin(psi_rad) / std::sin(static_cast<double>(mode.pattern.elevation_width_rad) / 2);
   return std::abs(x) < 1e-9 ? 1 : std::pow(std::sin(pi * x) / (pi * x), 4);
@@ -45,7 +45,7 @@ std::vector<int> beams_of_mean(const Sounding& s) {
   return beams;
 }
 
-/// The mean power pattern of these beams in a direction of sine u.
+/// Mean power pattern of these beams in a direction of sine u.
 class MeanPattern {
  public:
   MeanPattern(const Sounding& s, const std::vector<int>& beams) {
@@ -63,7 +63,7 @@ class MeanPattern {
   std::vector<double> power_;
 };
 
-/// Mean of E|s|^2 over some beams, for each row. The surface is divided into pieces of 4 mm by 0.003 rad; their power is summed
+/// Mean of E|s|^2 over some beams, for each row. The surface is divided into pieces of 4 mm by 0.003 rad. Their power is summed
 /// by range and weighted by the squared pulse.
 std::vector<double> arcs_of(const Sounding& s, const std::vector<int>& beams, const Ripples& ripples) {
   constexpr double step = 0.004, turn = 0.003, bin = 0.002;
@@ -75,7 +75,7 @@ std::vector<double> arcs_of(const Sounding& s, const std::vector<int>& beams, co
       const double x = ground * std::cos(azimuth), y = ground * std::sin(azimuth);
       const Vec3d p{x, y, ripples.z(x, y) - height}, n = ripples.normal(x, y);
       const double r = length(p), cosine = -dot(n, p) / (length(n) * r);
-      // In the sonar's axes, nose down.
+      // In the sonar's axes, with the nose down.
       const double ahead = p.x * std::cos(tilt) - p.z * std::sin(tilt), up = p.x * std::sin(tilt) + p.z * std::cos(tilt);
       const double sigma = lambert_per_area(mu, cosine) * length(n) * ground * turn * step;
       by_range[static_cast<std::size_t>(r / bin)] += sigma * heard(y / r) *
@@ -128,13 +128,13 @@ TEST(Ripples, ShowNoFalseArcs) {
   for (const double wavelength : {0.05, 0.07, 0.1, 0.15, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.5, 2.0}) {
     const int of_each = 9;
     for (int i = 0; i < of_each; ++i, ++cases)
-      // Three headings, 0 to 0.7 rad; the phases are spread by the golden section.
+      // Three headings, 0 to 0.7 rad. The phases are distributed by the golden section.
       expect_no_arc({wavelength, 2 * pi * std::fmod(0.618034 * cases, 1.0), (i % 3) * 0.35});
   }
   EXPECT_GE(cases, 100);
 }
 
-// One and a half ripples between two rays that both hit slopes of 0: only the ray between them shows a slope.
+// There are one and a half ripples between two rays that both hit slopes of 0. Only the ray between them shows a slope.
 TEST(Ripples, ShowNoFalseArcsInStepWithTheRays) {
   for (const Ripples& ripples : {Ripples{0.39, 0.138, 0}, Ripples{0.349, 4.922, 0}}) expect_no_arc(ripples);
 }

@@ -1,4 +1,4 @@
-// The position of a sample in its row (PingSettings::row_centre), through the whole engine.
+// Position of a sample in its row (PingSettings::row_centre), through the whole engine.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 struct Case {
   const char* name;
   double row_centre;
-  int at_0_3, at_0_7;  // row of a point 0.3 and 0.7 rows beyond the near edge of row 100, less 100
+  int at_0_3, at_0_7;  // row of a point 0.3 and 0.7 rows beyond the near edge of row 100, minus 100
 };
 constexpr Case cases[] = {{"middle", 0.5, 0, 0}, {"near edge", 0, 0, 1}, {"far edge", 1, -1, 0}};
 
@@ -27,7 +27,7 @@ TEST(RowOrigin, MovesAPointByHalfARow) {
     for (const double part : {0.3, 0.7}) {
       Sounding s(SceneMaker().add_point({(100 + part) * settings.range_bin_m, 0, 0}, -20).make(), p900(), settings);
       for (const Case& c : cases) {
-        s.request.settings.row_centre = c.row_centre;  // the engine must see that it changed
+        s.request.settings.row_centre = c.row_centre;  // the engine must notice the change
         s.ping();
         EXPECT_EQ(s.loudest_row(256) - 100, part < 0.5 ? c.at_0_3 : c.at_0_7) << c.name << " " << part << " " << samples_per_row;
         if (samples_per_row > 1) continue;

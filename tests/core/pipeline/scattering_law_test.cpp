@@ -28,7 +28,7 @@ Material gsab(float a_db, double b_deg, float c_db, float d = 2, float e_db = -2
 }
 std::vector<Material> seabeds() { return {gsab(-12, 5, -32), gsab(-8, 8, -24), gsab(-10, 20, -15)}; }  // mud, sand, gravel
 
-/// Looks a value up as the kernels do.
+/// Looks a value up in the same way as the kernels.
 double looked_up(const LawTable& law, double cosine) {
   if (!law.table()) return law.mu * cosine * cosine;
   const double at = law_steps * std::sqrt(1 - cosine);
@@ -38,8 +38,8 @@ double looked_up(const LawTable& law, double cosine) {
   return law.mu * root * root;
 }
 
-// Oracle 9 for d -> infinity, by the law that pings run: integrating mu cos^2 dA over the lit half of a sphere gives
-// (2 pi / 3) mu a^2.
+// Oracle 9 for d -> infinity, by the law that pings use. The integral of mu cos^2 dA over the lit half of a sphere is (2 pi /
+// 3) mu a^2.
 TEST(ScatteringLaw, Oracle09_LambertSphereFromAfar) {
   Material rough;
   rough.lambert_db = -13;
@@ -65,7 +65,7 @@ TEST(ScatteringLaw, GsabIsTheSumOfItsThreeTerms) {
                             std::pow(10, -2.0) * std::exp(-deg * deg / (2 * 625));
     EXPECT_NEAR(db(scattering_strength(m, cosine, 900e3, 1500, false) / expected), 0, 1e-3) << deg;
   }
-  // D = 2 and nothing else is Lambert's law.
+  // With D = 2 and no other terms it is Lambert's law.
   Material lambert;
   lambert.lambert_db = -24;
   for (const double cosine : {1.0, 0.7, 0.2, 0.01})
@@ -89,7 +89,7 @@ TEST(ScatteringLaw, LambertNeedsNoTable) {
 
 TEST(ScatteringLaw, TheTableFollowsTheLaw) {
   std::vector<Material> materials = seabeds();
-  materials.push_back(gsab(-8, 2, -40));            // as steep as a scene file may ask for
+  materials.push_back(gsab(-8, 2, -40));            // the steepest law that a scene file may contain
   materials.push_back(gsab(-8, 8, -24, 0.5f));      // the slowest cosine
   materials.push_back(gsab(-12, 5, -32, 10, -30));  // the fastest
   materials.emplace_back();
@@ -133,7 +133,7 @@ TEST(ScatteringLaw, RoughnessSharesEnergyBetweenMirrorAndScatter) {
       return scattering_strength(m, cosine, c.hz, 1500, true) / scattering_strength(m, cosine, c.hz, 1500, false);
     };
     EXPECT_NEAR(diffuse(1), 1 - std::pow(10, -0.1 * c.mirror_loss_db), 1e-3) << c.hz << " " << c.roughness_m;
-    // Obliquely it is smoother: the loss goes with the square of the cosine.
+    // At oblique incidence the surface is smoother: the loss is proportional to the square of the cosine.
     EXPECT_NEAR(diffuse(0.5), 1 - std::pow(10, -0.1 * c.mirror_loss_db / 4), 1e-3) << c.hz << " " << c.roughness_m;
   }
   Material rough;
@@ -147,8 +147,8 @@ std::shared_ptr<const Scene> bed_of(const Material& material) {
   return std::make_shared<const Scene>(std::move(scene));
 }
 
-/// E|s|^2 at azimuth 0 over a flat bed, conical beams, no elevation pattern: integral of S_b(a) T^2 p^2 over the strip
-/// dA = dx (r du), r^2 = x^2 + h^2, as far as the fan sees it. Holds straight down as well, where oracle 8 has a pole.
+/// E|s|^2 at azimuth 0 over a flat bed, conical beams, no elevation pattern: integral of S_b(a) T^2 p^2 over the strip dA = dx
+/// (r du), r^2 = x^2 + h^2, within the fan. It also holds straight down, where oracle 8 has a pole.
 double bed_power(const Sounding& s, const Material& material, double range_m, double height_m, double tilt_rad) {
   const BeamPattern& pattern = s.mode().pattern;
   const double theta = effective_beam_width_u(
@@ -173,13 +173,13 @@ double bed_power(const Sounding& s, const Material& material, double range_m, do
 TEST(ScatteringLaw, LevelOfABedThatFollowsGsab) {
   const double height = 2;
   std::vector<Material> materials = seabeds();
-  materials.emplace_back();  // Lambert, a little mirror-like
+  materials.emplace_back();  // Lambert, with a weak specular part
   materials.back().roughness_m = 1.5e-4f;
   for (const Material& material : materials)
     for (const double tilt : {rad_from_deg(75), 0.45, 0.25}) {
       Sounding s(bed_of(material), without_elevation_pattern(p900()), native_rows(9, 0.0254));
       s.request.switches.expected_power = true;
-      s.request.switches.specular = material.law == ScatteringLaw::lambert;  // its specular echo is elsewhere: straight down
+      s.request.switches.specular = material.law == ScatteringLaw::lambert;  // its specular echo is straight down
       const bool straight_down = tilt > 1;
       const int block = straight_down ? 6 : 20;
       const double nearest = straight_down ? (s.request.switches.specular ? 2.12 : 2.0) : height / std::sin(0.4 + tilt) + 0.1;

@@ -17,16 +17,16 @@ Mesh box(Vec3d half_size_m);
 /// Sphere about the origin: an octahedron halved `halvings` times, vertices on the sphere (8 * 4^halvings triangles).
 Mesh sphere(double radius_m, int halvings);
 
-/// A relief of `waves` plane waves with random directions, wavelengths (0.3 to 3 m) and slopes, and the given rms height.
-/// Always the same.
+/// A relief of `waves` plane waves with random directions, wavelengths (0.3 to 3 m) and slopes, and the given rms height. It is
+/// the same in every run.
 std::function<double(double, double)> rough_relief(double rms_height_m, int waves);
 
-/// Builds scenes step by step; every object gets its own material.
+/// Builds scenes step by step. Every object has its own material.
 class SceneMaker {
  public:
   SceneMaker& add(Mesh mesh, double lambert_db, Vec3d position_m = {}, Quatd orientation = {});
   SceneMaker& add_of(Mesh mesh, const Material& material, Vec3d position_m = {}, Quatd orientation = {});
-  SceneMaker& add_body(Mesh mesh, double lambert_db, Pose in_world);  // the next moving body
+  SceneMaker& add_body(Mesh mesh, double lambert_db, Pose in_world);  // the body becomes the next moving body
   SceneMaker& add_point(Vec3d position_m, double target_strength_db);
   std::shared_ptr<const Scene> make() const { return std::make_shared<const Scene>(scene_); }
 

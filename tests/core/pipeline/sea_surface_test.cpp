@@ -1,4 +1,5 @@
-// The sea surface from below: a rough sheet, a mirror when still, and the bubbles under it (docs/acoustics.md, section 3).
+// The sea surface from below: a rough sheet, or a mirror if it is still, and the bubbles under it (docs/acoustics.md, section
+// 3).
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -73,7 +74,7 @@ TEST(SeaSurface, TheRougherTheLessItMirrorsTheMoreItScatters) {
   EXPECT_NEAR(last, std::pow(10.0, -3.0), 1e-9);
 }
 
-/// A sonar under the surface that looks up into it.
+/// A sonar under the surface that looks up.
 constexpr double depth_m = 2, nose_up_rad = 0.25;
 
 TEST(SeaSurface, DiffuseEchoIsMuSquareSine) {
@@ -82,7 +83,7 @@ TEST(SeaSurface, DiffuseEchoIsMuSquareSine) {
     s.request.switches.expected_power = true;
     s.request.switches.specular = true;
     s.ping_from({0, 0, -depth_m}, {0, -nose_up_rad, 0});
-    // The mirror image of a seabed: same height, tilted the other way.
+    // The mirror image of a seabed: same height, opposite tilt.
     const reference::SeabedLevel from_above(s.mode(), s.medium(), s.envelope_hz(), lambert_db, depth_m, nose_up_rad);
     for (double r = 4.2; r < 9.5; r += 0.5) {
       double sum = 0;
@@ -95,7 +96,8 @@ TEST(SeaSurface, DiffuseEchoIsMuSquareSine) {
   }
 }
 
-// The middle of a tile that reaches through a mirror may lie where no way by it leads: still a factor, never not a number.
+// The middle of a tile that extends through a mirror may lie where no path via this mirror leads. The factor must still be a
+// number.
 TEST(Bubbles, OfAPlaceBehindTheMirrorAreStillAFactor) {
   const std::vector<FlatMirror> mirrors{{.face = 0, .normal = {0, 0, -1}, .height_m = 1, .reflection = -1}};
   const BubbleLayer bubbles(SeaSurface{.present = true, .bubble_layer_m = 0.5f, .bubble_loss_db_per_m = 4});
@@ -121,7 +123,7 @@ TEST(SeaSurface, BubblesTakeTheirShareOfThePath) {
   surface.present = false;
   EXPECT_FALSE(BubbleLayer(surface).present());
 
-  // In the picture: of a path from 2 m depth a quarter lies in the layer.
+  // In the picture: a quarter of a path from 2 m depth lies in the layer.
   Sounding calm(sea("lambert_db: -15"), p900(), default_rows(10, 394));
   Sounding bubbly(sea("lambert_db: -15, bubble_layer_m: 0.5, bubble_loss_db_per_m: 4"), p900(), default_rows(10, 394));
   for (Sounding* s : {&calm, &bubbly}) {
@@ -137,7 +139,7 @@ TEST(SeaSurface, BubblesTakeTheirShareOfThePath) {
   }
 }
 
-/// Sea over a bed at 3 m, looked at from that height.
+/// Sea over a bed at 3 m, seen from this height.
 struct OverABed {
   Sounding sounding;
   explicit OverABed(const std::string& surface = "sea_surface: {size_m: [60, 60]}\n")

@@ -1,4 +1,4 @@
-// Tables of settings are kept up to a number of bytes; those in use are always kept.
+// Tables of settings are kept up to a number of bytes. Tables in use are always kept.
 #include "core/pipeline/settings_cache.hpp"
 
 #include <gtest/gtest.h>
@@ -66,7 +66,7 @@ TEST(SettingsCache, TheOnesInUseStayHoweverLarge) {
 TEST(SettingsCache, CountsTheTableOfSharedNoiseAndTheDraws) {
   Drivers drivers;
   const PreparedSettings& p = drivers.ask(2);
-  const std::size_t draws = sizeof(float) * 2 * p.noise.shaped().size();  // white and filtered
+  const std::size_t draws = sizeof(float) * 2 * p.noise.shaped().size();  // white and filtered noise
   EXPECT_GE(drivers.cache.bytes(), p.plan.shared_noise.bytes() + draws);
   const std::size_t before = drivers.cache.bytes();
   drivers.ask(30, 16);  // shares the draws

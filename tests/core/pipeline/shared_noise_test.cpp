@@ -1,5 +1,6 @@
-// Noise and leak that channels share: power in every beam against the sum over the channels, correlation of beams, its
-// end, and nothing where it is off (docs/acoustics.md, section 5). Codes that are cut off, not rounded (section 7).
+// Noise and leak that channels share: power in every beam compared with the sum over the channels, correlation of beams, the
+// range at which the noise ends, and no effect if it is off (docs/acoustics.md, section 5). Also codes that are truncated
+// instead of rounded (section 7).
 #include "core/pipeline/shared_noise.hpp"
 
 #include <gmock/gmock.h>
@@ -38,8 +39,8 @@ const auto loud = [](ReceiverModel& law) { law.shared_noise.level_db = 60; };
 
 constexpr int all = -1;
 
-/// Sum over channels with signs in turns, focused at `r` and sine `u` by their delays: over all of them, or over group `g`, whose
-/// weights are half a period of a sine, the next group's being half of that further on.
+/// Sum over channels with alternating signs, whose delays focus at `r` and sine `u`: over all channels, or over group `g`. The
+/// weights of a group are half a period of a sine. The next group begins half a group later.
 std::complex<double> focused(const FrequencyMode& mode, double r, double u, int g) {
   const SharedNoise& law = mode.receiver.shared_noise;
   const double wavelength_m = 1500 / static_cast<double>(mode.centre_hz),
@@ -58,14 +59,15 @@ int groups(const FrequencyMode& mode) {
   return 2 * law.channels / law.group + 1;
 }
 double focused_power(const FrequencyMode& mode, double r, double u) { return std::norm(focused(mode, r, u, all)); }
-/// E[a b*] of two beams re a channel's power.
+/// E[a b*] of two beams, divided by a channel's power.
 std::complex<double> in_common(const FrequencyMode& mode, double r, double u, double v) {
   std::complex<double> sum = 0;
   for (int g = 0; g < groups(mode); ++g) sum += focused(mode, r, u, g) * std::conj(focused(mode, r, v, g));
   return sum;
 }
 
-/// Power that is left of it at range `r`: it fades from 2 to 3 times the range where the whole array's part leaves the sector.
+/// Fraction of the power that is left at range `r`. It fades from 2 to 3 times the range at which the whole array's part leaves
+/// the sector.
 double fade(const FrequencyMode& mode, double r) {
   const SharedNoise& law = mode.receiver.shared_noise;
   const double sine = static_cast<double>(law.sine), widest = std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2),
@@ -114,8 +116,8 @@ TEST_P(ChannelsShare, IsTheFocusedArraysSumOverItsChannels) {
 }
 INSTANTIATE_TEST_SUITE_P(OfALevel, ChannelsShare, ::testing::Values(60.0f, 3.4f));
 
-// Each part of each beam against the sum over its channels in double precision, from inside the array to far away; sectors of one
-// beam, and up to the array's own line, where the phases are hardest.
+// Compares each part of each beam with the sum over its channels in double precision, from inside the array to far away.
+// Sectors have one beam, or extend to the array's own line, where the phases are most difficult.
 TEST(FocusedArray, IsTheSumOverItsChannels) {
   struct Case {
     int beams;
@@ -163,7 +165,7 @@ TEST(SharedNoise, KeepsOnlyWhatIsHeard) {
   EXPECT_LT(table.bytes(), table.response().size() * sizeof(float) * 7 / 10);
 }
 
-// It ends without a step, in all beams.
+// The noise ends without a step in all beams.
 TEST(SharedNoise, FadesAway) {
   Sounding s = with([](ReceiverModel& law) { law.shared_noise.level_db = 10; });
   s.request.switches.expected_power = true;
@@ -179,7 +181,7 @@ TEST(SharedNoise, FadesAway) {
   EXPECT_NEAR(s.power(s.rows() - 1, 0) / (own_upa * own_upa), 1, 0.01);
 }
 
-// Correlation of two beams, over 30 pings and 50 rows, against the sum over groups; two pings have none.
+// Correlation of two beams, over 30 pings and 50 rows, compared with the sum over groups. Two pings are not correlated.
 TEST(SharedNoise, IsOneDrawAGroupNewInEveryPing) {
   Sounding s = with(loud);
   s.request.switches.keep_beams = true;
@@ -212,7 +214,7 @@ TEST(SharedNoise, IsOneDrawAGroupNewInEveryPing) {
   EXPECT_NEAR(earlier / expected_power, 0, 0.1);
 }
 
-// 90 % steady: two pings differ by a tenth of the power each, and the mean power stays.
+// With 90 % steady noise, two pings differ by a tenth of the power each, and the mean power is unchanged.
 TEST(SharedNoise, HasASteadyPart) {
   Sounding s = with([](ReceiverModel& law) {
     loud(law);
@@ -242,8 +244,8 @@ TEST(SharedNoise, HasASteadyPart) {
   EXPECT_NEAR(difference, 0.2, 0.02);
 }
 
-// The leak by the same channels: fringes of the focused array, their mean over the beams as without, and no other in any ping but
-// for its changing part.
+// The leak through the same channels: fringes of the focused array. Their mean over the beams equals the leak without sharing.
+// Only the changing part differs from ping to ping.
 TEST(SharedLeak, IsWhatTheFocusedArrayMakesOfIt) {
   const auto leaking = [](ReceiverModel& law) {
     law.leak_upa = 1e8f;
@@ -291,7 +293,7 @@ TEST(SharedLeak, IsWhatTheFocusedArrayMakesOfIt) {
   EXPECT_EQ(s.pressure(3, 40), 0);
 }
 
-// One beam ahead, where the signs cancel: it is not given the level of the mean for all that.
+// One beam straight ahead, where the signs cancel. It must not get the level of the mean.
 TEST(SharedLeak, IsNotRaisedWhereItCancels) {
   Sounding s = with([](ReceiverModel& law) {
     law.leak_upa = 1e8f;
@@ -307,7 +309,7 @@ TEST(SharedLeak, IsNotRaisedWhereItCancels) {
     EXPECT_NEAR(s.power(row, 0) / (1e16 * power_from_db(-200 * s.range_of_row(row))), 0.02, 0.001) << "its changing part alone";
 }
 
-// A sample at range 0, of a leak without shared noise.
+// A sample at range 0 of a leak without shared noise.
 TEST(SharedLeak, BeginsAtRangeZero) {
   Sounding s = with([](ReceiverModel& law) {
     law.leak_upa = 1e8f;

@@ -1,4 +1,4 @@
-// The elevation pattern's side lobes: the levels of points, beds and walls far off the main lobe agree with closed forms.
+// Side lobes of the elevation pattern: the levels of points, beds and walls far off the main lobe agree with closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
 
-/// sinc^2 of transmitter and receiver with an aperture that puts half of the two-way power at half the quoted width, in dB.
+/// sinc^2 of transmitter and receiver [dB]. The aperture puts half of the two-way power at half of the quoted width.
 double two_way_db(const FrequencyMode& mode, double psi_rad) {
   // sinc(x) = 2^(-1/4) at x = 0.3189.
   const double x = 0.31888 * std::sin(psi_rad) / std::sin(static_cast<double>(mode.pattern.elevation_width_rad) / 2);
@@ -26,7 +26,7 @@ TEST(SideLobes, PointsAreHeardAllAround) {
     double loudest = 0;
     for (const double deg : {0.01, 10.0, 14.0, 20.0, 25.0, 35.0, 50.0, -20.0, -50.0, 75.0, -78.0}) {
       const double psi = rad_from_deg(deg);
-      if (two_way_db(mode, psi) < -60) continue;  // about a zero of the pattern
+      if (two_way_db(mode, psi) < -60) continue;  // near a zero of the pattern
       Sounding s(SceneMaker().add_point({5 * std::cos(psi), 0, 5 * std::sin(psi)}, 0).make(), mode, native_rows(6, 0.0254));
       s.request.switches.side_lobes = true;
       s.ping();
@@ -40,7 +40,7 @@ TEST(SideLobes, PointsAreHeardAllAround) {
 
 constexpr double tilt = 0.1, lambert_db = -20;  // nose down; strength of the beds
 
-/// A flat bed `height` below a sonar, up to six heights away.
+/// A flat bed `height` below a sonar, up to a range of six heights.
 Sounding over_bed(const FrequencyMode& mode, double height = 2, double pulse_width_m = 0.0254) {
   const double size = height / 2;
   return Sounding(
@@ -50,8 +50,8 @@ Sounding over_bed(const FrequencyMode& mode, double height = 2, double pulse_wid
       mode, native_rows(6 * height, pulse_width_m));
 }
 
-/// Expects of a bed 2 m below, nose down, the mean over beams about the middle, over blocks of rows, re the closed
-/// form.
+/// Expected values for a bed 2 m below, nose down: the mean over beams around the middle, over blocks of rows, divided by the
+/// closed form.
 void expect_bed(const FrequencyMode& mode, bool side_lobes, bool speckle) {
   constexpr double height = 2;
   Sounding s = over_bed(mode);
@@ -63,7 +63,7 @@ void expect_bed(const FrequencyMode& mode, bool side_lobes, bool speckle) {
   double sum = 0;
   for (double r = 2.15; r < 11; r += 0.1) {
     const double psi = bed.psi_rad(r), level = two_way_db(mode, psi);
-    // Away from the zeros, where the pattern changes within a pulse, and from 80 degrees on.
+    // Rows near the zeros, where the pattern changes within a pulse, and beyond 80 degrees are excluded.
     const double near = two_way_db(mode, bed.psi_rad(r - 0.05)), far = two_way_db(mode, bed.psi_rad(r + 0.05));
     if (level < -45 || std::abs(near - far) > 3 || psi < -1.3) continue;
     double ratio = 0;
@@ -79,7 +79,7 @@ void expect_bed(const FrequencyMode& mode, bool side_lobes, bool speckle) {
     if (level < -20) sum += ratio / n, ++lobes;
     if (!speckle) record_oracle(8, "bed in the side lobes, expected power", 0, db(ratio / n), 0.5, "dB");
   }
-  // Each block has some forty independent looks.
+  // Each block has about forty independent samples.
   if (speckle) record_oracle(8, "bed in the side lobes, speckle, mean of all ranges", 0, db(sum / lobes), 0.5, "dB");
   if (side_lobes) {
     EXPECT_GT(lobes, 5) << mode.name;
@@ -91,8 +91,8 @@ TEST(SideLobes, ABedIsAsLoudAsTheClosedFormDownTo45Db) {
 }
 TEST(SideLobes, CoarserCellsKeepItsLevel) { expect_bed(p900(), true, true); }
 
-/// Power of samples over the bed's closed form, where the pattern is between `least_db` and -20 dB: scintillation index, 1 for
-/// speckle of many cells a sample, and mean in dB.
+/// Power of samples divided by the bed's closed form, where the pattern is between `least_db` and -20 dB. Results: the
+/// scintillation index, which is 1 for speckle of many cells per sample, and the mean in dB.
 struct Speckle {
   double index, mean_db;
 };
@@ -121,7 +121,8 @@ TEST(SideLobes, CoarserCellsKeepItsSpeckle) {
   for (const FrequencyMode& mode : {p900(), oculus_high()})
     record_oracle(24, "bed in the side lobes, scintillation index", 1, speckle_of_bed(mode, -45, 2, 0.0254).index, 0.2, "");
 }
-// Cells are as large as the beams and the pulse allow: other heights and pulses, other shapes of what a beam and a pulse cover.
+// Cells are as large as the beams and the pulse allow. Therefore other heights and pulses give other shapes of the area of a
+// beam and a pulse.
 TEST(SideLobes, CoarserCellsSuitEveryRangeAndPulse) {
   for (const auto& [height, pulse_width_m] : {std::pair{0.9, 0.0026}, {1.3, 0.01}, {5.0, 0.02}, {3.0, 0.1}}) {
     const Speckle found = speckle_of_bed(oculus_high(), -45, height, pulse_width_m);
@@ -130,7 +131,7 @@ TEST(SideLobes, CoarserCellsSuitEveryRangeAndPulse) {
   }
 }
 
-// Without side lobes a bed begins with a step where the fan is cut off.
+// Without side lobes a bed begins with a step where the fan ends.
 TEST(SideLobes, TheBedHasNoStepAtTheEdgeOfTheFan) {
   constexpr double height = 2;
   Sounding s = over_bed(p900());
@@ -138,7 +139,7 @@ TEST(SideLobes, TheBedHasNoStepAtTheEdgeOfTheFan) {
   double edge_m = 2 * height;
   while (two_way_db(s.mode(), bed.psi_rad(edge_m)) > -20) edge_m -= 0.01;
   for (const bool side_lobes : {false, true}) {
-    double before = 0, behind = 0;  // sums over the closed form, of as many samples
+    double before = 0, behind = 0;  // sums divided by the closed form, of equal numbers of samples
     for (const std::uint32_t seed : {1u, 2u, 3u, 4u}) {
       s.request.seed = Seed{seed};
       s.request.switches.side_lobes = side_lobes;
@@ -160,7 +161,7 @@ TEST(SideLobes, TheBedHasNoStepAtTheEdgeOfTheFan) {
 }
 TEST(SideLobes, AnObstacleBelowTheFanIsThere) {
   constexpr double range = 2.7, radius = 0.2;
-  const auto heard = [&](double psi_deg, bool side_lobes) {  // echo energy of a sphere there
+  const auto heard = [&](double psi_deg, bool side_lobes) {  // energy of the echo of a sphere at this angle
     const double psi = rad_from_deg(psi_deg);
     Sounding s(SceneMaker().add(sphere(radius, 5), -10, {range * std::cos(psi), 0, range * std::sin(psi)}).make(), p900(),
                native_rows(4, 0.0254));

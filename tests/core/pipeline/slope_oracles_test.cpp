@@ -1,5 +1,5 @@
-// Oracles on how levels of surfaces fall with range: a wall's first cell, a seabed of constant strength, a Lambert seabed; with
-// conical and with flat beams. Expected power throughout.
+// Oracles on the fall of surface levels with range: a wall's first cell, a seabed of constant strength, a Lambert seabed. With
+// conical and with flat beams, always in expected power.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ constexpr double dr = 0.0254;
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
 
-/// A few beams ahead, so that little surface has to be made into cells.
+/// A few beams straight ahead, so that only a small surface needs cells.
 FrequencyMode narrow(FrequencyMode mode) {
   mode = without_elevation_pattern(mode);
   mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(4));
@@ -35,7 +35,7 @@ TEST(SlopeOracles, Oracle06_FirstCellOfAWallFallsAs25LogR) {
   std::vector<double> level;
   for (int octave = 0; octave <= 5; ++octave) {
     PingSettings settings = few_beams(std::ldexp(1.0, octave) + 0.3);
-    // The wall is at the middle of a row at every range, so that the first cell is sampled in the same way.
+    // The wall is at the middle of a row at every range. So the first cell is sampled in the same way.
     const double distance = (std::floor(std::ldexp(1.0, octave) / settings.range_bin_m) + 0.5) * settings.range_bin_m;
     Sounding s(SceneMaker().add(wall(2.5, 4), -20, {distance, 0, 0}).make(), silent(narrow(p900())), settings);
     s.request.switches.expected_power = true;
@@ -43,7 +43,7 @@ TEST(SlopeOracles, Oracle06_FirstCellOfAWallFallsAs25LogR) {
     const int row = static_cast<int>(std::lround(s.row_of_range(distance)));
     double loudest = 0;
     for (int n = row; n < row + 4; ++n) {
-      double sum = 0;  // within a third of a degree of ahead: farther out the wall is farther off, too
+      double sum = 0;  // within a third of a degree of straight ahead, because the wall is farther away at larger angles
       for (int j = s.beams() / 2 - 2; j < s.beams() / 2 + 2; ++j) sum += s.power(n, j) / 4;
       loudest = std::max(loudest, sum);
     }
@@ -55,8 +55,8 @@ TEST(SlopeOracles, Oracle06_FirstCellOfAWallFallsAs25LogR) {
     record_oracle(6, "octave by octave", -25, (level[i] - level[i - 1]) / octave_in_decades, 0.5, "dB/decade");
 }
 
-/// A strip of seabed ahead, `height_m` below, and its level against range: mean over beams and over blocks of rows at whole
-/// octaves of range.
+/// A strip of seabed ahead, `height_m` below, and its level as a function of range: the mean over beams and over blocks of rows
+/// at whole octaves of range.
 struct Octaves {
   double height_m, first_m;
   int count;
@@ -76,7 +76,7 @@ std::vector<double> levels_of(const Octaves& o) {
     const int row = static_cast<int>(std::lround(s.row_of_range(range)));
     double sum = 0;
     int n = 0;
-    // Each row is brought to the block's middle by the slope that is looked for: only the trend across blocks is measured.
+    // Each row is corrected to the block's middle by the expected slope. Therefore only the trend across blocks is measured.
     for (int at = row - 12; at <= row + 12; ++at)
       for (int j = 0; j < s.beams(); ++j, ++n) sum += s.power(at, j) * std::pow(s.range_of_row(at) / range, 4);
     levels.push_back(db(sum / n));
@@ -110,7 +110,7 @@ TEST(SlopeOracles, Oracle07_SeabedFallsAs30Or50LogR) {
   check("Lambert, flat beams, 3 to 24 heights", -50, {1, 3, 4, false, lambert});
 }
 
-// sigma of a seabed in flat beams is that in conical ones times cos(phi_s), phi_s the elevation in the sonar's frame.
+// sigma of a seabed in flat beams is that in conical beams times cos(phi_s), where phi_s is the elevation in the sonar's frame.
 TEST(SlopeOracles, Oracle08_AbsoluteSeabedLevelInFlatBeams) {
   const double height = 2, lambert_db = -27;
   for (const double tilt : {0.0, 0.25, 0.5}) {
@@ -134,7 +134,7 @@ TEST(SlopeOracles, Oracle08_AbsoluteSeabedLevelInFlatBeams) {
       int n = 0;
       for (int at = row; at < row + block; ++at) {
         const double r = s.range_of_row(at), expected = power_from_db(level.db(r)) * std::cos(level.psi_rad(r));
-        for (int j = 6; j < 30; ++j, ++n) sum += s.power(at, j) / expected;  // within 2 degrees of ahead
+        for (int j = 6; j < 30; ++j, ++n) sum += s.power(at, j) / expected;  // within 2 degrees of straight ahead
       }
       record_oracle(8, "level over closed form, flat beams", 0, db(sum / n), 0.3, "dB");
       ++blocks;

@@ -1,5 +1,4 @@
-// A sonar that moves while its ping is under way: bearings at the moment an echo is received, ranges at the moment it is
-// scattered.
+// A sonar that moves during its ping: bearings are those at the time of reception, ranges those at the time of scattering.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +12,7 @@
 namespace sonar::test {
 namespace {
 
-/// Azimuth of the loudest beam about a range, between beams, degrees.
+/// Azimuth of the beam with the highest level near a range, interpolated between beams [deg].
 double bearing_deg(const Sounding& s, double range_m) {
   const int row = static_cast<int>(std::lround(s.row_of_range(range_m)));
   const int beam = s.loudest_beam(row);
@@ -22,7 +21,7 @@ double bearing_deg(const Sounding& s, double range_m) {
   return deg_from_rad(std::asin(s.beam_sine(beam) + peak.offset * step));
 }
 
-/// Mean azimuth of all power from a little before a range on, degrees.
+/// Mean azimuth of all power from slightly before a range on [deg].
 double centroid_deg(const Sounding& s, double range_m) {
   double sum = 0, turned = 0;
   for (int row = static_cast<int>(s.row_of_range(range_m - 0.1)); row < s.row_of_range(range_m + 0.3); ++row)
@@ -30,7 +29,7 @@ double centroid_deg(const Sounding& s, double range_m) {
   return deg_from_rad(turned / sum);
 }
 
-/// Upright, round and closed, about the origin.
+/// An upright, round, closed surface about the origin.
 Mesh pole(double radius_m, double half_height_m) {
   constexpr std::uint32_t sides = 64;
   Mesh mesh;
@@ -47,7 +46,7 @@ Mesh pole(double radius_m, double half_height_m) {
   return mesh;
 }
 
-/// Two upright poles 2 cm thick on boresight at 2 and 10 m, the far one looking out above the near one.
+/// Two upright poles, 2 cm thick, on boresight at 2 and 10 m. The far pole is visible above the near one.
 std::shared_ptr<const Scene> two_poles() {
   SceneMaker maker;
   maker.add(box({0.01, 0.01, 0.1}), -10, {2.01, 0, -0.15});
@@ -76,14 +75,14 @@ TEST(Motion, O40APoleFartherAwayIsTurnedFartherByAYaw) {
     EXPECT_NEAR(bearing_deg(s, 10), 0, 0.02);
     s.request.sonar_moves = turning_to_port;
     s.ping();
-    // The sonar turns to port, so things fall behind to starboard, the later the more.
+    // The sonar turns to port, so objects appear farther to starboard the later their echoes are received.
     record_oracle(40, points ? "yaw during the ping, points at 2 and 10 m" : "yaw during the ping, poles at 2 and 10 m", expected,
                   bearing_deg(s, 2) - bearing_deg(s, 10), 0.1 * expected, "deg");
     EXPECT_NEAR(bearing_deg(s, 10), -yaw_rate_deg_per_s * 2 * 10 / 1500, 0.1 * expected);
   }
 }
 
-// Occlusion is that at the rays' directions, not at those of reception.
+// Objects are hidden in the directions of the rays, not in those of reception.
 TEST(Motion, O40TurnsShowNoFarSides) {
   constexpr double near_m = 2, far_m = 10;
   for (const double deg_per_s : {-40.0, 40.0, 60.0, 120.0}) {
@@ -103,7 +102,8 @@ TEST(Motion, O40TurnsShowNoFarSides) {
   }
 }
 
-// Near cells in a quick turn were seen from directions far from those they are received from, outside of their group's map.
+// In a quick turn the directions of near cells at scattering differ much from those at reception, and lie outside the map of
+// their group.
 TEST(Motion, IsTheSameForAnyNumberOfThreads) {
   SceneMaker maker;
   for (const double y : {-0.15, -0.05, 0.05, 0.15}) maker.add(pole(0.02, 0.05), -10, {0.3, y, 0});
@@ -159,8 +159,8 @@ TEST(Motion, SwitchedOffOrAtRestItChangesNoByte) {
 }
 
 TEST(Motion, AWorldThatMovesTheOtherWayLooksTheSame) {
-  // Range and bearing depend on relative motion alone: a sonar in steady motion sees at the far end what one at the place and
-  // heading of that echo's return would.
+  // Range and bearing depend only on relative motion. A sonar in steady motion sees at the far end the same as a sonar at the
+  // position and heading at which that echo is received.
   SceneMaker maker;
   maker.add(height_field(-4, 16, -10, 10, 0.5, rough_relief(0.05, 12)), -20);
   Sounding s = looking_at(maker.make());

@@ -74,7 +74,7 @@ Sounding::Sounding(std::shared_ptr<const Scene> scene, const FrequencyMode& mode
   request.water = {.temperature_c = 10, .salinity_psu = 0, .ph = 8, .sound_speed_mps = 1500};
   request.switches.keep_pressure = true;
   request.switches.noise = false;
-  request.switches.specular = false;  // tests that want mirrors say so: at 1 kHz ("silent") everything is one
+  request.switches.specular = false;  // tests of mirrors switch it on: at 1 kHz ("silent") every surface is a mirror
   request.seed = Seed{20250101};
 }
 

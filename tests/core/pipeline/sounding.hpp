@@ -1,4 +1,4 @@
-// One sonar over one scene, through which tests call the engine, and measurements of the result.
+// One sonar over one scene. Tests call the engine through it and measure the result.
 #pragma once
 
 #include <memory>
@@ -10,17 +10,17 @@
 
 namespace sonar::test {
 
-// Modes with the published numbers of real devices. `silent` moves a mode to 1 kHz: in the tests' fresh water it then has no
-// absorption to speak of, and everything else follows the widths.
+// Modes with the published values of real devices. `silent` moves a mode to 1 kHz: then the tests' fresh water has practically
+// no absorption. All other values follow from the widths.
 FrequencyMode p900();         // 900 kHz, 90 deg, 1 x 20 deg, uniform in angle
 FrequencyMode oculus_low();   // 1.2 MHz, 130 deg, 0.6 x 20 deg, uniform in sine
 FrequencyMode oculus_high();  // 2.1 MHz, 60 deg, 0.4 x 12 deg, uniform in sine
 FrequencyMode silent(FrequencyMode mode);
 FrequencyMode without_elevation_pattern(FrequencyMode mode);
 
-/// Rows at F_s = 2 b (spacing dr / 2.355), one sample a row, 16 bits.
+/// Rows at F_s = 2 b (spacing dr / 2.355), one sample per row, 16 bits.
 PingSettings native_rows(double range_m, double pulse_width_m);
-/// Rows of the default rule: the pulse is 0.9 of the row spacing.
+/// Rows of the default rule: the pulse width is 0.9 of the row spacing.
 PingSettings default_rows(double range_m, int rows);
 
 struct SoundingOptions {
@@ -33,10 +33,10 @@ class Sounding {
   Sounding(std::shared_ptr<const Scene> scene, const FrequencyMode& mode, const PingSettings& settings,
            const SoundingOptions& options = {});
 
-  /// Request of the next ping; keep_pressure on, noise and specular off, water with c = 1500 m/s.
+  /// Request of the next ping. keep_pressure is on, noise and specular are off, the water has c = 1500 m/s.
   PingRequest request;
 
-  const Ping& ping();  // for the present request
+  const Ping& ping();  // computes the present request
   const Ping& ping_from(Vec3d position, RollPitchYaw attitude = {});
   const Ping& last() const { return ping_; }
   PingEngine& engine() { return *engine_; }
@@ -51,7 +51,7 @@ class Sounding {
   double pressure(int row, int beam) const;  // |s| [uPa]
   double power(int row, int beam) const { return pressure(row, beam) * pressure(row, beam); }
   double beam_sine(int beam) const;
-  int beam_at(double azimuth_rad) const;  // nearest
+  int beam_at(double azimuth_rad) const;  // the nearest beam
   int loudest_row(int beam) const;
   int loudest_beam(int row) const;
 
@@ -61,7 +61,7 @@ class Sounding {
   Ping ping_;
 };
 
-/// Peak of a Gaussian through three equidistant samples of |s|: place (offset from the middle one) and height.
+/// Peak of a Gaussian through three equidistant samples of |s|: position (offset from the middle one) and height.
 struct Peak {
   double offset = 0, height = 0;
 };

@@ -1,4 +1,5 @@
-// Column synthesis in the frequency and the time domain, against the direct sum of eq. (8) in double, for pulses of every shape.
+// Compares the synthesis of columns in the frequency and the time domain with the direct sum of eq. (8) in double, for pulses
+// of all shapes.
 #include "core/pipeline/spectral_columns.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@ using Shape = Waveform::Shape;
 using Complex = std::complex<double>;
 
 struct Arrived {
-  double sample;  // exactly a float
+  double sample;  // exactly representable as a float
   Complex amplitude;
 };
 
@@ -36,7 +37,7 @@ std::vector<Arrived> scattered(int n, double from_sample, double to_sample) {
   return all;
 }
 
-/// p(t) as a formula, with which both ways are compared.
+/// p(t) as a formula, with which both methods are compared.
 Complex formula(Shape shape, const Pulse& pulse, double time_s) {
   return shape == Shape::measured ? measured_envelope(time_s) : pulse.at(time_s);
 }
@@ -92,7 +93,7 @@ std::vector<PingSettings> grids() {
 struct Way {
   Shape shape;
   bool exact;
-  double error;  // a tone's corners take more band than anyone has
+  double error;  // the corners of a tone need an unlimited band
 };
 
 class EveryWay : public ::testing::TestWithParam<Way> {

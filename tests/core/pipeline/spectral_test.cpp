@@ -1,4 +1,4 @@
-// The sums over frequencies: the definition against closed forms, and the fast way against the definition.
+// Sums over frequencies: the definition compared with closed forms, and the fast method compared with the definition.
 #include "core/pipeline/pulses/spectral.hpp"
 
 #include <gtest/gtest.h>
@@ -86,7 +86,8 @@ TEST_F(SpectralWithTransform, TransformsThereAndBackAgain) {
   }
 }
 
-// Beams uniform in the sine: eq. (9) is a convolution over columns, which a transform carries out whole, without a band.
+// For beams that are uniform in the sine, eq. (9) is a convolution over columns. A transform computes it completely, without a
+// band.
 TEST_F(SpectralWithTransform, Oracle19_BeamsByTransformAgainstDenseSum) {
   const double spacing = 0.0018, aperture = aperture_in_wavelengths(Taper::taylor30, 0.00698);
   const int beams = 512, margin = 12, columns = beams + 2 * margin, size = quick_size(2 * columns);

@@ -1,4 +1,4 @@
-// Oracles 10 to 12 and their neighbours: specular echoes of primitives and of their meshes, near and far, through the whole
+// Oracles 10 to 12 and related tests: specular echoes of primitives and of their meshes, near and far, through the whole
 // engine.
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 class BothWays : public testing::TestWithParam<bool> {
  protected:
   bool as_meshes() const { return GetParam(); }
-  /// 0.1 dB for exact shapes, 1 dB for shapes that are recovered from facets.
+  /// Tolerance: 0.1 dB for exact shapes, 1 dB for shapes that are recovered from facets.
   double within_db(double exact) const { return as_meshes() ? 1.0 : exact; }
   void record(int number, const std::string& what, double expected_db, double measured_db, double tolerance_db) const {
     record_oracle(number, what + (as_meshes() ? ", as a mesh" : ""), expected_db, measured_db, within_db(tolerance_db), "dB");
@@ -38,10 +38,10 @@ TEST_P(BothWays, Oracle10_SphereAtAnyRange) {
   record(10, "sphere, far: TS = 20 log(a / 2)", db(0.05 / 2), db(s.strength_per_m(34)) + 40 * std::log10(34.0), 0.1);
 }
 
-/// The rod of a cylinder's wall at distance d of its axis, length L along z about z0.
+/// The wall of a cylinder at distance d from its axis, length L along z about z0.
 double rod_echo(double wavelength_m, double a, double length_m, double axis_m, double z0_m = 0) {
   return kirchhoff_per_m(wavelength_m, 4000, std::max(400, static_cast<int>(length_m * 4000)), [&](double u, double v) {
-    const double angle = (u - 0.5) * 0.5 * pi;  // the quarter that looks at us
+    const double angle = (u - 0.5) * 0.5 * pi;  // the quarter that faces the sonar
     const Vec3d out{-std::cos(angle), std::sin(angle), 0};
     return Patch{Vec3d{axis_m, 0, z0_m + (v - 0.5) * length_m} + a * out, (0.5 * pi * a * length_m) * out};
   });
@@ -87,7 +87,7 @@ TEST_P(BothWays, Oracle12_PlateFacingUs) {
            db(s.strength_per_m(34)) + 40 * std::log10(34.0), 0.5);
   }
   for (const double r : {0.8, 1.7, 4.0, 9.0}) {
-    Mirror near = specular_plane(0.3, 0.5);  // along z and along y, as turned
+    Mirror near = specular_plane(0.3, 0.5);  // along z and along y after the rotation
     near.in_world = facing(r);
     SpecularSounding s(world_of({near}, as_meshes()), p900(), native_rows(12, 0.0254));
     record(12, "plate, near: Kirchhoff's integral", db(plate_echo(s.wavelength_m(), 0.5, 0.3, r)), db(s.strength_per_m(r)), 0.5);
@@ -102,7 +102,8 @@ TEST_P(BothWays, Oracle12_WallFarFromItsEdges) {
 }
 
 TEST_P(BothWays, PlateBesideTheFoot) {
-  // If the plate is turned a little, the foot of the perpendicular leaves it, and the main lobe continues beyond its edge.
+  // If the plate is turned a little, the foot of the perpendicular lies outside it, and the main lobe continues beyond its
+  // edge.
   for (const double tilt : {0.0, 0.004, 0.008, 0.02}) {
     Mirror plate = specular_plane(0.3, 0.1);
     plate.in_world = facing(9, tilt);
@@ -135,7 +136,7 @@ TEST_P(BothWays, CapOfACylinder) {
   Mirror drum = specular_cylinder(0.09, 0.8);
   drum.in_world = facing(2.4);
   SpecularSounding s(world_of({drum}, as_meshes()), p900(), native_rows(12, 0.0254));
-  // On the axis of a disc: |1 - exp(-i 2 k (edge - middle))| / (2 r), but for the edge's own range.
+  // On the axis of a disc: |1 - exp(-i 2 k (edge - middle))| / (2 r), except for the range of the edge itself.
   const double edge = std::hypot(2.0, 0.09);
   const double expected = std::abs(1.0 - std::polar(1.0, -4 * pi / s.wavelength_m() * (edge - 2))) / 4;
   EXPECT_NEAR(db(s.strength_per_m(2)), db(expected), 1);
@@ -153,7 +154,7 @@ TEST_P(BothWays, SilentBehindABox) {
 }
 
 TEST_P(BothWays, HalfHiddenIsHalfAsStrong) {
-  // A screen whose edge runs through the line of sight: half of every Fresnel zone is left, 6 dB less.
+  // A screen whose edge crosses the line of sight. Half of every Fresnel zone is left, which is 6 dB less.
   Mirror wall = specular_plane(8, 8);
   wall.in_world = facing(4);
   Mirror screen = specular_box({0.02, 2, 2});
@@ -164,7 +165,7 @@ TEST_P(BothWays, HalfHiddenIsHalfAsStrong) {
 }
 
 TEST(SpecularOracles, RoughnessTakesTheMirrorAway) {
-  // Model, section 2.1.1: 0.6 dB at 0.05 mm, 2.5 dB at 0.1 mm, 9.9 dB at 0.2 mm at 900 kHz and 1500 m/s.
+  // Section 2.1.1 of the model: 0.6 dB at 0.05 mm, 2.5 dB at 0.1 mm, 9.9 dB at 0.2 mm, at 900 kHz and 1500 m/s.
   const auto level = [](double roughness_m) {
     Mirror sphere = specular_sphere(0.5);
     sphere.material.lambert_db = -80;
@@ -197,7 +198,7 @@ TEST_P(BothWays, SwitchedOffThereIsNothing) {
   s.sounding().request.switches.expected_power = true;
   s.turn(0);
   const double lambert = s.strength_per_m(2);
-  EXPECT_GT(lambert, 0);  // the whole surface scatters again
+  EXPECT_GT(lambert, 0);  // the whole surface scatters
   EXPECT_LT(db(lambert), db(1 / 20.0) - 6);
 }
 
@@ -218,7 +219,8 @@ TEST_P(BothWays, ExpectedPowerHoldsTheSameEcho) {
 }
 
 TEST_P(BothWays, TankFromInside) {
-  // The round wall seen from beside its axis: in front 1 - r / a is negative, the echo has gone through a line of focus.
+  // The round wall, seen from a point beside its axis. In front 1 - r / a is negative, because the echo has passed a line of
+  // focus.
   const double a = 1.1684, height = 1.2;
   Mirror tank = specular_cylinder(a, height);
   tank.primitive.inside = true;
@@ -260,7 +262,7 @@ TEST(SpecularOracles, MeshOfASphereFromEverySide) {
 }
 
 TEST(SpecularOracles, CapsuleAndTorusFromFacets) {
-  // Shapes without a closed form in the engine: radii a (half sphere end-on), and a with R + a (torus seen in its plane).
+  // Shapes for which the engine has no closed form: radii a (half sphere, end-on), and a with R + a (torus, seen in its plane).
   Mirror capsule{.mesh = make_capsule(0.3, 0.8, segments_for(0.3))};
   capsule.in_world = facing(2.7);
   SpecularSounding end_on(world_of({capsule}), p900(), native_rows(12, 0.0254));

@@ -1,4 +1,4 @@
-// Echoes of a slightly rough surface: the specular and the scattered part share the energy, and where both reach a beam their
+// Echoes of a slightly rough surface. The specular and the scattered part share the energy. Where a beam receives both, their
 // sum is Rician (oracle 25).
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ TEST(SpecularStatistics, WhatDoesNotMirrorScatters) {
     const double scattered = scattering_strength(m, 1, hz, c, true) / scattering_strength(m, 1, hz, c, false);
     const double mirrored = std::pow(coherent_reflection(m, c / hz), 2);
     EXPECT_NEAR(scattered + mirrored, 1, 1e-4) << kh;
-    // Away from the perpendicular roughness counts for less, and less scatters.
+    // Away from the perpendicular, roughness has less effect, and less energy is scattered.
     EXPECT_NEAR(scattering_strength(m, 0.5, hz, c, true) / scattering_strength(m, 0.5, hz, c, false), 1 - std::exp(-kh * kh),
                 1e-4);
   }
@@ -37,7 +37,7 @@ TEST(SpecularStatistics, SmoothTurnsIntoRoughWithoutAStep) {
   EXPECT_EQ(scattering_strength(m, 0.3, hz, c, true), scattering_strength(m, 0.3, hz, c, false));
 }
 
-/// A narrow sonar over a slightly rough plate, 1 m square and 2 m ahead.
+/// A narrow sonar over a slightly rough plate, 1 m square, 2 m ahead.
 class Plate {
  public:
   explicit Plate(double reflection) {
@@ -68,7 +68,8 @@ class Plate {
 };
 
 TEST(SpecularStatistics, Oracle25_RicianEcho) {
-  // Reflection set so that the mirror's power is four times that of the scattered echo in the same cell, both as expected.
+  // The reflection is chosen so that the mirror's power is four times that of the scattered echo in the same cell, both as
+  // expected values.
   const double scattered = Plate(0).intensity(1, true);
   const double mirrored = Plate(0.1).intensity(1, true) - scattered;
   ASSERT_GT(scattered, 0);

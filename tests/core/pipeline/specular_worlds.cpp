@@ -12,7 +12,7 @@ Material mirror(double reflection) {
   Material m;
   m.name = "mirror";
   m.lambert_db = -20;
-  m.roughness_m = 0;  // nothing is left to scatter
+  m.roughness_m = 0;  // no energy is left for scattering
   m.reflection = static_cast<float>(reflection);
   return m;
 }

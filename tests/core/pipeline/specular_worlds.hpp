@@ -12,7 +12,7 @@
 
 namespace sonar::test {
 
-/// A material that only reflects: smooth, without a diffuse echo.
+/// A material that only reflects: it is smooth and has no diffuse echo.
 Material mirror(double reflection = 1);
 
 struct Mirror {
@@ -21,27 +21,28 @@ struct Mirror {
   Pose in_world = {};
   Material material = mirror();
 };
-/// A scene of such objects; without their primitives when `as_meshes`.
+/// A scene of such objects. With `as_meshes` it has no primitives.
 std::shared_ptr<const Scene> world_of(std::vector<Mirror> mirrors, bool as_meshes = false);
 
-// Mirrors in their own axes, mesh and primitive alike.
+// Mirrors in their own axes, as mesh and as primitive.
 Mirror specular_sphere(double radius_m);
 Mirror specular_cylinder(double radius_m, double length_m);
 Mirror specular_plane(double length_x_m, double length_y_m);
 Mirror specular_box(Vec3d size_m);
-/// Turned so that its z axis (a plane's normal, a cylinder's axis) points along -x, and put in front of the sonar.
+/// Rotates the object so that its z axis (a plane's normal, a cylinder's axis) points along -x, and places it in front of the
+/// sonar.
 Pose facing(double x_m, double tilt_rad = 0);
-/// Its z axis along world z, or tilted about x by `tilt_rad` toward y; axis at x_m ahead.
+/// Places the object with its z axis along world z, or tilted about x by `tilt_rad` towards y, at x_m ahead.
 Pose standing(double x_m, double tilt_rad = 0);
 
-/// Pings from the origin with beam `beams / 2` looking along x; specular on.
+/// Pings from the origin. Beam `beams / 2` looks along x; specular is on.
 class SpecularSounding {
  public:
   SpecularSounding(std::shared_ptr<const Scene> scene, const FrequencyMode& mode, const PingSettings& settings);
   Sounding& sounding() { return sounding_; }
   /// Amplitude of the strongest echo of the middle beam within `slack_m` of a range [uPa]; 0 without an echo.
   double peak_upa(double range_m, double slack_m = 0.05);
-  /// The same as a pressure re source at 1 m, absorption taken out: eq. 7 without exp(-2 alpha r).
+  /// The same as a pressure re the source at 1 m, without absorption: eq. 7 without exp(-2 alpha r).
   double strength_per_m(double range_m, double slack_m = 0.05);
   /// Turns the sonar by this much more to port.
   void turn(double yaw_rad);
@@ -53,9 +54,9 @@ class SpecularSounding {
 };
 
 double db(double amplitude);
-/// A rigid surface's echo per source pressure at 1 m [1/m]: (1 / lambda) |integral of cos / R^2 exp(-i 2 k R) dA|, over
-/// surface(u, v), u and v in (0, 1), which returns place and area normal (length = area per du dv), sonar in the origin.
-/// Places that the sonar sees from behind are ignored.
+/// Echo of a rigid surface per source pressure at 1 m [1/m]: (1 / lambda) |integral of cos / R^2 exp(-i 2 k R) dA|. surface(u,
+/// v), with u and v in (0, 1), returns the position and the area normal (its length is the area per du dv). The sonar is at the
+/// origin. Points that the sonar sees from behind are ignored.
 struct Patch {
   Vec3d place, area;
 };

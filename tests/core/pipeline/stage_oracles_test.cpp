@@ -1,5 +1,5 @@
-// Oracles on single stages: column synthesis and beamforming against direct sums in double, quantisation, and inputs that must
-// not break a ping.
+// Oracles on single stages: column synthesis and beamforming compared with direct sums in double, quantisation, and inputs that
+// must not break a ping.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -81,7 +81,7 @@ struct BeamWeightsCase {
   int beams;
 };
 
-/// Random columns through the stage, the dense sum and the banded sum.
+/// Compares random columns in this stage, in the dense sum and in the banded sum.
 void check_beam_weights(const BeamWeightsCase& c, const simd::Kernels& kernels) {
   PingSettings settings = default_rows(8, 40);
   settings.beam_count = c.beams;
@@ -116,7 +116,8 @@ void check_beam_weights(const BeamWeightsCase& c, const simd::Kernels& kernels) 
       error += off * off, power += dense[i] * dense[i];
     }
   }
-  // A panel of four beams listens to the union of their bands, so it may do better than the band, not worse.
+  // A panel of four beams uses the union of their bands. Therefore its error may be smaller than that of one band, but not
+  // larger.
   const bool whole = dropped == 0;
   record_below(19, whole ? "nothing dropped: error" : "band: error over 1.1 of what was dropped + 1e-5", whole ? 1e-5 : 1,
                std::sqrt(error / power) / (whole ? 1 : 1.1 * std::sqrt(dropped / all) + 1e-5), "");
@@ -126,7 +127,7 @@ void check_beam_weights(const BeamWeightsCase& c, const simd::Kernels& kernels) 
 TEST(StageOracles, Oracle19_BeamsAgainstDenseSum) {
   FrequencyMode narrow = p900();
   narrow.beam_spacing = BeamSpacing::uniform_in_sine;
-  FrequencyMode open = oculus_low();  // nothing to drop: the sum itself must be right to a float
+  FrequencyMode open = oculus_low();  // no energy is dropped: the sum itself must be accurate to a float
   open.pattern.azimuth_taper = Taper::unit;
   for (const simd::Kernels* kernels : kernel_sets()) {
     for (const BeamWeightsCase& c :
@@ -138,7 +139,7 @@ TEST(StageOracles, Oracle19_BeamsAgainstDenseSum) {
   }
 }
 
-// End to end: points at random places, against the double sum with each at its own exact sine.
+// End to end: points at random positions, compared with the double sum in which each has its exact sine.
 TEST(StageOracles, PointsThroughTheEngineAgainstDirectSum) {
   for (const FrequencyMode& mode : {p900(), oculus_high()}) {
     std::mt19937 random(3);
@@ -231,7 +232,7 @@ TEST(StageOracles, GammaAndThirtyTwoBits) {
       for (int j = 0; j < s.beams(); ++j) {
         const double expected = quantise(s.pressure(row, j) * factor, format);
         const double got = code_at(ping, static_cast<std::size_t>(row) * 512 + static_cast<std::size_t>(j));
-        ASSERT_NEAR(got, expected, 1 + 2e-6 * expected) << row << " " << j;  // 32 bits: a float's worth of them
+        ASSERT_NEAR(got, expected, 1 + 2e-6 * expected) << row << " " << j;  // 32 bits: the tolerance is that of a float
       }
     }
   }
@@ -253,16 +254,16 @@ TEST(StageOracles, Oracle44_AwkwardPlacesStayFinite) {
     Vec3d position;
     RollPitchYaw attitude;
   } places[] = {
-      {{0, 0, 1}, {}},                  // on a point target: range zero
-      {{0, 0, 0}, {}},                  // in the plane of the bed: grazing everywhere, and on another point
-      {{0, 0, 1e-7}, {}},               // a hair above
-      {{3, 0, 0.5}, {}},                // inside the box, on a point
-      {{2.5, 0, 0.5}, {}},              // on the box's face
-      {{1.5, 1, 0.6}, {0, pi / 2, 0}},  // on the sphere's top, looking down
-      {{0, 0, 2}, {0, -pi / 2, 0}},     // straight up: nothing
-      {{0, 0, 2}, {0, pi / 2, 0}},      // straight down
-      {{1e6, -1e6, -500}, {1, 1, 1}},   // far from everything
-      {{-2.9, 0, 0.01}, {0, 0, pi}},    // at the edge, looking out
+      {{0, 0, 1}, {}},                  // at a point target: range zero
+      {{0, 0, 0}, {}},                  // in the plane of the bed (grazing everywhere) and at another point
+      {{0, 0, 1e-7}, {}},               // slightly above
+      {{3, 0, 0.5}, {}},                // inside the box, at a point
+      {{2.5, 0, 0.5}, {}},              // at the box's face
+      {{1.5, 1, 0.6}, {0, pi / 2, 0}},  // at the sphere's top, looking down
+      {{0, 0, 2}, {0, -pi / 2, 0}},     // looks straight up; nothing is there
+      {{0, 0, 2}, {0, pi / 2, 0}},      // looks straight down
+      {{1e6, -1e6, -500}, {1, 1, 1}},   // far from all objects
+      {{-2.9, 0, 0.01}, {0, 0, pi}},    // at the edge, looking outward
   };
   for (const FrequencyMode& mode : {p900(), oculus_high()}) {
     Sounding s(scene, mode, default_rows(10, 394));
@@ -344,7 +345,7 @@ TEST(StageOracles, Oracle44_AwkwardSettingsAreRefusedWithASentence) {
   refused([&](PingRequest& r) { r.switches.fixed_fan = std::numeric_limits<int>::max(); });
 }
 
-// Requests for more memory than any machine has are refused, too; merely large ones are not.
+// Requests for more memory than any machine has are also refused. Requests that are only large are accepted.
 TEST(StageOracles, Oracle44_PicturesBeyondAllMemoryAreRefusedWithASentence) {
   Sounding s(SceneMaker().make(), p900(), default_rows(10, 394));
   const auto why = [&](auto&& change, bool exact = false) {
@@ -371,7 +372,7 @@ TEST(StageOracles, Oracle44_PicturesBeyondAllMemoryAreRefusedWithASentence) {
   EXPECT_EQ(why(long_record, true), "");
 }
 
-// A ping is a pure function of its request: nothing of an earlier ping may show in a later one.
+// A ping is a pure function of its request. Earlier pings must have no effect on it.
 TEST(StageOracles, PingsForgetTheirPredecessors) {
   SceneMaker maker;
   maker.add(height_field(-2, 14, -10, 10, 1, [](double, double) { return 0.0; }), -20);

@@ -1,4 +1,4 @@
-// Oracles on what is random: receiver noise, speckle statistics, and how speckle moves with the sonar.
+// Oracles on random parts: receiver noise, statistics of speckle, and motion of speckle with the sonar.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -98,14 +98,14 @@ TEST(StatisticsOracles, NoiseGrainsHaveThePulsesLength) {
         for (int j = 0; j < s.beams(); j += 3) a.push_back(s.power(row, j)), b.push_back(s.power(row + apart, j));
       }
       const double seconds = apart * 2 * settings.range_bin_m / 1500;
-      // sqrt() lifts a correlation near nothing, hence the square is compared.
+      // sqrt() enlarges a correlation near zero. Therefore the square is compared.
       EXPECT_NEAR(correlation(a, b), std::pow(noise_correlation(s.envelope_hz(), seconds), 2), 0.05) << apart;
     }
   }
 }
 
-/// Intensities of independent cells of a flat bed over the level the closed form predicts: at least 3.5 beam widths and 2 dr
-/// apart.
+/// Intensities of independent cells of a flat bed, divided by the level of the closed form. The cells are at least 3.5 beam
+/// widths and 2 dr apart.
 std::vector<double> independent_intensities(const FrequencyMode& mode, const PingSettings& settings, double height, double tilt,
                                             int seeds, double from_m = 0) {
   std::vector<double> all;
@@ -146,7 +146,7 @@ TEST(StatisticsOracles, Oracle23_SpeckleIsRayleigh) {
   const auto n = static_cast<double>(intensity.size());
   double worst = 0;
   for (std::size_t i = 0; i < intensity.size(); ++i) {
-    const double cumulative = 1 - std::exp(-intensity[i]);  // |s| is Rayleigh: its square is exponential
+    const double cumulative = 1 - std::exp(-intensity[i]);  // |s| has a Rayleigh distribution, its square an exponential one
     worst = std::max(
         {worst, std::abs(cumulative - static_cast<double>(i) / n), std::abs(cumulative - static_cast<double>(i + 1) / n)});
   }
@@ -172,7 +172,7 @@ TEST(StatisticsOracles, Oracle24_ScintillationIndexIsOne) {
   }
 }
 
-// The last third of the range, where the cells of the default lattice are at their largest against the beam and the pulse.
+// The last third of the range. There the cells of the default lattice are largest compared with the beam and the pulse.
 TEST(StatisticsOracles, ScintillationIndexIsOneFarOutAtDefaultQuality) {
   struct Case {
     const char* name;
@@ -213,7 +213,7 @@ TEST(StatisticsOracles, Oracle34_StillSceneStillPing) {
     s.request.fired_at += std::chrono::seconds(3);
     EXPECT_EQ(s.ping().pressure_upa, pressure);
     record_oracle(34, "samples that differ", 0, differences(s.last().samples, samples), 0, "");
-    // To another place and back: values kept between pings must not change the result.
+    // Moves to another position and back. Values that are kept between pings must not change the result.
     s.ping_from({1, 1, 3}, {0, 0.4, 1});
     EXPECT_EQ(s.ping_from({0, 0, 2}, {0.02, 0.25, 0.1}).pressure_upa, pressure);
     if (first.empty()) first = pressure;
@@ -239,7 +239,7 @@ TEST(StatisticsOracles, Oracle26_CoherenceOfBeamsOnABed) {
         }
       }
     }
-    // Spacing in the sine shrinks off axis: the expectation is averaged over the same beams.
+    // Off axis the spacing in the sine shrinks. Therefore the expected value is averaged over the same beams.
     double expected = 0;
     for (int j = 128; j < 384 - apart; ++j) {
       double product = 0, square = 0;
@@ -253,7 +253,7 @@ TEST(StatisticsOracles, Oracle26_CoherenceOfBeamsOnABed) {
   }
 }
 
-// van Cittert-Zernike: an untapered array of length L that moves sideways by x keeps 1 - 2 x / L of its coherence.
+// van Cittert-Zernike: if an untapered array of length L moves sideways by x, 1 - 2 x / L of its coherence is left.
 TEST(StatisticsOracles, Oracle35_LateralShiftDecorrelates) {
   FrequencyMode mode = p900();
   mode.pattern.azimuth_taper = Taper::uniform;
@@ -279,7 +279,8 @@ TEST(StatisticsOracles, Oracle35_LateralShiftDecorrelates) {
   }
 }
 
-/// Correlation of intensities in a patch between two pings, the second read `shift` rows nearer and `beams` beams further on.
+/// Correlation of intensities in a patch between two pings. The patch of the second ping is `shift` rows nearer and `beams`
+/// beams farther along.
 double patch_correlation(const Sounding& s, const std::vector<float>& before, const std::vector<float>& after, double from_m,
                          double to_m, double azimuth_deg, int row_shift, int beam_shift) {
   std::vector<double> a, b;
@@ -325,11 +326,11 @@ TEST(StatisticsOracles, Oracle37_SpeckleStaysWithTheBedInATurn) {
       int beams_turned, beams_seen;
       double cos_phi;
     };
-    // The bed at range r lies at elevation -asin(h / r): the pattern moves by n cos(phi) beams.
+    // The bed at range r lies at elevation -asin(h / r). Therefore the pattern moves by n cos(phi) beams.
     for (const Case& c : {Case{10, 10, 0.9925}, Case{20, 19, 0.95}, Case{16, 15, 0.9375}}) {
       const double height = 1.0, range = height / std::sqrt(1 - c.cos_phi * c.cos_phi);
       const std::vector<float> before = s.ping_from({0, 0, height}, {0, 0, 0}).pressure_upa;
-      // To port by n beams: the scene moves to starboard, towards higher beam numbers.
+      // To port by n beams: the scene moves to starboard, to higher beam numbers.
       const std::vector<float> after = s.ping_from({0, 0, height}, {0, 0, c.beams_turned * spacing}).pressure_upa;
       const double aligned = patch_correlation(s, before, after, range - 0.1, range + 0.1, 5, 0, c.beams_seen);
       record_at_least(37, std::string(name) + ", conical beams", 0.9, aligned, "");

@@ -1,4 +1,4 @@
-// Texture: the Gamma field alone, in the surface cells, and what it makes of echoes (docs/acoustics.md, section 3).
+// Texture: the Gamma field by itself, in the surface cells, and its effect on echoes (docs/acoustics.md, section 3).
 #include "core/scene/cells/texture.hpp"
 
 #include <gtest/gtest.h>
@@ -34,12 +34,12 @@ struct Moments {
   double correlation() const { return (products / n - mean() * mean()) / variance(); }
 };
 
-/// Pairs of values `apart_m` apart in a direction, pair by pair far enough from each other to be independent.
+/// Pairs of values `apart_m` apart in one direction. Different pairs are far enough from each other to be independent.
 Moments pairs(const Texture& texture, Vec3d along, double apart_m) {
   const TextureField field(texture, 5, Seed{11});
   TexturePatch patch(field, 2);
   Moments m;
-  const double step = 3.77 * static_cast<double>(texture.correlation_m);  // not in step with the lattice
+  const double step = 3.77 * static_cast<double>(texture.correlation_m);  // not a multiple of the lattice spacing
   for (int i = 0; i < 40; ++i)
     for (int j = 0; j < 40; ++j)
       for (int k = 0; k < 15; ++k) {
@@ -65,7 +65,7 @@ TEST(Texture, TheFieldIsGammaOfMeanOne) {
     EXPECT_NEAR(m.mean(), 1, 0.03) << shape;
     EXPECT_NEAR(m.variance() * static_cast<double>(shape), 1, 0.1) << shape;
   }
-  // Shape 1 is the exponential distribution: its median is ln 2, its 90th percentile ln 10.
+  // Shape 1 is the exponential distribution. Its median is ln 2, its 90th percentile ln 10.
   const TextureField field({1, 0.5f}, 0, Seed{1});
   EXPECT_NEAR(std::pow(static_cast<double>(field.root_of(0)), 2), std::log(2.0), 2e-3);
   EXPECT_NEAR(std::pow(static_cast<double>(field.root_of(1.2815516f)), 2), std::log(10.0), 5e-3);
@@ -129,7 +129,7 @@ TEST(Texture, CellsOfEveryLevelCarryTheSameField) {
         const Vec3d place = t.centre_m + unit * Vec3d{1.0 * t.column(CellTile::x)[i], 1.0 * t.column(CellTile::y)[i],
                                                       1.0 * t.column(CellTile::z)[i]};
         const int plain = u.column(CellTile::weight_re)[i];
-        if (std::abs(plain) < 2000) continue;  // too few counts to divide by
+        if (std::abs(plain) < 2000) continue;  // counts that are too small for a quotient
         const double ratio =
             t.column(CellTile::weight_re)[i] * static_cast<double>(t.weight_unit) / (plain * static_cast<double>(u.weight_unit));
         EXPECT_NEAR(ratio, static_cast<double>(patch.root_at(place)), 5e-3) << level;
@@ -154,7 +154,7 @@ TEST(Texture, SwitchedOffItIsNotThereAndExpectedPowerHasTheMean) {
   EXPECT_EQ(patchy.ping().pressure_upa, plain.ping().pressure_upa);
 }
 
-/// Intensity over its mean, where the beams meet the bed.
+/// Intensity divided by its mean, where the beams hit the bed.
 template <class Visit>
 void visit_intensities(const Sounding& s, const reference::SeabedLevel& level, int beam_step, int row_step, Visit&& visit) {
   const auto pulse = static_cast<double>(s.request.settings.pulse_width_m);
@@ -188,7 +188,7 @@ TEST(Texture, EchoesAreKDistributed) {
   }
 }
 
-// A grain is a field of its own: with one as long as a patch, echoes are as with a texture, and both multiply.
+// A grain is a separate field. If it is as long as a patch, echoes are as with a texture. Both fields together multiply.
 TEST(Grain, IsATextureBesideTheTexture) {
   const FrequencyMode mode = oculus_high();
   Scene scene = *bed({});
@@ -212,7 +212,8 @@ TEST(Grain, IsATextureBesideTheTexture) {
   EXPECT_EQ(s.ping().pressure_upa, plain.ping_from({0, 0, height_m}, {0, tilt_rad, 0}).pressure_upa);
 }
 
-// The patches lie on the bed: seen from elsewhere, where no speckle is the same any more, they are where they were.
+// The patches are fixed to the bed. Seen from a position where the speckle is completely different, they are at the same
+// points.
 TEST(Texture, PatchesStayWhereTheyAre) {
   const FrequencyMode mode = oculus_high();
   for (const bool on : {true, false}) {

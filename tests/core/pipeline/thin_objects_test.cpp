@@ -1,5 +1,5 @@
-// Bodies too thin for the depth map: a few centimetres thick, they echo from the side that faces the sonar alone, and
-// bodies close behind an opaque face do not echo. Expected power, against integrals in double.
+// Bodies that are too thin for the depth map. Bodies a few centimetres thick echo only from the side that faces the sonar.
+// Bodies close behind an opaque face do not echo. In expected power, compared with integrals in double.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +25,7 @@ struct Look {
   FrequencyMode mode;
   double range_m, pulse_m;
 };
-/// The products' beams with the pulses of their longest ranges, too.
+/// The products' beams, also with the pulses of their longest ranges.
 std::vector<Look> looks() {
   return {{"P900, 5 m", p900(), 5, 0.0254},
           {"M1200d HF, 9 m", oculus_high(), 9, 0.9 * 10 / 437},
@@ -43,8 +43,8 @@ Sounding looking_at(std::shared_ptr<const Scene> scene, const Look& look, SimdLe
   return s;
 }
 
-/// sum sigma_i / r_i^4 of all that echoes between two ranges, from the beams of a whole ping: each echo is counted theta_eff
-/// tau_eff times.
+/// sum sigma_i / r_i^4 of all echoes between two ranges, from the beams of a whole ping. Each echo is counted theta_eff tau_eff
+/// times.
 double echo_per_m2(const Sounding& s) {
   double sum = 0;
   for (int j = 0; j < s.beams(); ++j)
@@ -56,7 +56,7 @@ double echo_per_m2(const Sounding& s) {
   return sum * 2 * s.request.settings.range_bin_m / 1500 * du / (theta * energy_width_s(s.envelope_hz()) * source * source);
 }
 
-/// Upright closed cylinder about the origin.
+/// An upright closed cylinder about the origin.
 Mesh closed_pole(double radius_m, double half_height_m) {
   constexpr std::uint32_t sides = 96;
   Mesh mesh;
@@ -75,7 +75,7 @@ Mesh closed_pole(double radius_m, double half_height_m) {
   return mesh;
 }
 
-/// sum sigma_i / r_i^4 over the lateral surface that faces the origin, the axis upright through (x, y).
+/// sum sigma_i / r_i^4 over the side of a cylinder that faces the origin. Its axis is upright through (x, y).
 double pole_echo_per_m2(double radius_m, double half_height_m, double x, double y) {
   const double mu = lambert_coefficient(lambert_db), dt = 2 * pi / 2000, dz = half_height_m / 500;
   double sum = 0;
@@ -103,7 +103,7 @@ TEST(ThinObjects, SpheresFromOneCentimetreEchoAsLambertSays) {
     }
 }
 
-// The pulses of long ranges make cells that are coarser than a small body's first cubes.
+// For the pulses of long ranges, cells are coarser than the first cubes of a small body.
 TEST(ThinObjects, SpheresAreHeardInSpeckleWithLongPulses) {
   for (const double range : {64.0, 120.0, 200.0}) {
     const Look look{"long", oculus_low(), 30, 0.9 * range / 437};
@@ -160,7 +160,7 @@ TEST(ThinObjects, APlateOfAnyThicknessEchoesOnce) {
     }
 }
 
-// A single sheet, and a mesh whose triangles do not agree on a side.
+// A single sheet, and a mesh whose triangles have inconsistent directions.
 TEST(ThinObjects, OpenMeshesEchoFromBothSides) {
   const Look look = looks()[0];
   std::vector<double> level;
@@ -181,7 +181,7 @@ TEST(ThinObjects, OpenMeshesEchoFromBothSides) {
 }
 
 TEST(ThinObjects, AClosedRoomIsSeenFromWithin) {
-  // Normals out: from within, all of them look away.
+  // Normals point outwards. Seen from inside, all of them point away.
   Sounding closed = looking_at(SceneMaker().add(box({4, 3, 2}), lambert_db, {1, 0.5, 0}).make(), looks()[0]);
   Mesh open = box({4, 3, 2});
   open.triangles.erase(open.triangles.begin() + 8, open.triangles.begin() + 10);  // without the wall behind the sonar
@@ -201,7 +201,7 @@ TEST(ThinObjects, WhichMeshesAreClosed) {
   Mesh inside_out = box({1, 1, 1});
   for (auto& t : inside_out.triangles) std::swap(t[0], t[1]);
   EXPECT_EQ(skin_of(inside_out).outward, -1);
-  Mesh soup;  // each triangle with vertices of its own
+  Mesh soup;  // each triangle has its own vertices
   for (const auto& t : box({1, 1, 1}).triangles) {
     const auto n = static_cast<std::uint32_t>(soup.vertices.size());
     for (const std::uint32_t i : t) soup.vertices.push_back(box({1, 1, 1}).vertices[i]);
@@ -212,7 +212,8 @@ TEST(ThinObjects, WhichMeshesAreClosed) {
   EXPECT_FALSE(encloses(soup, {1.1, 0, 0}));
 }
 
-/// Energy of a plate with the screen before it over that without [dB]; their numbers differ by that much.
+/// Energy of a plate with the screen before it divided by that without [dB]. The numbers of the two objects differ by the
+/// parameter.
 double heard_behind_screen_db(const Look& look, double yaw, double gap_m, int apart, SimdLevel level = SimdLevel::automatic) {
   const auto heard = [&](bool screened) {
     const Quatd turn = quat_from_rpy({0, 0, yaw});
@@ -230,13 +231,13 @@ double heard_behind_screen_db(const Look& look, double yaw, double gap_m, int ap
 
 TEST(ThinObjects, APlateBehindAnOpaqueScreenIsNotHeard) {
   for (const Look& look : looks())
-    for (const double yaw : {0.0, 0.5})  // the screen faces the sonar, or not quite
+    for (const double yaw : {0.0, 0.5})  // the screen faces the sonar exactly or almost
       for (const double gap : {0.005, 0.01, 0.03, 0.04, 0.2})
         record_below(no_number, std::string("plate from 5 mm behind a screen, ") + look.name, -25,
                      heard_behind_screen_db(look, yaw, gap, 1), "dB");
 }
 
-// Numbers whose last bits agree.
+// Numbers whose last bits are equal.
 TEST(ThinObjects, ObjectsOfLargeScenesAreToldApart) {
   for (const SimdLevel level : {SimdLevel::portable, SimdLevel::avx2, SimdLevel::avx512})
     for (const double yaw : {0.0, 0.5})

@@ -36,7 +36,7 @@ double closed_form_db(const Sounding& s, double volume_db, double range_m) {
          10 * std::log10(volume_m3);
 }
 
-/// Mean power over beams of |azimuth| below `azimuth_deg`, in dB.
+/// Mean power [dB] over beams with |azimuth| below `azimuth_deg`.
 double level_db(const Sounding& s, int row, double azimuth_deg) {
   double sum = 0;
   int n = 0;
@@ -162,11 +162,11 @@ TEST(Volume, IsNotTheNoiseAndOffIsOff) {
     turbid.request.switches.volume = false;
     EXPECT_EQ(turbid.ping().pressure_upa, none);
   }
-  // A blank ping has noise only.
+  // A blank ping contains only noise.
   turbid.request.switches.volume = true;
   turbid.request.blank = clear.request.blank = true;
   EXPECT_EQ(turbid.ping().pressure_upa, clear.ping().pressure_upa);
-  // Drawn apart: of one ping, volume alone and noise alone have nothing in common.
+  // Volume and noise have separate draws. In one ping, volume alone and noise alone are not correlated.
   Sounding volume(in_water({}, -60), p900(), default_rows(10, 300)), noise(in_water({}, -200), p900(), default_rows(10, 300));
   noise.request.switches.noise = true;
   volume.ping(), noise.ping();
