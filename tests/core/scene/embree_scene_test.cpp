@@ -1,4 +1,4 @@
-// The fast ray caster against the simple one: triangle soups, moving bodies, distant positions, and empty scenes.
+// Compares the fast ray caster with the simple one: triangle soups, moving bodies, distant positions, and empty scenes.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -20,7 +20,7 @@ using tests::Hit;
 using tests::set_ray;
 using tests::soup;
 
-// Casts `packets` packets from around the origin and judges every lane.
+// Casts `packets` packets from points around the origin and checks every lane.
 void compare(const Scene& scene, const RayScene& rays, std::span<const Pose> bodies, Draw& draw, int packets, double far_m,
              bool coherent, double tolerance_m) {
   int hits = 0;
@@ -28,7 +28,7 @@ void compare(const Scene& scene, const RayScene& rays, std::span<const Pose> bod
     RayPacket packet{};
     Vec3d from[16], along[16];
     for (int i = 0; i < 16; ++i) {
-      const Vec3 rounded = to_float(draw.point(6));  // both sides get the float place
+      const Vec3 rounded = to_float(draw.point(6));  // both sides get the position as float
       from[i] = rays.origin() + to_double(rounded);
       const Vec3d d = draw.point(1);
       along[i] = to_double(to_float((1 / length(d)) * d));
@@ -108,7 +108,7 @@ TEST(RayScene, AnotherSceneIsTracedAsANewOne) {
   Draw draw(14);
   std::vector<std::shared_ptr<const Scene>> scenes;
   const auto ground = soup(draw, 900, 5, 1), stone = soup(draw, 60, 3, 1);
-  for (int i = 0; i < 9; ++i) {  // more than take turns at once, with a part in common
+  for (int i = 0; i < 9; ++i) {  // more scenes than are kept at once, with a common part
     auto scene = three_soups(draw, {});
     if (i % 3 != 0) scene->objects[1] = Object{.name = "ground", .mesh = ground, .in_world = {{2, 0, 0}, {}}};
     scene->objects.push_back(Object{.name = "stone", .mesh = stone, .in_world = {{0, 0.1 * i, 0}, {}}});
@@ -124,7 +124,7 @@ TEST(RayScene, AnotherSceneIsTracedAsANewOne) {
   }
 }
 
-// Two bodies, one of two objects, beside a static one, all of it far from the world's zero.
+// Two bodies, one of them with two objects, beside a static object, far from the world's origin.
 class MovingScene : public ::testing::Test {
  protected:
   MovingScene() {
@@ -192,10 +192,10 @@ TEST(RayScene, AnEmptySceneMissesEverywhere) {
   }
 }
 
-// Embree may trace 4, 8 or 16 rays as one, and which of them depends on the processor.
+// Embree may trace 4, 8 or 16 rays together. The number depends on the processor.
 class TracerWidth : public ::testing::TestWithParam<const char*> {
  protected:
-  // The width that Embree has code for: of the instruction set that it is held to, and of this processor.
+  // The width for which Embree has code: that of its instruction set limit, and that of this processor.
   static int expected() {
     const std::string isa = GetParam();
 #if defined(__x86_64__)
@@ -218,7 +218,7 @@ TEST_P(TracerWidth, AgreesWithBruteForce) {
   compare(*scene, rays, {}, draw, 60, 30, false, 1e-4);
 }
 
-// Inactive lanes hold a caller's old bytes: rays of an earlier packet, zeros, or bytes that are not numbers.
+// Inactive lanes contain arbitrary bytes of the caller: rays of an earlier packet, zeros, or NaN.
 TEST_P(TracerWidth, LanesThatAreNotActiveAreNotRead) {
   Draw draw(8);
   const auto scene = three_soups(draw, {});

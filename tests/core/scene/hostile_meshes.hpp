@@ -1,5 +1,5 @@
-// Mesh files that crashed the program that read them, or used up its memory. Small ones are seeds of mesh_file_fuzz as well
-// (tests/fuzz/corpus/mesh_file): SONARD_WRITE_SEEDS=folder makes the test write them.
+// Mesh files that crashed the program that read them, or exhausted its memory. Small ones are also seeds of mesh_file_fuzz
+// (tests/fuzz/corpus/mesh_file): with SONARD_WRITE_SEEDS=folder the test writes them.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace sonar::tests {
 
 struct HostileMesh {
   std::string name, bytes;
-  std::string words;  // words of the error
+  std::string words;  // words that the error must contain
 };
 
 inline std::string repeated(const std::string& text, int times) {
@@ -35,7 +35,7 @@ inline std::string gltf_nodes(int nodes, int times) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[)" + list + "{}]}";
 }
 
-/// One triangle, whose corners are in the file that `uri` names.
+/// One triangle. Its corners are in the file that `uri` names.
 inline std::string gltf_with_buffer(const std::string& uri) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"byteLength":36,"uri":")" +

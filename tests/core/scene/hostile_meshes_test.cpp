@@ -1,4 +1,4 @@
-// Mesh files that would crash the program that reads them or exhaust its memory: each is refused, and the program continues.
+// Mesh files that would crash the program that reads them or exhaust its memory. Each is refused, and the program continues.
 #include "tests/core/scene/hostile_meshes.hpp"
 
 #include <gmock/gmock.h>
@@ -34,7 +34,7 @@ constexpr bool sanitized = true;
 constexpr bool sanitized = false;
 #endif
 
-/// Whether the system holds a process to its limit of memory. Sanitizers keep it themselves, and an emulated processor
+/// True if the system enforces the memory limit of a process. Sanitizers enforce it themselves, and an emulated processor
 /// (tests/tools/arm64.sh) has none.
 bool memory_is_limited() {
   rlimit before{}, now{};
@@ -48,7 +48,7 @@ bool memory_is_limited() {
 class HostileMeshes : public ::testing::Test {
  protected:
   HostileMeshes() {
-    // A test that needs more than this has failed, and must not exhaust the memory of the computer.
+    // If a test needs more than this, it has failed. It must not exhaust the memory of the computer.
     const rlimit most{std::uint64_t{4} << 30, RLIM_INFINITY};
     EXPECT_TRUE(sanitized || ::setrlimit(RLIMIT_AS, &most) == 0);
   }
@@ -61,7 +61,7 @@ class HostileMeshes : public ::testing::Test {
 
 TEST_F(HostileMeshes, AreRefusedAndTheProgramGoesOn) {
   for (const auto& mesh : tests::hostile_meshes()) {
-    if (mesh.words == "MiB of memory" && !memory_is_limited()) continue;  // a sanitizer itself ends the importer
+    if (mesh.words == "MiB of memory" && !memory_is_limited()) continue;  // the sanitizer itself ends the importer
     const std::string text = refusal(mesh.name, mesh.bytes);
     EXPECT_THAT(text, StartsWith(mesh.name + ": "));
     EXPECT_THAT(text, HasSubstr(mesh.words));
@@ -133,7 +133,7 @@ TEST_F(HostileMeshes, AnImporterThatCrashesOrAnswersNothingIsReported) {
   EXPECT_THAT(with("head -c 4096 /dev/zero"), HasSubstr("ended with code 0"));
 }
 
-// ---- the limits, in a process of their own
+// ---- the limits, in a separate process
 
 template <class Work>
 std::string answer_of(Work&& work) {

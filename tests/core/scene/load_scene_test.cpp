@@ -1,4 +1,4 @@
-// The scene format: what it means, what it refuses and with which sentence, and that no mutation of it can crash the loader.
+// The scene format: its meaning, the error text for each invalid scene, and no mutation of a scene can crash the loader.
 #include "core/scene/files/load_scene.hpp"
 
 #include <gmock/gmock.h>
@@ -71,7 +71,7 @@ objects:
   - {type: sphere, radius_m: 1, material: concrete}
   - {type: sphere, radius_m: 2, material: silt}
 )");
-  ASSERT_EQ(scene->materials.size(), 2u);  // only what is used
+  ASSERT_EQ(scene->materials.size(), 2u);  // only the materials in use
   EXPECT_EQ(scene->materials[0].name, "silt");
   EXPECT_FLOAT_EQ(scene->materials[0].lambert_db, -29);
   EXPECT_FLOAT_EQ(scene->materials[0].roughness_m, 0.002f);
@@ -136,7 +136,7 @@ objects:
   EXPECT_EQ(scene->objects[1].body, 0);
   EXPECT_EQ(scene->objects[2].body, 0);
   EXPECT_NEAR(length(scene->objects[1].in_world.position_m - Vec3d{5, 0, -2}), 0, 1e-12);
-  EXPECT_NEAR(length(scene->objects[2].in_world.position_m - Vec3d{5, 1, -2}), 0, 1e-12);  // turned with the diver
+  EXPECT_NEAR(length(scene->objects[2].in_world.position_m - Vec3d{5, 1, -2}), 0, 1e-12);  // rotated with the diver
   EXPECT_EQ(scene->point_targets[0].body, 1);
   EXPECT_EQ(length(scene->point_targets[0].position_m), 0);
   EXPECT_EQ(scene->point_targets[1].body, 0);
@@ -165,7 +165,7 @@ objects:
   for (const std::uint16_t m : scene->objects[0].mesh->material) ++count[scene->materials[m].name];
   EXPECT_EQ(count["steel"], 2);
   EXPECT_EQ(count["wood"], 2);
-  EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 101, 1e-9);  // the file's zero stays at the pose
+  EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 101, 1e-9);  // the file's origin stays at the pose
   EXPECT_THAT(refusal(object("type: mesh, file: m.obj"), files.folder()),
               StartsWith("s.yaml:2:5: objects[0].material: needed, because the mesh's material \""));
   EXPECT_THAT(refusal(object("type: mesh, file: m.obj, material: ice, materials: {hul: steel}"), files.folder()),
@@ -206,7 +206,7 @@ objects:
   EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 1003, 1e-9);
   EXPECT_NEAR(scene->objects[0].in_world.position_m.z, -16.5, 1e-9);
   EXPECT_NEAR(scene->objects[1].in_world.position_m.x, 0, 1e-9);
-  for (const char* other : {"g.txt", "g.grd"}) {  // downloads have many names
+  for (const char* other : {"g.txt", "g.grd"}) {  // downloaded files have many extensions
     const std::string grid = "type: heightmap, material: sand, file: " + std::string(other);
     EXPECT_THAT(refusal(object(grid), files.folder()),
                 ::testing::AnyOf(HasSubstr("unknown height format"), HasSubstr("cannot be opened")));
@@ -246,7 +246,7 @@ TEST(LoadScene, HeightmapsInDegreesStandAboutAnOrigin) {
   files.write("g.asc", "ncols 3\nnrows 3\nxllcenter 5\nyllcenter 60\ncellsize 0.01\n-1 -2 -3\n-4 -5 -6\n-7 -8 -9999\n");
   const std::string bed = "type: heightmap, file: g.asc, material: sand, ";
   const auto scene = parsed(object(bed + "geographic: true, origin: {lat: 60, lon: 5}"), files.folder());
-  EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 557.9, 0.5);  // 0.01 degrees, a little less in the north
+  EXPECT_NEAR(scene->objects[0].in_world.position_m.x, 557.9, 0.5);  // 0.01 degrees, slightly less in the north
   EXPECT_NEAR(scene->objects[0].in_world.position_m.y, 1114.2, 0.5);
   EXPECT_THAT(scene->notes, ::testing::ElementsAre("g.asc: 1 of its 9 heights (11 %) are missing: holes in the ground"));
   EXPECT_THAT(refusal(object(bed + "origin: {lat: 60, lon: 5}, centred: true"), files.folder()),
@@ -261,7 +261,7 @@ TEST(LoadScene, TheMiddleOfACentredGridInDegreesIsAtThePose) {
   const std::string bed = "type: heightmap, file: g.asc, material: sand, geographic: true";
   const auto of_its_own = parsed(object(bed), files.folder()), centred = parsed(object(bed + ", centred: true"), files.folder());
   const Vec3d own_m = of_its_own->objects[0].in_world.position_m, middle_m = centred->objects[0].in_world.position_m;
-  EXPECT_GT(std::hypot(own_m.x, own_m.y), 100);  // the mesh counts from between its first and its last vertex
+  EXPECT_GT(std::hypot(own_m.x, own_m.y), 100);  // the mesh is relative to the middle between its first and its last vertex
   EXPECT_NEAR(middle_m.x, own_m.x, 1e-6);
   EXPECT_NEAR(middle_m.y, own_m.y, 1e-6);
 }
@@ -371,7 +371,7 @@ sea_surface: {size_m: [9, 9]}
     for (const Object& o : (*scene)->objects) tests::expect_sound(*o.mesh);
   };
   for (std::size_t n = 0; n < good.size(); n += 5) check(good.substr(0, n));
-  for (std::uint32_t i = 0; i < (test::is_sanitized ? 200 : 1200); ++i) {  // there scene_fuzz makes up more
+  for (std::uint32_t i = 0; i < (test::is_sanitized ? 200 : 1200); ++i) {  // scene_fuzz makes more mutations
     const Random4 r = philox(i, 0, 0, 0, 5, 6);
     std::string bad = good;
     bad[r.v[0] % bad.size()] = alphabet[r.v[1] % alphabet.size()];

@@ -1,4 +1,4 @@
-// Materials: the keys of the file format, the library every scene may use, and what is refused with which sentence.
+// Materials: the keys of the file format, the library that every scene may use, and the error texts of invalid materials.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -79,7 +79,7 @@ TEST(Materials, TheLibraryHasTheNamesWePromise) {
   EXPECT_FLOAT_EQ(library["sand_gsab"].gsab.a_db, -8);
   EXPECT_FLOAT_EQ(library["mud_gsab"].gsab.b_rad, static_cast<float>(rad_from_deg(5)));
   EXPECT_FLOAT_EQ(library["gravel_gsab"].gsab.c_db, -15);
-  // From hardest to softest, by known reflections from water.
+  // From the hardest to the softest, with known reflections in water.
   for (const auto& [harder, softer] :
        {std::pair{"steel", "aluminium"}, {"aluminium", "concrete"}, {"rock", "sand"}, {"sand", "mud"}, {"mud", "rubber"}})
     EXPECT_GT(library[harder].reflection, library[softer].reflection) << harder << " " << softer;

@@ -7,7 +7,8 @@
 namespace sonar {
 namespace {
 
-// Vector area of a set of triangles, and the sum of their plain areas: equal lengths when nothing overlaps or is turned over.
+// Vector area of a set of triangles, and the sum of their plain areas. The lengths are equal if no triangles overlap or are
+// reversed.
 std::pair<Vec3d, double> areas(const std::vector<Vec3d>& p) {
   Vec3d sum;
   double plain = 0;

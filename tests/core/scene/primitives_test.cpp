@@ -47,14 +47,14 @@ TEST(Primitives, RoundSolidsAreClosedOutwardAndNearlyTheirVolume) {
 TEST(Primitives, ChordsStayWithinAMillimetre) {
   for (const double r : {0.02, 0.0508, 0.3, 2.0}) {
     const Mesh sphere = make_sphere(r, segments_for(r));
-    double worst = 0;  // error at the middles of edges, where a chord is deepest
+    double worst = 0;  // largest error at the middles of edges, where chords are deepest
     for (const auto& t : sphere.triangles) {
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec3d middle = 0.5 * (to_double(sphere.vertices[t[k]]) + to_double(sphere.vertices[t[(k + 1) % 3]]));
         worst = std::max(worst, r - length(middle));
       }
     }
-    EXPECT_LT(worst, 0.0021) << r;  // two directions
+    EXPECT_LT(worst, 0.0021) << r;  // two directions of curvature
     EXPECT_GT(worst, 0) << r;
   }
   EXPECT_EQ(segments_for(1e-5), 16);
@@ -91,7 +91,7 @@ TEST(Primitives, OpenCylindersLackTheirLids) {
   for (const Vec3& v : make_cylinder(0.5, 2, n, Caps::bottom).vertices) {
     if (std::hypot(v.x, v.y) < 0.1f) top = std::max(top, static_cast<double>(v.z));
   }
-  EXPECT_EQ(top, -1);  // nothing near the axis but the floor
+  EXPECT_EQ(top, -1);  // near the axis there is only the floor
 }
 
 TEST(Primitives, RocksDependOnTheirSeedAlone) {

@@ -1,4 +1,4 @@
-// The memory for a triangle while a large scene is made: 20 million must fit into a small computer.
+// Memory per triangle while a large scene is made: 20 million triangles must fit into a small computer.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -20,10 +20,10 @@ double bytes_after(const char* word) {
   return 0;
 }
 
-// The peak of the process while `work` runs, above what it held before.
+// The peak memory of the process while `work` runs, minus its memory before.
 template <class Work>
 double peak_bytes(Work&& work) {
-  std::ofstream("/proc/self/clear_refs") << "5";  // the peak begins anew
+  std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak
   const double before = bytes_after("VmRSS:"), earlier_peak = bytes_after("VmHWM:");
   work();
   EXPECT_LT(earlier_peak, before * 1.1 + 1e6) << "the system keeps the peak of earlier work";
@@ -68,7 +68,7 @@ TEST_F(SceneMemory, OfAMillionTrianglesInBinaryStl) {
   ASSERT_TRUE(mesh);
   EXPECT_EQ(mesh->centred.mesh.triangles.size(), count);
   EXPECT_EQ(mesh->centred.mesh.vertices.size(), edge * edge);
-  EXPECT_LT(peak / static_cast<double>(count), 45) << "bytes a triangle";  // 31; the importer takes 240
+  EXPECT_LT(peak / static_cast<double>(count), 45) << "bytes a triangle";  // 31; the importer needs 240
 }
 
 TEST_F(SceneMemory, OfTwoMillionTrianglesBehindTheRays) {

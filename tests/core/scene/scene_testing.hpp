@@ -1,4 +1,5 @@
-// Scenes made in tests: triangle soups, single facets, and a brute-force ray caster in double precision to judge the fast one.
+// Scenes made in tests: triangle soups, single facets, and a brute-force ray caster in double precision, with which the fast
+// one is compared.
 #pragma once
 
 #include <cmath>

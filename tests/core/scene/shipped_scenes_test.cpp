@@ -1,4 +1,4 @@
-// Every scene we ship loads, and is what docs/scenes.md says it is.
+// Every shipped scene loads, and agrees with docs/scenes.md.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -19,7 +19,7 @@ std::shared_ptr<const Scene> shipped(const std::string& name) {
   return *scene;
 }
 
-// The object that a ray from `from` in direction azimuth, elevation hits, and how far away.
+// The object that a ray from `from` in direction azimuth, elevation hits, and its distance.
 std::pair<std::string, float> look(const RayScene& rays, Vec3d from, double azimuth_deg, double elevation_deg) {
   const double a = rad_from_deg(azimuth_deg), e = rad_from_deg(elevation_deg);
   RayPacket packet{};
@@ -58,7 +58,7 @@ TEST(ShippedScenes, DemoStaysSmallAndHasWhatItPromises) {
   const auto [below, depth] = look(rays, {7, 0, -3}, 0, -89);
   EXPECT_EQ(below, "bed");
   EXPECT_NEAR(depth, 2, 0.3);
-  // The wreck's two materials came by name from its file.
+  // The file of the wreck names its two materials.
   const auto wreck =
       std::find_if(scene->objects.begin(), scene->objects.end(), [](const Object& o) { return o.name == "wreck"; });
   std::set<std::string> names;
@@ -69,7 +69,8 @@ TEST(ShippedScenes, DemoStaysSmallAndHasWhatItPromises) {
 TEST(ShippedScenes, LTargetsStandWhereTheTableSays) {
   const RayScene rays(shipped("l-targets"), 1);
   const auto expect = [&](double azimuth, double elevation, const char* name, double range) {
-    const auto [object, distance] = look(rays, {}, azimuth, elevation + 0.1);  // off the equator, an edge of the mesh
+    const auto [object, distance] =
+        look(rays, {}, azimuth, elevation + 0.1);  // off the equator, because an edge of the mesh lies there
     EXPECT_EQ(object, name) << azimuth << " " << elevation;
     if (range > 0) {
       EXPECT_NEAR(distance, range - 0.1, 4e-3);
@@ -91,7 +92,7 @@ TEST(ShippedScenes, TankRodFrontIsHalfAMetreAhead) {
   EXPECT_EQ(ahead, "rod");
   EXPECT_NEAR(distance, 0.5, 1e-3);
   EXPECT_NEAR(look(rays, {-0.4, 0, -0.61}, 180, 0).second, 1.1684 - 0.4, 2e-3);
-  EXPECT_EQ(look(rays, {-0.4, 0, -0.61}, 0, 80).first, "nothing");  // no lid
+  EXPECT_EQ(look(rays, {-0.4, 0, -0.61}, 0, 80).first, "nothing");  // the tank has no lid
 }
 
 TEST(ShippedScenes, TwoCylindersInTheirTank) {

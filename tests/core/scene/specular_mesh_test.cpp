@@ -1,4 +1,4 @@
-// Mirror points of meshes beside those of the true surfaces they were made from.
+// Compares the mirror points of meshes with those of the surfaces that the meshes approximate.
 #include "core/scene/specular/specular_mesh.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ TEST(SpecularMesh, SphereHasANearAndAFarPoint) {
     const std::vector<SpecularPoint> points = on_mesh(mesh, 3.0 * direction);
     ASSERT_EQ(points.size(), 2u) << direction.x << " " << direction.y << " " << direction.z;
     EXPECT_NEAR(points[0].range_m, 2.5, 2e-4);
-    EXPECT_NEAR(points[1].range_m, 3.5, 2e-4);  // the inside of the far half, which the near one hides
+    EXPECT_NEAR(points[1].range_m, 3.5, 2e-4);  // the inside of the far half, hidden by the near half
     EXPECT_GT(dot(points[0].normal, direction), 0.9995);
     for (const double k : points[0].curvature) EXPECT_NEAR(k, 2, 0.25);
     for (const double k : points[1].curvature) EXPECT_NEAR(k, -2, 0.25);
@@ -83,12 +83,12 @@ TEST(SpecularMesh, BoxIsSixFaces) {
   EXPECT_EQ(mirrors.curved_triangles(), 0u);
   const Vec3d sonar{2, 0.1, -0.2};
   const std::vector<SpecularPoint> points = on_mesh(mesh, sonar);
-  ASSERT_EQ(points.size(), 2u);  // the back is hidden by the front; rays tell
+  ASSERT_EQ(points.size(), 2u);  // the back is hidden by the front; only rays determine this
   const std::vector<SpecularPoint> exact = on_primitive({.kind = Primitive::Kind::box, .size_m = {0.6, 0.4, 0.8}}, sonar);
   ASSERT_EQ(exact.size(), 1u);
   EXPECT_NEAR(points[0].range_m, exact[0].range_m, 1e-6);
   EXPECT_NEAR(length(points[0].foot_m - exact[0].foot_m), 0, 1e-6);
-  EXPECT_EQ(points[0].outline.size(), 2u * (2 + 4));  // only the rim, cut into quarters of a metre
+  EXPECT_EQ(points[0].outline.size(), 2u * (2 + 4));  // only the rim, divided into quarters of a metre
 }
 
 TEST(SpecularMesh, FacetsWoundTheOtherWayBelongAllTheSame) {
@@ -118,7 +118,7 @@ TEST(SpecularMesh, UnwantedMaterialsAreLeftOut) {
   EXPECT_EQ(SpecularMesh(mesh, {}).faces(), 0u);
 }
 
-// The frequency decides which of the two reflects, so neither may be dropped as a repetition of the other.
+// The frequency decides which of the two reflects. Therefore neither may be dropped as a duplicate of the other.
 TEST(SpecularMesh, SurfacesOfTwoMaterialsAreNeverOne) {
   Mesh mesh = make_sphere(0.5, segments_for(0.5));
   const Mesh coat = make_sphere(0.5002, segments_for(0.5));
@@ -145,7 +145,7 @@ TEST(SpecularMesh, SmallAngleIsACurveLargeAngleAnEdge) {
 
 TEST(SpecularMesh, NothingFromNothing) {
   EXPECT_TRUE(on_mesh({}, {1, 2, 3}).empty());
-  EXPECT_TRUE(on_mesh(make_sphere(0.5, 32), {1000, 0, 0}).empty());  // beyond the range asked for
+  EXPECT_TRUE(on_mesh(make_sphere(0.5, 32), {1000, 0, 0}).empty());  // beyond the requested range
 }
 
 TEST(SpecularPrimitives, TankIsAudibleFromInsideAndOutside) {
