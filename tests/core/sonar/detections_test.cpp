@@ -1,4 +1,4 @@
-// Points of an echo sounder, over pictures summed from point scatterers by a sum that shares nothing with the engine.
+// Detected points of an echo sounder, in pictures summed from point scatterers by code that shares nothing with the engine.
 #include "core/sonar/detections.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace {
 constexpr int beams = 64, directions = 16;
 constexpr double above_db = 15, width_rad = 7 * pi / 180;
 
-/// Pattern of 21 elements, Hamming, 7 degrees wide at -3 dB; by the difference of two sines.
+/// Pattern of 21 elements with Hamming weights, 7 degrees wide at -3 dB, as a function of the difference of two sines.
 double pattern(double sines) {
   static const std::vector<double> table = [] {
     std::vector<double> values;
@@ -61,14 +61,14 @@ class Sounding {
     const PingSettings& settings = ping_.request.settings;
     const double row = (s.range_m - settings.range_of_row(0)) / settings.range_bin_m;
     for (int n = std::max(0, static_cast<int>(row) - 6); n < std::min(settings.range_bin_count, static_cast<int>(row) + 8); ++n) {
-      const double pulse = std::exp(-std::log(2.0) * 2 * std::pow((n - row) / 1.5, 2));  // half its power at half its width
+      const double pulse = std::exp(-std::log(2.0) * 2 * std::pow((n - row) / 1.5, 2));  // half of its power at half of its width
       for (int j = 0; j < beams; ++j)
         signal_[static_cast<std::size_t>(n * beams + j)] +=
             s.amplitude * pulse *
             pattern(std::sin(static_cast<double>(ping_.beam_azimuth_rad[static_cast<std::size_t>(j)])) - std::sin(s.azimuth_rad));
     }
   }
-  /// Evenly scattering; `range_m` of an azimuth.
+  /// A surface that scatters evenly. `range_m` is a function of the azimuth.
   void add_floor(const std::function<double(double)>& range_m) {
     for (int i = -600; i <= 600; ++i) {
       const double azimuth = i * rad_from_deg(0.08);
@@ -94,7 +94,7 @@ class Sounding {
 
 int direction_of(const Detection& p) { return static_cast<int>(std::floor((40 - deg_from_rad(p.azimuth_rad)) / 5)); }
 
-/// Every direction has a point, which lies on the floor: two and a half pulses off at most, half of one usually.
+/// Every direction has a point on the floor. The error is at most two and a half pulses, usually half a pulse.
 void expect_floor(double altitude_m, double slope_deg) {
   for (const double row_m : {0.012, 0.024, 0.048})
     for (unsigned seed = 1; seed <= 4; ++seed) {

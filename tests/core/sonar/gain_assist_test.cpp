@@ -1,4 +1,4 @@
-// Gain assist: the rule against its closed form, and what a device remembers from ping to ping.
+// Gain assist: the rule compared with its closed form, and the state that a device keeps from ping to ping.
 #include "core/sonar/gain_assist.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(GainAssist, PercentileOfEverySampleSize) {
 }
 
 TEST(GainAssist, ApproachesWithItsTimeConstant) {
-  // 6 dB below the wanted level (in amplitude): after one time constant 63 % of that is made up.
+  // 6 dB below the wanted level (in amplitude). After one time constant, 63 % of this difference has been corrected.
   EXPECT_NEAR(next_gain_db(40, assisted_level / 2, 1, 0.3), 40 + (1 - std::exp(-1.0)) * 20 * std::log10(2.0), 1e-9);
   EXPECT_NEAR(next_gain_db(40, assisted_level, 1, 0.1), 40, 1e-9);
   EXPECT_NEAR(next_gain_db(40, assisted_level / 2, 0.5, 100), 40 + 40 * std::log10(2.0), 1e-9)
@@ -43,7 +43,7 @@ TEST(GainAssist, ApproachesWithItsTimeConstant) {
   EXPECT_LT(next_gain_db(40, 1, 1, 10), 30) << "a saturated picture does not say how far it is over";
 }
 
-/// A device over a scene whose 99th percentile is `scene` of full scale at gain 0 dB, pinging every `period`.
+/// A device over a scene whose 99th percentile is the fraction `scene` of full scale at gain 0 dB. It pings every `period`.
 double settled_gain_db(double scene, double gamma, float from_db, int pings, milliseconds period) {
   GainAssist assist;
   PingSettings settings;
@@ -82,7 +82,7 @@ TEST(GainAssist, SettlesWhereTheLoudPartIsJustBelowFullScale) {
     }
 }
 
-/// A scene that grows louder by 3 dB a second: the gain follows without steps, and the picture saturates only now and then.
+/// A scene that becomes louder by 3 dB per second. The gain follows without steps, and the picture saturates only occasionally.
 TEST(GainAssist, FollowsAGrowingSceneWithoutSteps) {
   for (const double gamma : {1.0, 0.5}) {
     GainAssist assist;
@@ -96,7 +96,7 @@ TEST(GainAssist, FollowsAGrowingSceneWithoutSteps) {
       const auto gain = static_cast<double>(assist.gain_db(settings, at));
       if (i > 50) largest_step = std::max(largest_step, std::abs(gain - before));
       before = gain;
-      const double level_db = gain - 40 - 10 + 0.3 * i;  // level of the loud part, over full scale
+      const double level_db = gain - 40 - 10 + 0.3 * i;  // level of the loud part, re full scale
       const double v = std::min(1.0, std::pow(std::pow(10, level_db / 20), gamma));
       Ping ping = picture(0.02, static_cast<std::uint32_t>(std::lround(v * 65535)), 16, 65535);
       ping.request.settings.format.gamma = settings.format.gamma;

@@ -1,5 +1,5 @@
-// Oracles 27 to 29 of the acoustic model: absorption table, continuity of its branches, published sound speeds;
-// and the check values of the density equation. Reference numbers come from the papers, not from our code.
+// Oracles 27 to 29 of the acoustic model: absorption table, continuity of its branches, published sound speeds, and the check
+// values of the density equation. The reference numbers come from the papers, not from this code.
 #include "core/sonar/water.hpp"
 #include "tests/oracles/record.hpp"
 
@@ -33,10 +33,10 @@ TEST(Water, Oracle27_AbsorptionTable) {
     for (int column = 0; column < 5; ++column) {
       const Water water{.temperature_c = waters[column].temperature_c, .salinity_psu = waters[column].salinity_psu, .ph = 8};
       const double got = 1000 * absorption_db_per_m(water, 0, row.frequency_khz * 1e3);
-      // The two smallest entries are printed to three digits only.
+      // The two smallest entries are printed with only three digits.
       const double tolerance = std::max(1e-3 * row.db_per_km[column], 0.0051);
       EXPECT_NEAR(got, row.db_per_km[column], tolerance) << row.frequency_khz << " kHz, column " << column;
-      const bool rounded = tolerance > 1e-3 * row.db_per_km[column];  // by the table itself, beyond what is asked
+      const bool rounded = tolerance > 1e-3 * row.db_per_km[column];  // limit of the table itself, beyond the requirement
       if (!rounded) test::record_oracle(27, "over the table's", 1, got / row.db_per_km[column], 1e-3, "");
     }
   }
@@ -70,7 +70,7 @@ TEST(Water, Oracle28_AbsorptionBranchesMeetAt20Degrees) {
       const Water above{.temperature_c = std::nextafter(20.0, 21.0), .salinity_psu = salinity, .ph = 8};
       const double f = row.frequency_khz * 1e3;
       const double a = absorption_db_per_m(below, 0, f), b = absorption_db_per_m(above, 0, f);
-      EXPECT_NE(a, b);  // two branches, not one
+      EXPECT_NE(a, b);  // the two branches differ
       test::record_oracle(28, "above over below 20 C", 1, b / a, 1e-3, "");
     }
   }
