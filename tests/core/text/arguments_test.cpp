@@ -1,4 +1,4 @@
-// Faults of a command line, in one sentence with option, value and the allowed values.
+// Errors of a command line: one sentence with option, value and the allowed values.
 #include "core/text/arguments.hpp"
 
 #include <gmock/gmock.h>

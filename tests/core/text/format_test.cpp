@@ -1,4 +1,4 @@
-// Texts with numbers in them: short ones, long ones and none at all.
+// Texts with numbers in them: short, long and empty texts.
 #include "core/text/format.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// IPv4 addresses: text to bytes to number and back; every other text is refused.
+// IPv4 addresses: conversion from text to bytes to number and back. All other texts are refused.
 #include "core/text/ipv4.hpp"
 
 #include <gtest/gtest.h>

@@ -13,7 +13,7 @@ constexpr std::array<std::string_view, 5> keys{"range_m", "rate_hz", "mount", "t
 
 TEST(Nearest, FindsSlipsOfTheFinger) {
   EXPECT_EQ(nearest("mout", keys), "mount");
-  EXPECT_EQ(nearest("muont", keys), "mount");  // a swap is one slip
+  EXPECT_EQ(nearest("muont", keys), "mount");  // a swap counts as one error
   EXPECT_EQ(nearest("bind-ip", keys), "bind_ip");
   EXPECT_EQ(nearest("Mount", keys), "mount");
   EXPECT_EQ(nearest("rang_m", keys), "range_m");

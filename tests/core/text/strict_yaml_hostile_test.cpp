@@ -34,7 +34,7 @@ TEST(StrictYamlHostile, Refusals) {
   EXPECT_THAT(refusal("\xFF\xFE"
                       "a"),
               HasSubstr("not UTF-8"));
-  // Latin-1, an overlong form and half a character would reach status and metrics, whose readers refuse them.
+  // Latin-1, an overlong form and half a character. In status and metrics, readers would refuse them.
   for (const char* text : {"a: 1\nb: r\xf6v", "a: 1\nb: r\xc0\xafv", "a: 1\nb: r\xe2\x82"})
     EXPECT_EQ(refusal(text), "f.yaml:2:5: not UTF-8; save the file as UTF-8");
   EXPECT_TRUE(parse_yaml("\xef\xbb\xbf# \xe2\x82\xac\na: r\xc3\xb6v", "f.yaml"));
@@ -80,7 +80,7 @@ TEST(StrictYamlHostile, ManyKeysAreCheckedInLittleTime) {
   EXPECT_TRUE(d->finish());
 }
 
-// Reads whatever is there, as configurations and scenes do.
+// Reads all values, as configurations and scenes do.
 void read_all(const Node& n, int depth = 0) {
   if (n.is_map()) {
     Map m = n.map();

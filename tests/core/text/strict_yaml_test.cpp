@@ -1,4 +1,4 @@
-// Reading values: what is accepted, what is refused, and the exact sentences.
+// Reading values: accepted and refused values, and the exact error texts.
 #include "core/text/strict_yaml.hpp"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ Document parsed(std::string_view text) {
   return std::move(*d);
 }
 
-// The sentence a reader ends with, or "ok".
+// The error text of a reader, or "ok".
 std::string read(std::string_view text, const std::function<void(Map)>& reader) {
   const Document d = parsed(text);
   reader(d.root());
@@ -179,7 +179,7 @@ TEST(StrictYaml, TextsHaveLimits) {
   EXPECT_EQ(read("a: abcdef", [](Map m) { m.required("a").text(5); }), "f.yaml:1:4: a: has 6 bytes, at most 5 are allowed");
 }
 
-// docs/scenes.md promises this form of sentence.
+// docs/scenes.md promises this form of the error text.
 TEST(StrictYaml, UnknownKeyNamesTheNearest) {
   const std::string text = "sonars:\n  - name: front\n    rang: 10\n";
   const auto reader = [](Map m) {
