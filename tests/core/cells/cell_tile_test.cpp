@@ -1,4 +1,4 @@
-// The cells of a tile against a plain way of making them: point by point, with the library's functions and a sort.
+// Compares the cells of a tile with a simple implementation: point by point, with functions of the standard library and a sort.
 #include "core/scene/cells/cell_tile.hpp"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace sonar {
 namespace {
 
 constexpr int side = 16;                        // cells along a tile
-constexpr std::uint32_t block_key = 0x6e6574u;  // keeps the draws of blocks apart from those of cells
+constexpr std::uint32_t block_key = 0x6e6574u;  // separates the draws of blocks from those of cells
 
 struct LatticePoint {
   double u, v;
@@ -27,23 +27,23 @@ struct LatticePoint {
 };
 
 struct Cell {
-  std::uint32_t order;  // 4 x 4 sub-squares, so that sixteen neighbours in memory are neighbours in space
+  std::uint32_t order;  // order by 4 x 4 sub-squares: sixteen neighbours in memory are neighbours in space
   Vec3d from_centre;
   Vec3d normal;
   float re, im;
 };
 
-/// Which quarter of its cell a point lies in, across a 4 x 4 block, from where the cell lies along it: two binary digits, each
-/// flipped by random bits that depend on the digits before it (nested scrambling).
+/// The quarter of a cell in which its point lies, along one axis of a 4 x 4 block, from the position of the cell in the block:
+/// two binary digits, each flipped by random bits that depend on the digits before it (nested scrambling).
 int quarter_of(int along, std::uint32_t scramble) {
   const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
   const int half = (along & 1) ^ bit(along >> 1);
   return 2 * half + ((along >> 1) ^ bit(2 + half));
 }
 
-/// One draw gives a lattice cell all it needs: two numbers for where its point lies, two for its speckle. Points of a block of 4
-/// x 4 cells share the block out: its sixteen strips of any shape from 1/16 x 1 to 1 x 1/16 hold one point each (a scrambled
-/// digital net), so that the echo of a stretch of range depends little on the draw. Each point alone is uniform in its cell.
+/// One draw of a lattice cell gives four numbers: two for the position of its point, two for its speckle. The points of a block
+/// of 4 x 4 cells form a scrambled digital net: each of the sixteen strips of any shape from 1/16 x 1 to 1 x 1/16 contains one
+/// point. So the echo of an interval of range depends little on the draw. Each point by itself is uniform in its cell.
 std::array<LatticePoint, side * side> draw_points(const TileAddress& a, std::uint32_t texture_seed, Seed seed) {
   std::array<LatticePoint, side * side> points;
   const double s = lattice::cell_size_m(a.level);
@@ -76,7 +76,7 @@ constexpr std::uint32_t sub_square_order(int row, int col) {
   return static_cast<std::uint32_t>((row / 4) * 64 + (col / 4) * 16 + (row % 4) * 4 + col % 4);
 }
 
-/// Lattice columns (or rows) of this tile that an interval of the plane can reach.
+/// Columns (or rows) of the lattice in this tile that an interval of the plane can reach.
 struct CellRange {
   int from, to;
 };
@@ -131,7 +131,7 @@ void pack(const std::vector<Cell>& cells, CellTile& tile) {
     tile.data[static_cast<std::size_t>(c * tile.stride + i)] = v;
   };
   for (int i = 0; i < tile.count; ++i) {
-    const Cell& c = cells[static_cast<std::size_t>(std::min(i, n - 1))];  // padding repeats the last place, with zero weight
+    const Cell& c = cells[static_cast<std::size_t>(std::min(i, n - 1))];  // padding repeats the last position with zero weight
     put(CellTile::x, i, counts(c.from_centre.x / tile.position_unit_m));
     put(CellTile::y, i, counts(c.from_centre.y / tile.position_unit_m));
     put(CellTile::z, i, counts(c.from_centre.z / tile.position_unit_m));
@@ -167,7 +167,7 @@ CellTile built_plainly(const TileAddress& a, const Mesh& mesh, std::span<const s
   return tile;
 }
 
-/// Every triangle whose normal leans most to the axis, on the side that the address names.
+/// All triangles whose normals have the axis as their largest component, on the side that the address names.
 std::vector<std::uint32_t> of_patch(const Mesh& mesh, const TileAddress& a) {
   std::vector<std::uint32_t> triangles;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -218,7 +218,7 @@ void compare(const Mesh& mesh, TileAddress a, int reach, const TextureField* tex
       }
 }
 
-/// Triangles of all directions about the origin, some of them small, some through the whole cube of side 2.
+/// Triangles in all directions about the origin. Some are small, some cross the whole cube of side 2.
 Mesh heap(std::uint32_t count, std::uint32_t seed) {
   Mesh mesh;
   for (std::uint32_t t = 0; t < count; ++t) {
@@ -254,7 +254,7 @@ TEST(CellTile, EqualsTheOneMadePointByPointWithTexture) {
   EXPECT_GT(sum.cells, 500);
 }
 
-// Two patches through one cube own the same points; so do two copies of one triangle, and the earlier comes first.
+// Two patches in one cube own the same points. So do two copies of one triangle; then the earlier copy comes first.
 TEST(CellTile, PointsWithSeveralSurfacesKeepTheirOrder) {
   Mesh mesh;
   for (const float z : {0.1f, 0.3f, 0.1f}) {
@@ -293,7 +293,8 @@ TEST(CellTile, EqualsTheOneMadePointByPointOnATerrain) {
   }
 }
 
-// The same digest on every processor: with AVX-512, with AVX2, with neither, and under sanitizers, where one way is compiled.
+// The digest is the same on every processor: with AVX-512, with AVX2, with neither, and with sanitizers, where only one form is
+// compiled.
 TEST(CellTile, BytesDoNotDependOnTheInstructionSet) {
   const Mesh mesh = heap(120, 8);
   std::uint64_t digest = 0xcbf29ce484222325u;

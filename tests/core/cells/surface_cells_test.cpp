@@ -72,7 +72,7 @@ std::shared_ptr<const Scene> scene_of(std::shared_ptr<const Mesh> mesh) {
   return scene;
 }
 
-/// Everything in front of a sonar that looks along +x from far behind, at one level.
+/// A view of everything in front of a sonar that looks along +x from far behind, at one level.
 CellView whole_scene(int level, Vec3d from = {-200, 0, 0}) {
   CellView view;
   view.sonar_in_world.position_m = from;
@@ -102,7 +102,8 @@ TEST(SurfaceCells, EveryLatticePointOfATerrainHasExactlyOneOwner) {
     for (int i = 0; i < t.tile->count; ++i) {
       if (!real(*t.tile, i)) continue;
       const Vec3d p = place(*t.tile, i);
-      // A point's rounding may carry it over its cell's border by micrometres: count the owners of neighbours together below.
+      // Rounding may move a point across the border of its cell by micrometres. Therefore the owners of neighbouring cells are
+      // counted together below.
       ++owners[{std::lround(std::floor(p.x * 32)), std::lround(std::floor(p.y * 32))}];
     }
   }
@@ -112,10 +113,11 @@ TEST(SurfaceCells, EveryLatticePointOfATerrainHasExactlyOneOwner) {
     wrong += n != 1;
   }
   EXPECT_EQ(total, 128 * 128);
-  EXPECT_LE(wrong, 20);  // rounding of stored places only
+  EXPECT_LE(wrong, 20);  // allowed: rounding of stored positions
 }
 
-// Condition of an even flat bed (docs/acoustics.md, section 3): a strip of a block's sixteenth of any shape holds one point.
+// Condition of a uniform flat bed (docs/acoustics.md, section 3): each strip of a sixteenth of a block, of any shape, contains
+// one point.
 TEST(SurfaceCells, SixteenNeighboursShareTheirBlockOutEvenly) {
   SurfaceCells cells(scene_of(terrain(1, 2.0, [](double, double) { return 0.0; })), Seed{5}, 1u << 30);
   Parallel pool(1);
@@ -141,8 +143,8 @@ TEST(SurfaceCells, SixteenNeighboursShareTheirBlockOutEvenly) {
   int wrong = 0;
   for (const auto& [strip, n] : in_strip) wrong += n != 1;
   EXPECT_NEAR(static_cast<double>(in_strip.size()), 5 * 64 * 64, 12);
-  EXPECT_LE(wrong, 12);                    // places are stored to 1 / 4000 of a cell: a few round over a border
-  EXPECT_NEAR(sum[0] / total, 0.5, 0.01);  // alone, a point is uniform in its cell
+  EXPECT_LE(wrong, 12);                    // positions are stored to 1 / 4000 of a cell; rounding moves a few across a border
+  EXPECT_NEAR(sum[0] / total, 0.5, 0.01);  // a point by itself is uniform in its cell
   EXPECT_NEAR(sum[1] / total, 0.5, 0.01);
   EXPECT_NEAR(corner / total, 0.25, 0.02);
 }
@@ -243,7 +245,7 @@ TEST(SurfaceCells, SeveralViewsAtOnceFindWhatEachFindsAlone) {
   SurfaceCells alone(scene, Seed{5}, 1u << 30);
   CellView nothing = whole_scene(4, {0, 0, 500});
   nothing.max_range_m = 1;
-  // With a tiny budget all cells are removed when none is in view, and none within one call.
+  // With a tiny budget all cells are removed if no cell is in view, and no cell is removed within one call.
   for (const std::size_t budget : {std::size_t{1} << 30, std::size_t{1} << 12}) {
     SurfaceCells together(scene, Seed{5}, budget);
     for (int again = 0; again < 2; ++again) {
@@ -264,7 +266,7 @@ TEST(SurfaceCells, SeveralViewsAtOnceFindWhatEachFindsAlone) {
 }
 
 TEST(SurfaceCells, AnObjectAttachedToABodyHasItsCellsWhereItIs) {
-  const Pose attached{{1.5, -0.4, 0.3}, quat_from_rpy({0.2, -0.1, 0.7})};  // in the body
+  const Pose attached{{1.5, -0.4, 0.3}, quat_from_rpy({0.2, -0.1, 0.7})};  // pose in the body
   const Pose body_then{{9, 9, -9}, quat_from_rpy({0, 0, 2})}, body_now{{3, 1, 0.5}, quat_from_rpy({0.1, 0.3, -0.4})};
   auto fixed = std::make_shared<Scene>(*scene_of(sphere(0.4, 12)));
   auto riding = std::make_shared<Scene>(*fixed);
@@ -283,7 +285,7 @@ TEST(SurfaceCells, AnObjectAttachedToABodyHasItsCellsWhereItIs) {
   ASSERT_EQ(found.size(), expected.size());
   ASSERT_FALSE(found.empty());
   for (std::size_t i = 0; i < found.size(); ++i) EXPECT_LT(length(found[i].from_sonar_m - expected[i].from_sonar_m), 1e-9);
-  EXPECT_EQ(bytes_of(found), bytes_of(expected));  // its speckle rides with it
+  EXPECT_EQ(bytes_of(found), bytes_of(expected));  // the speckle moves with the object
 }
 
 TEST(SurfaceCells, ALongJourneyStaysWithinItsBudget) {
@@ -336,7 +338,7 @@ TEST(SurfaceCells, CullsWhatLiesBehindBesideOrBeyond) {
 }
 
 TEST(CellLattice, SharedEdgesHaveOneOwner) {
-  // Points exactly on the shared edge, both windings.
+  // Points exactly on the shared edge, for both directions of the triangles.
   for (int flip = 0; flip < 2; ++flip) {
     Mesh mesh;
     mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
@@ -352,7 +354,7 @@ TEST(CellLattice, SharedEdgesHaveOneOwner) {
   }
 }
 
-// Cells coarser than the cubes that a small body was planted in.
+// These cells are coarser than the first cubes of a small body.
 TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
   const auto scene = scene_of(sphere(1, 24));
   SurfaceCells from_coarse(scene, Seed{9}, 1u << 30), from_fine(scene, Seed{9}, 1u << 30);
@@ -363,7 +365,7 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
       for (int i = 0; i < t.tile->count; ++i) count += real(*t.tile, i);
     return count;
   };
-  // Area of the six patches on their lattices, about [m^2].
+  // Area of the six patches on their lattices (approximate) [m^2].
   const double shadows = 6 * 4 * std::asin(1 / std::sqrt(3)) / std::sqrt(2);
   const int coarse = counted(from_coarse, whole_scene(0));
   for (int level = 6; level >= 1; --level) {
@@ -371,7 +373,7 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
     EXPECT_NEAR(counted(from_fine, whole_scene(level)), expected, 0.1 * expected + 3 * std::sqrt(expected)) << level;
   }
   EXPECT_GT(coarse, 0);
-  // The order is the same whichever level was requested first.
+  // The order does not depend on which level was requested first.
   const CellView view = whole_scene(1);
   counted(from_fine, whole_scene(0));
   const auto first = from_coarse.in_view(view, pool), second = from_fine.in_view(view, pool);
@@ -380,14 +382,14 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
     ASSERT_EQ(first[t].tile->bytes(), second[t].tile->bytes());
     EXPECT_EQ(std::memcmp(first[t].tile->data.get(), second[t].tile->data.get(), first[t].tile->bytes()), 0);
   }
-  // Also if only the side lobes request such coarse cells, and beside a finer level.
+  // The same if only the side lobes request such coarse cells, and beside a finer level.
   CellView sides = whole_scene(4, {-10, 0, -10});
   sides.main_elevation_rad = 0.1f, sides.side_from_rad = 0.1f, sides.side_area_per_range_m = 1e6f, sides.side_coarser = 2;
   SurfaceCells beside(scene, Seed{9}, 1u << 30);
   EXPECT_EQ(counted(beside, sides), counted(from_fine, whole_scene(2)));
 }
 
-// Scenes in turn: tiles kept from earlier ones are equal to newly made ones, in the same order, at coarse and fine levels.
+// Alternating scenes: tiles that were kept equal newly made tiles, in the same order, at coarse and fine levels.
 TEST(SurfaceCells, AnotherSceneHasTheCellsOfANewOne) {
   const auto one = terrain(20, 4.0, gentle), other = terrain(16, 4.0, gentle), ball = sphere(0.5, 12);
   const auto with = [&](std::vector<std::shared_ptr<const Mesh>> meshes, std::uint32_t texture_seed, float shape) {
