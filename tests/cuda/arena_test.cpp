@@ -1,4 +1,4 @@
-// Memory of a batch: every byte that is copied back was written, also between the pieces.
+// Memory of a batch: every byte that is copied back was written before, also between the pieces.
 #include "cuda/arena.hpp"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@ namespace sonar::cuda {
 namespace {
 
 TEST(Arena, SetsMemoryThatComesBackToZero) {
-  const auto machine = make_host_loops(LoopOrder::backwards);  // whose memory begins as 0xFF
+  const auto machine = make_host_loops(LoopOrder::backwards);  // its memory begins as 0xFF
   Arena results(*machine, Arena::Where::both, 4096, 0);
   const auto few = results.allocate<std::uint8_t>(8), more = results.allocate<std::uint8_t>(8);
   ASSERT_EQ(more.host - few.host, 256);

@@ -1,4 +1,4 @@
-// The device's rays meet what Embree's meet: over relief, through bodies turned any way, along edges and past silhouettes.
+// The device's rays have the same hits as Embree's: on relief, through rotated bodies, along edges and past silhouettes.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,7 +43,7 @@ struct Agreement {
   int rays = 0, hits = 0, other_object = 0;
   double worst_range = 0;
 };
-/// Rays from places above to places around.
+/// Rays from points above to points around.
 Agreement compare(const Tracers& t, Vec3d middle, double spread, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> any(-1, 1);
@@ -73,7 +73,7 @@ TEST(DeviceRays, MeetARoughBedWhereEmbreesDo) {
   const Tracers t(maker.make());
   const Agreement a = compare(t, {0, 0, 2}, 6, 1);
   EXPECT_GT(a.hits, 6000);
-  EXPECT_LE(a.other_object, 2);  // silhouettes: one of 20,000 rays may pass an edge on either side
+  EXPECT_LE(a.other_object, 2);  // at silhouettes, one of 20,000 rays may pass an edge on the other side
   EXPECT_LT(a.worst_range, 2e-4);
   RecordProperty("other_object", a.other_object);
 }
@@ -99,7 +99,7 @@ TEST(DeviceRays, MeetBodiesWhereverTheyAre) {
   }
 }
 
-// A closed surface hit from inside: not one ray of a hundred thousand, most of them at edges and corners, may slip out.
+// A closed surface seen from inside. Of a hundred thousand rays, most of them at edges and corners, none may miss it.
 TEST(DeviceRays, NeverSlipThroughAnEdge) {
   SceneMaker maker;
   const Mesh mesh = test::sphere(2, 4);
@@ -134,7 +134,7 @@ TEST(DeviceRays, MeetOneTriangleAndManyInOnePlace) {
   SceneMaker maker;
   Mesh fan;
   fan.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-  for (int i = 0; i < 300; ++i) fan.triangles.push_back({0, 1, 2});  // no plane divides them
+  for (int i = 0; i < 300; ++i) fan.triangles.push_back({0, 1, 2});  // no plane separates them
   fan.material.assign(300, 0);
   maker.add(fan, -20);
   const auto scene = maker.make();
@@ -143,7 +143,7 @@ TEST(DeviceRays, MeetOneTriangleAndManyInOnePlace) {
   const Vec3d o = flat.origin();
   const RayHit hit = trace_ray(host_view(flat, places), ray_to(Vec3d{0.2, 0.2, 1} - o, Vec3d{0.2, 0.2, -1} - o), 10);
   EXPECT_EQ(hit.object, 0u);
-  EXPECT_EQ(hit.triangle, 0u);  // with many triangles at one range, always the first
+  EXPECT_EQ(hit.triangle, 0u);  // if many triangles have the same range, always the first
   EXPECT_NEAR(hit.range_m, 1, 1e-6);
 }
 

@@ -1,4 +1,4 @@
-// The device engine beside the CPU's, and how far two pings are apart.
+// The device engine and the CPU engine over one scene, and the difference of two pings.
 #pragma once
 
 #include <algorithm>
@@ -16,16 +16,17 @@
 
 namespace sonar::test {
 
-/// Machine of these tests' engine: host loops, or, in programs compiled for it, the device.
+/// The machine of these tests' engine: host loops or, in programs compiled for it, the device.
 #ifdef SONAR_TEST_ON_DEVICE
 inline Result<std::unique_ptr<cuda::Machine>> test_machine() {
-  setenv("SONARD_CUDA_MODULE", SONAR_TEST_ON_DEVICE, 0);  // the environment's first: a packed test lies elsewhere
+  setenv("SONARD_CUDA_MODULE", SONAR_TEST_ON_DEVICE,
+         0);  // the value of the environment has priority, because a packed test lies elsewhere
   return cuda::open_cuda_machine();
 }
 #else
 inline Result<std::unique_ptr<cuda::Machine>> test_machine() { return cuda::make_host_loops(); }
 #endif
-/// Stands first in every test.
+/// Every test begins with this macro.
 #define SKIP_WITHOUT_A_MACHINE() \
   if (const auto machine = sonar::test::test_machine(); !machine) GTEST_SKIP() << "CUDA: " << machine.error().text
 
@@ -53,8 +54,8 @@ class BothEngines {
 
 struct Apart {
   double relative_l2 = 0;       // difference of the beams' signals, or of pressures if those are not kept
-  std::uint32_t most_lsb = 0;   // largest difference of the samples
-  std::size_t samples_off = 0;  // that differ at all
+  std::uint32_t most_lsb = 0;   // largest difference of two samples
+  std::size_t samples_off = 0;  // number of samples that differ
   bool shape = true, truth = true;
 };
 

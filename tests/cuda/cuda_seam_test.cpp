@@ -1,4 +1,5 @@
-// The interface to the CUDA module works on every machine: without the module, with an invalid one, without and with a device.
+// The interface to the CUDA module on every machine: without the module, with an invalid one, without a device and with a
+// device.
 #include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +20,7 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 #ifdef SONARD_CUDA_MODULE
-/// The environment's, as the program began: a packed test lies elsewhere than the build.
+/// The value in the environment when the program began. A packed test is not in the build folder.
 const std::string built_module = [] {
   const char* const given = std::getenv("SONARD_CUDA_MODULE");
   return std::string(given ? given : SONARD_CUDA_MODULE);
@@ -45,7 +46,7 @@ TEST(CudaSeam, SaysThatThereIsNoModule) {
 TEST(CudaSeam, SaysThatAModuleIsNone) {
   look_at(SONARD_SOURCE_DIR "/LICENSE");
   EXPECT_THAT(cuda_status(), StartsWith("not loadable: "));
-  EXPECT_EQ(cuda_presence(), "not used");  // which did not try to load it
+  EXPECT_EQ(cuda_presence(), "not used");  // it did not try to load the module
   expect_no_engine();
 }
 
@@ -59,7 +60,7 @@ TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
 #endif
 }
 
-// The library alone: it names its cuFFT, or the missing file, without a device.
+// Only the library: it names its cuFFT, or the missing file, without a device.
 TEST(CudaSeam, FindsCufftOrSaysWhichFileIsMissing) {
 #ifdef SONARD_CUDA_MODULE
   void* library = dlopen(built_module.c_str(), RTLD_NOW | RTLD_LOCAL);

@@ -1,5 +1,5 @@
-// The device engine against the shipped CPU engine, which uses Embree. Both round rays differently in the last bit, so that at
-// the edge of a shadow a cell may be visible for only one of them; the test measures and bounds the number of such cells.
+// Compares the device engine with the shipped CPU engine, which uses Embree. The two round rays differently in the last bit. At
+// the edge of a shadow a cell may therefore be visible for only one of them. The test limits the number of such cells.
 #include <gtest/gtest.h>
 
 #include "tests/core/pipeline/basin.hpp"
@@ -9,7 +9,7 @@
 namespace sonar::test {
 namespace {
 
-/// Relief with a ball and a turned box that moves: plenty of shadows.
+/// Relief with a ball and a rotated, moving box: many shadows.
 std::shared_ptr<const Scene> sea_bed() {
   SceneMaker maker;
   maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
@@ -46,7 +46,7 @@ TEST(DeviceEngineBesideEmbree, DiffersByTheRimsOfShadowsAlone) {
     ASSERT_TRUE(d.shape);
     const double echoes = static_cast<double>(both.cpu().statistics().echoes);
     const double other_echoes = static_cast<double>(both.device().statistics().echoes);
-    // A rim that moves by a sixteenth of an interval of the fan moves a handful of cells of a hundred thousand.
+    // If the edge of a shadow moves by a sixteenth of an interval of the fan, only a few of a hundred thousand cells change.
     EXPECT_NEAR(other_echoes, echoes, 2e-3 * echoes) << i;
     EXPECT_LE(d.relative_l2, 0.05) << i;
     EXPECT_LE(d.samples_off, cpu.samples.size() / 50) << i;
@@ -59,7 +59,7 @@ TEST(DeviceEngineBesideEmbree, DiffersByTheRimsOfShadowsAlone) {
   RecordProperty("mean", std::to_string(all / pings));
 }
 
-// Without an object that casts a shadow both give the same.
+// Without an object that casts a shadow, both give the same samples.
 TEST(DeviceEngineBesideEmbree, IsTheSameWhereThereAreNoShadows) {
   SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;

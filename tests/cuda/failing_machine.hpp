@@ -1,4 +1,4 @@
-// A device that is lost at a given call and stays lost, with host loops inside: for tests of what happens then.
+// A device that fails at a given call and at all later calls, with host loops inside. Tests use it to examine the consequences.
 #pragma once
 
 #include <atomic>
@@ -16,11 +16,12 @@ class FailingMachine final : public cuda::Machine {
  public:
   /// If set, transforms fail with this reason.
   std::string no_transforms;
-  /// Bytes of the device; more is DeviceMemoryFull. `tells_bytes`: the free bytes that it reports at the start.
+  /// Memory of the device [bytes]. Larger requests cause DeviceMemoryFull. `tells_bytes`: the number of free bytes that it
+  /// reports at the start.
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
-  /// A fault of the program instead of a lost device: std::logic_error at the call `last`, and none after it.
+  /// A fault of the program instead of a lost device: std::logic_error at the call `last`, and at no call after it.
   bool has_fault = false;
-  /// `calls` counts the calls, and must outlive this object; call number `last` and all later ones fail.
+  /// `calls` counts the calls and must outlive this object. The call number `last` and all later calls fail.
   FailingMachine(int& calls, int last) : calls_(calls), last_(last) {}
 
   std::string name() const override { return "a device that fails"; }

@@ -1,4 +1,4 @@
-// A device that fails, at every call that it can fail at: no ping is lost, or the engine reports that it cannot continue.
+// A device that fails, at every possible call. No ping is lost, or the engine reports that it cannot continue.
 #include "tests/cuda/failing_machine.hpp"
 
 #include <gmock/gmock.h>
@@ -41,7 +41,7 @@ class LostDevice : public ::testing::Test {
       r.number = PingNumber{i};
       requests_.push_back(r);
     }
-    if (spectral::have_transform) {  // one that is transformed there and back
+    if (spectral::have_transform) {  // one ping that is transformed on the device
       SonarModel exact = *requests_[3].model;
       exact.modes[0].waveform.shape = Waveform::Shape::cw;
       exact.modes[0].waveform.exact = true;
@@ -58,7 +58,7 @@ class LostDevice : public ::testing::Test {
     device.say = [this](const std::string& what) { said_.push_back(what); };
     return cuda::make_device_engine(scene_, pool_, options_, std::make_unique<FailingMachine>(calls_, last_call), device);
   }
-  /// Submits calls of two requests; each is submitted before the previous one is collected.
+  /// Submits calls of two requests. Each is submitted before the previous one is collected.
   static std::vector<Ping> pipelined(PingEngine& engine, std::span<const PingRequest> requests) {
     std::vector<Ping> pings;
     const auto collect = [&] {
@@ -75,7 +75,7 @@ class LostDevice : public ::testing::Test {
   EngineOptions options_{.simd = SimdLevel::portable, .now_s = no_time};
   std::shared_ptr<const Scene> scene_;
   std::vector<PingRequest> requests_;
-  std::vector<std::vector<std::byte>> samples_;  // the CPU's
+  std::vector<std::vector<std::byte>> samples_;  // samples of the CPU
   int calls_ = 0;
   std::vector<std::string> said_;
 };
@@ -86,7 +86,7 @@ TEST_F(LostDevice, IsReplacedByTheCpuFromThePingItLost) {
     const auto sound = engine(never, true);
     first = calls_;
     sound->run(requests_);
-    all = calls_;  // before the waits of its end
+    all = calls_;  // number of calls before the waits at the end
     EXPECT_TRUE(said_.empty());
     EXPECT_THAT(sound->description(), StartsWith("cuda, "));
   }
@@ -94,7 +94,7 @@ TEST_F(LostDevice, IsReplacedByTheCpuFromThePingItLost) {
   ASSERT_GE(all - first, 40);
   for (int last = first; last < all; ++last) {
     const auto lost = engine(last, true);
-    for (const std::size_t count : {requests_.size(), std::size_t{1}}) {  // and again, when it has been lost for a while
+    for (const std::size_t count : {requests_.size(), std::size_t{1}}) {  // also some time after the failure
       const auto pings = lost->run(std::span(requests_).first(count));
       ASSERT_EQ(pings.size(), count);
       for (std::size_t i = 0; i < pings.size(); ++i) {
@@ -108,7 +108,7 @@ TEST_F(LostDevice, IsReplacedByTheCpuFromThePingItLost) {
   }
 }
 
-// Calls that were collected are the device's, all others the CPU's.
+// Calls that were collected before the failure come from the device, all others from the CPU.
 TEST_F(LostDevice, LosesNoPingOfCallsThatAreUnderWay) {
   const int first = (engine(never, true), calls_);
   const auto sound = engine(never, true);
@@ -186,7 +186,7 @@ TEST_F(LostDevice, IsNotAskedForTransformsThatItDoesNotHave) {
   EXPECT_EQ(said_[0], "CUDA: pings with an exact pulse are computed by the CPU (no libcufft.so.12)");
 }
 
-/// A device whose memory is full is not lost: everything is given back, batches become smaller, and no ping is lost.
+/// A device whose memory is full is not lost. All its memory is released, batches become smaller, and no ping is lost.
 TEST_F(LostDevice, IsNotWhatAFullOneIs) {
   constexpr std::size_t megabyte = 1u << 20;
   const std::vector<Ping> there = engine(never, false)->run(requests_);

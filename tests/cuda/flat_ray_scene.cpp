@@ -1,5 +1,5 @@
-// RayScene by the device's own rays, in place of Embree: a program that is linked with this file has one tracer for CPU and
-// device, so that what is left of a difference is arithmetic.
+// Implements RayScene with the device's own rays instead of Embree. A program that is linked with this file has one tracer for
+// CPU and device, so that only arithmetic can differ.
 #include "core/scene/ray_scene.hpp"
 #include "cuda/flat_scene.hpp"
 #include "cuda/trace_ray.hpp"

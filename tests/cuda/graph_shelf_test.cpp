@@ -1,4 +1,4 @@
-// Launches that become graphs: those that come twice, up to a small number, even if they differ by a few cells.
+// Launches that become graphs: those that occur twice, up to a small number, even if they differ by a few cells.
 #include "cuda/graph_shelf.hpp"
 
 #include <gtest/gtest.h>

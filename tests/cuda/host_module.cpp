@@ -1,6 +1,6 @@
-// A module as nvcc makes one, but with host loops for a device: the shipped programs then do all that they do with a CUDA device,
-// from looking for the module to the last image. SONARD_TEST_DEVICE_LASTS=N loses that device at the Nth call;
-// SONARD_TEST_DEVICE_IDLE=1 leaves out its steps, so that the rate is what the processor's share of a ping allows.
+// A module like that of nvcc, but with host loops as the device. With it the shipped programs do everything that they do with a
+// CUDA device, from the search for the module to the last image. SONARD_TEST_DEVICE_LASTS=N makes the device fail at the Nth
+// call. SONARD_TEST_DEVICE_IDLE=1 omits its steps, so that only the processor's part of a ping limits the rate.
 #include <climits>
 #include <cstdio>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// The order of a device's threads and queues and the addresses of its memory are arbitrary: the bytes do not depend on them, and
-// no step reads memory that was not written.
+// The order of a device's threads and queues and the addresses of its memory are arbitrary. The bytes must not depend on them,
+// and no step may read memory that was not written.
 #include <gtest/gtest.h>
 
 #include <iterator>
@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Device{"Piecewise", []() -> MachinePointer { return std::make_unique<PiecewiseMachine>(); }}),
     [](const auto& of) { return std::string(of.param.name); });
 
-// The test would detect a source of a copy that is used again too early, and a missing order.
+// The test would detect a source of a copy that is reused too early, and a missing order of lanes.
 TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   DeferringMachine machine;
   auto* host = static_cast<int*>(machine.allocate_host(sizeof(int)));
@@ -94,7 +94,7 @@ TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   machine.release_host(back);
 }
 
-// Cells that are evicted and sent again, more sets of settings than are kept, batches of every size: late steps must find their
+// Cells that are evicted and sent again, more sets of settings than are kept, batches of every size. Late steps must find their
 // data.
 TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
   const auto scene = basin();
@@ -103,7 +103,7 @@ TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
   for (int k = 0; k < 20; ++k) {
     PingRequest r = wide;
     r.switches.multipath = false;
-    r.settings.range_bin_count = 20 + 2 * (k % 10);  // more sets of settings than an engine keeps
+    r.settings.range_bin_count = 20 + 2 * (k % 10);  // more sets of settings than the engine keeps
     r.number = PingNumber{static_cast<std::uint32_t>(k)};
     r.sonar_in_world.position_m.x += 0.2 * (k % 3);
     all.push_back(std::move(r));
@@ -113,7 +113,8 @@ TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
     expect_same(there, pings_of(std::make_unique<DeferringMachine>(), scene, all, options));
 }
 
-// Pings of several sonars, in calls of every size, one after the other and submitted before the one before it is collected.
+// Pings of several sonars in calls of every size: one call after the other, and each submitted before the previous one is
+// collected.
 class Grouped : public ::testing::TestWithParam<std::size_t> {};
 
 TEST_P(Grouped, MakesTheSameBytes) {

@@ -1,4 +1,4 @@
-// A device that does not answer counts as failed, a slow one does not.
+// A device that does not answer counts as failed; a slow device does not.
 #include "cuda/patience.hpp"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ struct Waited {
   int code = 0, asked = 0, rested = 0;
   double s = 0;
 };
-/// Waits on a clock that advances by a millisecond at every look and every rest.
+/// Waits by a clock that advances by a millisecond at every query and every rest.
 Waited wait(double answers_after_s, int answer) {
   Waited w;
   w.code = wait_for(

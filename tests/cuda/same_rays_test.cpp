@@ -1,5 +1,5 @@
-// The device engine against the CPU engine where both are given the same rays (flat_ray_scene.cpp): the rest is arithmetic,
-// which must be the same. Every part of the model, alone and together, in batches and one by one.
+// Compares the device engine with the CPU engine if both have the same rays (flat_ray_scene.cpp). The rest is arithmetic, which
+// must be the same. All parts of the model, alone and together, in batches and one by one.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -12,8 +12,8 @@
 namespace sonar::test {
 namespace {
 
-// The goal is 1e-4 and 1 LSB. With the same rays, on a processor that rounds as the device does, it is nothing at all; the rest
-// is what the last bit of a library's sine, or a transform instead of a band across the beams, may do.
+// The goal is 1e-4 and 1 LSB. With the same rays, on a processor that rounds like the device, there is no difference, except
+// for the last bit of a library's sine and for a transform instead of a band across the beams.
 constexpr double most_apart = 5e-6;
 
 void expect_same(const Ping& cpu, const Ping& device, const std::string& what) {
@@ -25,13 +25,14 @@ void expect_same(const Ping& cpu, const Ping& device, const std::string& what) {
   EXPECT_TRUE(d.truth) << what;
 }
 
-/// Beams three times as wide: cells, most of whose time goes into making them, are a ninth as many.
+/// Beams three times as wide need a ninth of the cells. Most of the time is spent on making cells.
 std::shared_ptr<const SonarModel> with_wide_beams(FrequencyMode mode, Waveform::Shape shape) {
   mode.pattern.azimuth_width_rad *= 3;
   return model_of(mode, shape, false);
 }
 
-/// All turns that the device takes: tones in the time domain too. Ghosts, which are the CPU's and slow, in one of them only.
+/// All variants that the device computes, tones in the time domain included. Only one of them has ghosts, because the CPU
+/// computes these slowly.
 std::vector<std::pair<std::string, PingRequest>> on_device_turns() {
   auto all = turns();
   const auto tone = with_wide_beams(p900(), Waveform::Shape::cw), sweep = with_wide_beams(oculus_high(), Waveform::Shape::lfm);
@@ -67,7 +68,7 @@ TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
   EXPECT_TRUE(both.said.empty());
 }
 
-// Tones that are exact, and a pulse that is measured and complex: echoes to a grid, two transforms, back to samples.
+// Exact tones, and a measured complex pulse: from echoes to a grid, two transforms, and to samples.
 TEST(DeviceEngine, SumsPulsesByWayOfTheSpectrumAsTheCpuDoes) {
   SKIP_WITHOUT_A_MACHINE();
   if (const std::string why = spectral::have_transform ? test_machine().value()->why_no_transforms() : "no FFTW"; !why.empty())
@@ -99,7 +100,7 @@ TEST(DeviceEngine, SumsPulsesByWayOfTheSpectrumAsTheCpuDoes) {
     }
   ASSERT_EQ(requests.size(), 14u);
   EXPECT_TRUE(both.said.empty()) << both.said[0];
-  // Beside pings that need no transform, in one batch.
+  // In one batch with pings that need no transform.
   requests.push_back(high());
   requests.back().switches.multipath = false;
   std::swap(requests.back(), requests[2]);
@@ -128,8 +129,8 @@ TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// A launch that comes again may be a captured graph, one that is timed never is; a batch may end for lack of room, cells be sent
-// anew.
+// A repeated launch may be a captured graph, a timed launch never is one. A batch may end because memory is full, and cells may
+// be sent again.
 TEST(DeviceEngine, IsTheSameBytesHoweverItIsLaunched) {
   SKIP_WITHOUT_A_MACHINE();
   PingRequest request;
@@ -189,14 +190,16 @@ std::vector<Case> cases() {
   return {{"P1", p900(), default_rows(10, 394)}, {"P3a", oculus_high(), default_rows(10, 437)}, {"P3c", oculus_high(), near}};
 }
 
-// The benchmark's sizes, over relief with things on it, standing still and moving; also beside the CPU's widest instructions.
+// The sizes of the benchmark, over relief with objects, at rest and in motion. Also compared with the CPU's widest
+// instructions.
 TEST(DeviceEngine, DoesTheBenchmarksCases) {
   SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;
   maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
   maker.add(sphere(0.5, 4), -15, {5, 0.7, -1.5});
   maker.add_body(box({0.4, 0.3, 0.3}), -15, {{4, -1, -1.4}, quat_from_rpy({0.1, 0.2, 0.7})});
-  // More objects than the marks of 1 / x tell apart: the last one, close before the sphere, has the sphere's.
+  // More objects than the marks of 1 / x distinguish. The last object, close before the sphere, has the same mark as the
+  // sphere.
   for (int i = 3; i < 65; ++i) maker.add(wall(0.1, 0.1), -10, {-2.0 - i, 0, 0});
   maker.add(wall(0.3, 0.3), -20, {4.48, 0.7, -1.5});
   const auto scene = maker.make();
@@ -221,8 +224,8 @@ TEST(DeviceEngine, DoesTheBenchmarksCases) {
     EXPECT_EQ(ours.echoes, theirs.echoes) << c.name;
     RecordProperty(c.name, std::to_string(compare(cpu, device).relative_l2));
 
-    // The CPU's wider instructions fuse multiplications with additions. That turns carriers by a ten-thousandth: as far as the
-    // CPU's own loops are apart, and no farther, the device is from them.
+    // The CPU's wider instructions fuse multiplications with additions, which changes the phase of carriers by a
+    // ten-thousandth. The device may differ from them as much as the CPU's own portable loops do.
     Parallel pool(2);
     const Ping fused = make_cpu_engine(scene, pool, {})->run({&r, 1}).at(0);
     EXPECT_LE(compare(fused, device).relative_l2, 1.01 * compare(fused, cpu).relative_l2 + 1e-6) << c.name;
@@ -232,7 +235,7 @@ TEST(DeviceEngine, DoesTheBenchmarksCases) {
   }
 }
 
-// Side-lobe cells of different seeds differ in their phases only, and memory of dropped cells is used again.
+// Side-lobe cells of different seeds differ only in their phases, and memory of dropped cells is reused.
 TEST(DeviceEngine, TakesNoCellsOfAnotherSeed) {
   SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;

@@ -1,5 +1,5 @@
-// Devices with behaviour of real ones that host loops lack: all work as late as the order of lanes allows; a step's indices
-// computed by threads at the same time; memory in pieces that are not adjacent.
+// Devices with properties of real ones that host loops lack: all work is done as late as the order of lanes allows; threads
+// compute the indices of a step at the same time; pieces of memory are not adjacent.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace sonar::test {
 
-/// Host loops, of which others change a part.
+/// Host loops; derived classes change a part.
 class PassingMachine : public cuda::Machine {
  public:
   std::string name() const override { return "host loops"; }
@@ -38,12 +38,12 @@ class PassingMachine : public cuda::Machine {
   void wait(int lane) override { inner_->wait(lane); }
 
  protected:
-  // Memory begins as no number.
+  // Memory begins as NaN.
   std::unique_ptr<cuda::Machine> inner_ = cuda::make_host_loops(cuda::LoopOrder::backwards);
 };
 
-/// Does no work before a lane is waited for, and then only what that lane needs. Sources of copies are read only then: a
-/// source that was changed or given back too early shows, and so does an order that was forgotten.
+/// Does no work before a wait for a lane, and then only the work that this lane needs. Sources of copies are read only then. So
+/// a test detects a source that was changed or released too early, and a missing order of lanes.
 class DeferringMachine final : public PassingMachine {
  public:
   void upload(int lane, void* to, const void* from, std::size_t n) override {
@@ -64,7 +64,7 @@ class DeferringMachine final : public PassingMachine {
     queue(lane, [this, earlier, until = at(earlier).begun + at(earlier).waiting.size()] { catch_up(earlier, until); });
   }
   void wait(int lane) override { catch_up(lane, at(lane).begun + at(lane).waiting.size()); }
-  void release(void* device) override {  // as cudaFree, which waits for everything
+  void release(void* device) override {  // as cudaFree, which waits for all work
     for (int lane = 0; lane < lanes; ++lane) wait(lane);
     inner_->release(device);
   }
@@ -88,7 +88,7 @@ class DeferringMachine final : public PassingMachine {
  private:
   struct Work {
     std::function<void()> what;
-    const std::byte* host;  // what it copies from or to
+    const std::byte* host;  // source or target of the copy on the host
   };
   struct Lane {
     std::deque<Work> waiting;
@@ -112,8 +112,8 @@ class DeferringMachine final : public PassingMachine {
   bool early_release_ = false;  // releases memory that a copy still needs
 };
 
-/// A step's indices dealt to four threads: for the thread sanitizer, which sees two that write one place, also where the sum does
-/// not show it.
+/// Distributes the indices of a step to four threads. The thread sanitizer then detects two threads that write to one position,
+/// even if the sum is not affected.
 class ThreadedMachine final : public PassingMachine {
  public:
   void run(int, const cuda::Launch& launch) override {
@@ -139,8 +139,7 @@ class ThreadedMachine final : public PassingMachine {
   }
 };
 
-/// Every piece of an arena is an allocation of its own: for the address sanitizer and valgrind, which then see an index beyond
-/// it.
+/// Every piece of an arena is a separate allocation. The address sanitizer and valgrind then detect an index beyond the piece.
 class PiecewiseMachine final : public PassingMachine {
  public:
   bool pieces_apart() const override { return true; }
