@@ -12,7 +12,7 @@
 namespace sonar::render {
 namespace {
 
-/// Names that formulas may use beside the sweep: CONTRIBUTING.md lists them.
+/// Names that formulas may use besides those of the sweep. CONTRIBUTING.md lists them.
 Values known_values(const RenderJob& job, const PingRequest& request) {
   const FrequencyMode& mode = job.mode();
   const PingSettings& s = job.settings;
@@ -59,7 +59,7 @@ tl::unexpected<Error> at_place(const Expectation& e, const Error& error) {
   return failure(error.kind, e.place + ": " + error.text);
 }
 
-/// One ping of the job, with everything that is measured in it.
+/// Computes one ping of the job and measures all quantities in it.
 Result<Step> take_step(const RenderInput& input, const RenderJob& job, Parallel& pool) {
   auto expectations = read_expectations(input.text, input.source, job.values);
   if (!expectations) return tl::make_unexpected(expectations.error());

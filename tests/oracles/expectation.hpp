@@ -1,5 +1,5 @@
-// Expectations of a render file, and how they are measured: its `expect:` list (CONTRIBUTING.md, "An oracle"). An oracle of
-// acoustics is such a file; oracle_files_test.cpp runs them all.
+// Expectations of a render file (its `expect:` list) and their measurement (CONTRIBUTING.md, "An oracle"). An oracle of
+// acoustics is such a file. oracle_files_test.cpp runs all of them.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace sonar::render {
 
-/// Part of the picture: device ranges and azimuths (positive to port); the whole picture by default.
+/// Part of the picture, in device ranges and azimuths (positive to port). The default is the whole picture.
 struct Window {
   double from_m = 0, to_m = 1e9;
   double from_deg = -180, to_deg = 180;
@@ -30,9 +30,9 @@ enum class Measure {
 };
 
 enum class Over {
-  each,        // every step of the sweep by itself
-  slope,       // per decade of a swept value, by least squares
-  difference,  // last step less first
+  each,        // every step of the sweep separately
+  slope,       // change per decade of a swept value, by least squares
+  difference,  // last step minus first step
 };
 
 struct Expectation {
@@ -42,14 +42,14 @@ struct Expectation {
   Over over = Over::each;
   std::string against;  // slope: the swept value
   Window window;
-  std::optional<Window> less;  // measured there too, and taken away
+  std::optional<Window> less;  // if set, also measured there and subtracted
   enum class Bound { near, at_least, at_most } bound = Bound::near;
-  std::string value;  // a formula (CONTRIBUTING.md names what it may use)
+  std::string value;  // a formula (CONTRIBUTING.md lists its names)
   double within = 0;  // near: the tolerance
   std::string place;  // file:line:col
 };
 
-/// Those of one step of the sweep. `text` of the render file; errors name its place.
+/// The expectations of one step of the sweep. `text` is the render file; errors name the position in it.
 Result<std::vector<Expectation>> read_expectations(const std::string& text, const std::string& source, const Values& values);
 
 std::string name_of(Measure measure);
@@ -62,10 +62,10 @@ struct Verdict {
   Expectation expectation;
   double measured = 0, expected = 0;
   bool met = false;
-  std::string sentence() const;  // place in the file, quantity, what was measured and expected
+  std::string sentence() const;  // position in the file, quantity, measured and expected value
 };
-/// Renders one ping of every job of a file that parse_render_file() has read, and checks it. Errors: no expectations, wrong keys,
-/// an engine that cannot start, a formula that cannot be read.
+/// Renders one ping of every job of a file that parse_render_file() has read, and checks the expectations. Errors: no
+/// expectations, wrong keys, an engine that cannot start, an invalid formula.
 Result<std::vector<Verdict>> check_expectations(const RenderInput& input, int threads);
 
 }  // namespace sonar::render

@@ -8,8 +8,8 @@
 namespace sonar::render {
 namespace {
 
-/// The peak of a Gaussian through three equidistant samples, which is a parabola through their logarithms: the offset of the peak
-/// from the middle sample, and its height.
+/// The peak of a Gaussian through three equidistant samples, which is a parabola through their logarithms: its offset from the
+/// middle sample, and its height.
 struct Parabola {
   double offset = 0, height = 0;
 };
@@ -50,8 +50,8 @@ class Picture {
   /// Mean energy of one beam.
   double energy() const { return sum_of_power() * row_s() / static_cast<double>(beams_.size()); }
 
-  /// Target strength. The sum of E|s|^2 over rows and beams holds the energy of each echo times theta_eff tau_eff
-  /// (ResolutionCell), so it is divided by both and by the source level.
+  /// Target strength. The sum of E|s|^2 over rows and beams contains the energy of each echo times theta_eff tau_eff
+  /// (ResolutionCell). Therefore it is divided by both and by the source level.
   double strength() const {
     const ResolutionCell cell = cell_of(job_);
     const double source_upa = amplitude_from_db(static_cast<double>(job_.mode().source_level_db));

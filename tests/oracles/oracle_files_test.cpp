@@ -1,5 +1,5 @@
-// Runs every oracle that is written as a render file (*.yaml beside this): renders it in process, holds it to what it expects
-// and records the figures for the table. A file that expects the wrong thing must fail.
+// Runs every oracle that is a render file (*.yaml in this folder): renders it in this process, checks its expectations and
+// records the figures for the table. A file with a wrong expectation must fail.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -112,7 +112,7 @@ TEST(Expectations, SlopesNeedASweep) {
   EXPECT_THROW(judged("{measure: peak_level_db, over: slope, against: r, value: -40, within: 1}"), std::runtime_error);
   EXPECT_THROW(judged("{measure: peak_level_db, value: nothing_known, within: 1}"), std::runtime_error);
   EXPECT_THROW(judged("{measure: peak_level_db, range_m: [50, 60], value: 0, within: 1}"), std::runtime_error);
-  EXPECT_THROW(judged("{measure: coverage_percent, at_least: 99}"), std::runtime_error);  // no bed in the scene
+  EXPECT_THROW(judged("{measure: coverage_percent, at_least: 99}"), std::runtime_error);  // the scene has no bed
 }
 
 TEST(Expectations, RefusalsNameWhatIsMissing) {

@@ -62,7 +62,7 @@ ORACLES = {
     45: "frequency modes against each other",
     46: "conical shift",
 }
-NO_NUMBER = 0  # truths beyond the table
+NO_NUMBER = 0  # number of the checks beyond the table
 
 NOT_BUILT = {
     13: "no corner reflector is built: corners echo by multipath or not at all",
@@ -104,7 +104,7 @@ def rows_of(records):
         row["pass"] &= record["pass"]
         if badness(record) > badness(row["worst"]):
             row["worst"] = record
-    # The 46 first, the truths beyond them last; within one oracle the order in which tests recorded.
+    # The 46 numbered oracles come first, the other checks last. Within one oracle, the order is that of the records.
     return sorted(rows.items(), key=lambda item: item[0][0] or math.inf)
 
 

@@ -27,7 +27,7 @@ std::string quoted(const std::string& text) {
   return out + '"';
 }
 
-/// Writes a number for Python's json module, which reads NaN and Infinity.
+/// Writes a number in the form that Python's json module reads: NaN and Infinity are allowed.
 std::string number_text(double value) {
   if (std::isnan(value)) return "NaN";
   if (std::isinf(value)) return value > 0 ? "Infinity" : "-Infinity";
@@ -36,14 +36,14 @@ std::string number_text(double value) {
   return out.str();
 }
 
-/// One file per oracle and test: ctest runs tests at the same time, each in its own process. The first record of a process
-/// replaces the record of an earlier run of the same test.
+/// There is one file for each oracle and test, because ctest runs tests at the same time, each in its own process. The first
+/// record of a process replaces the record of an earlier run of the same test.
 void append(int number, const std::string& line) {
   const char* folder = std::getenv("SONARD_ORACLES");
   if (folder == nullptr || *folder == 0) return;
   std::string name = running_test();
   for (char& c : name) {
-    if (c == '/') c = '_';  // names of parametrised tests have it
+    if (c == '/') c = '_';  // names of parametrised tests contain it
   }
   std::ostringstream file;
   file << std::setw(2) << std::setfill('0') << number << '-' << name << ".jsonl";

@@ -1,4 +1,4 @@
-// The records of oracles: a figure out of tolerance fails, records can be read back, old records are removed.
+// The records of oracles: a figure out of tolerance fails the test, records can be read back, old records are removed.
 #include "tests/oracles/record.hpp"
 
 #include <gtest/gtest-spi.h>
@@ -13,7 +13,7 @@
 namespace sonar::test {
 namespace {
 
-/// A folder of its own for what these tests record, so that it does not stand among the real figures.
+/// A separate folder for the records of these tests, so that they are not mixed with the real figures.
 class RecordOracle : public testing::Test {
  protected:
   void SetUp() override {
