@@ -17,18 +17,19 @@ HERE = pathlib.Path(__file__).resolve().parent
 SCENE = HERE / "scenes" / "like-the-capture.yaml"
 CAPTURE = "three_pings_8bit.raw"
 ROWS, BEAMS, PINGS = 703, 256, 3
-MESSAGE, IMAGE = 182_016, 2048  # bytes of a captured ping, offset of its image
+MESSAGE, IMAGE = 182_016, 2048  # bytes of a captured ping, and offset of its image
 FULL = 254
 ROW_M = 0.0028421889710794315
 TOLERANCE = 0.15
-SMALLEST_CORRELATION = 0.2  # what is less is as good as nothing: compared with this, as is a skewness
-LOCAL = 4  # half the side of a local mean: 9 x 9 samples
+SMALLEST_CORRELATION = 0.2  # a smaller correlation counts as this value, and so does a skewness
+LOCAL = 4  # half the side of the square of a local mean: 9 x 9 samples
 BED, NOISE = (288, 448), (620, 703)  # rows
 BANDS = (20, 96), (96, 224), (224, 288), (288, 448), (448, 620), (620, 703)  # near floor, water, edge and bed, its end, noise
 NEEDS_NO_REASON = 0.12  # a figure at the edge of the tolerance keeps its reason
 
-# Why a statistic lies farther off than 15 %, and how far it may: today's figure and what another processor or seed could add. A
-# statistic without its reason, beyond its bound, or within 12 % in spite of a reason here, fails the test beside this.
+# The reason why a statistic differs by more than 15 %, and its limit: today's figure plus the effect of another processor or
+# seed. The test beside this file fails for a statistic without a reason, beyond its limit, or within 12 % although a reason is
+# given here.
 UNKNOWN_BED = "the bed's true place, relief and patches are not known"
 THIRD = "the third ping differs from the two that were fitted, which have what ours has"
 REASONS = {
@@ -288,7 +289,7 @@ def draw(real, ours, path):
 
         Image.open(path).convert("L").quantize(32).save(path, optimize=True)
     except ImportError:
-        pass  # larger, but the same picture
+        pass  # larger, but with the same picture
 
 
 INTRODUCTION = """## Beside a real device

@@ -5,7 +5,7 @@ import numpy as np
 from runs import db
 from texts import table
 
-GRAZING_DEG = [(60, 0), (45, 0), (30, 0), (20, 1), (10, 1), (5, 2)]  # and the fan of scenes/grazing.yaml that sees it
+GRAZING_DEG = [(60, 0), (45, 0), (30, 0), (20, 1), (10, 1), (5, 2)]  # height, and the fan of scenes/grazing.yaml that contains it
 HEIGHT_M = 2.0
 KINDS = [("canonical", []), ("paper", ["--mode", "paper"]), ("raster", ["--mode", "raster"])]
 
@@ -20,7 +20,7 @@ def grazing(sonard):
         row = int(np.argmin(np.abs(ours.range - HEIGHT_M / np.sin(np.radians(degrees)))))
         around = slice(row - 1, row + 2)
         off = float(np.mean(db(theirs.power[around, theirs.beam_at()]) - db(ours.power[around, ours.beam_at()])))
-        sine = HEIGHT_M / ours.range[row]  # of the row that was taken
+        sine = HEIGHT_M / ours.range[row]  # sine of the row that was used
         first = first or (off, sine)
         rows.append([f"{degrees} deg", f"{off - first[0]:+.2f} dB", f"{10 * np.log10(sine / first[1]):+.2f} dB"])
     return table(["grazing angle", "paper less canonical, re 60 deg", "10 log cos of incidence, re 60 deg"], rows)

@@ -6,7 +6,7 @@ import page
 from runs import db
 from texts import table
 
-DENSE_ROWS = 20000  # rays a column at which a fan of rays has reached its limit here
+DENSE_ROWS = 20000  # rays per column; with more rays the fan does not change here
 FAN_DEG, TILT_DEG, HEIGHT_M = 20.0, 14.3239, 2.0
 
 
@@ -14,7 +14,7 @@ def elevation_of_bed(ping):
     """Where the level bed lies in each bin [rad], of flat beams; NaN where it does not."""
     tilt = np.radians(TILT_DEG)
     r, azimuth = np.meshgrid(ping.range, ping.azimuth, indexing="ij")
-    # In the sonar's axes the bed is at x sin(tilt) - z cos(tilt) = h: a cos(phi) - b sin(phi) = h / r.
+    # In the sonar's axes the bed is at x sin(tilt) - z cos(tilt) = h. Therefore a cos(phi) - b sin(phi) = h / r.
     a, b = np.cos(azimuth) * np.sin(tilt), np.cos(tilt)
     along = np.hypot(a, b)
     with np.errstate(invalid="ignore"):
@@ -28,7 +28,7 @@ def share_of_limit(sonard, *arguments):
     limit, = sonard.expected("flat-sand", "--mode", mode, "--fixed-fan", DENSE_ROWS)
     elevation = elevation_of_bed(limit)
     bins = np.abs(elevation) < np.radians(FAN_DEG - 0.5)
-    bins[-3:, :] = False  # the record's end, where pulses come in again at its beginning
+    bins[-3:, :] = False  # the end of the record, where pulses from beyond it appear
     bins[:3, :] = False
     off = db(some.power[bins]) - db(limit.power[bins])
     return {"bins": int(bins.sum()), "within_1_db": 100.0 * float(np.mean(np.abs(off) < 1)), "worst_db": float(off[np.argmax(np.abs(off))])}

@@ -8,7 +8,7 @@ SCENES = ["local-search", "demo"]
 CASE, LOW = "P3b", "P3d"
 PARTS = ["specular", "texture", "volume", "multipath", "crosstalk", "leak"]
 OPT_IN = {"multipath"}  # off by default
-GIVEN = {"texture", "volume", "crosstalk", "leak"}  # sonard_bench --give: where scene or sonar have nothing of it
+GIVEN = {"texture", "volume", "crosstalk", "leak"}  # sonard_bench --give: used if the scene or the sonar has no data for the part
 PINGS = 40
 
 

@@ -7,13 +7,13 @@ from runs import db
 from texts import table
 from two_cylinders import KINDS
 
-# As in scenes/pitched-sonar.yaml.
+# The same values as in scenes/pitched-sonar.yaml.
 PLATES_M, HEIGHT_M, PITCH_DEG = (5.0, 2.5), 1.2, 20.0
-FIRST_M = 1.95                # nearer, the fan of the comparison modes ends
-BEFORE_M = 0.1                # of the plate's foot
-BEAMS_DEG = (-20.0, 5.0)      # past the rod and its shadow
+FIRST_M = 1.95                # at shorter ranges the fan of the comparison modes ends
+BEFORE_M = 0.1                # distance from the plate's foot
+BEAMS_DEG = (-20.0, 5.0)      # beams that miss the rod and its shadow
 TOO_DARK_DB = -6.0
-HALF_FAN_DEG = 20.0           # of both comparison modes: the quoted elevation width
+HALF_FAN_DEG = 20.0           # half fan of both comparison modes: the quoted elevation width
 PULSE_M = 0.0299
 
 
@@ -49,7 +49,7 @@ def predicted(rows, is_raster, range_m):
         at_m = HEIGHT_M / np.sin(down)
         solid_angle = np.cos(up) ** (2 if is_raster else 1)
         strength = solid_angle * np.sin(down) ** 2 / at_m**2 * np.sinc(0.884 * np.sin(up) / np.radians(HALF_FAN_DEG)) ** 4
-        steepness = np.log(2) / 2 / (PULSE_M / 2) ** 2  # of the amplitude: -3 dB at half the width
+        steepness = np.log(2) / 2 / (PULSE_M / 2) ** 2  # steepness of the amplitude: -3 dB at half the width
         power = np.exp(-2 * steepness * (range_m[:, None] - at_m) ** 2) @ strength
         return db(power / np.mean(power))
     return too_dark(level_db(rows), level_db(40 * 228))

@@ -5,7 +5,8 @@ import re
 
 from texts import table, tables_of
 
-# Groups of oracles; a test holds them to tests/oracles/oracle_table.py. "+" are the measurements beyond the numbered oracles.
+# Groups of oracles. A test compares them with tests/oracles/oracle_table.py. "+" are the measurements beyond the numbered
+# oracles.
 GROUPS = [
     ("range, sound speed", range(1, 3)), ("levels and their slopes", range(3, 10)), ("specular echoes", range(10, 13)),
     ("widths, side lobes", range(14, 18)), ("fast against direct sums", range(18, 20)), ("ray and beam counts", range(21, 23)),
@@ -31,7 +32,7 @@ def share_of_tolerance(expected, measured, tolerance):
         off = abs(value - limit)
         allowed = 0 if tolerance == "exact" else first_number(tolerance)
         return off / allowed if allowed else (math.inf if off else 0)
-    if expected.startswith("at least"):  # shares: what is missing to all
+    if expected.startswith("at least"):  # for shares: the part that is missing to the whole
         whole = 100 if "%" in expected else 1
         missing = whole - value
         return missing / (whole - limit) if whole > limit else (math.inf if missing > 0 else 0)
@@ -133,7 +134,7 @@ def tell_apart(text):
 
 CASES = {"tank": tank, "pitched-sonar": pitched_sonar, "two-cylinders": two_cylinders, "local-search": local_search, "differences": differences, "coverage": coverage,
          "capture": capture, "tell-apart": tell_apart}
-CHAPTERS = [*CASES, "oracles", "cost"]  # all that the page is made of
+CHAPTERS = [*CASES, "oracles", "cost"]  # all chapters of the page
 PICTURE_FILE = "capture.png"
 
 

@@ -9,8 +9,8 @@ from texts import table, with_seeds, with_step
 PINGS = 100
 READINGS = ["HF, rod lying square (calibration)", "HF, rod upright", "LF, rod lying, yawed 15 degrees", "LF, rod upright, tilted across",
             "LF, rod upright, tilted away"]
-# An integration of the model's eq. (5) and (6) made independently of this program: peak of LF less peak of HF in 2.5 mm
-# bins, absorption apart, and the HF reading each belongs to.
+# An integration of the model's eq. (5) and (6) that was made independently of this program: peak of LF minus peak of HF in 2.5
+# mm bins, without absorption, and the HF reading to which each belongs.
 PREDICTED_PEAK_DB = {2: (0, 0.5), 3: (1, 1.2), 4: (1, -6.1)}
 PREDICTED_TOTAL_DB = [-24.06, -21.86, -22.11, -18.98, -19.13]
 ROD_M, WALL_M = (0.40, 0.70), (1.35, 1.75)

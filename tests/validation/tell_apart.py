@@ -19,7 +19,7 @@ import capture_comparison as comparison
 PATCH = 32
 TREES = 200
 RESAMPLES = 1000
-SEEDS = 101, 202  # of the speckle; the second is the control's
+SEEDS = 101, 202  # seeds of the speckle; the second is for the control
 BANDS = (0, 32), (32, 160), (160, 288), (288, 448), (448, 672)  # rows: leak, near floor, before the bed, bed, beyond it
 FITTED = "type: point", "pulse_width_m:", "noise_width:"  # what drifts, and settings that replace the product's
 
@@ -113,7 +113,7 @@ def patches(pings):
     return np.array(table), np.array(places), names
 
 
-LEVELS = 4  # the last features, of level_features
+LEVELS = 4  # number of last features, those of level_features
 
 
 def forest(seed=1):

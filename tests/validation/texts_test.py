@@ -192,7 +192,7 @@ class Summary(unittest.TestCase):
                     mock.patch.object(sys, "argv", ["validate.py", "--program", "sonard", "--tables", folder,
                                                     "--page", f"{folder}/{validate.PAGE.name}", "--only",
                                                     *(name for name in makers if name != "oracles")]):
-                # The table of oracles is kept: it is not made here.
+                # The table of oracles is copied, because it is not made here.
                 validate.write_tables(pathlib.Path(folder), {name: chapters[name] for name in chapters if name == "oracles"})
                 end = self.assertRaises(SystemExit) if code else contextlib.nullcontext()
                 with end:

@@ -6,16 +6,16 @@ import page
 from runs import db
 from texts import table
 
-# Where the cylinders' nearest points lie in the beam straight ahead [m], see scenes/tank-two-cylinders.yaml: axes 2.5 m ahead and
-# 0.5 m below, 3.5 m ahead; radius 0.1 m.
+# Ranges of the cylinders' nearest points in the beam straight ahead [m], see scenes/tank-two-cylinders.yaml: axes 2.5 m ahead
+# and 0.5 m below, 3.5 m ahead; radius 0.1 m.
 LYING_M, STANDING_M = float(np.hypot(2.5, 0.5)) - 0.1, 3.4
 WINDOW_M = 0.15
-# The paper's Table 2 has 228 rays, its text 300; its raster run was left with 11 rows.
+# Table 2 of the paper has 228 rays, its text 300. Its raster run had 11 rows left.
 KINDS = [("raster, 11 rows", ["--mode", "raster"]), ("raster, 228 rows", ["--mode", "raster", "--fixed-fan", "228"]),
          ("ray, 228 rays", ["--mode", "paper", "--fixed-fan", "228"]), ("ray, 300 rays", ["--mode", "paper"]),
          ("default, Lambert part", ["--specular", "off"])]
-EQUAL_SHARE, EQUAL_DARK = 90, 5  # percent; ours, the paper names no measure
-PAIRS = [(1, 2), (0, 2), (2, 3)]  # of KINDS, whose pictures are compared
+EQUAL_SHARE, EQUAL_DARK = 90, 5  # percent; our choice, because the paper names no measure
+PAIRS = [(1, 2), (0, 2), (2, 3)]  # the pairs of KINDS whose pictures are compared
 
 
 def peak_near(ping, range_m):
@@ -28,7 +28,7 @@ def peak_near(ping, range_m):
 def floor_gaps(ping, reference):
     """Share of the bins with tank floor that lie more than 6 dB below the default's level, both re their own mean."""
     r = ping.range
-    rows = (r > 4.75) & (r < 5.15)  # nearer, the fan of the comparison modes ends
+    rows = (r > 4.75) & (r < 5.15)  # at shorter ranges the fan of the comparison modes ends
     wide = (np.abs(np.degrees(ping.azimuth)) > 8) & (np.abs(np.degrees(ping.azimuth)) < 25)
     nearest = [reference.beam_at(a) for a in ping.azimuth[wide]]
     ours, theirs = ping.power[rows][:, wide], reference.power[rows][:, nearest]

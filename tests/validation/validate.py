@@ -113,7 +113,7 @@ def make(options):
     tables.parent.mkdir(parents=True, exist_ok=True)
     before = chapters_of(tables.read_text(encoding="utf-8")) if tables.is_file() else {}
     sonard = Sonard(options.program.resolve())
-    # Refused before anything else takes its time.
+    # These arguments are refused before the slow work begins.
     table_of_oracles = oracles.chapter(options.oracles, options.partial) if not options.only or "oracles" in options.only else None
     makers = makers_of(sonard, tables.parent, table_of_oracles)
     unknown = set(options.only or []) - set(makers)

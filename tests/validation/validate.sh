@@ -16,7 +16,7 @@ case "${1:-}" in
   --summary) exec python3 tests/validation/validate.py --summary ;;
 esac
 
-# A Python before the system's in PATH may not find the system's packages.
+# A Python that comes before the system's in PATH may not find the system's packages.
 python_with_matplotlib() {
   local candidate
   for candidate in python3 /usr/bin/python3; do
@@ -28,7 +28,7 @@ if ! python=$(python_with_matplotlib); then
   need_packages python3-matplotlib python3-pil || exit
   python=$(python_with_matplotlib) || { echo "no python3 that finds matplotlib, numpy and PIL" >&2; exit 69; }
 fi
-# The classifier alone needs it; without it that chapter is skipped.
+# Only the classifier needs it. Without it that chapter is skipped.
 if [ -n "${SONARD_CAPTURES:-}" ] && ! "$python" -c 'import sklearn' 2>/dev/null; then
   need_packages python3-sklearn || echo "going on without python3-sklearn"
 fi
