@@ -78,7 +78,7 @@ class CufftLibrary {
       case CUFFT_EXEC_FAILED:
         return "cuFFT: a transform failed";
       case CUFFT_INVALID_SIZE:
-        return "cuFFT: a size that it does not do";
+        return "cuFFT: unsupported transform size";
       default:
         return "cuFFT failed";
     }

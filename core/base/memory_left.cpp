@@ -89,9 +89,10 @@ Result<void> check_memory_for(const std::string& what, std::uint64_t bytes) {
   const auto left = memory_left_bytes();
   if (!left || bytes <= *left - *left / 10) return {};
   const auto mib = [](std::uint64_t n) { return std::to_string(n >> 20) + " MiB"; };
-  return failure(ErrorKind::unavailable, what + " would take about " + mib(bytes) + " of memory, and " + mib(*left) +
-                                             " are left to this process; use a smaller scene, or give it more (MemoryMax, "
-                                             "docker --memory)");
+  return failure(ErrorKind::unavailable,
+                 what + " would take about " + mib(bytes) + " of memory, and " + mib(*left) +
+                     " are left to this process; use a smaller scene, or give the process more (MemoryMax, "
+                     "docker --memory)");
 }
 
 }  // namespace sonar

@@ -27,7 +27,7 @@ Result<void> flush_standard_output() {
   if (flushed && std::ferror(stdout) == 0) return {};
   pollfd output{STDOUT_FILENO, POLLOUT, 0};
   if (::poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0) return {};
-  return failure(ErrorKind::io, "standard output cannot be written: " + why + "; what is printed there is not complete");
+  return failure(ErrorKind::io, "standard output cannot be written: " + why + "; the printed text is incomplete");
 }
 
 }  // namespace sonar

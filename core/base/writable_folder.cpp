@@ -42,7 +42,7 @@ std::string why_no_files_in(const std::filesystem::path& folder) {
   struct statfs about {};
   if (::statfs(folder.c_str(), &about) == 0 &&
       std::find(kernels_own.begin(), kernels_own.end(), static_cast<unsigned long>(about.f_type)) != kernels_own.end())
-    return "holds the kernel's own files; no others can be written there";
+    return "contains only the kernel's own files; other files cannot be written there";
   if (is_of_devices(folder)) return "is for devices; files there take memory and are lost when the computer stops";
   if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
   return std::string("cannot be written: ") + std::strerror(errno);

@@ -160,7 +160,7 @@ class Reader {
     const bool numbers = is_number(words_.front());
     if (format_ == Format::automatic) format_ = guessed(numbers);
     if (!wrong_.empty()) return false;
-    if (asked_.rate_hz && format_ != Format::kitti) set_error("the lines have times, they need no rate_hz");
+    if (asked_.rate_hz && format_ != Format::kitti) set_error("the lines have times; remove rate_hz");
     switch (format_) {
       case Format::tum:
         columns_ = Columns::tum();

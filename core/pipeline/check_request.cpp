@@ -44,7 +44,7 @@ std::string why_beams_unlisted(const FrequencyMode& mode, int beam_count) {
   if (static_cast<int>(azimuth.size()) != beam_count)
     return "beam_count " + std::to_string(beam_count) + " is not the " + std::to_string(azimuth.size()) +
            " beams that are listed";
-  if (!width.empty() && width.size() != azimuth.size()) return "beam widths must be as many as beams, or none";
+  if (!width.empty() && width.size() != azimuth.size()) return "there must be as many beam widths as beams, or none";
   const double edge_rad = static_cast<double>(mode.horizontal_aperture_rad) / 2 + sector_slack_rad;
   for (std::size_t j = 0; j < azimuth.size(); ++j) {
     const std::string beam = "listed beam " + std::to_string(j);

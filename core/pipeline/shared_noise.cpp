@@ -135,7 +135,7 @@ class Responses {
 
 std::string why_impossible(const SharedNoise& law) {
   if (law.channels < 2 || law.channels % 2 != 0)
-    return "channels must be even and at least 2, since neighbours have opposite signs, and are " + std::to_string(law.channels);
+    return "channels must be even and at least 2 (neighbours have opposite signs), not " + std::to_string(law.channels);
   const auto fits = [&](int group) {
     return group >= 2 && group % 2 == 0 && law.channels % (group / 2) == 0 && law.channels <= most_groups * group;
   };

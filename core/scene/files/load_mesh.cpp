@@ -58,7 +58,8 @@ tl::unexpected<Error> without_answer(const MeshFile& request, const ChildEnd& en
     return bad_mesh(request, std::string("cannot be read: the importer crashed on it (") + ::strsignal(end.signal) +
                                  "); it is damaged or nested too deep, export it again" + words);
   return failure(ErrorKind::unavailable, request.file.filename().string() + ": cannot be read: " + program + " ended with code " +
-                                             std::to_string(end.exit_code) + words + "; is it of this version of sonard?");
+                                             std::to_string(end.exit_code) + words +
+                                             "; check that it has the version of this program");
 }
 
 Result<LoadedMesh> import_in_a_child(const MeshFile& request) {

@@ -41,8 +41,7 @@ std::vector<std::uint16_t> ShapeReader::assign_materials(const std::vector<std::
     } else if (const auto same = materials.find(names[i])) {
       out[i] = *same;
     } else {
-      rest.fail("needed, because the mesh's material \"" + names[i].substr(0, 64) +
-                "\" is not a known one; set material or materials");
+      rest.fail("needed, because the mesh's material \"" + names[i].substr(0, 64) + "\" is unknown; set material or materials");
     }
   }
   return out;

@@ -67,7 +67,7 @@ Result<CentredMesh> mesh_from_grid(const HeightGrid& grid) {
     high = std::max(high, static_cast<double>(z));
   }
   if (low > high)
-    return failure(ErrorKind::bad_data, "no cell of the grid has a height; is the value right that it declares as no data?");
+    return failure(ErrorKind::bad_data, "no cell of the grid has a height; check the value that the file declares as no data");
   CentredMesh out;
   const PlaneOf place(grid);
   out.centre_m = 0.5 * (place(0, 0, low) + place(columns - 1, rows - 1, high));

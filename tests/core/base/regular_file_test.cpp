@@ -42,7 +42,7 @@ TEST_F(RegularFile, WhatElseHasTheNameIsSaid) {
   EXPECT_THAT(refusal(folder), HasSubstr(": is a folder, not a regular file"));
   EXPECT_THAT(refusal("/dev/zero"), HasSubstr("/dev/zero: is a device, not a regular file"));
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
-  EXPECT_THAT(refusal(folder / "pipe"), HasSubstr("pipe: is a FIFO, not a regular file; save the contents in one"));
+  EXPECT_THAT(refusal(folder / "pipe"), HasSubstr("pipe: is a FIFO, not a regular file; save its contents in a regular file"));
   EXPECT_EQ(read_regular(folder / "pipe", 10).error().kind, ErrorKind::missing_file);
 }
 

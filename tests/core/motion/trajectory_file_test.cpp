@@ -266,7 +266,7 @@ TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
   EXPECT_THAT(refusal("0 1 2 3 0 0 0 1\n", {.format = Format::csv, .frame = Frame::enu_flu}),
               "p.csv:1: a CSV file begins with a line of column names: t_s,x_m,y_m,z_m,qw,qx,qy,qz");
   const ReadOptions ten_hz{.frame = Frame::enu_flu, .rate_hz = 10};
-  EXPECT_THAT(refusal("0 1 2 3 0 0 0 1\n", ten_hz), "p.csv:1: the lines have times, they need no rate_hz");
+  EXPECT_THAT(refusal("0 1 2 3 0 0 0 1\n", ten_hz), "p.csv:1: the lines have times; remove rate_hz");
   EXPECT_THAT(refusal("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 -1 0\n", ten_hz),
               "p.csv:2: the first three columns of the matrix are not a rotation");
   EXPECT_THAT(refusal("2 0 0 0 0 2 0 0 0 0 2 0\n", ten_hz), HasSubstr("not a rotation"));

@@ -119,7 +119,7 @@ TEST(ListedBeams, AreChecked) {
   EXPECT_EQ(why({0.2, -0.1, 0}), "listed beam 2 is not to starboard of the one before");
   EXPECT_EQ(why({0.9, 0, -0.1}), "listed beam 0 does not point into the sector");
   EXPECT_EQ(why({0.2, std::nan(""), -0.1}), "listed beam 1 does not point into the sector");
-  EXPECT_EQ(why({0.2, 0, -0.1}, {0.1f}), "beam widths must be as many as beams, or none");
+  EXPECT_EQ(why({0.2, 0, -0.1}, {0.1f}), "there must be as many beam widths as beams, or none");
   EXPECT_EQ(why({0.2, 0, -0.1}, {0.1f, 0, 0.1f}), "the width of listed beam 1 is impossible");
 }
 

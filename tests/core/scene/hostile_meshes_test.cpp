@@ -128,7 +128,7 @@ TEST_F(HostileMeshes, AnImporterThatCrashesOrAnswersNothingIsReported) {
   EXPECT_THAT(with("kill -SEGV $$"), HasSubstr("a.obj: cannot be read: the importer crashed on it (Segmentation fault)"));
   EXPECT_THAT(with("kill -KILL $$"), HasSubstr("was killed, most likely because memory was short"));
   EXPECT_THAT(with("echo no library >&2; exit 127"),
-              HasSubstr("ended with code 127: no library; is it of this version of sonard?"));
+              HasSubstr("ended with code 127: no library; check that it has the version of this program"));
   EXPECT_THAT(with("exit 0"), HasSubstr("ended with code 0"));
   EXPECT_THAT(with("head -c 4096 /dev/zero"), HasSubstr("ended with code 0"));
 }

@@ -114,7 +114,7 @@ TEST(TrajectoryConfig, MistakesAreToldWithTheirPlace) {
   EXPECT_THAT(why("{file: missions/dive.tum, speeed: 2}"), HasSubstr("did you mean \"speed\""));
   EXPECT_THAT(why("{file: missions/dive.tum, start_s: 61}"), HasSubstr("start_s: is beyond the end of the trajectory, 60.000 s"));
   EXPECT_THAT(why("{file: missions/dive.tum, format: csv}"), HasSubstr("dive.tum:2: a CSV file begins with"));
-  EXPECT_THAT(why("{file: missions/dive.tum, rate_hz: 10}"), HasSubstr("need no rate_hz"));
+  EXPECT_THAT(why("{file: missions/dive.tum, rate_hz: 10}"), HasSubstr("remove rate_hz"));
   EXPECT_THAT(why("{file: kitti.txt, frame: ENU_FLU}"), HasSubstr("rate_hz"));
   EXPECT_THAT(why("{file: missions/dive.tum, body: rov}"), HasSubstr("remove the key \"body\""));
   EXPECT_THAT(why("{file: fleet.csv, body: avu}"), HasSubstr("did you mean \"auv\""));
