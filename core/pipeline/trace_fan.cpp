@@ -30,7 +30,7 @@ std::vector<ColumnSine> column_sines(const Columns& columns, int first, int last
   return sines;
 }
 
-/// Fills a packet of sixteen rays lane by lane. Rays decide shadows only, so that float directions are accurate enough.
+/// Fills a packet of sixteen rays lane by lane. Rays only determine shadows, so float directions are accurate enough.
 class PacketFiller {
  public:
   PacketFiller(const PingPlan& plan, const PingScalars& scalars, float far_m)
@@ -45,7 +45,7 @@ class PacketFiller {
     packet.direction_x[i] = m_[0] * x + m_[1] * y + m_[2] * z;
     packet.direction_y[i] = m_[3] * x + m_[4] * y + m_[5] * z;
     packet.direction_z[i] = m_[6] * x + m_[7] * y + m_[8] * z;
-    // Places are relative to RayScene::origin() [m], so that floats are small even far from the world's origin.
+    // Positions are relative to RayScene::origin() [m], so that floats are small even far from the world's origin.
     packet.origin_x[i] = origin_.x;
     packet.origin_y[i] = origin_.y;
     packet.origin_z[i] = origin_.z;
@@ -53,7 +53,7 @@ class PacketFiller {
     packet.far[i] = far_m_;
   }
   void trace(const RayScene& scene, bool coherent = true) {
-    // Bit i stands for lane i: the last packet of a row may be partly filled.
+    // Bit i is lane i. The last packet of a row may be partly filled.
     scene.trace(packet, count_ == RayPacket::size ? 0xFFFFu : (1u << count_) - 1u, coherent);
     traced += static_cast<std::size_t>(count_);
   }
@@ -84,7 +84,7 @@ class FanTracer {
       ahead_[i] = static_cast<float>(scalars.world_from_sonar.m[i][0]);
       port_[i] = static_cast<float>(scalars.world_from_sonar.m[i][1]);
     }
-    // One pulse width [m]; the depth map needs no smaller errors (section 2).
+    // One pulse width [m]. The depth map needs no higher accuracy (section 2).
     tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
     base_.reserve(plan.fan.elevation_rad.size());
@@ -108,7 +108,7 @@ class FanTracer {
   /// Converts a lane of the packet to the sample for which it was traced.
   void store(int lane, Elevation e, ColumnSine column, Sample& sample) const {
     sample.elevation_rad = e.angle_rad;
-    // x of the unit direction: the map holds 1 / x, of flat beams 1 / h, h being the horizontal distance.
+    // x of the unit direction. The map holds 1 / x; for flat beams it holds 1 / h, where h is the horizontal distance.
     sample.forward = plan_.switches.conical ? column.across * e.cosine : e.cosine;
     sample.tangent = e.sine / e.cosine;
     const auto i = static_cast<std::size_t>(lane);
@@ -141,7 +141,7 @@ class FanTracer {
     }
   }
 
-  /// Traces few columns at all elevations from `e` on, with several elevations per packet.
+  /// Traces a few columns at all elevations from `e` on, with several elevations per packet.
   void trace_few(int e) {
     const int n = elevations(), end = n - plan_.fan.side_elevations, columns = last_ - first_;
     for (const int rows = RayPacket::size / columns; e < end; e += rows) {
@@ -162,7 +162,7 @@ class FanTracer {
     at(index).edge_above = false;
   }
 
-  /// Traces the side lobes, where a few columns share a ray, also across groups. All of them get the result.
+  /// Traces the side lobes. A few columns, possibly of several groups, share a ray. All of them get its result.
   void trace_side(int e, Elevation elevation) {
     const int n = elevations(), step = PingPlan::side_columns;
     for (int from = first_; from < last_;) {
@@ -175,7 +175,7 @@ class FanTracer {
         filler_.add(sines[lanes], elevation);
       }
       filler_.trace(scene_);
-      // A ray counts once, in the group of the first of its columns.
+      // A ray counts once, in the group of its first column.
       if (from % step != 0) --filler_.traced;
       for (int k = from; k < std::min(to, last_); ++k) {
         const int lane = k / step - from / step;
@@ -190,7 +190,7 @@ class FanTracer {
 
   void refine() {
     FanRefinement<Sample> refinement(s_.samples, s_.open, s_.halves, tolerance_m_, first_);
-    // Goes elevation by elevation over all columns, so that packets of middles have neighbouring directions, too.
+    // Goes elevation by elevation over all columns. So packets of middles have neighbouring directions, too.
     const int n = elevations();
     for (int e = 0; e + 1 < n; ++e)
       for (int k = 0; k < last_ - first_; ++k) {
@@ -200,7 +200,8 @@ class FanTracer {
         else
           refinement.consider_base(below, below + 1, k);
       }
-    // If rays of neighbouring columns end farther apart than this, they share too few triangles to be traced as one bundle.
+    // If the rays of neighbouring columns end farther apart than this [m], they share too few triangles to be traced as one
+    // bundle.
     constexpr double bundled_m = 0.06;
     const bool bundled = plan_.columns.spacing * static_cast<double>(filler_.far_m()) < bundled_m;
     std::array<Elevation, RayPacket::size> middle;
@@ -230,7 +231,7 @@ class FanTracer {
     return -spacing * (to_port - forward * column.along / column.across) / hit.offset;
   }
 
-  /// Draws the map: linear between hits of one surface, the farther value across edges.
+  /// Draws the map: linear between hits of one surface, and the farther value across edges.
   void draw(DepthMap& seen) {
     const Fan& fan = plan_.fan;
     const int n = elevations();
@@ -243,7 +244,8 @@ class FanTracer {
         // Bins up to `end` lie between a and b; the last interval gets bins that rounding left over.
         const float top = bin_of_tangent(fan.axis, b.tangent);
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
-        // 1 / x is linear in tan psi along a plane (section 2); 0 is infinitely far, so the smaller value is the farther surface.
+        // 1 / x is linear in tan psi along a plane (section 2). 0 is infinitely far, so the smaller value is the farther
+        // surface.
         const float inverse_a = a.surface.inverse_x, inverse_b = b.surface.inverse_x, farther = std::min(inverse_a, inverse_b);
         const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
         if (bin > end) continue;
@@ -255,7 +257,7 @@ class FanTracer {
           std::fill(map + bin, map + end + 1, with_mark(farther, mark));
         } else {
           const float* __restrict tangent = fan.tangent.data();
-          // A bin may lie a rounding error outside of [a, b]: 1 / x must not become negative there.
+          // By rounding, a bin may lie slightly outside [a, b]. 1 / x must not become negative there.
           for (int place = bin; place <= end; ++place)
             map[place] = with_mark(std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent)), mark);
         }

@@ -29,7 +29,7 @@ void quantise(const float* power, float gain, const CodeScale& scale, float* cod
 }
 
 void quantise_levels(const float* power, float gain, float per_octave, float at_full_scale, float max_code, float* codes, int n) {
-  // docs/acoustics.md, eq. 40. Zero becomes 1e-30 of full scale, -300 dB, which is the lowest possible floor.
+  // docs/acoustics.md, eq. 40. Zero becomes 1e-30 of full scale, which is -300 dB, the lowest possible floor.
   for (int i = 0; i < n; i += lanes) {
     const Lanes code = per_octave * log2_of(larger(load(power + i) * gain, all(1e-30f))) + (at_full_scale + 0.5f);
     store(codes + i, smaller(larger(code, all(0)), all(max_code)));
