@@ -31,7 +31,7 @@ std::string without_blanks(std::string name) {
   return name;
 }
 
-/// Datums that agree with WGS 84 within 2 m, as names of systems have them, without blanks and underscores.
+/// Datums that agree with WGS 84 within 2 m. The names are those in names of systems, without blanks and underscores.
 constexpr std::array<std::string_view, 16> modern_datums{"WGS84",    "WGS1984", "ETRS89",  "ETRS1989",   "NAD83",  "NAD1983",
                                                          "GDA94",    "GDA1994", "GDA2020", "SIRGAS2000", "SIRGAS", "RGF93",
                                                          "NZGD2000", "JGD2000", "JGD2011", "SWEREF99"};
@@ -79,7 +79,7 @@ CoordinateSystem system_of_lines(const std::string& text) {
     if (key == "UNITS" && (value == "DS" || value == "DM")) system.unit_deg = value == "DS" ? 1.0 / 3600 : 1.0 / 60;
     if (key == "ZUNITS") system.height_unit_m = unit_of(value);
   }
-  if (is_utm)  // southern zones are negative
+  if (is_utm)  // southern zones have negative numbers
     system.utm = utm_of_name(datum + " UTM ZONE " + (zone.starts_with('-') ? zone.substr(1) + "S" : zone + "N"));
   return system;
 }
@@ -101,7 +101,7 @@ class WktReader {
         word.clear();
       } else if (c == ',' || c == ']' || c == ')') {
         if (open_.empty() && c != ',') break;
-        if (open_.empty()) {  // ESRI appends the vertical system
+        if (open_.empty()) {  // ESRI appends the vertical system after the horizontal one
           word.clear();
           continue;
         }
@@ -121,7 +121,7 @@ class WktReader {
   struct Open {
     std::string word, name;
     unsigned commas = 0;
-    std::array<std::string, 2> values;  // its second and third value
+    std::array<std::string, 2> values;  // second and third value of a keyword
   };
   static constexpr std::size_t deepest = 64;
 
@@ -175,7 +175,7 @@ class WktReader {
     const std::string& word = open_[owner - 1].word;
     const bool degrees = is_one_of(word, in_degrees), lengths = is_one_of(word, in_lengths);
     if (word == "PRIMEM") meridian_unit_deg_ = unit_deg;
-    // A system with three axes has a unit of heights beside that of its coordinates.
+    // A system with three axes has a unit of heights in addition to that of its coordinates.
     if (is_one_of(word, of_heights) || (of_height && (degrees || lengths)))
       system_.height_unit_m = *first;
     else if (degrees && unit.word != "LENGTHUNIT")

@@ -1,5 +1,5 @@
-// Which systems of the EPSG data set are UTM, and which agree with WGS 84. Source: the EPSG Geodetic Parameter Dataset 10, in
-// the version of PROJ 9.1: every transverse Mercator projection with UTM's scale on the ellipsoids GRS 80 and WGS 84.
+// The systems of the EPSG data set that are UTM, and those that agree with WGS 84. Source: the EPSG Geodetic Parameter Dataset
+// 10, in the version of PROJ 9.1: every transverse Mercator projection with UTM's scale on the ellipsoids GRS 80 and WGS 84.
 #include <algorithm>
 #include <array>
 #include <cmath>

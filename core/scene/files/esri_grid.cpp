@@ -29,7 +29,7 @@ class Words {
     return std::string_view(text_).substr(from, at_ - from);
   }
   std::size_t line() const { return line_; }
-  /// Ends the header: the heights begin with this word, the last one read.
+  /// Ends the header. The heights begin with the word that was read last.
   void end_header(std::string_view word) { at_ -= word.size(), in_header_ = false; }
 
  private:
@@ -49,7 +49,7 @@ struct Header {
   std::string no_data = "-9999";
 };
 
-/// The key's normalised name, ignoring case, "_" and British spelling.
+/// The normalised name of a key: without case, "_" and British spelling.
 std::string key_of(std::string_view word) {
   std::string key = small_letters(word.substr(0, 20));
   std::erase(key, '_');
@@ -122,7 +122,7 @@ Result<HeightGrid> read_esri_heights(const std::filesystem::path& file, const He
   const auto header = read_header(words);
   if (!header) return bad(header.error().text);
   const std::size_t columns = header->columns, rows = header->rows;
-  RawHeights raw{.system = system_by_prj(file)};  // grows with the file's contents, not by the sizes in its header
+  RawHeights raw{.system = system_by_prj(file)};  // grows with the contents of the file, not with the sizes in its header
   HeightValues values(header->no_data);
   for (std::size_t i = 0; i < rows * columns; ++i) {
     const std::string_view word = words.next();

@@ -97,14 +97,14 @@ bool counts_downwards(std::uint16_t system) {
   return depths.contains(system);
 }
 
-/// "EPSG:27700", or the name in the file.
+/// The name of the system: "EPSG:27700", or the name in the file.
 std::string name_by(std::optional<std::uint16_t> code, const GeoKeys& keys, std::uint16_t own_citation) {
   if (code) return "EPSG:" + std::to_string(*code);
   const std::string own = keys.text_of(own_citation), of_all = keys.text_of(citation);
   return !own.empty() ? own : !of_all.empty() ? of_all : "a system of its own";
 }
 
-/// nullopt if the keys state neither the datum nor the ellipsoid.
+/// Determines the datum; nullopt if the keys state neither the datum nor the ellipsoid.
 std::optional<bool> has_modern_datum(const GeoKeys& keys) {
   if (const auto code = code_of(keys, geographic_system)) return agrees_with_wgs84(*code);
   if (const auto code = code_of(keys, ellipsoid)) return *code == 7019 || *code == 7030;
@@ -112,7 +112,7 @@ std::optional<bool> has_modern_datum(const GeoKeys& keys) {
   return axis && flattening ? std::optional(is_modern_ellipsoid(*axis, *flattening)) : std::nullopt;
 }
 
-/// The zone from the code of the system, else from the code of its projection, else from its parameters.
+/// The zone from the code of the system, else from the code of its projection, else from the parameters of the projection.
 std::optional<UtmZone> utm_of_keys(const GeoKeys& keys) {
   if (const auto code = code_of(keys, projected_system)) return utm_of_epsg(*code);
   if (!has_modern_datum(keys).value_or(false)) return std::nullopt;
@@ -124,7 +124,7 @@ std::optional<UtmZone> utm_of_keys(const GeoKeys& keys) {
                             number(false_easting), number(false_northing)});
 }
 
-/// The system in the citation, where ArcGIS (and GDAL for ESRI's codes) writes WKT if no code exists.
+/// The system in the citation. ArcGIS (and GDAL for ESRI's codes) writes WKT there if no code exists.
 std::optional<CoordinateSystem> system_of_citation(const GeoKeys& keys) {
   constexpr std::string_view before_wkt = "ESRI PE String = ";
   constexpr std::size_t longest_wkt = 8192;

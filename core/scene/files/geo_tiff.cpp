@@ -24,7 +24,7 @@ constexpr std::uint64_t most_file_bytes = std::uint64_t{2} << 30;
 constexpr std::uint64_t memory_of_a_cell = 4;
 constexpr std::uint16_t most_bands = 16;
 
-// Tags.
+// Numbers of tags.
 enum : std::uint32_t {
   pixel_scale = 33550,
   tie_points = 33922,
@@ -219,7 +219,7 @@ class GeoTiffReader {
     if (scale.size() >= 2 && tie.size() >= 6) {
       place = {tie[3] - tie[0] * scale[0], tie[4] + tie[1] * scale[1], scale[0], -scale[1]};
     } else if (matrix.size() == 16) {
-      constexpr double rounding = 1e-7;  // it moves no cell by a tenth of its size
+      constexpr double rounding = 1e-7;  // rounding by this amount moves no cell by a tenth of its size
       if (std::abs(matrix[1]) > rounding * std::abs(matrix[0]) || std::abs(matrix[4]) > rounding * std::abs(matrix[5]))
         return bad("is rotated against its axes; straighten it: gdalwarp IN OUT.tif");
       place = {matrix[3], matrix[7], matrix[0], matrix[5]};
@@ -231,7 +231,8 @@ class GeoTiffReader {
     } else {
       return bad("has no coordinates (no GeoTIFF); give it some: gdal_translate -a_ullr WEST NORTH EAST SOUTH");
     }
-    if (keys.value_of(GeoKeys::raster_type) != GeoKeys::pixel_is_point)  // the corner of the first cell, not its middle
+    if (keys.value_of(GeoKeys::raster_type) !=
+        GeoKeys::pixel_is_point)  // the position is that of the first cell's corner, not of its middle
       place.x += 0.5 * place.step_x, place.y += 0.5 * place.step_y;
     return check(place);
   }

@@ -16,10 +16,10 @@ namespace {
 constexpr double highest_m = 1e7, least_fill = 1e20;
 constexpr double farthest_deg = 5, nearest_pole_deg = 89;
 constexpr float none = std::numeric_limits<float>::quiet_NaN();
-/// Usual fill values that could be heights.
+/// Usual fill values that could also be heights.
 constexpr std::array<float, 14> usual_fills{-9999, -32768, -32767, 32767,  -99999,   99999,  -999999,
                                             65535, -999,   9999,   -10000, -9999999, 999999, 9999999};
-/// Limits of 32-bit integers; no height is that large.
+/// Limits of 32-bit integers. No height is as large.
 constexpr std::array<double, 4> ends_of_32_bits{-2147483648.0, -2147483647.0, 2147483647.0, 4294967295.0};
 
 /// The value of one unit in the last digit of a number as it is written.
@@ -62,7 +62,8 @@ bool could_be_degrees(const RawHeights& raw) {
   return raw.x.front() >= -180 && raw.x.back() <= 360 && raw.y.front() >= -90 && raw.y.back() <= 90;
 }
 
-/// Cells of an arc second, its ninth, or several of them, such as 0.000277777778, which is unlikely in metres.
+/// True for cells of an arc second, a ninth of it, or several of them, such as 0.000277777778. Such sizes are unlikely in
+/// metres.
 bool are_arc_seconds(double cell) {
   const auto is_whole = [](double v) { return v > 0.5 && std::abs(v - std::round(v)) < 1e-3; };
   constexpr double ninths_in_a_degree = 9 * 3600;
@@ -83,13 +84,13 @@ bool shows_degrees(const RawHeights& raw, double height_m) {
       const double step = height_m * std::abs(static_cast<double>(raw.z[k]) - static_cast<double>(raw.z[k - 1]));
       rise += step, ++steps, steep_steps += step > steep * cell;
     }
-  // Large cells are more likely in metres, so a few wrong heights must not decide.
+  // Large cells are more likely in metres. Therefore a few wrong heights must not decide.
   if (cell >= small_cell_deg) return 2 * steep_steps > steps;
   const double slope = steps == 0 ? 0 : rise / static_cast<double>(steps) / cell;
   return slope > steep || (slope == 0 && cell < 0.005) || are_arc_seconds(cell);
 }
 
-/// A metre of Web Mercator is shorter on the ground, by the cosine of the latitude.
+/// A metre of Web Mercator is shorter on the ground by the cosine of the latitude.
 void convert_web_mercator(RawHeights& raw, std::vector<std::string>& notes) {
   constexpr double radius_m = 6378137;
   for (double& x : raw.x) x = deg_from_rad(x * raw.system.unit_m / radius_m);
@@ -100,7 +101,7 @@ void convert_web_mercator(RawHeights& raw, std::vector<std::string>& notes) {
                    1 / std::cos(rad_from_deg(0.5 * (raw.y.front() + raw.y.back())))));
 }
 
-/// Converts longitudes and latitudes in other units, or relative to another meridian than Greenwich.
+/// Converts longitudes and latitudes in other units, or relative to a meridian other than that of Greenwich.
 void convert_to_degrees(RawHeights& raw, std::vector<std::string>& notes) {
   const double unit_deg = raw.system.unit_deg, meridian_deg = raw.system.prime_meridian_deg;
   if (unit_deg != 1) {
@@ -134,7 +135,7 @@ void remove_zone_number(RawHeights& raw, UtmZone zone, std::vector<std::string>&
   notes.push_back(text::format("its eastings begin with %d, the number of their zone, which is removed", zone.number));
 }
 
-/// A note about a system whose latitudes and longitudes are unknown here, or only roughly known.
+/// A note about a system whose latitudes and longitudes are unknown or only roughly known.
 std::string note_of_system(const CoordinateSystem& system) {
   const bool is_named = !same_letters(system.name, "unknown") && !same_letters(system.name, "unnamed");
   const std::string name = is_named ? text::printable(system.name) : "a system without a name";
@@ -276,7 +277,7 @@ void hint_at_zone(HeightGrid& grid, const Geodetic& world_origin) {
 }  // namespace
 
 bool is_nan_word(std::string_view word) {
-  // words of printf, Microsoft's C, R, databases, Python, and numpy's masked arrays
+  // no-data words of printf, Microsoft's C, R, databases, Python, and numpy's masked arrays
   static constexpr std::array<std::string_view, 16> words{"nan", "NaN",  "NAN",  "nan(ind)", "1.#QNAN", "1.#IND",
                                                           "NA",  "null", "NULL", "None",     "none",    "--",
                                                           "inf", "Inf",  "INF",  "Infinity"};

@@ -12,7 +12,7 @@ constexpr std::uintmax_t max_mesh_bytes = std::uintmax_t{2} << 30;  // limit for
 
 /// The extension in small letters, such as ".obj".
 std::string mesh_extension(const std::filesystem::path& file);
-/// Whether files with this extension are read as meshes.
+/// True if files with this extension are read as meshes.
 bool is_mesh_extension(std::string_view extension);
 /// True if y is up in imported meshes of this format, unless MeshFile::up states another axis. For COLLADA, Assimp always makes
 /// y up.

@@ -1,4 +1,4 @@
-// Grey PNG images, also stored as colours, as heights; the only file of the scene that includes libpng.
+// Reads heights from grey PNG images, also if stored as colours. No other file of the scene includes libpng.
 #include <png.h>
 
 #include <algorithm>

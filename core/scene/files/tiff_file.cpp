@@ -88,7 +88,7 @@ void CloseTiff::operator()(tiff* file) const { TIFFClose(file); }
 
 Tiff open_tiff(const std::filesystem::path& file) {
   TIFFSetErrorHandler(on_error);
-  TIFFSetWarningHandler(nullptr);  // libtiff would warn of every tag that it does not know
+  TIFFSetWarningHandler(nullptr);  // libtiff would warn of every unknown tag
   last_error.clear();
 #if TIFFLIB_VERSION >= 20221213
   const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(), TIFFOpenOptionsFree);

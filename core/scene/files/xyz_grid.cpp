@@ -36,7 +36,7 @@ std::size_t split(std::string_view line, Line& words, std::string_view between =
   return count;
 }
 
-/// The uniform coordinates that contain all given ones, among which some may be missing; empty if there are none.
+/// The uniform coordinates that contain all given ones. Some may be missing among the given ones. Empty if there are none.
 std::vector<double> even_axis(std::vector<double> given) {
   std::sort(given.begin(), given.end());
   given.erase(std::unique(given.begin(), given.end()), given.end());
@@ -47,7 +47,7 @@ std::vector<double> even_axis(std::vector<double> given) {
   const std::size_t middle = (sorted.size() - 1) / 2;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(middle), sorted.end());
   const double usual = sorted[middle];
-  double sum = 0, count = 0;  // the mean step is more accurate than a single, rounded one
+  double sum = 0, count = 0;  // the mean step is more accurate than one rounded step
   for (const double step : steps)
     if (step < 1.5 * usual) sum += step, ++count;
   const double cells = std::round((given.back() - given.front()) / (sum / count));
@@ -63,13 +63,13 @@ std::vector<double> even_axis(std::vector<double> given) {
   return even ? axis : std::vector<double>();
 }
 
-/// Computed from the whole length, because one step alone is rounded if coordinates are large.
+/// The spacing follows from the whole length, because a single step is rounded if coordinates are large.
 std::size_t index_on(const std::vector<double>& axis, double v) {
   const double last = static_cast<double>(axis.size() - 1);
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));
 }
 
-/// Splits a line of column names, which may have blanks in them if there are commas, semicolons or tabs between them.
+/// Splits a line of column names. The names may contain blanks if commas, semicolons or tabs separate them.
 std::size_t split_names(std::string_view line, Line& words) {
   for (const char between : {';', ',', '\t'}) {
     if (line.find(between) == line.npos) continue;
@@ -81,16 +81,16 @@ std::size_t split_names(std::string_view line, Line& words) {
   return split(line, words);
 }
 
-/// Indices of the words of a line for east, north and height.
+/// Positions of the words for east, north and height in a line.
 struct Order {
   std::size_t x = 0, y = 1, z = 2;
-  bool depth = false;  // whether the name of the column is depth
-  bool named = false;  // whether the name of the x column is easting
+  bool depth = false;  // true if the name of the column is depth
+  bool named = false;  // true if the name of the x column is easting
   std::size_t last() const { return std::max({x, y, z}); }
   bool operator==(const Order&) const = default;
 };
 
-/// The order by column names, such as "lat lon depth" or "id,x,y,z"; the first three columns for other names.
+/// The order according to column names, such as "lat lon depth" or "id,x,y,z". For other names: the first three columns.
 Order order_by(const Line& names, std::size_t count) {
   using Begins = std::initializer_list<std::string_view>;
   const auto column = [&](Begins begins, std::size_t otherwise, std::string_view whole = "z") {
@@ -114,7 +114,7 @@ Order order_by(const Line& names, std::size_t count) {
   return order;
 }
 
-/// Whether a line has three numbers with decimal commas, "500000,5 6650000,5 -10,2" or "500000,5;6650000,5;-10,2".
+/// True if a line has three numbers with decimal commas, "500000,5 6650000,5 -10,2" or "500000,5;6650000,5;-10,2".
 bool has_decimal_commas(std::string_view line) {
   Line words;
   const std::size_t count = split(line, words, " \t;\r\"");
@@ -131,7 +131,7 @@ bool may_be_northing_first(const std::vector<double>& x, const std::vector<doubl
   return x.front() > least_northing && x.back() < most_northing && y.front() > least_easting && y.back() < most_easting;
 }
 
-/// Advice for a file that begins with something else than points.
+/// Advice for a file that does not begin with points.
 std::string way_out(const std::vector<Point>& points) {
   return points.empty() ? "; other grids: gdal_translate -of GTiff IN OUT.tif" : "";
 }
@@ -156,7 +156,7 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
       Line names;
       const std::size_t number = begin == this_line.npos ? 0 : split_names(this_line.substr(begin), names);
       if (const Order found = order_by(names, number); found != Order())
-        comment = {number, found};  // names of columns, if as many values follow
+        comment = {number, found};  // names of columns, if the next line has as many values
       continue;
     }
     const auto bad = [&](const std::string& what) {
