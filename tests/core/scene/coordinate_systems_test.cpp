@@ -1,4 +1,4 @@
-// Coordinate systems as files name them: codes and keys of GeoTIFF, WKT of .prj files, and what a note says of unknown ones.
+// Coordinate systems in files: codes and keys of GeoTIFF, WKT of .prj files, and the notes about unknown systems.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -168,7 +168,7 @@ TEST(CoordinateSystems, AnAxisOfHeightsChangesNoUnitOfCoordinates) {
   }
 }
 
-/// Keys with values of their own, numbers, and one text.
+/// Keys with their own values, with numbers, and one with a text.
 GeoKeys keys(const std::vector<std::array<std::uint16_t, 2>>& values,
              const std::vector<std::pair<std::uint16_t, double>>& numbers = {}, const std::string& citation = "") {
   std::vector<std::uint16_t> words{1, 1, 0, 0};
@@ -200,7 +200,7 @@ TEST(CoordinateSystems, GeoKeysOfOnesOwnAreUtmByProjectionOrParameters) {
   EXPECT_FALSE(of(keys({{{1024, 2}, {2048, 4326}}})).other_datum);
   EXPECT_FALSE(of(keys({{{1024, 2}}})).other_datum);
   EXPECT_THAT(system_of_keys(keys({{{1024, 3}}}), std::nullopt).error().text, HasSubstr("geocentric"));
-  for (std::uint16_t at = 0; at < 8; ++at)  // places outside of the numbers and texts
+  for (std::uint16_t at = 0; at < 8; ++at)  // positions outside the numbers and texts
     (void)of(GeoKeys({1, 1, 0, 1, 3073, 34737, 60000, at, 2057, 34736, 1, at}, {}, "x"));
 }
 

@@ -1,4 +1,4 @@
-// Height grids as GeoTIFF, written here field by field: places, units, kinds of numbers, and files that are wrong.
+// Height grids as GeoTIFF, written here field by field: positions, units, types of numbers, and invalid files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -172,7 +172,7 @@ TEST_F(GeoTiff, WebMercatorHasItsLengthsOnTheGround) {
 
 TEST_F(GeoTiff, BlocksThatAreLeftOutAreHoles) {
   TiffFile sparse = TiffFile::of(3, 2, six).at(0, 100, 10, 10).without(273).without(278).without(279);
-  sparse.shorts(278, {1}), sparse.longs(273, {8, 0}), sparse.longs(279, {12, 0});  // a strip a row, the second without bytes
+  sparse.shorts(278, {1}), sparse.longs(273, {8, 0}), sparse.longs(279, {12, 0});  // one strip per row, the second without bytes
   sparse.fields[1].value = TiffFile::bytes_of(std::vector<std::uint16_t>{2});
   const auto grid = read(sparse);
   EXPECT_FALSE(grid && mesh_from_grid(*grid));
@@ -193,7 +193,7 @@ TEST_F(GeoTiff, CellsThatAMaskHidesAreHoles) {
     for (std::size_t k = 0; grid && k < 6; ++k) all += std::isnan(grid->z_m[k]) ? 'o' : 'x';
     return grid ? all : grid.error().text;
   };
-  // The file begins in the north, the grid in the south.
+  // The file begins in the north, but the grid in the south.
   EXPECT_EQ(holes(masked(1, {0b10100000, 0b10000000})), "xooxox");
   EXPECT_EQ(holes(masked(8, {255, 255, 255, 255, 0, 255})), "xoxxxx");
   EXPECT_FLOAT_EQ(masked(8, {255, 255, 255, 255, 0, 255})->z_m[3], -1);
@@ -217,7 +217,7 @@ TEST_F(GeoTiff, FloatingPointNumbersOf16Bits) {
 }
 
 TEST_F(GeoTiff, TheFirstOfSeveralBandsIsTheHeightAndAnAlphaBandMarksHoles) {
-  // As gdal_translate makes them of a BAG (elevation, uncertainty), and gdalwarp -dstalpha.
+  // Files as gdal_translate makes them from a BAG (elevation, uncertainty), and as gdalwarp -dstalpha makes them.
   const std::vector<float> pairs{-1, 0.5f, -2, 0, -3, 0.5f, -4, 0.5f, -5, 0.5f, -6, 0.5f};
   TiffFile file = TiffFile::of(3, 2, pairs).at(0, 100, 10, 10).bands({0});
   const auto uncertain = read(file);
@@ -303,7 +303,7 @@ TEST_F(GeoTiff, ItsZoneOfUtmPlacesItAboutAnOrigin) {
     EXPECT_NEAR(corner.y, (6651400 - 6651411.19) / 0.9996, 0.02);  // the northing of 60 degrees
   }
   EXPECT_EQ(read(tiff(32733), {.origin = Geodetic{rad_from_deg(-30.3), rad_from_deg(15), 0}})->zone, (UtmZone{33, true}));
-  // ED50: its coordinates are some 100 m from those of WGS 84.
+  // ED50: its coordinates differ from those of WGS 84 by about 100 m.
   EXPECT_THAT(read(tiff(23033), {.origin = origin}).error().text, HasSubstr("origin is for a grid in degrees or UTM"));
 }
 
@@ -412,13 +412,13 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   EXPECT_THAT(refusal(TiffFile::of(3, 2, six).at(0, 0, 0, 10)), HasSubstr("cells whose sizes are not"));
   EXPECT_THAT(refusal(TiffFile::of(2, 2, std::vector<float>{1e9f, 1, 2, 3}).at(0, 0, 1, 1)),
               HasSubstr("row 1, column 1 is beyond 1e7 m"));
-  // Four tiles of 64 MiB for 256 KiB of heights: small when packed, minutes to unpack if there were thousands.
+  // Four tiles of 64 MiB for 256 KiB of heights: small if packed, but minutes to unpack if there were thousands.
   TiffFile tiles = TiffFile::of(2, 16384, std::vector<float>(2)).at(0, 100, 10, 10).without(273).without(278).without(279);
   tiles.shorts(322, {4096}), tiles.shorts(323, {4096}), tiles.longs(324, {8, 8, 8, 8}), tiles.longs(325, {8, 8, 8, 8});
   EXPECT_THAT(refusal(tiles), HasSubstr("tiles are much larger than the picture"));
   EXPECT_EQ(read_geo_tiff_heights("no/such.tif", {}).error().kind, ErrorKind::missing_file);
   const std::string whole = good().bytes();
-  for (std::size_t n = 0; n < whole.size(); n += test::is_sanitized ? 5 : 1) {  // there geo_tiff_fuzz makes up more
+  for (std::size_t n = 0; n < whole.size(); n += test::is_sanitized ? 5 : 1) {  // geo_tiff_fuzz makes more mutations there
     const auto cut = read_geo_tiff_heights(files.write("cut.tif", whole.substr(0, n)), {});
     EXPECT_FALSE(cut) << n;
     if (!cut) {

@@ -1,4 +1,4 @@
-// Mesh files: every format, axes and scale, far offsets, and the many ways a file can be wrong.
+// Mesh files: all formats, axes and scale, large offsets, and many kinds of invalid files.
 #include "core/scene/files/load_mesh.hpp"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ using ::testing::HasSubstr;
 using tests::expect_sound;
 using tests::TemporaryFiles;
 
-// A wedge 2 long in x, 1 wide in y, 3 high in z.
+// A wedge: 2 long in x, 1 wide in y, 3 high in z.
 const std::string obj = "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 0 0 3\nusemtl steel\nf 1 3 2\nf 1 2 4\nusemtl wood\nf 1 4 3\nf 2 3 4\n";
 const std::string ply =
     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
@@ -38,7 +38,7 @@ const std::string stl =
     "facet normal 0 0 0\nouter loop\nvertex 2 0 0\nvertex 0 1 0\nvertex 0 0 3\nendloop\nendfacet\n"
     "endsolid wedge\n";
 
-// The same wedge as binary STL, with a header that begins as a text file does.
+// The same wedge as binary STL. Its header begins like that of a text file.
 std::string binary_stl() {
   const float corner[4][3] = {{0, 0, 0}, {2, 0, 0}, {0, 1, 0}, {0, 0, 3}};
   const int triangle[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
@@ -68,7 +68,7 @@ std::string collada(const std::string& axis) {
          "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
 }
 
-// A GLB with the wedge's vertices and triangles, in the glTF 2.0 container; that many nodes show it.
+// A GLB with the wedge's vertices and triangles in the glTF 2.0 container. `nodes` nodes show the wedge.
 std::string glb(int nodes = 1) {
   const float vertices[12] = {0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0, 3};
   const std::uint16_t indices[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
@@ -243,7 +243,7 @@ TEST_F(LoadMesh, TrianglesWithoutAreaAreLeftOutAndCounted) {
   EXPECT_GE(mesh.centred.left_out, 1u);
 }
 
-// A sonar needs only the vertices of a face: texture coordinates and normals may be missing, or stripped by a tool.
+// A sonar needs only the vertices of a face. Texture coordinates and normals may be missing, or removed by a tool.
 TEST_F(LoadMesh, ObjFacesThatNameMissingTextureCoordinatesAreRead) {
   const std::string left = "vn 0 0 1\no left\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
                     right = "v 2 0 0\nv 3 0 0\nv 3 1 0\nv 2 1 0\n";
@@ -351,7 +351,7 @@ TEST_F(LoadMesh, TrianglesThatAFileListsAndTheMeshHasNotAreCounted) {
   EXPECT_EQ(good("whole.glb", glb(3)).lost, 0u);
 }
 
-/// A glTF file of two squares at x = 0 and 2, its meshes 0 and 1; `rest` overrides what follows the parts.
+/// A glTF file of two squares at x = 0 and 2, its meshes 0 and 1. `rest` replaces the text that follows the parts.
 std::string gltf(const std::string& nodes, const std::string& scenes, const std::string& rest = "",
                  const std::string& last_index = "3") {
   static constexpr std::string_view letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -423,7 +423,7 @@ TEST_F(LoadMesh, GltfMorphTargetsThatMoveVerticesAreRefused) {
   EXPECT_EQ(good("a.gltf", with_weights("0,0.0")).centred.mesh.triangles.size(), 2u);
 }
 
-/// A COLLADA file of a square whose corners follow one bone, which is at `bone`; the node of the skin is elsewhere.
+/// A COLLADA file of a square whose corners follow one bone at `bone`. The node of the skin is at another position.
 std::string skinned_collada(const std::string& bone) {
   const auto source = [](const char* id, const char* kind, int count, const std::string& values, int stride, const char* type) {
     return std::string("<source id='") + id + "'><" + kind + "_array id='" + id + "a' count='" + std::to_string(count) + "'>" +
@@ -487,7 +487,7 @@ TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfACollada) {
   EXPECT_EQ(twice.lost + twice.hidden, 0u);
 }
 
-// Models of vehicles are that large: three of bluerov2_gz have more than 4 MiB.
+// Models of vehicles have this size: three of bluerov2_gz have more than 4 MiB.
 TEST_F(LoadMesh, AColladaOfManyMebibytesIsRead) {
   constexpr int edge = 350;
   std::string places, corners;
@@ -520,7 +520,7 @@ TEST_F(LoadMesh, FaultsOfAGlbAreNamed) {
     bent[at] = c;
     return bent;
   };
-  std::string unpadded = whole;  // as older exporters wrote it
+  std::string unpadded = whole;  // as older exporters write it
   const std::size_t json = static_cast<unsigned char>(whole[12]) + 256u * static_cast<unsigned char>(whole[13]);
   unpadded.insert(20 + json, " ");
   unpadded[12] = static_cast<char>(unpadded[12] + 1), unpadded[8] = static_cast<char>(unpadded[8] + 1);

@@ -23,7 +23,7 @@ TEST(Noise, IsSmoothBoundedAndDrawnFromItsSeed) {
   for (int i = 0; i < 4000; ++i) {
     const double x = -45 + 0.0225 * i, y = 20 * std::sin(i);
     const double v = field(x, y);
-    EXPECT_NEAR(v, again(x, y), 1e-9);  // whatever the rectangle
+    EXPECT_NEAR(v, again(x, y), 1e-9);  // for any rectangle
     differs += std::abs(v - other(x, y)) > 1e-3;
     sum += v * v;
     most = std::max(most, std::abs(v));

@@ -1,4 +1,4 @@
-// Height grids in metres of UTM: where their zone comes from, and where they lie in a scene and about the world's origin.
+// Height grids in metres of UTM: the source of their zone, and their position in a scene and relative to the world's origin.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using tests::TemporaryFiles;
 const Geodetic origin{rad_from_deg(60), rad_from_deg(15), 0};
 constexpr double northing_m = 6'651'411.19;  // latitude 60 degrees, in the middle of a zone
 
-/// 21 x 21 heights, 100 m apart, about a place.
+/// 21 x 21 heights, 100 m apart, around a position.
 std::string grid_about(double easting_m, double at_northing_m) {
   std::string text =
       text::format("ncols 21\nnrows 21\nxllcenter %.2f\nyllcenter %.2f\ncellsize 100\n", easting_m - 1000, at_northing_m - 1000);
@@ -57,7 +57,8 @@ TEST_F(UtmGrid, EveryVertexLiesWhereTheGeodesyOfPosesPutsItsPlace) {
     EXPECT_NEAR(vertex(k).y, expected.y, 1e-3) << k;
     EXPECT_NEAR(vertex(k).z, static_cast<double>(grid->z_m[k]), 1e-5) << k;
   }
-  const Vec3d row = vertex(20) - vertex(0);  // the sine of 60 degrees times 3 degrees, and a little, from the zone's middle
+  const Vec3d row =
+      vertex(20) - vertex(0);  // the sine of 60 degrees times the distance from the zone's middle, slightly more than 3 degrees
   EXPECT_NEAR(deg_from_rad(std::atan2(row.y, row.x)), 0, 0.2) << "seen from the origin, which is at the zone's middle";
   const auto there = read({.utm = UtmZone{33, false}, .origin = Geodetic{rad_from_deg(60), rad_from_deg(18), 0}});
   ASSERT_TRUE(there) << there.error().text;
