@@ -31,14 +31,14 @@ Result<std::vector<std::byte>> encode_gray_png(std::span<const std::byte> values
     png_destroy_write_struct(&png, nullptr);
     return failure(ErrorKind::unavailable, "not enough memory for a picture");
   }
-  if (setjmp(png_jmpbuf(png)) != 0) {  // libpng jumps to this place after an error
+  if (setjmp(png_jmpbuf(png)) != 0) {  // libpng jumps here after an error
     png_destroy_write_struct(&png, &info);
     return failure(ErrorKind::bug, "the picture could not be encoded");
   }
   png_set_write_fn(png, &bytes, append, flush);
   png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bits, PNG_COLOR_TYPE_GRAY,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_BASE, PNG_FILTER_TYPE_BASE);
-  png_set_compression_level(png, 1);         // noise hardly compresses: a higher level takes several times as long and saves 3 %
+  png_set_compression_level(png, 1);         // noise hardly compresses: a higher level needs several times as long and saves 3 %
   png_set_compression_strategy(png, Z_RLE);  // labels are runs of equal values; for noise, other strategies produce more bytes
   png_set_filter(png, 0, PNG_FILTER_SUB);
   png_write_info(png, info);

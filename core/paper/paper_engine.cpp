@@ -27,7 +27,7 @@ class ComparisonEngine {
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
-    // The tables are kept until model or settings change, because they take longer than a ping.
+    // The tables are kept until model or settings change, because making them takes longer than a ping.
     if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
     statistics_ = {};
     Ping ping = paper::simulate(rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);

@@ -52,7 +52,7 @@ class LabelWork {
     float from = 0, to = 0;
     std::uint32_t object = 0;
   };
-  struct Point;  // place and energy of an echo without a surface
+  struct Point;  // position and energy of an echo without a surface
 
   void spread(Part& part, const std::vector<float>& by_sample) const;
   static int row_of(double sample, int per_row);

@@ -351,7 +351,7 @@ void set_gain(PingPlan& plan, float gain_db) {
 }
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
-  PingSettings asked = r.settings;  // the plan's settings without those on which no table depends
+  PingSettings asked = r.settings;  // the plan's settings without values that affect no table
   asked.rate_hz = plan.settings.rate_hz;
   asked.gain_db = plan.settings.gain_db;
   asked.gain_assist = plan.settings.gain_assist;

@@ -1,4 +1,4 @@
-// Pings whose messages hold complex samples.
+// Pings whose messages contain complex samples.
 #pragma once
 
 #include "core/sonar/ping.hpp"

@@ -69,7 +69,7 @@ class FrequencySums {
   int count_, width_, points_, padded_;
   Fft forward_;
   int terms_ = 0;
-  std::vector<double> polynomial_;  // [terms][padded]: the kernel at each point, for an echo at a place between two points
+  std::vector<double> polynomial_;  // [terms][padded]: the kernel at each point, for an echo at a position between two points
   std::vector<double> correction_;  // 1 / the kernel's transform, per sum
 };
 

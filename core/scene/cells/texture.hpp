@@ -52,7 +52,7 @@ class TexturePatch {
   const TextureField& field_;
   int object_;
   bool stands_ = false;
-  std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points around the last place
+  std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points around the last position
   std::array<float, 27> near_{};                       // their normals, i fastest
   std::vector<Point> points_;
 };

@@ -33,7 +33,7 @@ class PlaneOf {
 
  private:
   struct Ring {
-    double radius_m, z_m;  // distance from the earth's axis, and place along it
+    double radius_m, z_m;  // distance from the earth's axis, and position along it
   };
   static Ring ring_at(double latitude_rad) {
     const Vec3d p = ecef_from({latitude_rad, 0, 0});

@@ -30,7 +30,7 @@ struct HeightGrid {
   std::vector<std::string> notes = {};  // sentences about decisions of the reader that the scene's author should know
 };
 
-/// A mesh relative to its middle, and the place of this middle in the original coordinates.
+/// A mesh relative to its middle, and the position of this middle in the original coordinates.
 struct CentredMesh {
   Mesh mesh;
   Vec3d centre_m;

@@ -37,7 +37,7 @@ class SpecularMesh {
   };
   struct Vertex {
     Vec3 position, normal;
-    std::array<float, 6> bend{};  // symmetric: xx xy xz yy yz zz of d normal / d place [1/m]
+    std::array<float, 6> bend{};  // symmetric: xx xy xz yy yz zz of d normal / d position [1/m]
   };
   struct Triangle {
     std::array<std::uint32_t, 3> vertex{};
