@@ -123,7 +123,7 @@ std::vector<float> fit_elevation(const FrequencyMode& mode, double half_angle_ra
   return {power.begin(), power.end()};
 }
 
-/// The value is rounded to a millionth. Settings whose rows differ only by rounding then have the same filter and share the
+/// Rounds the taps to about a millionth. Settings whose rows differ only by rounding then have the same filter and share the
 /// draws of noise.
 std::vector<float> rounded(std::vector<float> filter) {
   constexpr float steps = 1 << 20;
