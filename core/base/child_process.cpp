@@ -32,7 +32,7 @@ Result<MemoryFile> MemoryFile::make(const char* name) {
   const int error = errno;
   if (any >= 0) ::close(any);
   if (descriptor < 0)
-    return failure(ErrorKind::unavailable, std::string("no file can be made in memory: ") + std::strerror(error));
+    return failure(ErrorKind::unavailable, std::string("a file in memory cannot be made: ") + std::strerror(error));
   return MemoryFile(descriptor);
 }
 

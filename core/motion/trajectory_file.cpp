@@ -214,8 +214,8 @@ class Reader {
     // Contradictory frames are an error, because the frame that the file states must not be ignored silently.
     if (frame_.value_or(*frame) != *frame) return set_error("an earlier comment names another frame; a file has one frame");
     if (asked_.frame.value_or(*frame) != *frame)
-      return set_error("the file says " + std::string(name_of(*frame)) + ", but it was to be read as " +
-                       std::string(name_of(*asked_.frame)));
+      return set_error("the file states the frame " + std::string(name_of(*frame)) + ", but " +
+                       std::string(name_of(*asked_.frame)) + " was requested");
     frame_ = frame;
   }
 

@@ -14,7 +14,7 @@ std::string why_unlabelled(const PingRequest& request, const Scene& scene) {
   if (request.switches.mode != Mode::canonical || request.switches.fixed_fan > 0)
     return "labels need the canonical model: its surface cells belong to objects; leave out the mode and the fixed fan";
   if (range_image_of(request) != nullptr)
-    return "range images have no labels: they are made without surface cells; keep_truth records what each column hits";
+    return "range images have no labels: they are made without surface cells; keep_truth records the hit of each column";
   if (scene.objects.size() + scene.point_targets.size() > PingLabels::most_instances)
     return "labels are numbers of 16 bits: the scene has more than 65535 objects and point targets";
   return why_invalid(request);

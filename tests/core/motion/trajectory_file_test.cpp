@@ -189,7 +189,7 @@ TEST(TrajectoryFile, TakesTheFrameFromTheFileOrFromWhoAsks) {
               HasSubstr("p.csv: the file does not state the frame of its poses; begin it with a line \"# frame: "
                         "ENU_FLU\" or \"# frame: NED_FRD\""));
   EXPECT_THAT(refusal("# frame: ENU_FLU\n" + line, {.frame = Frame::ned_frd}),
-              "p.csv:1: the file says ENU_FLU, but it was to be read as NED_FRD");
+              "p.csv:1: the file states the frame ENU_FLU, but NED_FRD was requested");
   EXPECT_THAT(refusal("# frame: ENU_FLU\n# frame: NED_FRD\n" + line, {}),
               "p.csv:2: an earlier comment names another frame; a file has one frame");
   EXPECT_THAT(refusal("# frame: NWU\n"), StartsWith("p.csv:1: the frame must be"));

@@ -108,7 +108,7 @@ TEST(TrajectoryConfig, MistakesAreToldWithTheirPlace) {
                                      HasSubstr("no such file: \"dive.tum\"; looked in /")));
   EXPECT_THAT(why("missions/broken.csv"), HasSubstr("broken.csv:4: the time is earlier than the previous one"));
   EXPECT_THAT(why("missions/no-frame.tum"), HasSubstr("does not state the frame of its poses"));
-  EXPECT_THAT(why("{file: missions/dive.tum, frame: NED_FRD}"), HasSubstr("the file says ENU_FLU"));
+  EXPECT_THAT(why("{file: missions/dive.tum, frame: NED_FRD}"), HasSubstr("the file states the frame ENU_FLU"));
   EXPECT_THAT(why("{file: missions/dive.tum, frame: NWU}"), StartsWith("sonard.yaml:4:50: vehicles[0].trajectory.frame: "));
   EXPECT_THAT(why("{file: missions/dive.tum, speed: 0}"), HasSubstr("vehicles[0].trajectory.speed"));
   EXPECT_THAT(why("{file: missions/dive.tum, speeed: 2}"), HasSubstr("did you mean \"speed\""));
