@@ -1,5 +1,5 @@
 // The interface between the program and the CUDA module. Another compiler builds the module, and the program loads it by name.
-// The interface is plain C. The program checks its version and the sizes of its structs. cuda_machine.cpp calls it,
+// The interface is plain C. The program checks the version and the sizes of the structs. cuda_machine.cpp calls the interface,
 // cuda_module.cu implements it.
 #pragma once
 

@@ -1,6 +1,6 @@
-// Counter-based random numbers: every draw is a function of its key and counter. Therefore it does not depend on the order of
-// draws, on threads or on the device. Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"
-// (Philox4x32-10). Tests contain its known-answer vectors.
+// Counter-based random numbers: every draw is a function of its key and counter. Therefore a draw does not depend on the order
+// of draws, on threads or on the device. Source: Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"
+// (Philox4x32-10). Tests compare with the known-answer vectors of Random123.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
-// The picture that viewers show of a sonar. For most products it is a fan of the last ping, for others it is made of several
-// pings. protocol/<vendor>/host.cpp makes it. PicturePainter (draw_picture.hpp) draws it for `sonarctl view`, the live view and
-// other viewers.
+// The picture that viewers show of a sonar. For most products it is a fan of the last ping; for others it is made of several
+// pings. protocol/<vendor>/host.cpp makes the picture. PicturePainter (draw_picture.hpp) draws it for `sonarctl view`, the live
+// view and other viewers.
 #pragma once
 
 #include <array>

@@ -62,7 +62,8 @@ struct ReceivedPulse {
 std::vector<ReceivedPulse> receive_other_sonars(const PingContext& context, const PingRequest& request);
 /// The part of a pulse that lies within samples [from, to), in a beam in its direction.
 SampledPulse tone_of(const ReceivedPulse& pulse, int from, int to);
-/// Adds pulses to the beams, through the receive pattern with all its side lobes. In expected power it adds their power.
+/// Adds pulses to the beams, through the receive pattern with all side lobes. In expected power, the power of the pulses is
+/// added.
 void add_pulses(std::span<const ReceivedPulse> pulses, const PingPlan& plan, BeamSignals& beams);
 
 /// Each channel leaks into every beam. A single echo of amplitude A in one direction adds e A to all beams, e = crosstalk_db.

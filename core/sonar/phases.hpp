@@ -5,7 +5,7 @@
 
 namespace sonar {
 
-/// If a ping has vendor settings of this type, it keeps the signals of its beams (Ping::beam_signal_upa), because the vendor's
+/// A ping with vendor settings of this type keeps the signals of its beams (Ping::beam_signal_upa), because the vendor's
 /// message contains their phases.
 struct PhasedSettings : VendorSettings {};
 

@@ -26,8 +26,8 @@ struct RangeImageSettings : VendorSettings {
   bool chosen_as_heard = false;      // choose the strongest cell after speckle is applied (each range cell has its own)
   bool range_of_loudest = false;  // report the range of the strongest return in the chosen cell, not the centroid of all returns
   double range_sample_m = 0;      // ranges are whole multiples of it, 0 = any
-  // The filters of the device, in the order in which they are applied. The neighbours of a pixel are those of the eight around
-  // it that are in its block of rows.
+  // The filters of the device, in the order in which they are applied. The neighbours of a pixel are the pixels around it, up
+  // to eight, in the same block of rows.
   int block_rows = 0;        // number of rows that form a block; each block is measured with its own speckle; 0 = all rows
   int least_confirming = 0;  // a return is dropped if fewer of its neighbours confirm it
   double confirming_m = 0;   // a neighbour confirms a return if its range differs by no more than this

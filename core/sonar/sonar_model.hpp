@@ -1,4 +1,4 @@
-// The constants of a product, for each of its frequency modes. The folder of its make has their values.
+// The constants of a product, for each of its frequency modes. The folder of the product's make contains the values.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Recognises files of unexpected kinds by their first bytes: archives, web pages and other results of failed downloads. Readers
-// of meshes, grids and trajectories use it, so that the error names the kind of file instead of a wrong word in it.
+// Recognises files of unexpected kinds by their first bytes: archives, web pages and other results of failed downloads. With
+// it, readers of meshes, grids and trajectories name the kind of file in an error, instead of a wrong word in the file.
 #pragma once
 
 #include <string_view>

@@ -1,6 +1,6 @@
-// Points on smooth surfaces that reflect sound straight back, because the surface's normal passes through the sonar. Each has
-// the curvatures and the extent of its surface. specular_primitives and specular_mesh find them. core/pipeline/specular makes
-// echoes of them.
+// Points on smooth surfaces that reflect sound straight back, because the surface's normal passes through the sonar. Each point
+// has the curvatures and the extent of its surface. specular_primitives and specular_mesh find the points.
+// core/pipeline/specular makes echoes of them.
 #pragma once
 
 #include <array>
