@@ -18,7 +18,7 @@ using protocol::DeviceState;
 using protocol::Notice;
 using protocol::Reaction;
 
-constexpr std::size_t most_waiting = 256;    // changes of settings that a fault (D01, D02) may hold back
+constexpr std::size_t most_waiting = 256;    // changes of settings that a fault (D01, D02) may delay
 constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile controller can cause
 
 bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
@@ -52,8 +52,8 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
-  /// The settings on which the next command is based: the last commanded ones, even if a fault still holds them back; or the
-  /// device's, if something else, such as the control interface, has replaced them.
+  /// Returns the settings that the next command changes. They are those of the last command, even if a fault delays their use. If
+  /// something else, such as the control interface, has replaced the device's settings since then, they are the device's.
   Settings base() {
     if (device_.settings != seen_) {
       const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);
@@ -139,8 +139,8 @@ class ArisDialogue final : public protocol::Dialogue {
   }
 
   /// A controller that does not know the product sends the settings of each product, one after the other, and the device accepts
-  /// those of its own. So refusals are logged only if none was accepted: at the next command of another type, at the latest the
-  /// keep-alive, which comes every second.
+  /// those of its own. So refusals are logged only if the device accepted none of these settings. That is known at the next
+  /// command of another type, for example the keep-alive, which is sent every second.
   void on_acoustics(const Command& command) {
     const Verdict verdict = apply(settings_, command.acoustics.value_or(Acoustics{}), device_);
     accepts_ |= verdict.refusal.empty();

@@ -10,8 +10,8 @@
 namespace sonar::aris {
 namespace {
 
-/// Each ping of a frame forms 16 beams, one for each channel of the digitiser. With n pings a frame, channel k of ping p holds
-/// beam n sixteenth[k] + p. This order is a property of the hardware; the vendor's library has the same table.
+/// Each ping of a frame forms 16 beams, one for each channel of the digitiser. If a frame consists of n pings, channel k of ping
+/// p holds beam n * sixteenth[k] + p. This order is a property of the hardware; the vendor's library has the same table.
 constexpr std::array<std::size_t, channels> sixteenth{10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5};
 constexpr std::size_t first_part_samples = 620, part_samples = 1370;  // samples in a datagram of 1400 bytes
 constexpr std::size_t largest_picture = std::size_t{most_samples} * 128;
@@ -111,8 +111,8 @@ Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings) {
   return picture;
 }
 
-// The first part has room for 620 samples beside the header, the others for 1370, in datagrams of 1400 bytes. If
-// `longest` is larger, each part holds one more sample for each byte more.
+// In datagrams of 1400 bytes, the first part has room for the header and 620 samples, and each other part for 1370 samples. Each
+// additional byte of `longest` makes room for one more sample.
 std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples, std::size_t longest) {
   const std::size_t more = longest - longest_datagram;
   std::vector<Bytes> parts;

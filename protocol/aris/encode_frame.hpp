@@ -32,10 +32,11 @@ std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region regio
 
 Bytes make_beacon(const protocol::DeviceState& device);
 
-/// Vendor::change_integer of a datagram of a frame: ping_id (FrameIndex, which counts from 0) and image_size (total_data_size).
+/// Implements Vendor::change_integer() for a datagram of a frame. It knows two fields: ping_id (FrameIndex, which counts from 0)
+/// and image_size (total_data_size).
 bool change_part(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& part);
-/// Vendor::change_integer of a beacon: device_id; connected_address (not 0: a controller is connected); device_status (bits of an
-/// Oculus: 0x4000 too hot, 0x8000 stopped by heat).
+/// Implements Vendor::change_integer() for a beacon. It knows these fields: device_id; connected_address (not 0: a controller is
+/// connected); device_status (bits of an Oculus: 0x4000 too hot, 0x8000 stopped by heat).
 bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& beacon);
 
 /// A frame, assembled from all its parts.
@@ -58,7 +59,7 @@ class FrameAssembler {
   std::size_t total_ = 0, received_ = 0;
   bool done_ = true;
   Bytes header_, samples_;
-  std::vector<bool> has_;  // for each byte of the samples: whether it has arrived
+  std::vector<bool> has_;  // for each byte of the samples: true if it has arrived
   std::uint64_t incomplete_ = 0;
 };
 

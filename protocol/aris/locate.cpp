@@ -27,7 +27,7 @@ std::optional<FramePart> first_of(BytesView first_part) {
 
 }  // namespace
 
-// Without a datagram, the place in the header itself, as Vendor::field() requires for an empty message.
+// For an empty message the result is the position within the frame header, as Vendor::field() requires.
 std::optional<Field> locate(FieldName name, BytesView first_part) {
   auto found = wire::locate<FrameHeader>(name);
   if (!found || first_part.empty()) return found;

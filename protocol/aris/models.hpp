@@ -40,7 +40,7 @@ struct Product {
   std::array<double, 2> pulse_limit_us{};  // low, high frequency
   double pulse_energy_us_hz = 0;           // longest pulse times frame rate
   double window_end_m = 0;
-  double small_period_margin = 0, period_margin = 0;  // margins of a cycle, with sample periods up to 4 us and above
+  double small_period_margin = 0, period_margin = 0;  // margins of a cycle: for sample periods up to 4 us, and for longer ones
   Acoustics initial;                                  // used until a controller sends settings; from the vendor's sample program
 };
 

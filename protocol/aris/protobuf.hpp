@@ -81,8 +81,7 @@ class RawReader {
 template <class M>
 bool read(BytesView bytes, M& message);
 
-/// Visits the description of a message with one received field, and stores its value in the member with the same number and
-/// type.
+/// Stores one received field: it visits the description of the message and sets the member with the same number and type.
 class Reader {
  public:
   explicit Reader(const RawField& field) : field_(field) {}

@@ -32,11 +32,11 @@ Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, con
     s.acoustics.ping_mode = mode.number;
     return {};
   }
-  return refused(device.model->name + " forms " + counts + " beams, as its mode says, not " + std::to_string(*wanted.beams));
+  return refused(device.model->name + " forms " + counts + " beams in this mode, not " + std::to_string(*wanted.beams));
 }
 
-/// Changes the end of the window and keeps its start. It keeps the sample period too, if the number of samples then is valid, and
-/// makes the pulse at least as long as the sample period.
+/// Changes the end of the window and keeps its start. Keeps the sample period too if the resulting number of samples is valid.
+/// Makes the pulse at least as long as the sample period.
 Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState& device) {
   const PingSettings now = ping_settings(s, device);
   const double speed = static_cast<double>(now.device_sound_speed_mps), end_m = product_of(*device.model).window_end_m;
