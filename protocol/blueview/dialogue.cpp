@@ -89,8 +89,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const HeadSettings& fired = fired_with.heads[static_cast<std::size_t>(head)];
     const HeadSettings now_set = settings_from(device_.settings.get(), device_).heads[static_cast<std::size_t>(head)];
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-      // If the host sent SET and then PING, a ping fired before the SET does not answer: its settings differ both from those at
-      // the request and from the present ones.
+      // A ping that was fired before a SET does not answer a PING request that came after the SET: the settings of the ping
+      // differ both from those at the request and from the present ones.
       if (it->head != head || (fired != it->asked_with && fired != now_set)) {
         ++it;
         continue;
@@ -195,7 +195,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     if (version != protocol_version) {
       refuse(frame, Code::bad_packet_version,
              "version " + std::to_string(version) + " of the link is not supported, only version 1", reaction);
-      reaction.events.emplace_back(Close{"speaks another version of the link"});
+      reaction.events.emplace_back(Close{"uses another version of the link"});
       return;
     }
     greeted_ = true;

@@ -67,7 +67,7 @@ constexpr void fields(V& visit, M& m) {
   visit("raw_len", m.raw_length, means::image_size);
 }
 
-/// Vendor::field and Vendor::region for a PING_DATA message, header included.
+/// Implements Vendor::field() and Vendor::region() for a PING_DATA message, including its header.
 std::optional<protocol::Field> locate(protocol::FieldName name, wire::BytesView ping);
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
 

@@ -204,8 +204,8 @@ PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState
   Water believed = device.water;
   if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
   if (head.fluid == 1) believed.salinity_psu = 0;
-  // The slope is added to the absorption. It counts once per metre of range, the absorption counts there and back: so half of the
-  // slope.
+  // The absorption applies to the way out and to the way back, but the slope applies once to each metre of range. So half of the
+  // slope is added to the absorption.
   s.device_absorption_db_per_m =
       static_cast<float>(absorption_db_per_m(believed, device.depth_m, static_cast<double>(mode.centre_hz)) +
                          0.5 * static_cast<double>(head.tvg_db_per_m));

@@ -46,7 +46,7 @@ struct Refusal {
 };
 struct Applied {
   std::optional<Value> value;
-  Refusal refusal;  // if there is no value
+  Refusal refusal;  // set if there is no value
 };
 /// Sets one key of a head and returns the applied value: the nearest valid one.
 Applied apply(SonarSettings& settings, int head, Key key, const Value& value, const protocol::DeviceState& device);

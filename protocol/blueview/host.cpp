@@ -204,7 +204,7 @@ class BlueViewHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{0, make_frame(type, id, payload)});
   }
 
-  /// Reads frames of a recording. They answer the requests of the host that was recorded, so their request ids do not count.
+  /// Reads frames of a recording. They answer the requests of the host that was recorded, so their request ids are ignored.
   void on_recorded(const Frame& frame, HostActions& actions) {
     if (frame.header.type == FrameType::hello_ok) greeting_ = read_greeting(frame.payload).value_or(greeting_);
     if (frame.header.type == FrameType::ping_data) on_ping(frame, actions);

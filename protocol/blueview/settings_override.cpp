@@ -50,7 +50,8 @@ float gain_db_from(double percent) { return static_cast<float>(half_gain_db * (p
 
 double gain_percent_from(double gain_db) { return 50 * (gain_db / half_gain_db + 1); }
 
-// SET clamps a range; an override with the same range is refused with the limits of the product (Vendor::apply_override).
+// SET clamps a range that is not possible. An override refuses such a range, and its error states the limits of the product
+// (Vendor::apply_override).
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   SonarSettings all = settings_from(device.settings.get(), device);
   if (wanted.mode) {
