@@ -31,7 +31,7 @@ inline constexpr std::string_view health_of_replay = "ok: replays ";
 Result<PoseSample> decode_pose_datagram(BytesView datagram);
 /// Reads a message of the stream, without its length prefix. If the message is not protobuf, the refusal has id 0.
 tl::expected<Request, RefusedRequest> decode_request(BytesView message);
-/// Whether a message of the stream is a pose without an id, which gets no answer. Much faster than decode_request(), because it
+/// True if a message of the stream is a pose without an id, which gets no answer. Much faster than decode_request(), because it
 /// does not decode the pose.
 bool is_unasked_pose(BytesView message);
 /// Encodes a response. Bytes of its texts that are not UTF-8 become '?'.

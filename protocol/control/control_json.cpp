@@ -94,8 +94,7 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
   const auto* field = v1::Request::descriptor()->FindFieldByName(std::string(op));
   if (field == nullptr || field->containing_oneof() == nullptr) return refused("unknown request");
   if (json.size() > largest_json) return refused("longer than 1 MiB");
-  // For the strict reader a zero byte ends the text, for protobuf's reader it does not, so the text after it would be
-  // unchecked.
+  // A zero byte ends the text for the strict reader but not for protobuf's reader, so the text after it would stay unchecked.
   if (const auto zero = json.find('\0'); zero != std::string_view::npos)
     return refused("not JSON: a zero byte at character " + std::to_string(zero + 1));
   StrictReader reader;

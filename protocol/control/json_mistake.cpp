@@ -24,7 +24,7 @@ const FieldDescriptor* field_of(const Descriptor& type, const std::string& name)
   return nullptr;
 }
 
-/// The number in a text, which protobuf reads like the number itself; other values as they are.
+/// Converts a text that holds a number to the number, because protobuf accepts both. Other values are returned unchanged.
 json number_of(const json& value) {
   return value.is_string() ? json::parse(value.get_ref<const std::string&>(), nullptr, false) : value;
 }

@@ -144,7 +144,7 @@ void LineParser::feed(std::span<const std::byte> received) {
   for (const std::byte b : received) buffer_.push_back(static_cast<char>(b));
 }
 
-// Keeps whole lines, and drops the line that has begun: its end is lost. The next bytes are the middle of some line.
+// Keeps whole lines and drops the incomplete line, because its end is lost. The next bytes belong to the middle of a line.
 void LineParser::skip_gap() {
   begun_ = in_gap_ = true;
   const std::size_t last = buffer_.rfind('\n');

@@ -22,7 +22,7 @@ inline constexpr std::size_t longest_line = 4096;
 ///   frame       "NED_FRD" (default, as ArduPilot) or "ENU_FLU": then position, velocity and attitude are ENU and FLU
 ///   vehicle     name, may be absent when there is one vehicle
 Result<PoseSample> parse_json_pose(std::string_view line);
-/// Whether the line is a JSON object, with any keys; other lines belong to another protocol.
+/// True if the line is a JSON object, with any keys; other lines belong to another protocol.
 bool is_json_object(std::string_view line);
 
 /// Cuts a byte stream into lines. A line beyond the limit is discarded to its end and reported once. A byte order mark at the
@@ -39,7 +39,7 @@ class LineParser {
   /// Call it when a part of the stream was dropped. It discards the current line and all bytes up to the next line end, because
   /// they may belong to a dropped line.
   void skip_gap();
-  /// Whether the current line can become a JSON object: it is blank so far, or its first character is a brace. A request line
+  /// True if the current line can become a JSON object: it is blank so far, or its first character is a brace. A request line
   /// of HTTP never can.
   bool may_become_object() const;
 

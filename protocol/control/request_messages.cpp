@@ -192,7 +192,8 @@ Result<Operation> checked(Result<Op> op) {
   return Operation{*std::move(op)};
 }
 
-/// The operation of a request. A request without a known one, as of a newer client, is Unsupported and not an error.
+/// The operation of a request. If the operation is unknown, for example because the client is newer, the result is Unsupported
+/// and not an error.
 Result<Operation> operation_of(const v1::Request& message) {
   switch (message.op_case()) {
     case v1::Request::kHello:
@@ -237,7 +238,7 @@ Result<Operation> operation_of(const v1::Request& message) {
   return Unsupported{};
 }
 
-/// The way back: a struct as the message of its operation, for clients and tests.
+/// Converts a struct back to the message of its operation, for clients and tests.
 struct FillRequest {
   v1::Request& out;
   void operator()(const Unsupported&) const {}
@@ -337,7 +338,7 @@ struct FillRequest {
 
 }  // namespace
 
-// The operation is read first, because its refusals say more about a wrong field than that it is NaN.
+// The operation is read first, because its refusals explain a wrong field better than "is NaN" does.
 tl::expected<Request, RefusedRequest> from(const v1::Request& message) {
   const auto refused_here = [&](std::string why) {
     return tl::unexpected(RefusedRequest{message.id(), std::move(why), message.has_pose() || message.has_object()});
