@@ -114,7 +114,7 @@ class SonarJudge {
     findings_.push_back({level, check, text, cure, sonar_.name(), client});
   }
 
-  /// Slots for clients: drivers that were refused, or wait. A driver that is connected by now is not reported.
+  /// Reports drivers that were refused a slot or that wait for one. A driver that is connected by now is not reported.
   void check_places() {
     const v1::Visit& visit = sonar_.turned_away();
     const std::string holders = sonar_.clients().empty() ? "" : " (" + addresses_of(sonar_) + ")";
@@ -164,8 +164,8 @@ class SonarJudge {
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
     if (!is_recent(gone) || gone.by_itself()) return;
-    // It has connected again, and gets pings; then the other connection is of the past. It may connect before the first
-    // connection ends, but not before that one began: a client of the same host that did is another driver.
+    // A driver that has connected again and gets pings is not reported. Its new connection may begin before the old one ends, but
+    // not before the old one began: a client of the same host that did so is another driver.
     const auto host = [](const std::string& address) { return address.substr(0, address.rfind(':')); };
     const bool is_back = std::any_of(sonar_.clients().begin(), sonar_.clients().end(), [&](const v1::ClientStatus& client) {
       return client.pings_written() > 0 && host(client.address()) == host(gone.address()) &&

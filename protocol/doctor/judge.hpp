@@ -20,8 +20,8 @@ struct Elsewhere {
 /// null = none.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere = {});
 
-/// Whether to search for drivers with wrong addresses: no driver is connected, and no active fault may refuse connections at
-/// the right address.
+/// True if a search for drivers with wrong addresses is useful: no driver is connected, and no active fault may refuse
+/// connections at the right address.
 bool looks_elsewhere(const v1::DaemonStatus& status);
 
 }  // namespace sonar::doctor
