@@ -14,7 +14,7 @@ constexpr recording::Framing framing{.magic = {'{', '"'}, .header_size = 2};
 recording::Codec codec() {
   return {.framing = &framing, .sender = [](const recording::RecordedMessage& message) -> std::optional<recording::Sender> {
             if (!recording::begins_with(message.bytes, {'{', '"'}) || message.bytes.size() > longest_line) return std::nullopt;
-            // Reports do not have the model, so the first model is taken.
+            // Reports do not have the model, so the first model is assumed.
             return read_line(message.bytes).velocity ? std::optional(recording::Sender{models().front()}) : std::nullopt;
           }};
 }

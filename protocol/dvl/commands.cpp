@@ -117,7 +117,7 @@ protocol::Bytes response_line(const std::string& to, const Outcome& outcome) {
                      {"result", outcome.result},
                      {"format", format_name},
                      {"type", "response"}};
-  // `to` is a text of the client and may be no UTF-8, at which dump() would throw.
+  // `to` is a text of the client and may not be UTF-8. Without `replace`, dump() would throw then.
   return line_of(message.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 

@@ -79,7 +79,7 @@ class JsonDialogue final : public Session {
     }
     const std::string command = named->get<std::string>();
     const auto parameters = message.find("parameters");
-    const auto outcome = obey(command, parameters != message.end() ? *parameters : Json(), now, reaction);
+    const auto outcome = execute(command, parameters != message.end() ? *parameters : Json(), now, reaction);
     reaction.replies.push_back(response_line(command, outcome.value_or(Outcome{.error = "there is no such command"})));
   }
 

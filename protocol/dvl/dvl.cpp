@@ -8,8 +8,8 @@
 namespace sonar::dvl {
 namespace {
 
-/// From the last echo to the report. Three public reports have 88 and 147 (USR) and 189 ms (DOC), by software of different years:
-/// too few for a default.
+/// Delay from the last echo to the report. Three public reports have 88 ms and 147 ms (USR) and 189 ms (DOC), from software of
+/// different years. These are too few for a default.
 constexpr std::string_view report_delay = "report_delay_ms";
 constexpr double assumed_delay_ms = 2;
 
@@ -33,7 +33,7 @@ class DvlVendor final : public protocol::PushingVendor {
         {{report_delay,
           {},
           "none",
-          "milliseconds from a ping's last echo to its report; none: it is sent once it is made",
+          "milliseconds from a ping's last echo to its report; none: it is sent as soon as it is made",
           0,
           1000}}};
     return all;
@@ -67,7 +67,7 @@ class DvlVendor final : public protocol::PushingVendor {
   }
   std::vector<protocol::Bytes> datagrams(const protocol::Port& port, const Ping& ping,
                                          const protocol::DeviceState& device) const override {
-    if (port.number != serial_port) return {};  // frame() is what it sends
+    if (port.number != serial_port) return {};  // the other port sends frame()
     const Measurement measured = measured_in(ping);
     const SerialOutput output = settings_from(device.settings.get()).serial_output;
     Bytes lines = velocity_sentences(measured, since_last(ping, device), sent_at(measured, device), output);

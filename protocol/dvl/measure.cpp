@@ -13,7 +13,7 @@ constexpr double fom_without_velocity = 2.5;   // LOG: 2.4 to 2.7
 constexpr auto longest_gap = std::chrono::seconds(3);  // over a longer gap between pings the velocity is unknown
 constexpr double drift_mps = 0.1;                      // unknown: growth of the error of a position without a valid velocity
 
-/// First number of the random streams of the beams. Those of the pixels, which have the same domain, are lower.
+/// First number of the random streams of the beams. The streams of the pixels, in the same domain, have lower numbers.
 constexpr std::uint32_t noise_stream = 1u << 16;
 
 double standard_normal(const PingRequest& r, std::size_t beam) {
@@ -39,7 +39,7 @@ Beam beam_of(const Ping& ping, std::size_t index, Vec3d velocity_mps) {
   if (echo.range == 0 || echo.strength == 0 || distance_m < s.range_start_m || distance_m > s.range_m) return beam;
   beam.is_valid = true;
   beam.distance_m = distance_m;
-  // The receiver's gain grows by 40 dB a decade of distance (models.cpp). It is taken out of the level.
+  // The receiver's gain grows by 40 dB a decade of distance (models.cpp). This gain is removed from the level.
   beam.rssi_dbm = rssi_at_full_scale_dbm + db_from_amplitude(echo.strength / static_cast<double>(RangePixel::most_strength)) -
                   40 * std::log10(distance_m);
   const double along_mps = dot(beam_direction(index), velocity_mps);
@@ -174,8 +174,9 @@ Measurement measure(const Ping& ping) {
 
 std::shared_ptr<const PingFindings> HeldSettings::look_at(const Ping& ping) const { return protocol::found(measure(ping)); }
 
-// The search of the device is unknown. Here it tries the next higher mode if it has no velocity, and after the highest the
-// lowest. With a velocity it keeps its mode while the altitude belongs to that (docs/protocols/dvl.md, "Range modes").
+// How the device searches is unknown. Here, if it has no velocity, it tries the next higher mode, and the lowest after the
+// highest. If it has a velocity, it keeps its mode while the altitude is within the limits of the mode (docs/protocols/dvl.md,
+// "Range modes").
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product) {
   if (!measured.is_valid) return settings.mode < settings.highest_mode ? settings.mode + 1 : settings.lowest_mode;
   const auto has = [&](int index) {

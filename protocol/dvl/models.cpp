@@ -79,7 +79,8 @@ Vec3d beam_direction(std::size_t beam) {
 
 std::size_t pixel_of(std::size_t beam) {
   const Vec3d at = beam_direction(beam);
-  // Columns begin at port, rows below. The sonar looks down the device's z axis with its own z forward, so row 0 is aft.
+  // Columns count from port, rows from the lowest elevation. The sonar looks down the device's z axis with its own z forward, so
+  // row 0 is aft.
   const int column = at.y < 0 ? margin : margin + steps_between, row = at.x < 0 ? margin : margin + steps_between;
   return static_cast<std::size_t>(row * grid_size + column);
 }

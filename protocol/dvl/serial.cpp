@@ -19,7 +19,7 @@ using protocol::Reaction;
 using text::format;
 
 constexpr std::size_t longest_sentence = 512;                  // chosen
-constexpr std::size_t events_per_call = 32;                    // limits what a hostile host causes
+constexpr std::size_t events_per_call = 32;                    // limits the events that a hostile host can cause
 constexpr auto longest_pause = std::chrono::milliseconds(10);  // between the bytes of a sentence (DOC)
 constexpr std::string_view no_sentence = "wr?", wrong_checksum = "wr!", done = "wra", failed = "wrn";
 
@@ -122,10 +122,10 @@ class SerialDialogue final : public Session {
     say(answer, reaction);
   }
 
-  /// Carries out a command; its letter is one of the documentation. The words follow the letter.
+  /// Carries out the command with this letter (DOC). The words follow the letter.
   std::string answer_to(char letter, const Words& words, Time now, Reaction& reaction) {
     const auto result = [&](const char* command, const Json& parameters = nullptr) {
-      return *obey(command, parameters, now, reaction);
+      return *execute(command, parameters, now, reaction);
     };
     const auto acknowledged = [](const Outcome& outcome) { return std::string(outcome.error.empty() ? done : failed); };
     if (words.size() == 1 && letter == 'p') return select_output(words[0], reaction);

@@ -36,7 +36,7 @@ protocol::Delivery Session::on_ping(const VendorSettings*, std::size_t, Time now
   return delivery;
 }
 
-std::optional<Outcome> Session::obey(const std::string& command, const Json& parameters, Time now, Reaction& reaction) {
+std::optional<Outcome> Session::execute(const std::string& command, const Json& parameters, Time now, Reaction& reaction) {
   Settings s = settings_after(reaction);
   if (command == "trigger_ping") return trigger(std::move(s), now, reaction);
   const auto before = s.configured();
@@ -49,7 +49,7 @@ std::optional<Outcome> Session::obey(const std::string& command, const Json& par
 Outcome Session::trigger(Settings s, Time now, Reaction& reaction) {
   if (s.acoustics) return {.error = "acoustic_enabled must be false"};
   if (waiting_ >= most_waiting) return {.error = "the queue is full"};
-  if (!s.is_triggered) {  // the rate of the settings is 0 while acoustics are disabled; a triggered ping needs another one
+  if (!s.is_triggered) {  // the rate of the settings is 0 while acoustics are disabled; a triggered ping needs another rate
     s.is_triggered = true;
     reaction.events.emplace_back(change_to(s, device_));
   }

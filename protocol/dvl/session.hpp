@@ -29,7 +29,7 @@ class Session : public protocol::Dialogue {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
   /// Carries out a command, and adds the events that follow. Returns nullopt if there is no such command.
-  std::optional<Outcome> obey(const std::string& command, const Json& parameters, Time now, protocol::Reaction& reaction);
+  std::optional<Outcome> execute(const std::string& command, const Json& parameters, Time now, protocol::Reaction& reaction);
 
  private:
   static Time next_report_after(Time now);
