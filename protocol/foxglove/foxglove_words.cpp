@@ -16,7 +16,7 @@ using Json =
 using Read = nlohmann::json;  // for reading from viewers, which may send thousands of keys
 constexpr int deepest = 16;
 
-/// Names may be no UTF-8; such bytes are replaced, because a message must not fail by a name.
+/// Names may contain bytes that are not UTF-8. They are replaced, so that no name makes a message fail.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(Time at) {
@@ -25,7 +25,7 @@ Json json_of(Time at) {
   return {{"sec", whole.count()}, {"nsec", (since - whole).count()}};
 }
 
-/// A parameter as the protocol has it. JSON has no NaN and no infinity, so such a value is sent as unset. Numbers have
+/// A parameter in the form of the protocol. JSON has no NaN and no infinity, so such a value is sent as unset. Numbers have
 /// the type "float64", because JSON does not distinguish 5.0 from 5.
 Json json_of(const Parameter& parameter) {
   Json json{{"name", parameter.name}};
@@ -77,7 +77,7 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> subscription(const Read& 
   if (!id || !channel) return std::nullopt;
   return std::pair(*id, *channel);
 }
-/// A value from a viewer. One with the type "float64" may be written without a fraction. Integers beyond 63 bits are not
+/// A value from a viewer, which may write a "float64" without a fraction. Integers beyond 63 bits are not
 /// accepted.
 Value value(const Read& json, bool is_float) {
   if (json.is_boolean()) return json.get<bool>();
