@@ -12,7 +12,7 @@ namespace {
 
 using protocol::HostActions;
 
-/// Positive angles are to port, as most clients take them (protocol/m3/README.md, "Left and right"). So the beam with the
+/// Positive angles are to port, as most clients assume (protocol/m3/README.md, "Left and right"). So the beam with the
 /// greatest angle, the last of the packet, is the first of the picture.
 PolarImage picture_of(const Packet& packet) {
   PolarImage image;
@@ -68,7 +68,7 @@ class M3Host final : public protocol::Host {
   std::optional<Counts> counts() const override { return counts_; }
 
  private:
-  /// The ping keeps the packet, and computes its picture only when it is asked for one.
+  /// The ping keeps the packet, and computes its picture only on request.
   protocol::HostPing ping_from(const Packet& packet, Bytes whole) {
     const DataFront& front = packet.header.front;
     const DataBack& back = packet.header.back;

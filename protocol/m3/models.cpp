@@ -11,7 +11,8 @@ namespace {
 // Sources: PKT, LOG: protocol/m3/README.md.
 constexpr double elevation_deg = 30;  // recalled from the data sheet
 constexpr double elements = 64;       // PKT
-// unknown: levels. Full scale so that the strongest echoes of the demo scene have the level of those of PKT, about.
+// unknown: levels. Full scale is chosen so that the strongest echoes of the demo scene have about the level of the strongest
+// echoes in PKT.
 constexpr float source_level_db = 210, full_scale_upa = 1.5e8f;
 
 /// The mode "Imaging 3" of PKT; other modes are not emulated.

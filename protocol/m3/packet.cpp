@@ -118,8 +118,8 @@ DataHeader header_of(const Ping& ping, const protocol::DeviceState& device) {
   return header;
 }
 
-/// The part of a packet that determines its length. The size in the head alone does not protect from a false begin within
-/// samples, so the numbers of beams and samples have to agree with it.
+/// The part of a packet that determines its length. The size in the head alone cannot detect a false start within samples, so the
+/// numbers of beams and samples must agree with it.
 struct StreamFront {
   PacketHead head;
   DataFront data;
