@@ -36,7 +36,7 @@ class DistanceRequests {
   /// Sets the interval of MAV_CMD_SET_MESSAGE_INTERVAL: -1 = no messages, 0 = one for each ping. Other negative numbers and NaN
   /// change nothing and return false.
   bool set_interval_us(float wanted);
-  /// Whether to send this distance, which then counts as sent.
+  /// True if this distance is due. It then counts as sent.
   bool is_due(const DistanceSensor& measured);
 
  private:

@@ -16,7 +16,7 @@ constexpr std::int64_t late_ns = late_ms * 1'000'000;
 constexpr double farthest_m = 100e3;               // distance from the origin up to which the tangent plane is valid
 constexpr double moved_origin_m = 0.01;            // an origin that moves by more causes a jump of the poses
 constexpr double highest_hud_m = 1e5;              // keeps the results finite
-constexpr std::int64_t longest_sinking_ms = 1000;  // the depth is extrapolated with its last speed for so long
+constexpr std::int64_t longest_sinking_ms = 1000;  // longest time for which the depth is extrapolated with its last speed
 
 std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
@@ -65,7 +65,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   reported_.reset();
   autopilot_component_ = first_autopilot;
   received_.clear();
-  told_ignored_.clear();
+  reported_ignored_.clear();
   local_in_world_.reset();
   newest_ns_ = {};
   last_pose_ = {};
@@ -84,7 +84,7 @@ void MavlinkPoses::clear_histories() {
   ++resets_;
 }
 
-/// Whether the frame is from the selected system. Selects one if there is none: the configured system, or else the first that
+/// True if the frame is from the selected system. Selects one if there is none: the configured system, or else the first that
 /// sends a pose or the heartbeat of an autopilot. Another one is selected only after the first has been silent for
 /// system_silence.
 bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
@@ -149,7 +149,7 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
 }
 
 /// Carries out MAV_CMD_INJECT_FAILURE, and requests for DISTANCE_SENSOR, if they are addressed to this component. Commands for
-/// other components of the system are not answered: they answer themselves.
+/// other components of the system are not answered, because those components answer them.
 void MavlinkPoses::on_command(const CommandLong& command, const Frame& frame, Reaction& out) {
   const bool is_ours = command.target_system == self_.system && command.target_component == own_component;
   const bool asks_for_message =
@@ -280,7 +280,7 @@ void MavlinkPoses::handle(const GpsGlobalOrigin& m, Moment at) {
 }
 
 /// The altitude in VFR_HUD is relative to the surface only from ArduSub; other vehicles send it above mean sea level or home. The
-/// message has no time stamp, so the newest boot time is taken.
+/// message has no time stamp, so the newest boot time is used.
 void MavlinkPoses::handle(const VfrHud& m, Moment at) {
   const double altitude_m = static_cast<double>(m.altitude_m);
   if (!is_submarine_ || receives(GlobalPositionInt::id, at.now) || !(std::abs(altitude_m) <= highest_hud_m)) return;

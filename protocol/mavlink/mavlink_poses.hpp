@@ -50,7 +50,7 @@ inline constexpr std::uint32_t distance_sensor = 7;
 /// Carries out MAV_CMD_INJECT_FAILURE. `unit`: FAILURE_UNIT of common.xml; `instance`: 0 = all.
 using InjectFailure = std::function<MavResult(std::uint32_t unit, FailureType type, std::uint32_t instance)>;
 
-/// Whether the vehicle has a range finder, whose distances can be sent.
+/// True if the vehicle has a range finder, whose distances can be sent.
 using HasRangeFinder = std::function<bool()>;
 
 struct SourcedPose {
@@ -87,7 +87,7 @@ class MavlinkPoses {
   /// Names another vehicle (system) whose messages are ignored, while it sends. Else empty.
   std::string rival(Time now) const;
 
-  /// Whether distances are wanted: by the settings, or by the last command of the vehicle.
+  /// True if distances are wanted: by the settings, or by the last command of the vehicle.
   bool wants_distances() const { return distances_.wanted(); }
   /// The datagram of a distance; nullopt if distances are not wanted, or less than the requested interval has passed since the
   /// sensor's last one.
@@ -118,12 +118,12 @@ class MavlinkPoses {
     Reaction& out;
   };
 
-  static constexpr std::size_t most_told = 16;  // ignored systems and components that notices name
-  /// Whether only vehicles or their simulators send this message. Ground stations send the others too.
+  static constexpr std::size_t most_reported = 16;  // ignored systems and components that notices name
+  /// True if only vehicles or their simulators send this message. Ground stations send the others too.
   static bool contains_pose(std::uint32_t id);
-  /// Whether only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
+  /// True if only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
   static bool identifies_vehicle(const Frame& frame);
-  /// Whether system_id or component_id select other senders.
+  /// True if system_id or component_id select other senders.
   bool is_excluded(const Frame& frame) const {
     return (settings_.system_id != 0 && frame.system != settings_.system_id) ||
            (settings_.component_id != 0 && frame.component != settings_.component_id);
@@ -179,7 +179,7 @@ class MavlinkPoses {
   bool global_has_fix_ = false, sim_state_has_fix_ = false;
   Time found_at_{}, last_received_{}, next_heartbeat_{}, next_request_{}, next_reminder_{};
   std::optional<Time> first_tick_;  // first tick
-  std::optional<bool> reported_;    // whether poses arrive
+  std::optional<bool> reported_;    // true: poses arrived at the last report
   std::chrono::nanoseconds reminder_period_{0};
   std::optional<std::pair<int, int>> ignored_;  // system and component of the last ignored message
   /// Text of the notice for each system and component that one has named since the vehicle was selected.

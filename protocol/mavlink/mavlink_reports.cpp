@@ -53,8 +53,8 @@ bool MavlinkPoses::has_poses(Time now) const {
                      [now](const std::optional<Time>& at) { return at && now - *at <= system_silence; });
 }
 
-/// Reports when poses start or stop. Without poses it repeats the report at growing intervals, so that the end of the log says
-/// what is missing, however long ago sonard was started.
+/// Reports when poses start or stop. Without poses it repeats the report at growing intervals, so that the end of the log always
+/// states what is missing.
 void MavlinkPoses::report_changes(Time now, Reaction& out) {
   if (!first_tick_) first_tick_ = now;
   if (system_ ? now - found_at_ < listen_before_report : now - *first_tick_ < silence_before_report) return;

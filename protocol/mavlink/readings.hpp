@@ -43,7 +43,7 @@ control::RawPose raw_pose(const VisionPositionEstimate& m);
 /// Errors: an unsupported frame_id or child_frame_id.
 Result<control::RawPose> raw_pose(const Odometry& m);
 
-/// Whether the message has its position in the integer extensions, which version 1 cannot contain.
+/// True if the message has its position in the integer extensions, which version 1 cannot contain.
 bool has_exact_position(const SimState& m);
 
 }  // namespace sonar::mavlink
