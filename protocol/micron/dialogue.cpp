@@ -19,7 +19,8 @@ constexpr std::size_t notices_per_call = 8;                                     
 
 /// One host's conversation (docs/protocols/micron.md, "Session"):
 /// - After power-up or a reboot the head has no parameters: it sends mtAlive once a second and ignores requests for scan lines.
-/// - mtHeadCommand sets the parameters. The next mtAlive says that they were received, the one after it that they are valid.
+/// - mtHeadCommand sets the parameters. The next mtAlive reports that they were received, and the one after it reports that they
+///   are valid.
 /// - mtSendData requests one or two scan lines (`wanted_`). For each the head turns (`arrives_`), a ping is requested and awaited
 ///   (`awaited_`), and the head turns on. mtAlive pauses meanwhile.
 /// The protocol has no refusal, so invalid messages are logged and ignored.
@@ -68,7 +69,7 @@ class MicronDialogue final : public protocol::Dialogue {
     const auto arrival = awaited_.arrive(made_with);
     if (arrival == protocol::AwaitedPing::Arrival::other) return {};
     if (arrival == protocol::AwaitedPing::Arrival::awaited) advance(now);
-    next_alive_ = now + alive_period;  // unknown: assumed, because drivers read the lines of a scan without looking for others
+    next_alive_ = now + alive_period;  // unknown: assumed, because drivers expect only scan lines during a scan
     return {{Bytes{}}, {}};
   }
 
@@ -107,7 +108,7 @@ class MicronDialogue final : public protocol::Dialogue {
 
   void on_command(BytesView payload, Time now, Reaction& reaction) {
     Settings s = settings_after(reaction);
-    if (payload.size() == 1 && payload.front() == std::byte{reverse_command}) {  // MCG: turns the scan around
+    if (payload.size() == 1 && payload.front() == std::byte{reverse_command}) {  // MCG: reverses the scan
       scan_.to_right = !scan_.to_right;
       return;
     }
@@ -183,10 +184,10 @@ class MicronDialogue final : public protocol::Dialogue {
   const protocol::DeviceState& device_;
   recording::MessageSplitter splitter_{recording::Origin::client, framing};
   Time next_alive_{}, boots_until_{};
-  int recentring_ = 0;     // messages mtAlive that still have to say that the head returns to its centre
+  int recentring_ = 0;     // number of mtAlive messages that still have to report the return of the head to its centre
   Scan scan_;              // the bearing that the head has, or turns to
   Time arrives_{};         // when the head has that bearing
-  bool knows_parameters_;  // an mtAlive has said that parameters were received
+  bool knows_parameters_;  // an mtAlive has reported that parameters were received
   int wanted_ = 0;         // scan lines that were requested and not sent yet
   protocol::AwaitedPing awaited_;
 };

@@ -36,7 +36,7 @@ bool is_known(Id id) {
 }
 
 /// Returns the length of the frame with this header. A frame states its length twice, as digits and as a number. Both have to
-/// agree, so that bytes of an image that look like the start of a frame are seldom taken for one.
+/// agree, so that bytes of an image that look like the start of a frame are seldom mistaken for one.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   const auto header = read_front<Header>(bytes);
   if (!header || header->hex_length != digits_of(header->length) || (strict && !is_known(header->id))) return std::nullopt;
@@ -74,7 +74,7 @@ Bytes packed(BytesView bins, bool upper_first) {
   return bytes;
 }
 
-// The upper half of a byte is taken as the nearer bin, because the frame does not state the order (option first_4bit_bin).
+// The upper half of a byte is assumed to be the nearer bin, because the frame does not state the order (option first_4bit_bin).
 Bytes unpacked(BytesView bytes) {
   Bytes bins;
   for (const std::byte both : bytes) bins.insert(bins.end(), {both >> 4, both & std::byte{15}});

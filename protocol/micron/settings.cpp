@@ -74,7 +74,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 std::string complaint(const HeadCommand& c) {
   if (c.bins < 1 || c.bins > 1500) return text::format("%d bins are not in 1..1500", c.bins);
   if (c.interval < 1) return "the interval of the bins is 0";
-  // 750 m/s is half of the nominal sound speed: the way there and back.
+  // 750 m/s is half of the nominal sound speed, because the sound travels there and back.
   if (c.bins * c.interval * bin_unit_s * 750 > farthest_m) return text::format("the bins reach beyond %g m", farthest_m);
   if (c.step < 1) return "the step of the motor is 0";
   if (c.left >= turn || c.right >= turn) return text::format("a limit is not in 0..%d", turn - 1);
