@@ -6,7 +6,7 @@
 namespace sonar::norbit {
 namespace {
 
-/// By the first packet: a recording of the daemon has both of a ping in one message.
+/// The sender is that of the first packet. A message in a recording of the daemon has both packets of a ping.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   const auto size = framing.length(message.bytes, recording::Origin::device, true);
   if (!size || *size > message.bytes.size()) return std::nullopt;

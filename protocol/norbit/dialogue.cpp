@@ -21,7 +21,7 @@ using protocol::Reaction;
 using text::format;
 
 constexpr std::size_t longest_line = 512;
-constexpr std::size_t events_per_call = 32;                  // limits what a hostile host causes
+constexpr std::size_t events_per_call = 32;                  // limits the events that a hostile host can cause
 constexpr auto end_of_line = std::chrono::milliseconds(20);  // ROS sends no end of line
 
 /// A setting with its arguments. They are read before and written after the settings change.
@@ -141,7 +141,7 @@ class CommandDialogue final : public protocol::Dialogue {
   void run(const std::vector<std::string_view>& words, Reaction& reaction) {
     std::string_view name = words.front();
     std::vector<std::string_view> given(words.begin() + 1, words.end());
-    if (name == "exit") return reaction.events.emplace_back(protocol::Close{"it said exit"}), void();
+    if (name == "exit") return reaction.events.emplace_back(protocol::Close{"it sent exit"}), void();
     if (name == "on" || name == "off") given = {name == "on" ? "1" : "0"}, name = "set_power";
     if (name == "set_default") {
       reaction.events.emplace_back(change_to(Settings{}, device_));

@@ -22,7 +22,7 @@ using text::format;
 
 constexpr std::size_t empty_rows = 500;
 constexpr double usual_range_m = 10, usual_rate_hz = 10;
-constexpr auto patience = std::chrono::seconds(2);  // with a silent port, when the other has sent its packet
+constexpr auto patience = std::chrono::seconds(2);  // wait for a silent port after the other port has sent its packet
 constexpr std::size_t most_waiting = 1024, most_waiting_bytes = 64u << 20;
 
 Bytes request_of(const protocol::SettingsOverride& wanted) {
@@ -44,7 +44,7 @@ std::vector<std::pair<double, double>> points_of(const Bathymetry& bathymetry) {
   return points;
 }
 
-/// Angles rise from port to starboard, so that the beams are in the order of a picture. Nothing: they do not, or have no range.
+/// The picture of a water column. nullopt: the angles do not rise from port to starboard, or the samples have no range.
 std::optional<PolarImage> image_of(const Column& column) {
   PolarImage image;
   image.rows = column.front.samples;
@@ -70,14 +70,14 @@ std::optional<PolarImage> image_of(const Column& column) {
   return image;
 }
 
-/// On which points are drawn when there is no water column.
+/// A fan without samples. Points are drawn on it if there is no water column.
 PolarImage empty_fan(double range_m) {
   const double half_rad = rad_from_deg(swath_deg / 2);
   return {empty_rows, 2, range_m / empty_rows, {half_rad, -half_rad}, std::vector<float>(2 * empty_rows)};
 }
 
-/// The two packets of a ping come by two ports, each in the order of the pings. A slow connection may bring its packets long
-/// after the other.
+/// The two packets of a ping arrive at two ports, at each port in the order of the pings. The packets of a slow connection may
+/// arrive long after those of the other.
 class NorbitHost final : public protocol::Host {
  public:
   explicit NorbitHost(std::optional<Bytes> request) : request_(std::move(request)) {}
@@ -109,7 +109,7 @@ class NorbitHost final : public protocol::Host {
     }
     return actions;
   }
-  /// All ports have been read by then, also after a pause of the reader.
+  /// All ports have been read before a tick, even after a pause of the reader.
   HostActions on_tick(Time now) override {
     HostActions actions;
     show(now, actions);
@@ -159,14 +159,15 @@ class NorbitHost final : public protocol::Host {
     return &*ping;
   }
 
-  /// A port that has sent nothing at all may be closed on purpose; then pings wait only at the beginning.
+  /// The time at which a ping is shown without its other packet. A port that has never sent anything may be closed on purpose, so
+  /// only the first pings wait for it.
   Time given_up_at(const Parts& ping) const {
     const std::optional<Time>& heard = heard_at_[ping.missing()];
     return (heard ? std::max(*heard, ping.since) : begun_.value_or(ping.since)) + patience;
   }
 
-  /// Shows the pings that are whole. One whose other packet was left out, because the port has sent that of a later ping, counts
-  /// as missing: a reader who is slow loses other pings at each port. If the port is silent at `now`, the ping is shown as it is.
+  /// Shows the complete pings. If a port has already sent the packet of a later ping, the earlier ping counts as missing: a slow
+  /// reader loses different pings at each port. If the port is silent at `now`, the ping is shown incomplete.
   void show(std::optional<Time> now, HostActions& actions) {
     while (!waiting_.empty()) {
       const Parts& ping = waiting_.front();

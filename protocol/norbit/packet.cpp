@@ -13,11 +13,11 @@ namespace sonar::norbit {
 namespace {
 
 constexpr double above_db = 15;           // unknown: assumed
-constexpr std::uint8_t good_quality = 8;  // DFD: of a signal 12 dB over the noise
+constexpr std::uint8_t good_quality = 8;  // DFD: quality of a signal 12 dB above the noise
 constexpr std::size_t longest_packet = 24 + 168 + (1u << 20) + 4 * 512;
 constexpr double most_pixel = 65535;
 
-/// The packet of `front` and what follows it, with the header.
+/// A whole packet: the header, `front`, and the bytes after it.
 template <class Front>
 Bytes sealed(Type type, const Front& front, const Bytes& rest) {
   Bytes body = wire::bytes_of(front);
@@ -91,7 +91,7 @@ Grid grid_in(const Ping& ping) {
                  static_cast<double>(ping.request.settings.device_sound_speed_mps));
 }
 
-/// The pixels of the water column as its packet has them.
+/// The pixels of the water column in the order of its packet.
 Bytes column_pixels(const Ping& ping) {
   const Settings settings = settings_from(ping.request.vendor_settings.get());
   const Grid grid = grid_in(ping);
