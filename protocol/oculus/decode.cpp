@@ -40,7 +40,7 @@ std::uint32_t unsigned_at(const wire::Bytes& bytes, std::size_t offset, std::siz
   return value;
 }
 
-// A ping that states more than it holds is decoded as far as possible, so that identity_violations() can say what is wrong.
+// A ping that states more than it holds is decoded as far as possible, so that identity_violations() can report the mistake.
 void read_bearings(DecodedPing& ping, wire::Reader& reader) {
   const std::size_t count = std::min<std::size_t>(ping.head.fixed.beam_count, reader.remaining() / 2);
   ping.bearings_cdeg.resize(count);

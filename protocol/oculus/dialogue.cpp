@@ -41,7 +41,8 @@ class OculusDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // The daemon carries out the events of this call after it. `stored_` lets a read see a write that is in the same bytes.
+    // The daemon carries out the events of this call after the call has returned. `stored_` lets a read see a write that is in
+    // the same bytes.
     stored_ = device_.stored_address;
     const std::uint64_t skipped_before = framer_.skipped_bytes();
     framer_.append(received);
@@ -116,24 +117,24 @@ class OculusDialogue final : public protocol::Dialogue {
     reaction.events.emplace_back(ChangeSettings{resolved.settings, fired_, summary(*fire, resolved)});
     if (one_ping) reaction.events.emplace_back(RequestPing{});
     requested_ping_ = one_ping;
-    // Drivers take a dummy as the acknowledgement of standby (ENS). Some repeat a fire message for every ping (VND) or ten times
-    // a second (MRG); a repeated standby is applied again but not acknowledged again, or dummies would flood the client.
+    // Drivers interpret a dummy as the acknowledgement of standby (ENS). Some repeat a fire message for every ping (VND) or ten
+    // times a second (MRG); a repeated standby is applied again but not acknowledged again, or dummies would flood the client.
     if (standby && !repeated) {
       reaction.replies.push_back(make_dummy(device_.id));
       postpone_dummy(now);
     }
   }
 
-  /// A client that waits for pings is sent no dummy, however long they take: ENSTA's driver takes a dummy as confirming standby,
-  /// and stores standby as its ping rate. With network trigger the device waits for the client, so dummies are sent. Fire
-  /// messages of an observer change nothing.
+  /// A client that waits for pings is sent no dummy, however long they take: ENSTA's driver interprets a dummy as the
+  /// acknowledgement of standby, and then stores standby as its ping rate. With network trigger the device waits for the client,
+  /// so dummies are sent. Fire messages of an observer change nothing.
   bool expects_pings() const {
     const auto* held = dynamic_cast<const HeldFire*>(device_.settings.get());
     if (!is_heard() || held == nullptr || table_rate_hz(held->fire.settings.ping_rate) <= 0) return false;
     return requested_ping_ || (held->fire.settings.flags & flag::network_trigger) == 0;
   }
 
-  /// Whether the device uses settings of this client or has used them.
+  /// True if the device uses settings of this client or has used them.
   bool is_heard() const { return is_heard_ || (fired_ != nullptr && device_.settings == fired_); }
 
   static std::string summary(const FireRequest& fire, const ResolvedSettings& resolved) {
@@ -155,7 +156,7 @@ class OculusDialogue final : public protocol::Dialogue {
     // By default a write is not answered, because the vendor's viewer reads the values back itself.
     if (write && text_option(device_.options, option_name::user_config_write) != "reply") return;
     reaction.replies.push_back(make_user_config(device_.id, stored_, device_));
-    postpone_dummy(now);  // VND takes the first 28 bytes after its request as the reply, so no dummy may come first
+    postpone_dummy(now);  // VND reads the first 28 bytes after its request as the reply, so no dummy may precede it
   }
 
   void notice(Reaction& reaction, std::string text) {

@@ -83,7 +83,7 @@ void set_environment(PingResultV2& fixed, const PingRequest& request) {
 }
 
 /// Sets the time since power-up as both versions state it. CAP's 32-bit counter rises by 62 502 100 a ping at 16 Hz, so its unit
-/// is a nanosecond and it overflows every 4.3 s; option ping_start_time_unit has microseconds for another reading.
+/// is a nanosecond and it overflows every 4.3 s; option ping_start_time_unit also allows microseconds.
 void set_start_time(PingHead& head, std::chrono::nanoseconds since_power_up, std::string_view unit) {
   const auto microseconds = std::chrono::floor<std::chrono::microseconds>(since_power_up).count();
   head.fixed.ping_start_time_s = static_cast<double>(microseconds) * 1e-6;

@@ -17,9 +17,10 @@ namespace {
 // pages for the C550d; the data sheet itself was not read. CAP: the captured M1200d pings. unknown: no public source; the value
 // is assumed, or fitted as the comment says.
 
-/// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB, so that the demo scene at gain 50, gamma 127
-/// has an 8-bit median of 30 to 60; of the others by the same brightness at half their range. Not by the captured M1200d pings:
-/// at their gain of 50 % a scene like theirs comes out 47 dB too weak (docs/acoustics.md, section 9). Tuned here only.
+/// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB. With it, the demo scene at gain 50 and gamma
+/// 127 has an 8-bit median of 30 to 60. The other products were fitted to the same brightness at half their range. The captured
+/// M1200d pings were not used: at their gain of 50 % a scene like theirs is 47 dB too weak (docs/acoustics.md, section 9). The
+/// values are tuned only here.
 namespace fitted_full_scale_upa {
 constexpr float m370s = 2.2e10f, c550d_low = 1.9e10f, c550d_high = 1.4e10f, m750d_low = 2e10f, m750d_high = 1.5e10f;
 constexpr float m1200d_low = 1.5e10f, m1200d_high = 3.5e10f, m3000d_low = 1.4e10f, m3000d_high = 3.3e10f;
@@ -28,9 +29,10 @@ constexpr float m1200d_low = 1.5e10f, m1200d_high = 3.5e10f, m3000d_low = 1.4e10
 constexpr float source_level_db = 200;  // unknown: assumed; Choi et al. 2025 fitted 170 dB to an M1200d, with gains of their own
 constexpr float tvg_ceiling_db = 80;    // unknown: assumed
 
-// unknown: fitted to the captured M1200d ping (docs/acoustics.md, section 9), and taken for all products, which share their
-// electronics, as far as is known. The law: from the part of the picture that changes from ping to ping, noise, which rises
-// by 35 dB from 0.1 to 1.9 m and hardly below 0.25 m. The leak: rows 0 to 6; in the range of one pulse it is over.
+// unknown: fitted to the captured M1200d ping (docs/acoustics.md, section 9), and used for all products, because they share their
+// electronics, as far as is known. The law comes from the noise, which is the part of the picture that changes from ping to ping.
+// The noise rises by 35 dB from 0.1 to 1.9 m, and hardly below 0.25 m. The leak is in rows 0 to 6 and ends within the range of
+// one pulse.
 constexpr float tvg_slope_db = 35, tvg_minimum_range_m = 0.25f;
 constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
 // unknown: fitted to the captured M1200d ping on the assumption that its bed is soft mud (-40 dB): the echo of the bed at 1
@@ -49,9 +51,9 @@ void fit_to_recording(ReceiverModel& receiver) {
   receiver.profile.near_noise_db = {-9.9f, -9.9f, -9.9f, -8.7f, -8.7f, -8.7f, -8.7f, -6.4f, -4.1f,
                                     -6.4f, -8.7f, -8.7f, -8.7f, -8.7f, -9.9f, -9.9f, -9.9f};
   receiver.profile.near_m = 0.4f;
-  // Three traces of noise that the channels share: in rows 0 and 1 the leak is a comb across the fan; in rows 8 to 20 the noise
-  // has steady fringes; in rows 10 to 180 it lies beside a dome, in grains that are wider the nearer they are. They fit 128
-  // channels with opposite signs in neighbouring ones, and a direction with a sine of 0.56 (half a wavelength of the low mode
+  // The noise that the channels share has three traces. In rows 0 and 1 the leak is a comb across the fan. In rows 8 to 20 the
+  // noise has steady fringes. In rows 10 to 180 it lies beside a dome, in grains that are wider at shorter ranges. The traces fit
+  // 128 channels whose neighbours have opposite signs, and a direction with a sine of 0.56 (half a wavelength of the low mode
   // would give 0.57).
   receiver.shared_noise = {.level_db = 3.4f, .full_m = 0.2f, .steady = 0.6f, .focus_rows = 0.5f, .nearest_focus_m = 0.0085f};
   receiver.leak_is_shared = true;
@@ -64,10 +66,10 @@ void fit_to_recording(ReceiverModel& receiver) {
   receiver.leak_ring_step_m = 0.001421f;
 }
 
-constexpr double usual_pulse_rows = 0.9;  // chosen: a point between two rows is seen
-// unknown: of the captured M1200d ping, the echoes fit 0.66 rows, the noise fits 0.71 (in neighbouring rows it is uncorrelated).
-// Both pass the same filter, so one width is used. At 0.66 the surface cells, whose width is a power of two, would be half as
-// wide, and a ping at 2 m would take twice as long.
+constexpr double usual_pulse_rows = 0.9;  // chosen so that a point between two rows is visible
+// unknown: in the captured M1200d ping the echoes fit 0.66 rows, and the noise fits 0.71 (it is uncorrelated in neighbouring
+// rows). Both pass the same filter, so one width is used. At 0.66 the surface cells, whose width is a power of two, would be half
+// as wide, and a ping at 2 m would take twice as long.
 constexpr double recorded_pulse_rows = 0.71;
 
 struct ModeRow {
@@ -87,8 +89,8 @@ struct ProfileRow {
   const FamilyRow* family = nullptr;
 };
 
-// 370 kHz and 200 m: VND, ENS; aperture and minimum range: BAS; elevation 20: VND; azimuth width 2.0: CAT, and what an array as
-// long as the M750d's (1.0 at 750 kHz) has.
+// 370 kHz and 200 m: VND, ENS; aperture and minimum range: BAS; elevation 20: VND; azimuth width 2.0: CAT; an array as long as
+// the M750d's (1.0 at 750 kHz) has the same.
 constexpr FamilyRow m370s{0.2, {370e3, 130, 2.0, 20, 200, fitted_full_scale_upa::m370s}, {}};
 // Frequencies and ranges: VND; apertures, elevation, minimum range: CAT; unknown: azimuth widths 1.0 and 0.7.
 constexpr FamilyRow c550d{0.2,
@@ -105,8 +107,8 @@ constexpr FamilyRow m1200d{
     0.1, m1200d_low, {140.625e6 / 67, 60, 0.4, 12, 10, fitted_full_scale_upa::m1200d_high, m1200d_high_noise_figure_db, true}};
 // unknown: a single-frequency product by its name; the low mode of the M1200d is assumed.
 constexpr FamilyRow n1200s{0.1, m1200d_low, {}};
-// Frequencies, ranges, widths low: APL, VND; apertures: CAT. Azimuth width high: CAT has 0.25, what the array that has 0.6 at 1.2
-// MHz has at 3.0; APL's 0.4 is the figure of the M1200d's high mode.
+// Frequencies, ranges, widths low: APL, VND; apertures: CAT. Azimuth width high: CAT has 0.25, which an array with 0.6 at 1.2 MHz
+// has at 3.0 MHz; APL's 0.4 is the figure of the M1200d's high mode.
 constexpr FamilyRow m3000d{0.1,
                            {1.2e6, 130, 0.6, 20, 30, fitted_full_scale_upa::m3000d_low},
                            {3.0e6, 40, 0.25, 20, 5, fitted_full_scale_upa::m3000d_high}};

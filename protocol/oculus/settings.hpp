@@ -36,14 +36,14 @@ SampleFormat sample_format(const FireRequest& fire);
 /// g, see option gain_echo.
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
 
-/// Whether flag bit 4 leaves the gain to the device; option gain_assist states which value of the bit does, if any.
+/// True if flag bit 4 leaves the gain to the device; option gain_assist states which value of the bit does, if any.
 bool asks_for_gain_assist(const FireSettings& fire, std::string_view option);
 
 /// Row gains of option `row_gain: digital`: the power gain 10^((gain_db + 20 log r) / 10), r at least row_gain_from_m, in 1 to
 /// 2^32 - 1. 32-bit samples have no time-varied gain: 10^(gain_db / 10).
 std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings);
 
-/// Whether a double of the message is NaN or infinite. Such a message must be ignored.
+/// True if a double of the message is NaN or infinite. Such a message must be ignored.
 bool has_non_finite(const FireSettings& fire);
 /// Index into the model's modes; unknown modes count as 1.
 int mode_index(const SonarModel& model, std::uint8_t wire_mode);
