@@ -21,7 +21,7 @@ namespace {
 
 using recording::RecordedMessage;
 
-/// Whether some device of the family sends or accepts this message.
+/// True if some device of the family sends or accepts this message.
 bool is_known(Id id) {
   switch (id) {
     case Id::ack:
@@ -84,7 +84,7 @@ bool is_known(Id id) {
   return false;
 }
 
-/// Length of the frame with this header. `BR` is no more than two bytes, which samples may contain: `strict` also demands a known
+/// Length of the frame with this header. `BR` has only two bytes, and samples may contain it, so `strict` also demands a known
 /// message.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   Header header;
@@ -94,7 +94,7 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool st
   return reader.ok() ? std::optional(header_size + header.length + sum_size) : std::nullopt;
 }
 
-/// Whether the message has a frame with one of these numbers and the right sum. The pings of each product have numbers of their
+/// True if the message has a frame with one of these numbers and the right sum. The pings of each product have numbers of their
 /// own, which identify the product.
 bool holds(const RecordedMessage& message, std::initializer_list<Id> pings) {
   Framer framer(longest_payload, true);
@@ -154,7 +154,7 @@ recording::Codec ping360::codec() {
           .ping_part = [](BytesView message) -> std::optional<recording::PingPart> {
             const auto line = line_in(message);
             if (!line) return std::nullopt;
-            // Drivers assume the usual mount; so does the angle of the line, as they read it.
+            // The angle of the line is computed for the usual mount, because drivers assume it.
             static const auto options = protocol::check_options(vendor(), {});
             return recording::PingPart{.head_rad = head_rad(line->ping.angle, *options)};
           },

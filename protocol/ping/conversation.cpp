@@ -24,14 +24,14 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   return reaction;
 }
 
-/// The sender of a datagram may be forged, and its answers would then go to another computer. So they are one datagram, little
-/// longer than the one received.
+/// The sender of a datagram may be forged, and its answers would then go to another computer. So the answers are one datagram
+/// that is little longer than the received one.
 protocol::Reaction Conversation::on_datagram(std::size_t size, Time now) {
   protocol::Reaction reaction;
   Bytes answers;
   std::size_t frames = 0;
   while (const auto frame = framer_.next()) {
-    // A wrong sum is refused if the frame is the whole datagram. Else it may be a false begin within another frame.
+    // A frame with a wrong sum is refused if it is the whole datagram. Otherwise it may be a false start within another frame.
     const bool is_all = header_size + frame->header.length + sum_size == size;
     if (!frame->sum_is_right && !is_all) continue;
     const std::size_t before = reaction.replies.size();

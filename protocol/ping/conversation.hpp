@@ -38,9 +38,9 @@ class Conversation : public protocol::Dialogue {
   virtual bool on_request(const Frame& frame, Time now, protocol::Reaction& reaction) = 0;
   /// The product's message `wanted` with its present values; empty: the product has no such message.
   virtual Bytes message_now(Id wanted, Time now) = 0;
-  /// Whether the message is sent with every ping and pings are enabled, so that the next ping answers the request for it.
+  /// True if the message is sent with every ping and pings are enabled, so that the next ping answers the request for it.
   virtual bool comes_with_pings(Id) const { return false; }
-  /// Whether the product answers the request for this message itself.
+  /// True if the product answers the request for this message itself.
   virtual bool on_wanted(Id wanted, Time now, protocol::Reaction& reaction) {
     static_cast<void>(wanted), static_cast<void>(now), static_cast<void>(reaction);
     return false;

@@ -67,7 +67,7 @@ Echo find_echo(const Ping& ping) {
 }
 
 Reach adjusted(const Reach& made_with, const Echo& echo, const ReachLimits& limits) {
-  constexpr int sure = 50;      // confidence from which a distance counts, per cent
+  constexpr int sure = 50;      // least confidence of a valid distance, per cent
   constexpr double loud = 250;  // from this amplitude on the peak may be cut off
   constexpr double loudest_wanted = 200;
   // Shares of the range; the echo is to lie between them.

@@ -18,8 +18,8 @@ inline constexpr std::uint32_t shortest_range_mm = 1000;
 /// The messages to be made from a ping, as bits.
 using Results = unsigned;
 inline constexpr Results no_result = 0;
-/// The messages for the results `wanted` (no_result: as recorded) of a recorded message of the result `own`, in order. `make`
-/// makes the message of another result.
+/// The messages for the results `wanted`, in order, made from a recorded message of the result `own`. no_result: the recorded
+/// message alone. `make` makes the message of another result.
 template <class Make>
 std::vector<wire::Bytes> messages_for(Results wanted, wire::BytesView recorded, Results own, Make make) {
   if (wanted == no_result) wanted = own;

@@ -22,7 +22,7 @@ constexpr int grads = 400, sector = 201, first_grad = 300;  // a scan covers the
 constexpr int astern = 200;                                 // angle at which the beams of a Sweep begin
 constexpr std::size_t point_rows = 300;                     // rows of a picture of points
 
-/// The request for points as y, z pairs (3011): one number pair a point suffices for the picture.
+/// The request for points as y, z pairs (3011): one pair of numbers per point suffices for the picture.
 Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   PingParameters p{.end_mm = static_cast<std::int32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
                    .enable = static_cast<std::uint8_t>(wanted.rate_hz == 0.0 ? 0 : 1),
@@ -80,8 +80,8 @@ Points points_in(const AtofPointData& data, BytesView rest) {
 }
 
 double end_m(const YzPointData& data, const Points&) { return static_cast<double>(data.end_m); }
-/// The message does not state the far end of the range. The time for which the sonar listened, which begins at the near end, is a
-/// lower bound.
+/// The message does not state the far end of the range. A lower bound is the time for which the sonar listened, which begins at
+/// the near end.
 double end_m(const AtofPointData& data, const Points& polar) {
   double far_m = static_cast<double>(data.listening_s) * static_cast<double>(data.speed_mps) / 2;
   for (const auto& point : polar) far_m = std::max(far_m, point.second);
@@ -142,7 +142,7 @@ class SurveyorHost final : public PingHost {
     return ping_of(data.ping, far_m, std::move(polar));
   }
 
-  std::pair<std::optional<std::uint32_t>, Id> newest_{};  // number of the newest ping, and the message that is used of it
+  std::pair<std::optional<std::uint32_t>, Id> newest_{};  // number of the newest ping, and the message from which it is read
 };
 
 /// First requests the protocol version, which changes nothing. UDP has no connection, so the answer shows that a sonar is there;

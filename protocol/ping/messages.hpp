@@ -150,7 +150,7 @@ std::optional<Frame> whole_frame(BytesView message);
 /// Messages that only devices send. They are not answered: two devices would answer each other without end.
 constexpr bool is_of_device(Id id) { return id == Id::ack || id == Id::nack || id == Id::ascii_text; }
 
-/// Whether a datagram contains a valid frame of a host.
+/// True if a datagram contains a valid frame of a host.
 bool holds_frame(BytesView datagram);
 
 struct DeviceInformation {

@@ -20,7 +20,7 @@ class OmniscanDialogue final : public StreamingConversation<Settings, settings_f
   using StreamingConversation::StreamingConversation;
 
  protected:
-  /// Requests that are accepted get no ack. unknown: whether a real device sends one.
+  /// Requests that are accepted get no ack. It is unknown if a real device sends one.
   bool on_request(const Frame& frame, Time, Reaction& reaction) override {
     if (frame.header.id == Id::os_ping_params) {
       OsPingParams parameters;

@@ -1,5 +1,5 @@
-// Omniscan 450: a side-scan sonar with one beam, narrow along the track and wide across it. TCP and UDP; it pings once a host
-// enables pings.
+// Omniscan 450: a side-scan sonar with one beam, narrow along the track and wide across it. TCP and UDP; it pings as soon as a
+// host enables pings.
 #pragma once
 
 #include "protocol/vendor.hpp"

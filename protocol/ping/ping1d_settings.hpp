@@ -66,9 +66,9 @@ Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
 /// The frames for Settings::results, in the order of their numbers.
 std::vector<Bytes> frames_of(const Ping& ping);
-/// The frames for these results, made of a recorded one; that one is returned as it is if it is among them, or if `wanted` is
-/// no_result. A result made of a poorer one has no samples, and 0 for values which that one lacks. Empty: the message does not
-/// hold a result.
+/// The frames for the results `wanted`, made from a recorded frame. The recorded frame is returned unchanged if it is one of
+/// them, or if `wanted` is no_result. A frame with more values than the recorded one gets no samples, and 0 for the missing
+/// values. Empty: the message does not hold a result.
 std::vector<Bytes> answer(BytesView recorded, Results wanted);
 
 }  // namespace sonar::ping::ping1d

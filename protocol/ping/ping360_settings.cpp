@@ -60,7 +60,7 @@ SonarModel make_model() {
 
 std::span<const protocol::Option> options() {
   static const std::array<protocol::Option, 6> all{{
-      {option_name::firmware, {"3.3.8", "3.1.1"}, "3.3.8", "version it states: hosts request single pings of 3.3.0 and older"},
+      {option_name::firmware, {"3.3.8", "3.1.1"}, "3.3.8", "version that it states; up to 3.3.0 hosts request single pings"},
       type_option("2", "number of the product in its device information"),
       {option_name::mount_grad, {}, "0", "angle, in grads to starboard, at which its own angle 0 lies on the mount", 0, 399},
       {option_name::sector_scan,
@@ -117,7 +117,8 @@ Settings settings_of(const AutoTransmit& t) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const Transducer& t = settings.ping;
-  // The device samples at intervals of time and has no setting for the sound speed. Each row lies where sound has come from.
+  // The device samples at intervals of time and has no setting for the sound speed. Each row lies at the range from which the
+  // sound came at the true speed.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;

@@ -50,7 +50,7 @@ class PingHost : public protocol::Host {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
-  /// Whether the host sends another request in place of the refused one.
+  /// True if the host sends another request in place of the refused one.
   virtual bool on_nack(Id refused, protocol::HostActions&) {
     static_cast<void>(refused);
     return false;

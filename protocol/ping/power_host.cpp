@@ -27,7 +27,7 @@ Bytes omniscan_request(const protocol::SettingsOverride& wanted) {
   return framed_message(Id::os_ping_params, 0, p);
 }
 
-/// Without a wanted range or gain it is automatic: the sonar chooses it.
+/// A range or gain that is not wanted is automatic: the sonar chooses it.
 Bytes s500_request(const protocol::SettingsOverride& wanted) {
   SetPingParams p{.length_mm = 0, .gain = -1, .period_ms = 100, .report = wanted.rate_hz == 0.0 ? Id{} : Id::s500_profile6};
   if (wanted.range_m) p.length_mm = static_cast<std::uint32_t>(std::lround(std::max(1000 * *wanted.range_m, 1.0)));

@@ -28,7 +28,7 @@ class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, s
       if (!read(frame, wanted, reaction)) return true;
       if (const std::string why = complaint(wanted); !why.empty()) return refuse(frame, why, reaction), true;
       change(reaction, [&](Settings& s) { s.parameters = requested(s.parameters, wanted); });
-      // The request replaces the one before: a ping under way and the stream belong to that one.
+      // This request replaces the previous one, to which a ping in progress and the stream belong.
       forget_ping(now);
       stop_stream(~no_result);
       const Results result = results_of(wanted.report);

@@ -198,7 +198,7 @@ Bytes frame_of(Results result, const Distance2& distance, const Profile6& profil
   payload.insert(payload.end(), samples.begin(), samples.end());
   return framed(Id::s500_profile6, id, payload);
 }
-/// Whether a recorded distance fits into the messages.
+/// True if a recorded distance fits into the messages.
 bool is_distance(float m) { return m >= 0 && m < 4e6f; }
 
 }  // namespace

@@ -37,10 +37,10 @@ class SurveyorDialogue final : public StreamingConversation<Settings, settings_f
         return true;
       }
       case Id::utc_response: {
-        UtcResponse told;
-        if (read(frame, told, reaction) && told.utc_ms < 4000000000000)  // times after the year 2096 are invalid
+        UtcResponse response;
+        if (read(frame, response, reaction) && response.utc_ms < 4000000000000)  // times after the year 2096 are invalid
           change(reaction,
-                 [&](Settings& s) { s.utc_ahead = Time(std::chrono::milliseconds(told.utc_ms)) - (now + device_.skipped); });
+                 [&](Settings& s) { s.utc_ahead = Time(std::chrono::milliseconds(response.utc_ms)) - (now + device_.skipped); });
         return true;
       }
       case Id::set_net_info: {

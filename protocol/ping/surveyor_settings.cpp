@@ -142,7 +142,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent));
   }
   if (wanted.mode && *wanted.mode != 0) return refused("a Surveyor has one mode, 0");
-  if (wanted.beams && *wanted.beams != beams) return refused("a Surveyor has as many beams as it has");
+  if (wanted.beams && *wanted.beams != beams) return refused("the number of beams of a Surveyor is fixed");
   if (wanted.sample_bits || (wanted.row_gains && *wanted.row_gains)) return refused("a Surveyor sends points, no samples");
   if (const std::string why = complaint(p); !why.empty()) return refused("Surveyor: " + why);
   return change_to(s);
