@@ -108,9 +108,9 @@ class FileSink final : public Sink {
   Result<void> give_up(int error) {
     const bool taken_back =
         ::ftruncate(file_.fd(), static_cast<off_t>(size_)) == 0 && ::lseek(file_.fd(), static_cast<off_t>(size_), SEEK_SET) >= 0;
-    broken_ = Error{ErrorKind::io, "cannot write on to " + name_ + ": " + std::strerror(error) + "; its first " +
+    broken_ = Error{ErrorKind::io, "cannot write more to " + name_ + ": " + std::strerror(error) + "; its first " +
                                        std::to_string(size_) + " bytes are whole" +
-                                       (taken_back ? "" : ", what follows them is cut short")};
+                                       (taken_back ? "" : ", the bytes after them are incomplete")};
     return tl::unexpected(*broken_);
   }
 
@@ -163,7 +163,8 @@ Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int mor
   Descriptor opened(fd);
   struct stat about {};
   if (::fstat(fd, &about) == 0 && S_ISREG(about.st_mode)) {
-    // A file is emptied once no other program that writes it holds its lock. File systems without locks have no check.
+    // The file is emptied only after its lock was obtained, so that no other program is writing it. File systems without locks
+    // have no check.
     if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
       return failure(ErrorKind::io, file.string() + " is being written by another program: give another name");
     if (::ftruncate(fd, 0) != 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(errno));

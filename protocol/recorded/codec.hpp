@@ -32,7 +32,7 @@ struct FileKind {
   std::string_view ending;              // extension: ".aris"
   std::string_view name;                // ".aris file"
   std::string_view holds;               // "frames of an ARIS"
-  bool (*begins)(BytesView) = nullptr;  // whether a file with these first 16 bytes (fewer if the file is shorter) has this format
+  bool (*begins)(BytesView) = nullptr;  // true if a file with these first 16 bytes (fewer if the file is shorter) has this format
   Result<std::unique_ptr<RecordingReader>> (*read)(std::unique_ptr<Source>) = nullptr;
   std::unique_ptr<RecordingWriter> (*write)(std::unique_ptr<Sink>) = nullptr;
   bool is_raw_dump = false;  // the format equals a raw dump, whose reader is used
@@ -67,14 +67,14 @@ struct Codec {
   std::optional<Samples> (*samples)(BytesView message) = nullptr;
   /// Converts the bytes of Vendor::frame() to the message that a client receives. Null: they are equal.
   Bytes (*message)(BytesView framed) = nullptr;
-  /// Set if requests of hosts decide which pings they get, or if pings come by several ports: then a replay is a whole device,
-  /// whose pings these are. nullopt: the message is not of a ping. A part of a ping may be a message of its own.
+  /// Finds the ping, or the part of a ping, in a message. Set if hosts request their pings, or if several ports send parts of a
+  /// ping; a replay then emulates the whole device with the recorded pings. nullopt: the message has no part of a ping.
   std::optional<PingPart> (*ping_part)(BytesView message) = nullptr;
-  /// A message of ping_part() as the messages that Vendor::frame() or Vendor::datagrams() makes of a ping that was requested with
-  /// `request`, in order. Null: the same bytes.
+  /// Converts a message of ping_part() to the messages that Vendor::frame() or Vendor::datagrams() would make of a ping that was
+  /// requested with `request`, in order. Null: the same bytes.
   std::vector<Bytes> (*answer)(BytesView message, const VendorSettings* request) = nullptr;
-  /// Whether a message of ping_part() holds all that another one of the same ping holds, and more. Null: no ping has two such
-  /// messages.
+  /// True if a message of ping_part() holds everything that another message of the same ping holds, and more. Null: no ping has
+  /// two such messages.
   bool (*is_richer)(BytesView message, BytesView than) = nullptr;
 };
 

@@ -46,7 +46,8 @@ void MessageSplitter::lose(std::size_t count) {
   lost_bytes_ += count;
 }
 
-// Bytes are missing behind those that wait, so the message that has begun is lost, and the next bytes may lie within another one.
+// Bytes are missing after the waiting ones, so the incomplete message is lost, and the next bytes may be in the middle of another
+// message.
 void MessageSplitter::break_off() {
   if (waiting_bytes() > 0) ++losses_;
   lose(waiting_bytes());
@@ -54,7 +55,7 @@ void MessageSplitter::break_off() {
 }
 
 /// Length of the message that begins here. 0: it is not known yet. nullopt: no message begins here. After lost bytes (strict_)
-/// only headers of known types count, because the two bytes of the magic number soon occur in an image by chance.
+/// only headers of known types count, because the two bytes of the magic number often occur in an image by chance.
 std::optional<std::size_t> MessageSplitter::length_at_front(wire::BytesView waiting) const {
   if (!starts_like_header(waiting)) return std::nullopt;
   if (waiting.size() < framing_->header_size) return 0;
@@ -71,7 +72,8 @@ std::optional<RecordedMessage> MessageSplitter::next() {
         return cut(*length);
       }
       if (!finished_) return std::nullopt;
-      // The stream ends within this message. The search continues inside it, because its begin may have been false.
+      // The stream ends within this message. The search continues inside it, because its start may have been recognised by
+      // mistake.
       if (!lost_) ++losses_;
       lost_ = strict_ = true;
       lose(1);

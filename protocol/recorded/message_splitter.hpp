@@ -16,7 +16,7 @@ struct Framing {
   /// Total length of the message with this header; nullopt: not a header. `strict`: unknown types are not headers either.
   std::optional<std::size_t> (*length)(wire::BytesView header, Origin from, bool strict) = nullptr;  // null: messages are lines
 
-  /// Whether `bytes` begin with a header of a known type.
+  /// True if `bytes` begin with a header of a known type.
   bool begins_message(wire::BytesView bytes, Origin from) const;
 };
 

@@ -220,7 +220,7 @@ class Inside(Files):
             self.assertIn(f"recording {kept}  of front: ", self.steer("status").stdout)
             self.assertRegex(self.steer("recording", "stop").stderr, "^sonarctl: sonard refused: nothing is being recorded; .* has ended: .*File too large")
             self.assertEqual(self.daemon.stop()[0], 0)
-            self.assertEqual(self.daemon.log().count("recording stopped: cannot write on to"), 1)
+            self.assertEqual(self.daemon.log().count("recording stopped: cannot write more to"), 1)
             self.assertNotIn("recording ended", self.daemon.log())
             done = run(SONARCTL, "record", "--from", kept, "--raw", self.path("raw"))
             self.assertIn(done.returncode, (0, 65), done.stderr)
@@ -335,7 +335,7 @@ class OneIntoAnother(Files):
             done = subprocess.run([str(SONARCTL), "record", "--from", str(self.path("raw")), f"--{kind}", str(self.path(kind))],
                                   preexec_fn=small_disk, capture_output=True, text=True, timeout=60, check=False)
             self.assertEqual(done.returncode, 74, done.stdout + done.stderr)
-            self.assertRegex(done.stderr, r"^sonarctl: cannot write on to .*: File too large; its first \d+ bytes are whole\n$")
+            self.assertRegex(done.stderr, r"^sonarctl: cannot write more to .*: File too large; its first \d+ bytes are whole\n$")
             out = self.folder / "rest.raw"
             self.assertEqual(self.convert(self.path(kind), "--raw", out).returncode, 0)
             kept = out.read_bytes()

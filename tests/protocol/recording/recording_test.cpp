@@ -94,7 +94,7 @@ TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
     static_cast<void>(writer->close());
   }
   EXPECT_EQ(error->kind, ErrorKind::io);
-  EXPECT_THAT(error->text, HasSubstr("cannot write on to " + file.path().string()));
+  EXPECT_THAT(error->text, HasSubstr("cannot write more to " + file.path().string()));
   EXPECT_THAT(error->text, HasSubstr("bytes are whole"));
 
   auto opened = open_recording(file.path());

@@ -398,7 +398,7 @@ TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
   EXPECT_EQ(daemon.stop(), 0);
   EXPECT_LE(missing, daemon.figures().dropped) << "what is missing was dropped for a client that did not read";
   const std::string log = daemon.log_text();
-  const auto first = log.find("recording stopped: cannot write on to " + told.file());
+  const auto first = log.find("recording stopped: cannot write more to " + told.file());
   EXPECT_NE(first, std::string::npos) << log;
   EXPECT_EQ(log.find("recording stopped", first + 1), std::string::npos) << log;
   EXPECT_EQ(log.find("recording ended"), std::string::npos) << log;
