@@ -15,8 +15,8 @@ struct RecordedPing {
   protocol::HostPing ping;
 };
 
-/// The pings that `host`, of that make, decodes of the next message of a recording. Null: the recording has ended, so pings that
-/// wait for another part are complete. Actions of the host other than pings are left out.
+/// The pings that `host`, a host of `make`, decodes from the next message of a recording. Null: the recording has ended, so pings
+/// that wait for another part are complete. Actions of the host other than pings are left out.
 std::vector<RecordedPing> decode_next(protocol::Host& host, const protocol::Make& make, const RecordedMessage* message);
 
 class RecordedPings {

@@ -96,14 +96,14 @@ std::optional<SentBy> find_sender(RecordingReader& reader) {
       if (model->profile == stated) by.sender.model = model, by.sender.names_model = true;
   };
   // A later message is better only if it names the model of the same sonar.
-  const auto tells_more = [&found](const SentBy& by) {
+  const auto is_better = [&found](const SentBy& by) {
     return !found || (by.sender.names_model && by.make == found->make && by.sender.serial == found->sender.serial);
   };
   for (std::uint64_t searched = 0; (!found || !found->sender.names_model) && searched <= most_searched_bytes;) {
     const auto message = reader.next();
     if (!message) break;
     searched += message->bytes.size();
-    if (auto by = sender_of(*message); by && tells_more(*by)) found = std::move(by);
+    if (auto by = sender_of(*message); by && is_better(*by)) found = std::move(by);
     if (found && !found->sender.names_model) take_stated_model(*found);
   }
   reader.rewind();

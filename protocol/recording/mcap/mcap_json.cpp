@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Names of scenes may be no UTF-8; such bytes are replaced, because a recording must not fail by a name.
+/// Names of scenes may contain bytes that are not UTF-8. They are replaced, so that no name makes a recording fail.
 std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(Time at) {

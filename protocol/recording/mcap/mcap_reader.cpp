@@ -107,7 +107,8 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   return std::nullopt;
 }
 
-/// `at`: of the record behind all data. Finds the end of the file's summary: what follows it, such as a second file, is not read.
+/// `at`: position of the record after all data. Finds the end of the file's summary. Bytes after it, such as a second file, are
+/// not read.
 void Reader::end_at(std::uint64_t at) {
   ended_ = true;
   for (std::size_t looked_at = 0; looked_at < most_summary_records; ++looked_at) {
@@ -136,7 +137,7 @@ void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) 
   } else if (auto channel = read_channel(content)) {
     if (channels_.contains(channel->id)) return;
     if (channels_.size() >= most_channels || described_bytes_ + content.size() > most_described_bytes)
-      return damages_.add("the channel" + at_byte(at) + " is one too many");
+      return damages_.add("the channel" + at_byte(at) + " is ignored: the file describes too many channels");
     is_new = channels_.try_emplace(channel->id, std::move(*channel)).second;
   } else {
     damages_.add("the channel" + at_byte(at) + " cannot be read");
@@ -176,7 +177,7 @@ void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
   const std::string compression = front.string();
   const auto stored = front.number<std::uint64_t>();
   scan_.seek(end);
-  if (!front.ok()) return damages_.add("the chunk" + at_byte(at) + " has no sound front");
+  if (!front.ok()) return damages_.add("the chunk" + at_byte(at) + " has an invalid header");
   const std::uint64_t begin = content + 28 + 4 + compression.size() + 8;
   if (!compression.empty())
     return damages_.add("the chunk" + at_byte(at) + " is compressed (" + compression.substr(0, 16) +

@@ -17,8 +17,8 @@ Bytes bytes_of(const std::string& text) {
   return bytes;
 }
 
-/// Reads the channels whose encoding is the name of a make: those with the vendor's bytes. Their metadata say which sonar, which
-/// end and which carrier a message is of.
+/// Reads the channels whose encoding is the name of a make: those with the vendor's bytes. Their metadata state the sonar, the
+/// sender and the carrier of a message.
 class McapRecordingReader final : public RecordingReader {
  public:
   McapRecordingReader(mcap::Reader reader, std::string sonar)

@@ -45,8 +45,8 @@ class Writer {
   std::vector<Schema> schemas_;
   std::vector<Channel> channels_;
   std::vector<std::uint32_t> next_sequence_;
-  std::vector<bool> announced_;         // per channel: whether it is in the file or the present chunk
-  std::vector<bool> announced_before_;  // per channel: whether it is in the file
+  std::vector<bool> announced_;         // per channel: true if it is in the file or the present chunk
+  std::vector<bool> announced_before_;  // per channel: true if it is in the file
   Bytes chunk_;
   Time chunk_first_{}, chunk_last_{};
   std::map<std::uint16_t, Entries> entries_;

@@ -34,7 +34,7 @@ struct Segment {
 /// IPv6, fragments, cut headers.
 std::optional<Segment> parse_packet(std::uint32_t link_type, wire::BytesView packet);
 
-/// Whether the packet is the first fragment of an IPv4 datagram.
+/// True if the packet is the first fragment of an IPv4 datagram.
 bool begins_fragments(std::uint32_t link_type, wire::BytesView packet);
 
 /// True for link types that parse_packet supports.

@@ -145,8 +145,8 @@ std::optional<Packet> PacketReader::next_block() {
     }
     if (size > most_block) return stop(place + " would have " + std::to_string(size) + " bytes");
     const BytesView rest = scan_.read(size - 8);
-    const BytesView body = rest.first(rest.size() - 4);  // a block ends with its length, as it begins
-    if (u32_at(rest, body.size(), endian_) != size) return stop(place + " does not end as it begins");
+    const BytesView body = rest.first(rest.size() - 4);  // the length at the start of a block is repeated at its end
+    if (u32_at(rest, body.size(), endian_) != size) return stop(place + " does not repeat its length at its end");
     if (type == interface_block) {
       add_interface(body);
       continue;

@@ -159,7 +159,7 @@ class PcapReader final : public RecordingReader {
     if (segment.target == device) add(at, segment, segment.source, Origin::client);
   }
 
-  /// Takes a datagram of a sonar that sends its pings by UDP, or the status of one that sends them by TCP.
+  /// Adds a datagram of a sonar that sends its pings by UDP, or the status of one that sends them by TCP.
   void add_datagram(Time at, const Segment& segment) {
     const auto take = [&](Origin from) {
       ready_.push_back({at, from, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});

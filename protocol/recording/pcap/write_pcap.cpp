@@ -180,7 +180,7 @@ class PcapWriter final : public RecordingWriter {
     for (const std::uint16_t value : {from.port, to.port, size, std::uint16_t{0}}) writer("u16", value);
     body.insert(body.end(), message.bytes.begin(), message.bytes.begin() + (size - 8));
     const std::uint16_t sum = transport_checksum(ip_udp, from, to, body);
-    put_u16(body, 6, sum == 0 ? 0xFFFF : sum);  // 0 would say that there is no checksum (RFC 768)
+    put_u16(body, 6, sum == 0 ? 0xFFFF : sum);  // 0 would mean that there is no checksum (RFC 768)
     packet(packets, ip_udp, from, to, body);
   }
 
