@@ -10,7 +10,7 @@
 namespace sonar::waterlinked {
 namespace {
 
-/// The sender of a datagram. Packets do not have the model, so the first model is taken.
+/// The sender of a datagram. Packets do not have the model, so the first model is assumed.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   if (message.by != recording::Carrier::datagram || rip_length(message.bytes) != message.bytes.size()) return std::nullopt;
   return recording::Sender{models().front()};

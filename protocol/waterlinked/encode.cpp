@@ -77,7 +77,7 @@ ImuMessage imu_message(const Ping& ping, const Settings& settings, const protoco
   const Time shot = device_time(r.fired_at, settings, device);
   const Time from = shot - (goes_on ? since_last : period);
   for (Time at = from - from.time_since_epoch() % imu_period + imu_period; at <= shot; at += imu_period) {
-    // The orientation is turned back by the rate of turn. The acceleration is not known and is taken as 0.
+    // The orientation is turned back by the rate of turn. The acceleration is not known and is assumed to be 0.
     const double before_s = -seconds(shot - at);
     const Quatd then = normalized(r.sonar_in_world.orientation * turned_by(before_s * r.sonar_moves.angular_rate_radps));
     m.samples.push_back({at, frd(rotate(conjugate(then), Vec3d{0, 0, gravity_mps2})), frd(r.sonar_moves.angular_rate_radps)});

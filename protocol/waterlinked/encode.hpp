@@ -14,7 +14,7 @@ std::uint8_t strength_pixel(std::uint32_t linear);
 
 RangeMessage range_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
 StrengthMessage strength_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
-/// The inertial samples since the previous shot; if that was long ago, of one period of the mode.
+/// The inertial samples since the previous shot; if that was long ago, those of one period of the mode.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device);
 
 /// The datagrams of a shot: range image, strength image and, if enabled, IMU samples.

@@ -17,7 +17,7 @@ using Json = nlohmann::json;
 using protocol::HostActions;
 
 constexpr std::size_t picture_rows = 300;
-constexpr double darkest = 0.85;  // the farthest pixel of a range image is darker by this part than the nearest
+constexpr double darkest = 0.85;  // the farthest pixel of a range image is darker by this fraction than the nearest
 constexpr std::size_t most_pixels = 1 << 20;
 constexpr std::string_view title = "a Sonar 3D-15", api = "/api/v1/integration";
 
@@ -102,7 +102,7 @@ class WaterlinkedHost final : public protocol::Host {
   HostActions on_open(std::span<const std::uint16_t>, Time) override { return {ask("GET", "/udp", "")}; }
 
   /// The first reply is that of GET /udp. If the output is disabled, the host switches multicast on; if it is unicast to another
-  /// program, the host leaves it alone and gives up. Then it sends the settings.
+  /// program, the host does not change it and fails. Then it sends the settings.
   HostActions on_reply(const protocol::ResourceReply& reply, Time) override {
     const auto fail = [](ErrorKind kind, std::string text) { return HostActions{Error{kind, std::move(text)}}; };
     if (!std::exchange(knows_output_, true)) {

@@ -262,7 +262,7 @@ ResourceReply answer(const protocol::ResourceRequest& request, const DeviceState
     return refused;
   }
   if (request.body.size() > longest_body) return reply_of(413, {{"error", "the body is longer than 1024 bytes"}});
-  // A missing body counts as an empty object. That suits force-sync, whose body is optional; other resources refuse it and say
+  // A missing body counts as an empty object. That suits force-sync, whose body is optional; other resources refuse it and state
   // what they need.
   const Json posted = request.body.empty() ? Json::object() : Json::parse(request.body, nullptr, false);
   if (posted.is_discarded()) return reply_of(400, {{"error", "not JSON"}});

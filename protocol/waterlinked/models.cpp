@@ -7,8 +7,8 @@
 namespace sonar::waterlinked {
 
 // Sources. DOC: the vendor's public documentation. SMP: a recording of a real unit. unknown: centre of the low frequency
-// (recalled), beams of the high frequency, range resolution. Width of a beam of the low frequency: strengths have a correlation
-// of 0.7 with those in the next column if it is 0.9 degrees, of 0.85 if it is 1.5; SMP: 0.62.
+// (recalled), beams of the high frequency, range resolution. Beam width of the low frequency: the strengths in neighbouring
+// columns have a correlation of 0.7 with 0.9 degrees, and of 0.85 with 1.5 degrees; SMP has 0.62.
 std::span<const ModeRow> mode_rows() {
   static constexpr std::array<ModeRow, 2> all{{
       {"low-frequency", 1.2e6, 90, 40, 0.9, 1.5, 0.02, 5},    // DOC, SMP: field of view; DOC: rate

@@ -14,8 +14,9 @@ inline constexpr std::uint32_t full_scale_strength = 400;  // linear; the assist
 
 /// Properties of the device seen in the images of SMP, fitted to shots 1 to 3 and confirmed by shots 4 to 6
 /// (likeness_test.cpp). Half of the ranges are equal to a neighbour's, more often at strong returns: beams in which the same
-/// scatterer is the strongest report its range. Neighbouring rows have a correlation of strength of 0.59 and equal ranges in
-/// half of the cases; across the edges of four blocks of 16 rows, 0.09 to 0.20 and 1 to 7 %.
+/// scatterer is the strongest report its range. In neighbouring rows the strengths have a correlation of 0.59, and half of the
+/// ranges are equal. Across the edges of four blocks of 16 rows the correlation is 0.09 to 0.20, and 1 to 7 % of the ranges are
+/// equal.
 inline constexpr bool range_of_loudest = true;
 inline constexpr int block_rows = 16;
 /// 69 % of the pixels have the median of their own and their eight neighbours' ranges; 3 % have the largest or the smallest.

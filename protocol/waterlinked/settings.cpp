@@ -109,7 +109,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     s.acoustics = *wanted.rate_hz > 0;
     s.rate_hz = *wanted.rate_hz < most ? *wanted.rate_hz : 0;
   }
-  if (wanted.gain_percent) return refused("a Sonar 3D-15 turns its own gain");
+  if (wanted.gain_percent) return refused("a Sonar 3D-15 sets its own gain");
   if (wanted.beams && *wanted.beams != columns) return refused("a Sonar 3D-15 has 256 columns");
   if (wanted.sample_bits || wanted.row_gains.value_or(false)) return refused("a Sonar 3D-15 has one format of its images");
   return change_to(s, device);
