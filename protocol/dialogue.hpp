@@ -98,7 +98,7 @@ class Dialogue {
   /// A client that sends nothing for longer is disconnected. Counted in wall time, because clients run in wall time even if the
   /// time of on_bytes() and on_tick() is simulated. nullopt: no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
-  /// Whether known hosts are silent while they receive pings. If so, and with datagrams, longest_silence() accepts an answer of
+  /// True if known hosts are silent while they receive pings. If so, and with datagrams, longest_silence() accepts an answer of
   /// the host's computer as a message of the host.
   virtual bool hosts_fall_silent() const { return false; }
   /// Called when a ping was put into this client's outbox; it postpones the keep-alive.

@@ -9,7 +9,7 @@
 
 namespace sonar::protocol {
 
-/// Whether a client would see no difference between two settings. A make whose settings have parts that differ from ping to ping
+/// True if a client would see no difference between two settings. A make whose settings have parts that differ from ping to ping
 /// defines this function in its own namespace.
 template <class Settings>
 bool same_settings(const Settings& a, const Settings& b) {

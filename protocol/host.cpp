@@ -4,7 +4,7 @@
 
 namespace sonar::protocol {
 
-// A setting that a make does not have is an error. If it were ignored, a user would take the ping for one with that setting.
+// A setting that a make does not have is an error. If it were ignored, a user would assume that the ping was made with it.
 Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known) {
   const SettingsOverride& s = wanted.settings;
   std::vector<std::string_view> given;

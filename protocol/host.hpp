@@ -62,8 +62,8 @@ struct HostSend {
   Bytes bytes;
 };
 /// Actions that the caller carries out in order. ResourceRequest goes to port 0, of kind http, and its reply to on_reply().
-/// Error: the host gives up; the sonar is the subject of its text ("refuses a request: ..."), except with ErrorKind::usage,
-/// where the text is a whole sentence.
+/// Error: the host cannot continue. The text begins with a verb whose subject is the sonar ("refuses a request: ..."); with
+/// ErrorKind::usage it is a whole sentence.
 using HostAction = std::variant<HostSend, ResourceRequest, HostPing, Notice, Error>;
 using HostActions = std::vector<HostAction>;
 
@@ -105,7 +105,7 @@ class Host {
   /// Called before the ports are closed.
   virtual HostActions on_leave() { return {}; }
 
-  /// Whether the sonar has answered and its settings have been requested.
+  /// True if the sonar has answered and its settings have been requested.
   virtual bool is_open() const { return true; }
   /// A text such as "an ARIS" or "a BlueView P900-90, serial 7001".
   virtual std::string about() const = 0;
@@ -114,7 +114,7 @@ class Host {
     std::uint64_t messages = 0, dummies = 0, junk_bytes = 0, missing_pings = 0;
   };
   virtual std::optional<Counts> counts() const { return std::nullopt; }
-  /// Whether pings echo the sent settings, so that HostPing::echo_mismatches is meaningful.
+  /// True if pings echo the sent settings, so that HostPing::echo_mismatches is meaningful.
   virtual bool expects_echo() const { return false; }
 };
 
@@ -153,7 +153,7 @@ struct Make {
   char own_faults = 0;                   // first letter of the kinds of faults that only this make has
   bool each_ping_requested = false;      // hosts request each ping; the rate is only a limit
   bool own_numbers = false;              // ping numbers of the wire differ from those of sonard's events
-  bool shares_port = false;              // another make uses the same port: the host of each serves both
+  bool shares_port = false;              // another make uses the same port; each of the two hosts serves both makes
   bool scans = false;                    // the turning head determines the ping rate
   std::string_view demo_name = {};       // NAME of `sonard --demo NAME`; empty: name()
   std::string_view demo_profile = {};    // product of the demo; empty: the first model

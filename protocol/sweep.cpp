@@ -12,8 +12,8 @@ double Sweep::bearing_rad(std::size_t direction) const {
   return (all / 2 - static_cast<double>(direction)) * 2 * pi / all;
 }
 
-// A sector scan of the half ahead would fill half a picture, so the picture is then that half. It becomes a whole turn with the
-// first line outside of it.
+// A scan of the half circle ahead would fill only half of a round picture, so the picture shows only that half. The first line
+// outside of it makes the picture a whole turn.
 PolarImage Sweep::shown() const {
   bool only_ahead = lines_.size() % 4 == 0;
   for (std::size_t i = 0; i < lines_.size(); ++i)

@@ -43,7 +43,7 @@ struct DeviceState {
   std::shared_ptr<const VendorSettings> settings;  // present ones; null = Vendor::initial_settings
   std::uint32_t last_ping = 0;                     // number of the last fired ping
   Time framed_at{};                                // stamp of the previously framed ping; Time{} = none
-  std::chrono::nanoseconds skipped{0};             // by which stamps of pings are ahead of the dialogues' time
+  std::chrono::nanoseconds skipped{0};             // lead of the stamps of pings over the dialogues' time
   bool simulated_time = false;                     // time may stop while clients wait
   StoredAddress stored_address;
 };
@@ -96,7 +96,7 @@ class Vendor {
     static_cast<void>(ping), static_cast<void>(device);
     return std::nullopt;
   }
-  /// Whether its sonars are range finders, which measure one distance with each ping.
+  /// True if its sonars are range finders, which measure one distance with each ping.
   virtual bool measures_distance() const { return false; }
   /// The distance in a ping, as the device reports it. nullopt: the sonar is not a range finder.
   virtual std::optional<Distance> distance_in(const Ping& ping) const {
@@ -127,7 +127,7 @@ class Vendor {
     static_cast<void>(port), static_cast<void>(request), static_cast<void>(device), static_cast<void>(now);
     return {404, "not found\n", "text/plain"};
   }
-  /// Whether a datagram at a port of kind udp_dialogue comes from a host that speaks the protocol. Others are dropped, so that
+  /// True if a datagram at a port of kind udp_dialogue comes from a host that speaks the protocol. Others are dropped, so that
   /// they neither open a dialogue nor take it over.
   virtual bool is_request(const Port& port, BytesView datagram) const {
     static_cast<void>(port), static_cast<void>(datagram);
@@ -136,7 +136,7 @@ class Vendor {
   /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   virtual PingsBy pings_by() const { return PingsBy::stream; }
-  /// When the device sends a ping's messages, if it needs time to make them. nullopt: as soon as they are made.
+  /// Time at which the device sends a ping's messages, if it needs time to make them. nullopt: as soon as they are made.
   virtual std::optional<Time> leaves_at(const Ping& ping, const DeviceState& device) const {
     static_cast<void>(ping), static_cast<void>(device);
     return std::nullopt;
