@@ -273,7 +273,7 @@ class Locator : public Visitor<Locator<Meaning>> {
     Visitor<Locator>::array(name, values);
   }
   Meaning wanted_;
-  bool is_wanted_ = false;  // whether the next field has the meaning
+  bool is_wanted_ = false;  // true: the next field has the meaning
   std::size_t offset_ = 0;
 };
 
