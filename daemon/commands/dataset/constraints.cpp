@@ -13,7 +13,7 @@ namespace {
 /// The name without the index of an instance: "rock[3]" gives "rock".
 std::string shared_name(const std::string& name) { return name.substr(0, name.find('[')); }
 
-/// Visible objects of that name, where they stand.
+/// Visible objects of that name, with their poses.
 std::vector<std::pair<const Object*, Pose>> placed(const std::string& name, const PingRequest& request, const Scene& scene) {
   std::vector<std::pair<const Object*, Pose>> found;
   for (const Object& o : scene.objects)
@@ -23,7 +23,7 @@ std::vector<std::pair<const Object*, Pose>> placed(const std::string& name, cons
 
 Vec3d middle_of(const Object& object, const Pose& in_world) { return transform(in_world, extent_of(*object.mesh).centre_m()); }
 
-/// Whether a point lies within range, the horizontal aperture and the vertical beam width of the sonar.
+/// True if a point lies within range, the horizontal aperture and the vertical beam width of the sonar.
 bool is_in_fan(Vec3d in_world, const PingRequest& r) {
   const Vec3d p = transform(inverse(r.sonar_in_world), in_world);
   const FrequencyMode& mode = r.model->modes[static_cast<std::size_t>(r.settings.mode)];
@@ -68,7 +68,8 @@ Extent box_of(const Object& object, const Pose& in_world) {
   return box;
 }
 
-/// Boxes along the axes of the world: objects that are turned have larger boxes, so the test may refuse a pair that is apart.
+/// The boxes are along the axes of the world. A rotated object has a larger box, so the test may refuse two objects that do not
+/// touch.
 bool overlap(const Extent& a, const Extent& b) {
   return a.low_m.x < b.high_m.x && b.low_m.x < a.high_m.x && a.low_m.y < b.high_m.y && b.low_m.y < a.high_m.y &&
          a.low_m.z < b.high_m.z && b.low_m.z < a.high_m.z;

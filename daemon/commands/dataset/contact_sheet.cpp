@@ -87,7 +87,7 @@ Result<std::optional<Raster>> contact_cell(const Ping& ping, const Scene& scene,
            static_cast<std::uint8_t>(dimmed * p.b)};
 
   FanPainter painter({.width_px = sheet_width_px, .colours = *gray, .rings = false});
-  // From here the samples of `polar` are a mask, first of the shadows, then of one instance after the other.
+  // From here on the samples of `polar` are a mask: first of the shadows, then of each instance in turn.
   polar.full_scale = 1;
   const PingLabels& labels = *ping.labels;
   std::ranges::transform(labels.caster, polar.samples.begin(), [](std::uint16_t caster) { return caster != 0 ? 1.0f : 0.0f; });

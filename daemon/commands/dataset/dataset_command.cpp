@@ -19,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-/// "3/8": from 0 to below 8.
+/// Reads a text such as "3/8"; the first number is from 0 to 7.
 bool read_part(const std::string& text, DatasetOptions& o) {
   const std::size_t slash = text.find('/');
   if (text.empty()) return true;

@@ -54,8 +54,8 @@ std::string sweep_of(const Draws& draws) {
   return sweep.empty() ? "" : "sweep: {" + sweep + "}";
 }
 
-/// The text of a ping's scene with all its numbers, which is equal for equal scenes. If the numbers cannot be computed (the
-/// reader of the file reports that) or the lines of the scene are not known, no two pings have the same text.
+/// The text of a ping's scene with all its numbers, which is equal for equal scenes. Each ping has a text of its own if the
+/// numbers cannot be computed (the reader of the file reports that) or the lines of the scene are not known.
 std::string scene_key_of(const DatasetJob& job, const Draws& draws, const std::string& lines, std::uint64_t number) {
   render::Values values = draws.numbers;
   for (const auto& [name, formula] : job.formulas)
@@ -70,7 +70,8 @@ std::string with_sweep(std::string text, const std::string& sweep) {
   return text + "\n" + sweep + "\n";
 }
 
-/// Hides the objects that the counts, or a negative, leave out. Draws decide which; the others keep their numbers.
+/// Hides the objects that the counts leave out, or all targets in a negative. Draws select the hidden objects; the others keep
+/// their numbers.
 Result<std::shared_ptr<const Scene>> with_counts(const DatasetJob& job, const text::Document& filled, const DrawnPing& ping,
                                                  std::uint64_t number) {
   auto changed = std::make_shared<Scene>(*ping.job.scene);

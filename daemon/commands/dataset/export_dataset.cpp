@@ -252,8 +252,8 @@ Result<Split> parse_split(const std::string& shares, const std::string& by) {
 std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const std::array<double, 3>& shares) {
   double sum = 0;
   for (const double share : shares) sum += share;
-  // Whole numbers of scenes: shares are rounded down, then the largest remainders get one more. Each split gets at least one
-  // scene while there are enough.
+  // Splits consist of whole scenes: shares are rounded down, then the splits with the largest remainders get one more scene. Each
+  // split gets at least one scene if there are enough.
   std::array<std::size_t, 3> count{};
   std::size_t left = scenes.size();
   for (std::size_t s = 0; s < count.size(); ++s) {

@@ -155,7 +155,7 @@ Result<LabelledPing> PingMaker::make(std::uint64_t number) {
     made.files.emplace_back("fan.png", *std::move(png));
   }
   made.files.emplace_back("json",
-                          bytes_of_text(words.dump() + "\n"));  // last, so that a reader of the stream has the whole ping then
+                          bytes_of_text(words.dump() + "\n"));  // last, so that a reader of the stream then has the whole ping
   return made;
 }
 

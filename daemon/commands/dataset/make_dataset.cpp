@@ -65,7 +65,7 @@ class Folder final : public DatasetFolder {
 
   /// Checks that the folder belongs to this job, or makes it the folder of this job.
   Result<void> claim() {
-    const auto first = draw_ping(job_, 1);  // what is wrong with the job shows before there is a folder
+    const auto first = draw_ping(job_, 1);  // reports mistakes of the job before the folder is made
     if (!first) return tl::make_unexpected(first.error());
     instruction_set_ = simd::kernels_for(o_.simd.value_or(first->job.config.engine.simd)).name;
     Sha256 files;
@@ -78,7 +78,8 @@ class Folder final : public DatasetFolder {
     if (ec)
       return failure(ErrorKind::io, "cannot make the folder " + o_.out.string() + ": " + ec.message() + "; choose another --out");
     const path about = o_.out / "job.json";
-    const std::string foreign = own_file_in(o_.out);  // before the owner is checked, because another process may be beginning
+    const std::string foreign =
+        own_file_in(o_.out);  // before the owner is checked, because another process may begin the folder at this moment
     if (!std::filesystem::exists(about, ec)) {
       if (!foreign.empty())
         return failure(ErrorKind::usage, (o_.out / foreign).string() +
@@ -104,7 +105,7 @@ class Folder final : public DatasetFolder {
     return {};
   }
 
-  /// If a run was killed between rename and digest, the shard has no digest yet, and gets it now.
+  /// If a run was killed after the rename of a shard but before its digest was written, the digest is written now.
   Result<bool> holds(std::uint64_t shard) override {
     differs_ = false;
     const path file = o_.out / shard_name(shard), noted = file.string() + ".sha256";
@@ -145,7 +146,7 @@ class Folder final : public DatasetFolder {
       }
       on_progress_(progress_);
     }
-    // The part is written first. So if the archive has its final name, the whole shard is there.
+    // The part is written first, so a shard is complete if the archive has its final name.
     if (const auto done = write_durably(part_file(o_.out, shard), part.dump() + "\n"); !done) return done;
     progress_.bytes += tar->bytes();
     if (const auto done = tar->commit(); !done) {
@@ -160,7 +161,7 @@ class Folder final : public DatasetFolder {
     return {};
   }
 
-  /// Called when no shard is missing, of this part or another. The labels of one shard at a time are in memory.
+  /// Called when no shard is missing, neither of this part nor of another. The labels of one shard at a time are in memory.
   Result<DatasetProgress> conclude() override {
     json shards = json::array(), pixels = json::object();
     std::uint64_t negatives = 0;

@@ -42,12 +42,12 @@ class DatasetFolder {
   virtual ~DatasetFolder() = default;
   virtual const std::string& inputs() const = 0;           // digest of all that the bytes depend on
   virtual const std::string& instruction_set() const = 0;  // a name of simd_level_names
-  /// Whether the shard exists and is unchanged. Error bad_data: it differs from its digest.
+  /// True if the shard exists and is unchanged. Error bad_data: it differs from its digest.
   virtual Result<bool> holds(std::uint64_t shard) = 0;
-  /// Makes the shard. If another process has made it meanwhile, that one is kept; error bad_data if its bytes differ. Other
-  /// errors: io; config, as draw_ping().
+  /// Makes the shard. If another process has made it in the meantime, its shard is kept; error bad_data if the bytes differ.
+  /// Other errors: io; config, as draw_ping().
   virtual Result<void> make(std::uint64_t shard) = 0;
-  /// Whether the last error is that a shard's bytes differ: another program, or a damaged disk or memory.
+  /// True if the last error is that a shard's bytes differ: another program, or a damaged disk or memory.
   virtual bool differs() const = 0;
   /// Writes the manifest, the COCO file and the card, if no shard is missing; sets `whole` or `missing`.
   virtual Result<DatasetProgress> conclude() = 0;

@@ -69,7 +69,7 @@ std::optional<std::uint64_t> size_in(std::string_view header) {
   return size;
 }
 
-/// "0000000001.labels.png", and nothing that leads out of a folder.
+/// True for a name such as "0000000001.labels.png", false for a path that leads out of the folder.
 bool is_plain_name(std::string_view name) {
   const auto is_plain = [](unsigned char c) { return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-'; };
   return !name.empty() && name.front() != '.' && std::ranges::all_of(name, is_plain);
@@ -153,7 +153,7 @@ void remove_unfinished(const path& folder, const std::function<bool(const std::s
     if (mark == std::string::npos || !is_own(name.substr(0, mark))) continue;
     const int fd = ::open(entry->path().c_str(), O_WRONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) continue;
-    // A file that a running process writes is locked by it, and stays.
+    // A file that a running process is writing is locked, and is not removed.
     if (::flock(fd, LOCK_EX | LOCK_NB) == 0) ::unlink(entry->path().c_str());
     ::close(fd);
   }
@@ -210,9 +210,9 @@ Result<std::string> ShardWriter::commit() {
     const auto there = digest_of_file(file);
     if (!there) return tl::make_unexpected(there.error());
     if (*there != digest)
-      return failure(ErrorKind::bad_data, file.string() + " is there with other bytes (" + *there + ") than were made now (" +
+      return failure(ErrorKind::bad_data, file.string() + " exists with other bytes (" + *there + ") than were made now (" +
                                               digest +
-                                              "): it was changed, or a disk or memory fails; remove it and what is wrong");
+                                              "): it was changed, or a disk or memory is faulty; remove the cause and this file");
   }
   // The digest is written after the archive, so a shard with a digest file is complete.
   const auto noted = write_durably(file.string() + ".sha256", digest + "  " + file.filename().string() + "\n");

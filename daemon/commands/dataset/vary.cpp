@@ -13,7 +13,7 @@
 namespace sonar::dataset {
 namespace {
 
-constexpr auto draws_domain = static_cast<Domain>(0x76617279u);  // apart from those of a ping
+constexpr auto draws_domain = static_cast<Domain>(0x76617279u);  // differs from the domains of a ping
 constexpr std::size_t most_words = 10000;
 
 std::uint64_t hash_of(std::string_view name) {  // FNV-1a

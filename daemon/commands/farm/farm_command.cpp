@@ -50,7 +50,7 @@ Result<int> submit(const FarmCommand& c) {
   if (level != SimdLevel::automatic && set != simd_level_names[static_cast<std::size_t>(level)])
     return failure(ErrorKind::unavailable, "this processor lacks " +
                                                std::string(simd_level_names[static_cast<std::size_t>(level)]) +
-                                               ": submit where the workers' instruction set is, or with --simd " + set);
+                                               ": submit on a computer with the workers' instruction set, or with --simd " + set);
   auto record = describe(*job, set);
   if (!record) return tl::make_unexpected(record.error());
   const auto queue = connect(c.queue);
@@ -69,7 +69,7 @@ Result<int> submit(const FarmCommand& c) {
   for (std::uint64_t shard = 0; shard < record->shards; ++shard) {
     const auto is_there = (*folder)->holds(shard);
     if (!is_there) return tl::make_unexpected(is_there.error());
-    // A shard that was given up earlier is tried again, because its cause may have been removed.
+    // A shard that was given up earlier is tried again, because the cause of its failure may have been removed.
     const std::string grave = record->id + "." + std::to_string(shard);
     if (std::find(dead->begin(), dead->end(), grave) != dead->end())
       if (const auto done = (*queue)->erase(dead_table, grave); !done) return tl::make_unexpected(done.error());
@@ -83,7 +83,8 @@ Result<int> submit(const FarmCommand& c) {
   }
   if (const auto done = (*queue)->erase(job_table, record->id + ".stopped"); !done) return tl::make_unexpected(done.error());
   std::printf(
-      "%s (%s): %llu shards: %llu submitted, %llu in the queue already, %llu finished\nwhen all are: sonarctl farm collect %s\n",
+      "%s (%s): %llu shards: %llu submitted, %llu in the queue already, %llu finished\nwhen all are finished: sonarctl farm "
+      "collect %s\n",
       record->folder().c_str(), set.c_str(), static_cast<Ull>(record->shards), static_cast<Ull>(published),
       static_cast<Ull>(waiting), static_cast<Ull>(there), out.c_str());
   return 0;
@@ -134,7 +135,7 @@ Result<std::string> describe_farm(Queue& queue) {
     std::uint64_t dead_shards = 0;
     for (auto at = dead->lower_bound(id + "."); at != dead->end() && at->first.starts_with(id + "."); ++at) {
       const auto shard = text::parse_unsigned(at->first.substr(id.size() + 1));
-      if (!shard || *shard >= record->shards) continue;  // none of the job's
+      if (!shard || *shard >= record->shards) continue;  // not a shard of the job
       ++dead_shards;
       dead_lines += "  dead: shard " + std::to_string(*shard) + ": " + text::printable(at->second) + "\n";
     }
@@ -149,7 +150,7 @@ Result<std::string> describe_farm(Queue& queue) {
       workers += text::format("  %s: %s, %.1f pings/s, %.0f shards made\n", text::printable(name).c_str(),
                               text::printable(text_in(is, "shard")).c_str(), rate, number_in(is, "shards"));
     }
-    // Every shard that neither waits nor runs nor was given up is done.
+    // A shard is done if it does not wait, does not run and was not given up.
     const std::uint64_t left = waiting->queued + waiting->running;
     const std::uint64_t done = record->shards - std::min(record->shards, left + dead_shards);
     text += text::format("%s (%s): %llu shards: %llu done, %llu running, %llu queued, %llu dead",
@@ -187,7 +188,7 @@ Result<int> status(const FarmCommand& c) {
 /// The job file and the instruction set that job.json in the folder of a job names.
 Result<FarmJob> described_in(const path& folder) {
   const auto words = read_regular(folder / "job.json", std::size_t{16} << 20);
-  if (!words) return failure(words.error().kind, words.error().text + "; the folder is that of a job, as submit said");
+  if (!words) return failure(words.error().kind, words.error().text + "; give the folder of a job, which submit printed");
   const json is = json::parse(*words, nullptr, false);
   FarmJob record;
   if (!is.is_object())

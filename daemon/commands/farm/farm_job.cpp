@@ -197,7 +197,7 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
       if (!piece) return tl::make_unexpected(piece.error());
       if (!*piece) break;
       contents += **piece;
-      // A short piece ends the file. A file of whole pieces has no short one: the next piece is then not there.
+      // A short piece ends the file. If all pieces of a file are full, the file ends where the next piece is missing.
       if ((*piece)->size() < piece_bytes || contents.size() > most_in_bucket) break;
     }
     if (digest_of(contents) != f.digest)

@@ -15,7 +15,7 @@ using std::chrono::milliseconds;
 
 constexpr const char* stream = "FARM";
 constexpr std::int64_t ns_per_ms = 1'000'000, patience_ms = 5000, listing_ms = 2000;
-constexpr int already_queued = 10071;  // JSStreamWrongLastSequence: a message of that subject is there
+constexpr int already_queued = 10071;  // JSStreamWrongLastSequence: a message with that subject exists
 
 template <auto destroy>
 struct Destroy {
@@ -26,7 +26,7 @@ using Owned = std::unique_ptr<T, Destroy<destroy>>;
 using Message = Owned<natsMsg, natsMsg_Destroy>;
 using Subscription = Owned<natsSubscription, natsSubscription_Destroy>;
 
-/// The answer of a call that makes something: its owner, and the status.
+/// The result of a call that creates an object: the object's owner, and the status.
 template <class Owner, class Call>
 natsStatus into(Owner& owner, const Call& call) {
   typename Owner::pointer made = nullptr;
@@ -140,8 +140,8 @@ class NatsQueue final : public Queue {
     config.AckPolicy = js_AckExplicit;
     config.AckWait = patience.count() * ns_per_ms;
     config.MaxAckPending = 100'000;
-    // MaxDeliver of the server is not used, because a shard that the server gives up would disappear without a report. Workers
-    // count deliveries and bury such a shard.
+    // MaxDeliver of the server is not used, because the server would then drop a shard without a report. Workers count
+    // deliveries, and record such a shard as dead (bury()).
     jsErrCode code{};
     const natsStatus s = js_AddConsumer(nullptr, jetstream_.get(), stream, &config, nullptr, &code);
     return s == NATS_OK ? Result<void>{} : refused("cannot open job " + job, s, code);
@@ -151,7 +151,7 @@ class NatsQueue final : public Queue {
   Result<bool> publish(const std::string& job, std::uint64_t shard) override {
     const std::string number = std::to_string(shard), id = job + "/" + number;
     // The server drops an id that it has seen within two minutes. If that shard has left the queue since then, it must be made
-    // anew.
+    // again.
     for (const char* message_id : {id.c_str(), static_cast<const char*>(nullptr)}) {
       jsPubOptions options;
       jsPubOptions_Init(&options);
@@ -231,7 +231,8 @@ class NatsQueue final : public Queue {
   void flush() { natsConnection_FlushTimeout(connection_.get(), patience_ms); }
 
  private:
-  /// js_WorkQueuePolicy: the server removes a message once it is acknowledged, so the stream holds exactly the work that is left.
+  /// js_WorkQueuePolicy: the server removes a message once it is acknowledged, so the stream holds exactly the shards that are
+  /// not made yet.
   Result<void> make_stream() {
     const char* subjects[] = {"farm.work.>"};
     jsStreamConfig config;
@@ -241,7 +242,7 @@ class NatsQueue final : public Queue {
     config.Retention = js_WorkQueuePolicy;
     config.Storage = js_FileStorage;
     jsErrCode code{};
-    const natsStatus s = js_AddStream(nullptr, jetstream_.get(), &config, nullptr, &code);  // no error where it is there
+    const natsStatus s = js_AddStream(nullptr, jetstream_.get(), &config, nullptr, &code);  // no error if the stream exists
     return s == NATS_OK ? Result<void>{} : refused("cannot make the stream FARM", s, code);
   }
 
@@ -271,7 +272,7 @@ class NatsQueue final : public Queue {
   /// Returns null if the server does not answer.
   kvStore* store(Table table) {
     auto& kv = stores_[table.name];
-    // The table is opened when it is used first, and made if the server does not have it.
+    // The table is opened at its first use, and created if the server does not have it.
     if (kv || into(kv, [&](auto** made) { return js_KeyValue(made, jetstream_.get(), table.name); }) == NATS_OK) return kv.get();
     kvConfig config;
     kvConfig_Init(&config);

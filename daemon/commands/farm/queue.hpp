@@ -29,7 +29,8 @@ inline constexpr Table file_table{"FARM_FILES", a_month};  // key SHA256.N: a pi
 inline constexpr Table dead_table{"FARM_DEAD", a_month};   // key JOB.SHARD: why it failed
 inline constexpr Table beat_table{"FARM_BEATS", std::chrono::seconds(30)};  // key HOST.PID: what that worker does
 
-/// A shard that is lent to this worker. The worker must call in_progress(), or end it, within the `patience` of the job.
+/// A shard that this worker makes. Within the `patience` of the job the worker must call in_progress(), or one of the functions
+/// that end the task.
 class Task {
  public:
   virtual ~Task() = default;

@@ -107,7 +107,7 @@ class Worker {
     return first;
   }
 
-  /// Works on the job until the queue has no shard of it to give.
+  /// Works on the job until the queue has no waiting shard of it.
   Result<void> serve(const FarmJob& record) {
     if (opened_ != record.id)
       if (const auto opened = open(record); !opened) {
@@ -116,14 +116,14 @@ class Worker {
         if (opened.error().kind == ErrorKind::unavailable)
           rest();
         else
-          unfit_[record.id] = opened.error().text;  // its shards are left to workers that are fit for it
+          unfit_[record.id] = opened.error().text;  // other workers make its shards
         return {};
       }
     while (!stopping) {
       const auto stopped = queue_.get(job_table, record.id + ".stopped");
       if (stopped && *stopped) return {};
       auto task = queue_.take(record.id, for_a_shard);
-      if (!task) {  // the server is away, or the job is
+      if (!task) {  // the server does not answer, or the job no longer exists
         say(task.error().text);
         rest();
       }
@@ -137,7 +137,8 @@ class Worker {
     return {};
   }
 
-  /// Receives the files of the job and opens its folder. The last job stays open, because the next shard is mostly of it too.
+  /// Receives the files of the job and opens its folder. The last job stays open, because the next shard usually belongs to it
+  /// too.
   Result<void> open(const FarmJob& record) {
     const path out = path(c_.out) / record.folder();
     const auto file = receive_files(record, out / "files", queue_);
@@ -172,14 +173,14 @@ class Worker {
     say(dataset::shard_name(task.shard()) + ": " + why.text + (is_last ? "; it is dead" : ""));
     const auto sent = is_last ? task.bury(why.text) : task.again(record.patience / 12);
     if (!sent) say(sent.error().text);
-    rest();  // if every shard fails here, as without a file, other workers get the next tries
+    rest();  // if every shard fails here, for example because a file is missing, other workers get the next tries
     return {};
   }
 
   /// An error means that this worker cannot do any work.
   Result<void> work(const FarmJob& record, Task& task) {
-    // The last refusal removes a shard from the queue. A further delivery means that its workers ended without a refusal, so it
-    // would end this one too.
+    // The last refusal removes a shard from the queue. A further delivery means that its workers ended without a refusal, so the
+    // shard would probably end this worker too.
     if (task.delivery() > most_tries)
       return refuse(
           record, task,
@@ -223,7 +224,7 @@ class Worker {
       return {};
     }
     if (why.kind != ErrorKind::io) return refuse(record, task, why);
-    task.again({});  // this machine's disk is full: another may have room
+    task.again({});  // this computer's disk is full, but another computer may have room
     return tl::make_unexpected(why);
   }
 
@@ -242,7 +243,7 @@ class Worker {
   [[noreturn]] void leave(Task& task) {
     task.again({});
     queue_.erase(beat_table, name_);
-    say("the shard that was under way is given back");
+    say("the unfinished shard was returned to the queue");
     std::_Exit(0);
   }
 
@@ -262,8 +263,8 @@ class Worker {
   std::string name_;
   milliseconds rest_ = least_rest;
   std::map<std::string, std::string> unfit_;  // jobs that cannot be opened here, and why
-  bool is_unfit_ = false;                     // the last error of next_job() is not the server's
-  std::string opened_;                        // the job that the next three are of
+  bool is_unfit_ = false;                     // the last error of next_job() was not an error of the server
+  std::string opened_;                        // the job of the next three members
   dataset::DatasetJob job_;
   std::unique_ptr<dataset::DatasetFolder> folder_;
   Clock::time_point begin_;

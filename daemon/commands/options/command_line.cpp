@@ -24,7 +24,7 @@ using text::whole_number;
 
 constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
 
-/// The names that --demo takes, separated by `between`. `first`: with the name of the demo that needs no name.
+/// The names that --demo accepts, separated by `between`. `first`: also the name of the default demo.
 std::string demo_names(std::string_view between, bool first = true) {
   std::string names;
   for (const protocol::Make& make : protocol::makes())
@@ -43,10 +43,11 @@ void add_run_options(CLI::App& app, RunCommand& run) {
   app.add_option("config", run.config, "configuration file; without one sonard looks in the usual places, then runs the demo");
   app.add_option_function<std::string>(
          "--demo", [&run](const std::string& maker) { run.demo = true, run.demo_of = maker; },
-         "run the built-in demo, whatever files there are; --demo " + demo_names(", ", false) +
+         "run the built-in demo, even if there are configuration files; --demo " + demo_names(", ", false) +
              ": with such a sonar instead of " + std::string(protocol::makes().front().title))
       ->expected(0, 1)
-      ->type_name("TEXT:" + demo_names("|"));  // complaint() checks the name, so that a file name is not taken as an unknown make
+      ->type_name("TEXT:" +
+                  demo_names("|"));  // complaint() checks the name, so that a file name is not reported as an unknown make
   app.add_option("--profile", run.profile, "run the demo with this product (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,
@@ -65,7 +66,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
       ->check(whole_number(1, 16));
   app.add_flag("--faults", run.faults, "arm faults on purpose: without it every request for one is refused (docs/faults.md)");
   app.add_option("--fault-journal", run.fault_journal, "file to which the journal of faults is appended, as JSON lines");
-  app.add_option("--exit-after-pings", run.exit_after_pings, "stop after so many served pings")->check(whole_number());
+  app.add_option("--exit-after-pings", run.exit_after_pings, "stop after this number of served pings")->check(whole_number());
   app.add_flag("--digest", run.digest, "print the SHA-256 of every client's byte stream at the end");
   app.add_option("--log-format", run.log_format, "text or json (default text)")
       ->check(one_of({"text", "json"}))
@@ -77,7 +78,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
 
 void add_render_options(CLI::App& app, RenderCommand& render) {
   app.add_option("config", render.config, "configuration or render file (docs/render.md)");
-  app.add_option("--out", render.out, "folder for the files; made when it is not there");
+  app.add_option("--out", render.out, "folder for the files; created if it is missing");
   app.add_option("--pings", render.pings, "pings to render (1; with --poses: one for every line)")
       ->check(whole_number(1, most_rendered_pings));
   app.add_option("--first", render.first, "number of the first ping, to make a part of a longer run (1)")
@@ -90,11 +91,11 @@ void add_render_options(CLI::App& app, RenderCommand& render) {
   app.add_flag("--complex", render.complex, "also the complex beam signal, before magnitude and gain (npy)");
   app.add_flag("--labels", render.labels,
                "also which object's echo each sample holds, with boxes and polygons (docs/datasets.md)");
-  app.add_option("--sonar", render.sonar, "which sonar of the configuration, when it has several");
+  app.add_option("--sonar", render.sonar, "sonar of the configuration, if it has several");
   app.add_option("--poses", render.poses, "file of the vehicle's poses: CSV with a header line, TUM, EuRoC, KITTI");
   app.add_option("--pose-frame", render.pose_frame, "frame of that file, if the file does not state it")
       ->check(one_of({"ENU_FLU", "NED_FRD"}));
-  app.add_option("--pose-rate", render.pose_rate_hz, "of that file, lines a second: KITTI files have no times")
+  app.add_option("--pose-rate", render.pose_rate_hz, "lines per second of that file, for KITTI files, which have no times")
       ->check(number(0.001, 10000.0));
   app.add_option("--rate", render.rate_hz, "pings a second (as the sonar is set; with --poses: at every line)")
       ->check(number(0.001, 10000.0));
@@ -115,7 +116,7 @@ void add_dataset_options(CLI::App& app, DatasetCommand& dataset) {
       "examples:\n  sonard dataset scenes/datasets/mines.yaml --out mines\n  sonard dataset job.yaml --out set --shards 3/8\n"
       "  sonard dataset job.yaml --out set --export coco --split 80,10,10");
   app.add_option("job", dataset.job, "job file (docs/datasets.md)")->required();
-  app.add_option("--out", dataset.out, "folder for the shards; made when it is not there")->required();
+  app.add_option("--out", dataset.out, "folder for the shards; created if it is missing")->required();
   app.add_option("--shards", dataset.shards,
                  "I/N: only shards whose number has remainder I when divided by N, to share a job among machines");
   auto* form = app.add_option("--export", dataset.export_form,
@@ -152,15 +153,14 @@ void add_farm_options(CLI::App& app, FarmCommand& farm) {
   CLI::App& submit = *app.add_subcommand("submit", "put the shards of a job that are missing into the queue");
   submit.add_option("job", farm.job, "job file (docs/datasets.md)")->required();
   submit.add_option("--out", farm.out, "the farm's folder; the job's folder is made below it")->required();
-  submit
-      .add_option("--simd", farm.simd, "instruction set that all workers have (default: that of the job, else this processor's)")
+  submit.add_option("--simd", farm.simd, "instruction set that all workers have (default: the job's, else this processor's)")
       ->check(one_of({simd_level_names.begin(), simd_level_names.end()}));
-  submit.add_option("--ack-wait", farm.ack_wait_s, "seconds until a silent worker's shard is another's (60)")
+  submit.add_option("--ack-wait", farm.ack_wait_s, "seconds after which the shard of a silent worker is given to another (60)")
       ->check(number(0.5, 86400));
   add_queue_options(submit, farm.queue);
   submit.callback([&farm] { farm.what = FarmCommand::What::submit; });
-  CLI::App& status = *app.add_subcommand("status", "how jobs and workers stand");
-  status.add_flag("--watch", farm.watch, "again every two seconds");
+  CLI::App& status = *app.add_subcommand("status", "show the state of jobs and workers");
+  status.add_flag("--watch", farm.watch, "repeat every two seconds");
   add_queue_options(status, farm.queue);
   status.callback([&farm] { farm.what = FarmCommand::What::status; });
   CLI::App& collect = *app.add_subcommand("collect", "check every shard, then write manifest.json, coco.json and README.md");
@@ -174,10 +174,10 @@ std::string complaint(const RenderCommand& render) {
   if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
   if (writes && render.out.empty()) return "give the folder for the files: --out DIR";
   if (!writes && !render.out.empty()) return "--report writes no files: leave out --out";
-  if (render.pose_rate_hz && render.poses.empty()) return "--pose-rate is about --poses FILE, which is not given";
+  if (render.pose_rate_hz && render.poses.empty()) return "--pose-rate needs --poses FILE";
   if (render.first - 1 + render.pings.value_or(1) > most_rendered_pings)
-    return "--first and --pings go beyond ping " + std::to_string(most_rendered_pings) + ", the last that has a name";
-  if (!render.pose_frame.empty() && render.poses.empty()) return "--pose-frame is about --poses FILE, which is not given";
+    return "--first and --pings go beyond ping " + std::to_string(most_rendered_pings) + ", the last possible number";
+  if (!render.pose_frame.empty() && render.poses.empty()) return "--pose-frame needs --poses FILE";
   return {};
 }
 
@@ -215,13 +215,13 @@ std::string unknown_command(std::string_view word) {
 }  // namespace
 
 /// Without a command, the options are those of `run`. Unknown words are reported before CLI11 parses the line, because it would
-/// take them for a configuration file.
+/// read them as a configuration file.
 Command parse_command_line(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == "bench")
     return complain("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");
 
   CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene", "sonard"};
-  app.set_version_flag("--version", [] {  // the best level of this processor, whatever SONARD_SIMD says
+  app.set_version_flag("--version", [] {  // the best level of this processor, independent of SONARD_SIMD
     return std::string("sonard " SONARD_VERSION "\nhot loops: ") + simd::kernels_for(SimdLevel::avx512).name;
   });
   RunCommand run;
@@ -256,13 +256,13 @@ Command parse_command_line(int argc, char** argv) {
     add_run_options(run_app, run);
     CLI::App& check_app = *app.add_subcommand("check", "validate a configuration and its scene, then exit");
     check_app.footer("examples:\n  sonard check my.yaml");
-    check_app.add_option("config", check.config, "the configuration file to look at")->required();
+    check_app.add_option("config", check.config, "the configuration file")->required();
     CLI::App& render_app = *app.add_subcommand("render", "render pings into files");
     render_app.footer("examples:\n  sonard render my.yaml --out pings --pings 5 --format npy,png");
     add_render_options(render_app, render);
     add_dataset_options(*app.add_subcommand("dataset", "make a labelled data set from a job"), dataset);
     add_worker_options(*app.add_subcommand("worker", "make the shards of a farm's jobs"), worker);
-    add_farm_options(*app.add_subcommand("farm", "what sonarctl farm runs"), farm);
+    add_farm_options(*app.add_subcommand("farm", "the commands of sonarctl farm"), farm);
     add_replay_options(*app.add_subcommand("replay", "serve a recording to a driver, byte for byte"), replay);
   }
   const std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);
@@ -296,7 +296,7 @@ Command parse_command_line(int argc, char** argv) {
 Result<void> override_config(Config& config, const RunCommand& command) {
   if (!command.profile.empty())
     if (const auto r = use_product(config, command.profile); !r) return failure(r.error().kind, "--profile: " + r.error().text);
-  if (command.demo)  // a sonar that waits to be switched on shows nothing
+  if (command.demo)  // in standby the demo would show nothing
     for (const auto& [name, value] : {std::pair("acoustics_at_start", "enabled"), std::pair("udp_at_start", "multicast")})
       if (const auto option = config.sonars.front().options.find(name); option != config.sonars.front().options.end())
         option->second = value;

@@ -23,7 +23,7 @@ void add_model_options(CLI::App& app, EngineOptionsGiven& given) {
       ->check(one_of({mode_names.begin(), mode_names.end()}))
       ->group(parts);
   app.add_option("--fixed-fan", given.fixed_fan,
-                 "number of rays per column, each with one scatterer, without surface cells; default 0: what --mode does")
+                 "number of rays per column, each with one scatterer, without surface cells; default 0: the rays of --mode")
       ->check(whole_number(0, most_fixed_rays))
       ->group(parts);
   app.add_flag("--expected-power", given.expected_power, "mean echo power instead of speckle")->group(parts);
@@ -43,7 +43,7 @@ std::string option_of(const NamedSwitch& part) {
 }
 
 void add_device_option(CLI::App& app, EngineOptionsGiven& given) {
-  app.add_option("--engine", given.device, "what computes the pings; auto: the CUDA device if there is one (default cpu)")
+  app.add_option("--engine", given.device, "device that computes the pings; auto: the CUDA device if there is one (default cpu)")
       ->check(one_of({engine_device_names.begin(), engine_device_names.end()}))
       ->envname("SONARD_ENGINE");
 }

@@ -35,8 +35,8 @@ void add_device_option(CLI::App& app, EngineOptionsGiven& given);
 void add_model_options(CLI::App& app, EngineOptionsGiven& given);
 void add_engine_options(CLI::App& app, EngineOptionsGiven& given);
 
-/// Errors: usage, if an option switches on a part that has no effect in this mode or with this fixed fan. A part that the file
-/// switches on is not refused here.
+/// Errors: usage, if an option switches on a part that has no effect in this mode or with this fixed fan. Parts that the file
+/// switches on are not checked here.
 Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const EngineOptionsGiven& given);
 
 }  // namespace sonar

@@ -11,7 +11,7 @@ LoadProgress::LoadProgress(Say say, std::chrono::milliseconds every)
         const auto begin = std::chrono::steady_clock::now();
         while (ended.wait_for(every) == std::future_status::timeout) {
           const LoadStep step = load_step();
-          if (step.what.empty()) continue;  // a small scene
+          if (step.what.empty()) continue;  // the scene is small
           std::string line = "loading the scene: " + step.what + ", ";
           if (step.part > 0) line += std::to_string(static_cast<int>(100 * step.part)) + " %, ";
           const auto passed = std::chrono::steady_clock::now() - begin;

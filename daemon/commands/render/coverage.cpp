@@ -121,7 +121,7 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   Coverage coverage;
   double ratios = 0;
   for (int j = 0; j < s.beam_count; ++j) {
-    // A bin counts if the bed fills its whole footprint; its ratio is the simulated power by the closed form.
+    // A bin counts if the bed fills its whole footprint; its ratio is the simulated power divided by that of the closed form.
     const auto beam = static_cast<std::size_t>(j);
     const double sine = std::sin(static_cast<double>(ping.beam_azimuth_rad[beam]));
     const double beam_sine = beam < widths.size() ? sine_of_width(widths[beam]) * std::sqrt(1 - sine * sine) : common_sine;

@@ -28,7 +28,7 @@ RenderJob with_bed_only(RenderJob job);
 /// width.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 
-/// Returns the job of a product over a level bed: a fifth of the range above it, 0.25 rad nose down.
+/// Returns a job with the product over a level bed: its height is a fifth of the range, and it looks down by 0.25 rad.
 RenderJob over_a_level_bed(std::shared_ptr<const SonarModel> model, const PingSettings& settings, const std::string& name);
 /// Returns the jobs of every mode of every product over a level bed, at its stored range or, if shorter, its longest range.
 std::vector<RenderJob> shipped_sonars_over_a_bed();

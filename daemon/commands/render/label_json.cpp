@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int beams_a_side = 4;  // corners of a polygon along an arc are no farther apart
+constexpr int beams_a_side = 4;  // largest distance between corners of a polygon along an arc
 
 /// Returns whether an instance is annotated: objects with a label and point targets are.
 bool is_thing(const Scene& scene, std::size_t i) {

@@ -11,7 +11,8 @@ namespace sonar::render {
 
 inline constexpr int cartesian_width_px = 1000;  // width of the fan to which `cartesian` refers, as in render's pictures
 
-/// By instance from 1: name, class, and whether it is a thing, which has boxes and polygons: an object with a label of its own.
+/// For each instance, from 1 on: its name, its class, and true if it is a thing. A thing is an object with a label of its own; it
+/// has boxes and polygons.
 nlohmann::json instances_of(const Scene& scene);
 
 /// Annotations of every visible thing: `bbox`, `area` and `segmentation` in pixels of the samples (x = beam, y = row), and

@@ -4,14 +4,14 @@
 
 namespace sonar::render {
 
-static_assert(std::endian::native == std::endian::little, "arrays are written as they lie in memory");
+static_assert(std::endian::native == std::endian::little, "arrays are written in the byte order of the memory");
 
 std::string npy_header(std::string_view type, std::initializer_list<std::size_t> shape) {
   std::string sizes;
   for (const std::size_t n : shape) sizes += std::to_string(n) + (shape.size() == 1 ? "," : ", ");
   if (shape.size() > 1) sizes.resize(sizes.size() - 2);
   std::string dictionary = "{'descr': '" + std::string(type) + "', 'fortran_order': False, 'shape': (" + sizes + "), }";
-  constexpr std::size_t before = 10, multiple = 64;  // magic, version and length stand before the dictionary
+  constexpr std::size_t before = 10, multiple = 64;  // magic, version and length precede the dictionary
   const std::size_t whole = (before + dictionary.size() + 1 + multiple - 1) / multiple * multiple;
   dictionary.resize(whole - before - 1, ' ');
   dictionary += '\n';

@@ -1,4 +1,4 @@
-// Reads what `sonard render` is given: a configuration, or a render file with its sweep.
+// Reads the input of `sonard render`: a configuration, or a render file with its sweep.
 #include <algorithm>
 
 #include "core/base/regular_file.hpp"
@@ -84,7 +84,7 @@ void read_sonar(const Node& node, RenderJob& job) {
   }
   const int first_mode = profile.vendor ? device_settings(job).mode : 0;
   const int mode = read_mode(ping.map().optional("mode"), *profile.model, first_mode);
-  if (model_node.present()) {  // else it stays the one that tables are kept for
+  if (model_node.present()) {  // otherwise the model keeps its identity, for which tables are cached
     SonarModel model = *profile.model;
     read_model(model_node.map(), model.modes[static_cast<std::size_t>(mode)]);
     profile.model = std::make_shared<const SonarModel>(std::move(model));
@@ -103,7 +103,7 @@ void read_sonar(const Node& node, RenderJob& job) {
 }
 
 /// The scene's keys inline, or the name of a file. An error in the scene is bad data, as it is in a scene
-/// file. Everything else must have been read before, because errors of the document are then taken as errors of the scene.
+/// file. Everything else must have been read before, because later errors of the document count as errors of the scene.
 Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::filesystem::path& folder, const std::string& name,
                                                    const text::Document& document, ShapeCache* known) {
   if (node.is_map()) {

@@ -90,7 +90,7 @@ PingRequest make_request(const RenderJob& job, const World& world, PingNumber nu
   request.model = sonar.profile.model;
   request.number = number;
   request.settings = job.settings;
-  request.vendor_settings = as_the_device_keeps(job).vendor_settings;  // they say whether the ping is a range image
+  request.vendor_settings = as_the_device_keeps(job).vendor_settings;  // they determine if the ping is a range image
   request.bearings = sonar.bearings;
   request.sonar_id = static_cast<std::uint32_t>(job.sonar_index);
   return request;

@@ -29,7 +29,7 @@ struct RenderJob {
 
   std::string name;
   std::shared_ptr<const Scene> scene;
-  Config config;                // a render file's has its one sonar and vehicle, water, seed and engine
+  Config config;                // for a render file: its one sonar and vehicle, water, seed and engine
   std::size_t sonar_index = 0;  // in config.sonars; keys the noise, as in the daemon
   PingSettings settings;
   Time begins_at{};           // the time stamp at which trajectories begin

@@ -137,7 +137,7 @@ class JobRun {
     }
   }
   Result<void> submit() {
-    if (!engine_) {  // not before it is needed: a finished folder costs no scene
+    if (!engine_) {  // loaded only when needed: a finished folder needs no scene
       auto started = engine_for(job_, pool_, folder_.options().labels);
       if (!started) return tl::make_unexpected(started.error());
       engine_ = *std::move(started);
@@ -154,7 +154,7 @@ class JobRun {
       batch_[i].ping = std::move(pings.at(i));
       batch_[i].count = counts.at(i);
     }
-    // One description for all pings, because those that a failed device had begun are made again.
+    // One description is valid for all pings, because pings that a failed device had begun are made again.
     const std::string description = engine_->description();
     pool_.for_each(batch_.size(),
                    [&](std::size_t i, int) { batch_[i].written = write_ping(job_, batch_[i], description, folder_); });
@@ -192,7 +192,7 @@ PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t n
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
   const std::vector<Time> lines = pose_times(job);
   const std::uint64_t before = o.first - 1;
-  // How many pings there are from the first wanted on, of the `all` pings that the poses cover.
+  // The number of pings from the first wanted one on. `all`: number of pings that the poses cover.
   const auto count_of = [&](std::uint64_t all, const char* how) -> Result<std::uint64_t> {
     if (before < all && o.pings.value_or(1) <= all - before) return o.pings.value_or(all - before);
     const std::string asked = (before > 0 ? " --first " + std::to_string(o.first) : std::string()) +
@@ -238,7 +238,7 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
       above += is_above && !hears_nothing && !lies_above ? 1 : 0;
     }
   }
-  constexpr const char* cure = "was NED taken for ENU? Check the poses and their frame";
+  constexpr const char* cure = "were NED poses read as ENU? Check the poses and their frame";
   if (in_air > 0)
     return text::format(
         "%zu of %zu pings: the sonar is above the sea surface and receives noise only (z = 0 is the surface, lower is negative); "

@@ -129,7 +129,7 @@ json json_of(const Water& water) {
           {"sound_speed_mps", water.sound_speed_mps}};
 }
 
-/// Range, index and name of what each beam met first; null where it met nothing.
+/// Range, index and name of the first object that each beam hit; null if it hit none.
 json truth_of(const Ping& ping, const Scene& scene) {
   json range = json::array(), object = json::array(), name = json::array();
   for (const BeamTruth& t : ping.truth) {

@@ -181,7 +181,7 @@ void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& 
       keys.optional("device_sound_speed_mps").number_or(static_cast<double>(s.device_sound_speed_mps), Range::between(100, 1e4)));
   set(keys.optional("device_absorption_db_per_m"), Range::between(0, 1000), s.device_absorption_db_per_m);
 
-  // The grid: rows, their spacing and the pulse follow one from the other where they are not given.
+  // The grid: of rows, their spacing and the pulse, each that is not given follows from the others.
   const Node rows = keys.optional("rows"), spacing = keys.optional("row_spacing_m"), pulse = keys.optional("pulse_width_m");
   const Range a_length = Range::between(1e-5, 100);
   if (pulse.present()) s.pulse_width_m = static_cast<float>(pulse.number(a_length));

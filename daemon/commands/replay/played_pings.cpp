@@ -53,7 +53,7 @@ std::optional<PlayedPings::Part> PlayedPings::read() {
   }
 }
 
-/// Takes the messages of a ping. They follow each other from the poorest to the richest or the other way around.
+/// Reads the messages of a ping and returns the richest. They are ordered from the poorest to the richest, or the reverse.
 recording::Bytes PlayedPings::take_richest() {
   recording::Bytes richest = std::move(ahead_->bytes);
   ahead_ = read();

@@ -8,7 +8,8 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
-// A batch, so that fast replays change threads seldom; a short one, so that a slow disk delays only what is not read yet.
+// Messages are read in batches, so that fast replays seldom change threads. Batches are short, so that a slow disk delays only
+// messages that are not read yet.
 constexpr std::size_t most_messages = 256, most_bytes = std::size_t{4} << 20;
 constexpr std::chrono::milliseconds longest{5};
 

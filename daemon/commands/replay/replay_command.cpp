@@ -27,13 +27,15 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
   CLI::Option* speed = app.add_option("--speed", replay.speed, "2 = twice as fast as recorded")
                            ->check(text::number(0.001, 1000))
                            ->capture_default_str();
-  app.add_flag("--stepped", replay.stepped, "no pace: the next message when the driver has received the last")->excludes(speed);
-  app.add_flag("--loop", replay.loop, "from the front again and again");
+  app.add_flag("--stepped", replay.stepped, "no pace: send the next message when the driver has received the last one")
+      ->excludes(speed);
+  app.add_flag("--loop", replay.loop, "repeat the recording without end");
   app.add_option("--rate", replay.rate_hz, "messages a second of raw dumps, which have no times")
       ->check(text::number(0.001, 10000))
       ->capture_default_str();
-  app.add_option("--sonar", replay.sonar, "which of several in the file: its address in captures, its name in MCAP");
-  app.add_option("--part-number", replay.part_number, "of the sonar, where the recording holds no status (1042 = M1200d)")
+  app.add_option("--sonar", replay.sonar, "the sonar, if the file has several: its address in captures, its name in MCAP");
+  app.add_option("--part-number", replay.part_number,
+                 "part number of the sonar, if the recording holds no status (1042 = M1200d)")
       ->check(text::whole_number(1, 65535))
       ->capture_default_str();
   app.add_option("--http", replay.http, "IP:PORT of the page that shows the recording, or off")->capture_default_str();

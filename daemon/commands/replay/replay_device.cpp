@@ -10,11 +10,11 @@ namespace {
 
 constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // a status comes every second
 
-/// Why pings of that make cannot be served to a driver; empty: they can.
+/// The reason if pings of that make cannot be served to a driver; empty if they can.
 std::string why_only_seen(const protocol::Make& make) {
   if (make.codec.ping_part != nullptr) return "";
   if (make.each_ping_requested || make.scans) return "depend on the requests of its host";
-  return make.has_several_streams() ? "come by several connections" : "";
+  return make.has_several_streams() ? "are sent over several connections" : "";
 }
 
 /// A sonar that answers its hosts.

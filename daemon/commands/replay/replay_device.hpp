@@ -1,5 +1,5 @@
-// The sonar of a recording: for an Oculus the recorded status datagram describes it, but with the local addresses; for other
-// makes the vendor and the state of the device do.
+// The sonar of a recording: the recorded status datagram, with the local addresses, describes an Oculus; the vendor and the state
+// of the device describe another make.
 #pragma once
 
 #include <memory>
@@ -19,7 +19,7 @@ struct ReplayDevice {
   const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null; and its state
   std::shared_ptr<protocol::DeviceState> state;
   std::uint32_t serial = 0;  // serial number of an ARIS
-  std::string is_only_seen;  // why no driver can be served; empty = one can
+  std::string is_only_seen;  // reason if no driver can be served; empty = drivers can be served
 
   /// Null: it listens by TCP for connections that last.
   const protocol::Port* http() const { return vendor != nullptr ? vendor->port(protocol::Port::Kind::http) : nullptr; }

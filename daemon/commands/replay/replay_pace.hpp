@@ -15,8 +15,7 @@ class ReplayPace {
   using Steady = std::chrono::steady_clock;
   static constexpr std::chrono::seconds longest_gap{5};  // longer pauses are shortened; drivers disconnect after ten seconds
   static constexpr std::chrono::milliseconds between_loops{100};  // from the last message to the first
-  static constexpr std::chrono::milliseconds lateness{
-      200};  // a longer delay is not made up for, so that slow clients get no burst
+  static constexpr std::chrono::milliseconds lateness{200};  // a longer delay is not caught up, so that slow clients get no burst
 
   /// `speed` > 0. `interval`: between messages of recordings without times.
   ReplayPace(double speed, std::optional<std::chrono::nanoseconds> interval) : speed_(speed), interval_(interval) {}

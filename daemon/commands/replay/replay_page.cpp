@@ -31,7 +31,7 @@ asio::awaitable<HttpOutcome> ReplayPage::answer(const HttpRequest& request, Http
     co_return HttpAnswer{200, "sonard replay: open this address in a browser\n", "text/plain"};
   if (std::holds_alternative<HealthAction>(routed.action))
     co_return HttpAnswer{200, std::string(control::health_of_replay) + of_.file.filename().string() + "\n", "text/plain"};
-  co_return answer_of(404, control::StatusCode::unsupported, "sonard replay has its page only");
+  co_return answer_of(404, control::StatusCode::unsupported, "sonard replay serves only its page");
 }
 
 HttpAnswer ReplayPage::refusal(const HttpRefusal& refusal) const {

@@ -69,7 +69,7 @@ Result<void> ReplayServer::open_http() {
   return {};
 }
 
-/// After an exception in one of its coroutines, the server would run and serve no client.
+/// An exception in one of the coroutines ends the replay. Otherwise the server would continue without serving a client.
 template <class Coroutine>
 void ReplayServer::spawn(Coroutine coroutine) {
   asio::co_spawn(io_, std::move(coroutine), [this](std::exception_ptr fault) {
@@ -281,20 +281,20 @@ asio::awaitable<bool> ReplayServer::write(ClientPointer client, protocol::BytesV
   co_return !ec;
 }
 
-/// A client that reads nothing would keep the only slot. It is reset, as by a sonar of sonard.
+/// A client that reads nothing would keep the only slot. It is reset, as by an emulated sonar.
 void ReplayServer::watch_stall(const ClientPointer& client) {
   client->stall.expires_after(options_.stall);
   client->stall.async_wait([this, client](const error_code& ec) {
     if (ec || over_ || !client->socket.is_open()) return;
     ++figures_.stalled;
-    log_.warning("client reset: it took no byte for " + std::to_string(options_.stall.count()) + " ms",
+    log_.warning("client reset: it read no byte for " + std::to_string(options_.stall.count()) + " ms",
                  {{"client", client->name}});
     close_by_reset(client->socket);
   });
 }
 
-/// Requests of a host decide where frames go, and from when on. A host that reads none of the answers is disconnected, as a sonar
-/// of sonard does it.
+/// Requests of a host determine the receivers of frames and the time of the first frame. A host that does not read the answers is
+/// disconnected, as by an emulated sonar.
 void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.heard = Steady::now();
   const protocol::Reaction reaction = client.dialogue->on_bytes(bytes, {});
@@ -311,8 +311,8 @@ void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.wake.cancel();
 }
 
-/// Carries out what a request of the host means for the replay: whether and where frames are sent. All other settings have no
-/// effect.
+/// Applies the part of a host's request that concerns the replay: if frames are sent, and to which receivers. All other settings
+/// have no effect.
 void ReplayServer::apply(Client& client, const protocol::Event& event) {
   const protocol::Port* const stream = device_.vendor->port(protocol::Port::Kind::udp_stream);
   const auto send_to = [&](const protocol::SetReceivers& set) {
@@ -370,7 +370,7 @@ asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
   client->wake.cancel();
 }
 
-/// The end of our stream; then the client's, so that none of our last bytes is lost to a reset.
+/// Ends our stream, then waits for the end of the client's stream, so that a reset cannot discard our last bytes.
 asio::awaitable<void> ReplayServer::close_stream(ClientPointer client) {
   error_code ec;
   client->socket.shutdown(tcp::socket::shutdown_send, ec);

@@ -1,8 +1,8 @@
 // Serves a recording as the recorded sonar would: over TCP, to one client at a time, its messages byte for byte; and status
 // datagrams. A sonar that sends pings on request answers its host, and sends them once the host requests them: an ARIS as
-// datagrams to the receivers that its controller sets; a Sonar 3D-15 in the same way, to the receivers set over HTTP, as for one
-// client that does not leave. It has no scene and no engine. RequestedReplay serves the sonars whose
-// hosts decide which pings they get.
+// datagrams to the receivers that its controller sets; a Sonar 3D-15 in the same way, to the receivers that were set over HTTP.
+// It behaves as if one client stayed connected. It has no scene and no engine. RequestedReplay serves the sonars whose hosts
+// decide which pings they get.
 #pragma once
 
 #include <functional>
@@ -25,7 +25,7 @@ struct ReplayOptions {
   bool stepped = false;             // without a pace: sends a message when the client has read the previous one
   bool loop = false;                // repeats the recording
   double rate_hz = 10;              // messages a second of recordings without times
-  std::chrono::milliseconds stall = LimitConfig{}.stall;  // a client that reads no byte for so long is reset
+  std::chrono::milliseconds stall = LimitConfig{}.stall;  // a client that reads no byte for this time is reset
   bool handle_signals = false;
   std::function<void()> on_end = {};  // called when the server has no more work on io
 };

@@ -72,7 +72,7 @@ void RequestedReplay::start() {
 
 void RequestedReplay::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
-  due_.cancel();  // a waiting ping is completed at once, because the device ends only when none is under way
+  due_.cancel();  // a waiting ping is completed at once, because the device ends only when no ping is in progress
   device_->stop(why);
   end_when_gone();
 }
@@ -90,7 +90,7 @@ void RequestedReplay::on_change() {
   if (device_ == nullptr) return;
   if (was_last_ && !stopping_ && device_->sonar().settled())
     asio::post(io_, [this] {
-      if (was_last_) stop("recording served to its end");  // else another client has connected
+      if (was_last_) stop("recording served to its end");  // otherwise another client has connected
     });
   end_when_gone();
 }

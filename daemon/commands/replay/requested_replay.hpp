@@ -1,7 +1,7 @@
-// Serves a recording of a sonar whose hosts decide which pings they get: the device with all its ports and conversations, whose
-// pings are those of the recording. A request of a mechanical scan gets the line nearest to the direction in which its head
-// looks; other requests get one ping after another, not faster than they were recorded. These are read in a thread of their own,
-// so that a slow disk delays no conversation.
+// Serves a recording of a sonar whose hosts decide which pings they get. It is the whole device with its ports and conversations,
+// and its pings are the recorded ones. A request of a mechanical scan gets the line nearest to the direction in which its head
+// looks; other requests get one ping after another, not faster than they were recorded. Another thread reads them, so that a slow
+// disk delays no conversation.
 #pragma once
 
 #include <memory>
@@ -54,7 +54,7 @@ class RequestedReplay final : public DeviceParent {
   asio::io_context& io_;
   recording::RecordingReader& reader_;
   const recording::Codec& codec_;
-  PlayedPings pings_;  // after open() used by `disk_`, but for the lines of a scan
+  PlayedPings pings_;  // after open() used by `disk_` only, except for the lines of a scan
   ReplayOptions options_;
   Log& log_;
   Config config_;
@@ -69,7 +69,7 @@ class RequestedReplay final : public DeviceParent {
   std::uint64_t clients_ = 0;
   bool from_the_front_ = false, was_last_ = false, stopping_ = false, over_ = false;
   std::unique_ptr<Device> device_;
-  asio::thread_pool disk_{1};  // destroyed first: waits for what is read
+  asio::thread_pool disk_{1};  // destroyed first: its destructor waits for the current read
 };
 
 }  // namespace sonar

@@ -60,7 +60,7 @@ Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
   run.found = *std::move(found);
   const Config& config = run.found.config;
   if (const auto r = check_files(config, run.token_warning); !r) return tl::make_unexpected(r.error());
-  // The checks above take no time. Loading the scene may take minutes, so progress is logged from here.
+  // The checks above are fast. Loading the scene may take minutes, so progress is logged from here.
   const LoadProgress loading(say_with(config));
   const auto scene = load_scene(config.scene, config.origin);
   if (!scene) return tl::make_unexpected(scene.error());
@@ -69,7 +69,7 @@ Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
   run.pool = std::make_unique<Parallel>(compute_threads(config.engine), compute_niceness);
   run.make_engine = engine_factory(config, *run.pool);
   Result<std::unique_ptr<PingEngine>> engine;
-  // The engine is started here, so that a device that cannot compute ends the start, before any port is open.
+  // The engine is started here, so that sonard ends before it opens a port if the device cannot compute.
   compute_apart([&] { engine = start_engine(run.make_engine, run.scene); });
   if (!engine) return tl::make_unexpected(engine.error());
   run.engine = *std::move(engine);

@@ -30,7 +30,7 @@ void let_hangups_through(bool let) {
 void prepare_process() {
   let_hangups_through(false);     // a hangup that arrives while the scene loads stays pending until it is handled
   std::signal(SIGPIPE, SIG_IGN);  // a closed log pipe (sonard 2>&1 | head) must not end the daemon
-  std::signal(SIGXFSZ, SIG_IGN);  // a recording that may not grow any more ends; clients stay
+  std::signal(SIGXFSZ, SIG_IGN);  // a recording that reaches the limit of file sizes ends; clients stay connected
   raise_descriptor_limit();
 }
 
@@ -86,7 +86,7 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
   let_hangups_through(false);
   log.announce(summary(app));
   std::fputs(digest_lines(app).c_str(), stdout);
-  if (app.is_at_work()) {  // a scene or ping that is not needed any more
+  if (app.is_at_work()) {  // a scene is loading or a ping is being computed that is no longer needed
     std::fflush(nullptr);
     std::_Exit(code);
   }
