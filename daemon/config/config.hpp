@@ -95,7 +95,7 @@ struct PoseConfig {
 /// A site whose pages may open the live view (docs/live-view.md), as in the Origin header: "https://example.com".
 struct ViewOrigin {
   std::string origin;
-  bool steer = false;  // false: its pages may only look
+  bool steer = false;  // false: its pages cannot change anything
   bool operator==(const ViewOrigin&) const = default;
 };
 /// The control interfaces (docs/control.md).

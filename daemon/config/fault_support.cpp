@@ -12,7 +12,7 @@ namespace {
 using E = FaultEffect;
 using S = FaultStage;
 
-/// Whether a kind acts on a sonar that sends pings only as datagrams: it changes the first datagram, or does not change pings.
+/// True if a kind acts on a sonar that sends pings only as datagrams: it changes the first datagram, or does not change pings.
 /// In a dialogue by datagrams it may also hold pings back.
 bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   if (kind.stage == S::stream) return false;
@@ -24,7 +24,7 @@ bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   return std::find(std::begin(of_streams), std::end(of_streams), kind.effect) == std::end(of_streams);
 }
 
-/// Whether an effect can change an integer without a fixed place.
+/// True if an effect can change an integer without a fixed place.
 bool takes_integer(E effect) {
   constexpr E all[] = {E::renumber, E::add_to_field, E::heat, E::beacon_address, E::second_beacon};
   return std::find(std::begin(all), std::end(all), effect) != std::end(all);
@@ -36,7 +36,7 @@ bool has_integer(const protocol::Vendor& vendor, protocol::Part part, protocol::
       part, name, [](auto n) { return n; }, none);
 }
 
-/// Whether a model of the vendor accepts `enough` of the values from first to last.
+/// True if a model of the vendor accepts `enough` of the values from first to last.
 template <class T>
 bool accepts(const protocol::Vendor& vendor, std::optional<T> protocol::SettingsOverride::*setting, std::uint32_t first,
              std::uint32_t last, int enough) {
@@ -72,7 +72,7 @@ std::string why_without_setting(std::string_view what, const protocol::Vendor& v
 
 std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor) {
   using Port = protocol::Port::Kind;
-  if (kind.code == "B15") return "is of files: cut one with head -c";
+  if (kind.code == "B15") return "applies to files: cut one with head -c";
   if (kind.effect == E::harness) return "needs two network namespaces: sonarctl lab";
   for (const protocol::Make& make : protocol::makes())
     if (kind.code.front() == make.own_faults && vendor.name() != make.name())

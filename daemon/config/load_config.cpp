@@ -35,7 +35,7 @@ Ipv4 read_host_ip(const Node& node, Ipv4 fallback = {}) {
 Ipv4 read_netmask(const Node& node) {
   const Ipv4 mask = read_ip(node);
   const std::uint32_t zeros = ~text::number_from_ipv4(mask);
-  if (node.present() && (zeros & (zeros + 1)) != 0)  // not a netmask: some zero precedes a one
+  if (node.present() && (zeros & (zeros + 1)) != 0)  // not a netmask: a zero precedes a one
     node.fail(text_of(mask) + " is not a netmask: give ones followed by zeros, such as 255.255.255.0");
   return mask;
 }
@@ -174,8 +174,8 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     if (!tuned) options.fail(tuned.error().text);
     sonar.profile.model = tuned.value_or(profile->model);
   } else if (options.present()) {
-    // The product is unknown, which is already reported. Its options cannot be checked; this call keeps them from being unknown
-    // keys.
+    // The product is unknown, which is already reported, so its options cannot be checked. This call prevents errors about
+    // unknown keys.
     options.map().entries();
   }
   for (const SonarConfig& other : config.sonars) {  // a missing key is reported once, not also as a duplicate
@@ -229,7 +229,7 @@ RecordingConfig read_recording(const Node& node, const std::filesystem::path& di
   const Node folder = map.required("folder");
   const std::filesystem::path path = (directory / folder.text()).lexically_normal();
   if (const std::string why = folder.present() ? why_no_files_in(path) : ""; !why.empty())
-    folder.fail(why + ": " + path.string() + "; recordings need a folder that is there, writable for sonard");
+    folder.fail(why + ": " + path.string() + "; recordings need an existing folder to which sonard can write");
   return {path};
 }
 

@@ -28,7 +28,7 @@ motion::ReadOptions options_of(const TrajectoryKeys& keys) {
   return options;
 }
 
-/// Whether a text is a word, not a file name; an unknown word is probably a typing error.
+/// True if a text is a word, not a file name; an unknown word is probably a typing error.
 bool is_word(const std::string& text) { return text.find_first_of("./") == std::string::npos; }
 
 }  // namespace
@@ -84,7 +84,7 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   plan.about = text::format("%s: %s, %s, %zu poses, %.3f s", plan.file.c_str(), std::string(name_of(f.format)).c_str(),
                             std::string(name_of(f.frame)).c_str(), (*way)->size(), seconds((*way)->duration()));
   if (f.unit != "seconds" || f.unit_by_steps) plan.about += ", stamps in " + std::string(f.unit);
-  if (f.unit_by_steps) plan.about += " by their steps (a first line of names says otherwise: t_s x y z qx qy qz qw)";
+  if (f.unit_by_steps) plan.about += " by their steps (a first line with names would define it: t_s x y z qx qy qz qw)";
   if (f.replaced > 0) plan.about += ", " + text::counted(f.replaced, "pose") + " replaced by the next of the same stamp";
   return plan;
 }

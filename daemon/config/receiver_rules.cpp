@@ -8,7 +8,7 @@ namespace {
 bool is_multicast(const Ipv4& ip) { return ip[0] >> 4 == 0xE; }
 
 bool is_broadcast(const Ipv4& ip, const SonarConfig& sonar) {
-  constexpr unsigned first_reserved = 240;  // no single computer has an address from here on
+  constexpr unsigned first_reserved = 240;  // from here on, addresses do not belong to single computers
   if (ip[0] >= first_reserved || ip == Ipv4{127, 255, 255, 255}) return true;
   bool broadcast = sonar.netmask != Ipv4{255, 255, 255, 255};
   for (std::size_t i = 0; i < ip.size(); ++i)

@@ -30,7 +30,7 @@ const std::vector<std::filesystem::path>& shipped_folders() {
   return folders;
 }
 
-/// Whether a file is below a folder, after resolving links. The root directory contains everything, so it never counts.
+/// True if a file is below a folder, after resolving links. The root directory contains everything, so it never counts.
 bool is_below(const std::filesystem::path& file, const std::filesystem::path& folder) {
   std::error_code ec;
   const auto real = std::filesystem::canonical(file, ec);

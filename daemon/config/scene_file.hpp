@@ -24,7 +24,7 @@ std::string scene_folders(const std::filesystem::path& directory);
 
 /// True if the name ends in .yaml or .yml; for names from control clients.
 bool has_scene_name(const std::filesystem::path& given);
-/// Whether errors that quote the file may be sent to control clients: only for files in `directory` (the configuration's) and for
+/// True if errors that quote the file may be sent to control clients: only for files in `directory` (the configuration's) and for
 /// the shipped scenes, after resolving links.
 bool may_be_quoted(const SceneFile& file, const std::filesystem::path& directory);
 

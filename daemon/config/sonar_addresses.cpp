@@ -62,10 +62,10 @@ struct Listening {
   std::string key;
   Endpoint at;
   bool udp, tcp;
-  bool gives_way = false;  // a default, which is dropped if its port is in use
+  bool gives_way = false;  // the address is a default, which is not used if its port is in use
   bool is_shared = false;  // may be shared with other listeners for which this is true
 };
-/// Whether two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
+/// True if two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
 bool meet(const Listening& a, const Listening& b) {
   const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
   const bool same_kind = (a.udp && b.udp && !(a.is_shared && b.is_shared)) || (a.tcp && b.tcp);

@@ -16,7 +16,7 @@ using std::chrono::nanoseconds;
 
 constexpr double longest_s = 86400;
 constexpr std::uint64_t most_pings = 1'000'000'000;
-constexpr double least_probability = 1e-9;  // a fault with a smaller one would never act, because no run has enough pings
+constexpr double least_probability = 1e-9;  // a fault with a lower probability would never act, because no run has enough pings
 
 std::vector<std::string_view> words_of(std::string_view text) {
   std::vector<std::string_view> words;
