@@ -38,7 +38,7 @@ struct Refuse {
   ConnectionId connection = 0;
   bool reset = false;  // RST in place of FIN
 };
-/// Whether the ports of kind tcp_stream accept connections, or refuse them as ports without a listener do. They accept from the
+/// True if the ports of kind tcp_stream accept connections, or refuse them as ports without a listener do. They accept from the
 /// start.
 struct Listen {
   bool on = true;

@@ -68,7 +68,7 @@ std::vector<protocol::Endpoint> Connections::receivers(const Connection& stream)
   const std::size_t number = stream.receivers.front().stream;
   std::vector<protocol::Endpoint> all;
   for (const Connection& c : all_) {
-    // The stream itself has the device's list; the lists of clients count while they are served.
+    // The device's own list belongs to the stream; the list of a client counts while the client is served.
     const bool counts = c.role == Role::stream ? c.id == stream.id : !c.finishing && c.state == State::served;
     for (const protocol::SetReceivers& list : c.receivers)
       for (const protocol::Endpoint& to : list.to)

@@ -52,13 +52,13 @@ struct Connection {
   std::uint64_t requests = 0;                            // requests for settings or a ping
   std::string complaint = {};                            // the latest complaint about its requests
 
-  /// Whether it gets datagrams: its port is of kind udp_stream or udp_dialogue.
+  /// True if it gets datagrams: its port is of kind udp_stream or udp_dialogue.
   bool takes_datagrams() const { return port != nullptr && port->kind != protocol::Port::Kind::tcp_stream; }
   /// Whether its port never has pings, only answers to commands.
   bool is_for_commands() const { return port != nullptr && !port->has_pings; }
   /// Pings sent to it by its own connection or a stream.
   std::uint64_t pings_written() const { return outbox.pings_written() + streamed_pings; }
-  /// Whether it has requested a receiver of that stream.
+  /// True if it has requested a receiver of that stream.
   bool receives(std::size_t stream) const;
   /// The next time at which the conversation must be called; nullopt while the connection is ending.
   std::optional<Time> next_tick() const;

@@ -24,8 +24,8 @@ class Histogram {
   double sum_s() const { return sum_s_; }
   /// Element i counts durations above bounds_s[i - 1] up to bounds_s[i]; the last element counts those beyond all bounds.
   const std::array<std::uint64_t, bounds_s.size() + 1>& counts() const { return counts_; }
-  /// Estimates a quantile, q in [0, 1], by linear interpolation between two bounds: accurate to a factor of 2.5. Quantiles
-  /// beyond the last bound return that bound; 0 if empty.
+  /// Estimates a quantile, q in [0, 1], by linear interpolation between two bounds: its error is at most a factor of 2.5.
+  /// Quantiles beyond the last bound return that bound; 0 if empty.
   double quantile_s(double q) const;
 
  private:

@@ -28,7 +28,8 @@ inline constexpr std::size_t drop_reasons = 4;
 class Outbox {
  public:
   using Bytes = std::vector<std::byte>;
-  /// The pauses and the end with which a fault, or the port's gap, has a message written. The bytes do not change.
+  /// The pauses in the writing of a message, from a fault or the port's gap, and the end of the connection after it. The bytes do
+  /// not change.
   struct Shape {
     struct Pause {
       std::size_t before = 0;             // index of the byte after the pause

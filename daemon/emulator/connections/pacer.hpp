@@ -56,7 +56,7 @@ class Pacer {
   void note_ping(Time at);
 
   bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
-  std::chrono::nanoseconds period_{0}, travel_{0};  // travel_: of sound to the range and back
+  std::chrono::nanoseconds period_{0}, travel_{0};  // travel_: travel time of sound to the range and back
   Time start_{};                                    // start of the grid
   std::int64_t index_ = 0;                          // index of the next tick on the grid
   Time trigger_at_{};

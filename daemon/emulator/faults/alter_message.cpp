@@ -69,7 +69,7 @@ void add_to(Bytes& bytes, const std::optional<Field>& field, std::int64_t by) {
   if (field) write_integer(bytes, field->offset, field->size, read_integer(bytes, *field) + static_cast<std::uint64_t>(by));
 }
 
-/// Makes `count` bytes of the kind that the option `fill` names.
+/// Makes `count` bytes of the kind `fill`.
 Bytes filling(const std::string& fill, std::size_t count, const Bytes& message, const FaultDraws& draws) {
   constexpr std::string_view text = "sonar: debug 0x00 ok\r\n";
   Bytes out(count, fill == "FF" ? std::byte{0xFF} : std::byte{0});

@@ -28,7 +28,7 @@ struct MessageContext {
   const protocol::Bytes* before = nullptr;  // for splice: the previous message; may be null
 };
 
-/// Whether a fault acted on a message, and at which byte, if that is not the first changed byte (for a pause or an end).
+/// True if a fault acted on a message, and at which byte, if that is not the first changed byte (for a pause or an end).
 struct Touch {
   bool acted = true;
   std::optional<std::size_t> place = {};

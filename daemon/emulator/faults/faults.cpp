@@ -45,7 +45,7 @@ Faults::Entry* Faults::active(Effect effect) {
 
 // ---- triggers
 
-/// Whether this ping triggers an inactive fault. Triggers by time and by events are handled elsewhere.
+/// True if this ping triggers an inactive fault. Triggers by time and by events are handled elsewhere.
 bool Faults::fires(const Entry& e, std::uint32_t ping) const {
   const FaultRecord::At& at = e.fault.at;
   if (at.ping) return e.begun == 0 && ping >= *at.ping;
@@ -252,7 +252,7 @@ void Faults::count_ping(Entry& e, Time now) {
   if (e.fault.kind->effect != Effect::power_cycle) end(e, now);
 }
 
-/// Whether the fault acts on this ping. Numbers are remembered, because a ping may be sent long after it was made.
+/// True if the fault acts on this ping. Numbers are remembered, because a ping may be sent long after it was made.
 bool Faults::met(const Entry& e, std::uint32_t ping) const {
   return std::find(e.hits.begin(), e.hits.end(), ping) != e.hits.end();
 }

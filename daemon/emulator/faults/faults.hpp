@@ -102,13 +102,13 @@ class Faults {
   void begin_ping(std::uint32_t number, Time now);
   /// Returns the ping as the device reports it, with changed samples or stamps.
   std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
-  /// Whether alter_datagrams() may change this ping. If not, the clients of a port share the datagrams.
+  /// True if alter_datagrams() may change this ping. If not, the clients of a port share the datagrams.
   bool alters_datagrams(const Connection& stream, std::uint32_t ping) const;
   void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   bool leaves_group() const;
   /// Changes a message before it is sent to a client. Returns false if it must not be sent.
   bool shape(const Connection& to, Outbox::Message& message, Time now);
-  /// Whether and until when a ping is held back before it enters a client's outbox.
+  /// True if and until when a ping is held back before it enters a client's outbox.
   struct Hold {
     enum class Kind { pass, until, after_next, collect } kind = Kind::pass;
     Time until{};
@@ -126,8 +126,8 @@ class Faults {
   Admission admission() const;
   void on_served(const Connection& client, Time now);
   enum class RequestVerdict { apply, ignore, end, reset };
-  /// Call it when a client requests settings. It may limit `change`. `ignore`: the sonar must not apply the change now (it may
-  /// follow as an order).
+  /// Call it when a client requests settings. It may limit `change`. With the verdict `ignore` the sonar must not apply the
+  /// change now; a delayed change follows as an order.
   RequestVerdict on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
                             Time now);
   /// Call it when a client has sent any bytes.

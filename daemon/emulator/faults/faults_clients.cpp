@@ -8,7 +8,7 @@ constexpr std::size_t most_late_requests = 64;
 
 }  // namespace
 
-/// Whether the fault acts on this client. A stream sends the same datagrams to all receivers, so the choice of a client does
+/// True if the fault acts on this client. A stream sends the same datagrams to all receivers, so the choice of a client does
 /// not apply to it.
 bool Faults::chosen(const Fault& fault, const Connection& client) const {
   if (client.role == Role::observer) return false;

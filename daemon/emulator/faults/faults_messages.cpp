@@ -114,7 +114,7 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (!edit) return true;
   message.bytes = std::make_shared<const Bytes>(std::move(edit->bytes));
   message.prefixes.clear();
-  message.shape = nullptr;  // the positions of the port's shape are those of the unaltered bytes
+  message.shape = nullptr;  // its positions refer to the unaltered bytes
   if (!edit->pauses.empty() || edit->end != Outbox::Shape::End::none) {
     std::sort(edit->pauses.begin(), edit->pauses.end(), [](const auto& a, const auto& b) { return a.before < b.before; });
     message.shape = std::make_shared<const Outbox::Shape>(Outbox::Shape{std::move(edit->pauses), edit->end});
@@ -158,7 +158,7 @@ void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Conne
   }
 }
 
-/// Whether faults of framing change bytes of this stream's datagrams.
+/// True if faults of framing change bytes of this stream's datagrams.
 bool Faults::frames_datagrams(const Connection& stream) const {
   return stream.role == Role::client || around_.vendor.pings_by() == protocol::PingsBy::datagrams;
 }

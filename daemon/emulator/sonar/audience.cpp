@@ -20,7 +20,7 @@ void drop_unreceived(Connections& connections) {
 
 // ---- slots
 
-// In a take-over, the previous client begins to end before the new connection is added, which is then the newest.
+// In a take-over, the previous client begins to finish before the new connection is added, so the new connection is the newest.
 Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
                             Actions& actions) {
   using Verdict = Connections::Verdict;

@@ -43,7 +43,7 @@ FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceSta
     bytes_ = std::move(all);
   }
   if (bytes_ != nullptr || !vendor.has_several_streams()) return;
-  // The whole is joined from the ports' parts, so that the ping is encoded only once.
+  // The whole ping is joined from the parts of the ports, so that it is encoded only once.
   auto whole = std::make_shared<Bytes>();
   for (const protocol::Port& port : vendor.ports())
     if (port.kind == protocol::Port::Kind::tcp_stream)

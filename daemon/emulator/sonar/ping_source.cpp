@@ -47,7 +47,7 @@ void PingSource::change_settings(const protocol::ChangeSettings& change, const s
     sonar_.report(Report::Topic::settings, who.empty() ? LogLevel::debug : LogLevel::info, "settings: " + change.summary,
                   {{"client", who.empty() ? "the sonar itself" : who}}, actions);
   }
-  settings_ = change.settings;  // also if repeated, because the device's own sound speed depends on its depth
+  settings_ = change.settings;  // also if they are repeated, because the device's own sound speed depends on its depth
   asked_ = true;
   if (change.receivers) audience_.set_receivers(nullptr, {}, *change.receivers);
   if (change.receivers || wants_pings()) update_pacer(now);
@@ -202,8 +202,8 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   ++figures.pings;
   figures.simulation_s += outcome.seconds;
   figures.simulation.add(outcome.seconds);
-  // The recording sets the pace of its pings: the next one is requested now, and comes when it is due. Fewer beams or more
-  // threads would not raise that pace.
+  // A recording determines the pace of its pings: the next one is requested now and arrives when it is due. Fewer beams or more
+  // threads would not change that pace.
   if (outcome.recorded != nullptr && !outcome.recorded->empty()) pacer_.hurry(now);
   if (!settings_.triggered && pacer_.period().count() > 0 && outcome.recorded == nullptr)
     if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),

@@ -107,7 +107,7 @@ class PingSource {
 
   std::uint32_t ping_number_ = 0;
   std::uint64_t numbered_skips_ = 0;  // ticks lost to overload before the last ping
-  bool in_air_ = false;               // whether the sonar was above the water at the last ping
+  bool in_air_ = false;               // true: the sonar was above the water at the last ping
   std::optional<Time> air_reported_;
   RateWatch rate_watch_;
 };

@@ -22,7 +22,7 @@ void RateWatch::begin(std::uint64_t ticks, std::uint64_t busy, double rate_hz) {
 
 std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t busy, double ping_s, double rate_hz,
                                            bool has_others) {
-  if (said_ || !(rate_hz > 0)) return std::nullopt;
+  if (warned_ || !(rate_hz > 0)) return std::nullopt;
   if (to_pass_over_ > 0) --to_pass_over_;
   // The first pings are not judged, and a change of the rate begins a new stretch.
   if (to_pass_over_ > 0 || rate_hz != rate_hz_) {
@@ -40,12 +40,12 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
   const double longest_s = longest_s_;
   begin(ticks, busy, rate_hz);
   if (skipped <= tolerated_share) return std::nullopt;
-  said_ = true;
+  warned_ = true;
   // If pings on average take less than a period, other sonars or single slow pings caused the delay.
   const bool by_itself = alone_hz < rate_hz;
   const double possible_hz = by_itself ? alone_hz : made_hz;
   const std::string why = by_itself    ? std::string()
-                          : has_others ? ", and other sonars are computed between"
+                          : has_others ? ", and other sonars are computed in between"
                                        : text::format(", single pings up to %.0f ms", 1e3 * longest_s);
   return text::format(
       "computing takes %.0f ms a ping%s: %.*f Hz at most here, %.3g Hz are asked for; ticks are skipped: ask for "

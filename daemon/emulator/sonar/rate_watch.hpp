@@ -18,7 +18,7 @@ class RateWatch {
  private:
   void begin(std::uint64_t ticks, std::uint64_t busy, double rate_hz);
 
-  bool said_ = false;
+  bool warned_ = false;
   int to_pass_over_ = 5;  // the first pings do not count: they take longer, because they fill caches
   double rate_hz_ = 0;
   std::uint64_t ticks_before_ = 0, busy_before_ = 0;

@@ -284,7 +284,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
     if (!observer) data_.report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.name}}, actions);
   } else if (observer) {
     // Only clients may send settings, triggers and addresses. An observer that sends one may use the wrong port.
-    data_.report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients change what a sonar does",
+    data_.report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients can change settings",
                  {{"observer", from.name}}, actions);
   } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
     change_as_requested(from, *change, now, actions);

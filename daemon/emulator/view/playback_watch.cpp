@@ -9,7 +9,7 @@ constexpr std::chrono::milliseconds slack{1};  // for the rounding at a change o
 
 }  // namespace
 
-PlaybackWatch::PlaybackWatch(const motion::Playback& of, Time now) : playback_(of), looked_at_(now), said_(state(now)) {}
+PlaybackWatch::PlaybackWatch(const motion::Playback& of, Time now) : playback_(of), looked_at_(now), sent_(state(now)) {}
 
 /// A position that playing since the last look cannot explain is a seek.
 std::optional<foxglove::PlaybackState> PlaybackWatch::look(const motion::Playback* of, Time now) {
@@ -20,12 +20,12 @@ std::optional<foxglove::PlaybackState> PlaybackWatch::look(const motion::Playbac
     playback_.pause(now);
   // Speed and pause may have changed at any moment since the last look.
   const double fastest = std::max(before, playback_.rules().speed.factor());
-  const Time farthest = said_.at + nanoseconds_from(fastest * seconds(now - looked_at_)) + slack;
+  const Time farthest = sent_.at + nanoseconds_from(fastest * seconds(now - looked_at_)) + slack;
   foxglove::PlaybackState holds = state(now);
-  holds.did_seek = holds.at + slack < said_.at || holds.at > farthest;
-  const bool is_news = holds.did_seek || holds.status != said_.status || holds.speed != said_.speed;
+  holds.did_seek = holds.at + slack < sent_.at || holds.at > farthest;
+  const bool is_news = holds.did_seek || holds.status != sent_.status || holds.speed != sent_.speed;
   looked_at_ = now;
-  said_ = holds;
+  sent_ = holds;
   return is_news ? std::optional(holds) : std::nullopt;
 }
 

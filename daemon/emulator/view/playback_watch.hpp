@@ -24,7 +24,7 @@ class PlaybackWatch {
  private:
   motion::Playback playback_;
   Time looked_at_{};
-  foxglove::PlaybackState said_;
+  foxglove::PlaybackState sent_;
 };
 
 }  // namespace sonar

@@ -34,7 +34,7 @@ void Preview::done(bool made) {
 
 void Preview::end() {
   until_.reset();
-  made_ = {};  // so that the pause before the next preview does not count
+  made_ = {};  // so that the pause before the next preview does not count for the rate
 }
 
 }  // namespace sonar

@@ -23,7 +23,7 @@ class RecordingPlayer {
   /// Reads one more ping to find the recording's length. False: there are no more, and the recording is at its start again.
   bool measure();
   Time begin() const { return begin_.value_or(Time{}); }
-  /// Time time since the first ping to the last.
+  /// The time from the first ping to the last.
   Ns length() const { return length_; }
   std::uint64_t count() const { return count_; }
   const recording::SentBy& by() const { return pings_.by(); }

@@ -13,7 +13,7 @@ constexpr double messages_per_s = 100, burst = 200;
 constexpr int most_complaints = 10;
 constexpr std::size_t most_passing = 64, longest_name_said = 256;
 constexpr milliseconds between_times{33};
-constexpr seconds slow_is_said_for{5}, refusal_is_said_for{10};
+constexpr seconds slow_is_said_for{5}, refusal_is_shown_for{10};
 // Viewers recognise exactly this text and show a hint.
 constexpr const char* too_slow = "Send buffer limit reached";
 constexpr const char* slow_id = "slow";
@@ -36,7 +36,7 @@ void Viewer::on_text(std::string_view text, Moment now) {
   if (!word) return complain(word.error().text);
   const bool is_read =
       !std::holds_alternative<foxglove::UnknownWord>(*word) && !std::holds_alternative<foxglove::Incapable>(*word);
-  if (is_read && !stray.empty()) say_ignored("fields such as \"" + stray + "\" are ignored");
+  if (is_read && !stray.empty()) warn_ignored("fields such as \"" + stray + "\" are ignored");
   std::visit([&](const auto& said) { on_word(said, now); }, *word);
 }
 
@@ -108,7 +108,7 @@ void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
     names.push_back(wanted.name);
     const std::string why = rights_.may_steer ? host_.set_parameter(*this, wanted) : may_only_look;
     const std::string name = wanted.name.substr(0, longest_name_said);
-    if (!why.empty()) say_for_now(name + ": " + why, "param:" + name, now, refusal_is_said_for);
+    if (!why.empty()) show_for_now(name + ": " + why, "param:" + name, now, refusal_is_shown_for);
     if (!rights_.may_steer) break;  // one error is enough
   }
   if (!names.empty()) say(foxglove::parameter_values(host_.parameters(*this, names), word.request));
@@ -132,12 +132,12 @@ void Viewer::on_word(const foxglove::Incapable& word, Moment) {
 }
 
 void Viewer::on_word(const foxglove::UnknownWord& word, Moment) {
-  say_ignored("operations such as \"" + word.op + "\" are ignored");
+  warn_ignored("operations such as \"" + word.op + "\" are ignored");
 }
 
 /// Warns once for each connection.
-void Viewer::say_ignored(const std::string& what) {
-  if (!std::exchange(said_unknown_, true)) say_status(foxglove::StatusLevel::warning, what);
+void Viewer::warn_ignored(const std::string& what) {
+  if (!std::exchange(warned_unknown_, true)) say_status(foxglove::StatusLevel::warning, what);
 }
 
 // ---- from the host
@@ -153,7 +153,7 @@ void Viewer::add_word(ViewMessage word) {
 }
 
 /// Shows a status that next() removes after `lasts`. If 64 such statuses exist, the new one is not removed.
-void Viewer::say_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts) {
+void Viewer::show_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts) {
   if (passing_.size() >= most_passing && !passing_.contains(id)) return say_status(foxglove::StatusLevel::error, text);
   say_status(foxglove::StatusLevel::error, text, id);
   passing_[id] = now + lasts;

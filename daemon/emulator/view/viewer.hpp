@@ -74,7 +74,7 @@ class ViewerHost {
   virtual std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) = 0;
   /// Sets a parameter. Returns the reason if it was not set, else an empty text.
   virtual std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) = 0;
-  /// Controls the trajectory and answers with its state. Returns false if the viewer does not look at a trajectory.
+  /// Controls the trajectory and answers with its state. Returns false if the viewer does not watch a trajectory.
   virtual bool steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) = 0;
   /// Performs a call and answers with Viewer::answer() or fail(), now or later.
   virtual void call(Viewer& viewer, const foxglove::ServiceCall& call) = 0;
@@ -114,7 +114,7 @@ class Viewer {
     say(foxglove::status(level, text, id));
   }
   /// Shows a status, which is removed after `lasts`.
-  void say_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts);
+  void show_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts);
   void offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now);
   bool subscribes(std::uint32_t channel) const;
   bool subscribes_any() const { return !slots_.empty(); }
@@ -130,7 +130,7 @@ class Viewer {
   void on_parameters(std::span<const foxglove::Parameter> changed);
   bool watches_parameters() const { return watches_all_ || !watched_.empty(); }
 
-  /// Sets the vehicle whose trajectory the viewer looks at, in the trajectory's time; empty = none.
+  /// Sets the vehicle whose trajectory the viewer watches, in the trajectory's time; empty = none.
   void play(std::string vehicle) { playback_ = std::move(vehicle); }
   const std::string& playback() const { return playback_; }
   /// Sets a parameter of this connection only.
@@ -159,7 +159,7 @@ class Viewer {
   void add_word(ViewMessage word);
   bool has_room_for_message(Moment now);
   void complain(const std::string& why);
-  void say_ignored(const std::string& what);
+  void warn_ignored(const std::string& what);
   void on_word(const foxglove::Subscribe& word, Moment);
   void on_word(const foxglove::Unsubscribe& word, Moment);
   void on_word(const foxglove::GetParameters& word, Moment);
@@ -182,7 +182,7 @@ class Viewer {
   std::optional<Moment> time_sent_, slow_since_, allowance_at_;
   std::map<std::string, Moment> passing_;  // statuses with the time of their removal
   std::set<std::string> watched_;
-  bool watches_all_ = false, said_unknown_ = false;
+  bool watches_all_ = false, warned_unknown_ = false;
   double allowance_ = 200;  // number of messages that the viewer may send now
   int complaints_ = 0;
   std::size_t open_calls_ = 0;

@@ -16,13 +16,13 @@ constexpr std::size_t least_steps = 20;         // of the way; fewer prove nothi
 constexpr double least_step_m = 1e-3;           // a shorter one has no direction
 constexpr double agrees = 0.97, differs = 0.7;  // length of the mean of unit vectors: 1 if all are equal, 0 if evenly spread
 constexpr double most_short_of_turn_deg = 0.3;  // a jump from pi to -pi, less the turn of that step
-constexpr double steady_deg = 0.3;              // most that other steps turn, were they radians: 17 deg
+constexpr double steady_deg = 0.3;              // largest turn of other steps; if they are radians, 17 deg
 
 double heading_deg(const Pose& pose) { return deg_from_rad(rpy_from_quat(pose.orientation).yaw_rad); }
 double without_turns_deg(double angle_deg) { return std::remainder(angle_deg, 360); }
 double length_of_mean(Direction sum, std::size_t count) { return std::abs(sum) / static_cast<double>(count); }
 
-/// The course turns, and the heading would keep its angle to it if it were multiplied by 57.3; as it is, it does not.
+/// True if the course turns, the heading does not follow it, and the heading multiplied by 57.3 would follow it.
 bool follows_course_as_radians(const std::vector<Pose>& poses, const std::vector<double>& turned_deg) {
   Direction as_read, as_radians, courses;
   std::size_t steps = 0;
@@ -40,7 +40,7 @@ bool follows_course_as_radians(const std::vector<Pose>& poses, const std::vector
          length_of_mean(as_radians, steps) > agrees;
 }
 
-/// Angles that stay within one turn of 2 pi and jump from its one end to the other.
+/// True if the angles stay within one turn of 2 pi and jump from one end of it to the other.
 bool jumps_by_two_pi(const std::vector<double>& turned_deg) {
   std::size_t jumps = 0;
   for (std::size_t i = 1; i < turned_deg.size(); ++i) {
@@ -57,7 +57,7 @@ bool jumps_by_two_pi(const std::vector<double>& turned_deg) {
 
 std::optional<std::string> radians_read_as_degrees(const std::vector<Pose>& poses) {
   if (poses.size() <= least_steps) return std::nullopt;
-  // The heading since the first pose: thus the frame of the file does not matter.
+  // The heading relative to the first pose, so that the frame of the file does not matter.
   std::vector<double> turned_deg;
   for (const Pose& p : poses) {
     turned_deg.push_back(without_turns_deg(heading_deg(p) - heading_deg(poses.front())));

@@ -10,7 +10,8 @@
 namespace sonar {
 
 /// Returns why the headings of these poses, in the order of time, are probably radians that were read as degrees: "follow the
-/// course ..."; nullopt if they are plausible. A vehicle that neither moves on a curved way nor turns all around gives no reason.
+/// course ..."; nullopt if they are plausible. nullopt also if the vehicle neither moves on a curved path nor turns by a whole
+/// turn.
 std::optional<std::string> radians_read_as_degrees(const std::vector<Pose>& poses);
 
 }  // namespace sonar

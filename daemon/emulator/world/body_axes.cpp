@@ -22,7 +22,7 @@ constexpr std::array<OtherAxes, 2> other_axes{
 }  // namespace
 
 const OtherAxes* axes_of(const std::vector<Pose>& poses) {
-  constexpr double leaning = 0.3;  // cameras look far down
+  constexpr double leaning = 0.3;  // cameras may look steeply down
   std::vector<Quatd> lying;
   for (const Pose& p : poses)
     if (upright(p.orientation) < tilted) lying.push_back(p.orientation);

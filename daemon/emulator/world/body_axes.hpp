@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-inline constexpr double tilted = 0.5;  // upright() of a body 60 degrees from upright
+inline constexpr double tilted = 0.5;  // upright() of a body that is tilted by 60 degrees
 
 /// Returns the upward component of the body's z axis, -1 to 1.
 inline double upright(Quatd q) { return 1 - 2 * (q.x * q.x + q.y * q.y); }
@@ -21,7 +21,7 @@ struct OtherAxes {
 /// The axes in which these poses would be nearly upright, although in ours they mostly lie on their side; null if there are
 /// none.
 const OtherAxes* axes_of(const std::vector<Pose>& poses);
-/// Whether the mounts make the sonars upright in these axes.
+/// True if the mounts make the sonars upright in these axes.
 bool are_upright(const std::vector<Pose>& mounts, const OtherAxes& axes);
 
 }  // namespace sonar

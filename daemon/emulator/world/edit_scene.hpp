@@ -28,7 +28,7 @@ const Object* object_named(const Scene& scene, std::string_view name);
 /// Makes the error "there is no object ...; did you mean ...".
 Error no_such_object(const Scene& scene, std::string_view name);
 
-/// Whether both scenes give the same pings; the scenes' names are not compared.
+/// True if both scenes give the same pings; the scenes' names are not compared.
 bool is_same(const Scene& a, const Scene& b);
 
 }  // namespace sonar

@@ -17,20 +17,21 @@ namespace {
 
 using text::format;
 
-constexpr double turned_over = -0.5;           // the z axis points down, by more than 30 deg below the horizon
+constexpr double turned_over = -0.5;           // the z axis points more than 30 deg below the horizon
 constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
 constexpr double ground_flatness = 0.05;       // height over width; flatter objects are ground, which may be long
 constexpr double least_ground_m = 2;           // width; a flat plate that is narrower is not ground
 constexpr double far_from_origin_m = 1000;     // vehicles may drive this far to the scene
 constexpr double long_ranges = 5;              // an object may be this many times as long as the longest range
 
-// Each cure identifies a kind of note; a kind is reported once.
+// Each remedy identifies a kind of note; a kind is reported once.
 constexpr const char* surface_cure =
     "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
     "in the other; state the frame that was sent";
 constexpr const char* depth_cure =
     "the scene is less deep than that: see the origin that depths are counted from, and the unit (metres)";
-constexpr const char* exchanged_cure = "with x and y exchanged it would be in the scene: ENU_FLU has east first, NED_FRD north";
+constexpr const char* exchanged_cure =
+    "it would be in the scene if x and y were exchanged: ENU_FLU has east first, NED_FRD north";
 constexpr const char* far_cure =
     "positions are metres from the world's 0, 0, 0: see the unit and the origin that they are sent in";
 constexpr const char* turned_cure =
@@ -106,14 +107,14 @@ std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
   return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
 }
 
-/// Whether a body is upright, in the frame of the file, if w is at the other end of the four numbers.
+/// True if a body is upright, in the frame of the file, if w is at the other end of the four numbers.
 bool is_upright_in_another_order(Quatd q) {
   const auto reordered = [](Quatd r) { return std::array{upright({r.x, r.y, r.z, r.w}), upright({r.z, r.w, r.x, r.y})}; };
   const auto as_enu = reordered(q), as_ned = reordered(enu_flu_from_ned_frd(q));
   return std::max({as_enu[0], as_enu[1], as_ned[0], as_ned[1]}) > tilted;
 }
 
-/// Whether w can be at the wrong end: CSV files name their columns, and KITTI files have matrices. `about` begins with the
+/// True if w can be at the wrong end: CSV files name their columns, and KITTI files have matrices. `about` begins with the
 /// format.
 bool has_nameless_quaternions(const motion::Plan& plan) {
   const auto is = [&](motion::Format format) {
@@ -122,7 +123,7 @@ bool has_nameless_quaternions(const motion::Plan& plan) {
   return is(motion::Format::tum) || is(motion::Format::euroc);
 }
 
-/// Whether the poses are implausibly tilted, but upright with the numbers in another order.
+/// True if the poses are implausibly tilted, but upright with the numbers in another order.
 bool is_out_of_order(const std::vector<Pose>& poses) {
   std::size_t lying = 0, explained = 0;
   for (const Pose& p : poses) {
@@ -169,7 +170,7 @@ Extent in_world(const Extent& own, const Pose& place) {
   return out;
 }
 
-/// Whether all checked triangles face up, so that from above no part of the object hides another.
+/// True if all checked triangles face up, so that from above no part of the object hides another.
 bool is_height_field(const Mesh& mesh) {
   const std::size_t step = 1 + mesh.triangles.size() / most_looked_at;
   for (std::size_t i = 0; i < mesh.triangles.size(); i += step) {
@@ -187,12 +188,12 @@ MeshShape shape_of(const Mesh& mesh) {
   return shape;
 }
 
-/// Whether an object is the sheet that the loader makes for the scene's sea_surface.
+/// True if an object is the sheet that the loader makes for the scene's sea_surface.
 bool is_sea_surface(const Scene& scene, const Object& o) {
   return scene.sea_surface.present && o.primitive.kind == Primitive::Kind::plane && o.name == "sea surface";
 }
 
-/// Whether poses are judged equally in both.
+/// True if poses are judged equally in both.
 bool is_same(const Surroundings& a, const Surroundings& b) {
   return a.scene == b.scene && a.longest_range_m == b.longest_range_m && a.ground == b.ground;
 }
@@ -327,7 +328,7 @@ std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan
       add(notes, carrier.vehicle, Doubt{"the poses of " + plan.file + " " + axes->text, axes->cure});
   } else if (has_nameless_quaternions(plan) && is_out_of_order(poses))
     add(notes, carrier.vehicle,
-        Doubt{"the quaternions of " + plan.file + " turn " + carrier.vehicle + " over, and would not with w at the other end",
+        Doubt{"the quaternions of " + plan.file + " turn " + carrier.vehicle + " over, but would not if w were at the other end",
               order_cure});
   else
     add(notes, carrier.vehicle,
@@ -347,7 +348,7 @@ std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
   std::vector<Note> fresh;
   for (const Note& n : notes)
     // A vehicle gets one note per cure, even if numbers differ; the scene gets one note per text.
-    if (told_.insert(n.vehicle.empty() ? n.text : n.vehicle + "|" + n.cure).second) fresh.push_back(n);
+    if (reported_.insert(n.vehicle.empty() ? n.text : n.vehicle + "|" + n.cure).second) fresh.push_back(n);
   return fresh;
 }
 

@@ -91,7 +91,7 @@ class Plausibility {
       played_;                                // the trajectories for which of_plans_ was made; a reload reads new ones
   std::vector<Note> of_plans_, of_setup_;     // of_setup_ contains of_plans_
   std::map<std::string, LastPose> of_poses_;  // by vehicle
-  std::set<std::string> told_;
+  std::set<std::string> reported_;
 };
 
 }  // namespace sonar

@@ -70,7 +70,7 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
   return nullptr;
 }
 
-/// Whether a pose continues the body's history: the same sender and kind of time stamp, and no long silence before it.
+/// True if a pose continues the body's history: the same sender and kind of time stamp, and no long silence before it.
 bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
   const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
   if (!known) return false;
@@ -117,7 +117,7 @@ std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) con
     return "WALL time stamp is " + std::to_string(seconds(at - now)) +
            " s from this computer's clock: synchronise the clocks, or send SIM or ARRIVAL time";
   if (rules_.follows && sample.of == PoseSample::Of::vehicle && sample.stamp.domain == ClockDomain::arrival)
-    return "it has no time stamp, from which clock: follow takes the time: send SIM or WALL time";
+    return "it has no time stamp, but clock: follow needs one: send SIM or WALL time";
   return {};
 }
 
@@ -167,7 +167,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     return out;
   }
 
-  // SIM stamps are of the sender's own clock, in stepped time WALL ones too.
+  // SIM stamps come from the sender's own clock; in stepped time, WALL stamps do too.
   const bool own_clock = !has_shared_clock(sample) && sample.stamp.domain != ClockDomain::arrival;
   const Ns offset = own_clock ? offset_for(track, at, now, goes_on) : Ns(0);
   const bool vehicle = sample.of == PoseSample::Of::vehicle;  // poses of objects may be rare
@@ -191,7 +191,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   return out;
 }
 
-/// Also ends the state "stale". The body is hidden or shown as the pose says.
+/// Also ends the state "stale". The body is hidden or shown as the pose requests.
 void World::keep(Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) {
   track.source = sender.source;
   track.sender_id = sender.id;

@@ -124,7 +124,7 @@ class World {
     motion::Playback playback{};  // playback of body.plan
     std::string sender_id, source;
     std::string earlier_sender_id;  // the sender before the last change; empty after silence
-    bool rival_reported = false;    // whether it was reported that two senders alternate
+    bool rival_reported = false;    // true: it was reported that two senders alternate
     std::uint64_t seq = 0;
     std::uint32_t reset_counter = 0;
     control::ClockDomain domain{};

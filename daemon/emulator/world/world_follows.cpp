@@ -14,9 +14,10 @@ bool World::is_followed(const Track& track, Time newest) const {
   return !track.history.empty() && track.history.newest().at + track.offset >= newest - rules_.stale_after;
 }
 
-/// Offset from the stamps of a sender to sonard's time. It is the first of these that places the stamp near the newest one: the
-/// vehicle's present offset, 0, the offset of another vehicle. If none does, this is the first pose or the sender's clock has
-/// jumped: a stamp ahead skips the time between if no other vehicle is followed; any other stamp becomes the present time.
+/// Offset from the stamps of a sender to sonard's time. The candidates are the vehicle's present offset, 0, and the offsets of
+/// other vehicles; the first one that places the stamp near the newest stamp is used. If none does, this is the first pose, or
+/// the sender's clock has jumped. Then a stamp ahead skips the time between if no other vehicle is followed; any other stamp
+/// becomes the present time.
 World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
   const Time newest = newest_followed_.value_or(now);
   const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });
@@ -29,7 +30,7 @@ World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
     const Wide by = lead(offset);
     return (by < 0 ? -by : by) <= rules_.stale_after.count();
   };
-  if (!vehicle || newest_followed_) {  // time begins with the first pose, however soon after 0
+  if (!vehicle || newest_followed_) {  // time begins with the first pose, even if its stamp is close to 0
     if (is_near(track.offset)) return take(track.offset);
     if (is_near(Ns{0})) return take(Ns{0});
     for (const Track& other : vehicles_)

@@ -50,7 +50,7 @@ TEST(RateWatch, TheFirstPingsProveNothing) {
 TEST(RateWatch, KnowsThatOthersComputeToo) {
   Sonar one_of_three{20, 0.03, 0.06};
   one_of_three.ping(200);
-  EXPECT_THAT(one_of_three.said, HasSubstr("30 ms a ping, and other sonars are computed between: 10 Hz at most here"));
+  EXPECT_THAT(one_of_three.said, HasSubstr("30 ms a ping, and other sonars are computed in between: 10 Hz at most here"));
 }
 
 TEST(RateWatch, DoesNotBlameOthersWhereThereAreNone) {

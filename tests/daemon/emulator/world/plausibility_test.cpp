@@ -118,7 +118,7 @@ TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
   strip.objects[0].in_world.position_m = {0, 500, -5};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [500, 0, -2]}"), strip),
               ElementsAre(AllOf(HasSubstr("m from everything in the scene, but its range is at most 40 m"),
-                                HasSubstr("with x and y exchanged it would be in the scene"))));
+                                HasSubstr("it would be in the scene if x and y were exchanged"))));
   EXPECT_THAT(at("xyz_m: [3000, 0, -3]"), ElementsAre(HasSubstr("positions are metres from the world's 0, 0, 0")));
 }
 
@@ -216,10 +216,10 @@ TEST(Plausibility, ATrajectoryWithWAtTheWrongEnd) {
   for (const char* frame : {"ENU_FLU", "NED_FRD"}) {
     const double z_m = std::string(frame) == "ENU_FLU" ? -3 : 3;
     EXPECT_THAT(notes(playing(turning(false, frame, z_m))), IsEmpty());
-    EXPECT_THAT(
-        notes(playing(turning(true, frame, z_m))),
-        ElementsAre(HasSubstr("the quaternions of dive.tum turn rov over, and would not with w at the other end; write w where "
-                              "the format has it: last in a TUM line")));
+    EXPECT_THAT(notes(playing(turning(true, frame, z_m))),
+                ElementsAre(HasSubstr(
+                    "the quaternions of dive.tum turn rov over, but would not if w were at the other end; write w where "
+                    "the format has it: last in a TUM line")));
     EXPECT_THAT(notes(playing(turning(true, frame, z_m, ",", "000000000"), "dive.csv")), IsEmpty()) << "EuRoC";
     EXPECT_THAT(notes(playing(turning(false, frame, z_m, ",", "000000000"), "dive.csv")),
                 ElementsAre(HasSubstr("with w at the other end")));
@@ -411,7 +411,7 @@ TEST_F(RunningNotes, DegreesSentAsRadians) {
   send(R"({"position":[0,0,3],"attitude":[0,-10,-90]})");
   EXPECT_THAT(
       texts_of(daemon.status().notes()),
-      ElementsAre("the attitude of rov has an angle of 90 rad; angles are radians there: were degrees sent? Multiply them by "
+      ElementsAre("the attitude of rov has an angle of 90 rad; angles must be in radians: were degrees sent? Multiply them by "
                   "0.0174533"));
   send(R"({"position":[0,0,3],"quaternion":[0,0.9848077530122081,0.17364817766693033,0]})");
   EXPECT_THAT(texts_of(daemon.status().notes()), ElementsAre(HasSubstr("rov is upside down, 180 deg from upright")));
