@@ -161,12 +161,12 @@ void App::stop(const std::string& why) {
   changes_.stop();
   fleet_.stop();
   recordings_.finish();
-  // By then all clients are finished; a long computation, for example, is abandoned.
+  // At that time all clients are finished. Other work, such as a long computation, is abandoned.
   stop_timer_.expires_after(stop_limit);
   stop_timer_.async_wait([this](const error_code& ec) {
     if (ec) return;
     if (files_are_written()) return io_.stop();
-    stop_timer_.expires_after(files_limit - stop_limit);  // recorded pings still wait to be written
+    stop_timer_.expires_after(files_limit - stop_limit);  // recorded pings are still being written
     stop_timer_.async_wait([this](const error_code& again) {
       if (!again) io_.stop();
     });

@@ -48,7 +48,7 @@ bool Stepper::step(const std::function<bool()>& enough_served) {
   return false;
 }
 
-/// Whether a sonar has something due at the present time, apart from pings.
+/// True if a sonar has something due at the present time, apart from pings.
 bool Stepper::is_overdue() {
   return std::any_of(fleet_.devices().begin(), fleet_.devices().end(), [this](const Device& d) {
     const auto next = d.sonar().next_tick_of_conversations();

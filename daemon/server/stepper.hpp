@@ -19,7 +19,7 @@ class Stepper {
   Stepper(Clock& clock, World& world, SteppedTime& time, Fleet& fleet, Log& log, std::function<void()> on_change)
       : clock_(clock), world_(world), time_(time), fleet_(fleet), log_(log), on_change_(std::move(on_change)) {}
 
-  /// Handles the next event if everything before it is done. Returns true if the daemon may end: `enough_served` returns true,
+  /// Handles the next event if all earlier events are finished. Returns true if the daemon may end: `enough_served` returns true,
   /// and all requests are answered.
   bool step(const std::function<bool()>& enough_served);
 

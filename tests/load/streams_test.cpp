@@ -90,7 +90,7 @@ TEST(Load, OneThatNeverReads) {
   ASSERT_EQ(stalled.receive(&first, 1, patience), 1);
   ASSERT_TRUE(readers.front()->socket().send(fire(40)));
   const auto begin = Steady::now();
-  const auto is_reset = [&] { return daemon.log_text().find("took no byte for ") != std::string::npos; };
+  const auto is_reset = [&] { return daemon.log_text().find("read no byte for ") != std::string::npos; };
   while (!is_reset() && Steady::now() < begin + patience * 2) read_all(readers, Steady::now() + milliseconds(50));
   const double reset_s = std::chrono::duration<double>(Steady::now() - begin).count();
   EXPECT_TRUE(is_reset());

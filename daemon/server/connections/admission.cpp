@@ -12,7 +12,7 @@ namespace sonar {
 namespace {
 
 constexpr auto accept_pause = std::chrono::milliseconds(100);  // after a failed accept
-constexpr auto spell = std::chrono::seconds(60);               // after this time without a refusal, the next one is logged again
+constexpr auto spell = std::chrono::seconds(60);               // after this time without a refusal, the next refusal is logged
 
 constexpr std::uint64_t most_kept_for_drivers = 64;
 
@@ -81,7 +81,7 @@ Admission::~Admission() {
 }
 
 /// Logs the first of a series of refusals. A series ends after a minute without one.
-void Admission::say(Steady::time_point& last, const char* what) {
+void Admission::log_first(Steady::time_point& last, const char* what) {
   const auto now = Steady::now();
   if (last == Steady::time_point{} || now - last > spell) log_.warning(what, {{"connected", *count_}});
   last = now;
@@ -91,7 +91,8 @@ bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   // All descriptors below that of a new socket are in use, so its number is the count of used descriptors.
   if (number_of(socket) < first_spare(limits_, purpose)) return true;
   ++for_descriptors_;
-  say(descriptors_said_, "file descriptors run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
+  log_first(descriptors_logged_,
+            "file descriptors run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
   return false;
 }
 
@@ -106,7 +107,7 @@ Admission::Place Admission::enter(const tcp::socket& socket) {
   if (!leaves_spare(socket, Purpose::client)) return {};
   if (*count_ >= static_cast<std::uint64_t>(limits_.clients)) {
     ++for_places_;
-    say(places_said_, "no connection slot free: refusing clients until one is (limits.clients)");
+    log_first(slots_logged_, "no connection slot free: refusing clients until one is (limits.clients)");
     return {};
   }
   ++*count_;
@@ -145,7 +146,8 @@ bool Admission::send_away(tcp::acceptor& acceptor, const error_code& why) {
     ::close(visitor);
   }
   reserve_ = open_reserve();
-  say(descriptors_said_, "file descriptors have run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
+  log_first(descriptors_logged_,
+            "file descriptors have run out: refusing clients until some are free (raise LimitNOFILE or ulimit -n)");
   return visitor >= 0;
 }
 

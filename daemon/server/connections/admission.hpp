@@ -25,8 +25,8 @@ void raise_descriptor_limit();
 
 class Admission {
  public:
-  /// The slot of a client. The owner of the socket holds it; the slot becomes free when the last copy is destroyed. Empty = no
-  /// slot.
+  /// The slot of a client. The owner of the socket holds it; the slot becomes free when the last copy is destroyed. Empty: there
+  /// is no slot.
   using Place = std::shared_ptr<const void>;
 
   Admission(const LimitConfig& limits, Log& log);
@@ -39,7 +39,7 @@ class Admission {
   /// Requests a slot for a socket that was just accepted. If the result is empty, close the socket; the first refusal of a
   /// series is logged.
   Place enter(const tcp::socket& socket);
-  /// Whether a socket that is not a driver's has a descriptor reserved for drivers, or a higher one. A connection of the same
+  /// True if a socket that is not a driver's has a descriptor reserved for drivers, or a higher one. A connection of the same
   /// listener must then be closed.
   bool is_drivers(const tcp::socket& socket) const;
   /// Accepts the next connection of a listener, with any descriptor. nullopt: the listener is closed.
@@ -57,7 +57,7 @@ class Admission {
 
  private:
   using Steady = std::chrono::steady_clock;
-  void say(Steady::time_point& last, const char* what);
+  void log_first(Steady::time_point& last, const char* what);
   /// Returns false, and logs a line, if the descriptor is a reserved one.
   bool leaves_spare(const tcp::socket& socket, Purpose purpose);
   /// Call it when accept() failed with `why`. Returns true if descriptors had run out and a waiting client was accepted and
@@ -70,7 +70,7 @@ class Admission {
   std::shared_ptr<std::uint64_t> count_ =
       std::make_shared<std::uint64_t>(0);  // shared, because slots of sessions may outlive this object
   std::uint64_t for_places_ = 0, for_descriptors_ = 0;
-  Steady::time_point places_said_{}, descriptors_said_{};
+  Steady::time_point slots_logged_{}, descriptors_logged_{};
   int reserve_ = -1;
 };
 

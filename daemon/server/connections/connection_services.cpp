@@ -6,9 +6,10 @@ WorkRate::Steady::duration ConnectionServices::pause_after(const Sender& of, std
   constexpr std::chrono::milliseconds worth_a_word{200};
   const auto pause = work.pause_after(of.source, amount, limits.input_bytes_per_s, WorkRate::Steady::now());
   if (pause > worth_a_word)
-    log_limited(log, notices, LogLevel::info,
-                server + " clients of an address wait: they ask for more work than limits.input_bytes_per_s (docs/control.md)",
-                {{"from", of.source}});
+    log_limited(
+        log, notices, LogLevel::info,
+        server + " clients of an address are delayed: they cause more work than limits.input_bytes_per_s (docs/control.md)",
+        {{"from", of.source}});
   return pause;
 }
 

@@ -24,7 +24,7 @@ class WorkRate {
  public:
   using Steady = InputRate::Steady;
   static constexpr std::size_t most_addresses = 256;
-  /// Upper limit of a pause, whatever the work, so that /healthz answers within it.
+  /// Upper limit of any pause, so that /healthz answers within it.
   static constexpr std::chrono::seconds longest_pause{1};
 
   /// Counts work of the address. Returns the time that it must wait; may be 0. `per_s`: the present limit.

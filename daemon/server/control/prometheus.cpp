@@ -84,19 +84,20 @@ struct SonarFamily {
   double (*value)(const DeviceFigures&);
 };
 constexpr SonarFamily sonar_families[] = {
-    {"sonard_ticks_total", Type::counter, "Moments at which a ping was due.",
+    {"sonard_ticks_total", Type::counter, "Number of times at which a ping was due.",
      [](const DeviceFigures& f) { return static_cast<double>(f.ticks); }},
     {"sonard_pings_total", Type::counter, "Pings simulated.",
      [](const DeviceFigures& f) { return static_cast<double>(f.pings); }},
     {"sonard_pings_refused_total", Type::counter, "Pings that the engine could not make.",
      [](const DeviceFigures& f) { return static_cast<double>(f.refused); }},
-    {"sonard_pings_unwanted_total", Type::counter, "Pings that were ready after their client had left or changed its settings.",
+    {"sonard_pings_unwanted_total", Type::counter,
+     "Pings that were ready after their client had left or had changed its settings.",
      [](const DeviceFigures& f) { return static_cast<double>(f.unwanted); }},
     {"sonard_pings_out_of_water_total", Type::counter, "Pings of noise only: the sonar was above the sea surface.",
      [](const DeviceFigures& f) { return static_cast<double>(f.out_of_water); }},
     {"sonard_pings_served_total", Type::counter, "Pings written whole to at least one client.",
      [](const DeviceFigures& f) { return static_cast<double>(f.served); }},
-    {"sonard_pings_offered_total", Type::counter, "Pings times the clients they were for.",
+    {"sonard_pings_offered_total", Type::counter, "Pings, counted for each client to which they were offered.",
      [](const DeviceFigures& f) { return static_cast<double>(f.offered); }},
     {"sonard_pings_sent_total", Type::counter, "Pings written whole, counted for each client.",
      [](const DeviceFigures& f) { return static_cast<double>(f.sent); }},
@@ -148,10 +149,11 @@ struct TimeFamily {
 };
 constexpr TimeFamily time_families[] = {
     {"sonard_simulation_seconds", "Wall time of one ping's simulation.", &DeviceFigures::simulation},
-    {"sonard_tick_lateness_seconds", "Time from when a tick was due until it was handled.", &DeviceFigures::lateness},
-    {"sonard_ping_jitter_seconds", "How far the time between two served pings is off the time between their ticks.",
+    {"sonard_tick_lateness_seconds", "Delay between the time at which a tick was due and its handling.",
+     &DeviceFigures::lateness},
+    {"sonard_ping_jitter_seconds", "Difference between the interval of two served pings and the interval of their ticks.",
      &DeviceFigures::jitter},
-    {"sonard_ping_latency_seconds", "From a ping's tick to its last byte handed to the kernel, for each client.",
+    {"sonard_ping_latency_seconds", "Time from a ping's tick until the kernel has its last byte, for each client.",
      &DeviceFigures::latency},
 };
 
@@ -196,12 +198,12 @@ void write_links(PrometheusText& text, const std::vector<LinkFigures>& links) {
 }
 
 void write_faults(PrometheusText& text, const DaemonFigures& figures) {
-  text.family("sonard_faults_active", Type::gauge, "Faults on purpose that act now.");
+  text.family("sonard_faults_active", Type::gauge, "Injected faults that are active now.");
   for (const auto& [sonar, count] : figures.active_faults) text.sample({{"sonar", sonar}}, static_cast<double>(count));
-  text.family("sonard_fault_injections_total", Type::counter, "What faults on purpose did, by kind.");
+  text.family("sonard_fault_injections_total", Type::counter, "Effects of injected faults, by kind.");
   for (const auto& [code, count] : figures.fault_injections) text.sample({{"kind", code}}, static_cast<double>(count));
   text.family("sonard_fault_entries_lost_total", Type::counter,
-              "Entries of the journal of faults that were not written to its file.");
+              "Entries of the fault journal that were not written to its file.");
   text.sample({}, static_cast<double>(figures.fault_entries_lost));
 }
 
@@ -216,17 +218,17 @@ void write_process(PrometheusText& text, const DaemonFigures& figures) {
   text.sample({{"reason", "places"}}, static_cast<double>(figures.refused_for_places));
   text.sample({{"reason", "descriptors"}}, static_cast<double>(figures.refused_for_descriptors));
   one("sonard_viewers", Type::gauge, "Viewers of the live view now.", static_cast<double>(figures.viewers.size()));
-  text.family("sonard_viewer_dropped_total", Type::counter, "Messages that newer ones replaced: the viewer was too slow.");
+  text.family("sonard_viewer_dropped_total", Type::counter, "Messages that newer ones replaced because the viewer was too slow.");
   for (const ViewerFigures& v : figures.viewers)
     for (const auto& [topic, count] : v.dropped)
       text.sample({{"viewer", v.address}, {"channel", topic}}, static_cast<double>(count));
   const ProcessFigures& p = figures.process;
   one("process_resident_memory_bytes", Type::gauge, "Resident memory size in bytes.", static_cast<double>(p.resident_bytes));
   one("process_open_fds", Type::gauge, "Open file descriptors.", static_cast<double>(p.open_descriptors));
-  one("process_max_fds", Type::gauge, "Most file descriptors allowed.", static_cast<double>(p.descriptor_limit));
+  one("process_max_fds", Type::gauge, "Largest allowed number of file descriptors.", static_cast<double>(p.descriptor_limit));
   one("process_threads", Type::gauge, "Threads.", static_cast<double>(p.threads));
   one("process_cpu_seconds_total", Type::counter, "User and system time spent in seconds.", p.processor_s);
-  one("sonard_uptime_seconds", Type::gauge, "Since the start.", figures.uptime_s);
+  one("sonard_uptime_seconds", Type::gauge, "Time since the start.", figures.uptime_s);
   text.family("sonard_build_info", Type::gauge, "Always 1; the version is a label.");
   text.sample({{"version", figures.version}}, 1);
 }

@@ -30,8 +30,8 @@ class FairTurns {
   }
   bool several() const { return accounts_.size() > 1; }
 
-  /// Whether to compute a ping of `other` before the rest of a ping of `running`, which has taken `elapsed_s` so far: true if
-  /// `other` has used less time and its ping takes less time than that rest.
+  /// True if a ping of `other` should be computed before the rest of a ping of `running`, which has taken `elapsed_s` so far.
+  /// That is so if `other` has used less time and its ping takes less time than that rest.
   bool goes_first(std::uint32_t other, std::uint32_t running, double elapsed_s) const {
     const auto a = accounts_.find(other), b = accounts_.find(running);
     if (a == accounts_.end() || b == accounts_.end() || a->second.pings == 0 || b->second.pings == 0) return false;

@@ -14,7 +14,7 @@ using Steady = std::chrono::steady_clock;
 
 double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
 
-/// The ping with its findings, which are made here to keep this work off the I/O thread.
+/// Adds the findings to the ping. This is done here, so that the I/O thread need not do it.
 std::shared_ptr<const Ping> looked_at(Ping ping) {
   look_at(ping);
   return std::make_shared<const Ping>(std::move(ping));

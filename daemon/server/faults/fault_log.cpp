@@ -42,13 +42,13 @@ void FaultLog::write_pending() {
         if (written->lines < entries) {
           lose(entries - written->lines, done ? written->why : done.error().text);
         } else if (std::exchange(losing_, false)) {
-          log_limited(log_, limiter_, LogLevel::info, "the journal of faults is written again", about_file());
+          log_limited(log_, limiter_, LogLevel::info, "the fault journal can be written again", about_file());
         }
         if (!pending_.empty()) write_pending();
       });
 }
 
-/// Logs one line when losses begin and one when they end, however many entries are lost.
+/// Logs one line when losses begin and one when they end, independent of the number of lost entries.
 void FaultLog::lose(std::uint64_t entries, const std::string& why) {
   lost_ += entries;
   why_lost_ = why;

@@ -23,7 +23,7 @@ HttpAnswer socket_refusal(unsigned status, const std::string& text, const std::s
   return answer;
 }
 
-/// Whether a text is 16 bytes in base64.
+/// True if a text is 16 bytes in base64.
 bool is_key(std::string_view key) {
   constexpr std::size_t length = 24;
   return key.size() == length && key.ends_with("==") && std::all_of(key.begin(), key.end() - 2, [](char c) {
@@ -115,7 +115,7 @@ std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
   const auto found = std::find_if(listed.begin(), listed.end(), [&](const ViewOrigin& o) { return o.origin == request.origin; });
   if (found == listed.end()) {
     const std::string origin = request.origin.substr(0, 200);
-    return socket_refusal(403, "pages of other sites may not look without the key that sonard prints at its start",
+    return socket_refusal(403, "pages of other sites need the key that sonard prints at its start",
                           origin.starts_with("http") ? "this would allow it: control: {view_origins: [\"" + origin + "\"]}"
                                                      : "Origin " + origin + " cannot be listed in control.view_origins");
   }

@@ -1,4 +1,4 @@
-// Decides who may open the live view's socket, and who may steer, by the rules of docs/live-view.md. Pure.
+// Decides which clients may open the live view's socket, and which may change settings, by the rules of docs/live-view.md. Pure.
 #pragma once
 
 #include <chrono>

@@ -31,20 +31,20 @@ bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std
 
 /// Splits a header that is a list into its words.
 std::vector<std::string> words_of_header(std::string_view list);
-/// Whether a list header contains the word, ignoring case. `wanted` must be in small letters.
+/// True if a list header contains the word, ignoring case. `wanted` must be in small letters.
 bool header_names(std::string_view list, std::string_view wanted);
 
-/// Whether the type is "application/json", with or without parameters.
+/// True if the type is "application/json", with or without parameters.
 bool is_json(std::string_view content_type);
 
-/// Whether a stream begins with an HTTP request. Needs the first longest_http_method bytes.
+/// True if a stream begins with an HTTP request. Needs the first longest_http_method bytes.
 bool begins_http_request(std::string_view bytes);
 inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
 
 /// Detects HTTP requests on ports of other protocols, which any web page can make a browser send.
 class HttpDetector {
  public:
-  /// Returns, after the next bytes, whether the stream begins with an HTTP request.
+  /// Reads the next bytes. True if the stream begins with an HTTP request.
   bool speaks_http(std::span<const std::byte> received);
 
  private:

@@ -153,7 +153,7 @@ std::string Monitoring::metrics() const {
 /// Reports the first of these: the simulation hangs, a scene takes too long, a sonar does not listen.
 std::string Monitoring::problem() const {
   const auto under_way = of_.simulator.under_way_for();
-  if (under_way > longest_ping) return "the simulation has been at one ping for " + whole_seconds(under_way);
+  if (under_way > longest_ping) return "the simulation has computed one ping for " + whole_seconds(under_way);
   const std::string loading = slow_load();
   return loading.empty() ? of_.fleet.problem() : loading;
 }

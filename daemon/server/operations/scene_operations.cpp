@@ -9,7 +9,7 @@ namespace {
 
 OperationResult too_many_changes() { return failed("64 changes of the scene wait already"); }
 
-/// Whether the World handles the request: it places and hides moving objects that the scene itself does not hide.
+/// True if the World handles the request: the World places and hides moving objects, unless the scene hides them.
 bool is_the_worlds(const Scene& scene, const control::SetObject& asked) {
   const Object* const object = object_named(scene, asked.object);
   return body_named(scene, asked.object) >= 0 && (object == nullptr || object->visible || !asked.visible.value_or(false));

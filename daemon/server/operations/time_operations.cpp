@@ -17,8 +17,8 @@ void TimeOperations::take(const control::PoseSample& sample, const Sender& sende
   if (sample.of != control::PoseSample::Of::vehicle || !time_.follows_poses()) return done({});
   if (time_.is_full())
     return done(
-        failed("the pose was accepted, but too many earlier poses wait for their pings; this answer is "
-               "sent before the pose's own pings"));
+        failed("the pose was accepted, but too many earlier poses wait for their pings, so this answer "
+               "does not wait for the pings of the pose"));
   time_.wait([done = std::move(done)](Time, bool) { done({}); });
 }
 

@@ -186,8 +186,7 @@ void PoseServer::admit(tcp::socket socket) {
     return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
   connections_.forget_if([](Connection& c) { return has_left(c.socket); });
   const auto say_evicted = [this](const Connection& evicted) {
-    log_limited(log_, notices_, LogLevel::info,
-                "pose connection closed to make room: without a pose, or beyond its limit, for longest",
+    log_limited(log_, notices_, LogLevel::info, "pose connection closed to make room: it was idle or over its limit for longest",
                 {{"from", evicted.sender.id}});
   };
   if (admission_.is_drivers(socket)) connections_.evict(sender.source, say_evicted);

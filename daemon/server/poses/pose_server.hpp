@@ -48,8 +48,8 @@ class PoseServer {
     DatagramRate rate{most_datagrams_per_s};
     Listener lines;  // for JSON only
   };
-  /// One TCP sender. It is closed by stop(), or if its slot is needed and, of all senders, it has been idle or over its limits
-  /// for longest. A sender that has disconnected has no slot.
+  /// One TCP sender. It is closed by stop(), or if its slot is needed and no other sender has been idle or over its limits for
+  /// longer. A sender that has disconnected has no slot.
   struct Connection {
     Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
         : socket(std::move(s)),

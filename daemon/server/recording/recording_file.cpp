@@ -21,7 +21,7 @@ const protocol::Make& make_of(std::string_view vendor) {
   return found != nullptr ? *found : protocol::makes().front();
 }
 
-/// Whether clients of this make receive pings as one byte stream, which a file can contain unchanged.
+/// True if clients of this make receive pings as one byte stream, which a file can contain unchanged.
 bool is_one_stream(const protocol::Make& make) {
   return make.codec.framing != nullptr && !make.each_ping_requested && make.device->pings_by() != protocol::PingsBy::datagrams;
 }
@@ -98,7 +98,7 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
   if (!is_plain_name(name))
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
-    return refuse("the name of a recording does not begin with -, which every program takes for an option: run-1.mcap");
+    return refuse("the name of a recording must not begin with -, because programs would read it as an option: run-1.mcap");
   // MCAP is possible for all sonars. Then follow the formats for any single stream, those of this make, and those of other
   // makes, which are refused with a reason.
   if (name.ends_with(mcap.ending)) return &mcap;

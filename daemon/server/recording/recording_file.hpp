@@ -47,11 +47,11 @@ class RecordingFile {
   using Kind = const recording::FileKind*;
   static const recording::FileKind mcap, pcap, raw_dump;
 
-  /// Whether `name` is a plain file name: at most 128 letters, digits, - _ and . , not beginning with a dot.
+  /// True if `name` is a plain file name: at most 128 letters, digits, - _ and . , not beginning with a dot.
   static bool is_plain_name(std::string_view name);
-  /// Whether `name` is a plain file name with the extension of a recording.
+  /// True if `name` is a plain file name with the extension of a recording.
   static bool is_recording(std::string_view name);
-  /// Whether the file, after following symbolic links, lies in the folder.
+  /// True if the file, after following symbolic links, lies in the folder.
   static bool is_inside(const std::filesystem::path& folder, const std::filesystem::path& file);
   /// The format of a plain file name, by its extension: .mcap, those of this vendor, and .pcap or .raw if pings are sent as a
   /// stream. Other names are errors.

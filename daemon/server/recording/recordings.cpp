@@ -34,7 +34,7 @@ struct Recordings::Recording {
   bool labels = false;
   v1::RecordingStatus status;
   std::size_t waiting_bytes = 0;
-  bool failed = false;    // it failed, and the failure was logged
+  bool failed = false;    // true: it failed, and the failure was logged
   std::string ends_with;  // reason, if the sonar stopped while the file was being opened
   std::vector<Done> at_end;
   std::shared_ptr<Work> work = std::make_shared<Work>();
@@ -131,7 +131,7 @@ void Recordings::find_earlier() {
 Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& asked, const RecordedSonar& sonar) {
   if (config_.recording.folder.empty())
     return failure(ErrorKind::usage,
-                   "sonard may not write recordings: set recording: {folder: DIR} in its configuration (docs/recording.md)");
+                   "sonard has no folder for recordings: set recording: {folder: DIR} in its configuration (docs/recording.md)");
   const auto kind = RecordingFile::kind_of(asked.file, sonar.vendor);
   if (!kind) return tl::make_unexpected(kind.error());
   if (const std::string why = asked.labels ? why_without_labels(*kind, sonar, config_.engine.switches) : ""; !why.empty())
@@ -175,7 +175,7 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
     if (r->state != Recording::State::ended && (asked.file.empty() || asked.file == r->name)) meant.push_back(r);
   if (meant.empty()) return done(failure(ErrorKind::usage, why_none_to_stop(asked.file)));
   if (std::any_of(meant.begin(), meant.end(), [](const Pointer& r) { return r->state == Recording::State::opening; }))
-    return done(failure(ErrorKind::unavailable, "the recording is just being begun: stop it when its start was answered"));
+    return done(failure(ErrorKind::unavailable, "the recording is being started: stop it after the answer to its start"));
   struct All {
     std::size_t left = 0;
     Result<void> first_error;

@@ -51,7 +51,7 @@ class Recordings {
   void finish();
 
   bool takes(const std::string& sonar) const;
-  /// Whether a recording of the sonar needs the first hits of beams. Only MCAP files contain them.
+  /// True if a recording of the sonar needs the first hits of beams. Only MCAP files contain them.
   bool wants_truth(const std::string& sonar) const;
   bool wants_labels(const std::string& sonar) const;
   void take(const std::string& sonar, RecordedPing ping);
@@ -84,7 +84,7 @@ class Recordings {
   template <class Job, class After>
   void on_thread(const std::shared_ptr<Work>& work, Job job, After after);
   std::size_t running() const;
-  /// Whether `bytes` more of this recording may wait. If not, the recording with most waiting bytes ends.
+  /// True if `bytes` more of this recording may wait. If not, the recording with most waiting bytes ends.
   bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
   /// Queues `job`, which writes `bytes` bytes, for the writer thread.

@@ -31,7 +31,7 @@ Ipv4 broadcast_of(const SonarConfig& sonar) {
   return address;
 }
 
-/// Whether a socket error is the answer "port unreachable" of a datagram's destination.
+/// True if a socket error is the answer "port unreachable" of a datagram's destination.
 bool is_closed_port(msghdr& message) {
   for (const cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, const_cast<cmsghdr*>(c))) {
     if (c->cmsg_level != IPPROTO_IP || c->cmsg_type != IP_RECVERR) continue;

@@ -64,7 +64,7 @@ std::optional<std::vector<protocol::Bytes>> Device::on_limited_datagram(
   return answers;
 }
 
-/// The dialogue belongs to the last sender, because without connections the end of a host is not visible.
+/// The dialogue belongs to the last sender, because UDP has no connection whose end would show that a host has gone.
 void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram) {
   if (stopping_ || !sonar_.vendor().is_request(port, datagram)) return;
   const Peer host{text_of(from), from.ip, from.port};

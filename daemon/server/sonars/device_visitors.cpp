@@ -67,7 +67,7 @@ asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place)
   asio::steady_timer deadline(network_.io, std::chrono::seconds(1));
   deadline.async_wait([&socket, &late](const error_code& e) {
     if (e) return;
-    late = true;  // a read that has just ended cannot be cancelled, and the next one would never end
+    late = true;  // a read that has just ended cannot be cancelled, and the next read would never end
     socket.cancel();
   });
   std::array<std::byte, 1024> discarded;

@@ -103,7 +103,7 @@ bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, Change& change) {
   return false;
 }
 
-/// Whether a sonar uses this address. A sonar at 0.0.0.0 uses every address.
+/// True if a sonar uses this address. A sonar at 0.0.0.0 uses every address.
 bool Fleet::is_held(Ipv4 ip) const {
   return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) {
     const Ipv4 held = d.config().bind_ip;

@@ -25,7 +25,7 @@ std::string reason(const error_code& ec) {
 
 /// Sends small messages at once, and lets few bytes wait in the kernel, because pings in the outbox can still be replaced.
 void prepare(tcp::socket& socket, const LimitConfig& limits) {
-  error_code ec;  // if an option fails, only smoothness suffers
+  error_code ec;  // the options are not essential, so errors are ignored
   socket.set_option(tcp::no_delay(true), ec);
   using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
   socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
@@ -276,7 +276,7 @@ asio::awaitable<void> Session::watch() {
       if (!sent_fin_) reset("did not receive its last message in time");
       over(why_);
     } else if (writing_ && now - progress_at_ > setup_.limits.stall) {
-      reset("took no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");
+      reset("read no byte for " + std::to_string(setup_.limits.stall.count()) + " ms");
     } else if (!finishing_ && is_silent(now)) {
       finish("silent for " + std::to_string(parent_.longest_silence(setup_.id)->count() / 1000) + " s");
     }

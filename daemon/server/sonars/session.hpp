@@ -75,7 +75,8 @@ class Session : public std::enable_shared_from_this<Session> {
   void finish(std::string why);
   /// Ends the connection at once with RST.
   void reset(std::string why);
-  /// `on` false: the client's bytes stay in the kernels' buffers. Writes the rest of the current message without pauses.
+  /// Starts or stops reading. With `on` false the client's bytes stay in the buffers of the kernels. Writes the rest of the
+  /// current message without pauses.
   void end_pauses();
   void read_from_client(bool on);
   /// Ends the session if the peer has closed and every byte from it has been read.

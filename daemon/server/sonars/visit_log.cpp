@@ -38,13 +38,13 @@ void VisitLog::sum_up() {
   const auto suppressed = std::exchange(suppressed_, {});
   if (std::accumulate(suppressed.begin(), suppressed.end(), std::uint64_t{0}) == 0) return;
   const auto count = [&](Kind kind) { return suppressed[static_cast<std::size_t>(kind)]; };
-  log_.info("clients come and go", {{"sonar", sonar_},
-                                    {"connected", count(Kind::connected)},
-                                    {"gone", count(Kind::gone)},
-                                    {"refused", count(Kind::refused)},
-                                    {"wait", count(Kind::waits)},
-                                    {"within_s", spell_.count() / 1000},
-                                    {"last", last_suppressed_}});
+  log_.info("clients connect and leave often", {{"sonar", sonar_},
+                                                {"connected", count(Kind::connected)},
+                                                {"gone", count(Kind::gone)},
+                                                {"refused", count(Kind::refused)},
+                                                {"wait", count(Kind::waits)},
+                                                {"within_s", spell_.count() / 1000},
+                                                {"last", last_suppressed_}});
 }
 
 void VisitLog::end() {

@@ -24,7 +24,7 @@ void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit);
 /// Returns whether the peer has closed the connection. Bytes that it sent before may still be unread.
 bool has_left(tcp::socket& socket);
 
-/// Whether poses from an address are accepted. Without ranges only this computer's are, because a reload may remove the ranges
+/// True if poses from an address are accepted. Without ranges only this computer's are, because a reload may remove the ranges
 /// while the listener stays open.
 bool is_admitted(const std::vector<AddressRange>& allow_from, const asio::ip::address& from);
 

@@ -6,8 +6,8 @@
 
 namespace sonar {
 
-/// Niceness of the threads that compute pings, so that the I/O thread has priority over them. Higher values would be too nice:
-/// at +10, busy programs get nine tenths of a shared core.
+/// Niceness of the threads that compute pings, so that the I/O thread has priority over them. Higher values would be too high: at
+/// +10, other busy programs get nine tenths of a shared core.
 inline constexpr int compute_niceness = 1;
 /// Niceness of threads for which no ping waits: building a scene, recording.
 inline constexpr int background_niceness = 10;

@@ -18,8 +18,8 @@ class SteppedTime {
   /// Limits for one request and for all that wait.
   static constexpr double longest_step_s = 3600;
   static constexpr std::size_t most_waiting = 4096;
-  /// By how much poses of a simulator that does not wait for pings may be ahead of time. Earlier ticks are skipped, as in real
-  /// time, unless a request waits for them.
+  /// The lead that the poses of a simulator may have over time, if it does not wait for pings. Earlier ticks are skipped, as in
+  /// real time, unless a request waits for them.
   static constexpr std::chrono::nanoseconds most_lead = std::chrono::seconds(1);
 
   SteppedTime(ClockMode mode, const Clock& clock, const World& world) : mode_(mode), clock_(clock), world_(world) {}

@@ -81,7 +81,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   struct Work {
     std::optional<RecordingPlayer> player;
     PicturePainter painter{view_fan_style()};
-    std::string failure;  // why it cannot be played
+    std::string failure;  // reason if it cannot be played
     bool is_measured = false;
     bool is_behind = false;  // the slice ended before the ping was found
     std::optional<RecordingPlayer::Ns> drawn_at;
@@ -150,7 +150,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   std::optional<RecordingPlayer::Ns> shown_for_;
   asio::steady_timer timer_;
   Steady::time_point status_at_{};
-  std::vector<foxglove::Parameter> said_;
+  std::vector<foxglove::Parameter> sent_;
   bool busy_ = false, behind_ = false, wanted_ = false;
 };
 
@@ -313,8 +313,8 @@ void RecordingViews::Seen::say_changes() {
   const auto connection = connection_.lock();
   std::vector<foxglove::Parameter> holds = parameters(), changed;
   for (const foxglove::Parameter& p : holds)
-    if (std::find(said_.begin(), said_.end(), p) == said_.end()) changed.push_back(p);
-  said_ = std::move(holds);
+    if (std::find(sent_.begin(), sent_.end(), p) == sent_.end()) changed.push_back(p);
+  sent_ = std::move(holds);
   if (!connection || changed.empty() || (changed.size() == 1 && changed.front().name.ends_with("position_s") && !stands(now())))
     return;
   connection->viewer().on_parameters(changed);

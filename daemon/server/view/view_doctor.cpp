@@ -30,8 +30,8 @@ ViewPayloadPointer ViewDoctor::newest() {
 }
 
 ViewPayloadPointer ViewDoctor::news() {
-  if (newest() == said_) return nullptr;
-  return said_ = newest_;
+  if (newest() == sent_) return nullptr;
+  return sent_ = newest_;
 }
 
 void ViewDoctor::look() {

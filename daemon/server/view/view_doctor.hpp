@@ -38,7 +38,7 @@ class ViewDoctor {
   Steady::time_point looked_at_{};
   std::shared_ptr<const v1::DaemonStatus> last_;
   std::deque<std::pair<Steady::time_point, std::uint64_t>> failed_;  // failed connections of this computer at each check
-  ViewPayloadPointer newest_, said_;                                 // said_: sent to all subscribers
+  ViewPayloadPointer newest_, sent_;                                 // sent_: the payload that all subscribers have
 };
 
 }  // namespace sonar

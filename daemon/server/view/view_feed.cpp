@@ -66,7 +66,7 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   Viewer& viewer = connection->viewer();
   const std::string no_playback = begin_playback(viewer, connection->playback());
   viewer.greet(server_info(viewer));
-  say_time(viewer);
+  send_time(viewer);
   std::vector<foxglove::Channel> channels;
   for (const auto& [id, channel] : channels_) channels.push_back(channel.advertised);
   advertise(viewer, channels);
@@ -81,7 +81,7 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
 }
 
 /// Sends the time, if the viewer's time is not simply the time of arrival.
-void ViewFeed::say_time(Viewer& viewer) const {
+void ViewFeed::send_time(Viewer& viewer) const {
   const Time now = of_.clock.now();
   if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())
     viewer.say_frame(foxglove::time_frame(watch->second.stamp(now)));
@@ -261,7 +261,7 @@ void ViewFeed::remove(const SonarView& sonar) {
     c.viewer().say(foxglove::unadvertise(gone));
     c.viewer().say(server_info(c.viewer()));
     // With a new session id viewers clear their state.
-    say_time(c.viewer());
+    send_time(c.viewer());
     for (const auto& [id, channel] : channels_)
       if (id != log_ && c.viewer().subscribes(id)) on_subscribed(c.viewer(), id);
     c.wake();

@@ -134,7 +134,7 @@ class ViewFeed final : public ViewerHost {
   void push_parameters();
   static std::string services_word();
   ViewPayloadPointer current(const Viewer& viewer, std::uint32_t channel);
-  void say_time(Viewer& viewer) const;
+  void send_time(Viewer& viewer) const;
   /// Offers a payload to one viewer.
   void give(Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload);
   void give(Viewer& viewer, const Slow& slow);

@@ -35,7 +35,7 @@ double seconds_left(const Device& device, const std::string& fault, Time now) {
   return std::ceil(left * 10) / 10;
 }
 
-/// Whether the product accepts any value of this setting. Products that set their rate or gain themselves accept none.
+/// True if the product accepts any value of this setting. Products that set their rate or gain themselves accept none.
 template <class Value>
 bool takes(const Device& device, std::optional<Value> protocol::SettingsOverride::*setting, Value value) {
   protocol::SettingsOverride wanted;
@@ -46,7 +46,7 @@ bool takes(const Device& device, std::optional<Value> protocol::SettingsOverride
 void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_preview) {
   const PingSettings& s = device.sonar().settings();
   const std::string at = "/" + device.config().name + "/";
-  // A product with a turning head may be previewed with a longer range than its initial one.
+  // For a product with a turning head, the preview may have a longer range than the initial settings.
   const protocol::Vendor& vendor = *device.config().profile.vendor;
   const auto step = device.preview().on() ? vendor.scan_step(1, device.sonar().state()) : std::nullopt;
   all.push_back({at + "range_m", step ? step->settings.range_m : s.range_m});

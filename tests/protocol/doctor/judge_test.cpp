@@ -176,9 +176,9 @@ TEST(Judge, OneThatWasTurnedAwayOrWaits) {
 }
 
 TEST(Judge, OneThatWasDisconnected) {
-  const std::string gone = R"(gone { address: "10.0.0.7:1" why: "took no byte for 10000 ms" utc_ns: 3723000000000 ago_s: 5 })";
+  const std::string gone = R"(gone { address: "10.0.0.7:1" why: "read no byte for 10000 ms" utc_ns: 3723000000000 ago_s: 5 })";
   EXPECT_THAT(trouble(with(pinging + driver + gone), "driver").text,
-              HasSubstr("ended at 01:02:03 UTC: took no byte for 10000 ms"));
+              HasSubstr("ended at 01:02:03 UTC: read no byte for 10000 ms"));
   EXPECT_FALSE(any_fails(with(pinging + driver + gone)));
   EXPECT_FALSE(any_fails(with(gone)));
 }

@@ -121,7 +121,7 @@ TEST_F(PoseLimits, ThoseBehindGiveTheirPlacesToNewcomers) {
     flood.back().send(lines(300000));
   }
   EXPECT_TRUE(a_newcomer_moves_the_boat());
-  EXPECT_THAT(daemon->log_text(), HasSubstr("closed to make room: without a pose, or beyond its limit"));
+  EXPECT_THAT(daemon->log_text(), HasSubstr("closed to make room: it was idle or over its limit"));
 }
 
 TEST_F(PoseLimits, ThoseWhoSendNoPosesGiveTheirPlacesToNewcomers) {

@@ -181,7 +181,7 @@ TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
   late.send(json_at_x(22));
   EXPECT_TRUE(asked_from(22));
   EXPECT_TRUE(senders.back().read_to_end());
-  EXPECT_THAT(daemon.log_text(), HasSubstr("without a pose, or beyond its limit, for longest"));
+  EXPECT_THAT(daemon.log_text(), HasSubstr("it was idle or over its limit for longest"));
   senders.front().send(json_at_x(23));
   EXPECT_TRUE(asked_from(23)) << "the others keep theirs";
 }

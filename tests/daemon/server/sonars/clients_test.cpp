@@ -97,7 +97,7 @@ TEST(Clients, OneThatTakesNothingIsReset) {
   Daemon daemon(setup);
   Client stalled(daemon.address(), 52100, 16384);
   stalled.fire(large_fire(PingRate::hz40));
-  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("took no byte for 300 ms") != std::string::npos; }));
+  ASSERT_TRUE(eventually([&] { return daemon.log_text().find("read no byte for 300 ms") != std::string::npos; }));
   Client next(daemon.address());
   next.fire(fire_at(PingRate::hz10));
   EXPECT_TRUE(next.next_ping()) << "its place is free again";

@@ -28,7 +28,7 @@ control::AddFault fault(const std::string& what, std::map<std::string, std::stri
 }
 bool done(const OperationResult& result) { return result.code == OperationResult::Code::done; }
 
-/// Whether a connection is accepted; a refusal comes at once.
+/// True if a connection is accepted; a refusal comes at once.
 bool accepts(const std::string& address) {
   asio::io_context io;
   tcp::socket socket(io);
