@@ -187,10 +187,10 @@ Outcome set_time(Call& call, const Json& posted) {
       year > 2200)
     return malformed("not a time");
   if (call.synchronised()) return {409, {{"error", "synchronized by NTP"}}};
-  const Time told = Time(std::chrono::sys_days(date)) + std::chrono::hours(hour) + std::chrono::minutes(minute) +
-                    nanoseconds_from(second) -
-                    (sign == '-' ? -1 : 1) * (std::chrono::hours(zone_hour) + std::chrono::minutes(zone_minute));
-  call.settings.clock_offset = told - Time(call.now - call.device.powered_up_at);
+  const Time wanted = Time(std::chrono::sys_days(date)) + std::chrono::hours(hour) + std::chrono::minutes(minute) +
+                      nanoseconds_from(second) -
+                      (sign == '-' ? -1 : 1) * (std::chrono::hours(zone_hour) + std::chrono::minutes(zone_minute));
+  call.settings.clock_offset = wanted - Time(call.now - call.device.powered_up_at);
   return {};
 }
 
