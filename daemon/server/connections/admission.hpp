@@ -25,8 +25,8 @@ void raise_descriptor_limit();
 
 class Admission {
  public:
-  /// The slot of a client. The owner of the socket holds it; the slot becomes free when the last copy is destroyed. Empty: there
-  /// is no slot.
+  /// The slot of a client. The owner of the socket holds it; the slot becomes free when the last copy is destroyed. Empty if none
+  /// is free.
   using Place = std::shared_ptr<const void>;
 
   Admission(const LimitConfig& limits, Log& log);
