@@ -13,7 +13,7 @@ namespace sonar::bvt {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// A view of bytes that another object owns.
+/// A view of bytes whose owner is another object.
 struct BytesView {
   const std::uint8_t* data = nullptr;
   std::size_t size = 0;

@@ -1,5 +1,5 @@
-// Handles that programs get instead of pointers. A handle is a number below 2^31 cast to the pointer type, so that truncation to
-// 32 bits (by Python's ctypes) does no harm. Stale and foreign handles are detected.
+// Handles that programs get instead of pointers. A handle is a number below 2^31 cast to the pointer type, so that a truncation
+// to 32 bits (by Python's ctypes) does not change it. Stale and foreign handles are detected.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +44,8 @@ class Handles {
 
   std::mutex mutex_;
   std::vector<Place> places_;
-  std::deque<std::uint32_t> free_;  // indices are reused in the order freed, so that stale handles are detected for long
+  std::deque<std::uint32_t>
+      free_;  // indices are reused in the order in which they were freed, so that stale handles are detected for a long time
   std::size_t live_ = 0;
 };
 

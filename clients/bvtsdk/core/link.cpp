@@ -77,8 +77,8 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   if (greeted == bad_packet_version)
     return refuse(greeted,
                   "sonard at " + there + " uses another version of the link; use the library and sonard of the same release");
-  // Programs retry after connection_timed_out and give up after any other code. Therefore this code is
-  // returned for a sonar that is just starting or shutting down.
+  // Programs retry after connection_timed_out and give up after any other code. Therefore this code is returned for a sonar that
+  // is starting or shutting down.
   if (greeted != success)
     return refuse(connection_timed_out,
                   there +

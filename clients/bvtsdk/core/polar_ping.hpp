@@ -42,7 +42,7 @@ struct NavData {
   bool has(NavField field) const { return (present & field) != 0; }
 };
 
-/// Sample k of beam j is samples[j * bins + k]: it covers start_m + k bin_m ... start_m + (k + 1) bin_m and looks at
+/// Sample k of beam j is samples[j * bins + k]: it covers start_m + k bin_m ... start_m + (k + 1) bin_m, and its bearing is
 /// fov_min_deg + (j + 1/2) (fov_max_deg - fov_min_deg) / beams, clockwise from ahead. 65535 is full scale.
 /// A decoded ping is finite throughout, 0 <= start_m < stop_m, bin_m > 0, sound_speed_mps > 0 and
 /// -180 <= fov_min_deg < fov_max_deg <= 180.

@@ -17,8 +17,8 @@ std::uint16_t lowest_significant(float noise_threshold);
 
 class SampleGrid {
  public:
-  /// The ping must have samples and outlive this object. `pool`: how many bins become one, the strongest of them. May throw
-  /// bad_alloc.
+  /// The ping must have samples and outlive this object. `pool`: number of bins that become one; its sample is the strongest of
+  /// them. May throw bad_alloc.
   SampleGrid(const PolarPing& ping, float noise_threshold, float clipping_threshold, int pool);
   SampleGrid(const SampleGrid&) = delete;
   SampleGrid& operator=(const SampleGrid&) = delete;

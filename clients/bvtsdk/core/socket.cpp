@@ -44,7 +44,8 @@ Descriptor::~Descriptor() {
 
 bool split_endpoint(const std::string& endpoint, std::string& host, std::string& port) {
   const std::size_t colon = endpoint.find(':');
-  const bool with_port = colon != std::string::npos && endpoint.find(':', colon + 1) == std::string::npos;  // more: IPv6
+  const bool with_port =
+      colon != std::string::npos && endpoint.find(':', colon + 1) == std::string::npos;  // several colons: IPv6
   host = with_port ? endpoint.substr(0, colon) : endpoint;
   if (with_port) port = endpoint.substr(colon + 1);
   const bool number = !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;

@@ -94,7 +94,8 @@ H create() noexcept {
   return handle;
 }
 
-/// Makes the handle invalid; null and stale handles are ignored. The object is freed when the last thread that uses it is done.
+/// Makes the handle invalid; null and stale handles are ignored. The object is freed when the last thread that uses it has
+/// finished.
 template <class T>
 void destroy(const void* handle) noexcept {
   guarded([&]() -> int {

@@ -8,9 +8,9 @@ extern "C" {
 
 #define BVT_API __attribute__((visibility("default")))
 
-/* Handles. They are numbers, not addresses: never look behind them. Null is allowed wherever something is destroyed. All are one
- * pointer type, because hosts of the earlier 3.x, whose handles were all void*, keep one kind in a variable of another; calls
- * answer BVT_INVALID_PTR to a handle of the wrong kind. Hosts of the later 3.x name the structs behind them. */
+/* Handles. They are numbers, not addresses: never dereference them. Functions that destroy an object accept null. All handles have
+ * one pointer type, because handles of the earlier 3.x were all void*, and its hosts may keep one kind in a variable of another.
+ * Calls return BVT_INVALID_PTR for a handle of the wrong kind. Hosts of the later 3.x use the names of the structs. */
 typedef struct BVTOpaqueHandle BVTOpaqueSonar, BVTOpaqueHead, BVTOpaquePing, BVTOpaqueMagImage, BVTOpaqueColorImage,
     BVTOpaqueColorMapper, BVTOpaqueNavData, BVTOpaqueSonarDiscoveryAgent, BVTOpaqueRangeData;
 typedef BVTOpaqueSonar* BVTSonar;
@@ -85,7 +85,7 @@ enum {
 /* Cartesian, or rows of equal range and columns of equal bearing. */
 enum { BVTHEAD_IMAGE_XY = 0, BVTHEAD_IMAGE_RTHETA = 1 };
 
-/* What the sonar is in. */
+/* The fluid around the sonar. */
 enum { BVTHEAD_FLUID_SALTWATER = 0, BVTHEAD_FLUID_FRESHWATER = 1, BVTHEAD_FLUID_OTHER = 2 };
 
 /* Sonar: a live one, a recording that is played, or one that is being written. Heads belong to it. */
@@ -101,8 +101,8 @@ BVT_API RetVal BVTSonar_GetSonarName(BVTSonar self, char* buffer, int buffer_siz
 BVT_API RetVal BVTSonar_GetSerialNumber(BVTSonar self, char* buffer, int buffer_size);
 BVT_API RetVal BVTSonar_GetSonarTypeAsString(BVTSonar self, char* buffer, int buffer_size);
 
-/* Head: ranges in metres. GetPing ignores the number on a live sonar, transmits and waits; in a file a negative one means the
- * next. */
+/* Head: ranges in metres. On a live sonar, GetPing ignores the number, transmits a ping and waits for it. In a file, a negative
+ * number means the next ping. */
 BVT_API RetVal BVTHead_SetRange(BVTHead self, float start_m, float stop_m);
 BVT_API float BVTHead_GetStartRange(BVTHead self);
 BVT_API float BVTHead_GetStopRange(BVTHead self);
@@ -194,8 +194,8 @@ BVT_API float BVTColorMapper_GetGamma(BVTColorMapper self);
 BVT_API RetVal BVTColorMapper_SetAutoMode(BVTColorMapper self, int on);
 BVT_API int BVTColorMapper_GetAutoMode(BVTColorMapper self);
 
-/* RangeData: one range a bearing, left to right; metres and degrees clockwise from ahead. Above 999: no echo above the threshold,
- * which is 10000 of 65535 until BVTHead_SetRangeDataThreshold sets another. */
+/* RangeData: one range per bearing, left to right; metres and degrees clockwise from ahead. A range above 999 means no echo above
+ * the threshold. The threshold is 10000 of 65535 unless BVTHead_SetRangeDataThreshold sets another. */
 BVT_API int BVTRangeData_GetCount(BVTRangeData self);
 BVT_API float BVTRangeData_GetRangeValue(BVTRangeData self, int i);
 BVT_API float BVTRangeData_GetBearingValue(BVTRangeData self, int i);
@@ -206,7 +206,7 @@ BVT_API double BVTRangeData_GetRangeResolution(BVTRangeData self);
 BVT_API double BVTRangeData_GetBearingResolution(BVTRangeData self);
 BVT_API RetVal BVTRangeData_CopyRangeValues(BVTRangeData self, float* buffer, int count);
 
-/* NavData: where the vehicle is. A value that was not set answers BVT_NAV_NO_DATA. */
+/* NavData: position and attitude of the vehicle. The getter of a value that was not set returns BVT_NAV_NO_DATA. */
 BVT_API BVTNavData BVTNavData_Create(void);
 BVT_API void BVTNavData_Destroy(BVTNavData self);
 BVT_API RetVal BVTNavData_SetLatitude(BVTNavData self, double value); /* degrees, north positive */
@@ -230,7 +230,7 @@ BVT_API RetVal BVTNavData_GetCourseOverGround(BVTNavData self, float* out);
 BVT_API RetVal BVTNavData_SetUserNavString(BVTNavData self, const char* text); /* at most 80 bytes */
 BVT_API RetVal BVTNavData_GetUserNavString(BVTNavData self, char* buffer, int buffer_size);
 
-/* SonarDiscoveryAgent: finds sonars; give them a moment between Start and counting. */
+/* SonarDiscoveryAgent: finds sonars. They need a moment to answer, so wait between Start and counting. */
 BVT_API BVTSonarDiscoveryAgent BVTSonarDiscoveryAgent_Create(void);
 BVT_API void BVTSonarDiscoveryAgent_Destroy(BVTSonarDiscoveryAgent self);
 BVT_API RetVal BVTSonarDiscoveryAgent_Start(BVTSonarDiscoveryAgent self);

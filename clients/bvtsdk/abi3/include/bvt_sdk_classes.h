@@ -1,11 +1,11 @@
-/* The C++ layer that 3.x hosts use: range data that turns into its handle. C++98; part of bvt_sdk.h. */
+/* The C++ layer that 3.x hosts use: range data that converts to its handle. C++98; part of bvt_sdk.h. */
 #pragma once
 
 #include "bvt_sdk.h"
 
 namespace BVTSDK {
 
-/* Pass it where BVTPing_GetRangeData wants a pointer to a handle, then ask it. The range data belong to the ping. */
+/* Pass it to BVTPing_GetRangeData as the pointer to a handle, then read it. The range data belong to the ping. */
 class RangeData {
  public:
   RangeData() : handle_(0) {}

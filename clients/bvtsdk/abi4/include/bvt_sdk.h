@@ -8,7 +8,7 @@ extern "C" {
 
 #define BVT_API __attribute__((visibility("default")))
 
-/* Handles. They are numbers, not addresses: never look behind them. Null is allowed wherever something is destroyed. */
+/* Handles. They are numbers, not addresses: never dereference them. Functions that destroy an object accept null. */
 typedef struct BVTOpaqueSonar* BVTSonar;
 typedef struct BVTOpaqueHead* BVTHead;
 typedef struct BVTOpaquePing* BVTPing;
@@ -82,10 +82,10 @@ enum {
 /* Cartesian, or rows of equal range and columns of equal bearing. */
 enum { BVT_IMAGETYPE_XY = 0, BVT_IMAGETYPE_RTHETA = 1 };
 
-/* What the sonar is in. */
+/* The fluid around the sonar. */
 enum { BVT_FLUIDTYPE_SALTWATER = 0, BVT_FLUIDTYPE_FRESHWATER = 1, BVT_FLUIDTYPE_OTHER = 2 };
 
-/* Where the sonar is mounted. */
+/* The place where the sonar is mounted. */
 enum {
   BVT_MOUNTTYPE_UNKNOWN = 0,
   BVT_MOUNTTYPE_POLE = 1,
@@ -117,8 +117,8 @@ BVT_API RetVal BVTSonar_GetTimeIndexedPingCount(BVTSonar self, int* out);
 BVT_API RetVal BVTSonar_IsFile(BVTSonar self, int* out);
 BVT_API RetVal BVTSonar_IsConnected(BVTSonar self, int* out);
 
-/* Head: ranges in metres. GetPing ignores the number on a live sonar, transmits and waits; in a file a negative one means the
- * next. */
+/* Head: ranges in metres. On a live sonar, GetPing ignores the number, transmits a ping and waits for it. In a file, a negative
+ * number means the next ping. */
 BVT_API void BVTHead_Destroy(BVTHead self);
 BVT_API RetVal BVTHead_SetRange(BVTHead self, float start_m, float stop_m);
 BVT_API RetVal BVTHead_SetStartRange(BVTHead self, float start_m);
@@ -248,8 +248,8 @@ BVT_API RetVal BVTColorMapper_GetGamma(BVTColorMapper self, float* out);
 BVT_API RetVal BVTColorMapper_SetAutoMode(BVTColorMapper self, int on);
 BVT_API RetVal BVTColorMapper_GetAutoMode(BVTColorMapper self, int* out);
 
-/* RangeProfile: one range a bearing, left to right; metres and degrees clockwise from ahead. Above 999: no echo above the
- * threshold, which is 10000 of 65535 until BVTImageGenerator_SetRangeProfileIntensityThreshold sets another. */
+/* RangeProfile: one range per bearing, left to right; metres and degrees clockwise from ahead. A range above 999 means no echo
+ * above the threshold. The threshold is 10000 of 65535 unless BVTImageGenerator_SetRangeProfileIntensityThreshold sets another. */
 BVT_API void BVTRangeProfile_Destroy(BVTRangeProfile self);
 BVT_API RetVal BVTRangeProfile_GetCount(BVTRangeProfile self, int* out);
 BVT_API RetVal BVTRangeProfile_GetValidCount(BVTRangeProfile self, int* out);
@@ -264,7 +264,7 @@ BVT_API RetVal BVTRangeProfile_Get_X_Value(BVTRangeProfile self, int i, float* o
 BVT_API RetVal BVTRangeProfile_Get_Y_Value(BVTRangeProfile self, int i, float* out);
 BVT_API RetVal BVTRangeProfile_Get_Z_Value(BVTRangeProfile self, int i, float* out);
 
-/* NavData: where the vehicle is. A value that was not set answers BVT_NAV_NO_DATA. */
+/* NavData: position and attitude of the vehicle. The getter of a value that was not set returns BVT_NAV_NO_DATA. */
 BVT_API BVTNavData BVTNavData_Create(void);
 BVT_API void BVTNavData_Destroy(BVTNavData self);
 BVT_API RetVal BVTNavData_SetNavTime(BVTNavData self, double value); /* s since 1970 UTC */
@@ -290,7 +290,7 @@ BVT_API RetVal BVTNavData_GetCourseOverGround(BVTNavData self, float* out);
 BVT_API RetVal BVTNavData_SetUserNavString(BVTNavData self, const char* text); /* at most 80 bytes */
 BVT_API RetVal BVTNavData_GetUserNavString(BVTNavData self, char* buffer, int buffer_size);
 
-/* SonarDiscoveryAgent: finds sonars; give them a moment between Start and counting. */
+/* SonarDiscoveryAgent: finds sonars. They need a moment to answer, so wait between Start and counting. */
 BVT_API BVTSonarDiscoveryAgent BVTSonarDiscoveryAgent_Create(void);
 BVT_API void BVTSonarDiscoveryAgent_Destroy(BVTSonarDiscoveryAgent self);
 BVT_API RetVal BVTSonarDiscoveryAgent_Start(BVTSonarDiscoveryAgent self);

@@ -1,4 +1,4 @@
-/* The C++ classes of 4.x: each holds one handle and shares it when copied; what fails throws SdkException. C++11; part of
+/* The C++ classes of 4.x: each holds one handle and shares it when copied; a call that fails throws SdkException. C++11; part of
  * bvt_sdk.h. A method does what the C function of its name does; its last out-parameter is returned. */
 #pragma once
 
@@ -59,7 +59,7 @@ class Shared {
   std::shared_ptr<T> handle_;
 };
 
-/* Calls f(handle, arguments..., &value) and gives the value. */
+/* Calls f(handle, arguments..., &value) and returns the value. */
 template <class V, class F, class... A>
 V got(F f, A... arguments) {
   V value = V();
