@@ -43,7 +43,9 @@ void DeviceArguments::add_to(CLI::App& command, const std::string& port_help) {
       ->check(clients::address());
   command.add_option("--port", port, port_help)->check(text::whole_number(1, 65535));
   command.add_flag("--discover", discover, "use the address in the status broadcast on udp 52102");
-  command.add_option("--wait", patience_s, "seconds to retry the connection; if above 10, also to wait for pings")
+  command
+      .add_option("--wait", patience_s,
+                  "time for which the connection is retried [s]; if above 10, also the time to wait for pings")
       ->check(text::number(0))
       ->capture_default_str();
 }

@@ -20,7 +20,7 @@ int complain(const std::string& text, ErrorKind kind) {
 }  // namespace
 
 int run(int argc, char** argv) {
-  CLI::App app("sonarctl: listen to, look at and steer sonars served by sonard", "sonarctl");
+  CLI::App app("sonarctl: receive, show and control the sonars of sonard", "sonarctl");
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("sonarctl " SONARD_VERSION));
   app.footer(

@@ -148,7 +148,7 @@ Result<ControlClient::Response> ControlClient::next_message(Clock::time_point de
     if (read.what == Wait::closed)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " closed the control stream" +
                                                  (read.error.empty() ? "" : ": " + read.error) +
-                                                 "; its log says why (a wrong token, or sonard was stopped)");
+                                                 "; its log has the reason (a wrong token, or sonard was stopped)");
     if (read.what == Wait::timed_out || (read.what == Wait::interrupted && until_signal)) return nullptr;
     if (read.what != Wait::data) continue;
     const auto received = std::span<const std::byte>(chunk).first(read.size);

@@ -25,7 +25,7 @@ struct StyleArguments {
     app.add_option("--colour-map", colour_map, "one of " + colour_map_names())
         ->check(clients::colour_map())
         ->capture_default_str();
-    app.add_option("--width", width_px, "of the picture, in pixels")->check(whole_number(1, 100000))->capture_default_str();
+    app.add_option("--width", width_px, "width of the picture, in pixels")->check(whole_number(1, 100000))->capture_default_str();
     app.add_flag("--no-rings", no_rings, "draw no range rings");
   }
 
@@ -76,7 +76,8 @@ Run add_listen(CLI::App& app) {
 }
 
 Run add_view(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("view", "draw pings as the make shows them: into a file or the terminal, once or live");
+  CLI::App& command =
+      *app.add_subcommand("view", "draw pings like the make's own program: into a file or the terminal, once or live");
   command.footer(
       "examples:\n"
       "  sonarctl view --png ping.png\n"

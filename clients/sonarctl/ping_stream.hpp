@@ -31,9 +31,9 @@ const Make* make_at(std::uint16_t port);
 
 class PingStream {
  public:
-  /// Connects and opens the conversation. `make`: null = the first that answers at its own port. `patience`: for the connection
-  /// and for answers. Errors: usage (settings that the sonar does not have), io (closed), unavailable (no answer), bad_data
-  /// (another service). `keeps_messages`: for Item::messages.
+  /// Connects and opens the conversation. `make`: null = the first make that answers at its usual port. `patience`: for the
+  /// connection and for answers. Errors: usage (settings that the sonar does not have), io (closed), unavailable (no answer),
+  /// bad_data (another service). `keeps_messages`: for Item::messages.
   static Result<PingStream> open(const Endpoint& device, const Make* make, const Wanted& wanted,
                                  std::chrono::milliseconds patience, bool keeps_messages = false);
   PingStream(PingStream&&) = default;

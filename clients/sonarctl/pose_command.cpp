@@ -18,10 +18,10 @@ void add_pose_options(CLI::App& command, PoseOptions& options) {
   command.add_flag("--json", options.json, "send JSON lines with ArduPilot's keys, not protobuf");
   command.add_flag("--confirm", options.confirm, "use the TCP control stream; sonard confirms each pose");
   command.add_option("--token-file", options.token_file, "with --confirm or --object: the daemon's control.token_file");
-  add_frame_option(command, options.frame, "of the arguments and of what is sent: enu (FLU body) or ned (FRD body)");
+  add_frame_option(command, options.frame, "frame of the arguments and of the sent poses: enu (FLU body) or ned (FRD body)");
   command.add_option("--vehicle", options.vehicle, "name of the vehicle, if there are several");
   command.add_option("--object", options.object, "move an object of the scene instead");
-  command.add_option("--rate", options.rate_hz, "poses a second")->check(number(0.001, 1000.0))->capture_default_str();
+  command.add_option("--rate", options.rate_hz, "poses per second")->check(number(0.001, 1000.0))->capture_default_str();
   command.add_option("--seconds", options.seconds, "how long; 0 = once, one turn, one line")->check(number(0));
 }
 
@@ -47,17 +47,17 @@ Run add_pose(CLI::App& app) {
   add_triple(once, "--rpy", options->rpy_deg, "roll, pitch, yaw in degrees, intrinsic Z-Y-X");
   once.callback([options] { options->path = PoseOptions::Path::once; });
 
-  CLI::App& circle = *pose.add_subcommand("circle", "circle round a centre, looking at it");
+  CLI::App& circle = *pose.add_subcommand("circle", "circle around a centre, with the bow towards it");
   add_triple(circle, "--centre", options->centre_m, "m");
   circle.add_option("--radius", options->radius_m, "m")->check(number(0.0, 1e6))->capture_default_str();
   circle.add_option("--period", options->period_s, "seconds per turn; negative = clockwise")
       ->check(number())
       ->capture_default_str();
   circle.add_option("--pitch", options->pitch_deg, "degrees, bow up positive")->check(number(-90.0, 90.0));
-  circle.add_flag("!--look-ahead", options->look_inwards, "look along the path");
+  circle.add_flag("!--look-ahead", options->look_inwards, "keep the bow along the path");
   circle.callback([options] { options->path = PoseOptions::Path::circle; });
 
-  CLI::App& line = *pose.add_subcommand("line", "from a point to another, looking ahead");
+  CLI::App& line = *pose.add_subcommand("line", "move from one point to another, with the bow ahead");
   add_triple(line, "--from", options->from_m, "m");
   add_triple(line, "--to-point", options->to_m, "m");
   line.add_option("--speed", options->speed_mps, "m/s")->check(number(1e-3, 1e3))->capture_default_str();

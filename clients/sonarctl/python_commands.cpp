@@ -29,7 +29,7 @@ fs::path sonard_near(const fs::path& program) {
   return {};
 }
 
-/// Returns when there is no such program.
+/// Returns only if there is no such program.
 void execute(std::vector<std::string>& words) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -60,9 +60,9 @@ Run add(CLI::App& app, const char* name, const char* purpose, const std::string&
 
 }  // namespace
 
-/// The farm makes data sets, which sonard does, so it is a command of sonard.
+/// sonard makes data sets, so the farm is a command of sonard.
 Run add_farm(CLI::App& app, const std::vector<std::string>& words) {
-  app.add_subcommand("farm", "labelled data sets by many machines: submit jobs, see how they stand, collect");
+  app.add_subcommand("farm", "make labelled data sets on many machines: submit jobs, show their state, collect the results");
   return [words]() -> Result<void> {
     std::error_code ec;
     const fs::path program = fs::read_symlink("/proc/self/exe", ec), sonard = sonard_near(program);

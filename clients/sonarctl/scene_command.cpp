@@ -64,7 +64,7 @@ void add_check(CLI::App& scene, SceneArguments& a) {
 }
 
 void add_info(CLI::App& scene, SceneArguments& a) {
-  CLI::App& command = *scene.add_subcommand("info", "its objects, materials, sizes and places in tables");
+  CLI::App& command = *scene.add_subcommand("info", "print tables of its objects, materials, sizes and places");
   command.add_option("FILE", a.file, "a scene, or demo.yaml")->required();
   command.add_flag("--json", a.json, "for programs");
   command.callback([&a] { a.what = SceneArguments::What::info; });
@@ -77,24 +77,24 @@ void add_import(CLI::App& scene, SceneArguments& a) {
       "  sonarctl scene import harbour.world --out harbour.yaml --model-path ~/models\n"
       "  sonarctl scene import rov.urdf --out rov.yaml --moving rov --material aluminium\n"
       "  sonarctl scene import tank.sdf --out tank.yaml --collision --material walls=concrete --offset 0,0,-5\n"
-      "models are looked for in --model-path, GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH, IGN_GAZEBO_RESOURCE_PATH, "
+      "models are searched in --model-path, GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH, IGN_GAZEBO_RESOURCE_PATH, "
       "ROS_PACKAGE_PATH,\n"
       "AMENT_PREFIX_PATH, beside the file and, for addresses of Fuel, in Gazebo's caches (~/.gz/fuel, ~/.ignition/fuel)\n"
-      "what a scene cannot hold is listed, and named in the comments of the file that is written");
+      "parts that a scene cannot hold are listed, and named in the comments of the written file");
   ImportOptions& o = a.import;
   command.add_option("FILE", a.file, "an .sdf, .world or .urdf")->required();
   command.add_option("--out", a.out, "the scene file to write")->required();
   command.add_option("--model-path", a.folders, "folder with models or packages (repeatable)")->allow_extra_args(false);
-  CLI::Option* collision = command.add_flag("--collision", o.read.collisions, "take collision shapes");
-  command.add_flag("--visual", a.visual, "take visual shapes (the default)")->excludes(collision);
+  CLI::Option* collision = command.add_flag("--collision", o.read.collisions, "import collision shapes");
+  command.add_flag("--visual", a.visual, "import visual shapes (the default)")->excludes(collision);
   command.add_option("--material", o.materials, "NAME for everything, or MODEL=NAME (repeatable)")->allow_extra_args(false);
-  command.add_option("--moving", o.moving, "this MODEL shall move by poses (repeatable)")->allow_extra_args(false);
+  command.add_option("--moving", o.moving, "MODEL moves by poses (repeatable)")->allow_extra_args(false);
   command.add_option("--offset", a.offset, "X,Y,Z added to every place, m; z = 0 is the water's surface")
       ->delimiter(',')
       ->expected(3)
       ->check(text::number());
-  command.add_flag("--skip-missing", o.read.skip_missing, "leave out models and meshes that are not found");
-  command.add_flag("--no-check", a.no_check, "do not try meshes, nor load what was written");
+  command.add_flag("--skip-missing", o.read.skip_missing, "omit models and meshes that are not found");
+  command.add_flag("--no-check", a.no_check, "do not test meshes, and do not load the written scene");
   command.add_flag("--overwrite", o.overwrite, "replace the scene file");
   command.callback([&a] { a.what = SceneArguments::What::import; });
 }

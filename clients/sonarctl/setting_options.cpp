@@ -37,11 +37,13 @@ void SettingArguments::add_to(CLI::App& app) {
   };
   group(app.add_option_function<std::uint32_t>(
             "--mode", [this](std::uint32_t given) { settings.mode = given - 1; },
-            "from 1, as the sonar's models list them: a frequency, or a head"))
+            "number from 1 of a frequency or a head, in the order of the sonar's model"))
       ->check(whole_number(1, 100));
   CLI::Option* metres = value("--range", settings.range_m, "metres")->check(number(0.0, 1000.0));
-  extra("range-percent", "of the mode's maximum, instead of metres")->check(number(0.0, 100.0))->excludes(metres);
-  value("--gain", settings.gain_percent, "per cent of what can be set")->check(number(0.0, 100.0));
+  extra("range-percent", "range in per cent of the mode's maximum, instead of metres")
+      ->check(number(0.0, 100.0))
+      ->excludes(metres);
+  value("--gain", settings.gain_percent, "gain in per cent of the possible range")->check(number(0.0, 100.0));
   group(app.add_option_function<std::string>(
             "--rate", [this](const std::string& given) { settings.rate_hz = given == "standby" ? 0 : std::stod(given); },
             "maximum ping rate [Hz], any number, of some makes the nearest of these; or standby"))
@@ -80,7 +82,7 @@ void SourceArguments::add_to(CLI::App& app, bool recordings, const std::string& 
     usual += (usual.empty() ? "" : ", ") + std::to_string(one.ports.front().number) + " of " + std::string(one.title);
     names.emplace_back(one.name());
   }
-  device.add_to(app, "port of the sonar (default: " + usual + ", the first that answers)");
+  device.add_to(app, "port of the sonar (default: " + usual + ", the first make that answers)");
   app.add_option("--make", make, "make of the sonar; needed on a port that is not the make's own")->check(one_of(names));
   app.add_flag("--as-it-is", as_it_is, "send no settings (many sonars then send no pings)");
   app.add_flag("--observe", observe,

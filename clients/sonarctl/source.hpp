@@ -24,8 +24,8 @@ struct OpenedStream {
   std::chrono::steady_clock::time_point connected_at;
   bool observes = false;  // no settings sent: pings as requested by the sonar's clients
 };
-/// Connects as an observer if source.observe is set. Also, with a note on standard error, if the sonar has no free client slot
-/// and its sonard reports an address for observers.
+/// Connects as an observer if source.observe is set. It also does so, with a note on standard error, if the sonar has no free
+/// client slot and its sonard reports an address for observers.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
 /// find_device() and open_stream().
@@ -64,8 +64,8 @@ Error silence(const SourceOptions& source, const PingStream& stream, bool receiv
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
 
 /// Returns read_ping() of a recording, or the first ping of a device with the requested settings. If a picture consists of many
-/// pings, it waits until the picture is complete or source.picture_limit_s is over; not with `of_samples`, if single pings have
-/// no picture.
+/// pings, it waits until the picture is complete or source.picture_limit_s is over; with `of_samples` it does not wait if single
+/// pings have no picture.
 Result<HostPing> fetch_ping(const SourceOptions& source, std::optional<std::size_t> number, bool of_samples = false);
 
 }  // namespace sonar::clients

@@ -40,7 +40,7 @@ std::optional<std::string> PictureProgress::line_at(const HostPing& ping, Clock:
   if (!begin_) {
     begin_ = said_ = now;
     first_lines_ = ping.lines;
-    return have + text::format("; it is taken when it is whole, after %g s at the latest, or as it is with Ctrl-C", limit_s_);
+    return have + text::format("; it is used when it is complete, or incomplete after %g s or Ctrl-C", limit_s_);
   }
   if (seconds_between(said_, now) < said_every_s) return std::nullopt;
   said_ = now;

@@ -165,7 +165,7 @@ TEST(Doctor, KnowsMachinesWhoseNetworkIsTheirOwn) {
   Facts facts = facts_of("oculus", "172.17.0.2");
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("may not pass")));
   facts.machine = Machine::wsl2;
-  expect(line(facts, "network"), Level::ok, "172.17.0.2 is reached by way of this WSL2 machine", "status_to");
+  expect(line(facts, "network"), Level::ok, "172.17.0.2 is reached via this WSL2 machine", "status_to");
   facts.status.received.push_back(received("172.17.0.2"));  // here, not outside
   facts.machine = Machine::container;
   expect(line(facts, "network"), Level::ok, "by way of this container", "status_to");

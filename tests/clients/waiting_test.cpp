@@ -21,8 +21,9 @@ HostPing ping_of(std::size_t lines, std::size_t whole) {
 TEST(PictureProgress, TellsTheLinesAtOnceAndThenEveryTwoSecondsWithTheTimeThatIsLeft) {
   PictureProgress progress(30);
   const PictureProgress::Clock::time_point begin{seconds(1000)};
-  EXPECT_THAT(progress.line_at(ping_of(1, 201), begin).value_or(""),
-              HasSubstr("the picture has 1 of 201 scan lines; it is taken when it is whole, after 30 s at the latest"));
+  EXPECT_THAT(
+      progress.line_at(ping_of(1, 201), begin).value_or(""),
+      HasSubstr("the picture has 1 of 201 scan lines; it is used when it is complete, or incomplete after 30 s or Ctrl-C"));
   EXPECT_FALSE(progress.line_at(ping_of(20, 201), begin + milliseconds(1900)));
   EXPECT_THAT(progress.line_at(ping_of(21, 201), begin + seconds(2)).value_or(""), HasSubstr("21 of 201 scan lines; 18 s more"));
   EXPECT_FALSE(progress.line_at(ping_of(22, 201), begin + seconds(3)));

@@ -12,7 +12,7 @@
 namespace sonar::clients {
 namespace {
 
-constexpr std::chrono::minutes scene_patience{6};  // the daemon gives up after five
+constexpr std::chrono::minutes scene_patience{6};  // the daemon's limit is five minutes
 constexpr std::chrono::hours step_patience{24};    // limit until the pings are computed; Ctrl-C ends it
 
 std::vector<std::string> lines_of(const std::string& text, int most) {

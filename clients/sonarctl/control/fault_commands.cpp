@@ -72,7 +72,7 @@ Result<void> print_journal(const FaultArguments& a) {
 Result<void> request_fault(FaultArguments& a) {
   if (Result<void> read = read_parameters(a.with, a.record); !read) return read;
   if (Result<void> read = read_trigger(a.at, a.record); !read) return read;
-  return steer(a.control, control::AddFault{a.record}, a.record.what + " is added; sonarctl fault list shows what it does");
+  return steer(a.control, control::AddFault{a.record}, a.record.what + " is added; sonarctl fault list shows its state");
 }
 
 CLI::App& add_command(CLI::App& fault, FaultArguments& a, const std::string& name, const std::string& help,
@@ -104,9 +104,9 @@ void add_add(CLI::App& fault, FaultArguments& a) {
   add.add_option("--at", a.at, "ping=N, every=N, phase=N, time_s=S, probability=P or on=OCCASION (default: now)")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  number_to("--seconds", r.lasts.seconds, "how long it acts each time")->check(number(0));
-  number_to("--pings", r.lasts.pings, "number of pings it acts on each time")->check(whole_number(1));
-  number_to("--count", r.lasts.count, "how often it begins")->check(whole_number(1));
+  number_to("--seconds", r.lasts.seconds, "duration of each occurrence")->check(number(0));
+  number_to("--pings", r.lasts.pings, "number of pings of each occurrence")->check(whole_number(1));
+  number_to("--count", r.lasts.count, "number of occurrences")->check(whole_number(1));
   add.add_option("--sonar", r.sonar, "name of the sonar (default: all)");
   add.add_option("--client", r.client, "newest, oldest, an ordinal, an address or a prefix 10.0.0.0/8 (default: all)");
   add.add_option("--name", r.name, "its name (default: FAULT)");
@@ -115,31 +115,32 @@ void add_add(CLI::App& fault, FaultArguments& a) {
 }  // namespace
 
 Run add_fault(CLI::App& app) {
-  CLI::App& fault = *app.add_subcommand("fault", "faults on purpose of a sonard that runs with --faults");
+  CLI::App& fault = *app.add_subcommand("fault", "inject faults into a sonard that runs with --faults");
   fault.require_subcommand(1);
   fault.footer(
       "examples:\n"
       "  sonarctl fault kinds                         all kinds and troubles\n"
       "  sonarctl fault add silent-open --seconds 6\n"
       "  sonarctl fault list\n"
-      "  sonarctl fault journal --follow              what was done to which client, at which byte");
+      "  sonarctl fault journal --follow              the effects: which client, at which byte");
   const auto arguments = std::make_shared<FaultArguments>();
   FaultArguments& a = *arguments;
   add_add(fault, a);
   CLI::App& list = add_command(
-      fault, a, "list", "the faults that wait, act or are over", "  sonarctl fault list\n  sonarctl fault list --support",
+      fault, a, "list", "list the waiting, active and ended faults", "  sonarctl fault list\n  sonarctl fault list --support",
       [&a] { return a.support ? print_report(a, true, fault_support_text) : print_report(a, false, fault_list_text); });
-  list.add_flag("--support", a.support, "which kind takes effect on which vendor's sonars, or why not");
+  list.add_flag("--support", a.support,
+                "list the kinds that take effect on each vendor's sonars, and the reasons for the others");
   CLI::App& kinds = add_command(fault, a, "kinds", "the catalogue: kinds with their parameters, and troubles",
                                 "  sonarctl fault kinds", [&a] { return print_report(a, true, fault_kinds_text); });
-  CLI::App& journal = add_command(fault, a, "journal", "what the faults did, the latest 1000 entries",
+  CLI::App& journal = add_command(fault, a, "journal", "the effects of faults, the latest 1000 entries",
                                   "  sonarctl fault journal --follow --json", [&a] { return print_journal(a); });
-  journal.add_flag("--follow", a.follow, "then each entry as it is written, until Ctrl-C");
+  journal.add_flag("--follow", a.follow, "then print each new entry, until Ctrl-C");
   for (CLI::App* command : {&list, &kinds, &journal}) command->add_flag("--json", a.json, "JSON (names as in control.proto)");
-  CLI::App& remove = add_command(fault, a, "remove", "end a fault that waits or acts", "  sonarctl fault remove flips", [&a] {
+  CLI::App& remove = add_command(fault, a, "remove", "end a waiting or active fault", "  sonarctl fault remove flips", [&a] {
     return steer(a.control, control::EndFaults{a.ended}, "fault " + a.ended + " is ended");
   });
-  remove.add_option("NAME", a.ended, "its name, as fault list shows it")->required();
+  remove.add_option("NAME", a.ended, "its name in fault list")->required();
   add_command(fault, a, "reset", "end all faults", "  sonarctl fault reset",
               [&a] { return steer(a.control, control::EndFaults{}, "all faults are ended"); });
   return [arguments] { return arguments->what(); };

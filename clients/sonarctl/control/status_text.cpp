@@ -14,7 +14,7 @@ namespace {
 using text::counted;
 using text::format;
 
-constexpr double told_silence_s = 3;
+constexpr double reported_silence_s = 3;
 
 unsigned long long wide(std::uint64_t value) { return value; }
 

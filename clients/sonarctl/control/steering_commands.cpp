@@ -121,7 +121,7 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
 }
 
 void add_set_water(CLI::App& set, const std::shared_ptr<Steering>& steering) {
-  CLI::App& command = *set.add_subcommand("water", "temperature, salt, acidity, speed of sound");
+  CLI::App& command = *set.add_subcommand("water", "change the temperature, salinity, pH or speed of sound of the water");
   command.footer(
       "examples:\n"
       "  sonarctl set water --temperature 8 --salinity 34\n"
@@ -218,7 +218,7 @@ Run add_events(CLI::App& app) {
   command.add_flag("--clients", options->wanted.clients, "clients that connect and disconnect");
   command.add_flag("--poses", options->wanted.poses, "poses that stop, resume or change their source");
   command.add_flag("--scene", options->wanted.scene, "scenes loaded and changed");
-  command.add_flag("--faults", options->wanted.faults, "faults that begin, act and end");
+  command.add_flag("--faults", options->wanted.faults, "faults: their begin, effects and end");
   command.add_option("--count", options->count, "stop after this number of events")->check(whole_number());
   command.add_option("--seconds", options->seconds, "stop after this time")->check(number(0));
   command.add_flag("--json", options->json, "one JSON object per line");
@@ -249,7 +249,7 @@ Run add_step(CLI::App& app) {
   CLI::App& command = *app.add_subcommand("step", "advance the time of a sonard with clock: lockstep and wait for the pings due");
   command.footer(
       "examples:\n"
-      "  sonarctl step 0.1                        a tenth of a second; a ping due at its very end belongs to the next step\n"
+      "  sonarctl step 0.1                        0.1 s; a ping that is due exactly at its end belongs to the next step\n"
       "  sonarctl step 0.1 --count 50");
   const auto options = std::make_shared<StepOptions>();
   add_control_options(command, options->control);
@@ -265,7 +265,7 @@ Run add_load(CLI::App& app) {
   command.footer(
       "examples:\n"
       "  sonarctl load scenes/tank-rod.yaml           a file of this computer\n"
-      "  sonarctl load local-search.yaml              or one that sonard finds: beside its configuration, or shipped");
+      "  sonarctl load local-search.yaml              a file that sonard finds: beside its configuration, or shipped");
   struct Arguments {
     ControlOptions control;
     std::string path;

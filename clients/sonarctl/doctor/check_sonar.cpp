@@ -92,7 +92,7 @@ class SonarChecks {
     check_faults();
   }
 
-  /// If no driver stays connected, only faults can be the cause.
+  /// If the sonar has no client connections, only faults can be the cause.
   void check_faults() {
     for (const Finding& found : sonar::doctor::judge(*facts_.control.status, nullptr))
       if (found.check == "fault" && found.level != Level::ok && (found.sonar.empty() || found.sonar == sonar_.reported->name()))
@@ -124,7 +124,7 @@ class SonarChecks {
         reachable ? "" : "set advertise_ip of the sonar to an address that reaches it from here");
   }
 
-  /// The sonar answers, but its status message does not arrive.
+  /// Reports a sonar that answers although its status message does not arrive.
   void check_silence(const std::string& port) {
     std::string text = "no status from " + sonar_.at.host + " on udp " + port + " within " +
                        format("%.1f", facts_.status.waited_s) + " s: drivers that search for the sonar will not find it";
@@ -250,11 +250,11 @@ class SonarChecks {
   }
 
   std::string stats_of_daemon() const {
-    if (!sonar_.reported) return " (--take connects anyway)";
+    if (!sonar_.reported) return " (--take connects nevertheless)";
     const v1::SonarFigures& f = sonar_.reported->figures();
     return "; it reports " + std::to_string(f.served()) + " pings served, " + std::to_string(f.dropped()) + " dropped, latency " +
            format("%.0f", f.latency_ms_p50()) + " ms p50, " + format("%.0f", f.latency_ms_p99()) +
-           " ms p99 (--take connects anyway)";
+           " ms p99 (--take connects nevertheless)";
   }
 
   std::string latency_text() const {

@@ -87,8 +87,8 @@ void check_networks(const Facts& facts, std::vector<Finding>& findings) {
     }
     if (lost.empty()) continue;
     const char* const where = is_routed                        ? "in another network"
-                              : facts.machine == Machine::wsl2 ? "reached by way of this WSL2 machine"
-                                                               : "reached by way of this container";
+                              : facts.machine == Machine::wsl2 ? "reached via this WSL2 machine"
+                                                               : "reached via this container";
     findings.push_back({is_routed ? Level::warn : Level::ok, "network",
                         sonar.at.host + " is " + where + ": broadcasts and multicasts may not pass (" + lost + ")", instead});
   }

@@ -37,7 +37,8 @@ Result<void> examine(const Arguments& arguments) {
 }  // namespace
 
 Run add_doctor(CLI::App& app) {
-  CLI::App& command = *app.add_subcommand("doctor", "check everything that a driver needs; faults with cause and cure");
+  CLI::App& command =
+      *app.add_subcommand("doctor", "check everything that a driver needs, and report faults with their causes and remedies");
   command.footer(
       "examples:\n"
       "  sonarctl doctor\n"
@@ -46,7 +47,7 @@ Run add_doctor(CLI::App& app) {
       "does not connect to a sonar that has a client (--take does); exit code 0 when nothing failed, 69 otherwise");
   const auto arguments = std::make_shared<Arguments>();
   doctor::Questions& questions = arguments->questions;
-  command.add_option("ADDRESS", questions.address, "of one sonar, HOST or HOST:PORT (default: every sonar found)")
+  command.add_option("ADDRESS", questions.address, "address of one sonar, HOST or HOST:PORT (default: every sonar found)")
       ->check(address());
   command.add_flag("--json", arguments->json, "one JSON object");
   command.add_flag("--take", questions.take,

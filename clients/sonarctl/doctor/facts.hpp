@@ -35,7 +35,7 @@ struct ReceivedStatus {
 };
 struct StatusFacts {
   Endpoint on{"0.0.0.0", 52102};
-  std::string error;                     // why listening failed; empty = it succeeded
+  std::string error;                     // reason if listening failed; empty = it succeeded
   std::vector<PortHolder> holders;       // programs that use the port, if listening failed
   std::vector<ReceivedStatus> received;  // one per pair of `from` and `advertised`
   double waited_s = 0;
@@ -43,7 +43,7 @@ struct StatusFacts {
 
 struct StreamFacts {
   enum class Outcome { not_tried, refused, unreachable, closed_without_a_byte, no_ping, pings } outcome = Outcome::not_tried;
-  std::string error;                         // why the connection or the greeting failed
+  std::string error;                         // reason if the connection or the greeting failed
   bool refuses = false;                      // true: `error` is the sonar's answer to a request
   std::string own;                           // our end of the connection; empty = there was none
   bool asked = false;                        // settings were sent, because no other client was connected
@@ -63,7 +63,7 @@ struct SonarFacts {
   Endpoint at;
   const protocol::Make* make = &protocol::makes().front();
   std::string name;        // from the control stream; empty = not known
-  std::string unresolved;  // why its host name has no address
+  std::string unresolved;  // reason if its host name has no address
   bool on_this_host = false;
   bool in_our_network = true;                       // an interface reaches its address without a router
   bool out_of_time = false;                         // not examined, because time ran out
@@ -76,7 +76,7 @@ struct SonarFacts {
 struct ControlFacts {
   Endpoint at;
   bool given = false;                              // the user gave the address; then a missing answer is an error
-  std::string error;                               // why there is no status
+  std::string error;                               // reason if there is no status
   bool token_required = false;                     // there is no status, because the daemon requires a token
   std::shared_ptr<const v1::DaemonStatus> status;  // null = there is none
   std::shared_ptr<const v1::DaemonStatus> latest;  // status after the pings; null = not requested again
@@ -100,9 +100,9 @@ struct FoundSonar {
   const protocol::Make* make = nullptr;
   std::string at, about;  // "BlueView head P900-90 (7001)"
 };
-/// Whether drivers control the sonar by HTTP and receive its images by UDP. Such a sonar has no client connections.
+/// True if drivers control the sonar by HTTP and receive its images by UDP. Such a sonar has no client connections.
 inline bool is_by_http(const SonarFacts& sonar) { return sonar.make->ports.front().kind == protocol::HostPort::Kind::http; }
-/// Whether drivers find the sonar by status messages to the port of `status`.
+/// True if drivers find the sonar by status messages to the port of `status`.
 inline bool sends_status(const SonarFacts& sonar, const StatusFacts& status) {
   const protocol::Port* const beacon = sonar.make->device->port(protocol::Port::Kind::udp_beacon);
   return beacon != nullptr && beacon->number == status.on.port;

@@ -21,7 +21,7 @@ bool is_on_this_host(const std::string& ipv4);
 bool is_in_our_network(const std::string& ipv4);
 Machine this_machine();
 
-/// Whether connections to this TCP port are refused because no program listens there.
+/// True if connections to this TCP port are refused because no program listens there.
 bool refuses(const Endpoint& at);
 
 /// Receives and sorts status messages, including those that arrive during other queries.
