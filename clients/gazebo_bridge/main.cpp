@@ -28,7 +28,7 @@ struct Following {
   void on_poses(const ignition::msgs::Pose_V& message) {
     const std::vector<std::string> lines = lines_from(message, models);
     for (const std::string& line : lines) {
-      // An error here says that the previous datagram was refused. A restart of sonard must not end the bridge.
+      // An error here means that the previous datagram was refused. A restart of sonard must not end the bridge.
       const bool refused = !write_all(socket, std::as_bytes(std::span(line)));
       if (refused && !was_refused)
         std::fprintf(stderr, "gazebo_bridge: sonard does not listen at the address of --to; start it, or correct --to\n");

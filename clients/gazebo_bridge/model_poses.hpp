@@ -43,9 +43,9 @@ inline std::optional<std::string> json_line(const Pose& body_in_world, std::int6
   return line.dump() + "\n";
 }
 
-/// The lines of one message; `Message` is ignition.msgs.Pose_V, or anything of its shape. Uses the first of several poses with
-/// one name: models precede their links, whose poses are relative to the model. Skips a repeated time: Gazebo repeats the last
-/// message while paused.
+/// The lines of one message; `Message` is ignition.msgs.Pose_V, or a type with the same members. If several poses have one name,
+/// the first is used: models precede their links, whose poses are relative to the model. Skips a repeated time: Gazebo repeats
+/// the last message while paused.
 template <class Message>
 std::vector<std::string> lines_from(const Message& message, std::vector<FollowedModel>& followed) {
   std::vector<std::string> lines;

@@ -60,7 +60,7 @@ Result<Loaded> load(const fs::path& file) {
   auto scene = built_in ? load_built_in_scene(name) : load_scene(file);
   if (!scene && is_configuration(file))
     return failure(ErrorKind::bad_data,
-                   name + ": this is a configuration of sonard, not a scene: sonard check " + name + " looks at both of them");
+                   name + ": this is a configuration of sonard, not a scene; to check both: sonard check " + name);
   if (!scene) return tl::make_unexpected(scene.error());
   std::string_view contents;
   for (const BuiltInFile& f : built_in_files())

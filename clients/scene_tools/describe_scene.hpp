@@ -16,7 +16,7 @@ struct DescribedObject {
   std::string name = {}, kind = {}, file = {};  // kind: as in the scene (box, mesh, seabed, point, ...)
   std::vector<std::string> materials = {};
   std::size_t triangles = 0;
-  Extent own = {}, in_world = {};  // along its own axes, and the world's; where the scene puts it
+  Extent own = {}, in_world = {};  // along its own axes, and along the world's axes at its place in the scene
   std::string moves_with = {};     // the moving object that it is or is attached to
   bool visible = true;
 };

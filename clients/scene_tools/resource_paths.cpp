@@ -84,7 +84,7 @@ fs::path model_in(const fs::path& folder) {
   return best;
 }
 
-/// True if a folder is the ROS package of that name. Repositories often name the folder otherwise.
+/// True if a folder is the ROS package of that name. In repositories the folder often has another name.
 bool is_package(const fs::path& folder, std::string_view name) {
   const fs::path manifest = folder / "package.xml";
   if (name.empty() || !is_file(manifest)) return false;
@@ -121,8 +121,8 @@ std::string without_escapes(std::string_view text) {
 }
 
 /// Searches the folders, then beside and above the referencing file: models lie next to each other, packages contain their files.
-/// Last, a file of a model in the model that refers to it, whose folder may be named otherwise. Never the referencing file: a
-/// model may be named like the one on Fuel that it includes.
+/// Last, it searches the referring model itself for a file of that model, because its folder may have another name. It never
+/// returns the referencing file, because a model may have the same name as the one on Fuel that it includes.
 fs::path look_around(const fs::path& wanted, const fs::path& from_file, const std::vector<fs::path>& folders, int version = -1) {
   std::error_code error;
   const fs::path from = fs::absolute(from_file, error).lexically_normal(), here = from.parent_path();
@@ -229,7 +229,7 @@ fs::path find_resource(std::string_view uri, const fs::path& from_file, const st
   if (uri.empty() || uri.size() > 4000 || uri.find('\0') != std::string_view::npos) return {};
   std::string path = std::string(scheme.empty() ? uri : uri.substr(colon + 3));
   if (!scheme.empty()) path = without_escapes(path);
-  if (scheme == "http" || scheme == "https" || scheme == "fuel") {  // never fetched, but a copy may lie here
+  if (scheme == "http" || scheme == "https" || scheme == "fuel") {  // never fetched, but a local copy may exist
     const auto address = fuel_address(path);
     if (address)
       if (fs::path found = find_in_fuel_caches(*address); !found.empty()) return found;

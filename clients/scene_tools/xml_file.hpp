@@ -1,5 +1,5 @@
 // XML files for the importers: elements with their positions in the file, and a list of errors and omissions. Only xml_file.cpp
-// uses tinyxml2; it limits all sizes, so that the readers can accept any text.
+// uses tinyxml2; it limits all sizes, so that any text is safe for the readers.
 #pragma once
 
 #include <cstddef>

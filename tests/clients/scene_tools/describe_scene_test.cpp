@@ -157,7 +157,7 @@ TEST_F(DescribeScene, KnowsAConfiguration) {
   const auto scene = describe_scene(config);
   ASSERT_FALSE(scene);
   EXPECT_EQ(scene.error().kind, ErrorKind::bad_data);
-  EXPECT_THAT(scene.error().text, HasSubstr("this is a configuration of sonard, not a scene: sonard check "));
+  EXPECT_THAT(scene.error().text, HasSubstr("this is a configuration of sonard, not a scene; to check both: sonard check "));
 }
 
 TEST(DescribeShippedScenes, NothingIsWrongWithThem) {
