@@ -132,8 +132,8 @@ class Control:
 
     def mount_sonar(self, sonar: str = "", position: Optional[Sequence[float]] = None, rpy_deg: Optional[Sequence[float]] = None,
                     frame: str = "FLU") -> None:
-        """Sets the mount of the sonar on its vehicle, as a tilt unit does: its position, its angles or both; what is None keeps
-        its values. frame: "FLU" or "FRD"; position: m; rpy_deg: intrinsic Z-Y-X."""
+        """Sets the mount of the sonar on its vehicle, as a tilt unit does: its position, its angles or both. A value that is None keeps
+        the present one. frame: "FLU" or "FRD"; position: m; rpy_deg: intrinsic Z-Y-X."""
         if position is None and rpy_deg is None:
             raise ValueError("a mount needs a position, angles (rpy_deg) or both")
         given = _given(position=None if position is None else _xyz("position", position),

@@ -56,8 +56,8 @@ class Fault:
         return [entry for entry in self._control.fault_journal() if self._is_ours(entry["fault"])]
 
     def noticed_within(self, seconds: float) -> bool:
-        """Whether a client of a sonar that the fault acts on closed its connection, or connected, within `seconds` after the first
-        injection (after the beginning, for a fault without injections). Waits for that long at most, and as long again for the
+        """True if a client of an affected sonar closed its connection, or connected, within `seconds` after the first
+        injection (after the beginning, for a fault without injections). Waits at most for that time, and for the same time for the
         first injection. A connection that the fault itself ended does not count; a request on an open connection is not seen."""
         give_up = time.monotonic() + seconds
         with self._news:

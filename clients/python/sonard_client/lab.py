@@ -7,7 +7,7 @@ The same as python3 -m sonard_client.lab. Lines on standard input apply faults w
 `end L06`, `list`.
 
 A process cannot fake a pulled cable: its kernel keeps acknowledging. Here the packets themselves are dropped. Needs root or
-user namespaces, and the programs unshare, nsenter, ip; most faults also nft, one tc. What is missing is named.
+user namespaces, and the programs unshare, nsenter, ip; most faults also nft, one tc. An error names the missing programs.
 """
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import Callable, List, NamedTuple, Optional, Sequence, TextIO, Tuple
 from ..geodesy import Geodetic, LocalPlane
 from ..rotations import Quaternion, Vector3, between
 
-Warn = Callable[[str], None]  # takes one sentence, without the file's name
+Warn = Callable[[str], None]  # called with one sentence, without the file's name
 Value = TypeVar("Value")
 Stream = List[Tuple[float, Value]]  # times in s
 Place2 = Tuple[float, float]  # north, east [m]

@@ -43,24 +43,24 @@ def _parser() -> argparse.ArgumentParser:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--driver", metavar="TEXT", help="starts the driver; {ip}, {port} and {id} are filled in")
     parser.add_argument("--tap", metavar="TEXT", default="none", type=lambda text: "none" if text == "wire" else text,
-                        help="json: the driver prints a JSON line a ping; ros1:TOPIC or ros2:TOPIC; wire or none (the default): only "
+                        help="json: the driver prints a JSON line per ping; ros1:TOPIC or ros2:TOPIC; wire or none (the default): only "
                              "the packets are looked at")
     parser.add_argument("--profile", metavar="TEXT", default=DEFAULT_PROFILE, help="product")
     parser.add_argument("--case", metavar="TEXT", action="append", default=[],
                         help="number (L05.2), code (L05), family (L) or name; repeatable")
-    parser.add_argument("--strict", action="store_true", help="SHOULDs count too")
+    parser.add_argument("--strict", action="store_true", help="count failed SHOULDs too")
     parser.add_argument("--repeat", type=int, default=1, metavar="INT", help="runs of each case; disagreement is FLAKY")
-    parser.add_argument("--jobs", type=int, default=1, metavar="INT", help="cases at a time")
+    parser.add_argument("--jobs", type=int, default=1, metavar="INT", help="number of cases that run at the same time")
     parser.add_argument("--torture", action="store_true",
                         help="cut, reset and pause at every point of a ping, instead of the cases")
-    parser.add_argument("--shallow", type=int, metavar="INT", help="with --torture: only so many points, chosen by the seed")
-    parser.add_argument("--seed", type=int, default=1, metavar="INT", help="of the scene, the faults and --shallow")
+    parser.add_argument("--shallow", type=int, metavar="INT", help="with --torture: only this number of points, selected by the seed")
+    parser.add_argument("--seed", type=int, default=1, metavar="INT", help="seed of the scene, the faults and --shallow")
     parser.add_argument("--out", metavar="TEXT", help="folder for the report; must be new or empty")
-    parser.add_argument("--name", metavar="TEXT", help="of the driver in the report; default: its program")
-    parser.add_argument("--driver-version", default="", metavar="TEXT", help="for the report")
+    parser.add_argument("--name", metavar="TEXT", help="name of the driver in the report; default: its program")
+    parser.add_argument("--driver-version", default="", metavar="TEXT", help="version of the driver, for the report")
     parser.add_argument("--sonard", metavar="TEXT", default=os.environ.get("SONARD", "sonard"), help="the program")
     parser.add_argument("--no-namespaces", action="store_true",
-                        help="on loopback addresses, without the cases that need namespaces")
+                        help="run on loopback addresses, without the cases that need namespaces")
     parser.add_argument("--list", action="store_true", help="print the cases, run nothing")
     return parser
 
@@ -69,7 +69,7 @@ def _merge_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="sonarctl judge merge", description="Makes one matrix of several reports.")
     parser.add_argument("reports", nargs="+", metavar="REPORT", help="folders with index.json")
     parser.add_argument("--out", required=True, metavar="FOLDER")
-    parser.add_argument("--page", type=pathlib.Path, metavar="FILE", help="also a page of Markdown")
+    parser.add_argument("--page", type=pathlib.Path, metavar="FILE", help="also write a page of Markdown")
     return parser
 
 

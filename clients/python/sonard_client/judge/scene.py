@@ -125,7 +125,7 @@ class Scene:
 
     @property
     def reads_pings(self) -> bool:
-        """Whether the truth can be read from the wire: there is a capture, and a reader of the make's protocol."""
+        """True if the truth can be read from the wire: there is a capture, and a reader of the make's protocol."""
         return self.capture is not None and self.make is not None
 
     def say(self, what: str) -> None:

@@ -100,7 +100,7 @@ class Connection:
 
 class DatagramFlow(Connection):
     """Datagrams between the sonar and one port of the driver, or of a group. It begins with the driver's first one, or with the
-    first of a ping that the sonar pushes; nothing says that it ends. What was on the wire counts as delivered: UDP has no
+    first of a ping that the sonar pushes; its end is not visible. Data on the wire count as delivered, because UDP has no
     acknowledgement."""
 
     def __init__(self, number: int, peer: str, mono: float, reader: Reader) -> None:
@@ -181,7 +181,7 @@ class Capture(threading.Thread):
             pass
 
     def mark(self) -> None:
-        """Marks the begin of the fault. The packets kept until now stay; after them only a limited number of bytes is kept."""
+        """Marks the start of the fault. The packets kept until now stay; of later packets only a limited number of bytes is kept."""
         with self._lock:
             self._marked = True
 
