@@ -10,8 +10,8 @@ const now_s = () => performance.now() / 1000;
 const sameLine = (a, b) => a.ns === b.ns && a.message === b.message && a.name === b.name && a.level === b.level;
 const beginsWith = (lines, beginning) => beginning.every((line, i) => sameLine(line, lines[i]));
 
-/// A new connection repeats the last lines of the log, then sends new ones. Returns the lines of `came` that are new: all
-/// except the longest beginning that equals an end of `known`. Returns null while that is undecided.
+/// A new connection repeats the last lines of the log, then sends new ones. Returns the new lines of `came`: all lines after the
+/// longest beginning that equals an end of `known`. Returns null while that is undecided.
 function linesAfter(known, came) {
   const last = known.slice(-replayed_lines);
   for (let at = 0; at < last.length; at++) {
@@ -56,14 +56,14 @@ export class Facts {
     this.history = [];  // {time_s, rate} of pings made, the last minute
     this.droppedAt = new Map();  // client -> time (now_s) of the last increase of its drops
     this.drops = new Map();
-    this.movedAt = now_s();  // when the daemon's time last moved
+    this.movedAt = now_s();  // time of the last change of the daemon's time
     this.now_ns = null;
     this.now_at = now_s();
   }
 
   opened(info) {
     const same = this.info?.sessionId === info.sessionId;
-    const daemonOf = (one) => one?.sessionId.split('-')[0];  // what follows counts its sessions
+    const daemonOf = (one) => one?.sessionId.split('-')[0];  // the rest counts its sessions
     if (this.connection !== 'open') this.replayed = daemonOf(this.info) === daemonOf(info) ? [] : null;
     this.info = info;
     this.connection = 'open';
@@ -105,7 +105,8 @@ export class Facts {
   get linesByPing() {
     return ['sweep', 'waterfall'].includes(this.pictureKind);
   }
-  /// The measured rate of the pings that the page shows; of previews from their numbers, before the next status. Older daemons send none.
+  /// The measured rate of the pings that the page shows. The rate of previews is computed from their numbers until the next
+  /// status. Older daemons send no rate.
   get madeRate() {
     return this.preview ? this.numbered.rate : this.sonarStatus?.figures?.made_hz ?? this.rate;
   }
@@ -221,7 +222,7 @@ export class Facts {
     const before = this.vehicle;
     this.status = status;
     if (!this.vehicle?.stale) this.staleSince = undefined;
-    else if (before && !before.stale) this.staleSince = now_s();  // unknown to a page that was opened later
+    else if (before && !before.stale) this.staleSince = now_s();  // a page that was opened later does not know it
     this.clock = status.clock || this.clock;
     this.setTime(status.now_ns || ns);
     if (!status.sonars.some((s) => s.name === this.sonar)) this.sonar = status.sonars[0]?.name ?? '';

@@ -117,7 +117,8 @@ function showAllEchoes(threshold) {
   allEchoesOf = wanted;
 }
 
-// Canvases are drawn in frame() alone: after any other task that draws, the browser waits for the graphics, and clicks wait with it.
+// Canvases are drawn only in frame(). After any other task that draws, the browser waits for the graphics, and clicks would wait
+// too.
 function draw() {
   const now = notice.draw();
   fan.setMood(now ? now.picture : 'fresh');

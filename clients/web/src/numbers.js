@@ -16,5 +16,5 @@ export const countdown = (seconds) => {
   return `${Math.floor(left / 60)}:${String(left % 60).padStart(2, '0')}`;
 };
 export const frequency = (hz) => (!known(hz) || hz <= 0 ? dash : hz >= 1e6 ? `${short(hz / 1e6, 1)} MHz` : `${short(hz / 1e3, 0)} kHz`);
-/// 600 kHz and 12.5 kbit/s are both "of a thousand": bits a second as Mbit/s with a digit more below one.
+/// Bits per second as Mbit/s; values below one have one more digit.
 export const megabits = (bits) => (known(bits) ? fixed(bits / 1e6, bits < 1e6 ? 2 : 1) : dash);

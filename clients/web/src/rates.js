@@ -29,7 +29,7 @@ export class Counter {
   }
 }
 
-/// One counter a name; names that are no longer read are dropped.
+/// One counter per name; names that are no longer read are removed.
 export class Counters {
   counters = new Map();
   update(time_s, counts) {

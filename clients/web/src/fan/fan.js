@@ -34,7 +34,7 @@ export class Fan {
     this.gain = 1;
     this.rings = !exact && this.remembered.rings;
     this.cost_ms = 0;
-    this.quality = 2;  // 2: footprint mean; 1: one sample a pixel; 0: also half resolution
+    this.quality = 2;  // 2: mean over the footprint; 1: one sample per pixel; 0: also half resolution
     this.useMap(this.remembered.map);
     const observer = new ResizeObserver(() => this.resize());
     for (const id of ['fan-pane', 'fan-top', 'fan-controls']) observer.observe($(id));
@@ -58,7 +58,7 @@ export class Fan {
     return Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
   }
 
-  /// How samples become shades; daemons before it sent linear ones.
+  /// The conversion of samples to shades. Older daemons do not send it; their samples are linear.
   get shades() {
     const { gamma, per_mille } = this.facts.pictures.get(this.facts.sonar) ?? {};
     return { gamma: gamma || 1, per_mille: per_mille || 999 };
@@ -192,7 +192,7 @@ export class Fan {
   }
   painted = 0;
 
-  /// On slow machines a picture takes one sample a pixel, then also half the pixels.
+  /// On slow machines a picture uses one sample per pixel, then also half of the pixels.
   adapt(ms) {
     this.cost_ms = this.cost_ms ? 0.6 * this.cost_ms + 0.4 * ms : ms;
     const worst = this.quality === 2 ? slow_ms : very_slow_ms;

@@ -90,8 +90,8 @@ export function beamTable(azimuth_rad) {
   return { first, last, beams };
 }
 
-/// Samples of the image as a typed array, and the code that is drawn brightest: as in `sonarctl view`. Of a thousand wide samples,
-/// `per_mille` do not exceed it.
+/// Samples of the image as a typed array, and the code that is drawn brightest, as in `sonarctl view`. If samples have more than
+/// 8 bits, `per_mille` of a thousand samples do not exceed this code.
 export function samplesOf(image, per_mille) {
   const { data, encoding } = image;
   const at = data.byteOffset;

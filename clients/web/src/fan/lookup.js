@@ -11,7 +11,7 @@ export class LookupPainter {
     this.g = canvas.getContext('2d', { alpha: false });
   }
 
-  /// Returns how many pixels to draw in a CSS pixel, so that a picture of this size is drawn quickly.
+  /// Returns the number of pixels per CSS pixel with which a picture of this size is drawn quickly.
   ratio({ width, height }, ratio) {
     return width * height * ratio ** 2 < most_pixels ? ratio : 1;
   }

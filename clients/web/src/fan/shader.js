@@ -5,7 +5,7 @@ const vertex = `#version 300 es
 in vec2 corner;
 void main() { gl_Position = vec4(corner, 0.0, 1.0); }`;
 
-// SINGLE: one sample a pixel, for slow machines. Rows and beams of large footprints are read with a stride.
+// SINGLE: one sample per pixel, for slow machines. Rows and beams of large footprints are read with a stride.
 const fragment = (single, sampler) => `#version 300 es
 precision highp float;
 precision highp ${sampler};

@@ -5,7 +5,7 @@ import {
 } from 'three.module.js';
 import { table_entries } from '../fan/layout.js';
 
-/// A box of about a small vehicle's size with a cone ahead; hollow() while it has no poses.
+/// A box of the size of a small vehicle, with a cone at the bow; hollow() is called while it has no poses.
 export function makeVehicle() {
   const group = new Group();
   const paint = new MeshPhongMaterial({ color: 0xe0a526, shininess: 20 });

@@ -101,7 +101,7 @@ export class Camera {
     this.camera.lookAt(target);
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld();
-    this.view = azimuth + Math.PI;  // its direction, counter-clockwise from east
+    this.view = azimuth + Math.PI;  // direction of the camera, counter-clockwise from east
   }
 }
 

@@ -191,7 +191,7 @@ export class Scene {
     gl.flush();
   }
 
-  /// Whether the last frame is drawn; never waits for it. On slow machines the scene takes half of the pixels, and leaves most of the
+  /// True if the last frame is drawn; never waits for it. On slow machines the scene takes half of the pixels, and leaves most of the
   /// time to the rest of the page.
   finished(now) {
     if (!this.fence) return true;

@@ -171,7 +171,7 @@ export class Connection {
     if (frame?.op !== 'data') return;
     const channel = this.subscriptions.get(frame.subscription);
     if (!channel) return;
-    // Here, for most channels are never subscribed to.
+    // Parsed here, because most channels are never subscribed to.
     channel.types ??= readDescriptors(Uint8Array.from(atob(channel.schema), (c) => c.charCodeAt(0)));
     this.on.message(channel.topic, decode(channel.types, channel.schemaName, frame.payload), frame.ns);
   }

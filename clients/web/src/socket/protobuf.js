@@ -92,7 +92,7 @@ export function readDescriptors(bytes) {
 // Wrapper types such as google.protobuf.DoubleValue hold one value. A field that is absent is decoded as null: no value was given.
 const isWrapper = (type) => /^google\.protobuf\.(Double|Float|U?Int(32|64)|Bool|String)Value$/.test(type);
 
-/// `bytes` as an object of the type. Messages that are not there are null, lists empty.
+/// `bytes` as an object of the type. Absent messages are null, absent lists are empty.
 export function decode(types, type, bytes) {
   const fields = types.get(type);
   if (!fields) throw new Error(`the descriptors do not hold ${type}`);
