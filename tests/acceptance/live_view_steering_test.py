@@ -115,7 +115,7 @@ class Steering(unittest.TestCase):
             with Viewer(daemon.address, headers={"Origin": "https://look.example"}) as looker:
                 looker.greeted().wait_for(lambda kind, word: kind == "word" and word["op"] == "advertiseServices")
                 failure, kind = looker.call("/sonard/step", b'{"dt_s": 0.5}')
-                self.assertIn("may only look", failure["message"])
+                self.assertIn("is read-only", failure["message"])
                 self.assertEqual(looker.set("/front/range_m", 5), 10)
 
 
@@ -241,7 +241,7 @@ class Playback(unittest.TestCase):
             with Viewer(daemon.address, path="/?playback=rov", headers={"Origin": "https://look.example"}) as looker:
                 looker.greeted()
                 self.assertEqual(self.control(looker, "x", pause=True)["state"], "playing")
-                self.assertIn("may only look", looker.words[-1]["message"])
+                self.assertIn("is read-only", looker.words[-1]["message"])
             with Viewer(daemon.address, path="/?playback=nothing") as viewer:
                 self.assertIn("nothing", viewer.greeted().status()["message"])
                 self.assertNotIn("playbackControl", viewer.info["capabilities"])

@@ -32,7 +32,7 @@ STATES = {  # of the mock -> the page's name of it, what the user reads, the but
     "no pose": ("fine", "rov stands where it was", ""),
     "slow engine": ("fine", " of 10 Hz: computing takes 138 ms", ""),
     "fault": ("fine", "Thin tether", ""),
-    "look only": ("fine", "look only", ""),
+    "look only": ("fine", "read-only", ""),
 }
 
 
@@ -210,7 +210,7 @@ class Page(PageChecks, unittest.TestCase):
         page.press(" ")
         time.sleep(0.5)
         self.assertEqual(self.mock.set_calls, [])
-        self.assertEqual(page.run("document.querySelector('#troubles button').title"), "this page may only look")
+        self.assertEqual(page.run("document.querySelector('#troubles button').title"), "this page is read-only")
 
     def test_faults_begin_and_are_cleared(self):
         page = self.open()

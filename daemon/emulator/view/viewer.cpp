@@ -50,7 +50,7 @@ void Viewer::on_binary(wire::BytesView frame, Moment now) {
   }
   const auto* call = std::get_if<foxglove::ServiceCall>(&*read);
   ++open_calls_;
-  if (!rights_.may_steer) return fail(*call, may_only_look);
+  if (!rights_.may_steer) return fail(*call, read_only);
   if (open_calls_ > most_calls) return fail(*call, "4 calls are open already");
   if (call->encoding != "json") return fail(*call, "the encoding of services is json");
   host_.call(*this, *call);
@@ -106,7 +106,7 @@ void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
   std::vector<std::string> names;
   for (const foxglove::Parameter& wanted : word.parameters) {
     names.push_back(wanted.name);
-    const std::string why = rights_.may_steer ? host_.set_parameter(*this, wanted) : may_only_look;
+    const std::string why = rights_.may_steer ? host_.set_parameter(*this, wanted) : read_only;
     const std::string name = wanted.name.substr(0, longest_name_said);
     if (!why.empty()) show_for_now(name + ": " + why, "param:" + name, now, refusal_is_shown_for);
     if (!rights_.may_steer) break;  // one error is enough

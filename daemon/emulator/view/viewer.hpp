@@ -89,7 +89,7 @@ class Viewer {
     double most_hz = 0;  // limit for the rate of pictures; 0 = none
   };
   enum class CloseCode : std::uint16_t { none = 0, policy = 1008, try_again_later = 1013 };
-  static constexpr const char* may_only_look = "this connection may only look";
+  static constexpr const char* read_only = "this connection is read-only";
   static constexpr std::size_t most_subscriptions = 256, most_words = 256, most_word_bytes = std::size_t{1} << 20, most_calls = 4;
 
   /// `who`: the viewer's address, for the log.

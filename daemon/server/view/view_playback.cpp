@@ -51,7 +51,7 @@ void ViewFeed::watch_playback(const Viewer* but) {
 bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) {
   auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return false;
-  std::string why = viewer.may_steer() ? "" : Viewer::may_only_look;
+  std::string why = viewer.may_steer() ? "" : Viewer::read_only;
   if (why.empty()) {
     control::SetTrajectory op;
     op.of = control::PoseSample::Of::vehicle;

@@ -34,7 +34,7 @@ export function drawDoctor(facts, steering) {
     if (bad.length === 0) return [item({ level: 0, text: 'Nothing is in the way of a driver.', cure: '' })];
     return bad.map((finding) => {
       const fault = ofFault(finding);
-      const clear = fault && make('button', { class: 'link', onclick: () => steering.clear(fault), disabled: !facts.maySteer, title: facts.maySteer ? `ends ${titleOf(troubleOf(fault))}` : 'this page may only look' }, 'Clear it');
+      const clear = fault && make('button', { class: 'link', onclick: () => steering.clear(fault), disabled: !facts.maySteer, title: facts.maySteer ? `ends ${titleOf(troubleOf(fault))}` : 'this page is read-only' }, 'Clear it');
       return item(finding, clear);
     });
   });

@@ -60,7 +60,7 @@ function button({ name, trouble }, facts, able, steering) {
   ];
   return make(
     'button',
-    { 'data-trouble': trouble, onclick: () => steering.start(name, $('fault-seconds').value), disabled: !able || Boolean(cannot), title: able ? '' : 'this page may only look' },
+    { 'data-trouble': trouble, onclick: () => steering.start(name, $('fault-seconds').value), disabled: !able || Boolean(cannot), title: able ? '' : 'this page is read-only' },
     make('b', {}, titleOf(trouble)),
     make('small', {}, notes.filter(Boolean).join(' ')),
   );
@@ -68,7 +68,7 @@ function button({ name, trouble }, facts, able, steering) {
 
 export function drawFaults(facts, steering) {
   const armed = facts.armed ?? facts.value('/faults/armed') ?? facts.status?.faults_armed;
-  setText($('armed'), armed === undefined ? '–' : !armed ? 'not armed' : facts.maySteer ? 'armed' : 'look only');
+  setText($('armed'), armed === undefined ? '–' : !armed ? 'not armed' : facts.maySteer ? 'armed' : 'read-only');
   const groups = activeTroubles(facts);
   const list = $('active-faults');
   showList(list, groups.map((g) => [g.trouble, g.sonar, g.by, facts.troubles.size]), () => groups.map((g) => card(g, facts.troubles.get(g.trouble))));

@@ -30,7 +30,7 @@ export class Notice {
     setHidden(button, !now?.button);
     setText(button, now?.button?.label ?? '');
     button.disabled = !facts.maySteer;
-    button.title = facts.maySteer ? '' : 'this page may only look';
+    button.title = facts.maySteer ? '' : 'this page is read-only';
     const badges = badgesOf(facts);
     showList($('badges'), badges, () => badges.map((b) => make('span', { class: `chip ${b.level}`, title: b.title }, b.level === 'warning' ? sign('warning') : null, b.text)));
     return now;

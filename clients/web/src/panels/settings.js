@@ -74,7 +74,7 @@ export function drawSettings(facts, steering) {
   if ($('measured')) setText($('measured'), facts.recording ? dash : `${fixed(facts.madeRate, 1)} ${facts.rateUnit}`);
   for (const field of box.querySelectorAll('input, select')) {
     field.disabled = !able;
-    field.title = able ? '' : 'this page may only look';
+    field.title = able ? '' : 'this page is read-only';
     const value = facts.value(field.name);
     const text = value === 0 && field.placeholder ? '' : typeof value === 'number' ? short(value, 2) : String(value ?? '');
     if (document.activeElement !== field && field.value !== text) field.value = text;

@@ -77,7 +77,7 @@ export class Timeline {
     setText(play, paused ? '▶' : '❚❚');
     const label = paused ? 'Play' : 'Pause';
     if (play.getAttribute('aria-label') !== label) play.setAttribute('aria-label', label);
-    play.title = able ? `${label} (space)` : 'this page may only look';
+    play.title = able ? `${label} (space)` : 'this page is read-only';
     setText($('timeline-name'), `${facts.vehicle.name} · ${trajectory.file.replace(/^.*\//, '')}`);
     const bar = $('position');
     if (Number(bar.max) !== trajectory.duration_s) bar.max = trajectory.duration_s;

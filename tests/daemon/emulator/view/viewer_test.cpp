@@ -181,7 +181,7 @@ TEST_F(OneViewer, WhoMayOnlyLookSteersNothing) {
   Viewer looker(host, {false, 0}, "127.0.0.1");
   looker.on_text(R"({"op": "setParameters", "parameters": [{"name": "/front/range_m", "value": 5}]})", now);
   EXPECT_EQ(host.values["/front/range_m"], foxglove::Value(10.0));
-  EXPECT_THAT(text_of(*looker.next(now)), testing::HasSubstr("may only look"));
+  EXPECT_THAT(text_of(*looker.next(now)), testing::HasSubstr("is read-only"));
   EXPECT_THAT(text_of(*looker.next(now)), testing::HasSubstr("10.0"));
   looker.on_binary(foxglove::encode(foxglove::ServiceCall{1, 2, "json", "{}"}), now);
   EXPECT_TRUE(host.calls.empty());
