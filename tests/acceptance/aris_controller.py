@@ -36,7 +36,7 @@ def read_varint(data, at):
 
 
 def fields(data):
-    """{number: [values]} of a message, without the missing numbers."""
+    """Returns {number: [values]} of a message; numbers that are missing in it are left out."""
     found, at = {}, 0
     while at < len(data):
         key, at = read_varint(data, at)
@@ -78,7 +78,7 @@ class Frame:
         return struct.unpack_from("<f", self.header, at)[0]
 
     def brightest(self, beams, near_m, far_m):
-        """(range, beam) of the largest sample in a window."""
+        """Returns (range, beam) of the largest sample in a window."""
         start, length = self.f32(52), self.f32(56)
         rows = [s for s in range(self.samples) if near_m <= start + s * length / self.samples <= far_m]
         _, row, beam = max((self.picture[row * self.beams + beam], row, beam) for row in rows for beam in beams)

@@ -23,7 +23,7 @@ LENSES = {48: (15.879, -2.384), 96: (16.135, -2.404), 64: (15.024, -0.128), 128:
 
 
 def bearing_deg(beam, beams=128):
-    """Clockwise."""
+    """Azimuths are clockwise."""
     a, b = LENSES[beams]
     x = 2 * beam / (beams - 1) - 1
     return -(a * x + b * x ** 3)

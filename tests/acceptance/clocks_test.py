@@ -1,5 +1,6 @@
-"""Tests clocks that programs advance. lockstep: a program sends a pose, requests a step, and receives every ping due in it. follow: a
-simulator stamps its poses and waits for each answer. Both give the same bytes in every run, independent of the wall clock."""
+"""Tests clocks that programs advance. lockstep: a program sends a pose, requests a step, and receives every ping due in it.
+follow: a simulator stamps its poses and waits for each answer. Both give the same bytes in every run, independent of the wall
+clock."""
 import re
 import signal
 import socket
@@ -107,7 +108,7 @@ class Clocks(unittest.TestCase):
             self.assertIn("only with clock: lockstep", result.stderr)
 
     def test_a_step_ends_with_its_connection(self):
-        """The client of a long step leaves; time stands again, for every way to ask for a step."""
+        """The client of a long step disconnects; then time stops again. Tested for every way to request a step."""
         def by_http(daemon, _where):
             asking = socket.create_connection((daemon.address, 8088))
             body = b'{"dt_s": 3000}'

@@ -10,7 +10,7 @@ FOLDER = ROOT / "clients/sonarctl/completion"
 
 
 def complete(program, *words):
-    """The words that bash offers for the last word."""
+    """Returns the words that bash offers for the last word."""
     line = " ".join([program, *words])
     script = f"""
 source "{FOLDER / program}"

@@ -36,7 +36,7 @@ def setup_packages():
 
 
 def ignored(path):
-    """What docker does with a file of the tree: the last line that matches it, or a folder that it is in, decides."""
+    """True if docker ignores a file of the tree: the last line that matches the file, or a folder above it, decides."""
     path, decided = pathlib.PurePosixPath(path), False
     for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines():
         anywhere, pattern = "**/" in line, line.lstrip("!").removeprefix("**/")
@@ -97,7 +97,7 @@ class Container(unittest.TestCase):
 
     @unittest.skipIf(shutil.which("hadolint") is None, "hadolint is not here")
     def test_hadolint_finds_nothing(self):
-        result = run("hadolint", "--ignore", "DL3008", FILE)  # versions are the release's
+        result = run("hadolint", "--ignore", "DL3008", FILE)  # DL3008 demands fixed versions; the release determines ours
         self.assertEqual(result.returncode, 0, result.stdout)
 
 

@@ -63,7 +63,7 @@ def post(host, path, message, headers=None):
 
 
 class Page(unittest.TestCase):
-    """Runs the examples in order, on one daemon."""
+    """Runs the examples in order with one daemon."""
 
     def run_examples(self, run_one):
         daemon = Sonard(profile="oculus-m1200d", trajectory="way.csv", more="recording: {folder: .}",

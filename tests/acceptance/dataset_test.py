@@ -1,4 +1,5 @@
-"""Tests `sonard dataset`: killed and run again, on a full disk, read by the loader of docs/datasets.md, and used for learning."""
+"""Tests `sonard dataset`: the run is killed and repeated, the disk is full, the loader of docs/datasets.md reads the set, and a
+model learns from it."""
 import hashlib
 import json
 import pathlib
@@ -43,7 +44,8 @@ def features(samples):
 
 
 def learned(x, y):
-    """Logistic regression by Newton's method, with equal total weights of things and of the rest. Returns the weight of each feature."""
+    """Logistic regression by Newton's method, with equal total weights of things and of the rest. Returns the weight of each
+    feature."""
     x = np.column_stack([x, np.ones(len(x))])
     counts = np.where(y, 0.5 / y.mean(), 0.5 / (1 - y.mean()))
     weights = np.zeros(x.shape[1])
@@ -224,7 +226,7 @@ class Dataset(unittest.TestCase):
         (x, y), (x_test, y_test) = sets
         score = x_test @ learned(x, y)
         share = y_test.mean()
-        found = score > np.quantile(score, 1 - share)  # as many samples as there are of things
+        found = score > np.quantile(score, 1 - share)  # as many samples as belong to things
         iou = (found & y_test).sum() / (found | y_test).sum()
         chance = share / (2 - share)
         print(f"intersection over union {iou:.3f}, by chance {chance:.3f}")

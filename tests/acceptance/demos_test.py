@@ -1,5 +1,5 @@
-"""Tests all demos at the same time: each previews while a viewer looks, stops for a driver, resumes after it, and shows echoes. The page
-shows the product's kind of picture, with nothing over it, and all controls can be reached and used by keys.
+"""Tests all demos at the same time: each previews while a viewer looks, stops for a driver, resumes after it, and shows echoes.
+The page shows the product's kind of picture, with nothing over it, and all controls can be reached and used by keys.
 
 The page's part is skipped without browser or page. SONARD_SHOTS names a folder for pictures.
 """
@@ -53,7 +53,7 @@ def demo(maker):
 
 
 def product_of(daemon):
-    """As sonard prints it when it starts."""
+    """The text that sonard prints when it starts."""
     return re.search(r"^sonar +front +(.+?)  ", daemon.log(), re.MULTILINE).group(1)
 
 
@@ -190,7 +190,7 @@ class EachDemo(PageChecks, unittest.TestCase):
         page.wait(UNCOVERED)
         page.wait(f"document.querySelector('#sonar').selectedOptions[0]?.textContent === 'front · {product}'")
         self.assertLessEqual(page.run(LACKING_PX), 0)
-        word = "pinging" if maker == "3d15" else "preview"  # which has a multicast group to send to
+        word = "pinging" if maker == "3d15" else "preview"  # this demo sends to a multicast group
         page.wait(f"document.querySelector('#rate-word').textContent === '{word}'")
         self.every_control_can_be_reached(page, width, by_finger=maker == "oculus")  # the tabs are the same in every demo
         page.run("document.querySelector('#tabs [data-tab=fan]').click()")
@@ -203,7 +203,7 @@ class EachDemo(PageChecks, unittest.TestCase):
                 (page.touch if by_finger else page.click)(f"#tabs [data-tab={tab}]")
                 page.wait(f"document.body.dataset.tab === '{tab}'")
             page.run(NOTE_FOCUSED)
-            for _ in range(3):  # a message of the daemon may make controls anew, and the way begins again
+            for _ in range(3):  # a message of the daemon may replace controls; then the search starts again
                 wanted = set(page.run(CONTROLS))
                 page.press("Tab", len(wanted) + 5)
                 unreached = wanted - set(page.run(REACHED))
@@ -237,7 +237,7 @@ class Pages(PageChecks, unittest.TestCase):
                         driver.terminate()
 
     def test_wide_samples_are_as_bright_as_sonard_draws_them(self):
-        """Of makes that have shades of their own; on the graphics processor, and without."""
+        """Tests makes that have shades of their own, with and without the graphics processor."""
         for maker, script in (("m3", ""), ("blueview", ""), ("m3", WITHOUT_WEBGL)):
             with self.subTest(demo=maker, webgl=not script), demo(maker), Viewer(HTTP) as viewer:
                 viewer.greeted().subscribe("/front/fan")
@@ -248,7 +248,7 @@ class Pages(PageChecks, unittest.TestCase):
                 fans = {}
 
                 def of_one_ping():
-                    """Waits until the page has a ping whose picture the viewer also got."""
+                    """Waits until the page has a ping whose picture the viewer has received too."""
                     page.run("sonardTest.fan.frozen = false")
                     _, ns, data = viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/fan")
                     fans[float(ns)] = data

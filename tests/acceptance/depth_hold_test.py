@@ -1,4 +1,5 @@
-"""Tests the distances that an autopilot gets from an altimeter by MAVLink: a controller requests them, and holds its altitude by them."""
+"""Tests the distances that an autopilot gets from an altimeter by MAVLink: a controller requests them, and holds its altitude by
+them."""
 import pathlib
 import re
 import socket
@@ -31,7 +32,7 @@ objects:
 
 
 class Autopilot:
-    """A UDP port that sonard dials, or that sends first to `peer`, a listening link of sonard."""
+    """A UDP port to which sonard sends first, or that sends first to `peer`, a listening link of sonard."""
 
     def __init__(self, peer=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -74,7 +75,7 @@ def sonard(port, folder, distance_sensor="true", link="udpout:127.0.0.1", **opti
 
 
 def dropped(daemon):
-    """Distances of the only link that were not sent, by reason, which status and metrics count alike."""
+    """Returns the counts of unsent distances of the only link, by reason. Status and metrics must agree."""
     with urllib.request.urlopen(f"http://{daemon.address}:8088/metrics", timeout=60) as answer:
         metrics = answer.read().decode()
     reasons = {reason: int(count) for reason, count in

@@ -1,4 +1,5 @@
-"""Tests that runs in stepped time give equal bytes with any number of threads: for one sonar, and for a vehicle with three makes."""
+"""Tests that runs in stepped time give equal bytes with any number of threads: for one sonar, and for a vehicle with three
+makes."""
 import hashlib
 import json
 import math
@@ -51,7 +52,7 @@ class Determinism(unittest.TestCase):
 
 
 def way():
-    """A dive around the middle of the harbour, facing it: CSV lines every 0.2 s."""
+    """A dive around the middle of the harbour, with the bow towards it: a CSV line every 0.2 s."""
     lines = ["# frame: ENU_FLU", "t_s,x_m,y_m,z_m,yaw_deg"]
     for step in range(11 + round(5 * STEPS * STEP_S)):
         turned = math.radians(4 * step / 5)
@@ -71,8 +72,8 @@ def read_all(link, to):
 
 
 class SuiteRun:
-    """Runs the example and compares the bytes of its three ports and its link, and sonard's recordings. Status datagrams and MAVLink's
-    heartbeats depend on the wall clock and are not compared."""
+    """Runs the example and compares the bytes of its three ports and its link, and sonard's recordings. Status datagrams and
+    MAVLink's heartbeats depend on the wall clock and are not compared."""
 
     PORTS = {"front": (("127.0.0.2", 52100), fire_message(version=2, rate_hz=10, range_=5)),
              "dvl": (("127.0.0.3", 16171), b'{"command":"get_config"}'),
@@ -97,7 +98,7 @@ class SuiteRun:
         for file, sonar in self.RECORDED.items():
             control.start_recording(file, sonar)
         autopilot.socket.sendto(autopilot.speak("HEARTBEAT", type=12, autopilot=3, mavlink_version=3), autopilot.peer)
-        assert autopilot.command(511, 0) == 0  # each ping's distance
+        assert autopilot.command(511, 0) == 0  # requests a distance for each ping
         self.received, links, readers = {sonar: bytearray() for sonar in self.PORTS}, [], []
         for sonar, (at, request) in self.PORTS.items():
             links.append(socket.create_connection(at, PATIENCE_S))
@@ -105,7 +106,7 @@ class SuiteRun:
             readers.append(threading.Thread(target=read_all, args=(links[-1], self.received[sonar])))
             readers[-1].start()
         eventually(lambda: {sonar["name"]: [client["bytes_read"] for client in sonar["clients"]] for sonar in control.status()["sonars"]}
-                   == {sonar: [len(request)] for sonar, (_, request) in self.PORTS.items()})  # so time may pass
+                   == {sonar: [len(request)] for sonar, (_, request) in self.PORTS.items()})  # so that time can advance
         self.pings = sum(control.step(STEP_S)["pings"] for _ in range(STEPS))
         self.distances = [tuple(sorted(message.items())) for message in autopilot.arrived()]
         control.stop_recording()

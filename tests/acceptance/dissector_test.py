@@ -1,7 +1,8 @@
-"""Tests the Wireshark dissector (protocol/oculus/oculus.lua) with tshark: three decoders in three languages must read the same values.
+"""Tests the Wireshark dissector (protocol/oculus/oculus.lua) with tshark: three decoders in three languages must read the same
+values.
 
-Every field of every message is compared with a reader in Python (oculus_fields) and with our own decoder (dump_oculus): in a run recorded
-from sonard, in the hand-made golden messages, and in captured pings of a real device if SONARD_CAPTURES is set.
+Every field of every message is compared with a reader in Python (oculus_fields) and with our own decoder (dump_oculus): in a run
+recorded from sonard, in the hand-made golden messages, and in captured pings of a real device if SONARD_CAPTURES is set.
 """
 import json
 import os
@@ -27,7 +28,7 @@ from record import record  # noqa: E402  the folder above
 GOLDEN = ROOT / "tests/protocol/oculus/golden"
 WHY_NOT = why_not()
 FLAGS = ["rangeInMetres", "samples16Bit", "rowGains", "simpleResult", "gainAssist", "lowPower", "beams512", "networkTrigger"]
-JUNK = b"\0S\0SO" + b"\xff" * 20 + b"S"  # half and whole ids; the last byte runs into the header behind it
+JUNK = b"\0S\0SO" + b"\xff" * 20 + b"S"  # half and whole ids; the last byte is directly before a header
 ASK_CONFIG = HEADER.pack(0x4F53, 0, 0, 0x55, 0, 12, 0) + bytes(12)
 
 
@@ -158,7 +159,8 @@ class RecordedRun(Dissected):
         dict(mode=2, version=2, flags=0x4F, extended=0x200, range_=0.5)]
 
     def record(self, daemon):
-        """[(sender, [messages])] of a conversation with the shipped daemon, and a status datagram while a client is there."""
+        """Returns [(sender, [messages])] of a conversation with the shipped daemon, and a status datagram while a client is
+        connected."""
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener, Client(daemon.address) as client:
             listener.bind((daemon.address, 52102))
             listener.settimeout(20)
@@ -290,7 +292,7 @@ class HandMade(Dissected):
 
 
 class Malformed(Dissected):
-    """No bytes make the script fail (tshark() checks that), and it finds the stream again."""
+    """The script survives any bytes (tshark() checks that), and finds the next message after them."""
 
     def test_every_length_of_every_message(self):
         stream = b""
@@ -355,7 +357,7 @@ class Malformed(Dissected):
         for number, piece in enumerate(pieces(stream, [700] * 9)):
             capture.tcp("device", piece)
             if number == 1:
-                del capture.packets[-1]  # never seen by the capture
+                del capture.packets[-1]  # the capture does not contain it
         self.assertEqual(self.dissect(capture)[-1].title, "Oculus, dummy")
 
     def test_status_of_every_length_and_of_others(self):
@@ -370,7 +372,7 @@ class Malformed(Dissected):
 
 
 class Used(Dissected):
-    """As clients/wireshark/README.md describes."""
+    """Uses the dissector as clients/wireshark/README.md describes."""
 
     def capture(self, **settings):
         capture = Capture(**settings)

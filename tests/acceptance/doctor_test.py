@@ -1,4 +1,4 @@
-"""sonarctl doctor with a healthy daemon, without a daemon, with a busy one, and with ports that other programs use."""
+"""Tests sonarctl doctor with a healthy daemon, without a daemon, with a busy one, and with ports that other programs use."""
 import json
 import os
 import pathlib
@@ -126,8 +126,8 @@ class Doctor(unittest.TestCase):
             self.assertTrue(driver.recv(16))
 
     def examine_driver(self, daemon, port, sent):
-        """Runs doctor beside a driver that has sent these bytes, after the daemon has handled them. Returns the findings, and whether the
-        driver was still connected."""
+        """Runs doctor beside a driver that has sent these bytes, after the daemon has handled them. Returns the findings, and
+        whether the driver was still connected."""
         with socket.create_connection((daemon.address, port), 10) as driver:
             driver.sendall(sent)
             own = f":{driver.getsockname()[1]}"

@@ -11,7 +11,7 @@ from running_sonard import Sonard
 PORT, SERIAL_PORT, PATIENCE_S = 16171, 4001, 120
 DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
 ORBIT_MPS, RADIUS_M = 0.5, 7
-IDS = {(-1, 1): 0, (-1, -1): 1, (1, -1): 2, (1, 1): 3}  # of beams, by the signs of forward and starboard
+IDS = {(-1, 1): 0, (-1, -1): 1, (1, -1): 2, (1, 1): 3}  # ids of beams, by the signs of their forward and starboard components
 
 
 class Driver:
@@ -132,7 +132,7 @@ class Velocity(unittest.TestCase):
 
     def test_pings_are_triggered_while_acoustics_are_disabled(self):
         self.driver.set(acoustic_enabled=False)
-        self.driver.next("position_local")  # a ping that was under way is over
+        self.driver.next("position_local")  # a ping in progress is finished then
         before = self.driver.velocities
         for _ in range(3):
             self.assertTrue(self.driver.command("trigger_ping")["success"])

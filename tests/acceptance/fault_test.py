@@ -1,4 +1,5 @@
-"""Tests `sonarctl fault` with a running daemon: a fault acts on a connection, is listed, written to the journal, recorded, and ends."""
+"""Tests `sonarctl fault` with a running daemon: a fault acts on a connection, is listed, written to the journal, recorded, and
+ends."""
 import json
 import pathlib
 import signal
@@ -51,7 +52,7 @@ class Faults(unittest.TestCase):
         self.assertNotIn("cut", self.listed())
         socket.create_connection((self.daemon.address, 52100), 10).close()
         self.refuses(65, ("remove", "cut"), 'no fault "cut"')
-        for name in ("silent-open", "L05"):  # a fault without a name is ended by the word or the code of its kind
+        for name in ("silent-open", "L05"):  # a fault without a name is ended by the name or the code of its kind
             self.does("add", "silent-open")
             self.assertRegex(self.does("list"), r"(?m)^silent-open +L05 ")
             self.does("remove", name)

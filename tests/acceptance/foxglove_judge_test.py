@@ -18,7 +18,7 @@ from running_sonard import BUILD, ROOT, Sonard, run
 
 SOURCE, PLACE = pathlib.Path(__file__).parent / "view/node", BUILD / "tests/acceptance/view-node"
 SCHEMAS = ROOT / "protocol/foxglove/schemas/foxglove.proto"
-OURS = ("EUSAGE", "EINTEGRITY", "EJSONPARSE")  # npm's codes for a wrong package.json or lock file
+OURS = ("EUSAGE", "EINTEGRITY", "EJSONPARSE")  # npm's error codes for a wrong package.json or lock file
 
 
 def install():
@@ -101,7 +101,7 @@ class Foxglove(unittest.TestCase):
     def test_channels_decode_and_the_picture_is_what_the_driver_got(self):
         with Sonard(trajectory="orbit") as daemon, Driver(daemon) as driver:
             seen = judge("channels", url(daemon))
-            time.sleep(0.5)  # the viewer may have its last picture before the driver
+            time.sleep(0.5)  # the viewer may receive its last picture before the driver does
         self.assertLessEqual({"/tf", "/scene", "/swath", "/log", "/status", "/faults", "/front/image", "/front/fan", "/front/cloud",
                               "/front/geometry", "/front/ping", "/front/figures"}, set(seen["topics"]))
         taken = driver.sums()

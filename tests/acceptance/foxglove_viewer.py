@@ -1,5 +1,5 @@
-"""A strict viewer of the live view, written without libraries from the specifications of WebSocket (RFC 6455), Foxglove and protobuf.
-It shares nothing with the C++ code. Any deviation from the specifications is an AssertionError."""
+"""A strict viewer of the live view, written without libraries from the specifications of WebSocket (RFC 6455), Foxglove and
+protobuf. It shares nothing with the C++ code. Any deviation from the specifications is an AssertionError."""
 import base64
 import hashlib
 import json
@@ -120,8 +120,8 @@ class Viewer:
         self.send_frame(1, json.dumps(word).encode())
 
     def receive(self):
-        """Stores and returns the next message: ("word", dict), ("message", (topic, ns, bytes)), ("time", ns), ("playback", dict) or
-        ("answer", ...)."""
+        """Stores and returns the next message: ("word", dict), ("message", (topic, ns, bytes)), ("time", ns), ("playback", dict)
+        or ("answer", ...)."""
         is_text, payload = self.frame()
         if is_text:
             word = json.loads(payload.decode())
@@ -185,7 +185,7 @@ class Viewer:
         return self
 
     def parameters(self, request="all", *names):
-        """Values by name; of all parameters if none is named."""
+        """Returns values by name; those of all parameters if no name is given."""
         self.say(op="getParameters", parameterNames=list(names), id=request)
         return {p["name"]: p.get("value") for p in self._values_for(request)}
 
@@ -205,7 +205,7 @@ class Viewer:
         self.send_frame(2, struct.pack("<BIII", 2, service, call, 4) + b"json" + payload)
 
     def call(self, name, payload, call=1):
-        """The answer of a service or the reason of its failure, and which of both it is."""
+        """Returns the answer of a service or the reason of its failure, and the kind: answer or failure."""
         self.request(name, payload, call)
         kinds = []
 

@@ -1,6 +1,6 @@
-"""The end and the restart of sonard, and its behaviour after signals, kill -9, full disks, closed outputs, and while it is frozen.
-Figures are recorded for the table of reliability in the folder that SONARD_RELIABILITY names. Times are asserted with room for a busy
-machine; the record states whether the promised time was met."""
+"""The end and the restart of sonard, and its behaviour after signals, kill -9, full disks, closed outputs, and while it is
+frozen. Figures are recorded for the table of reliability in the folder that SONARD_RELIABILITY names. Times are asserted with
+room for a busy machine; the record states whether the promised time was met."""
 import contextlib
 import fcntl
 import os
@@ -171,7 +171,7 @@ class Stop(unittest.TestCase):
             self.assertIn("run.oculus", daemon.log())
 
     def test_terminate_while_a_viewer_searches_a_recording(self):
-        """After the last ping the file has zeros, as after a power cut: more than can be read in the time."""
+        """After the last ping the file has zeros, as after a power cut. They are more than the player can read in time."""
         with tempfile.TemporaryDirectory() as folder, Sonard(more=f"recording: {{folder: {folder}}}") as daemon:
             file = pathlib.Path(folder, "cut.oculus")
             self.assertEqual(daemon.ctl("listen", "--record", file, "--pings", "3", "--seconds", "60", "--quiet").returncode, 0)
@@ -215,7 +215,7 @@ class Stop(unittest.TestCase):
 
 
 class Undisturbed(unittest.TestCase):
-    """A client that reads loses no ping, whatever happens to the log."""
+    """A client that reads loses no ping, even if the log cannot be written."""
 
     def stream(self, daemon, pings=12):
         reader = Reader(daemon.address)
@@ -269,7 +269,7 @@ class Undisturbed(unittest.TestCase):
 
     def test_a_reader_of_the_log_that_stays_and_does_not_read(self):
         ours, theirs = os.pipe()
-        fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page, which the banner fills
+        fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page of memory, which the banner fills
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=theirs)
         os.close(theirs)
         reader = self.stream(daemon)

@@ -126,7 +126,7 @@ def is_ping(kind, value):
 class Preview(unittest.TestCase):
     @staticmethod
     def numbers(viewer, seconds):
-        """(number, whether it is a preview) of each ping shown meanwhile."""
+        """Returns (number, True if it is a preview) of each ping that is shown in the meantime."""
         seen, deadline = [], time.monotonic() + seconds
         while time.monotonic() < deadline:  # /status is sent every second
             kind, value = viewer.receive()
@@ -155,7 +155,7 @@ class Preview(unittest.TestCase):
                 deadline = time.monotonic() + 60  # the view looks ten times a second
                 while viewer.parameters("now", "/front/preview")["/front/preview"]:
                     self.assertLess(time.monotonic(), deadline)
-                    time.sleep(0.1)  # a viewer that asks without end is closed
+                    time.sleep(0.1)  # a viewer that sends requests without a pause is disconnected
                 self.assertEqual(viewer.set("/front/preview", True), False)
                 self.assertTrue(all(not preview for _, preview in self.numbers(viewer, 1)))
             events = [viewer.decode(topic, payload) for topic, _, payload in viewer.messages if topic == "/front/ping"]
@@ -181,7 +181,7 @@ class Preview(unittest.TestCase):
 
 
 def follows_file(loop=False):
-    """Ten seconds straight ahead."""
+    """A trajectory of ten seconds, straight ahead."""
     daemon = Sonard(trajectory=f"{{file: ahead.tum, loop: {str(loop).lower()}}}", control=ORIGINS)
     lines = ["# frame: ENU_FLU", "100 -7 0 -3 0 0 0 1", "110 -6 0 -3 0 0 0 1"]
     (pathlib.Path(daemon.folder.name) / "ahead.tum").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -218,7 +218,7 @@ class Playback(unittest.TestCase):
             self.assertEqual(self.control(viewer, "c", pause=True, to_ns=2**62)["ns"], end_ns)
             self.control(viewer, "d", pause=True, to_ns=3 * self.S)
 
-            # What others steer is told; stamps are the trajectory's.
+            # Changes by other viewers are reported; stamps are those of the trajectory.
             self.assertEqual(plain.set("/rov/trajectory/position_s", 5), 5)
             moved = viewer.wait_for(lambda kind, value: kind == "playback" and value["request"] == "")
             self.assertEqual((moved["ns"], moved["did_seek"]), (5 * self.S, 1))

@@ -27,7 +27,7 @@ def refusal(*arguments, **options):
 
 
 def let_in(*arguments):
-    """A viewer, or None while there is no place for it."""
+    """Returns a viewer, or None while no slot is free."""
     try:
         return Viewer(*arguments)
     except Refused as refused:
@@ -132,7 +132,7 @@ class Channels(unittest.TestCase):
             self.assertTrue(viewer.times and viewer.times == sorted(viewer.times))
 
     def seen_of(self, viewer, topics, patience_s=60):
-        """Until all topics and some pictures have come: the messages of each topic, and the last picture with its time."""
+        """Waits for all topics and some pictures. Returns the messages of each topic, and the last picture with its time."""
         seen, last = collections.Counter(), None
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline and not (topics <= set(seen) and seen["/front/image"] >= 5):
@@ -285,7 +285,7 @@ class LookingChangesNothing(unittest.TestCase):
     PINGS = 40
 
     def run_with(self, viewers, reads=True):
-        """SHA-256 of what a driver received."""
+        """Returns the SHA-256 of the bytes that a driver received."""
         with Sonard(trajectory="orbit", arguments=["--clock", "stepped", "--digest", "--exit-after-pings", self.PINGS]) as daemon:
             connections = [Viewer(daemon.address, small_window=not reads).greeted() for _ in range(viewers)]
             for viewer in connections:
@@ -331,7 +331,7 @@ class LookingChangesNothing(unittest.TestCase):
                     viewer.greeted().subscribe("/front/image", "/front/geometry", "/tf", "/status")
                 take_pings(client, 30)
                 print(f"{(resident_kb(daemon) - before) / viewers:.0f} kB a viewer")
-                if "SONAR_SANITIZE:STRING=\n" in (BUILD / "CMakeCache.txt").read_text(encoding="utf-8"):  # sanitizers keep what was freed
+                if "SONAR_SANITIZE:STRING=\n" in (BUILD / "CMakeCache.txt").read_text(encoding="utf-8"):  # sanitizers keep freed memory
                     self.assertLess(resident_kb(daemon) - before, 2048 * viewers + picture_kb)
             daemon.stop()
             self.assertRegex(daemon.log(), r"sonar front .* 0 dropped")

@@ -1,4 +1,5 @@
-"""Tests an emulated M3 with a driver: packets of complex samples over TCP, decoded by hand-typed offsets (docs/protocols/m3.md)."""
+"""Tests an emulated M3 with a driver: packets of complex samples over TCP, decoded by hand-typed offsets
+(docs/protocols/m3.md)."""
 import cmath
 import math
 import pathlib
@@ -46,7 +47,8 @@ class Packet:
         return [(abs(self.at(j, k)), j, k) for j in beams for k in rows]
 
     def place(self, *window):
-        """Range of the strongest value; mean angle of the power, since the brightest spot of a sphere need not be its middle."""
+        """Returns the range of the strongest value and the mean angle of the power, because the brightest spot of a sphere may
+        not be in its middle."""
         levels = self.levels(*window)
         angle = sum(level**2 * self.angles[j] for level, j, _ in levels) / sum(level**2 for level, _, _ in levels)
         return self.range_of(max(levels)[2]), angle
@@ -100,7 +102,7 @@ class Stream(unittest.TestCase):
             self.assertAlmostEqual(bearing_deg, -A[1], delta=1)
 
     def test_a_phase_turns_with_the_distance(self):
-        """4 pi f / c for each metre that an echo comes nearer."""
+        """If an echo comes nearer, its phase turns by 4 pi f / c per metre."""
         moved_m, seen = 0.0003, []
         for x_m in (0, moved_m):
             with sonar(x_m, arguments=QUIET) as daemon, Driver(daemon.address) as driver:

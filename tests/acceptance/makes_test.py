@@ -1,6 +1,6 @@
-"""Every make of sonar serves and shows what it did when makes_expected.json was written, for changes that must not alter it: in
-stepped time the bytes and samples that a recording holds, the lines of `sonarctl listen`, the picture of `sonarctl view` and the
-findings of `sonarctl doctor`. The table of fault support is pinned by fault_docs_test.
+"""Checks that a change does not alter the output of any make of sonar. In stepped time it compares with makes_expected.json: the
+bytes and samples of a recording, the lines of `sonarctl listen`, the picture of `sonarctl view` and the findings of `sonarctl
+doctor`. The table of fault support is pinned by fault_docs_test.
 
 `makes_test.py --write` writes the file anew, with SONARD_BUILD set.
 """
@@ -13,7 +13,7 @@ import sys
 import unittest
 import zlib
 
-os.environ.update(SONARD_SIMD="portable", SONARD_EMBREE_ISA="sse2")  # whatever the processor: samples differ in their last digits
+os.environ.update(SONARD_SIMD="portable", SONARD_EMBREE_ISA="sse2")  # the same on every processor: samples differ in their last digits
 
 import mcap_checker  # noqa: E402
 from recording_test import Replay  # noqa: E402
@@ -30,14 +30,14 @@ MAKES = {"oculus-m1200d": (52100, "--range", 3, "--gain", 60, "--rate", 5, "--mo
          "omniscan-450": (51200, "--range", 3, "--gain", 60, "--rate", 5),
          "ping1d": (9090, "--range", 3, "--gain", 60, "--rate", 5),
          "s500": (51200, "--make", "s500", "--range", 3, "--gain", 60, "--rate", 5),
-         "dvl-a50": (16171, "--as-it-is"),  # it pings before settings come
-         "m3": (20001, "--as-it-is"),  # no settings come
+         "dvl-a50": (16171, "--as-it-is"),  # it pings before it receives settings
+         "m3": (20001, "--as-it-is"),  # it receives no settings
          "micron": (4001, "--range", 3, "--gain", 60),
          "norbit-wbms": (2210, "--range", 3, "--gain", 60, "--rate", 5)}
 PINGS = 4
 LONGEST_BEACON = 142  # bytes; beacons hold the address, which differs from run to run
 PATIENCE = ("--wait", 120)
-# Little to compute.
+# Settings that need little computing time.
 CHEAP = ["--clock", "stepped", "--threads", 1, "--fixed-fan", 2]
 for part in ("volume", "conical", "crosstalk", "shared-noise", "defocus", "uneven"):
     CHEAP += [f"--{part}", "off"]
@@ -45,7 +45,7 @@ VOLATILE = {"at_s", "rate_hz", "interval_max_ms", "interval_p50_ms", "interval_p
 
 
 def pixels_of(png):
-    """SHA-256 of the uncompressed rows: which zlib packed them does not matter."""
+    """SHA-256 of the uncompressed rows, so that the version of zlib has no influence."""
     data, at, packed = png.read_bytes(), 8, b""
     while at < len(data):
         size, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]
@@ -55,14 +55,14 @@ def pixels_of(png):
 
 
 def steady(value):
-    """Without fields that depend on the time of day."""
+    """Removes fields that depend on the time of day."""
     if isinstance(value, dict):
         return {name: steady(inner) for name, inner in value.items() if name not in VOLATILE}
     return [steady(inner) for inner in value] if isinstance(value, list) else value
 
 
 class Observed:
-    """One make, from a run of the daemon for each command."""
+    """Tests one make, with a run of the daemon for each command."""
 
     def __init__(self, profile):
         self.profile, self.seen = profile, {}
@@ -118,7 +118,7 @@ OWN_KINDS = {"oculus-m1200d": "oculus", "aris-3000": "aris", "waterlinked-3d15":
 
 
 class Recordings(unittest.TestCase):
-    """`sonarctl record` of a running sonar, and what `view` makes of its files."""
+    """Runs `sonarctl record` for a running sonar, and `view` for its files."""
 
     def ctl(self, *arguments):
         return run(SONARCTL, *arguments, patience_s=300)
@@ -128,7 +128,7 @@ class Recordings(unittest.TestCase):
             with self.subTest(profile=profile), Sonard(scene="l-targets.yaml", profile=profile, arguments=CHEAP) as daemon:
                 folder = pathlib.Path(daemon.folder.name)
                 kinds = ["mcap", "pcap"] + ([OWN_KINDS[profile]] if profile in OWN_KINDS else [])
-                pings = 210 if profile in ("ping360", "micron") else PINGS  # a picture is of a whole scan
+                pings = 210 if profile in ("ping360", "micron") else PINGS  # a picture needs a whole scan
                 outputs = [word for kind in kinds for word in (f"--{kind}", folder / f"run.{kind}")]
                 done = self.ctl("record", f"{daemon.address}:{port}", "--pings", pings, *settings, *PATIENCE, *outputs)
                 self.assertEqual(done.returncode, 0, done.stderr)
@@ -144,7 +144,7 @@ class Recordings(unittest.TestCase):
                         self.replay(folder / f"run.{kind}", port)
 
     def replay(self, path, port):
-        """`sonarctl listen` of `sonard replay`."""
+        """Runs `sonarctl listen` with `sonard replay`."""
         with Replay(path, "--loop") as replay:
             done = self.ctl("listen", f"{replay.address}:{port}", "--as-it-is" if port == 52100 else "--quiet", "--pings", 2, *PATIENCE)
             self.assertIn("pings 2", done.stdout, done.stderr + replay.text())

@@ -1,11 +1,12 @@
-"""MAVLink as a vehicle speaks it, written from the message definitions and on its own terms: fields in the order of the XML, sorted
-here; CRC_EXTRA computed here. The oracle of tests/protocol/mavlink, and the voice of tests/acceptance/mavlink_test.py.
+"""Writes MAVLink as a vehicle does. It is written from the message definitions, independently of our C++ code: it sorts the
+fields of the XML and computes CRC_EXTRA itself. It makes the golden frames of tests/protocol/mavlink and the messages of
+tests/acceptance/mavlink_test.py.
 
-usage: mavlink_frames.py      prints golden frames: version, message, frame in hex, fields as they must be read
+usage: mavlink_frames.py      prints golden frames: version, message, frame in hex, expected fields
 """
 import struct
 
-# Message -> number, fields as the XML lists them, extension fields. "type[n] name".
+# Message -> number, fields in the order of the XML, extension fields. A field is "type[n] name".
 MESSAGES = {
     "HEARTBEAT": (0, "uint8_t type, uint8_t autopilot, uint8_t base_mode, uint32_t custom_mode, uint8_t system_status, "
                      "uint8_t mavlink_version", ""),
@@ -30,7 +31,7 @@ MESSAGES = {
                       "float[21] velocity_covariance", "uint8_t reset_counter, uint8_t estimator_type, int8_t quality"),
     "VFR_HUD": (74, "float airspeed, float groundspeed, int16_t heading, uint16_t throttle, float alt, float climb", ""),
 }
-# The same, of messages that sonard sends and never reads: without golden frames.
+# The same for messages that sonard only sends; they have no golden frames.
 SENT = {
     "COMMAND_ACK": (77, "uint16_t command, uint8_t result",
                     "uint8_t progress, int32_t result_param2, uint8_t target_system, uint8_t target_component"),
@@ -102,7 +103,7 @@ class Speaker:
 
 
 def read_frames(datagram):
-    """(message, fields) of what sonard sends: version 2, known messages; raises on anything else."""
+    """Decodes the messages that sonard sends to (message, fields). Accepts only version 2 and known messages."""
     by_id = {layout.id: layout for layout in LAYOUTS.values()}
     while datagram:
         magic, length, flags, _, _, _, system, component = struct.unpack_from("<BBBBBBBB", datagram[:5] + b"\0" + datagram[5:7])
@@ -122,7 +123,8 @@ def read_frames(datagram):
 
 
 def golden_lines():
-    """Every field has a value of its own that a float holds exactly; the last of the payload is 0 in every other frame."""
+    """Every field has a different value that a float represents exactly; the last one of the payload is 0 in every second
+    frame."""
     for number, name in enumerate(MESSAGES):
         for version in (1, 2):
             layout = LAYOUTS[name]

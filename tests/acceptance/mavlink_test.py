@@ -1,9 +1,10 @@
-"""An autopilot that speaks MAVLink drives a sonar along a square: the picture shows point targets where the true poses say.
+"""An autopilot sends poses by MAVLink while it drives a sonar along a square. The picture must show the point targets at the
+positions that follow from the true poses.
 
-The vehicle is mavlink_frames.py, written from the message definitions; pings are read by the Python client, and the moment of each
-ping comes from the daemon's events. Only pings are judged whose pose had left in time: what a busy computer sends late is another
-question (tests/daemon/emulator/world/world_test.cpp). A computer that stalls the daemon itself cannot be seen from outside, so some echoes may be
-off by what the vehicle moves meanwhile. The square is driven again until enough pings can be judged.
+The vehicle is mavlink_frames.py, written from the message definitions; pings are read by the Python client, and the moment of
+each ping comes from the daemon's events. Only pings are judged whose pose was sent in time; poses that a busy computer sends late
+are tested in tests/daemon/emulator/world/world_test.cpp. A stall of the daemon itself is not visible from outside, so some echoes
+may be displaced by the motion of the vehicle during the stall. The square is driven again until enough pings can be judged.
 """
 import math
 import pathlib
@@ -21,24 +22,24 @@ sys.path.insert(0, str(ROOT / "clients/python"))
 from sonard_client import Control, OculusClient  # noqa: E402
 
 SIDE_M, LEG_S, TURN_S, DEPTH_M = 1.0, 1.2, 2.5, 3.0
-START_S = 1.0  # at rest before it goes
-SALINITY = 30.0  # as the water's, so that the device assumes the water's sound speed
+START_S = 1.0  # time at rest before the motion
+SALINITY = 30.0  # that of the water, so that the device assumes the water's sound speed
 RANGE_M, FIELD_DEG = 8.0, 50  # targets farther to the side are left out
-RING_M, TARGETS = 4.5, 10  # round the square's middle
-OLDEST_POSE_S, UNDER_WAY_S = 0.05, 0.02  # of a pose at a ping: its age, and the time it has had to arrive
-MOST_STALLED, MOST_STALLED_BUSY = 0.05, 0.5  # of the echoes; the second where the computer delays the vehicle as well
+RING_M, TARGETS = 4.5, 10  # around the middle of the square
+OLDEST_POSE_S, UNDER_WAY_S = 0.05, 0.02  # for the pose at a ping: its greatest age, and the least time since it was sent
+MOST_STALLED, MOST_STALLED_BUSY = 0.05, 0.5  # fractions of the echoes; the second if the computer delays the vehicle as well
 ENOUGH, MOST_LAPS = 30, 10  # pings
 GOLDEN = ROOT / "tests/protocol/mavlink/golden/frames.txt"
 
 
 def eased(u):
-    """From 0 to 1, with velocity 0 at both ends; and its derivative."""
+    """Returns a value from 0 to 1, with velocity 0 at both ends, and its derivative."""
     u = min(max(u, 0.0), 1.0)
     return (1 - math.cos(math.pi * u)) / 2, math.pi / 2 * math.sin(math.pi * u)
 
 
 class Path:
-    """Where the vehicle truly is: north, east, heading clockwise from north, and the rates of all three."""
+    """The true state of the vehicle: north, east, heading clockwise from north, and the rates of all three."""
     LAP_S = 4 * (LEG_S + TURN_S)
 
     def __call__(self, t):
@@ -62,7 +63,8 @@ class Path:
 
 
 class Vehicle(threading.Thread):
-    """Sends attitudes and, 7 ms later, positions, 50 times a second, along the path; remembers when each left."""
+    """Sends attitudes and, 7 ms later, positions, 50 times a second, along the path; remembers the time at which each was
+    sent."""
 
     def __init__(self, address, port):
         super().__init__(daemon=True)
@@ -70,7 +72,7 @@ class Vehicle(threading.Thread):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.settimeout(0)
         self.say = mavlink_frames.Speaker(system=1, component=1)
-        self.began_unix, self.began = time.time(), time.monotonic()  # one reading: the clock on the wall may be set meanwhile
+        self.began_unix, self.began = time.time(), time.monotonic()  # one reading, because the wall clock may be set in the meantime
         self.heard = []
         self.end = threading.Event()
 
@@ -94,7 +96,7 @@ class Vehicle(threading.Thread):
             t = round(self.now(), 3)
             north, east, _, to_north, to_east, _ = self.path(t)
             self.send("LOCAL_POSITION_NED", time_boot_ms=round(1000 * t) + 5000, x=north, y=east, z=DEPTH_M, vx=to_north, vy=to_east)
-            waiting = [t] if t - at > 0.018 else []  # for the next attitude: this one is too old to be carried on
+            waiting = [t] if t - at > 0.018 else []  # wait for the next attitude: this one is too old to be extrapolated
             if not waiting:
                 self.sent.append((t, self.now()))
             self.listen()
@@ -113,7 +115,7 @@ class Vehicle(threading.Thread):
         self.socket.close()
 
     def was_in_time(self):
-        """It sends every 20 ms; one in 20 may be late."""
+        """It sends every 20 ms; one of 20 may be late."""
         late = [one for one, other in zip(self.sent, self.sent[1:]) if other[0] - one[0] > 0.03]
         return len(late) <= 0.05 * len(self.sent)
 
@@ -134,7 +136,7 @@ def scene():
 
 
 def expected(ping, pose, place):
-    """Row and beam, both with fractions, or nothing when it is out of the field."""
+    """Returns row and beam, both with fractions, or None if the point is outside the field of view."""
     north, east, heading = pose[:3]
     to_north, to_east = place[1] - north, place[0] - east
     ahead = to_north * math.cos(heading) + to_east * math.sin(heading)
@@ -148,7 +150,7 @@ def expected(ping, pose, place):
 
 
 def found_near(ping, place):
-    """The centre of the echo round the brightest sample near a place."""
+    """Returns the centre of the echo around the brightest sample near a position."""
     row, beam = (int(round(x)) for x in place)
     rows = range(max(row - 8, 0), min(row + 9, ping.rows))
     beams = range(max(beam - 8, 0), min(beam + 9, ping.beams))
@@ -167,7 +169,7 @@ class Mavlink(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             ring = pathlib.Path(folder) / "ring.yaml"
             ring.write_text(scene(), encoding="utf-8")
-            # Without motion within a ping, so that one pose says where everything is.
+            # Without motion during a ping, so that one pose determines all positions.
             with Sonard(scene=ring, pose=f"{{frame: ENU_FLU, xyz_m: [0, 0, {-DEPTH_M}]}}",
                         more="engine: {noise: off, motion: off}", poses=", mavlink: 'udpin:ADDRESS:14551'") as daemon:
                 vehicle, pings, fired_at = self.drive(daemon)
@@ -212,7 +214,7 @@ class Mavlink(unittest.TestCase):
 
     @staticmethod
     def judged(vehicle, pings, fired_at):
-        """(ping, time) of those whose pose had left in time."""
+        """Returns (ping, time) of the pings whose pose was sent in time."""
         timed = [(ping, fired_at[ping.number] / 1e9 - vehicle.began_unix) for ping in pings if ping.number in fired_at]
         return [(ping, t) for ping, t in timed if t >= START_S / 2 and vehicle.has_fresh_pose_at(t)]
 

@@ -24,7 +24,7 @@ def expect(condition, what):
 
 
 class Fields:
-    """Consumes the content of a record; what is left over is an error."""
+    """Consumes the content of a record; remaining bytes are an error."""
 
     def __init__(self, data):
         self.data, self.at = data, 0
@@ -79,7 +79,7 @@ def channel_of(content):
 
 
 class Checked:
-    """What is in a sound file: .messages [(topic, log time, data)], .channels, .schemas, .chunks."""
+    """The content of a valid file: .messages [(topic, log time, data)], .channels, .schemas, .chunks."""
 
     def __init__(self, data):
         self.data, self.schemas, self.channels, self.messages = data, {}, {}, []
@@ -90,7 +90,8 @@ class Checked:
         self._check_summary()
 
     def read(self, topic):
-        """The messages of a topic, JSON or protobuf, by the schema that the file holds. Protobuf leaves out what is 0 or empty."""
+        """The messages of a topic, JSON or protobuf, by the schema that the file holds. Protobuf omits fields that are 0 or
+        empty."""
         _, schema, _, encoding, _ = next(channel for channel in self.channels.values() if channel[2] == topic)
         _, name, _, described = self.schemas[schema]
         read = json.loads if encoding == "json" else lambda data: Schema(described).decode(name, data)
@@ -224,7 +225,7 @@ class Checked:
 
 
 def check(data):
-    """A Checked, or Broken with what is wrong."""
+    """Returns a Checked, or raises Broken with the reason."""
     try:
         return Checked(bytes(data))
     except (struct.error, IndexError, UnicodeDecodeError) as error:

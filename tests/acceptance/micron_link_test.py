@@ -29,7 +29,7 @@ def command(left_deg, right_deg, control=0x2305, step=16, interval=26, bins=600,
 
 
 class Line:
-    """Of a scan."""
+    """Tests a scan."""
 
     def __init__(self, payload):
         (total, self.type, self.status, self.sweep, self.control, _, _, self.gain, _, _, _, _, self.interval, self.left, self.right, self.step,
@@ -148,7 +148,7 @@ class MicronLink(unittest.TestCase):
         capture.tcp("client", command(-30, 30))
         capture.tcp("client", frame(25, bytes(4)))
         joined = b"".join(messages)
-        for at in range(0, len(joined), 100):  # not at the edges of messages
+        for at in range(0, len(joined), 100):  # cuts that do not coincide with the ends of messages
             capture.tcp("device", joined[at:at + 100])
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "micron.pcap"

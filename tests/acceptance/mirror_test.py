@@ -1,4 +1,4 @@
-"""Left is left, near is near, down is down: the L scene through the socket, read by the independent reader, posed by sonarctl.
+"""Tests that the picture is not mirrored. The independent reader reads the L scene from the socket, and sonarctl sets the poses.
 
 Places are those of scenes/l-targets.yaml; the spheres' nearest points are 0.1 m in front of their centres.
 """
@@ -9,9 +9,9 @@ from oculus_reader import Client, fire_message
 from running_sonard import Sonard, eventually
 
 A, B, C, BELOW = (3.9, -20), (3.9, 10), (6.9, -8), (4.9, 0)  # range m, bearing deg: positive to starboard
-VERBATIM_GAIN = 0x59  # metres, simple result, 512 beams; bit 4: the gain is used as it is in mode 2 too
+VERBATIM_GAIN = 0x59  # metres, simple result, 512 beams; bit 4: the gain is used unchanged, also in mode 2
 UNASSISTED = "oculus-m1200d\n    options: {gain_assist: off}"
-SALINITY = 30.0  # as the water's: else the device assumes another sound speed, and its ranges are off by a few per cent
+SALINITY = 30.0  # that of the water; otherwise the device assumes another sound speed, and its ranges are wrong by a few per cent
 LEVEL, BOW_DOWN, BOW_UP = "0,0,0", "0,25,0", "0,-25,0"      # east-north-up, forward-left-up
 
 
@@ -20,7 +20,7 @@ def rows_between(ping, near_m, far_m):
 
 
 def brightest_of_half(ping, near_m, far_m, side):
-    """Range and bearing of what is bright in one half of the fan: side -1 port, +1 starboard. Its centre, not its brightest speckle."""
+    """Returns range and bearing of the centre of the bright echo in one half of the fan: side -1 is port, +1 starboard."""
     first, last = rows_between(ping, near_m, far_m)
     beams = [b for b in range(ping.beams) if ping.bearings[b] * side > 0]
     top = max(ping.image[r][b] for r in range(first, last) for b in beams)
@@ -122,7 +122,8 @@ class Rolled(unittest.TestCase):
                 return client.ping_made_with(fire_message(version=2, flags=VERBATIM_GAIN, gain=20.0, salinity=SALINITY, **settings))
 
     def test_a_list_swings_what_lies_below_to_the_low_side(self):
-        """Bow 13 degrees down, `below` is 12 degrees under the axis: starboard down it comes to starboard, port down to port."""
+        """With the bow 13 degrees down, `below` is 12 degrees under the axis. If starboard is down, it moves to starboard; if
+        port is down, to port."""
         bearing_deg = math.degrees(math.asin(math.sin(math.radians(12)) * math.sin(math.radians(20))))
         for roll_deg in (20, -20):
             with self.subTest(roll_deg=roll_deg):
@@ -133,7 +134,8 @@ class Rolled(unittest.TestCase):
                 self.assertAlmostEqual(found[1], math.copysign(bearing_deg, roll_deg), delta=1)
 
     def test_a_starboard_list_lifts_port_targets_out_of_the_fan(self):
-        """Rolled 90 degrees, left and right become up and down: A and C leave the 12 degree fan, the picture loses its L."""
+        """With a roll of 90 degrees, left and right become up and down. A and C leave the fan of 12 degrees, so the picture loses
+        its L."""
         ping = self.ping((90, 0, 0))
         self.assertAlmostEqual(ping.roll_deg, 90, delta=0.5)
         self.assertLess(mean_around(ping, A, 0.15, 1), 40)

@@ -1,5 +1,5 @@
-"""A vehicle that dives through the tank on a trajectory, in stepped time: used by the tests of reproducibility and of whole missions.
-The trajectory is a file in the run's folder; all bytes that a client received are kept."""
+"""A vehicle that dives through the tank on a trajectory, in stepped time: used by the tests of reproducibility and of whole
+missions. The trajectory is a file in the run's folder; all bytes that a client received are kept."""
 import hashlib
 import math
 import pathlib
@@ -14,7 +14,7 @@ TWO_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 2}"  # inserte
 
 
 def way(seconds):
-    """A slow figure before the rod, with the rod turning meanwhile: CSV lines a fifth of a second apart, two bodies."""
+    """A slow curve in front of the rod, which turns: CSV lines of two bodies, every 0.2 s."""
     lines = ["# frame: ENU_FLU", "body,t_s,x_m,y_m,z_m,yaw_deg"]
     for step in range(5 * seconds + 1):
         t = step / 5
@@ -24,7 +24,7 @@ def way(seconds):
 
 
 class Mission:
-    """with Mission(seconds) as m: m.fly() ... m.stream, m.digests; the daemon is there before, and has ended after fly()."""
+    """with Mission(seconds) as m: m.fly() ... m.stream, m.digests; the daemon runs before fly(), and has ended after it."""
 
     def __init__(self, seconds, pings, *arguments, start_s=0, record=()):
         self.pings, self.record = pings, record
@@ -60,7 +60,7 @@ class Mission:
         return self.folder / "recordings" / name
 
     def fly(self, keep=True, after=None):
-        """Reads to the end; after = (pings, what to do then), once. Without keep only the stream's hash stays."""
+        """Reads to the end. after = (pings, function to call then, once). Without `keep`, only the hash of the stream is kept."""
         taken, said = 0, hashlib.sha256()
         with Client(self.daemon.address, patience_s=120) as client:
             client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=1, flags=0x09))
@@ -93,7 +93,7 @@ class Mission:
 
 
 class Onlooker:
-    """A second client that asks for nothing and reads everything."""
+    """A second client that requests nothing and reads everything."""
 
     def __init__(self, address):
         self.pings = 0

@@ -1,7 +1,8 @@
-"""A whole mission, faster than real time: a trajectory in stepped time, recorded by sonard as .oculus, replayed by sonard replay, and
-received by our client byte for byte. Twice, with one digest. And the time that a long trajectory takes to read.
+"""A whole mission, faster than real time: a trajectory in stepped time, recorded by sonard as .oculus, replayed by sonard replay,
+and received by our client byte for byte. It runs twice, and both runs have the same digest. Also measures the time for reading a
+long trajectory.
 
-usage: mission_test.py [--long]     --long: ten minutes of it, 1,200 pings; figures go where SONARD_RELIABILITY says
+usage: mission_test.py [--long]     --long: ten minutes, 1,200 pings; figures are written to the folder SONARD_RELIABILITY
 """
 import hashlib
 import pathlib
@@ -30,7 +31,7 @@ sonars: [{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}]
 
 
 def kept(item, figure, bound, passed):
-    if LONG:  # the short one proves that it works, not how well
+    if LONG:  # the short run shows only that it works, so its figures are not recorded
         record(item, figure, bound, passed, COMMAND)
     return passed
 
@@ -54,7 +55,7 @@ class WholeMission(unittest.TestCase):
         kept("mission-pace", f"{SECONDS / took_s:.1f} x: {SECONDS} s in {took_s:.0f} s", "faster than real time", took_s < SECONDS)
 
     def received_again(self, log, flown):
-        """Whether what our client is sent by the replay is what the mission's client got."""
+        """True if our client receives the same bytes from the replay as the client of the mission did."""
         with tempfile.TemporaryDirectory() as folder, Replay(log, "--stepped") as replay:
             again = pathlib.Path(folder) / "again.raw"
             done = run(SONARCTL, "listen", replay.address, "--as-it-is", "--pings", PINGS, "--quiet", "--record", again, patience_s=600)
@@ -73,7 +74,7 @@ def spent_by_children_s():
 
 class LongTrajectory(unittest.TestCase):
     def test_an_hour_at_100_hz_is_read_within_a_second(self):
-        """Of the processor, with all that sonard check does besides; the test itself fails at five times that."""
+        """Limit of processor time, including everything else that sonard check does; the test fails at five times this."""
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             with open(folder / "hour.csv", "w", encoding="utf-8") as out:

@@ -44,7 +44,7 @@ class Driver:
         return head + body
 
     def points(self):
-        """Ping, and (range m, degrees to port) of each beam with a bottom."""
+        """Returns the ping number, and (range m, degrees to port) of each beam with a bottom."""
         packet = self.packet(BATHYMETRY)
         speed, rate, beams, ping = struct.unpack_from("<ffII", packet, 24)
         assert len(packet) == 112 + 20 * beams
@@ -52,7 +52,7 @@ class Driver:
         return ping, [(row[0] * speed / (2 * rate), -math.degrees(row[1])) for row in rows if row[0] > 1 and row[6] == 3]
 
     def column(self):
-        """Ping, metres a sample, first sample, rows of pixels, degrees to port."""
+        """Returns ping number, metres per sample, first sample, rows of pixels, degrees to port."""
         packet = self.packet(COLUMN)
         speed, rate, beams, rows = struct.unpack_from("<ffII", packet, 24)
         kind, first = struct.unpack_from("<Ii", packet, 48)
@@ -105,7 +105,7 @@ class Link(unittest.TestCase):
         kinds = []
         for data in messages:
             magic, kind, size, _, _, crc = struct.unpack_from("<6I", data) if len(data) >= 24 else (0,) * 6
-            if magic == 0xDEADBEEF:  # else a reply to a command
+            if magic == 0xDEADBEEF:  # otherwise it is a reply to a command
                 self.assertEqual((size, zlib.crc32(data[24:])), (len(data), crc))
                 kinds.append(kind)
         self.assertGreaterEqual((kinds.count(1), kinds.count(2)), (5, 5))

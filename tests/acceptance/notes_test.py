@@ -1,4 +1,4 @@
-"""Notes of what is allowed and was probably not meant: by sonard check, in the log, by sonarctl doctor and status."""
+"""Tests notes on valid settings that are probably mistakes: in sonard check, the log, sonarctl doctor and status."""
 import pathlib
 import tempfile
 import unittest

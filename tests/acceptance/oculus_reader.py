@@ -1,4 +1,5 @@
-"""A second reader of the Oculus stream, typed by hand from the sources of docs/protocols/oculus.md. Shares nothing with the C++ code."""
+"""A second reader of the Oculus stream, typed by hand from the sources of docs/protocols/oculus.md. Shares nothing with the C++
+code."""
 import contextlib
 import functools
 import math
@@ -52,7 +53,7 @@ class Ping:
 
     @functools.cached_property
     def _rows(self):
-        """Of each row its gain, nothing where rows have none, and its samples. Read when they are asked for: it takes a while."""
+        """The gain of each row (nothing if rows have none) and its samples. Computed at the first use, because it is slow."""
         rows, at, width = [], 0, self.sample_bytes
         for _ in range(self.rows):
             gain = ()
@@ -119,14 +120,14 @@ class Client:
         return kind, header + self._exactly(payload)
 
     def ping(self):
-        """The next ping; dummies and texts are passed over."""
+        """Returns the next ping; skips dummies and texts."""
         while True:
             kind, message = self.message()
             if kind == 0x23:
                 return Ping(message)
 
     def ping_made_with(self, fire):
-        """Sends settings; the first ping that repeats mode, flags and range. Counts those before in `stale`."""
+        """Sends settings and returns the first ping that repeats mode, flags and range. Counts earlier pings in `stale`."""
         self.send(fire)
         wanted = FIRE.unpack_from(fire, 16)
         self.stale = 0
@@ -139,7 +140,7 @@ class Client:
 
 @contextlib.contextmanager
 def reading(client):
-    """It reads as a driver does until the end, when it hangs up."""
+    """Reads like a driver and disconnects at the end."""
     def read():
         with contextlib.suppress(OSError):
             while client.socket.recv(1 << 16):
@@ -155,7 +156,7 @@ def reading(client):
 
 
 def expected_bearings(beams, half_aperture_deg):
-    """The bearing law of the capture: equal steps of the sine, hundredths of a degree cut toward zero."""
+    """The bearing law of the capture: equal steps of the sine, truncated to hundredths of a degree."""
     top = math.sin(math.radians(half_aperture_deg))
     values = [math.degrees(math.asin(top * (2 * i / (beams - 1) - 1))) for i in range(beams)]
     return [int(100 * v + math.copysign(1e-6, v)) for v in values]

@@ -1,4 +1,5 @@
-"""The results of `cpack -G DEB` and `cmake --install`: the right files in the right places, and a sonard that runs from any folder."""
+"""The results of `cpack -G DEB` and `cmake --install`: the right files in the right places, and a sonard that runs from any
+folder."""
 import gzip
 import os
 import pathlib
@@ -57,7 +58,7 @@ def files_below(folder):
 
 
 class Installed:
-    """What both ways of installing must bring; `self.root` holds usr or usr/local."""
+    """Checks that both ways of installation must pass; `self.root` contains usr or usr/local."""
     prefix = "usr"
 
     def program(self, name):
@@ -152,7 +153,7 @@ class Package(Installed, unittest.TestCase):
             dpkg("--install", *self.packages.values())
             of_the_package = installed()
             run(sys.executable, "-m", "compileall", "-q", root / "usr/share/sonard/python", root / "usr/share/doc/sonard")
-            (root / "etc/sonard").mkdir()  # by systemd, when the service starts
+            (root / "etc/sonard").mkdir()  # systemd makes it when the service starts
             self.assertTrue(list(root.rglob("*.pyc")))
             dpkg("--install", *self.packages.values())
             self.assertEqual(installed() - of_the_package, {pathlib.Path("etc/sonard")})
@@ -189,7 +190,7 @@ class Package(Installed, unittest.TestCase):
                 self.assertEqual((shown.returncode, shown.stderr), (0, ""), page)
 
     def test_the_programs_name_no_folder_they_were_built_in(self):
-        """Strings such as assertions would, and a folder of scenes in the source tree."""
+        """Strings that assertions would add, and a folder of scenes in the source tree."""
         for name in ("sonard", "sonarctl"):
             self.assertNotIn(str(ROOT).encode(), self.program(name).read_bytes(), name)
             self.assertNotIn(str(BUILD).encode(), self.program(name).read_bytes(), name)

@@ -3,7 +3,8 @@
 page_figures.py FirstMinute   the first picture of the demo, clicks, the size of the page: a minute
 page_figures.py Long          memory over SONARD_PAGE_MINUTES (20), delays, pictures a second
 
-SONARD_RELIABILITY names a folder that keeps the figures. A missed goal of time fails nothing: it depends on what else the computer does.
+SONARD_RELIABILITY names a folder that keeps the figures. A missed goal is not a failure, because times depend on other programs
+of the computer.
 """
 import gzip
 import http.client
@@ -79,7 +80,7 @@ def kept(item, figure, bound, passed, where="Long"):
 
 
 def click(page, selector):
-    """As fast as a mouse does; without a wait for the element to stand still."""
+    """Clicks as fast as a mouse does, without waiting until the element stops moving."""
     x, y = page.run(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])(document.querySelector('{selector}').getBoundingClientRect())")
     for kind in ("mousePressed", "mouseReleased"):
         page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
@@ -101,7 +102,7 @@ def keep_clicks(found, bounds_ms, where):
 
 @unittest.skipIf(WHY_NOT, WHY_NOT)
 class FirstMinute(unittest.TestCase):
-    """The demo, its page opened as soon as it is ready, without a driver."""
+    """Runs the demo without a driver, and opens its page as soon as it is ready."""
 
     def setUp(self):
         self.browser = self.enterContext(Browser())
@@ -130,7 +131,7 @@ class FirstMinute(unittest.TestCase):
             keep_clicks(delays(page, ROUNDS * len(CLICKED)), {"page-demo-clicks": 150, "page-demo-clicks-scripts": SCRIPTS_MS}, "FirstMinute")
 
     def test_size(self):
-        """Of all that the page loads until its picture is there."""
+        """The size of everything that the page loads until it shows its picture."""
         with demo("oculus"), self.open() as page:
             shown(page)
             packed = raw = 0
@@ -167,7 +168,7 @@ class Long(unittest.TestCase):
             first, deadline = heap_mb(), time.monotonic() + 60 * MINUTES
             while time.monotonic() < deadline:
                 time.sleep(10)
-                page.run("0")  # takes the browser's notes out of its queue
+                page.run("0")  # empties the browser's queue of events
             last = heap_mb()
             pings = page.run("document.querySelector('#ping-number').textContent")
             self.assertTrue(kept("page-memory", f"{last - first:+.1f} MB of {first:.1f} MB after {MINUTES:g} minutes, ping {pings}", "+10 MB",

@@ -32,7 +32,7 @@ SEEN_AT = """requestAnimationFrame(function look() {
   else requestAnimationFrame(look);
 })"""
 
-# What the page has asked for, when, and whether its picture was painted then.
+# The requests of the page, with their times, and true if its picture was painted then.
 SENT = """window.sent = []; WebSocket.prototype.send = ((old) => function (data) {
   if (typeof data === 'string') window.sent.push({ at: performance.now(), painted: /\\d/.test(document.querySelector('#ping-number').textContent), word: JSON.parse(data) });
   return old.call(this, data);
@@ -40,7 +40,8 @@ SENT = """window.sent = []; WebSocket.prototype.send = ((old) => function (data)
 
 
 class Driver(threading.Thread):
-    """Requests and reads pings at a limited rate, and stores the last ones by number. It connects again after a lost connection."""
+    """Requests and reads pings at a limited rate, and stores the last ones by number. It connects again after a lost
+    connection."""
 
     def __init__(self, address, reads_hz=1000.0, **settings):
         super().__init__(daemon=True)
@@ -104,7 +105,7 @@ class Live(PageChecks, unittest.TestCase):
         return self.opened(self.browser.open(url_of(daemon) + query, width, height, **options))
 
     def test_fan_is_true(self):
-        """What the page draws of a ping is what `sonarctl view` draws of the bytes that a driver got."""
+        """The page draws a ping as `sonarctl view` draws the bytes that a driver received."""
         for settings, width in (({}, 1000), ({"bits": 16}, 300), ({"mode": 1, "range_m": 20}, 300)):
             with self.subTest(**settings), Sonard(mount=MOUNT, trajectory="orbit", arguments=["--clock", "stepped"]) as daemon, \
                     tempfile.TemporaryDirectory() as folder:
@@ -123,7 +124,7 @@ class Live(PageChecks, unittest.TestCase):
                 page.close()
 
     def test_first_picture_comes_within_a_second(self):
-        """Of opening the page; the best of some tries, for other programs run beside it."""
+        """The time to open the page; the best of several tries, because other programs run too."""
         with Sonard(mount=MOUNT, trajectory="orbit") as daemon, Driver(daemon.address) as driver:
             self.patiently(lambda: driver.read > 5)
             best = 1e9
@@ -154,18 +155,18 @@ class Live(PageChecks, unittest.TestCase):
             self.skipTest(f"other programs keep the processors busy: load {os.getloadavg()[0]:.1f}")
 
     def test_numbers_are_true(self):
-        """A driver that reads at 7 Hz is shown with 7 Hz, and with the drops that the status has."""
+        """A driver that reads at 7 Hz is shown with 7 Hz, and with the dropped pings of the status."""
         with Sonard(scene="tank-rod.yaml", pose="{frame: ENU_FLU, xyz_m: [-0.4, 0, -0.61]}") as daemon, \
                 Driver(daemon.address, reads_hz=7, rate_hz=15, range_m=1, beams=256):
             page = self.open(daemon)
             try:
                 page.wait("Number(document.querySelector('#clients td:nth-child(4)').innerText.replace(/\\D/g, '')) > 0", 90)
             except AssertionError:
-                self.skip_beside_busy_programs()  # which leave it fewer than 7 pings a second: it drops none
+                self.skip_beside_busy_programs()  # beside them the driver gets fewer than 7 pings a second, and none is dropped
                 raise
             cell = "Number(document.querySelector('#clients td:nth-child(%d)').innerText.replace(/[^\\d.]/g, ''))"
             page.wait(f"Math.abs({cell % 2} - 7) <= 0.3", 60)
-            # Pings leave in bursts, as the kernel's buffers drain: means over ten seconds.
+            # Pings are sent in bursts while the kernel's buffers drain, so means over ten seconds are used.
             before, written, shown_hz = client_of(daemon), [], []
             for _ in range(50):
                 written.append((time.monotonic(), int(client_of(daemon)["pings_written"])))
@@ -204,7 +205,7 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("[...sonardTest.scene.objects.keys()].sort().join() === 'rod,tank'")
 
     def test_the_page_steers(self):
-        """A setting, a fault and its end, the trajectory, standby and its button."""
+        """Tests a setting, a fault and its end, the trajectory, standby and its button."""
         with Sonard(mount=MOUNT, trajectory=str(self.circle()), arguments=["--faults"]) as daemon, Driver(daemon.address):
             page = self.open(daemon)
             shown(page)
@@ -263,7 +264,7 @@ class Live(PageChecks, unittest.TestCase):
             self.assertIn("recording: {folder: DIR}", page.text("#refusal"))
 
     def test_everything_at_once(self):
-        """Two drivers, one of them slow, a trajectory and a fault: all panels have something to show."""
+        """Two drivers, one of them slow, a trajectory and a fault: so that all panels have content."""
         trajectory = f"{{file: {self.circle()}, loop: true}}"
         with Sonard(mount=MOUNT, trajectory=trajectory, arguments=["--faults", "--clients", "2"]) as daemon, \
                 Driver(daemon.address, rate_hz=RATE_HZ), Driver(daemon.address, reads_hz=0.7 * RATE_HZ, rate_hz=RATE_HZ):
@@ -284,7 +285,7 @@ class Live(PageChecks, unittest.TestCase):
         return f"document.querySelector('[data-trouble={name.lower().replace(' ', '_')}]')"
 
     def circle(self):
-        """A file with a circle about the middle of the demo's scene in 90 s, looking inwards."""
+        """A trajectory file: a circle around the middle of the demo's scene in 90 s, with the bow towards the middle."""
         path = self.scratch() / "survey.csv"
         rows = []
         for n in range(901):
@@ -330,7 +331,7 @@ class Live(PageChecks, unittest.TestCase):
                         page.close()
 
     def use(self, page):
-        """Brings up what does not show at first. A click hides a refusal, so it comes last."""
+        """Makes hidden elements visible. A click hides a refusal, so the refusal comes last."""
         page.run("document.querySelector('#freeze').click()")
         page.wait("document.querySelector('#freeze').textContent === 'Go on'")
         page.wait("!!" + self.trouble("Thin tether"))

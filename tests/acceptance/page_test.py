@@ -1,6 +1,8 @@
-"""Tests the page of the live view in a real browser, with a scripted daemon (view/mock_daemon.py). Skipped without browser or page.
+"""Tests the page of the live view in a real browser, with a scripted daemon (view/mock_daemon.py). Skipped without browser or
+page.
 
-Pictures of the states are kept in the folder that SONARD_SHOTS names; without it only of tests that fail, beside the build.
+Pictures of the states are kept in the folder that SONARD_SHOTS names; without it, only pictures of failed tests are kept, beside
+the build.
 """
 import gzip
 import http.client
@@ -36,7 +38,8 @@ STATES = {  # of the mock -> the page's name of it, what the user reads, the but
 }
 
 
-# Lines, each of one letter and all of the same time, that connections bring -> the log. A daemon brings its last 100 lines again.
+# Lines that connections receive (each one letter, all with the same time) -> the expected log. A daemon sends its last 100 lines
+# again.
 LOGS_OF_CONNECTIONS = (
     ("1:abab", "abab"),
     ("1:abc 1:abcd", "abcd"),
@@ -44,9 +47,9 @@ LOGS_OF_CONNECTIONS = (
     ("1:aaa 1:aaaa", "aaaa"),
     ("1:abcab 1:abcabcab", "abcabcab"),
     ("1:abca 1:abcad", "abcad"),
-    ("1:abc 1:ab 1:abcd", "abcd"),  # lost before all had come again
+    ("1:abc 1:ab 1:abcd", "abcd"),  # lost before all lines were repeated
     ("1:abc 1: 1:abcc 1:abccd", "abccd"),
-    ("1:abc 1:dea", "abcdea"),  # more were lost than the daemon keeps
+    ("1:abc 1:dea", "abcdea"),  # more lines were lost than the daemon keeps
     ("1:abcx 1:bcde", "abcxbcde"),
     ("1:abc 2:abcd", "abcabcd"),  # another daemon
     ("1:" + "a" * 150 + " 1:" + "a" * 100 + "ab", "a" * 151 + "b"),
@@ -63,7 +66,7 @@ LOG_AFTER = """(connections) => {
   return facts.log.map((line) => line.message).join('');
 }"""
 
-# The page takes the software renderer for a graphics processor.
+# The page gets the software renderer under the name of a graphics processor.
 NAMED_GRAPHICS = """window.Worker = class {
   constructor() { setTimeout(() => this.onmessage({ data: 'ANGLE (a graphics processor)' })); }
   terminate() {}
@@ -75,7 +78,7 @@ BRIGHTEST = """(() => {
   return Math.max(...copy.getImageData(0, 0, 300, 300).data.filter((_, i) => i % 4 === 0));
 })()"""
 
-# Notes the canvases that are drawn on by other tasks than animation frames.
+# Lists the canvases on which other tasks than animation frames draw.
 DRAWN_OUTSIDE = """window.outside = [], window.inside = new Set();
 {
   let framed = 0;
@@ -94,7 +97,7 @@ DRAWN_OUTSIDE = """window.outside = [], window.inside = new Set();
   }
 }"""
 
-# Settings whose field something else is painted over.
+# Settings whose field is covered by another element.
 COVERED_SETTINGS = """[...document.querySelectorAll('#setting-rows :is(input, select)')].filter((e) => {
   e.scrollIntoView({ block: 'nearest' });
   const r = e.getBoundingClientRect();
@@ -103,7 +106,7 @@ COVERED_SETTINGS = """[...document.querySelectorAll('#setting-rows :is(input, se
 
 
 def ping_about(ping, full_scale=254):
-    """A ping of the Python client as the mock wants it: (samples, description)."""
+    """Converts a ping of the Python client for the mock: (samples, description)."""
     rows, beams = ping.samples.shape
     return ping.samples.tobytes(), {
         "settings": {"rows": rows, "beams": beams, "max_code": full_scale}, "row_spacing_m": ping.row_m,
@@ -141,7 +144,7 @@ class Page(PageChecks, unittest.TestCase):
         return self.opened(self.browser.open(self.url + query, width, height, **options))
 
     def test_fan_is_true(self):
-        """What the page draws is what `sonarctl view` draws of the same ping: the usual picture, the others smaller."""
+        """The page draws a ping as `sonarctl view` does: the usual picture, and smaller ones."""
         maps = [line for line in (ROOT / "core/image/colour_map.cpp").read_text().split('"') if line.isalpha() and line.islower()]
         self.assertIn("cividis", maps)
         for name, width, colours in [("60 degrees, 8 bit", 1000, ["copper"]), ("60 degrees, 8 bit", 300, maps),
@@ -155,7 +158,7 @@ class Page(PageChecks, unittest.TestCase):
             page.close()
 
     def test_fan_without_a_graphics_processor_is_true(self):
-        """It takes whole samples, so that edges of echoes may lie a sample beside."""
+        """It uses whole samples, so the edges of echoes may differ by one sample."""
         for name in self.pings:
             self.mock.pings = [self.pings[name]]
             page = self.open(1100, 700, query="?test=600", script=WITHOUT_WEBGL)
@@ -214,7 +217,7 @@ class Page(PageChecks, unittest.TestCase):
 
     def test_faults_begin_and_are_cleared(self):
         page = self.open()
-        page.wait("document.querySelector('[data-trouble=thin_tether] small')?.innerText")  # with it the buttons are made anew
+        page.wait("document.querySelector('[data-trouble=thin_tether] small')?.innerText")  # this message replaces the buttons
         page.press_mouse("[data-trouble=thin_tether]")
         page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:')")
         self.assertIn(("/faults/thin_tether", 20), self.mock.set_calls)
@@ -289,7 +292,7 @@ class Page(PageChecks, unittest.TestCase):
     def test_a_graphics_processor_draws_the_fan(self):
         page = self.open(1100, 760, script=NAMED_GRAPHICS)
         shown(page)
-        page.wait("!!document.querySelector('#fan').getContext('webgl2')")  # null of a canvas that has another context
+        page.wait("!!document.querySelector('#fan').getContext('webgl2')")  # null if the canvas has another context
         number = page.text("#ping-number")
         page.wait(f"document.querySelector('#ping-number').textContent !== '{number}'")
         page.wait(BRIGHTEST + " > 100")
@@ -300,7 +303,7 @@ class Page(PageChecks, unittest.TestCase):
         self.assert_quiet(page, self.url)
 
     def test_canvases_are_drawn_in_animation_frames_alone(self):
-        """After another task that draws, the browser may wait for the graphics, and clicks wait with it."""
+        """After another task that draws, the browser may wait for the graphics, and clicks would wait too."""
         page = self.open(script=DRAWN_OUTSIDE)
         shown(page)
         for key in "tffc+g":
@@ -349,7 +352,7 @@ class Page(PageChecks, unittest.TestCase):
                 page.close()
 
     def test_can_be_read_and_reached(self):
-        """Contrast of words, names of controls, size of targets on touch screens; dark and light."""
+        """Checks the contrast of words, the names of controls and the size of targets on touch screens, in dark and light."""
         for theme in ("dark", "light"):
             for touch in (False, True):
                 with self.subTest(theme=theme, touch=touch):
@@ -402,7 +405,7 @@ class Page(PageChecks, unittest.TestCase):
         self.mock.parameters["/front/range_m"] = 10.0
 
     def test_settings_are_two_presses_away(self):
-        """By a key and by a link for those who use Tab; on phones they are in another tab."""
+        """The panels can be reached by a key, and by a link for users of Tab; on phones they are in another tab."""
         for width, way in ((1440, ("r",)), (1440, ("Tab", "Tab", "Enter")), (390, ("r",))):
             with self.subTest(width=width, way=way):
                 page = self.open(width, 844)
@@ -417,14 +420,15 @@ class Page(PageChecks, unittest.TestCase):
                 page.close()
 
     def test_settings_come_first(self):
-        """The first panel beside the picture, or of its tab on a phone: seen without scrolling, and the first that Tab reaches there."""
+        """The doctor is the first panel beside the picture, or of its tab on a phone: visible without scrolling, and the first
+        that Tab reaches."""
         for width in (1600, 390):
             with self.subTest(width=width):
                 page = self.open(width, 844, touch=width < 800)
                 page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
                 page.wait("!!document.querySelector('#troubles button')")
                 if width < 800:
-                    page.click("#tabs [data-tab=clients]")  # which leaves the focus
+                    page.click("#tabs [data-tab=clients]")  # the click moves the focus
                 tops = page.run("[...document.querySelectorAll('#rail > .panel')].filter((p) => p.offsetHeight > 0).map((p) => [p.getBoundingClientRect().top, p.id]).sort((a, b) => a[0] - b[0])")
                 self.assertEqual(tops[0][1], "settings", tops)
                 self.assertEqual(page.run("document.querySelector('#rail').scrollTop"), 0)
@@ -463,7 +467,7 @@ class Page(PageChecks, unittest.TestCase):
     def test_numbers_are_true(self):
         page = self.open()
         page.wait("Math.abs(document.querySelector('#clients tr:nth-child(2) td:nth-child(2)').innerText - 7) <= 0.3", 40)
-        for _ in range(100):  # drops rise every four seconds, and reach the page a little later
+        for _ in range(100):  # drops increase every four seconds, and the page shows them a little later
             made = self.mock.drops
             rows = page.run("[...document.querySelectorAll('#clients tr')].map((r) => [...r.children].map((c) => c.innerText.trim()))")
             slow = next(r for r in rows if r[0].startswith("192.0.2.9"))
@@ -475,7 +479,7 @@ class Page(PageChecks, unittest.TestCase):
 
 @unittest.skipIf(WHY_NOT == "this build has no page", WHY_NOT)
 class Serving(unittest.TestCase):
-    """What sonard itself sends; which file answers what is tested without sockets in page_test.cpp."""
+    """Checks the page that sonard itself sends; page_test.cpp tests the answers without sockets."""
 
     @staticmethod
     def ask(daemon, path, method="GET", **headers):

@@ -15,7 +15,7 @@ def _checksum(data):
 
 
 class Capture:
-    """One device and one client; time runs in milliseconds, a packet each."""
+    """One device and one client; time advances by a millisecond per packet."""
 
     def __init__(self, device="127.90.0.1", client="127.90.0.2", device_port=DEVICE_PORT, snap_length=65535):
         self.ends = {"device": (socket.inet_aton(device), device_port), "client": (socket.inet_aton(client), CLIENT_PORT)}
@@ -28,7 +28,7 @@ class Capture:
         self.packets.append(header[:10] + struct.pack("!H", _checksum(header)) + header[12:] + segment)
 
     def tcp(self, sender, data, flags=0x18):
-        """A segment from "device" or "client": ACK and PSH unless told otherwise."""
+        """A segment from "device" or "client": ACK and PSH unless `flags` is given."""
         receiver = "client" if sender == "device" else "device"
         (source, source_port), (target, target_port) = self.ends[sender], self.ends[receiver]
         header = struct.pack("!HHIIBBHHH", source_port, target_port, self.sequence[sender] & 0xFFFFFFFF,
@@ -36,7 +36,7 @@ class Capture:
         pseudo = source + target + struct.pack("!BBH", 0, 6, len(header) + len(data))
         header = header[:16] + struct.pack("!H", _checksum(pseudo + header + data)) + header[18:]
         self._packet(6, source, target, header + data)
-        self.sequence[sender] += len(data) + (1 if flags & 0x03 else 0)  # SYN and FIN count as a byte
+        self.sequence[sender] += len(data) + (1 if flags & 0x03 else 0)  # SYN and FIN count as one byte
 
     def connect(self):
         self.tcp("client", b"", flags=0x02)

@@ -1,8 +1,9 @@
-"""Checks by statistics of the samples (`sonarctl stats`) that the picture of the demo is like that of a sonar.
+"""Checks by statistics of the samples (`sonarctl stats`) that the demo's picture resembles that of a real sonar.
 
-From the demo's first pose, with 256 beams as in the captured pings of a real M1200d, whose figures are: adjacent-beam correlation
-0.80, adjacent-row 0.58, quiet near field with a mean of 8, noise rising towards the far end. In the 512 format, which the demo's
-picture has, beams are as wide but stand half as far apart (0.117 degrees, a beam is 0.4 wide), so that neighbours are more alike.
+The picture is that of the demo's first pose, with 256 beams as in the captured pings of a real M1200d. The figures of these
+pings: adjacent beams have a correlation of 0.80, adjacent rows 0.58; the near field is quiet, with a mean of 8; noise rises
+towards the far end. In the 512 format, which the demo uses, beams are equally wide but half as far apart (0.117 degrees; a beam
+is 0.4 degrees wide), so neighbours are more similar.
 """
 import json
 import pathlib
@@ -12,7 +13,7 @@ import unittest
 from running_sonard import SONARCTL, Sonard, run
 
 # Rows and beams of 256; rows are 22 mm.
-SAND = (250, 350, 75, 125)            # 5.5 to 7.8 m, 12 degrees to port: rippled sand, nothing on it
+SAND = (250, 350, 75, 125)            # 5.5 to 7.8 m, 12 degrees to port: rippled sand without objects
 SHADOWS = {                           # a shadow, and sand at the same range
     "the second cobble": ((200, 208, 68, 74), (200, 208, 80, 110)),  # 4.5 m, 13 degrees to port
     "the wreck": ((236, 252, 222, 246), (236, 252, 66, 110)),        # 5.4 m, 25 degrees to starboard, behind its near side
@@ -62,7 +63,8 @@ class Picture(unittest.TestCase):
 
     def test_the_near_field_is_quiet_and_noise_rises_with_range(self):
         figures = self.figures["range"]
-        # The sonar is 1.9 m above the bed, which has relief. The main lobe meets it at 3.9 m, row 174, a side lobe straight below.
+        # The sonar is 1.9 m above the bed, which has relief. The main lobe reaches it at 3.9 m, row 174, and a side lobe straight
+        # below.
         self.assertGreater(figures["first_echo_row"], 80, "nothing is nearer than the bed below")
         self.assertLess(figures["first_echo_row"], 100, "a side lobe hears the bed below")
         self.assertLess(figures["near_field_mean"], 15)
@@ -73,7 +75,7 @@ class Picture(unittest.TestCase):
             for beams in self.raw:
                 with self.subTest(behind=name, beams=beams):
                     figures = self.stats(beams, "--shadow", window(shadow, beams), "--surroundings", window(beside, beams))
-                    # With gamma 127, 0.4 is 16 dB: noise as strong as in the captured pings shows in a shadow at 5 m.
+                    # With gamma 127, 0.4 is 16 dB: noise of the level of the captured pings is visible in a shadow at 5 m.
                     self.assertLess(figures["shadow"]["ratio"], 0.4, figures["shadow"])
 
     def test_samples_use_their_range_without_burning_out(self):

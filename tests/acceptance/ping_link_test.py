@@ -51,7 +51,7 @@ class Host:
         self.udp.send(data)
 
     def next(self, wanted, patience_s=30):
-        """Payload and seconds until it came."""
+        """Returns the payload and the time until it arrived [s]."""
         start = time.monotonic()
         self.udp.settimeout(patience_s)
         while True:
@@ -199,7 +199,7 @@ class SurveyorLink(unittest.TestCase):
                 for y, z in self.points(payload):
                     self.assertTrue(-12 < z < 0 and math.hypot(y, z) < 10.5, (y, z))
         host = Host(self.daemon.address, SURVEYOR)
-        eventually(lambda: host.is_answered(general(5)))  # the host by TCP is gone
+        eventually(lambda: host.is_answered(general(5)))  # the TCP host has disconnected
         self.assertEqual(host.ask(general(5), 5)[0][0], 1)
         host.send(settings(1))
         host.next(504)
@@ -407,7 +407,7 @@ class Dissected(unittest.TestCase):
         capture = Capture(device_port=SURVEYOR)
         capture.connect()
         whole = general(4) + settings(1)
-        for data in (whole[:7], whole[7:]):  # not at the edges of frames
+        for data in (whole[:7], whole[7:]):  # cuts that do not coincide with the ends of frames
             capture.tcp("client", data)
         for datagram in host.datagrams:
             capture.udp(datagram, PING360)

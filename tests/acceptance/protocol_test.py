@@ -1,4 +1,5 @@
-"""What a driver gets, read by the independent reader: sizes, versions, sample widths, bearings, standby, the end."""
+"""Tests the messages that a driver gets, with the independent reader: sizes, versions, sample widths, bearings, standby, the
+end."""
 import os
 import pathlib
 import signal
@@ -38,7 +39,8 @@ class Served(unittest.TestCase):
                     self.expect_bearings(ping, 30 if mode == 2 else 65)
 
     def expect_bearings(self, ping, half_aperture_deg):
-        """The law of the capture; a hundredth of a degree may fall the other way where the cut is a hair's breadth off."""
+        """The law of the capture; the truncation may differ by a hundredth of a degree where the value is very close to a whole
+        hundredth."""
         differences = [abs(a - b) for a, b in zip(ping.bearings, expected_bearings(ping.beams, half_aperture_deg))]
         self.assertLessEqual(max(differences), 1)
         self.assertLessEqual(sum(differences), ping.beams // 100)
@@ -86,10 +88,10 @@ class Ending(unittest.TestCase):
         with Sonard(scene="tank-rod.yaml", profile="oculus-m1200d") as daemon:
             with Client(daemon.address) as stalled:
                 stalled.ping_made_with(fire_message(rate_hz=40, flags=0x4B, version=2, extended=0x200))
-                time.sleep(1)  # reads no more: its window fills
+                time.sleep(1)  # it stops reading, so its window fills
                 code, seconds = daemon.stop()
             self.assertEqual(code, 0, daemon.log())
-            self.assertLess(seconds, 20)  # the promise is 2 s
+            self.assertLess(seconds, 20)  # the documented limit is 2 s
 
 
 class Capture(unittest.TestCase):
@@ -118,7 +120,7 @@ class TheReaderOfTheLogEnds(unittest.TestCase):
         try:
             self.assertTrue(any(b"ready in" in line for line in daemon.stdout))
             daemon.stdout.close()
-            for _ in range(2):  # each is worth some lines of log
+            for _ in range(2):  # each causes some log lines
                 with Client(configured.address) as client:
                     client.ping_made_with(fire_message(range_=4.0))
             self.assertIsNone(daemon.poll())

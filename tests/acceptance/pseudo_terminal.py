@@ -1,4 +1,4 @@
-"""A serial port whose other end is a TCP connection, as socat makes it."""
+"""A serial port whose other end is a TCP connection, made by socat."""
 import os
 import pty
 import selectors
@@ -8,7 +8,7 @@ import tty
 
 
 class PseudoTerminal:
-    """`read(count)` and `write(data)` at `name`, as a driver of a serial port has them."""
+    """`read(count)` and `write(data)` at the port `name`, like a driver of a serial port."""
 
     def __init__(self, address, port, patience_s):
         self.socket = socket.create_connection((address, port), timeout=patience_s)

@@ -1,4 +1,4 @@
-"""Recorded by sonarctl, replayed by sonard: the same bytes through every kind of file; files checked by other readers."""
+"""sonarctl records and sonard replays: every kind of file must keep the bytes, and other readers check the files."""
 import base64
 import json
 import os
@@ -59,7 +59,7 @@ class Replay:
         self.wait_for("Ctrl-C stops")
 
     def wait_for(self, text):
-        """Until its log has the text, or it ends."""
+        """Waits until its log has the text, or it ends."""
         deadline = time.monotonic() + 60
         while text not in self.text() and self.process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.01)
@@ -165,7 +165,7 @@ class Recorded(Files):
         self.assertEqual(tshark("-r", self.path("pcap"), *checks, "-Y", bad), "")
         good = tshark("-r", self.path("pcap"), *checks, "-Y", 'tcp.checksum.status=="Good"').splitlines()
         self.assertGreater(len(good), len(sent))
-        if shutil.which("editcap"):  # somebody else's pcapng
+        if shutil.which("editcap"):  # a pcapng file of another program
             subprocess.run(["editcap", "-F", "pcapng", self.path("pcap"), self.folder / "again.pcapng"], check=True, timeout=60)
             done = run(SONARCTL, "record", "--from", self.folder / "again.pcapng", "--raw", self.folder / "again.raw")
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -213,7 +213,7 @@ class Inside(Files):
                     numbers += [client.ping().id for _ in range(4)]
                 numbers += [client.ping().id for _ in range(4)]
             figures = json.loads(self.steer("status", "--json").stdout)["sonars"][0]["figures"]
-            missing = numbers[-1] - numbers[0] + 1 - len(numbers)  # some, where this test is too slow a client
+            missing = numbers[-1] - numbers[0] + 1 - len(numbers)  # not 0 if this test reads too slowly
             self.assertLessEqual(missing, int(figures.get("dropped", 0)))
             self.assertEqual(numbers, sorted(set(numbers)))
             self.assertIn("File too large", self.recording()["why"])
@@ -265,7 +265,7 @@ class Inside(Files):
 
 
 class OneIntoAnother(Files):
-    """Without a sonar: recordings out of recordings."""
+    """Converts recordings to recordings, without a sonar."""
 
     def made(self, pings=4, rows=40):
         body = struct.pack("<BBBBBdddd", 2, 0, 255, 127, 9, 1.0, 50.0, 0.0, 0.0)
@@ -340,7 +340,7 @@ class OneIntoAnother(Files):
             self.assertEqual(self.convert(self.path(kind), "--raw", out).returncode, 0)
             kept = out.read_bytes()
             self.assertTrue(kept and self.read("raw").startswith(kept), kind)
-        mcap_checker.check(self.read("mcap"))  # its end found room
+        mcap_checker.check(self.read("mcap"))  # its end could be written
 
     def test_captured_pings(self):
         folder = pathlib.Path(os.environ.get("SONARD_CAPTURES", self.folder))
@@ -388,7 +388,7 @@ class OneIntoAnother(Files):
             done = run(SONARCTL, *words)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, 1), done.stderr)
         self.assertEqual(self.read("raw"), b"nothing of the kind")
-        once, again = self.folder / "w", self.folder / "sub/../w"  # one file for two kinds
+        once, again = self.folder / "w", self.folder / "sub/../w"  # the same file for two kinds
         done = run(SONARCTL, "record", "--raw", once, "--oculus", again)
         self.assertEqual((done.returncode, done.stderr.count("\n")), (64, 1), done.stderr)
         self.assertIn("named for two kinds of files", done.stderr)

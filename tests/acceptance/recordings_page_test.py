@@ -1,4 +1,4 @@
-"""Recordings as viewers see them: of every demo, by sonard and by `sonard replay`, with a time line that each viewer moves alone.
+"""Tests recordings on the page: of every demo, by sonard and by `sonard replay`, with a separate time line for each viewer.
 
 The page's part is skipped without browser or page.
 """
@@ -28,7 +28,7 @@ def is_message(topic):
 
 
 def record(maker, pings):
-    """A recording of the demo that runs, started and stopped as from the page, while a driver is connected."""
+    """A recording of the running demo, started and stopped as by the page, while a driver is connected."""
     with subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--quiet"], stdout=subprocess.DEVNULL,
                           stderr=subprocess.DEVNULL) as driver:
         name = f"{maker}.mcap"
@@ -45,7 +45,7 @@ def more_than(pings):
 
 
 class Recordings(PageChecks, unittest.TestCase):
-    """In a folder of its own, where demos put their recordings."""
+    """Runs in a separate folder, in which demos create their recordings."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -54,7 +54,7 @@ class Recordings(PageChecks, unittest.TestCase):
         os.chdir(folder.name)
 
     def look(self, viewer, kind, product):
-        """It names the product and plays; then it is sought, stopped and played again."""
+        """The page names the product and plays; then it seeks, pauses and plays again."""
         viewer.greeted().subscribe("/recording/picture", "/recording/fan", "/recording/ping", "/status")
         self.assertEqual(viewer.first_of("/recording/picture", PATIENCE_S)["kind"], kind)
         image = viewer.first_of("/recording/fan")
@@ -80,7 +80,7 @@ class Recordings(PageChecks, unittest.TestCase):
 
         tell("paused", True)
         if any(is_last(ns - first_ns) for topic, ns, _ in viewer.messages[-20:] if topic == "/recording/ping"):
-            seek(0.0, lambda ns: ns == 0)  # a short recording may have ended meanwhile: no ping is shown twice in turn
+            seek(0.0, lambda ns: ns == 0)  # a short recording may have ended in the meantime; no ping is shown twice in succession
         seek(trajectory["duration_s"], is_last)
         seek(0.0, lambda ns: ns == 0)
         tell("speed", 4.0)
@@ -99,7 +99,7 @@ class Recordings(PageChecks, unittest.TestCase):
                 with Replay(path, "--loop") as replay, Viewer(HTTP) as viewer:
                     self.look(viewer, kind, product)
                     self.assertIn("open      http://127.0.0.1:8088", replay.text())
-                    with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=PATIENCE_S) as answer:  # doctor asks for it
+                    with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=PATIENCE_S) as answer:  # doctor requests it
                         self.assertEqual(answer.read(), f"ok: replays {path.name}\n".encode())
                     if maker == "oculus":
                         said = run(SONARCTL, "doctor").stdout
@@ -111,7 +111,8 @@ class Recordings(PageChecks, unittest.TestCase):
                         self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
 
     def test_a_recorded_refusal_of_another_request_stops_no_host(self):
-        """A host that does not know which product is at the port asks the other first; the recording holds the refusal."""
+        """A host that does not know the product at the port may ask for the other one first; then the recording contains the
+        refusal."""
         with demo("s500"):
             self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--seconds", 3).returncode, 0)
         with Replay(pathlib.Path("run.mcap"), "--loop") as replay:
@@ -188,7 +189,7 @@ class Recordings(PageChecks, unittest.TestCase):
             with subprocess.Popen([SONARCTL, "listen", SONAR, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                 page.wait("/ [1-9]\\d* pings .* running/.test(document.querySelector('#recordings').innerText)")
                 driver.terminate()
-            # The page changes as the driver leaves; a press meanwhile may miss the button.
+            # The page changes when the driver disconnects; a click at that moment may miss the button.
             page.wait("document.querySelector('#recordings').innerText.includes('waits for a driver, such as sonarctl listen')")
             page.press_mouse("#record")
             page.wait("document.querySelector('#record').innerText === 'Record'")

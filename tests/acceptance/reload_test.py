@@ -1,8 +1,8 @@
-"""SIGHUP as an operator sends it: the shipped daemon, its real engine, a configuration file that is edited.
+"""Tests SIGHUP with the shipped daemon, its real engine and an edited configuration file.
 
-A client of a sonar that the edit does not touch sees every ping id once, none is missing but those that the daemon counts as skipped
-or dropped, as a busy computer's must be; the scene it looks at changes under it.
-What is measured is kept for the table of reliability where SONARD_RELIABILITY names a folder.
+A client of a sonar that the edit does not concern sees every ping id once. Only pings that the daemon counts as skipped or
+dropped (on a busy computer) are missing. The scene changes while the client is connected. Figures for the table of reliability
+are written to the folder SONARD_RELIABILITY.
 """
 import json
 import pathlib
@@ -43,7 +43,7 @@ SECOND = """\
 
 
 class Watcher(threading.Thread):
-    """Reads all the time, so that no ping is lost for want of a reader: the ids of all, and the newest."""
+    """Reads without a pause, so that no ping is dropped because of this client. Keeps all ids and the newest ping."""
 
     def __init__(self, client):
         super().__init__(daemon=True)
@@ -69,7 +69,7 @@ class Watcher(threading.Thread):
         return Ping(self.newest)
 
     def wrong(self, daemon, begin=0):
-        """How many ids from that place on are repeated or out of order, or missing and not counted by the daemon."""
+        """Number of ids from that position on that are repeated, out of order, or missing without being counted by the daemon."""
         steps = [b - a for a, b in zip(self.ids[begin:], self.ids[begin + 1:])]
         figures = daemon.status()["sonars"][0]["figures"]
         counted = int(figures["skipped_ticks"]) + int(figures["dropped"])
@@ -127,7 +127,7 @@ class Reload(unittest.TestCase):
             self.assertEqual(code, 0, daemon.log())
 
     def test_pings_go_on_when_a_mesh_cannot_be_imported(self):
-        """Each ended the daemon when it imported meshes itself."""
+        """Each of these files once ended the daemon, when it imported meshes itself."""
         daemon = Sonard(pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")
         folder = pathlib.Path(daemon.folder.name)
         daemon.scene = folder / "reload.yaml"
@@ -163,7 +163,7 @@ class Reload(unittest.TestCase):
             self.assertEqual(code, 0, daemon.log())
 
     def look(self, watcher):
-        """Range of the strongest echo, a few pings from now: those from before the reload go first."""
+        """Returns the range of the strongest echo after a few pings, because pings from before the reload come first."""
         ping = watcher.ping_after(12)
         rows_per_m = 1 / ping.resolution
         ball, _, _ = ping.brightest(int(1.0 * rows_per_m), int(7.0 * rows_per_m))

@@ -1,4 +1,4 @@
-"""sonard render as a user runs it: arrays that another language reads, runs that continue where they stopped, plain refusals."""
+"""Tests sonard render: another language reads the arrays, interrupted runs continue, and refusals are clear."""
 import ast
 import contextlib
 import fcntl
@@ -123,7 +123,7 @@ class Render(unittest.TestCase):
         self.expect(self.render("--pings", "2", "--format", "npy"), 0)
         first = self.out / "000001_pressure.npy"
         before = first.stat().st_mtime_ns, first.read_bytes()
-        (self.out / "000002.json").unlink()  # broken off before the second was whole
+        (self.out / "000002.json").unlink()  # stopped before the second ping was complete
         result = self.render("--pings", "3", "--format", "npy")
         self.expect(result, 0, "3 of 3 pings", "1 were there already")
         self.assertEqual((first.stat().st_mtime_ns, first.read_bytes()), before)
@@ -208,7 +208,7 @@ class Render(unittest.TestCase):
         poses = self.path / "poses.csv"
         poses.write_text("# frame: ENU_FLU\nt,x,y,z\n0,0,0,-2\n1,0,0,2\n", encoding="utf-8")
         options = ["--poses", poses, "--quiet", "--format", "raw"]
-        for _ in range(2):  # the second finds all pings there
+        for _ in range(2):  # the second run finds all pings
             result = self.render(*options)
             self.expect(result, 0, "1 of 2 pings", "above the sea surface", "noise only", "NED")
             self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
@@ -276,13 +276,13 @@ class Render(unittest.TestCase):
 
     def test_two_runs_at_once_do_not_share_a_folder(self):
         with open_folder(self.out) as held:
-            fcntl.flock(held, fcntl.LOCK_EX)  # as another run holds it
+            fcntl.flock(held, fcntl.LOCK_EX)  # like another run that holds the lock
             self.expect(self.render(), 64, "another sonard render is writing into", "--out")
             self.assertEqual(list(self.out.iterdir()), [])
         self.expect(self.render("--format", "raw"), 0)
 
     def test_a_scene_is_told_from_a_render_file(self):
-        """And the command that is told works."""
+        """The suggested command works too."""
         scene = self.path / "my scene.yaml"
         scene.write_text((ROOT / "scenes/l-targets.yaml").read_text(encoding="utf-8"), encoding="utf-8")
         result = self.render(config=scene)

@@ -80,7 +80,7 @@ class Reproducibility(unittest.TestCase):
             mcap_checker.check(mission.recorded("rest.mcap").read_bytes())
 
     def expect_true_places(self, recording):
-        """Pose and frames in protobuf say what the ground truth says in JSON."""
+        """Pose and frames in protobuf agree with the ground truth in JSON."""
         frames = [frame for message in recording.read("/tf") for frame in message["transforms"]]
         self.assertEqual([frame["child_frame_id"] for frame in frames], ["front", "object/rod"] * PINGS)
         for number, (pose, truth) in enumerate(zip(recording.read("/front/pose"), recording.read("/front/truth"))):
@@ -95,7 +95,7 @@ class Reproducibility(unittest.TestCase):
         def kill():
             deadline = time.monotonic() + 60
             while killed.recorded("run.oculus").stat().st_size < 100_000 and time.monotonic() < deadline:
-                time.sleep(0.01)  # the recording has a ping or two
+                time.sleep(0.01)  # the recording contains one or two pings then
             killed.daemon.process.send_signal(signal.SIGKILL)
 
         with Mission(SECONDS, PINGS, record=("run.oculus",)) as killed:
@@ -112,7 +112,7 @@ class Reproducibility(unittest.TestCase):
             self.expect_the_same(again.fly(keep=False))
 
     def test_started_further_on_it_shows_the_same_pictures(self):
-        """Ping numbers and stamps count from the start of a run, and what the receiver adds with them: it is off here."""
+        """Ping numbers and stamps count from the start of a run, and so does the receiver's noise, which is off here."""
         quiet = ("--noise", "off", "--leak", "off")
         later = 10
         with Mission(SECONDS, PINGS, *quiet) as whole:

@@ -41,7 +41,7 @@ def run(*command, patience_s=120):
 
 
 def eventually(true, patience_s=120):
-    """Until true() is so; its value."""
+    """Waits until true() is true; returns its value."""
     end = time.monotonic() + patience_s
     while not (value := true()):
         if time.monotonic() > end:
@@ -51,7 +51,7 @@ def eventually(true, patience_s=120):
 
 
 def expect_quiet(udp, for_s=1, patience_s=60):
-    """What is under way arrives; after it nothing for so long."""
+    """Reads data in transit until nothing arrives for this time."""
     end = time.monotonic() + patience_s
     udp.settimeout(for_s)
     try:
@@ -72,7 +72,7 @@ class Sonard(Daemon):
         self.folder = self._folder = tempfile.TemporaryDirectory()
         self.scene, self.profile, self.pose, self.mount = ROOT / "scenes" / scene, profile, pose, mount
         self.trajectory = f", trajectory: {trajectory}" if trajectory else ""
-        self.control = control  # more of that section: ", token_file: token"
+        self.control = control  # further keys of that section, such as ", token_file: token"
         self.http = http  # empty: port 8088 of the address
         self.poses = poses  # as control
         self.more = more
@@ -94,11 +94,11 @@ class Sonard(Daemon):
         return run(SONARCTL, command, self.address, *arguments, **options)
 
     def status(self):
-        """What sonarctl status says, over the control stream of this address."""
+        """Returns the output of sonarctl status, over the control stream of this address."""
         return json.loads(run(SONARCTL, "status", "--json", "--control", f"{self.address}:14770").stdout)
 
     def get(self, path):
-        """What HTTP answers."""
+        """Returns the answer over HTTP."""
         with urllib.request.urlopen(f"http://{self.address}:8088{path}", timeout=60) as answer:
             return answer.read().decode()
 
@@ -115,7 +115,7 @@ class Sonard(Daemon):
         return self.process.wait(patience_s)
 
     def __exit__(self, *_):
-        """Kills the process: a test may have suspended it."""
+        """Kills the process, because a test may have suspended it."""
         if self._process is not None and self._process.poll() is None:
             self._process.kill()
             self._process.wait()

@@ -1,4 +1,4 @@
-"""sonarctl scene as a user runs it: a Gazebo world becomes a scene, and its box echoes at the position of its poses."""
+"""Tests sonarctl scene: a Gazebo world is converted to a scene, and its box has an echo at the position of its poses."""
 import json
 import math
 import pathlib

@@ -1,4 +1,5 @@
-"""The systemd unit: valid, at most 1.5 of exposure, and sonard needs none of what it forbids. No service manager is needed."""
+"""Tests the systemd unit: it is valid, its exposure is at most 1.5, and sonard needs nothing that it forbids. Needs no service
+manager."""
 import ctypes
 import os
 import pathlib
@@ -31,7 +32,7 @@ def settings():
 
 
 def calls_of(set_name, seen=()):
-    """The system calls of a set such as @system-service, sets within it followed."""
+    """The system calls of a set such as @system-service, including those of nested sets."""
     calls = set()
     for line in run("systemd-analyze", "syscall-filter", set_name).stdout.splitlines():
         name = line.strip()
@@ -64,7 +65,7 @@ class Unit(unittest.TestCase):
         base = self.file.read_text(encoding="utf-8")
         for drop_in in drop_ins:
             own = drop_in.replace("ExecStart=sonard", f"ExecStart={SONARD.resolve()}")
-            # A program that is not installed here is no fault of the drop-in.
+            # A program that is not installed here is not a mistake of the drop-in.
             own = re.sub(r"ExecStartPre=.*", "ExecStartPre=/bin/true", own)
             self.file.write_text(base + "\n" + re.sub("^    ", "", own, flags=re.MULTILINE), encoding="utf-8")
             result = run("systemd-analyze", "verify", "--man=no", self.file)
@@ -90,7 +91,7 @@ class Unit(unittest.TestCase):
     @NEEDS_SYSTEMD
     @unittest.skipIf(shutil.which("strace") is None, "strace is not here")
     def test_sonard_makes_no_system_call_that_the_unit_refuses(self):
-        """Twenty pings of the demo, a client included, counted by strace."""
+        """Twenty pings of the demo with a client, counted by strace."""
         if "SONAR_SANITIZE:STRING=\n" not in (BUILD / "CMakeCache.txt").read_text(encoding="utf-8"):
             self.skipTest("sanitizers make calls of their own")
         allowed = set()
@@ -122,14 +123,14 @@ class Unit(unittest.TestCase):
         with subprocess.Popen(["strace", "-f", "-qq", "-o", str(calls), str(SONARD), "run", str(config), "--exit-after-pings", "3"],
                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
             listened = run(SONARCTL, "listen", address, "--pings", "3", "--wait", "300", "--seconds", "300", "--quiet", patience_s=660)
-            if listened.returncode != 0:  # it waits for pings that are not taken
+            if listened.returncode != 0:  # it waits for pings that are not read
                 subprocess.run(["pkill", "-P", str(process.pid)], check=False)
             process.stderr.read()
         self.assertEqual((process.returncode, listened.returncode), (0, 0), listened.stderr)
         return calls.read_text(encoding="utf-8", errors="replace")
 
     def test_memory_that_is_written_is_never_executed(self):
-        """MemoryDenyWriteExecute= as the kernel's own switch has it: what Embree and the rest do must pass."""
+        """Sets MemoryDenyWriteExecute= by the switch of the kernel; Embree and all other code must work with it."""
         libc = ctypes.CDLL(None, use_errno=True)
         if not self.refuses_memory(libc):
             self.skipTest("this kernel has no PR_SET_MDWE")
@@ -141,7 +142,7 @@ class Unit(unittest.TestCase):
 
     @staticmethod
     def refuses_memory(libc):
-        """Asked in a child: there is no way back."""
+        """Set in a child process, because it cannot be undone."""
         child = os.fork()
         if child == 0:
             os._exit(0 if libc.prctl(PR_SET_MDWE, PR_MDWE_REFUSE_EXEC_GAIN, 0, 0, 0) == 0 else 1)

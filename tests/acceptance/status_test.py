@@ -1,4 +1,4 @@
-"""sonarctl status, events, set, load and object beside a running daemon."""
+"""Tests sonarctl status, events, set, load and object with a running daemon."""
 import json
 import pathlib
 import re
@@ -81,7 +81,7 @@ class Steering(unittest.TestCase):
         events = subprocess.Popen([str(SONARCTL), "events", "--clients", "--count", "1", "--seconds", "60", "--json", "--control",
                                    f"{self.daemon.address}:14770"], stdout=subprocess.PIPE, text=True)
         deadline = time.monotonic() + 30
-        while events.poll() is None and time.monotonic() < deadline:  # until it has subscribed and a visit is seen
+        while events.poll() is None and time.monotonic() < deadline:  # until it has subscribed and reports a client
             with socket.create_connection((self.daemon.address, 52100), 10):
                 time.sleep(0.2)
         output = events.communicate(timeout=60)[0]
@@ -129,8 +129,9 @@ class Steering(unittest.TestCase):
             for expected in (f"{self.daemon.address}:{port}", word, "--control HOST:PORT", "14770"):
                 self.assertIn(expected, result.stderr)
 
-    def test_nobody_is_not_taken_for_somebody_on_a_port_that_the_system_gives_us_ourselves(self):
-        """Of two ports for outgoing connections one is asked for: soon the socket would be connected to itself."""
+    def test_a_socket_that_is_connected_to_itself_is_not_an_answer(self):
+        """If only two ports are available for outgoing connections and one of them is the target, a socket may soon be connected
+        to itself."""
         command = f"ip link set lo up && echo 52100 52101 > /proc/sys/net/ipv4/ip_local_port_range && exec {SONARCTL.resolve()} status"
         if run("unshare", "-rn", "sh", "-c", command.split(" && exec")[0]).returncode != 0:
             self.skipTest("no network namespace of its own")
@@ -141,14 +142,14 @@ class Steering(unittest.TestCase):
 
     def test_a_port_of_something_else_is_noticed_soon(self):
         with socket.create_server((self.daemon.address, 0)) as silent:
-            # Lines of JSON, which ends a connection that begins otherwise; a program that says nothing.
+            # The port of JSON lines, which ends a connection with other content; and a program that sends nothing.
             for port, what in ((14771, "closes the connection"), (silent.getsockname()[1], "no greeting within 2 s")):
                 begin = time.monotonic()
                 result = run(SONARCTL, "status", "--control", f"{self.daemon.address}:{port}")
                 self.assertEqual(result.returncode, 65, result.stderr)
                 for expected in (f"{self.daemon.address}:{port}", what, "another service", "14770"):
                     self.assertIn(expected, result.stderr)
-                self.assertLess(time.monotonic() - begin, 20)  # 2 s on a quiet machine; that it waited no longer, the message says
+                self.assertLess(time.monotonic() - begin, 20)  # 2 s on a quiet machine; the message states the time that it waited
 
 
 class Secrets(unittest.TestCase):

@@ -26,7 +26,8 @@ def depth_m(t):
 
 
 def dive():
-    """Four seconds that turn to port, east first, and go down; in uneven steps, with stamps of a real clock."""
+    """A trajectory of four seconds that begins eastwards, turns to port and descends, in uneven steps with stamps of a real
+    clock."""
     lines = ["# frame: ENU_FLU"]
     for t in (0, 0.3, 1, 1.1, 2.5, 4):
         half = math.radians(yaw_deg(t)) / 2
@@ -75,7 +76,7 @@ class Stepped(unittest.TestCase):
 
         twice, other = stepped_run("{file: dive.tum, speed: 2, loop: true, start_s: 3}")
         self.assertNotEqual(other, digest)
-        for n, ping in enumerate(twice):  # a loop's end and its start are one moment
+        for n, ping in enumerate(twice):  # the end of a loop and its start are the same moment
             self.expect_at(ping, (3 + 2 * n / RATE_HZ) % 4)
 
 

@@ -8,14 +8,14 @@ import xml.etree.ElementTree as ElementTree
 from running_sonard import ROOT
 
 DISSECTOR = ROOT / "protocol/oculus/oculus.lua"
-# Made from other fields by the dissector, or parts of one: checked by their own means.
+# The dissector makes these from other fields, or from parts of a field; other code checks them.
 DERIVED = ("oculus.length", "oculus.ping.bits", "oculus.ping.firstBearing", "oculus.ping.lastBearing", "oculus.ping.bearing",
            "oculus.ping.filler", "oculus.ping.image", "oculus.ping.rowGain", "oculus.log.text", "oculus.payload", "oculus.junk")
 DERIVED_PARTS = ("oculus.fire.flags.", "oculus.fire.extFlags.", "oculus.status.status.")
 
 
 def tshark(*arguments, dissector=DISSECTOR):
-    """stdout; anything that Lua or tshark complains about is an error. The user's own preferences and plug-ins are left out."""
+    """Returns stdout; any complaint of Lua or tshark is an error. Ignores the user's preferences and plug-ins."""
     with tempfile.TemporaryDirectory() as empty:
         done = subprocess.run(["tshark", *[str(a) for a in arguments], "-n", "-X", f"lua_script:{dissector}"],
                               env=os.environ | {"HOME": empty, "XDG_CONFIG_HOME": empty, "TZ": "UTC"}, stdin=subprocess.DEVNULL,
@@ -29,7 +29,7 @@ def tshark(*arguments, dissector=DISSECTOR):
 
 
 def why_not():
-    """Why there is no tshark that runs Lua here; None when there is one."""
+    """The reason if no tshark with Lua can run here; else None."""
     if shutil.which("tshark") is None:
         return "tshark is not installed (Debian: apt-get install tshark)"
     with tempfile.NamedTemporaryFile("w", suffix=".lua") as probe:

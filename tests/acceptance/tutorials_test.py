@@ -1,4 +1,4 @@
-"""Every tutorial as a reader types it: its files are written, its commands run in one shell, and leave what it promises."""
+"""Runs every tutorial as a reader would: writes its files, runs its commands in one shell, and checks the promised results."""
 import os
 import pathlib
 import re
@@ -10,7 +10,7 @@ import unittest
 from running_sonard import BUILD, ROOT
 
 PYTHON = ROOT / "clients/python"
-ENDING = "trap 'kill $(jobs -p) 2>&- || true; wait || true' EXIT\n"  # a daemon in the background ends with the shell
+ENDING = "trap 'kill $(jobs -p) 2>&- || true; wait || true' EXIT\n"  # ends a daemon in the background when the shell ends
 sys.path.insert(0, str(PYTHON / "tests"))
 import made_logs  # noqa: E402  pylint: disable=wrong-import-position
 

@@ -1,4 +1,4 @@
-"""sonarctl view in the terminal and live: letters for pipes, colours for terminals, and the terminal given back."""
+"""Tests sonarctl view in the terminal and live: letters for pipes, colours for terminals; at the end the terminal is restored."""
 import os
 import pathlib
 import pty
@@ -16,7 +16,7 @@ from running_sonard import SONARCTL, Sonard, run
 
 
 def in_a_terminal(command, until, end, **environment):
-    """Output of a command on a terminal of its own; `end(process)` is called when `until` was seen."""
+    """Returns the output of a command on a separate terminal; `end(process)` is called after the text `until`."""
     master, slave = pty.openpty()
     variables = {**os.environ, "TERM": "xterm-256color", "LC_ALL": "C.UTF-8", "COLUMNS": "60", "LINES": "24", **environment}
     variables.pop("NO_COLOR", None)
@@ -28,7 +28,7 @@ def in_a_terminal(command, until, end, **environment):
             continue
         try:
             data = os.read(master, 65536)
-        except OSError:  # the other side is closed
+        except OSError:  # the other end is closed
             break
         output += data
         if not data:
@@ -75,7 +75,7 @@ class View(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertEqual(len(result.stdout.splitlines()), 3)
             self.assertEqual(png.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
-            self.assertEqual([p.name for p in pathlib.Path(folder).iterdir()], ["ping.png"])  # nothing unfinished lies about
+            self.assertEqual([p.name for p in pathlib.Path(folder).iterdir()], ["ping.png"])  # no unfinished file remains
 
     def test_the_recording_that_is_read_is_not_replaced(self):
         with tempfile.TemporaryDirectory() as folder:

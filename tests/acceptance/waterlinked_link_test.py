@@ -27,7 +27,7 @@ def why_not():
 
 
 def sonar(scene="l-targets.yaml", **options):
-    """Of a file: options are the sonar's."""
+    """Returns a configuration file with these options of the sonar."""
     daemon = Sonard(scene=scene, profile="waterlinked-3d15", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}")
     if options:
         daemon.profile += "\n    options: {" + ", ".join(f'{k}: "{v}"' for k, v in options.items()) + "}"
@@ -35,7 +35,7 @@ def sonar(scene="l-targets.yaml", **options):
 
 
 def receiver(address=None):
-    """Of multicast, or of unicast at an address."""
+    """Opens a socket for multicast, or for unicast at an address."""
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
@@ -124,7 +124,7 @@ class Image:
 @unittest.skipIf(why_not(), why_not())
 class Images(unittest.TestCase):
     def ask(self, daemon, path, value=None, method=None):
-        """Status and body."""
+        """Returns status and body."""
         data = None if value is None else value if isinstance(value, bytes) else json.dumps(value).encode()
         request = urllib.request.Request(f"http://{daemon.address}/api/v1/integration{path}", data, {"Content-Type": "application/json"},
                                          method=method)

@@ -86,7 +86,7 @@ class Page:
         try:
             self.call("Page.close")
         except OSError:
-            pass  # it is closed already
+            pass  # it is already closed
         self.socket.close()
 
     def size(self, width, height, scale=1, touch=False):
@@ -97,7 +97,7 @@ class Page:
         return self.answer(self.ask(method, **parameters))
 
     def ask(self, method, **parameters):
-        """Sends a call; answer() waits for what it returns."""
+        """Sends a call; answer() waits for the result."""
         self.calls += 1
         self.socket.send(TEXT, json.dumps({"id": self.calls, "method": method, "params": parameters}))
         return self.calls, method
@@ -120,7 +120,7 @@ class Page:
         return word["result"]
 
     def note(self, word):
-        """Requests, and what the console holds against the page."""
+        """Collects requests, and the errors in the console."""
         method, about = word.get("method"), word.get("params", {})
         if method in ("Network.requestWillBeSent", "Network.webSocketCreated"):
             self.requests.append(about.get("url") or about["request"]["url"])
@@ -136,14 +136,14 @@ class Page:
         self.call("Page.navigate", url=url)
 
     def run(self, expression):
-        """The value of an expression, or of what it promises."""
+        """Returns the value of an expression, or the result of its promise."""
         result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in result:
             raise RuntimeError(result["exceptionDetails"].get("exception", {}).get("description") or str(result["exceptionDetails"]))
         return result["result"].get("value")
 
     def wait(self, expression, patience_s=60):
-        """Until the expression is true; its value."""
+        """Waits until the expression is true; returns its value."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
             try:
@@ -162,7 +162,7 @@ class Page:
         """Sends several key presses at once, because each alone would wait for the browser, which is slow without a GPU."""
         code = {" ": "Space", "?": "Slash"}.get(key, key)
         text = {"text": key} if len(key) == 1 else {"text": "\r"} if key == "Enter" else {}
-        number = {"windowsVirtualKeyCode": KEY_NUMBERS[key]} if key in KEY_NUMBERS else {}  # without it the browser does nothing
+        number = {"windowsVirtualKeyCode": KEY_NUMBERS[key]} if key in KEY_NUMBERS else {}  # without this number the browser ignores the key
         asked = []
         for _ in range(times):
             asked.append(self.ask("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, **text, **number))
@@ -171,12 +171,13 @@ class Page:
             self.answer(each)
 
     def click(self, selector):
-        """Waits for the element: a message of the daemon may put it there, or replace it."""
+        """Waits for the element: a message of the daemon may add or replace it."""
         self.wait(f"!!document.querySelector({json.dumps(selector)})")
         self.run(f"document.querySelector({json.dumps(selector)}).click()")
 
     def place(self, selector):
-        """The middle of an element, which is scrolled into view, once it is enabled and stands still: a slow page is still laid out."""
+        """Scrolls an element into view, waits until it is enabled and stops moving (a slow page may still change its layout), and
+        returns its middle."""
         element = f"document.querySelector({json.dumps(selector)})"
         self.wait(f"{element}?.offsetWidth && !{element}.disabled")
         before, place = None, []
@@ -189,13 +190,13 @@ class Page:
 
     def press_mouse(self, selector):
         """Clicks as a mouse does: the topmost element at that place gets the click. A message of the daemon can move the element
-        between the look at its place and the press; a click that reached another element is therefore made again."""
+        between the measurement of its position and the press, so a click that reached another element is repeated."""
         for _ in range(5):
             x, y = self.place(selector)
             self.run("window.clicked = null, addEventListener('click', (e) => { window.clicked = e.target; }, {capture: true, once: true})")
             for kind in ("mousePressed", "mouseReleased"):
                 self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
-            try:  # undefined in the page that a click on a link has loaded
+            try:  # undefined if a click on a link has loaded another page
                 other = self.run(f"""window.clicked === undefined || window.clicked?.closest({json.dumps(selector)}) ? ''
                   : window.clicked?.outerHTML.slice(0, 200) ?? 'nothing'""")
             except Navigated:
@@ -205,7 +206,7 @@ class Page:
         raise AssertionError(f"a click at the place of {selector} reaches {other}")
 
     def touch(self, selector):
-        """As a finger does."""
+        """Taps as a finger does."""
         x, y = self.place(selector)
         self.call("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
         self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])

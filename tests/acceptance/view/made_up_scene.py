@@ -5,7 +5,7 @@ import struct
 
 
 def glb(vertices, normals, triangles, colour):
-    """One mesh; glTF is y-up, so (x, y, z) becomes (x, z, -y)."""
+    """Writes one mesh; glTF is y-up, so (x, y, z) becomes (x, z, -y)."""
     def packed(rows):
         return b"".join(struct.pack("<3f", x, z, -y) for x, y, z in rows)
     positions, directions = packed(vertices), packed(normals)

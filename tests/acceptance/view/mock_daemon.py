@@ -1,4 +1,5 @@
-"""A daemon for the page's tests: serves the built page and speaks the live view's socket with made-up data. Standard library only.
+"""A daemon for the page's tests: serves the built page and speaks the live view's socket with made-up data. Standard library
+only.
 
     mock = MockDaemon(page_folder, pings);  mock.start();  mock.state("standby")
 
@@ -29,7 +30,7 @@ TOPICS = {"/front/image": "foxglove.RawImage", "/front/fan": "foxglove.RawImage"
           "/doctor": "sonar.v1.Findings", "/faults": "sonar.v1.FaultReport"}
 TROUBLES = ["bad_connector", "thin_tether", "power_cycle", "wrong_subnet", "second_operator", "other_firmware", "overheating",
             "clock_step", "electrical_noise", "lease_renewal"]
-# What the report of faults says of troubles.
+# The part of the fault report about troubles.
 ABOUT = {"thin_tether": {"sentence": "The tether is slow and late."}, "power_cycle": {"own_s": 21},
          "second_operator": {"stays": "the settings that it changed"}, "bad_connector": {"waits_for": "a ping"},
          "lease_renewal": {"sentence": "The address is withdrawn and returns.",
@@ -40,14 +41,14 @@ OK, WARNING, ERROR = 0, 1, 2
 
 
 def read_pings(folder):
-    """What `sonard render --format raw` has written: [(samples, description), ...]."""
+    """Reads the files of `sonard render --format raw`: [(samples, description), ...]."""
     folder = pathlib.Path(folder)
     return [(path.with_name(path.stem + "_samples.raw").read_bytes(), json.loads(path.read_text()))
             for path in sorted(folder.glob("[0-9]*.json"))]
 
 
 def policy():
-    """The Content-Security-Policy of the daemon: that of its source."""
+    """The Content-Security-Policy of the daemon, read from its source."""
     text = re.sub(r'"\s*\n\s*"', "", (ROOT / "daemon/server/http/page.cpp").read_text())
     return re.search(r"default-src[^\"]*", text).group()
 
@@ -87,10 +88,10 @@ class MockDaemon:
         self.server.daemon_threads = True
         self.port = self.server.server_address[1]
 
-    # ---- what it is made up to be
+    # ---- the simulated situation
 
     def state(self, name):
-        """One of the situations of the page, or "fine"."""
+        """Sets one of the situations of the page, or "fine"."""
         with self.lock:
             self.name, self.faults = name, {}
             self.clock = {"stepped": "stepped", "lockstep": "lockstep", "follow": "follow"}.get(name, "realtime")
@@ -193,7 +194,7 @@ class MockDaemon:
     def serve(self, request):
         path = request.path.partition("?")[0]
         self.requests.append(request.path)
-        request.rfile.read(int(request.headers.get("Content-Length", 0)))  # left there, it would begin the connection's next request
+        request.rfile.read(int(request.headers.get("Content-Length", 0)))  # unread bytes would be taken as the connection's next request
         if "upgrade" in request.headers.get("Connection", "").lower():
             return self.serve_socket(request)
         if path == "/api/v1/view_ticket":
@@ -358,7 +359,7 @@ class Viewer:
             with self.sending:
                 self.socket.send(kind, payload)
         except OSError:
-            pass  # it is gone: its reader notices
+            pass  # the viewer has left; its reader notices that
 
     def close(self):
         try:

@@ -20,7 +20,7 @@ WHY_NOT = ("this build has no page" if not (PAGE / "index.html").is_file() else
            "no protoc" if shutil.which("protoc") is None else "")
 TABS = ("fan", "scene", "clients", "faults", "log")
 
-# Elements whose words stand out less than 4.5 to 1 from what is painted behind them (WCAG 1.4.3).
+# Elements whose words have a contrast of less than 4.5 to 1 to their background (WCAG 1.4.3).
 FAINT_WORDS = """(() => {
   const channels = (c) => c.match(/[\\d.]+/g).map(Number);
   const light = ([r, g, b]) => [r, g, b].map((v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
@@ -51,7 +51,7 @@ WITHOUT_WEBGL = """window.Worker = class { constructor() { setTimeout(() => this
 HTMLCanvasElement.prototype.getContext = ((old) => function (kind, ...rest) {
   return kind === 'webgl2' ? null : old.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)"""
 
-# The width that the names of the sonars need, beyond what they have.
+# The width that the names of the sonars lack.
 LACKING_PX = """((e) => {
   const whole = e.cloneNode(true);
   whole.style.cssText = 'position: absolute; max-width: none; width: max-content';
@@ -62,12 +62,12 @@ LACKING_PX = """((e) => {
 })(document.querySelector('#sonar'))"""
 
 
-# Resolved when the page has been laid out and drawn as it is now.
+# A promise that is resolved when the present page has been laid out and drawn.
 LAID_OUT = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
 def shown(page, patience_s=60):
-    """Until the page has drawn a ping and lists the sonars: it does not wait for the list to draw."""
+    """Waits until the page has drawn a ping and lists the sonars, because the page draws pings before it has the list."""
     page.wait("/\\d/.test(document.querySelector('#ping-number').textContent) && document.querySelector('#sonar').options.length", patience_s)
 
 
@@ -76,7 +76,7 @@ class PageChecks:
 
     @staticmethod
     def picture(page, name, settled_s=0.0):
-        """Kept where SONARD_SHOTS names a folder, once what moves has had some time."""
+        """Stores a picture in the folder SONARD_SHOTS, after a short wait for moving parts."""
         if SHOTS:
             SHOTS.mkdir(parents=True, exist_ok=True)
             time.sleep(settled_s)
@@ -85,7 +85,7 @@ class PageChecks:
     open_pages = ()
 
     def opened(self, page):
-        """For a page that the test opens: closed at its end, kept as a picture when the test or a part of it fails before."""
+        """A page that the test opens. It is closed at the end; if the test or a part of it fails before, a picture is kept."""
         self.open_pages = (*self.open_pages, page)
         self.addCleanup(page.close)
         return page
@@ -99,7 +99,7 @@ class PageChecks:
         except Exception:
             FAILED_SHOTS.mkdir(parents=True, exist_ok=True)
             for number, page in enumerate(self.open_pages):
-                with contextlib.suppress(OSError, RuntimeError):  # it is closed already, or another page is being loaded
+                with contextlib.suppress(OSError, RuntimeError):  # it is already closed, or another page is being loaded
                     page.picture(FAILED_SHOTS / f"failed-{self.id().rpartition('.')[2]}-{number}.png")
             raise
 
@@ -119,7 +119,7 @@ class PageChecks:
             time.sleep(0.05)
 
     def reference(self, raw, map_name, width):
-        """What `sonarctl view` draws of a ping's message in a file."""
+        """Returns the picture that `sonarctl view` draws of the message of a ping in a file."""
         png = pathlib.Path(f"{raw}.png")
         done = run(SONARCTL, "view", "--from-raw", raw, "--png", png, "--no-rings", "--colour-map", map_name, "--width", width)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -144,7 +144,7 @@ class PageChecks:
         self.assertGreater(difference(mirrored(width, height, ours), theirs)[0], max(2, 2 * mean))
 
     def assert_fits(self, page, width, name=""):
-        """No sideways scrolling in any pane, and no words that are cut."""
+        """Checks that no pane scrolls sideways and no words are cut."""
         for tab in TABS if width < 820 else TABS[:1]:
             if width < 820:
                 page.click(f"#tabs [data-tab={tab}]")
@@ -155,7 +155,7 @@ class PageChecks:
             self.picture(page, f"{name}{width}-{tab}")
 
     def assert_quiet(self, page, url):
-        """No error of the console, and no request but to `url`."""
+        """Checks that the console has no error and that all requests go to `url`."""
         page.run("1")
         self.assertEqual(page.errors, [])
         own = url.replace("http", "", 1)

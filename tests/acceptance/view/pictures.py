@@ -1,4 +1,4 @@
-"""PNG pictures as rows of RGB bytes, and how far two of them differ. Standard library only."""
+"""Reads PNG pictures as rows of RGB bytes, and measures the difference of two pictures. Standard library only."""
 import struct
 import zlib
 

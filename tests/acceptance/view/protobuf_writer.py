@@ -1,4 +1,5 @@
-"""Writes protobuf messages from dictionaries, by the descriptors that protoc makes of our .proto files. Standard library only."""
+"""Writes protobuf messages from dictionaries, by the descriptors that protoc makes from our .proto files. Standard library
+only."""
 import pathlib
 import struct
 import subprocess
@@ -21,7 +22,7 @@ def varint(value):
 
 
 def fields_of(data):
-    """(number, value) of each field; bytes for what has a length."""
+    """Yields (number, value) of each field; fields with a length have bytes."""
     at = 0
 
     def number():

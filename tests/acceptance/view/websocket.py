@@ -12,7 +12,7 @@ def accept_key(key):
 
 
 class WebSocket:
-    """After the handshake. `masks`: of clients."""
+    """A WebSocket after the handshake. `masks`: True for clients."""
 
     def __init__(self, stream, masks=False):
         self.stream, self.masks = stream, masks
@@ -52,7 +52,7 @@ class WebSocket:
         self.stream.sendall(head + data)
 
     def receive(self):
-        """(kind, payload) of the next message; None when it is closed."""
+        """Returns (kind, payload) of the next message; None if the connection is closed."""
         kind, whole = 0, b""
         while True:
             head = self.file.read(2)
