@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs sonard. usage: ./run.sh [sonard arguments...]   without arguments: the demo, until Ctrl-C
-#        ./run.sh --check   runs the demo by itself: 20 pings over TCP, a picture in out/demo.png, the figures; exit code 0 or not
+#        ./run.sh --check   checks the demo: 20 pings over TCP, a picture in out/demo.png, figures; exit code 0 if all is well
 #        ./run.sh --package makes Debian packages in build/release
 set -u -o pipefail
 cd "$(dirname "$0")" || exit 70
@@ -20,7 +20,8 @@ case "${1:-}" in
     exec tests/tools/check_demo.sh build/release
     ;;
   --package)
-    # What the packages depend on is read from the programs by tools of dpkg-dev and by file; without them it would be left out.
+    # Tools of dpkg-dev and the command `file` read the packages' dependencies from the programs; without them these would be
+    # missing.
     setup_and_build installed && need_packages dpkg-dev file && cd build/release && cpack -G DEB && say "packages" && ls -1 "$PWD"/*.deb
     exit
     ;;

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs the tests. usage: ./test.sh [--long] [ctest arguments...]
-#   --long   afterwards the loads, full fuzzing and all sanitizers (tests/tools/long_checks.sh), hours: before a release;
-#            the table of it is in build/reliability; what misses its bound or was not run fails
+#   --long   runs also the load tests, full fuzzing and all sanitizers (tests/tools/long_checks.sh) before a release; takes hours;
+#            their table is in build/reliability; a figure that misses its bound or was not measured is a failure
 # Tests that read recordings of real devices take their folder from SONARD_CAPTURES and are skipped without it.
 set -u -o pipefail
 cd "$(dirname "$0")" || exit 70
@@ -19,12 +19,12 @@ for packages in "${test_packages[*]}" "${browser_packages[*]}"; do
   # shellcheck disable=SC2086
   need_packages $packages || echo "going on without: the tests that need them are skipped"
 done
-# Most tests that take long wait: for sockets, pictures or a time to pass. Two a processor use it better than one.
+# Most long tests wait for sockets, pictures or time to pass, so two at a time for each processor use it better than one.
 say "running the tests (recordings: ${SONARD_CAPTURES:-none, set SONARD_CAPTURES to a folder of them})"
 timed "tests" ctest --test-dir build/release --parallel "${SONARD_TEST_JOBS:-$(($(nproc) * 2))}" --output-on-failure --no-tests=error \
   --output-junit "$PWD/build/release/tests.xml" "$@" </dev/null
 status=$?
-# What the oracles of docs/acoustics.md measured. A run of some tests only need not have figures for all of them.
+# The figures of the oracles of docs/acoustics.md. A run of only some tests need not have figures for all of them.
 partial=()
 [ $# -eq 0 ] || partial=(--partial)
 say "the oracles of the acoustic model"

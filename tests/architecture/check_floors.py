@@ -136,7 +136,8 @@ TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", 
 PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
 LONGEST_FILE = 400  # lines; tests may be longer
-# A comment is a sentence, or a noun phrase that names the thing: these beginnings are fragments, these words are of persons.
+# A comment is a sentence, or a noun phrase that names the thing: these beginnings make fragments, and these words are for
+# persons.
 FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*([Oo]f|What|Nothing:)(?=[\s,])")
 PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed|new" + r"comers?|turned aw" + r"ay)\b", re.I)
 # Idioms with a plain word: "this many", "call it", "the reason if not", "always", "successive", "via", "only C++17".
@@ -147,7 +148,7 @@ RIDDLES = re.compile(r"(?<!there )\b((?:is|are) none|(?:is|are) no (?!longer|mor
 
 
 def tracked_files(root):
-    """What git would commit; every file outside build folders where there is no git."""
+    """Returns the files that git would commit; without git every file outside build folders."""
     listing = subprocess.run(["git", "-C", str(root), "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
                              capture_output=True, check=False)
     if listing.returncode == 0:
@@ -159,19 +160,19 @@ def tracked_files(root):
 
 
 def without_comments(text):
-    """Comments become blanks of the same number of lines; strings stay."""
+    """Returns the text with blank lines in place of comments; strings stay."""
     pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.S)
     return pattern.sub(lambda m: m.group() if m.group().startswith('"') else re.sub(r"[^\n]", " ", m.group()), text)
 
 
 def comments_of(text):
-    """The opposite of without_comments."""
+    """Returns the text with only its comments; other lines become blank."""
     pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|[^\n"/]+|.', re.S)
     return pattern.sub(lambda m: m.group() if m.group().startswith(("//", "/*")) else re.sub(r"[^\n]", " ", m.group()), text)
 
 
 def citation_violations(root, name, text):
-    """Pages are named from the root or from the file's own folder; whoever reads the citation must find the place."""
+    """Checks cited pages: their paths start at the root or at the file's own folder, and the cited place must exist."""
     for match in PAGE.finditer(text):
         place = next((p for p in (root / match["page"], (root / name).parent / match["page"]) if p.is_file()), None)
         if place is None:
@@ -217,7 +218,7 @@ def component_of(name):
 
 
 def circle_violations(includes, part_of, parts):
-    """`includes`: (file, line, header). Every include that closes a circle of `parts`: part_of() of files."""
+    """`includes`: (file, line, header). Returns every include that closes a circle of `parts`: part_of() of files."""
     below = {}
     for name, _, header in includes:
         below.setdefault(part_of(name), set()).add(part_of(header))
@@ -254,7 +255,7 @@ def wording_violations(name, text):
 
 
 def make_violations(name, code):
-    """Of product files; those that NAME_MAKES excepts must name one, and LISTS no folder that is not of MAKE_FOLDERS."""
+    """Checks that product files name no make. Files in NAME_MAKES must name one; LISTS may have only folders of MAKE_FOLDERS."""
     if name in LISTS:
         for match in re.finditer(r'^#include "protocol/(\w+)/', code, re.M):
             if match[1] not in MAKE_FOLDERS:
@@ -303,11 +304,11 @@ def violations(root):
         for rule, where, excepted, pattern, why in FORBIDDEN:
             if not re.match(where, name) or (where and not is_code) or (excepted and re.match(excepted, name)):
                 continue
-            searched = code if where else text  # house rules hold in comments too
+            searched = code if where else text  # these rules apply to comments too
             for match in re.finditer(pattern, searched):
                 yield f"{name}:{line_of(searched, match.start())}: {rule}: \"{match.group().strip()}\"; {why}"
     yield from circle_violations(includes, folder_of, "folders")
-    in_one_folder = [i for i in includes if folder_of(i[0]) == folder_of(i[2])]  # those of several folders close a circle of folders too
+    in_one_folder = [i for i in includes if folder_of(i[0]) == folder_of(i[2])]  # others: circles of folders
     yield from circle_violations(in_one_folder, component_of, "components")
 
 

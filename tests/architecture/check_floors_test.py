@@ -9,12 +9,12 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 sys.dont_write_bytecode = True
 import check_floors  # noqa: E402
 
-SLASH, DOT = "/", "."  # keep this file free of what it plants
+SLASH, DOT = "/", "."  # so that this file has no violation itself
 PAGE = "docs/a" + DOT + "md"
 
 
 def found_in(files):
-    """Violations of a tree that holds these files, {name: text}."""
+    """Returns the violations in a tree that holds these files, {name: text}."""
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         for name, text in files.items():

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that shipped programs and libraries have the guards of the compiler and the linker.
+"""Checks that shipped programs and libraries have the protections of the compiler and the linker.
 
 usage: check_hardening.py FILE...    prints what is missing, a line each; exit 1 when anything is
 """
@@ -12,7 +12,7 @@ def readelf(option: str, path: str) -> str:
 
 
 def missing(path: str) -> list[str]:
-    """What `path`, a program or a shared library, lacks."""
+    """Returns the missing protections of `path`, a program or a shared library."""
     dynamic = readelf("--dynamic", path)
     symbols = readelf("--dyn-syms", path)
     found = []

@@ -33,12 +33,12 @@ def blank(match):
 
 
 def prose_of(text):
-    """Without code blocks; places stay."""
+    """Returns the text without code blocks; line numbers stay."""
     return INDENTED.sub(blank, FENCED.sub(blank, text))
 
 
 def anchors_of(text):
-    """The names under which GitHub reaches a page's headings, and those it gives itself."""
+    """Returns the anchors of a page: those that GitHub derives from its headings, and those that the page defines."""
     names, seen = set(re.findall(r'<a\s+(?:id|name)="([^"]+)"', text)), {}
     for heading in re.findall(r"^ {0,3}#{1,6}[ \t]+(.+?)[ \t]*#*[ \t]*$", FENCED.sub(blank, text), re.M):
         plain = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", heading)
@@ -49,7 +49,7 @@ def anchors_of(text):
 
 
 def alternatives(path):
-    """`a.{hpp,cpp}` is two files."""
+    """Expands `a.{hpp,cpp}` to two files."""
     match = re.search(r"\{([^{}]*)\}", path)
     if match is None:
         return [path]
@@ -72,7 +72,7 @@ class Tree:
         return (self.root / name).read_text(encoding="utf-8")
 
     def place(self, path):
-        """The name below the root of what is meant; None where nothing is, or what is outside or not tracked."""
+        """Returns the target's name below the root; None if it does not exist, is outside the root or is not tracked."""
         whole = path.resolve()
         if not whole.exists() or not whole.is_relative_to(self.root):
             return None
@@ -85,7 +85,7 @@ class Tree:
         return anchor in self.anchors[page]
 
     def why_dead(self, page, target):
-        """Of a link on a page; None when it leads somewhere."""
+        """Returns the fault of a link on a page; None if its target exists."""
         path, _, anchor = target.partition("#")
         place = self.place((self.root / page).parent / path) if path else page
         if place is None:
@@ -95,7 +95,7 @@ class Tree:
         return None
 
     def names_a_file(self, page, path):
-        """A path from the root or from the page's own folder; a module may go without the end of its files' names."""
+        """Checks a path from the root or from the page's own folder; a module may be named without the endings of its files."""
         return any(self.place(p) for base in (self.root, (self.root / page).parent) for end in ("", ".*") for p in base.glob(path + end))
 
     def dead_links(self, page):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Plants dead links in made-up trees and expects check_links to find exactly those, and to follow the living ones."""
+"""Plants dead links in made-up trees and expects check_links to report exactly those."""
 import pathlib
 import subprocess
 import sys
@@ -19,7 +19,7 @@ FILES = {
 
 
 def found_in(files, installed=False, links=()):
-    """The dead links of a tree that holds these files, {name: text}; `links`: symbolic ones, (name, where to)."""
+    """Returns the dead links of a tree that holds these files, {name: text}; `links`: symbolic ones, (name, where to)."""
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder) / "tree"
         for name, text in files.items():

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks which versions of system libraries programs and libraries need, so that they run on older systems than the build's.
+"""Checks which versions of system libraries programs and libraries need, so that they run on systems older than the build
+machine's.
 
 usage: check_symbol_versions.py GLIBC=2.35 [GLIBCXX=3.4.30 ...] FILE...    prints what is newer, a line each; exit 1 when anything is
 """
@@ -13,12 +14,12 @@ def numbers(version):
 
 
 def newer(dump, limits):
-    """What `objdump -p -T` of a file shows of versions beyond `limits`, {"GLIBC": "2.35"}: ["GLIBC_2.36 (arc4random)"]."""
+    """Returns versions beyond `limits` in a file's `objdump -p -T`. With {"GLIBC": "2.35"}: ["GLIBC_2.36 (arc4random)"]."""
     users = {}  # version -> symbols
     for line in dump.splitlines():
-        # A symbol that the file takes from a library; versions that it defines itself have a section in place of *UND*.
+        # A symbol that the file imports from a library; versions that it defines itself have a section in place of *UND*.
         symbol = re.search(r"\*UND\*\s+[0-9a-f]+\s+\(?([A-Za-z]\w*_[\w.]+)\)?\s+(\S+)$", line)
-        # "Version References": the loader refuses the file for one of these even where no symbol has it.
+        # "Version References": the loader refuses the file for a missing version even if no symbol has that version.
         reference = re.match(r"\s+0x[0-9a-f]{8} 0x[0-9a-f]{2} \d+ (\S+)$", line)
         if symbol:
             users.setdefault(symbol[1], []).append(symbol[2])
@@ -29,7 +30,7 @@ def newer(dump, limits):
         family, _, number = version.partition("_")
         if family not in limits:
             continue
-        # GLIBC_PRIVATE, GLIBC_ABI_DT_RELR: of one release, or newer than all that have numbers here.
+        # GLIBC_PRIVATE, GLIBC_ABI_DT_RELR: these belong to one release, or are newer than all numbered versions here.
         if not re.fullmatch(r"[\d.]+", number) or numbers(number) > numbers(limits[family]):
             found.append(f"{version} ({', '.join(symbols[:3]) or 'no symbol'})")
     return found

@@ -28,7 +28,7 @@ class Refusals(unittest.TestCase):
         subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@b", *arguments], cwd=self.tree, check=True, capture_output=True)
 
     def release(self, *steps):
-        """Exit code and messages; a home of its own, so that no system of a real release is touched."""
+        """Returns exit code and messages. It has its own home folder, so that it changes no system of a real release."""
         done = subprocess.run([self.tree / "tests/tools/release.sh", *steps], env=os.environ | {"HOME": str(self.tree / "out"),
                               "XDG_CACHE_HOME": str(self.tree / "out")}, capture_output=True, text=True, check=False, timeout=60)
         return done.returncode, done.stdout + done.stderr

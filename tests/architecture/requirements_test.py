@@ -8,7 +8,7 @@ REQUIREMENTS = pathlib.Path(__file__).parents[2] / "core/requirements.cmake"
 
 
 def configure(*options, before="", folders=None):
-    """What cmake prints, without its line breaks, and its exit status."""
+    """Returns cmake's output without line breaks, and its exit status."""
     with tempfile.TemporaryDirectory() as made:
         folder = pathlib.Path(made)
         (folder / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(requirements LANGUAGES CXX)\n"
@@ -34,7 +34,7 @@ class Requirements(unittest.TestCase):
         self.assertIn("apt-get install libcli11-dev libprotobuf-dev protobuf-compiler)", text)
 
     def test_names_libraries_without_a_description_for_cmake_too(self):
-        # Nothing is found by its files alone.
+        # No requirement is found by its files alone.
         text, status = configure("-DSONAR_FFTW=ON", "-DCMAKE_DISABLE_FIND_PACKAGE_tinyxml2=ON",
                                  before="macro(find_library)\nendmacro()\nmacro(find_path)\nendmacro()")
         self.assertNotEqual(status, 0)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the makes and products into the manual pages and the package's description, from the output of print_makes.
 
-usage: makes_text.py PRINT_MAKES [--check]     --check: writes nothing, exits 1 when a file is not what it should be
+usage: makes_text.py PRINT_MAKES [--check]     --check: writes nothing, exits 1 if a file is not up to date
 """
 import pathlib
 import re
@@ -17,12 +17,12 @@ def listed(words, last):
 
 
 def roff(text):
-    """A sentence of a manual page, broken where the page's source is."""
+    """Returns a sentence with the line breaks of a manual page's source."""
     return "\n".join(textwrap.wrap(text, 130, break_on_hyphens=False))
 
 
 def texts(makes, demos):
-    """{file: [(regular expression of the replaced text, new text)]}"""
+    """Returns {file: [(regular expression of the replaced text, new text)]}."""
     sonars = listed([title for title, _ in makes], "or")
     plural = listed([re.sub(r"^an? ", "", title) for title, _ in makes], "and")
     table = "\n".join(f".It {title.split(' ', 1)[1]}\n{roff(', '.join(products))}" for title, products in makes)

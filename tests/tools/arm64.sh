@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Builds sonard for 64-bit ARM on an amd64 Debian 12 and tests it under qemu-user, which takes about an hour; not part of .ci/run.
 # usage: tests/tools/arm64.sh [--root DIR] [STEP...]
-#   --root DIR  in a Debian 12 system of its own in DIR, made there by mmdebstrap where it is missing, on a clone of the last
-#               commit. Without it the step setup adds the architecture arm64 to dpkg of this system and installs libraries of
-#               arm64, for which apt may remove those of amd64: for a bare system or a container.
+#   --root DIR  in a Debian 12 system of its own in DIR, made by mmdebstrap if it is missing, on a clone of the last commit.
+#               Without it the step setup adds the architecture arm64 to dpkg of this system and installs libraries of arm64. For
+#               these apt may remove libraries of amd64, so use it in a bare system or a container.
 #   STEP        setup, build, test, threads, demo, package; all in this order by default. setup and --root need root.
-# What it makes is in build/arm64 (with --root below DIR/srv/sonard).
+# The results are in build/arm64 (with --root in that folder below DIR/srv/sonard).
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -13,7 +13,7 @@ cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/bare_root.sh
 . tests/tools/bare_root.sh
 folder=build/arm64
-emulated=$folder/emulated  # the programs as commands of this machine
+emulated=$folder/emulated  # commands of this machine that run the programs
 
 usage() { sed -n '2,8s/^# //p' "$0"; }
 root=
@@ -48,7 +48,7 @@ setup() {
   DEBIAN_FRONTEND=noninteractive apt-get -q -y --no-install-recommends install "${names[@]}" "${page_packages[@]}" </dev/null
 }
 
-# Core, protocol, the contract of all makes and the emulator, but for programs that repeat a stage many times to measure a figure.
+# Core, protocol, the contract of all makes and the emulator, without programs that repeat a stage many times to measure a figure.
 tested() {
   awk -v folder="$PWD/$folder/" 'index($2, folder) == 1 && $1 ~ /^GTEST/ && $1 !~ /FIGURES/ {print substr($2, length(folder) + 1)}' \
     "$folder/tests/programs" | grep -E '^tests/(core|protocol|example_make)/|^tests/daemon/daemon_emulator_test$'
@@ -77,10 +77,10 @@ make_commands() {
 # Programs that are emulated start the importer of meshes as a command of this machine, too.
 export SONARD_IMPORT_MESH=$PWD/$emulated/importer/sonard-import-mesh
 
-# qemu-user starts a program that is not there, which then ends with code 127.
+# If a program is missing, qemu-user starts nevertheless and ends with code 127.
 export GTEST_FILTER=-ChildProcess.AProgramThatIsNotThereIsNamed:HostileMeshes.WithoutTheImporterTheSentenceSaysWhatIsMissing
 
-# One line a program that passes; the whole output of one that fails.
+# Prints one line for each program that passes, and the whole output of each that fails.
 run_tests() {
   local programs
   make_commands

@@ -1,8 +1,8 @@
-# Bare Debian systems in folders, for builds that must not see what this machine has. Sourced by arm64.sh and release.sh.
+# Bare Debian systems in folders, for builds that must not use this machine's packages. Sourced by arm64.sh and release.sh.
 # shellcheck shell=bash
 
-# make_bare_root SUITE DIR: unpacks a new system into DIR, unless DIR is one. Its archive is kept in ~/.cache/sonard-roots, whose
-# removal makes it anew.
+# make_bare_root SUITE DIR: unpacks a new system into DIR, unless DIR has one. Its archive is kept in ~/.cache/sonard-roots;
+# remove that folder to make it again.
 make_bare_root() {
   local suite=$1 dir=$2 cache=${XDG_CACHE_HOME:-$HOME/.cache}/sonard-roots
   [ ! -e "$dir/etc/bare-$suite" ] || return 0
@@ -25,7 +25,8 @@ make_bare_root() {
   tar -C "$dir" -xf "$cache/$suite.tar" && touch "$dir/etc/bare-$suite"
 }
 
-# in_root DIR COMMAND...: as root of that system, with mounts of its own, which end with the command, and this machine's network.
+# in_root DIR COMMAND...: runs it as root of that system, with mounts of its own, which end with the command, and with this
+# machine's network.
 in_root() {
   local dir=$1
   shift
@@ -38,5 +39,5 @@ in_root() {
       ${https_proxy:+https_proxy="$https_proxy"} chroot "$root" "$@"' in_root "$dir" "$@"
 }
 
-# clone_into DIR: the last commit of this tree becomes /srv/sonard of that system; what was built there is removed.
+# clone_into DIR: clones the last commit of this tree into /srv/sonard of that system; earlier builds there are removed.
 clone_into() { rm -rf "$1/srv/sonard" && git clone -q --depth 1 "file://$PWD" "$1/srv/sonard"; }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs the benchmarks and writes docs/benchmarks.md with its pictures, and the tables behind it into the build folder.
+# Runs the benchmarks and writes docs/benchmarks.md with its pictures. Its detailed tables go to the build folder.
 # usage: tests/tools/benchmarks.sh [--instruction-sets] [BUILD_FOLDER]
-#   --instruction-sets  only that chapter of the tables: the rates with this processor's instruction sets and with lesser ones
+#   --instruction-sets  only that chapter of the tables: the rates with this processor's instruction sets and smaller ones
 # Needs an otherwise idle machine and ten to fifteen minutes. BUILD_FOLDER (default build/release) must hold a built sonard.
 set -eu -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
@@ -20,7 +20,8 @@ threads=$(nproc)
 each=(--threads "$threads")
 [ "$threads" = 1 ] || each=(--threads 1 --threads "$threads")
 
-# The hot loops (--simd) and the ray tracer (SONARD_EMBREE_ISA) held down together, from the best that this processor has.
+# The hot loops (--simd) and the ray tracer (SONARD_EMBREE_ISA) are limited together, from the best instruction set of this
+# processor down.
 levels=(avx2:avx2 portable:sse4.2)
 ! grep -qw avx512f /proc/cpuinfo 2>/dev/null || levels=(avx512:avx512 "${levels[@]}")
 sets=()
@@ -33,7 +34,7 @@ if [ -n "$sets_only" ]; then
   python3 tests/bench/write_benchmarks.py --instruction-sets "${sets[@]}" "$build"
 else
   json=$build/benchmarks.json
-  # A ratio that is missed (exit code 1) is in the page; anything else ends here.
+  # A ratio that is missed (exit code 1) is shown in the page; any other failure ends the script.
   # Demos have ports below 1024, which are allowed in a network of their own.
   "$build/tests/own_network/in_own_network" "$bench" --scene local-search "${each[@]}" --pings 200 --curves --json "$json" || [ $? -eq 1 ]
   python3 tests/bench/write_benchmarks.py "$json" "${sets[@]}" docs "$build"

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Shows how far a build is: ninja's output on standard input, one line that grows on a terminal, else a line every tenth.
+"""Shows the progress of a build from ninja's output on standard input: on a terminal one line that
+grows, otherwise a line for every tenth of the build.
 
 usage: ninja ... | build_progress.py       lines that are not steps, such as errors, are printed as they come
 """
@@ -15,7 +16,7 @@ def spoken(seconds):
 
 
 def main():
-    sys.stdin.reconfigure(errors="replace")  # a compiler quotes what it finds
+    sys.stdin.reconfigure(errors="replace")  # a compiler quotes bytes of the source
     begin, tenth, open_line = time.monotonic(), -1, False
     for line in sys.stdin:
         step = STEP.match(line)

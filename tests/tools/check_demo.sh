@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Runs the demo as a user would and judges it: the daemon on an address of its own, our client over TCP, 20 pings, a picture.
-# usage: check_demo.sh BUILD_FOLDER [PICTURE]     exit code 0, or a sentence on what failed
+# Runs the demo as a user would and checks it: the daemon on an address of its own, our client over TCP, 20 pings, a picture.
+# usage: check_demo.sh BUILD_FOLDER [PICTURE]     exit code 0, or a sentence about the failure
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 folder=${1:?usage: check_demo.sh BUILD_FOLDER [PICTURE]}
 picture=${2:-out/demo.png}
-# Sand with nothing on it, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py judges these figures with 256 beams.
+# Bare sand, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py judges these figures with 256 beams.
 sand=250:350,150:250
 pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=5 stop_goal_ms=2000 stop_limit_ms=10000 wait_s=10
-# An emulated processor takes so many times as long, hence fewer pings, and its emulator needs memory of its own.
+# An emulated processor is slower by this factor, so fewer pings are made; its emulator needs memory of its own.
 if [ -n "${SONARD_DEMO_SLOWNESS:-}" ]; then
   first_ping_limit_s=$((first_ping_limit_s * SONARD_DEMO_SLOWNESS)) stop_limit_ms=$((stop_limit_ms * SONARD_DEMO_SLOWNESS))
   wait_s=$((wait_s * SONARD_DEMO_SLOWNESS)) memory_limit_mb=$((2 * memory_limit_mb)) pings=5
@@ -27,7 +27,7 @@ fail() {
   exit 1
 }
 
-# The demo on one address of this machine's own network, poses included, so that nothing else running here is disturbed.
+# The demo, poses included, uses one address of this machine's own network, so that it disturbs no other program here.
 write_config() {
   cat >"$scratch/sonard.yaml" <<YAML
 world: {scene: $PWD/scenes/demo.yaml, seed: 1}
@@ -44,7 +44,7 @@ control: {stream: "$1:14770", http: "$1:8088"}
 YAML
 }
 
-# Another address when this one is taken, which the daemon says with exit code 69.
+# The daemon ends with exit code 69 if an address is in use; then the next address is tried.
 for attempt in 1 2 3 4 5; do
   address=127.$((64 + RANDOM % 64)).$((RANDOM % 256)).$((1 + RANDOM % 254))
   write_config "$address"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Says which tracked C++ and CUDA files clang-format 14 would change; ./tests/tools/check_format.sh --fix changes them.
+# Lists the tracked C++ and CUDA files that clang-format 14 would change; --fix changes them.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 mode=(--dry-run -Werror)

@@ -1,4 +1,5 @@
-"""What .ci/run and arm64.sh leave out, the compiler that setup.sh chooses, and failures as run_programs.py and test_times.py name them."""
+"""Tests what .ci/run and arm64.sh leave out, which compiler setup.sh chooses, and how run_programs.py and test_times.py name
+failures."""
 import os
 import pathlib
 import re
@@ -11,7 +12,7 @@ import unittest
 TOOLS = pathlib.Path(__file__).resolve().parent
 ROOT = TOOLS.parents[1]
 HEAVY = {"package", "page", "cuda", "bench", "levels", "sanitizers"}
-# A GoogleTest program as far as run_programs.py knows one.
+# A stand-in for a GoogleTest program, with the functions that run_programs.py uses.
 PROGRAM = """#!/bin/sh
 echo "$0 part $GTEST_SHARD_INDEX of $GTEST_TOTAL_SHARDS" >>"$RAN"
 echo "[ RUN      ] Suite.Ended"
@@ -101,7 +102,7 @@ class Configure(unittest.TestCase):
         os.mkfifo(held)
         reader = os.open(held, os.O_RDONLY | os.O_NONBLOCK)
         self.addCleanup(os.close, reader)
-        done = self.setup('begin_aside log sh -c "exec 3>held; sleep 600"; exec 4<held')  # goes on when it has begun
+        done = self.setup('begin_aside log sh -c "exec 3>held; sleep 600"; exec 4<held')  # returns when the command has started
         self.assertEqual(done.returncode, 0, done.stderr)
         ended = select.poll()
         ended.register(reader, 0)  # POLLHUP: the last writer has closed the pipe

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Simulates the farm of docs/datasets.md with 1 to 10,000 workers at one queue.
 
-usage: farm_scaling.py [--svg FILE]     prints the table of efficiencies, draws it
+usage: farm_scaling.py [--svg FILE]     prints the table of efficiencies; --svg also draws it
        farm_scaling.py --measure        measures the costs of a nats-server on loopback (COSTS below)
 
-Efficiency: time that workers computed, over workers times the time until the last shard is acknowledged. The server does one thing
-at a time, in order of arrival; a worker waits for its answers. Each worker has 50 shards on average. The file system is left out.
+Efficiency: the sum of the workers' computing times, divided by the number of workers times the time until the last
+shard is acknowledged. The server does one thing at a time, in order of arrival; a worker waits for its answers. Each worker has
+50 shards on average. The file system is left out.
 """
 import argparse
 import heapq
@@ -28,7 +29,7 @@ SHARDS_EACH = 50
 
 def efficiency(workers, shard_s, rng):
     shards, server_free, computed, end = workers * SHARDS_EACH, 0.0, 0.0, 0.0
-    # Events by time: the requests of workers, for each shard in this order.
+    # Events in order of time: the requests of workers. Each shard has them in this order.
     events = [(rng.random() * 0.01, worker, "take", 0.0) for worker in range(workers)]
     heapq.heapify(events)
     following = {"take": "look", "look": "compute", "acknowledge": "take"}

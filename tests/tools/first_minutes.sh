@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# The first five minutes as a newcomer types them: each command, and what really comes out. The README quotes it.
+# The first five minutes of a new user: types each command and prints its real output. The README quotes it.
 # usage: first_minutes.sh [BUILD_FOLDER]     programs of a build, build/release by default
 #        first_minutes.sh --package          builds the Debian package, installs it (as root) and uses that
-# It takes the usual addresses, 127.0.0.2 and the ports of poses, control and status: run it where nothing else does, or by
-# build/release/tests/own_network/in_own_network. Exit code 0 when all went well.
+# It uses the usual addresses: 127.0.0.2 and the ports of poses, control and status. Run it where no other program uses them, or
+# with build/release/tests/own_network/in_own_network. Exit code 0 when all went well.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 
@@ -15,7 +15,7 @@ finish() {
 }
 trap finish EXIT
 failed=0
-show() {  # show COMMAND...: prints it as typed, then runs it
+show() {  # show COMMAND...: prints the command, then runs it
   printf '$ %s\n' "$*"
   eval "$*" 2>&1 || { printf '(exit code %s)\n' $?; failed=1; }
   echo
@@ -39,7 +39,7 @@ for ((i = 0; i < 600; i++)); do grep -q '^ready in' "$scratch/log" && break; kil
 cat "$scratch/log"
 grep -q '^ready in' "$scratch/log" || exit 1
 echo
-sonarctl listen --pings 1 --quiet >/dev/null 2>&1  # the first ping takes longest: on a busy computer longer than doctor waits
+sonarctl listen --pings 1 --quiet >/dev/null 2>&1  # the first ping takes longest: too long for doctor on a busy computer
 said=$(wc -l <"$scratch/log")
 
 show sonarctl doctor

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Runs libFuzzer on every target, or on those named, as many at once as there are processors. usage: tests/tools/fuzz.sh [NAME...]
+# Runs libFuzzer on every target, or on the named ones, one for each processor at a time. usage: tests/tools/fuzz.sh [NAME...]
 #   SONARD_FUZZ_RUNS     inputs for each target (500000)
-#   SONARD_FUZZ_SECONDS  the longest for each (900); one that was SHORT of its inputs then fails as one with a fault does
-# What was found worth keeping stays in build/fuzz/corpus/NAME; an input that ends a target, in build/fuzz/findings/NAME: put it
-# into tests/fuzz/corpus/NAME with the fix, and every test run from then on tries it.
+#   SONARD_FUZZ_SECONDS  time limit of each target (900); a target that reaches it is reported as SHORT and fails
+# Useful inputs are kept in build/fuzz/corpus/NAME. An input that ends a target is kept in build/fuzz/findings/NAME; copy it to
+# tests/fuzz/corpus/NAME with the fix, so that every later test run tries it.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -19,13 +19,14 @@ if [ ${#names[@]} -eq 0 ]; then
 fi
 [ ${#names[@]} -gt 0 ] || { echo "no fuzz target" >&2; exit 1; }
 
-# A third-party library's leak is no finding; each has its reason there.
+# Leaks of third-party libraries are no findings; the file gives the reason for each.
 export LSAN_OPTIONS="suppressions=$PWD/tests/tools/lsan.supp"
 
-# figure NAME LOG: one number of libFuzzer's last words.
+# figure NAME LOG: prints one number of libFuzzer's final statistics.
 figure() { sed -n "s/^stat::$1: *//p" "$2" | tail -n 1; }
 
-# one NAME PLACE: runs the target, prints its result at once and writes it to NAME.result. Status 1: fault, or short of the bound.
+# one NAME PLACE: runs the target, prints its result at once and writes it to NAME.result. Status 1: a fault, or fewer inputs than
+# the bound.
 one() {
   local name=$1 corpus=build/fuzz/corpus/$1 findings=build/fuzz/findings/$1 log=build/fuzz/$1.log
   local result tried status before=$SECONDS
@@ -57,7 +58,7 @@ one() {
   fi
   printf '%-20s %s\n' "$name" "$result" >"build/fuzz/$name.result"
   printf '%s-- [%s] %s\n   %s\n' "$ending" "$2" "$name" "$result"
-  # The page judges what is promised, whatever was asked for here.
+  # The page compares with the promised bounds, not with the values requested here.
   python3 tests/reliability/record.py "fuzz-$name" "$tried$([ $status -eq 0 ] || echo ', with a fault')" "$words" \
     "$([ $status -eq 0 ] && [ "$tried" -ge "$promised" ] && echo yes || echo no)" "tests/tools/fuzz.sh $name"
   return $verdict
@@ -65,7 +66,7 @@ one() {
 
 failed=0
 running=0
-trap 'kill $(jobs -p) 2>/dev/null; exit 130' INT TERM  # what runs in the background does not hear Ctrl-C
+trap 'kill $(jobs -p) 2>/dev/null; exit 130' INT TERM  # background jobs do not receive Ctrl-C
 ended() { wait -n || failed=$((failed + 1)); running=$((running - 1)); }
 for i in "${!names[@]}"; do
   [ $running -lt "$(nproc)" ] || ended

@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# Checks the CUDA engine on a machine with a device, which needs a driver and nothing else: no package, no CMake, no compiler.
-#   gpu_check.sh build [FOLDER, default build/gpu]      where the CUDA toolkit is: programs, module and tests
-#   gpu_check.sh pack [FOLDER] [ARCHIVE]                 all of it with the libraries it needs, default FOLDER/gpu_pack.tar.gz
-#   gpu_check.sh prove [ARCHIVE]                         that the pack runs in an empty root, with host loops for a device
-#   gpu_check.sh run [ARCHIVE] [PART...]                 on the machine with the device; leaves found.tar.gz and a page of
+# Checks the CUDA engine on a machine with a device. That machine needs only a driver: no package, no CMake, no compiler.
+#   gpu_check.sh build [FOLDER, default build/gpu]      builds programs, module and tests, on a machine with the CUDA toolkit
+#   gpu_check.sh pack [FOLDER] [ARCHIVE]                 packs them with their libraries, default FOLDER/gpu_pack.tar.gz
+#   gpu_check.sh prove [ARCHIVE]                         proves that the pack runs in an empty root, with host loops as the device
+#   gpu_check.sh run [ARCHIVE] [PART...]                 runs on the machine with the device; writes found.tar.gz and a page of
 #                                                        the measurements in $OUT (default gpu-found)
 # Parts: facts smoke check ceiling rates page (those by default), kernels sanitize soak memory. Each takes less than ten minutes;
-# `page` is made of what facts, check and rates have left. A part that fails does not end the others; exit 1 when one did, 77
-# without a device. GPU_CHECK_ARCHITECTURES=90 builds for compute 9.0 only; GPU_CHECK_REFERENCE_MS=30 is what a frame of the public
-# reference code takes on this device, for the ratio P11; GPU_CHECK_THREADS="1 4" are the numbers of threads.
+# `page` uses the results of facts, check and rates. If a part fails, the others still run; exit code 1 if a part failed, 77
+# without a device. GPU_CHECK_ARCHITECTURES=90 builds for compute 9.0 only; GPU_CHECK_REFERENCE_MS=30 is the time of a frame of
+# the public reference code on this device, for the ratio P11; GPU_CHECK_THREADS="1 4" are the numbers of threads.
 set -uo pipefail
 
 default_build=build/gpu
 device_tests="cuda_device_same_rays_test cuda_device_embree_rays_test"
-# What every Linux machine's loader brings itself and must not be mixed.
+# Libraries that every Linux machine has with its loader and that must not be mixed.
 c_library='/(ld-linux[^/]*|libc|libm|libdl|librt|libpthread|libresolv|libstdc\+\+|libgcc_s)\.so[.0-9]*$'
 page_name=benchmarks-gpu
 default_parts="facts smoke check ceiling rates page"
@@ -53,7 +53,7 @@ do_pack() (
   [ "$bytes" -lt 57000000 ] || { echo "gpu_check: more than 57 MB do not travel" >&2; exit 1; }
 )
 
-# The pack alone, the C library and its loader: no /usr, no /proc, no shell.
+# Only the pack, the C library and its loader: no /usr, no /proc, no shell.
 do_prove() (
   set -e
   archive=${1:-$default_build/gpu_pack.tar.gz}
@@ -71,7 +71,7 @@ do_prove() (
   echo "gpu_check: the pack runs in an empty root"
 )
 
-# ---- what follows runs on the machine with the device
+# ---- the rest runs on the machine with the device
 
 begin_run() {
   out=$(mkdir -p "${OUT:-gpu-found}" && cd "${OUT:-gpu-found}" && pwd)
@@ -81,7 +81,7 @@ begin_run() {
   mkdir -p "$at" && tar -xzf "$1" -C "$at" || return
   pack=$at/gpu_pack
   export SONARD_CUDA_MODULE=$pack/bin/libsonard_cuda.so
-  # cuFFT may lie in the toolkit or among Python's packages; without it exact pulses are the CPU's.
+  # cuFFT is in the toolkit or in a Python package; without it the CPU computes exact pulses.
   local name
   name=$(grep -aoE 'libcufft\.so\.[0-9]+' "$SONARD_CUDA_MODULE" | head -1)
   cufft=$(find /usr/local /opt /usr/lib /root /home -name "${name:-libcufft.so.12}" -print -quit 2>/dev/null)
@@ -95,7 +95,8 @@ begin_run() {
   failures=0
 }
 
-# limited SECONDS COMMAND...: with the pack's libraries; what hangs is ended, and a part ends before its ten minutes do.
+# limited SECONDS COMMAND...: runs it with the pack's libraries. A command that hangs is ended, so that a part ends within its ten
+# minutes.
 limited() {
   local left=$((part_ends - SECONDS)) wanted=$1
   [ "$left" -gt 5 ] || { echo "no time left for: ${*:2}"; return 124; }
@@ -123,13 +124,14 @@ facts() {
 
 smoke() { bench 120 --case P1 --pings 64 --threads 1 || fail "P1 did not run: rc=$?"; }
 
-# The tests that host loops pass, and P9 beside host loops: the same bytes where the device rounds as the processor does.
+# Runs the tests that host loops pass, and compares P9 with host loops: the bytes are equal if the device rounds as the processor
+# does.
 check() {
   local test skipped
   for test in cuda_seam_test $device_tests; do
     limited 280 "$pack/bin/$test" --gtest_filter='OnDevice*:*NamesTheDevice*:*FindsCufft*' >"$found/$test.txt" 2>&1 ||
       fail "$test: rc=$?"
-    # One test may be skipped, and only for want of cuFFT; any other skip has checked nothing.
+    # Only one test may be skipped, and only because cuFFT is missing; any other skip is a failure.
     skipped=$(grep -E '^\[  SKIPPED \].*\(' "$found/$test.txt" | grep -vE 'SumsPulses|FindsCufft' || true)
     [ -z "$skipped" ] || fail "$test skipped: $skipped"
     grep -hE '^\[  (PASSED|FAILED|SKIPPED)|relative L2|Failure|no libcufft' "$found/$test.txt"
@@ -139,11 +141,11 @@ check() {
   if diff <(digests "$found/p9_host.txt") <(digests "$found/p9_device.txt") >/dev/null; then
     echo "digests of device and host loops: equal" | tee "$found/digests.txt"
   else
-    echo "digests of device and host loops: different" | tee "$found/digests.txt"  # no failure: the last bit of a sine may do it
+    echo "digests of device and host loops: different" | tee "$found/digests.txt"  # no failure: the last bit of a sine may differ
   fi
 }
 
-# What the processor allows when the device takes no time.
+# The rate that the processor allows if the device needs no time.
 ceiling() {
   # shellcheck disable=SC2046
   SONARD_TEST_DEVICE_IDLE=1 SONARD_CUDA_MODULE=$pack/bin/libhost_module.so bench 500 --case P10 --pings 128 $(thread_options) |
@@ -163,7 +165,7 @@ page() {
   python3 -B "$pack/write_gpu_benchmarks.py" "$found" "$out/${page_name}.md" || fail "the page"
 }
 
-# Time, instructions and divergence of each kernel.
+# Measures time, instructions and divergence of each kernel.
 kernels() {
   [ -n "$ncu" ] || { fail "no ncu"; return; }
   SONARD_CUDA_GRAPHS=0 limited 400 "$ncu" --clock-control none --csv --launch-skip 300 --launch-count 90 --metrics \
@@ -172,7 +174,7 @@ kernels() {
     >"$found/ncu.csv" 2>&1 || fail "ncu: $(tail -1 "$found/ncu.csv")"
 }
 
-# Not racecheck: it looks at shared memory, and the kernels have none.
+# racecheck is left out: it checks shared memory, and the kernels use none.
 sanitize() {
   [ -n "$sanitizer" ] || { fail "no compute-sanitizer"; return; }
   local tool
@@ -190,7 +192,7 @@ soak() {
   done
 }
 
-# A device without room: smaller batches or one sentence, and no ping lost.
+# A device with too little memory: batches become smaller or one sentence is printed, and no ping is lost.
 memory() {
   python3 -c "import torch,time;f=torch.cuda.mem_get_info()[0];x=torch.empty(f-(900<<20),dtype=torch.uint8,device='cuda');time.sleep(90)" &
   local hog=$!
@@ -218,7 +220,7 @@ do_run() {
       facts | smoke | check | ceiling | rates | page | kernels | sanitize | soak | memory) "$part" ;;
       *) fail "no part $part" ;;
     esac > >(tee -a "$found/log.txt") 2>&1
-    tar -czf "$out/found.tar.gz" -C "$out" found  # after every part: what is there comes back even when time runs out
+    tar -czf "$out/found.tar.gz" -C "$out" found  # after every part, so that its results come back even if time runs out
   done
   echo "gpu_check: $failures failures in $SECONDS s; $out"
   [ "$failures" -eq 0 ]

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Runs the ray, pipeline and cell tests as lesser processors run them: SONARD_SIMD holds down the hot loops, SONARD_EMBREE_ISA the
+# Runs the ray, pipeline and cell tests as older processors would: SONARD_SIMD limits the hot loops, SONARD_EMBREE_ISA limits the
 # ray tracer. usage: tests/tools/instruction_sets.sh [BUILD_FOLDER [SIMD:EMBREE_ISA...]]
 #   BUILD_FOLDER     default build/release; its tests must be built
-#   SIMD:EMBREE_ISA  default: avx2:avx2 where the processor has AVX-512, and portable:sse4.2. Embree's packets are then of 8 and of
-#                    4 rays, where AVX-512 has 16.
+#   SIMD:EMBREE_ISA  default: avx2:avx2 where the processor has AVX-512, and portable:sse4.2. Embree's packets then have
+#                    8 and 4 rays; with AVX-512 they have 16.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 case "${1:-}" in
@@ -16,11 +16,11 @@ if [ $# -eq 0 ]; then
   ! grep -qw avx512f /proc/cpuinfo 2>/dev/null || set -- avx2:avx2 "$@"
 fi
 
-# The programs of kind LEVELS (tests/CMakeLists.txt), less those that repeat one stage over thousands of pings to measure a figure and
-# those that name the instruction set of every case themselves.
+# The programs of kind LEVELS (tests/CMakeLists.txt), without those that repeat one stage over thousands of pings to measure a
+# figure and those that set the instruction set of every case themselves.
 mapfile -t programs < <(tests/tools/run_programs.py "$build" --list LEVELS)
 [ ${#programs[@]} -gt 0 ] || exit 66
-unset SONARD_ORACLES SONARD_RELIABILITY  # figures of record are those of the processor itself
+unset SONARD_ORACLES SONARD_RELIABILITY  # recorded figures are those of the full processor
 
 started=$SECONDS
 failed=0

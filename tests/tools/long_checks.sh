@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# What takes too long for every run, and is run before a release: the loads, starts, stops and reloads on a quiet computer, a mission
-# of ten minutes, the page for 20, full fuzzing, the whole functional suite under the address and undefined-behaviour sanitizers, and
-# what has threads under the thread sanitizer. Run by ./test.sh --long, or alone; two to four hours on two cores. Every step is run,
-# also after one that failed; a table ends it. The figures of all steps become the table of reliability: one that misses its bound
-# fails, and without STEPs also one that was not measured.
+# Checks that take too long for every run and are run before a release: the loads, starts, stops and reloads on a quiet computer,
+# a mission of ten minutes, the page of the live view for 20 minutes, full fuzzing, the whole functional suite under the address
+# and undefined-behaviour sanitizers, and programs with threads under the thread sanitizer. ./test.sh --long runs it; it takes two
+# to four hours on two cores. Every step is run, also after one that failed; a table of the steps is printed last. The figures of
+# all steps become the table of reliability. A figure that misses its bound is a failure; without STEPs a figure that was not
+# measured is one too.
 # usage: tests/tools/long_checks.sh [STEP...]
 #   SONARD_FUZZ_RUNS, SONARD_FUZZ_SECONDS   see tests/tools/fuzz.sh
 #   SONARD_RELIABILITY                      where figures and their table are kept (build/reliability)
@@ -16,7 +17,7 @@ export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
 wished=("$@")
 rows=()
 failures=0
-step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it ended
+step() {  # step NAME COMMAND...: runs it if it was requested, and stores how it ended
   local name=$1 before=$SECONDS result=passed
   shift
   [ ${#wished[@]} -eq 0 ] || [[ " ${wished[*]} " == *" $name "* ]] || return 0
@@ -25,19 +26,19 @@ step() {  # step NAME COMMAND...: runs it, when wished, and remembers how it end
   rows+=("$(printf '%-10s %-7s %6d s   %s' "$name" "$result" $((SECONDS - before)) "$*")")
 }
 
-# alone SCRIPT [ARGUMENTS]: of tests/acceptance, with the release build, in a network of its own.
+# alone SCRIPT [ARGUMENTS]: runs a script of tests/acceptance with the release build in a network of its own.
 alone() {
   SONARD_BUILD=$PWD/build/release build/release/tests/own_network/in_own_network python3 -B "tests/acceptance/$1.py" "${@:2}" </dev/null
 }
 
-# one_by_one NAME...: acceptance tests that keep figures.
+# one_by_one NAME...: runs acceptance tests that record figures.
 one_by_one() {
   local name failed=0
   for name in "$@"; do alone "${name}_test" || failed=1; done
   return $failed
 }
 
-if [ ${#wished[@]} -eq 0 ]; then  # what is not measured now is shown as "not run"
+if [ ${#wished[@]} -eq 0 ]; then  # a figure that is not measured now is shown as "not run"
   forget_figures || exit
 fi
 if [ ${#wished[@]} -eq 0 ] || [[ " ${wished[*]} " =~ \ (load|life|mission|page)\  ]]; then

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Reads the whole tree, tests too, with compilers other than the usual one; makes no code, so it finds errors and the warnings that
-# need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [--share N] [COMPILER...]
-#   --share N reads one Nth of the files, another one for each commit
-#   COMPILER  e.g. g++-11, clang++-14; without one, those installed take turns by the commit. Without any installed, it is skipped.
+# Reads the whole tree, tests included, with compilers other than the usual one. It generates no code, so it finds errors and only
+# those warnings that need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [--share N] [COMPILER...]
+#   --share N reads one Nth of the files; which one depends on the commit
+#   COMPILER  e.g. g++-11, clang++-14; without one, the commit selects an installed one; if there is none, the check is skipped.
 # Build folders stay in build/other.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
@@ -46,7 +46,7 @@ check() {
   local compiler=$1 folder=build/other/$1 made
   command -v "$compiler" >/dev/null || { echo "$compiler is not installed: apt-get install ${compiler/clang++/clang}" >&2; return 1; }
   mkdir -p "$folder"
-  # Headers that the build makes and precompiled headers are made as ever.
+  # Generated headers and precompiled headers are built as usual.
   cmake -S . -B "$folder" -G Ninja -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_BUILD_TYPE=Release -DSONAR_WERROR=ON -DSONAR_CUDA=OFF \
     >"$folder/log" 2>&1 &&
     made=$(ninja -C "$folder" -t targets all | grep -oE '^(cmake_object_order_depends_target_[^:]*|[^:]*cmake_pch\.hxx\.(gch|pch))') &&

@@ -41,13 +41,13 @@ def checked(*command, **options):
 
 
 def keep(picture, path, colours):
-    """As a palette: a third of the bytes."""
+    """Stores the picture with a palette, which takes a third of the bytes."""
     picture.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE, kmeans=4, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"{path}: {picture.width} x {picture.height}, {path.stat().st_size / 1000:.0f} kB")
 
 
 def page(path, width, height):
-    """The demo with one driver at 10 Hz, after ten seconds."""
+    """A picture of the page: the demo with one driver at 10 Hz, after ten seconds."""
     with Daemon(None, str(SONARD)), Browser() as browser, \
             subprocess.Popen([SONARCTL, "listen", "--rate", "10", "--quiet"], stdout=subprocess.DEVNULL) as driver:
         try:
@@ -75,7 +75,7 @@ def view(path, maker, place, turn, more):
 
 
 def data_set(path):
-    """One ping of mines.yaml and its labels, of the contact sheet."""
+    """Cuts one ping of mines.yaml and its labels out of the contact sheet."""
     with tempfile.TemporaryDirectory() as folder:
         checked(SONARD, "dataset", ROOT / "scenes/datasets/mines.yaml", "--out", pathlib.Path(folder) / "mines", "--quiet", patience_s=600)
         sheet = Image.open(pathlib.Path(folder) / "mines/contact.png")

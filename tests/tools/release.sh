@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Makes what a release offers for download, each from a clone of the last commit in a bare Debian system, and checks it there.
+# Builds the files of a release, each from a clone of the last commit in a bare Debian system, and checks them there.
 # usage: tests/tools/release.sh [STEP...]
 #   debian12, debian13  packages for amd64: installed in a bare system, demo checked
 #   arm64               packages of Debian 12 for arm64, cross-built (tests/tools/arm64.sh): demo checked under qemu-user
 #   tarball             for x86_64 without installation (tests/tools/tarball.sh): demo checked in bare Debian 12 and 13
 #   source              the sources with the page already bundled: that page checked
-#   sums                SHA256SUMS of all that is in the folder
-# Without a step all of them. They go to out/release; SONARD_RELEASE_ROOTS names a folder for the systems (default
+#   sums                SHA256SUMS of all files in the folder
+# Without STEP it runs all steps. The files go to out/release; SONARD_RELEASE_ROOTS names a folder for the systems (default
 # ~/.cache/sonard-release, about 10 GB). Needs root, mmdebstrap and a tree without changes. See docs/releasing.md.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
@@ -34,7 +34,8 @@ if [ -n "$tag" ] && [ "$tag" != "v$version" ]; then
 fi
 mkdir -p "$roots" "$out" || exit
 
-# system SUITE: its root, with a clone of the last commit; the clone and what is built in it serve all steps of this run.
+# system SUITE: sets root to the root of that system, with a clone of the last commit. All steps of this run share
+# the clone and its builds.
 declare -A cloned=()
 system() {
   root=$roots/$1
@@ -43,13 +44,13 @@ system() {
   cloned[$1]=1
 }
 
-# fresh SUITE: a bare system that has seen no build, with a clone for its tools.
+# fresh SUITE: sets root to the root of a bare system in which nothing was built, with a clone for its tools.
 fresh() {
   root=$roots/check-$1
   rm -rf --one-file-system "$root" && make_bare_root "$1" "$root" && clone_into "$root"
 }
 
-# check_programs FOLDER: of the root, with sonard and sonarctl in it.
+# check_programs FOLDER: checks sonard and sonarctl in that folder of the root.
 check_programs() {
   in_root "$root" bash -c 'set -e; cd /srv/sonard; mkdir -p /srv/check/daemon /srv/check/clients
     ln -sf "$0/sonard" /srv/check/daemon/sonard; ln -sf "$0/sonarctl" /srv/check/clients/sonarctl

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Runs test programs, two at once a processor, and prints a line for each that passes, all output of one that fails.
+"""Runs test programs, two at a time for each processor. Prints a line for each that passes and all output of each that fails.
 
 usage: run_programs.py BUILD_FOLDER NAME...        --list KIND... [--without KIND...] prints their names instead
-The names are of BUILD_FOLDER/tests/programs, which CMake writes: its kinds, then the program and its arguments (tests/CMakeLists.txt).
-A GoogleTest program is run in parts, by GTEST_TOTAL_SHARDS, and before the others, which are short: so no processor is idle at the end.
-Parts of all programs come in turns: those that wait for sockets or times to pass run beside those that compute.
+The names are listed in BUILD_FOLDER/tests/programs, which CMake writes: the kinds of a program, the program, and its
+arguments (tests/CMakeLists.txt).
+A GoogleTest program is run in parts, by GTEST_TOTAL_SHARDS, and before the others, which are short, so that no processor is idle
+at the end.
+Parts of all programs alternate, so that parts that wait for sockets or for time run beside parts that compute.
 The tests that failed are added to the file that SONARD_FAILED names.
   SONARD_TEST_JOBS      programs at once (default: two a processor)
   SONARD_TEST_SECONDS   the longest a program may take (1800)
@@ -20,7 +22,7 @@ import tempfile
 import time
 
 JOBS = int(os.environ.get("SONARD_TEST_JOBS") or 2 * os.cpu_count())
-PARTS_A_JOB = 2  # parts of a program differ: one may take five times another
+PARTS_A_JOB = 2  # one part of a program may take five times as long as another
 LONGEST_S = float(os.environ.get("SONARD_TEST_SECONDS") or 1800)
 
 
@@ -34,14 +36,14 @@ def programs_of(build):
 
 
 def failed_cases(output):
-    """Cases that GoogleTest reports; else the one that the program ended in."""
+    """Returns the failed cases that GoogleTest reports; if it reports none, the case in which the program ended."""
     failed = re.findall(r"^\[  FAILED  \] ([\w/]+\.[\w/]+)", output, re.MULTILINE)
     begun = re.findall(r"^\[ RUN      \] (\S+)", output, re.MULTILINE)
     return list(dict.fromkeys(failed)) or begun[-1:]
 
 
 def run(command, part, parts):
-    """How one part ended, nothing when it passed, and its output."""
+    """Returns how one part ended (empty if it passed) and its output."""
     environment = dict(os.environ)
     if parts > 1:
         environment |= {"GTEST_TOTAL_SHARDS": str(parts), "GTEST_SHARD_INDEX": str(part)}
@@ -59,7 +61,7 @@ def run(command, part, parts):
 
 
 def run_all(programs):
-    """Runs the parts of all programs; the tests that failed, each after its program."""
+    """Runs the parts of all programs. Returns the failed tests, each as its program and its name."""
     parts_of = {name: PARTS_A_JOB * JOBS if "GTEST" in kinds else 1 for name, (kinds, _) in programs.items()}
     failed, left, seconds = [], dict(parts_of), dict.fromkeys(programs, 0.0)
     broken = set()

@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # Builds tests with sanitizers and runs them. usage: tests/tools/sanitized_tests.sh [--build] [asan|asan-all|tsan] [targets...]
 #   --build   only builds them
-#   asan      address and undefined behaviour: what reads foreign bytes or files in the daemon and below it, the ray tracer, the core
-#             of the BlueView libraries, and the fuzz targets over their seeds and made-up inputs; the default, and what .ci/run does.
-#             Not engines, their choice and their turns, which read nothing foreign
-#   asan-all  the same over the whole functional suite, the shipped programs and the BlueView call sequences among it
+#   asan      address and undefined behaviour: the code that reads foreign bytes or files in the daemon and below it, the ray tracer,
+#             the core of the BlueView libraries, and the fuzz targets over their seeds and made-up inputs; the default, and part
+#             of .ci/run.
+#             Engines, their choice and their turns are left out, because they read no foreign data
+#   asan-all  the same over the whole functional suite, including the shipped programs and the BlueView call sequences
 #   tsan      threads: protocol, control, daemon, clients, the BlueView call sequences, the pool, and the CPU pipeline over analytic
 #             rays in place of Embree, alone (core_analytic_rays_test) and under a whole daemon (daemon_analytic_test, with the daemon's)
-# With targets only those test programs. Reports are in the output; the exit status is 1 when there was any. Figures of sanitized
-# programs are kept nowhere: SONARD_RELIABILITY gets the one line that says how all this ended.
+# With targets it runs only those test programs. Reports are in the output; the exit status is 1 if there was any. Figures of
+# sanitized programs are not stored; SONARD_RELIABILITY gets only one line with the result of the whole run.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -19,18 +20,18 @@ if [ "${1:-}" = --build ]; then only_build=1; shift; fi
 kind=asan
 case "${1:-}" in
   asan | asan-all | tsan) kind=$1; shift ;;
-  -h | --help) sed -n '2,11s/^# //p' "$0"; exit 0 ;;
+  -h | --help) sed -n '2,12s/^# //p' "$0"; exit 0 ;;
 esac
 preset=${kind%-all}
 
-# Through ctest: the shipped programs. Not among them, with the reasons:
+# ctest runs the shipped programs. The following are left out, for these reasons:
 #   render, determinism, reproducibility, mission, picture, capture_comparison, trajectory   compute for long; rendering, pictures,
-#                                                      recordings and what is played are sounded by the test programs
-#   service, package, container                        judge unit, archive and image files, not a program of ours at run time
+#                                                      recordings and replays are covered by the test programs
+#   service, package, container                        check unit, archive and image files, not a program of ours at run time
 #   bench, demo                                        measure speed and memory, by the same engine as the others
-#   load.descriptors                                   the undefined behaviour sanitizer looks at memory through a pipe, and takes
-#                                                      every object for a bad one when there is no descriptor left for it
-#   the Python client alone and without numpy          no program of ours takes part
+#   load.descriptors                                   the undefined behaviour sanitizer reads memory through a pipe, and reports
+#                                                      every object as invalid if no descriptor is left for the pipe
+#   the Python client alone and without numpy          they run no program of ours
 acceptance=(commands protocol mirror blueview_link aris_link waterlinked_link ping_link life_cycle control reload status fault doctor view completion scene_command
   dissector driver_example first_minutes recording live_view)
 programs="^acceptance\.($(IFS='|'; echo "${acceptance[*]}"))\$"

@@ -1,22 +1,23 @@
-# Prepares a machine and builds: sourced by run.sh, test.sh and .ci/run, from the repository root. Quick when nothing changed.
+# Prepares a machine and builds: sourced by run.sh, test.sh and .ci/run, from the repository root. It is quick if nothing has
+# changed.
 # shellcheck shell=bash
 
-# What the programs need on Debian 12, 13 and Ubuntu 22.04, 24.04, and what the tests need besides to be built; all of it from
-# their main archives.
+# Packages that the programs need on Debian 12, 13 and Ubuntu 22.04, 24.04, and further packages that the build of the tests
+# needs. All are in the main archives of these systems.
 product_packages=(
   g++ cmake ninja-build python3 libboost-dev libembree-dev libtbb-dev libyaml-cpp-dev libassimp-dev libtinyxml2-dev libpng-dev libtiff-dev zlib1g-dev
   libexpected-dev libspdlog-dev libcli11-dev nlohmann-json3-dev libprotobuf-dev protobuf-compiler libfftw3-dev libsnappy-dev libnats-dev
 )
 build_packages=("${product_packages[@]}" libeigen3-dev libgtest-dev libgmock-dev)
 
-# Sanitized programs and fuzzers are compiled with the system's own clang (14 on Debian 12, 19 on Debian 13), which takes half to
-# two thirds of g++'s time for them, and linked with lld in a quarter of the time; thereby a second compiler reads the tree.
+# Sanitized programs and fuzzers are compiled with the system's own clang (14 on Debian 12, 19 on Debian 13), which needs half to
+# two thirds of g++'s time for them, and linked with lld in a quarter of the time. So a second compiler reads the tree.
 clang_packages=(clang libclang-rt-dev lld)
 
-# For the page of the live view; without them the daemon is built without it.
+# Packages for the page of the live view; without them the daemon is built without the page.
 page_packages=(esbuild libjs-three)
 
-# What only tests use: without it some are skipped, saying so.
+# Packages that only tests use. Without them some tests are skipped with a message.
 test_packages=(
   tshark systemd dpkg-dev file strace python3-numpy python3-pil nats-server
 )
@@ -24,7 +25,7 @@ browser_packages=(chromium)
 
 say() { printf '\n== %s\n' "$*"; }
 
-# timed NAME COMMAND...: runs it; how many seconds it took goes to the file that SONARD_SECONDS names, for .ci/run.
+# timed NAME COMMAND...: runs it and appends its duration in seconds to the file that SONARD_SECONDS names, for .ci/run.
 timed() {
   local name=$1 from=$SECONDS status
   shift
@@ -34,7 +35,7 @@ timed() {
   return $status
 }
 
-# begin_aside LOG COMMAND...: begins it, to run when nothing else wants a processor; it is ended with this shell.
+# begin_aside LOG COMMAND...: starts it at the lowest priority; it ends with this shell.
 begin_aside() {
   local log=$1
   shift
@@ -45,7 +46,7 @@ begin_aside() {
   trap 'kill -- "-$aside" 2>/dev/null' EXIT
 }
 
-# end_aside: waits for what begin_aside began, from now on as urgent as all else where that is allowed; its status.
+# end_aside: waits for the command of begin_aside, from now on at normal priority where that is allowed; returns its status.
 end_aside() {
   renice -n 0 -g "$aside" >/dev/null 2>&1
   wait "$aside"
@@ -54,7 +55,8 @@ end_aside() {
   return $status
 }
 
-# need_packages NAME...: installs what is missing, with apt, and says so. What the archives do not have is named, the rest installed.
+# need_packages NAME...: installs missing packages with apt, with a message. It lists packages that the archives lack and installs
+# the rest.
 need_packages() {
   if ! command -v dpkg-query >/dev/null; then
     echo "not a Debian-like system: expecting the equivalents of these packages: $*"
@@ -100,7 +102,7 @@ forget_figures() {
   rm -f "$SONARD_RELIABILITY"/*.json
 }
 
-# Compilers at once: one a processor, but no more than the memory carries (a large file takes about 1.2 GB).
+# Number of parallel compilers: one for each processor, but no more than fit into memory (a large file needs about 1.2 GB).
 build_jobs() {
   local processors memory_kb by_memory
   processors=$(nproc 2>/dev/null || echo 2)
@@ -110,7 +112,7 @@ build_jobs() {
   echo $((processors < by_memory ? processors : by_memory))
 }
 
-# ccache, where it is installed, passes over compilations with precompiled headers unless it is told.
+# Without this setting ccache does not cache compilations with precompiled headers.
 export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
 
 # configure PRESET [cmake arguments...]
@@ -118,12 +120,12 @@ configure() {
   local log preset=$1 python=() status
   shift
   log=$(mktemp)
-  # Debian's packages of NumPy and Pillow are for its own Python, which need not be the first in PATH.
+  # Debian's packages of NumPy and Pillow are for Debian's own Python, which is not always the first in PATH.
   if command -v dpkg-query >/dev/null && [ -x /usr/bin/python3 ]; then python=(-DPython3_EXECUTABLE=/usr/bin/python3); fi
   for _ in as_it_is anew; do
     cmake --preset "$preset" -DCMAKE_CXX_COMPILER_LAUNCHER="$(command -v ccache || true)" "${python[@]}" "$@" >"$log" 2>&1 </dev/null
     status=$?
-    # With another compiler than before CMake drops every other setting, the sanitizers among them.
+    # If the compiler changes, CMake drops every other setting, including the sanitizers.
     grep -q '^You have changed variables that require your cache to be deleted' "$log" || break
     rm -f "build/$preset/CMakeCache.txt"
   done
@@ -138,7 +140,7 @@ configure() {
   fi
 }
 
-# clang_sanitizes: whether there is a clang++ that links a sanitized program.
+# clang_sanitizes: succeeds if there is a clang++ that links a sanitized program.
 clang_sanitizes() {
   local program status
   program=$(mktemp)
@@ -148,8 +150,8 @@ clang_sanitizes() {
   return $status
 }
 
-# configure_sanitized PRESET: with clang; where none can be had, with the default compiler, whose warnings then are no errors: what
-# sanitizers add makes g++ warn falsely.
+# configure_sanitized PRESET: configures with clang, or with the default compiler if clang is not available. Then warnings are no
+# errors, because the code of sanitizers causes false warnings of g++.
 configure_sanitized() {
   need_packages "${clang_packages[@]}"
   if clang_sanitizes; then
@@ -168,8 +170,9 @@ build() {
   return "${PIPESTATUS[0]}"
 }
 
-# setup_and_build [targets...]: the release build; without targets everything in it, tests too. With product_only set neither the
-# packages of tests are installed nor tests configured, unless they were before. What .ci/run sets differs: a plain run builds all.
+# setup_and_build [targets...]: makes the release build; without targets it builds everything, tests included. If product_only is
+# set, it neither installs packages for tests nor configures tests, unless an earlier run did. Settings of an earlier run by
+# .ci/run do not persist: a plain run builds everything.
 setup_and_build() {
   local packages=("${build_packages[@]}") testing=ON
   if [ -n "${product_only:-}" ] && [ ! -f build/release/tests/programs ]; then packages=("${product_packages[@]}") testing=OFF; fi

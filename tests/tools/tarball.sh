@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Builds sonard on Debian 12 as an archive that runs where it is unpacked: build/tarball/sonard-VERSION-linux-x86_64.tar.gz.
-# Libraries are linked statically where Debian has archives of them and are beside the programs where not. Of the system it needs
-# glibc 2.35 and libstdc++ of GCC 12 or newer: Debian 12, Ubuntu 22.04. Run by tests/tools/release.sh in a bare system.
+# Builds sonard on Debian 12 as an archive whose programs run in any folder: build/tarball/sonard-VERSION-linux-x86_64.tar.gz.
+# Libraries are linked statically if Debian has static archives of them; the others are stored beside the programs. The system
+# must have glibc 2.35 and libstdc++ of GCC 12 or newer: Debian 12, Ubuntu 22.04. tests/tools/release.sh runs this script in a
+# bare system.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -12,8 +13,9 @@ name=sonard-$version-linux-$(uname -m)
 folder=build/tarball stage=build/tarball/$name
 archives=/usr/lib/$(g++ -dumpmachine)
 
-# FFTW is left out: its licence, the GPL, would be that of the programs. So is the farm, which needs OpenSSL, whose updates this
-# archive would miss, and GeoTIFF, whose libtiff needs the GPL's libjbig. An old-style run path also holds for what the libraries beside the programs need of each other.
+# FFTW is left out, because its licence, the GPL, would apply to the programs. The farm is left out, because it needs OpenSSL,
+# whose updates this archive would miss. GeoTIFF is left out, because its libtiff needs libjbig, which has the GPL. An old-style
+# run path also applies when the libraries beside the programs load each other.
 # shellcheck disable=SC2016
 cmake -S . -B $folder -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF -DSONAR_FFTW=OFF -DSONAR_FARM=OFF -DSONAR_GEOTIFF=OFF -DSONAR_CUDA=OFF \
   -DCMAKE_INSTALL_RPATH='$ORIGIN/../lib/sonard;$ORIGIN/../../lib/sonard' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
@@ -34,13 +36,13 @@ for library in "${bundled[@]}"; do
   strip --strip-unneeded "$stage/lib/sonard/${library% *}"
 done
 
-# Licences of all that is inside: of libraries, and of what was compiled or linked in, by the packages that it came from.
+# Licences of all contents: of libraries, and of all code that was compiled or linked in, found by its packages.
 packages() {
   local package library
   for library in "${bundled[@]}"; do dpkg-query -S "*/$(basename "$(readlink -f "${library#* }")")"; done | sed 's/:.*//'
   for package in "${build_packages[@]}" libjs-three; do
     case $package in
-      libfftw3-dev | libnats-dev | libtiff-dev | libgtest-dev | libgmock-dev | libeigen3-dev) ;;  # nor what these need is inside
+      libfftw3-dev | libnats-dev | libtiff-dev | libgtest-dev | libgmock-dev | libeigen3-dev) ;;  # not in the archive
       *-dev | libjs-*) dpkg-query -W -f '${Package} ${Depends}\n' "$package" | sed 's/([^)]*)//g; s/[,|]/ /g' | tr -s ' ' '\n' ;;
     esac
   done | grep -E -- '-dev$|^libjs-' | grep -vE '^libc6?-dev$'
