@@ -1,5 +1,5 @@
-// listen, view and stats against a BlueView head of a few lines, written from docs/protocols/blueview-link.md: they
-// find it, request every ping, and draw it where its samples are.
+// The commands listen, view and stats with a small made-up BlueView head, written from docs/protocols/blueview-link.md: they find
+// the head, request every ping, and draw each sample at its place.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -203,7 +203,7 @@ TEST(BlueViewCommands, StatsMeasureTheSamplesAsSent) {
   FakeHead head;
   StatsOptions options;
   options.source = anything_there();
-  options.window = "10:11";  // the row of the bright one
+  options.window = "10:11";  // the row of the bright sample
   options.json = true;
   const std::string text = captured([&] { return stats(options); });
   EXPECT_THAT(text, HasSubstr("\"mean\":8279.375"));

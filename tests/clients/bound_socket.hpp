@@ -22,7 +22,7 @@ inline Socket bound_socket(const std::string& address, int type, std::uint16_t p
   at.sin_family = AF_INET;
   at.sin_port = htons(port);
   ::inet_pton(AF_INET, address.c_str(), &at.sin_addr);
-  // The cast is the sockets interface's own.
+  // The sockets interface requires this cast.
   EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
   return socket;
 }

@@ -20,7 +20,7 @@ std::string complaint(const std::vector<std::string>& words) {
   CLI::App app("", "sonarctl");
   app.require_subcommand(1);
   app.set_version_flag("--version", "1");
-  const std::vector<Run> commands{add_view(app), add_pose(app), add_set(app)};  // they own what the options are read into
+  const std::vector<Run> commands{add_view(app), add_pose(app), add_set(app)};  // they own the variables of the options
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
   } catch (const CLI::ParseError& error) {

@@ -1,4 +1,4 @@
-// The findings of doctor on where a sonar is and who has it, without a network: facts in, lines out.
+// The findings of doctor about the address of a sonar and about its clients, without a network: facts in, lines out.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -43,13 +43,13 @@ std::shared_ptr<const v1::DaemonStatus> daemon_of(const std::string& host) {
          sonars { name: "front" status_to: "192.0.2.255:52102" rate_hz: 10 listens: ")" +
       host + R"(:52100" advertised: ")" + host + R"(" })"));
 }
-/// The status of the daemon, to be changed.
+/// Returns the status of the daemon, which a test may change.
 v1::DaemonStatus& daemon_in(Facts& facts) {
   const auto copy = std::make_shared<v1::DaemonStatus>(*facts.control.status);
   facts.control.status = copy;
   return *copy;
 }
-/// Makes the daemon report the first sonar, to be changed.
+/// Makes the daemon report the first sonar and returns that report, which a test may change.
 v1::SonarStatus& report(Facts& facts) {
   const auto reported = std::make_shared<v1::SonarStatus>(facts.control.status->sonars(0));
   facts.sonars[0].reported = reported;
@@ -70,7 +70,7 @@ Facts healthy() {
   return facts;
 }
 
-/// The only line of that check; an empty one when there is none, or several.
+/// Returns the line of that check; empty if there is none or more than one.
 Finding line(const std::vector<Finding>& findings, const std::string& check) {
   std::vector<Finding> found;
   for (const Finding& f : findings)
@@ -157,7 +157,7 @@ TEST(Doctor, NamesWhatOtherNetworksDoNotPass) {
   for (const char* of_unicast : {"surveyor240", "omniscan450", "ping1d", "s500", "dvl", "m3", "micron", "norbit"})
     EXPECT_THAT(text_from(run_checks(behind_a_router(of_unicast))), Not(HasSubstr("another network")));
   Facts facts = behind_a_router("oculus");
-  facts.status.received.push_back(received("192.0.2.7"));  // it does pass
+  facts.status.received.push_back(received("192.0.2.7"));  // its messages do arrive
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("another network")));
 }
 
@@ -166,7 +166,7 @@ TEST(Doctor, KnowsMachinesWhoseNetworkIsTheirOwn) {
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("may not pass")));
   facts.machine = Machine::wsl2;
   expect(line(facts, "network"), Level::ok, "172.17.0.2 is reached via this WSL2 machine", "status_to");
-  facts.status.received.push_back(received("172.17.0.2"));  // here, not outside
+  facts.status.received.push_back(received("172.17.0.2"));  // on this computer
   facts.machine = Machine::container;
   expect(line(facts, "network"), Level::ok, "by way of this container", "status_to");
   facts.sonars[0].at.host = "127.0.0.2";  // for drivers here
@@ -427,7 +427,7 @@ TEST(Doctor, FindsBlueViewHeads) {
       R"(sonars { name: "bow" profile: "blueview-p900-90" listens: "127.0.0.4:14750" advertised: "127.0.0.4" rate_hz: 10 })"));
   expect(line(facts, "blueview"), Level::warn, "bow at 127.0.0.4:14750, a BlueView sonar, does not answer discovery on udp 14751",
          "udp 14751");
-  facts.address_given = true;  // 127.0.0.2: the other one was not asked
+  facts.address_given = true;  // 127.0.0.2: the other address was not checked
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("does not answer discovery")));
   facts.found = {{find_make("blueview"), "127.0.0.4:14750", "BlueView head P900-90 (123)"}};
   expect(line(facts, "blueview"), Level::ok, "BlueView head P900-90 (123) answers discovery at tcp 127.0.0.4:14750", "");

@@ -1,4 +1,4 @@
-// Poses of Gazebo's models as lines for sonard, from messages that have the shape of Gazebo's; read back by sonard's own reader.
+// Poses of Gazebo's models as lines for sonard, from stand-ins for Gazebo's messages. sonard's own reader reads the lines back.
 #include <gmock/gmock.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// The figures that judge a picture, on made-up images with known answers and on a real device's pings.
+// The figures that describe a picture, on made-up images with known figures and on a real device's pings.
 #include "clients/sonarctl/image_statistics.hpp"
 
 #include <gmock/gmock.h>

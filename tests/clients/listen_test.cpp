@@ -1,4 +1,4 @@
-// The commands against a device and a pose listener of a few lines, on loopback and free ports.
+// The commands with a small made-up device and a pose listener, on loopback and free ports.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ Socket bound(int type, std::uint16_t& port) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   ::inet_pton(AF_INET, "127.0.0.2", &address.sin_addr);
-  // The casts are the sockets interface's own.
+  // The sockets interface requires these casts.
   EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
   socklen_t size = sizeof address;
   ::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&address), &size);
@@ -57,8 +57,8 @@ wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
 }
 
 /// Accepts one client, waits for its fire message and sends the result of `answer`, then waits until the client leaves. Later
-/// clients are connected, and receive nothing. With `visits` > 1 it ends the connection instead, for this many clients in turn;
-/// then it is gone.
+/// clients are connected, and receive nothing. With `visits` > 1 it closes the connection instead, for this many clients one
+/// after another; then it closes its port.
 class FakeDevice {
  public:
   using Answer = std::function<wire::Bytes(std::uint32_t number, const oculus::FireSettings& asked)>;
@@ -332,7 +332,7 @@ TEST(Endpoints, TakeWhatIsMissingFromTheDefault) {
   for (const char* bad : {"host:", "host:0", "host:65536", "host:12x"}) EXPECT_FALSE(parse_endpoint(bad, fallback)) << bad;
 }
 
-/// Runs `send_poses` and hands over the first datagram it sent.
+/// Runs `send_poses` and returns its first datagram.
 wire::Bytes first_datagram(PoseOptions options) {
   std::uint16_t port = 0;
   const Socket listener = bound(SOCK_DGRAM, port);

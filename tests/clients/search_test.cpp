@@ -1,4 +1,4 @@
-// Sonars that PingStream searches without a given port, found or not: small test programs listen at the ports of some makes.
+// PingStream searches for sonars without a given port. Small test servers listen at the ports of some makes.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -50,7 +50,7 @@ class Server {
   std::thread thread_;
 };
 
-/// Answers as a web server that refuses. Returns false if the client left without a request.
+/// Answers like a web server that refuses. Returns false if the client disconnected without a request.
 bool refuse_as_a_web_server(const Socket& client) {
   std::array<std::byte, 1024> request;
   if (read_some(client, request, 60s).what != Wait::data) return false;
@@ -58,17 +58,17 @@ bool refuse_as_a_web_server(const Socket& client) {
   return write_all(client, std::as_bytes(std::span(reply.data(), reply.size()))).has_value();
 }
 
-/// A Ping360 that is sufficient for a host; stores the received messages.
+/// A stand-in for a Ping360 that a host accepts; it stores the received messages.
 class Ping360 {
  public:
   explicit Ping360(bool answers) : socket_(bound(SOCK_DGRAM, 12345)) {
     thread_ = std::thread([this, answers] { serve(answers); });
   }
-  /// The ids of all datagrams until now.
+  /// Returns the ids of all received datagrams.
   std::vector<ping::Id> received() {
     if (thread_.joinable()) {
       const auto last = connect_udp({address, 12345});
-      static_cast<void>(write_all(*last, ping::framed(ping::Id::reset, 0, {})));  // behind the others
+      static_cast<void>(write_all(*last, ping::framed(ping::Id::reset, 0, {})));  // after the others
       thread_.join();
     }
     return ids_;
@@ -176,7 +176,7 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
   EXPECT_THAT(named.error().text, HasSubstr("is not a Sonar 3D-15"));
 }
 
-/// The patience is longer than the test may last.
+/// The time limit is longer than the test may run.
 TEST(PingStream, AByteAtAnotherPortShowsThatTheSonarDoesNotReject) {
   std::array<int, 2> first{}, other{};
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, first.data()), 0);

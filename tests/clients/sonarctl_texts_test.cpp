@@ -1,4 +1,4 @@
-// Texts of sonarctl that need no device: what the terminal can show, the line under a picture, a daemon's status.
+// Texts of sonarctl that need no device: the abilities of the terminal, the line under a picture, a daemon's status.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Lines of sonarctl about its waits, without a network and without waiting.
+// Lines in which sonarctl reports what it waits for, without a network and without real waits.
 #include "clients/sonarctl/waiting.hpp"
 
 #include <gmock/gmock.h>

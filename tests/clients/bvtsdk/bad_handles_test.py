@@ -1,4 +1,4 @@
-"""Every function of both headers with handles that are null, stale, foreign, or of another kind: none crashes, none succeeds, and
+"""Every function of both headers with handles that are null, stale, foreign, or of another type: none crashes, none succeeds, and
 every out-parameter is written all the same."""
 import ctypes
 import re
@@ -12,7 +12,7 @@ INVALID = 7
 
 
 def prototypes(abi):
-    """Name, return type, [(type, name)] of every function."""
+    """Returns name, return type and [(type, name)] of every function."""
     text = re.sub(r"#define.*", "", (prefix(abi) / "include/bvt_sdk.h").read_text())
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.S)
     for result, name, arguments in re.findall(r"BVT_API ([^;()]*?)\b(BVT\w+)\(([^)]*)\);", text):
@@ -21,7 +21,7 @@ def prototypes(abi):
 
 
 class Call:
-    """One call with arguments of the right types and a bad handle wherever one goes in."""
+    """Makes one call with arguments of the right types; every handle argument is a bad handle."""
 
     def __init__(self, library, prototype, handle):
         self.name, self.result, arguments = prototype
@@ -48,7 +48,7 @@ class Call:
             inner = kind[:-1].strip()
             out = ctypes.c_void_p(0x55555555) if inner.endswith("*") else VALUES[inner](5)
             if name == "buffer":
-                return ctypes.byref(out)  # of a list: stays as it is
+                return ctypes.byref(out)  # an element of a list: it is not changed
         else:
             return VALUES[kind](32 if name == "buffer_size" else 1)
         self.outs.append(out)
@@ -60,7 +60,7 @@ class Call:
         return ctypes.c_int if self.result == "RetVal" else VALUES.get(self.result, ctypes.c_void_p)
 
     def untouched(self):
-        """Out-parameters that are not 0, null or empty."""
+        """Returns the out-parameters that are not 0, null or empty."""
         return [o for o in self.outs if (o.value != b"" if isinstance(o.value, bytes) else bool(o.value))]
 
 

@@ -33,7 +33,7 @@ MagImage image_with(std::vector<std::uint16_t> pixels) {
   return image;
 }
 
-/// A grey map, so that a mapped pixel tells its entry to a sixteenth.
+/// A grey map, so that a mapped pixel shows its entry to a sixteenth.
 ColourMapper grey_mapper(PixelOrder order = PixelOrder::bgra) {
   ColourMap map;
   for (int i = 0; i < 4096; ++i) map.push_back({static_cast<std::uint8_t>(i / 16), 7, static_cast<std::uint8_t>(i % 16)});
@@ -108,7 +108,7 @@ TEST_F(ColourMaps, AreRefusedWhenTheyAreNoMaps) {
     std::ofstream(folder / "odd.cmap", std::ios::binary) << std::string(size, 'x');
     EXPECT_EQ(mapper.load(folder / "odd.cmap"), load_color_map) << size;
   }
-  EXPECT_EQ(mapper.load(folder), load_color_map);               // a folder opens, but holds nothing
+  EXPECT_EQ(mapper.load(folder), load_color_map);               // a folder can be opened, but has no content
   EXPECT_EQ(entries(mapper, {65535}), std::vector<int>{4095});  // the old map stays
   ColourImage colours;
   EXPECT_EQ(ColourMapper(PixelOrder::bgra).map(image_with({1}), colours), bad_color_map);
@@ -120,7 +120,7 @@ TEST_F(ColourMaps, AreReadBetweenTheThresholds) {
   ASSERT_EQ(mapper.set_thresholds(30000, 10000), success);
   EXPECT_EQ(entries(mapper, {0, 10000, 20000, 30000, 65535}), (std::vector<int>{0, 0, 2048, 4095, 4095}));
   ASSERT_EQ(mapper.set_gamma(2), success);
-  EXPECT_EQ(entries(mapper, {10000, 15000, 30000}), (std::vector<int>{0, 2048, 4095}));  // a quarter, its root
+  EXPECT_EQ(entries(mapper, {10000, 15000, 30000}), (std::vector<int>{0, 2048, 4095}));  // a quarter, and its square root
   EXPECT_EQ(mapper.set_gamma(0), bad_parameter);
   EXPECT_EQ(mapper.set_gamma(std::numeric_limits<float>::quiet_NaN()), bad_parameter);
   EXPECT_EQ(mapper.set_thresholds(10, 10), bad_parameter);
@@ -134,7 +134,7 @@ TEST_F(ColourMaps, FindTheirTopThemselvesInAutoMode) {
   ColourMapper mapper = grey_mapper();
   mapper.set_auto_mode(true);
   EXPECT_EQ(mapper.set_thresholds(30000, 10000), bad_parameter);
-  std::vector<std::uint16_t> pixels(3000, 0);  // outside the sector: they say nothing
+  std::vector<std::uint16_t> pixels(3000, 0);  // pixels outside the sector have no effect
   for (std::uint16_t v = 1; v <= 1000; ++v) pixels.push_back(static_cast<std::uint16_t>(20 * v));
   entries(mapper, pixels);
   EXPECT_EQ(mapper.top(), 19900);

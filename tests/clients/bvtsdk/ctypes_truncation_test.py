@@ -1,4 +1,4 @@
-"""A Python host that forgets restype and argtypes: ctypes then cuts every handle to a C int, and all must still work."""
+"""A Python host that forgets restype and argtypes: ctypes then cuts every handle to a C int, and every call must still work."""
 import ctypes
 import unittest
 
@@ -13,7 +13,7 @@ class Truncation(unittest.TestCase):
         for h in handles[1:]:
             sdk.BVTSonar_Destroy(h)
         sonar, head, ping, image = handles[0], ctypes.c_int(), ctypes.c_int(), ctypes.c_int()
-        # The library writes 8 bytes: give each its room.
+        # The library writes 8 bytes, so each handle gets 8 bytes.
         head, ping, image = (ctypes.c_longlong() for _ in range(3))
         self.assertEqual(sdk.BVTSonar_Open(sonar, b"NET", daemon.address.encode()), 0)
         self.assertEqual(sdk.BVTSonar_GetHead(sonar, 0, ctypes.byref(head)), 0)
@@ -22,10 +22,10 @@ class Truncation(unittest.TestCase):
         self.assertGreater(size_of(image.value), 100)
         sdk.BVTMagImage_Destroy(image.value)
         sdk.BVTPing_Destroy(ping.value)
-        sdk.BVTPing_Destroy(ping.value)  # stale by now: silent
+        sdk.BVTPing_Destroy(ping.value)  # stale: no error
         self.assertEqual(image_of(ping.value, ctypes.byref(image)), 7)
         self.assertEqual(image.value, 0)
-        self.assertEqual(sdk.BVTHead_GetPing(sonar, -1, ctypes.byref(ping)), 7)  # of another kind
+        self.assertEqual(sdk.BVTHead_GetPing(sonar, -1, ctypes.byref(ping)), 7)  # a handle of another type
         self.assertEqual(sdk.BVTHead_GetPing(-1, -1, ctypes.byref(ping)), 7)
         sdk.BVTSonar_Destroy(sonar)
 

@@ -1,4 +1,4 @@
-"""Which sonars the discovery agent finds: those of this machine by itself, others also where BVE_DISCOVERY names them."""
+"""Tests which sonars the discovery agent finds: those of this machine always, others if BVE_DISCOVERY names them."""
 import ctypes
 import os
 import socket
@@ -17,7 +17,7 @@ class Discovery(unittest.TestCase):
         self.sdk = ctypes.CDLL(prefix(4) / "lib/libbvtsdk.so.4")
 
     def found(self, wanted, patience_s):
-        """Addresses the agent knows once it knows all that are wanted, or when time is up."""
+        """Returns the agent's addresses as soon as all wanted ones are known, or when the time is over."""
         agent = self.sdk.BVTSonarDiscoveryAgent_Create()
         self.assertEqual(self.sdk.BVTSonarDiscoveryAgent_Start(agent), 0)
         addresses, deadline = set(), time.monotonic() + patience_s

@@ -53,8 +53,8 @@ TEST(Handles, StaleOnesStayStaleWhenTheirPlaceIsUsedAgain) {
     ASSERT_EQ(table.find<Fish>(stale), nullptr);
     table.remove<Fish>(handle);
   }
-  EXPECT_LT(used.size(), 2000u);  // they are used again
-  EXPECT_GT(used.size(), 1000u);  // but not at once
+  EXPECT_LT(used.size(), 2000u);  // handles are reused
+  EXPECT_GT(used.size(), 1000u);  // but not immediately
   EXPECT_EQ(table.live(), 0u);
 }
 

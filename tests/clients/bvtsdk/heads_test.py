@@ -17,13 +17,13 @@ class Heads(unittest.TestCase):
                         mount="{frame: FLU, xyz_m: [0, 0, 0]}\n    options: {" + options + "}")
         self.enterContext(daemon)
         self.sdk = ctypes.CDLL(prefix(4) / "lib/libbvtsdk.so.4")
-        sonar = self.sdk.BVTSonar_Create()  # an int will do: see ctypes_truncation_test.py
+        sonar = self.sdk.BVTSonar_Create()  # an int is sufficient: see ctypes_truncation_test.py
         self.addCleanup(self.sdk.BVTSonar_Destroy, sonar)
         self.assertEqual(self.sdk.BVTSonar_Open(sonar, b"NET", daemon.address.encode()), SUCCESS)
         return sonar
 
     def head(self, sonar, number):
-        """Code and handle."""
+        """Returns the code and the handle."""
         out = ctypes.c_longlong()
         return self.sdk.BVTSonar_GetHead(sonar, number, ctypes.byref(out)), out.value
 
@@ -50,14 +50,14 @@ class Heads(unittest.TestCase):
             code, head = self.head(sonar, number)
             self.assertEqual(code, SUCCESS)
             self.assertEqual(self.number(self.sdk.BVTHead_GetCenterFreq, head, ctypes.c_int), hertz)
-            self.assertEqual(self.set_range(head, 0, 500), SUCCESS)  # moved into what the head can do
+            self.assertEqual(self.set_range(head, 0, 500), SUCCESS)  # moved into the limits of the head
             self.assertEqual(self.number(self.sdk.BVTHead_GetStopRange, head, ctypes.c_float), longest)
             self.set_range(head, 1, 5)
             self.ping_works(head)
         self.assertEqual(self.head(sonar, 2), (NO_HEAD, 0))
 
     def ranges(self, head, threshold=None):
-        """Bearings with a range in a new ping, and all bearings; threshold None: as the library has it."""
+        """Returns the bearings with a range in a new ping, and all bearings; threshold None: the library's default."""
         generator, ping, profile = self.sdk.BVTImageGenerator_Create(), ctypes.c_longlong(), ctypes.c_longlong()
         self.assertEqual(self.sdk.BVTImageGenerator_SetHead(generator, head), SUCCESS)
         if threshold is not None:
@@ -96,7 +96,7 @@ class Heads(unittest.TestCase):
         self.sdk.BVTHead_SetSoundSpeed(head, 1490)
         self.assertEqual(self.sdk.BVTSonar_CreateFile(recording, file, sonar, b""), SUCCESS)
         _, recorded = self.head(recording, 0)
-        self.assertEqual(self.number(self.sdk.BVTHead_GetSoundSpeed, recorded, ctypes.c_int), 1490)  # not that of connecting
+        self.assertEqual(self.number(self.sdk.BVTHead_GetSoundSpeed, recorded, ctypes.c_int), 1490)  # not the value of connecting
         for gain in (-6, -6, 3):
             self.assertEqual(self.sdk.BVTHead_SetGainAdjustment(head, ctypes.c_float(gain)), SUCCESS)
             ping = ctypes.c_longlong()
@@ -107,7 +107,7 @@ class Heads(unittest.TestCase):
         player = self.sdk.BVTSonar_Create()
         self.assertEqual(self.sdk.BVTSonar_Open(player, b"FILE", file), SUCCESS)
         _, played = self.head(player, 0)
-        self.assertEqual(self.gain(played), -6)  # of the first ping
+        self.assertEqual(self.gain(played), -6)  # the gain of the first ping
         for wanted in (-6, -6, 3):
             self.ping_works(played)
             self.assertEqual(self.gain(played), wanted)

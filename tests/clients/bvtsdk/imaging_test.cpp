@@ -1,4 +1,4 @@
-// Images: where an echo appears, how large they are, what the knobs do.
+// Images: the place of an echo, their size, and the effects of their settings.
 #include "clients/bvtsdk/core/imaging.hpp"
 
 #include <gtest/gtest.h>
@@ -55,7 +55,7 @@ TEST(XyImage, ShowsATargetWhereItIsAndNotMirrored) {
       const int row = static_cast<int>(std::lround(spot.row)), col = static_cast<int>(std::lround(spot.col));
       EXPECT_NEAR(image.pixel_range_m(row, col), range, 0.04) << range << " " << bearing;
       EXPECT_NEAR(image.pixel_bearing_deg(row, col), bearing, 0.6) << range << " " << bearing;
-      // The picture itself, as OpenCV shows it: up is ahead, right is starboard.
+      // The image as OpenCV shows it: up is ahead, right is starboard.
       const double ahead = (image.origin_row - spot.row) * image.range_resolution_m;
       const double starboard = (spot.col - image.origin_col) * image.range_resolution_m;
       EXPECT_NEAR(ahead, range * std::cos(bearing / 57.29578), 0.04);
@@ -100,7 +100,7 @@ TEST(XyImage, PutsPixelsWhereTheVendorsLibraryPutThem) {
       EXPECT_NEAR(image.pixel_range_m(row, col), std::hypot(x, y), 0.001);
       EXPECT_NEAR(image.pixel_bearing_deg(row, col), 57.29577951 * std::atan2(x, y), 1e-6);
     }
-  EXPECT_NEAR(image.pixel_range_m(12, 360), 14.841354, 0.0005);  // an entry as it stands there
+  EXPECT_NEAR(image.pixel_range_m(12, 360), 14.841354, 0.0005);  // one entry of that table
   EXPECT_NEAR(image.pixel_bearing_deg(12, 360), 16.855444, 1e-5);
 }
 
@@ -174,7 +174,7 @@ TEST(XyImage, IsZeroOutsideTheSectorAndSmoothInside) {
 }
 
 TEST(XyImage, InterpolatesBetweenBeamsAndBins) {
-  // A plane over bearing and range comes out as that plane.
+  // Samples that are linear in bearing and range give an image that is linear in them too.
   const PolarPing ping = make_ping(90, 200, 1, 0.05f, [](int j, int k) { return 1000 + 300 * j + 100 * k; });
   const MagImage image = image_of(ping, ImageType::xy);
   for (int row = 0; row < image.height; row += 7)

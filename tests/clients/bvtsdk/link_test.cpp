@@ -1,4 +1,4 @@
-// The link against a sonar of a few lines that misbehaves on command: loopback, a free port, bounded in time.
+// The link with a small made-up sonar that misbehaves on command: on loopback, on a free port, with time limits.
 #include "clients/bvtsdk/core/link.hpp"
 
 #include <arpa/inet.h>
@@ -37,7 +37,7 @@ SonarDescription some_sonar() {
 class Peer {
  public:
   explicit Peer(int fd) : socket_(fd) {}
-  /// The next frame; frames of other kinds than keep-alive only, unless asked for. type 0 when the host has gone.
+  /// Returns the next frame; it skips keep-alive frames unless they are requested. Type 0: the host has disconnected.
   FrameHeader next(Bytes& payload, bool keep_alives = false) {
     for (;;) {
       FrameHeader header;
@@ -67,7 +67,7 @@ class Peer {
     sonar.capabilities |= capabilities;
     reply(hello, encode_description(sonar));
   }
-  /// Until the host hangs up.
+  /// Waits until the host disconnects.
   void wait_for_the_end() {
     Bytes payload;
     while (next(payload).type != FrameType{}) {

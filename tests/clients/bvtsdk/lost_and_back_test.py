@@ -1,4 +1,4 @@
-"""A host whose daemon goes away, comes back, or freezes: the codes it gets, and that opening again suffices."""
+"""A host whose daemon stops, starts again, or hangs: the error codes, and that opening the sonar again is sufficient."""
 import ctypes
 import signal
 import time
@@ -26,7 +26,7 @@ class Host:
         return code
 
     def ping(self):
-        """Code of GetPing; the ping must be there exactly when it is 0."""
+        """Returns the code of GetPing; there must be a ping exactly if the code is 0."""
         ping = ctypes.c_void_p(1)
         code = self.sdk.BVTHead_GetPing(self.head, -1, ctypes.byref(ping))
         assert (code == SUCCESS) == bool(ping.value), (code, ping)
@@ -73,7 +73,7 @@ class LostAndBack(unittest.TestCase):
                 self.assertEqual(host.ping(), READ_TIMEOUT)
                 self.assertGreater(time.monotonic() - start, 5)
                 self.assertEqual(host.connected(), 0)
-                self.assertEqual(late.open(), CONNECTION_TIMEDOUT)  # the kernel takes the connection, no greeting comes
+                self.assertEqual(late.open(), CONNECTION_TIMEDOUT)  # the kernel accepts the connection, no greeting arrives
             finally:
                 daemon.process.send_signal(signal.SIGCONT)
             self.assertEqual(host.open(), SUCCESS)

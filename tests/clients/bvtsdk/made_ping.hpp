@@ -1,4 +1,4 @@
-// Pings for the tests, by a formula a reader can check.
+// Pings for the tests, computed by simple formulas.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-"""The prefixes as a driver's build uses them: headers in every language, the two-line detector that distinguishes 3.x and 4.x, every
-function in the library and nothing else, no foreign libraries, the CMake package and pkg-config."""
+"""The library prefixes as the build of a driver uses them: headers in every language, the two-line detector that distinguishes 3.x
+and 4.x, every function in the library and no other symbol, no foreign libraries, the CMake package and pkg-config."""
 import os
 import pathlib
 import re

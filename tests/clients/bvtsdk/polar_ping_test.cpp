@@ -1,4 +1,4 @@
-// Reading and writing of the payload of PING_DATA.
+// Reads and writes payloads of PING_DATA.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -55,7 +55,7 @@ TEST(PolarPing, ComesBackAsItWas) {
 }
 
 TEST(PolarPing, ReadsTheBytesOfTheDescription) {
-  // Put together by hand from docs/protocols/blueview-link.md: 2 beams of 3 bins, heading only.
+  // Written by hand from docs/protocols/blueview-link.md: 2 beams of 3 bins, heading only.
   const Bytes payload{2,    0,    0,    0,                                         // head
                       9,    0,    0,    0,                                         // number
                       0,    0,    0,    0,    0, 0, 0xF0, 0x3F,                    // 1 s
@@ -86,7 +86,7 @@ TEST(PolarPing, IsRefusedWhenCutAnywhere) {
   for (const Packing packing : every_packing) {
     const Bytes whole = encode_ping(some_ping(), packing);
     for (std::size_t n = 0; n < whole.size(); ++n) {
-      const auto exact = std::make_unique<std::uint8_t[]>(n);  // so that a sanitizer sees one byte too many
+      const auto exact = std::make_unique<std::uint8_t[]>(n);  // so that a sanitizer detects a read beyond it
       std::copy_n(whole.begin(), n, exact.get());
       std::string why;
       EXPECT_FALSE(decode_ping({exact.get(), n}, &why)) << n;
@@ -120,7 +120,7 @@ TEST(PolarPing, IsRefusedWithFieldsThatAreNone) {
 }
 
 TEST(PolarPing, IsNotInflatedPastWhatItAnnounces) {
-  // A stream that holds 2 MB of zeros behind the announcement of 70 bytes, and one of 20 bytes behind that of 60 MB.
+  // Two bad streams: one announces 70 bytes and has 2 MB of zeros; the other announces 60 MB and has 20 bytes.
   const Bytes small = encode_ping(some_ping(), Packing::deflate);
   const PolarPing zeros = make_ping(512, 2048, 1, 0.01f, [](int, int) { return 0; });
   const Bytes big = encode_ping(zeros, Packing::deflate);
@@ -143,7 +143,7 @@ TEST(PolarPing, InPlanesIsSmallerThanInOneStream) {
   std::uint32_t state = 1;
   const PolarPing noise = make_ping(256, 500, 1, 0.02f, [&](int, int) {
     state = state * 1664525u + 1013904223u;
-    return static_cast<int>(state >> 24) * static_cast<int>(state >> 24) / 512;  // as noise: mostly far below 256
+    return static_cast<int>(state >> 24) * static_cast<int>(state >> 24) / 512;  // like noise: mostly far below 256
   });
   const std::size_t plain = encode_ping(noise).size(), stream = encode_ping(noise, Packing::deflate).size();
   const std::size_t planes = encode_ping(noise, Packing::planes).size();

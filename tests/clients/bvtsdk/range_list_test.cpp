@@ -1,4 +1,4 @@
-// Range profile and range data: one range for each bearing.
+// Tests the range profile and the range data: one range for each bearing.
 #include "clients/bvtsdk/core/range_list.hpp"
 
 #include <gtest/gtest.h>

@@ -242,7 +242,7 @@ TEST_F(Recording, NamesThePingWhoseStreamIsDamaged) {
   put_frame(file, FrameType::hello_ok, hello);
   Bytes damaged = encode_ping(ping_number(0), Packing::planes);
   damaged.back() ^= 0xFF;
-  put_frame(file, FrameType::ping_data, damaged);  // with a checksum that is right
+  put_frame(file, FrameType::ping_data, damaged);  // with a correct checksum
   put_frame(file, FrameType::ping_data, encode_ping(ping_number(1), Packing::planes));
   write(file);
   RecordingReader reader;
@@ -291,7 +291,7 @@ TEST_F(Recording, StartsAnewWhenCreatedAgain) {
   ASSERT_EQ(writer.close(), success);
   RecordingReader reader;
   ASSERT_EQ(reader.open(path), success);
-  EXPECT_TRUE(reader.has_index());  // the first was closed in good order
+  EXPECT_TRUE(reader.has_index());  // the first file was closed normally
   expect_all(reader);
   ASSERT_EQ(reader.open(folder / "second.son"), success);
   EXPECT_EQ(reader.ping_count(0), 1);

@@ -94,7 +94,7 @@ TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
                                    HasSubstr("mm: big.stl is 3 mm long"), HasSubstr("more than 1 km from the origin"),
                                    HasSubstr("wholly above z = 0, the water's surface: gull"), HasSubstr("no seabed")));
   EXPECT_THAT(remarks("objects: []").warnings, ElementsAre(HasSubstr("the scene is empty")));
-  // Ground as a mesh may be long.
+  // A mesh of the ground may be long.
   files.write("bed.obj", "v 0 0 -9\nv 300 0 -9\nv 300 250 -8\nf 1 2 3\n");
   EXPECT_THAT(remarks("objects: [{name: bed, type: mesh, file: bed.obj, material: sand}]").warnings, IsEmpty());
   EXPECT_THAT(remarks("objects: [{name: bed, type: mesh, file: bed.obj, material: sand, scale: 100}]").warnings,
@@ -102,7 +102,7 @@ TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
 }
 
 TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
-  // A grid of one arc second whose header the loader is made to take for metres, and depths for heights.
+  // A grid of one arc second. The loader takes its header for metres and its depths for heights.
   files.write("g.asc", "ncols 2\nnrows 2\nxllcorner 5\nyllcorner 60\ncellsize 0.000277777778\n20 21 22 23\n");
   const Remarks tiny =
       remarks("objects: [{name: bed, type: heightmap, file: g.asc, material: sand, geographic: false, centred: true}]\n");

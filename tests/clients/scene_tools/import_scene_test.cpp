@@ -98,7 +98,7 @@ TEST_F(ImportScene, ModelsIncludeTheirNeighbours) {
   ASSERT_TRUE(done) << done.error().text;
   EXPECT_EQ(done->shapes, 2u);
   EXPECT_EQ(scene()->objects.size(), 2u);
-  // A file of the model itself, whose folder is named otherwise.
+  // A file of the model itself, whose folder has another name.
   write("models/clone/meshes/own.stl", triangle);
   const auto renamed = run(holding("crate", mesh("model://crate/meshes/own.stl")), "models/clone/model.sdf");
   EXPECT_TRUE(renamed) << renamed.error().text;
@@ -146,7 +146,7 @@ TEST_F(ImportScene, FilesOfRosPackagesAreFound) {
   EXPECT_TRUE(installed) << installed.error().text;
 }
 
-/// Both generations of Gazebo store HOST/OWNER/models/NAME/VERSION in small letters.
+/// Both generations of Gazebo store HOST/OWNER/models/NAME/VERSION in lower case.
 TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
   const Environment home("HOME", files.path("home").string()), none("GZ_FUEL_CACHE_PATH", ""), nor("IGN_FUEL_CACHE_PATH", "");
   const auto box = [](const char* name, const char* size) {
@@ -179,7 +179,7 @@ TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
   EXPECT_NEAR(described->objects[0].in_world.size_m().x, 20, 1e-5);
   EXPECT_NEAR(described->objects[0].in_world.centre_m().z, -5, 1e-5);
   EXPECT_NEAR(described->objects[1].in_world.size_m().x, 1, 1e-5);
-  // Given as a folder of models, without the cache.
+  // The folder of models is given; the cache is not used.
   const Environment elsewhere("HOME", "/nonexistent");
   options.model_folders = {files.path("home/.gz/fuel/fuel.gazebosim.org/hmoyen/models")};
   const auto given = run(sdf(fuel + "hmoyen/models/Sand Bed</uri></include>"));
@@ -187,7 +187,7 @@ TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
   EXPECT_THAT(text(), HasSubstr("size_m: [20, 20, 1]"));
   EXPECT_TRUE(run(sdf(fuel + "hmoyen/models/Sand Bed/2</uri></include>")));
   EXPECT_THAT(text(), HasSubstr("size_m: [1, 1, 1]"));
-  // Another version than the one named is not taken instead of it.
+  // A version other than the named one is not used in its place.
   const std::string third = sdf(fuel + "hmoyen/models/Sand Bed/3</uri></include>");
   EXPECT_THAT(error(third), HasSubstr("gz fuel download --url 'https://fuel.gazebosim.org/1.0/hmoyen/models/Sand Bed/3'"));
   const Environment again("HOME", files.path("home").string());
@@ -350,7 +350,7 @@ TEST_F(ImportScene, MaterialsByWordsThatMeanThem) {
   options.model_folders = {files.path("lib")};
   const std::string include = "<include><name>world</name><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/";
   EXPECT_EQ(material_of(sdf(include + "Sand%20Heightmap</uri></include>")), "sand");
-  // And so does the file of a mesh.
+  // The name of a mesh file is more descriptive, too.
   write("gravel_bed.stl", triangle);
   EXPECT_EQ(material_of(sdf(model("m", mesh("gravel_bed.stl")))), "gravel");
 }

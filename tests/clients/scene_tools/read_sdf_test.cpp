@@ -36,7 +36,7 @@ TEST(ReadSdf, PosesOfModelLinkAndVisualCompose) {
 TEST(ReadSdf, AnglesTurnAboutFixedAxesRollFirst) {
   Reading r;
   const auto world = r.read(sdf(model("m", link("l", "<pose degrees='true'>0 0 0 90 0 90</pose>", "<pose>0 1 0 0 0 0</pose>"))));
-  expect_near(where(world), {0, 0, 1});  // y -> z by the roll, and the yaw leaves z alone
+  expect_near(where(world), {0, 0, 1});  // the roll turns y to z; the yaw does not change z
   const auto by_quaternion = r.read(
       sdf(model("m", link("l", "<pose rotation_format='quat_xyzw'>0 0 0 0.7071 0 0 0.7071</pose>", "<pose>0 1 0 0 0 0</pose>"))));
   expect_near(where(by_quaternion), {0, 0, 1});
@@ -57,7 +57,7 @@ TEST(ReadSdf, PosesMayBeRelativeToAnyFrame) {
   expect_near(where(world, 0), {1, 0, -10});
   expect_near(where(world, 1), {1, 2, -10});
   expect_near(where(world, 2), {1, 2, -5});
-  expect_near(where(world, 3), {1, 2, -8});  // a joint stands at its child
+  expect_near(where(world, 3), {1, 2, -8});  // a joint is at the pose of its child
   expect_near(where(world, 4), {7, 0, -10});
   expect_near(where(world, 5), {1, 0, -7});
 }

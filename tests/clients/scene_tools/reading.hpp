@@ -11,7 +11,7 @@
 namespace sonar::scene_tools {
 
 struct Reading {
-  std::map<std::string, std::string> files;  // by what names them: model://crate
+  std::map<std::string, std::string> files;  // by their URI, for example model://crate
   ReadOptions options;
   Findings findings;
 

@@ -35,7 +35,7 @@ static BVTHead first_head(BVTSonar sonar) {
 }
 
 static void configure(BVTHead head) {
-  BVTHead_SetRange(head, 0, 9);  // below the least range: moved into it
+  BVTHead_SetRange(head, 0, 9);  // below the minimum range: raised to it
   BVTHead_SetRange(head, 1, 9);
   EXPECT_OK(BVTHead_SetSoundSpeed(head, 1490));
   EXPECT_OK(BVTHead_SetImageRes(head, BVTHEAD_RES_AUTO));
@@ -101,7 +101,7 @@ int main(int count, char** arguments) {
   EXPECT_OK(BVTSonar_Open(sonar, "NET", arguments[1]));
   EXPECT(BVTSonar_GetHeadCount(sonar) == 1);
   BVTHead head = first_head(sonar);
-  EXPECT(head == first_head(sonar));  // the sonar's own, not one a call
+  EXPECT(head == first_head(sonar));  // the same head for each call
   configure(head);
   BVTSonar file = BVTSonar_Create();
   EXPECT_OK(BVTSonar_CreateFile(file, recording.c_str(), sonar, ""));
@@ -114,13 +114,13 @@ int main(int count, char** arguments) {
     BVTSDK::RangeData data;
     EXPECT_OK(BVTPing_GetRangeData(ping, data));
     BVTPing_Destroy(ping);
-    EXPECT(data.GetCount() == 0);  // gone with its ping
+    EXPECT(data.GetCount() == 0);  // released with its ping
   }
   EXPECT(BVTSonar_GetFileSize(file) > 100);
   BVTSonar_Destroy(file);
 
   EXPECT_OK(BVTSonar_Open(sonar, "FILE", recording.c_str()));  // again, on the same object
-  EXPECT_CODE(BVTHead_SetRange(head, 1, 9), BVT_INVALID_PTR);  // the old head went with what was open
+  EXPECT_CODE(BVTHead_SetRange(head, 1, 9), BVT_INVALID_PTR);  // the old head became invalid with its sonar
   head = first_head(sonar);
   configure(head);
   EXPECT(BVTHead_GetPingCount(head) == 2);
@@ -131,9 +131,9 @@ int main(int count, char** arguments) {
     check_image(ping, arguments[2], recording + ".ppm");
     BVTPing_Destroy(ping);
   }
-  EXPECT_CODE(BVTSonar_Open(sonar, "FILE", (recording + ".ppm").c_str()), BVT_FILE_HEADER_BAD);  // as a vendor's .son is
+  EXPECT_CODE(BVTSonar_Open(sonar, "FILE", (recording + ".ppm").c_str()), BVT_FILE_HEADER_BAD);  // like a vendor's .son file
   EXPECT_CODE(BVTSonar_Open(sonar, "FILE", (recording + ".lost").c_str()), BVT_FILE_OPEN);
-  EXPECT(BVTHead_GetPingCount(head) == 2);  // what was open still is: hosts look for the next part of a recording in this way
+  EXPECT(BVTHead_GetPingCount(head) == 2);  // the open file stays open: hosts search for the next part of a recording in this way
   BVTSonar_Destroy(sonar);
   EXPECT_CODE(BVTHead_SetRange(head, 1, 9), BVT_INVALID_PTR);
   return 0;

@@ -5,7 +5,7 @@
 
 #include "tests/clients/bvtsdk/programs/expect.h"
 
-static BVTSDK::Sonar sonar, recording, player;  // destroyed in no chosen order
+static BVTSDK::Sonar sonar, recording, player;  // destroyed in an unspecified order
 static BVTSDK::Head head = NULL, recording_head = NULL, played_head = NULL;
 static BVTSDK::ColorMapper mapper;
 
@@ -90,7 +90,7 @@ int main(int, char** arguments) {
     expect_code(BVT_PING_NUM_TOO_LARGE, [] { played_head.GetPing(-1); });
     EXPECT(played_head.GetPing(1).GetTimestamp() == stamps[1]);
 
-    generator.SetSoundSpeedOverride(745);  // half of the ping's: everything looks half as far
+    generator.SetSoundSpeedOverride(745);  // half of the ping's: every range is halved
     const BVTSDK::RangeProfile profile = generator.GetRangeProfile(played_head.GetPing(0));
     EXPECT(profile.GetValidCount() > 0);
     for (int i = 0; i < profile.GetCount(); ++i)

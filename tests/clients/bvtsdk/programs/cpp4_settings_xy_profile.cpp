@@ -54,7 +54,7 @@ static void check_profile(const BVTSDK::RangeProfile& profile) {
 
 int main(int, char** arguments) {
   try {
-    BVTSDK::Head head = NULL;  // members of the node, there before the sonar is
+    BVTSDK::Head head = NULL;  // members of the node, which exist before the sonar
     BVTSDK::Ping ping = NULL;
     BVTSDK::MagImage image = NULL;
     EXPECT(head.Handle() == nullptr);
