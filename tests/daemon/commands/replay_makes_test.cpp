@@ -1,4 +1,4 @@
-// Replay on loopback of files of other makes than Oculus: their hosts request pings first, and get answers.
+// Replay on loopback, with files of makes other than Oculus. Their hosts first request pings, and get answers.
 #include <gmock/gmock.h>
 
 #include "protocol/aris/aris_file.hpp"
@@ -109,7 +109,7 @@ TEST(ReplayOfAris, CountsOnWhenItBeginsAgainAndFromOneForTheNextController) {
         controller.emplace(replay);
         controller->set_acoustics();
         frame = controller->next(milliseconds(500));
-      } catch (const std::exception&) {  // the one before is not yet gone
+      } catch (const std::exception&) {  // the previous host is still connected
       }
     for (std::int32_t i = 0; i < 5; ++i, frame = controller->next()) {
       ASSERT_TRUE(frame);
@@ -175,7 +175,7 @@ Bytes sonar_file(std::uint32_t shots, milliseconds period) {
   return file;
 }
 
-/// A host that has images sent to a port of its own.
+/// A host that receives images at a port of its own.
 class Host {
  public:
   explicit Host(const Replay& replay) : at_(replay.at()), images_(io_, udp::endpoint(asio::ip::address_v4::loopback(), 0)) {}

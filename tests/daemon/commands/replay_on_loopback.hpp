@@ -61,7 +61,7 @@ class Replay {
   std::future<void> done_;
 };
 
-/// Waits, with a limit that Asio's receive does not have. Returns true if bytes or the end can be received.
+/// Waits with a time limit, which Asio's receive does not have. Returns true if bytes or the end can be received.
 template <class Socket>
 bool readable(Socket& socket) {
   pollfd waited{socket.native_handle(), POLLIN, 0};
@@ -71,7 +71,7 @@ bool readable(Socket& socket) {
 class Driver {
  public:
   explicit Driver(const Replay& replay) : socket_(io_) { socket_.connect(replay.at()); }
-  /// Up to `most` bytes, fewer when the stream ends before.
+  /// Returns up to `most` bytes; fewer if the stream ends earlier.
   Bytes read(std::size_t most) {
     Bytes bytes, block(1 << 16);
     error_code ec;

@@ -1,4 +1,5 @@
-// Hostile clients of a replay: what they cost in memory and in lines of the log, and where they may send its datagrams.
+// Hostile clients of a replay: the memory and log lines that they cause, and the addresses to which they can direct its
+// datagrams.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -76,7 +77,7 @@ TEST(ReplayBesideStrangers, AHostThatReadsNoAnswersIsClosedAndFillsNoLog) {
   asio::io_context io;
   tcp::socket host(io);
   host.open(tcp::v4());
-  host.set_option(asio::socket_base::receive_buffer_size(2048));  // so that the kernel holds few answers
+  host.set_option(asio::socket_base::receive_buffer_size(2048));  // so that the kernel can store few answers
   host.connect(replay.at());
   Bytes refused;  // each is refused, with an answer and a line for the log
   for (int i = 0; i < 200; ++i) {
@@ -193,7 +194,7 @@ TEST(ReplayBesideStrangers, NoFramesGoToABroadcastAddress) {
   std::array<char, 2000> datagram;
   std::atomic<bool> any{false};
   images.async_receive(asio::buffer(datagram), [&](const error_code& ec, std::size_t) { any = !ec; });
-  io.run_for(milliseconds(500));  // a shot is sent at once where one is sent at all
+  io.run_for(milliseconds(500));  // if a shot is sent, it is sent at once
   EXPECT_FALSE(any) << "a frame was broadcast";
   ASSERT_EQ(receive_at("127.0.0.1"), "HTTP/1.1 204");
   io.restart();

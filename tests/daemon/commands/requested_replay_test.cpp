@@ -1,5 +1,5 @@
-// Replay of sonars whose drivers decide which pings they get: which line of a scan a request gets, which port sends what, and the
-// recorded pings at the sockets of a driver.
+// Replay of sonars whose drivers decide which pings they get. Tests which scan line answers a request, which port sends which
+// messages, and that a driver's sockets receive the recorded pings.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -119,7 +119,7 @@ Bytes file_of(MakeWriter make, const std::vector<Bytes>& messages) {
   return file;
 }
 
-/// A recording on a disk that stands still until `goes_on`, which may hold an exception.
+/// A recording on a disk that blocks until `goes_on` has a value or an exception.
 class SlowDisk final : public recording::RecordingReader {
  public:
   SlowDisk(std::unique_ptr<recording::RecordingReader> of, std::shared_future<void> goes_on)
@@ -138,7 +138,7 @@ class SlowDisk final : public recording::RecordingReader {
   std::shared_future<void> goes_on_;
 };
 
-/// A replay in a thread of its own. Once it is open, its disk stands still until `goes_on`, if given.
+/// A replay in a thread of its own. After it is open, its disk blocks until `goes_on`, if given.
 class Replay {
  public:
   explicit Replay(Bytes file, double rate_hz = 1000, std::shared_future<void> goes_on = {})
@@ -228,7 +228,7 @@ Bytes micron_line(int bearing, char bin) {
   return *micron::vendor().frame(ping, state);
 }
 
-/// A driver requests lines to port of ahead; the head turns by a grad after each.
+/// A driver requests scan lines that are to port of ahead; the head turns by one grad after each.
 TEST(ReplayOfMicron, ASendDataGetsTheRecordedLineOfItsDirection) {
   std::vector<Bytes> lines;
   for (int bearing = 2400; bearing <= 4000; bearing += 16) lines.push_back(micron_line(bearing, static_cast<char>(bearing / 16)));
@@ -290,7 +290,7 @@ Bytes ping360_line(std::uint16_t angle, bool of_a_scan) {
   return ping::framed(of_a_scan ? ping::Id::auto_device_data : ping::Id::device_data, 2, payload);
 }
 
-/// The recording is of a scan; the request of a single line is answered by the message that answers it.
+/// The recording is of a scan. A request of a single line gets the message with which the device answers such a request.
 TEST(ReplayOfPing360, ARequestGetsTheLineOfItsAngleInTheMessageThatAnswersIt) {
   Replay replay(file_of(ping_log, {ping360_line(10, true), ping360_line(20, true), ping360_line(30, true)}));
   Udp host(12345);
@@ -311,7 +311,7 @@ TEST(ReplayOfPing360, ARequestGetsTheLineOfItsAngleInTheMessageThatAnswersIt) {
   }
 }
 
-// ---- range finders: each result is requested, or a stream of them
+// ---- range finders: a host requests each result, or a stream of results
 
 Bytes ping1d_profile(std::uint32_t number) {
   ping::Profile profile;
@@ -498,7 +498,7 @@ TEST(ReplayOfSurveyor, AHostByUdpGetsEveryMessageAtTheRecordedPace) {
   host.send(wanted(ping::Id::device_information));
   ASSERT_EQ(next_measured(host)->header.id, ping::Id::device_information) << "and no ping before";
   const auto begin = std::chrono::steady_clock::now();
-  host.send(enabling(true));  // once a second; the recording has five a second
+  host.send(enabling(true));  // enables once a second; the recording has five pings a second
   for (std::uint32_t i = 1; i <= 4; ++i)
     for (const ping::Id id : {ping::Id::attitude_report, ping::Id::atof_point_data}) {
       const auto frame = next_measured(host);
@@ -593,7 +593,7 @@ TEST_F(NorbitReplay, EachPortSendsItsPacketsOnceTheDriverTurnsItOn) {
   EXPECT_EQ(replay.figures().clients, 3u);
 }
 
-/// Pings wait for the disk; what the driver says meanwhile is answered, and no ping is cut or lost.
+/// While pings wait for the disk, the driver's messages are answered, and no ping is cut or lost.
 TEST_F(NorbitReplay, ADiskThatStandsStillDelaysNoConversation) {
   std::promise<void> goes_on;
   Replay replay(file_of(raw_dump, messages), 1000, goes_on.get_future().share());

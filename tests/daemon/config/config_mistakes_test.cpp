@@ -148,7 +148,7 @@ TEST(ConfigMistakes, UnknownOptionsAreRefusedWithTheKnownOnes) {
   EXPECT_THAT(with("before_frist_fire: pings"),
               ::testing::AllOf(HasSubstr("sonars[0].options.before_frist_fire: unknown key"), HasSubstr("heads_base")));
   EXPECT_THAT(with("strict_rnage: on"), HasSubstr("did you mean \"strict_range\"?"));
-  EXPECT_THAT(with("before_first_fire: pigns"), HasSubstr("did you mean \"pings\"?"));  // would be wrong there, too
+  EXPECT_THAT(with("before_first_fire: pigns"), HasSubstr("did you mean \"pings\"?"));  // this place is wrong for it, too
 }
 
 TEST(ConfigMistakes, TheDemoTakesAnyProduct) {

@@ -1,4 +1,4 @@
-// docs/faults.md names the troubles of the code.
+// docs/faults.md lists the faults that the code has.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 
 const std::filesystem::path scenes = std::filesystem::path(SONARD_SOURCE_DIR) / "scenes";
 
-/// A folder of this test process, with the working directory in it while this lives.
+/// A folder of this test process, which is the working directory as long as this object exists.
 class EmptyFolder {
  public:
   EmptyFolder() : before_(std::filesystem::current_path()) {

@@ -74,7 +74,7 @@ std::uint8_t FakeEngine::sample(std::uint32_t ping, std::size_t row, std::size_t
   return static_cast<std::uint8_t>((ping * 31 + row * 7 + beam) % 255);
 }
 
-/// Row by row out of a row without end: single samples take long without optimisation.
+/// Copies row by row from one endless row, because single samples take long without optimisation.
 std::vector<std::byte> FakeEngine::samples(std::uint32_t ping, std::size_t rows, std::size_t beams, std::size_t sample_bytes) {
   constexpr std::size_t period = 255;
   std::vector<std::byte> long_row((period + beams) * sample_bytes);

@@ -23,18 +23,18 @@ namespace sonar::testing_daemon {
 
 using Steady = std::chrono::steady_clock;
 using std::chrono::milliseconds;
-constexpr milliseconds patience{20000};  // for anything that must happen
+constexpr milliseconds patience{20000};  // time limit of every expected event
 
 /// A path in the folder for temporary files that no other test uses, in this process or another one.
 std::string own_path(const std::string& name);
 
-/// Pings without physics: sample = a pattern of ping number, row and beam. Stores its requests.
+/// An engine without physics: each sample is a pattern of ping number, row and beam. It stores its requests.
 class FakeEngine final : public PingEngine {
  public:
   struct Record {
     std::mutex mutex;
     std::vector<PingRequest> requests;
-    std::vector<ScenePointer> scenes;  // in which each was made
+    std::vector<ScenePointer> scenes;  // the scene of each ping
     std::vector<PingRequest> all() {
       std::lock_guard lock(mutex);
       return requests;
@@ -61,7 +61,7 @@ class FakeEngine final : public PingEngine {
 class PingGate {
  public:
   void allow(int pings = 1);
-  /// Lets every ping pass from now on.
+  /// From now on allows every ping.
   void open();
   /// Called by the engine before each ping.
   void pass();
@@ -81,13 +81,13 @@ std::shared_ptr<Scene> small_scene(bool moving_object = false);
 struct DaemonSetup {
   std::string address = "127.0.0.2";
   std::string profile = "oculus-m1200d";
-  std::string sonar_lines;    // more keys of the sonar, "    key: value\n"
-  std::string vehicle_lines;  // vehicles beside rov, "  - {name: boat}\n"
-  std::string more;           // more sections
+  std::string sonar_lines;    // further keys of the sonar, "    key: value\n"
+  std::string vehicle_lines;  // vehicles in addition to rov, "  - {name: boat}\n"
+  std::string more;           // further sections
   AppOptions options;
   milliseconds engine_takes{0};
   FakeEngine::Before engine_before;
-  std::shared_ptr<PingGate> gate;  // null: pings are made as they are due; the daemon opens it when it stops
+  std::shared_ptr<PingGate> gate;  // null: each ping is made when it is due. The daemon opens the gate when it stops
   bool moving_object = false;
   ScenePointer scene;                               // instead of small_scene()
   std::function<void(const Scene&)> before_engine;  // on the thread that makes an engine for a later scene
@@ -101,14 +101,14 @@ class Daemon {
  public:
   explicit Daemon(DaemonSetup setup = {});
   ~Daemon();
-  /// Stops it, if it does not end by itself, and returns run()'s result.
+  /// Stops the daemon if it is still running, and returns run()'s result.
   int stop();
-  /// Waits for it to end by itself.
+  /// Waits until the daemon ends by itself.
   int wait();
   App& app() { return *app_; }
   const std::string& address() const { return address_; }
   std::vector<PingRequest> requests() { return record_->all(); }
-  /// The scenes in which those were made, one each.
+  /// The scene of each of these requests.
   std::vector<ScenePointer> scenes();
   /// Performs an operation on the I/O thread and waits for its answer.
   OperationResult ask(const control::Operation& operation);
@@ -163,7 +163,7 @@ class Client {
   std::uint64_t bytes_read = 0;
   bool ended = false, was_reset = false;
   oculus::Decoder decoder;
-  std::optional<Sha256> digest;  // digest of what is read, if a test sets one; it is slow without optimisation
+  std::optional<Sha256> digest;  // digest of all read bytes, if a test sets one; it is slow without optimisation
 
  private:
   bool read_some(milliseconds timeout, std::vector<std::byte>* raw = nullptr);

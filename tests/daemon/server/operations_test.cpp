@@ -25,7 +25,7 @@ control::SetSonar set_transmit(bool on) {
   return s;
 }
 
-/// The first ping, of at most a hundred, for which `fine` holds.
+/// Returns the first of at most a hundred pings for which `fine` is true.
 template <class Fine>
 bool sees(Client& client, Fine&& fine) {
   for (int i = 0; i < 100; ++i) {
@@ -45,7 +45,7 @@ TEST(Status, SaysWhatThereIsAndWhatItDoes) {
   Daemon daemon(setup);
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40, 3));
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(sees_range(client, 3));  // the first is on the books when the second is written
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(sees_range(client, 3));  // the first is counted when the second is written
   const v1::DaemonStatus s = daemon.status();
   EXPECT_FALSE(s.version().empty());
   EXPECT_EQ(s.config(), "test.yaml");
@@ -264,7 +264,7 @@ TEST(Events, ReachListenersOnly) {
   EXPECT_TRUE(has([](const v1::Event& e) { return e.pose().vehicle() == "rov" && !e.pose().stale(); }));
   EXPECT_TRUE(has([](const v1::Event& e) { return e.pose().stale(); }));
   daemon.on_io_thread([&] { token.reset(); });
-  ASSERT_EQ(daemon.ask(sample).code, Code::done);  // the list is swept when there is something to tell
+  ASSERT_EQ(daemon.ask(sample).code, Code::done);  // the list is cleaned up before an event is sent
   daemon.stop();
 }
 

@@ -41,7 +41,7 @@ std::size_t times(const std::string& text, const std::string& words) {
   return n;
 }
 
-/// Sends the signal and waits for the `nth` line with these words.
+/// Sends the signal and waits until the log has `nth` lines with these words.
 [[nodiscard]] bool reload(Daemon& daemon, const std::string& words, std::size_t nth = 1) {
   if (kill(getpid(), SIGHUP) != 0) return false;
   return eventually([&] { return times(daemon.log_text(), words) >= nth; });
@@ -110,7 +110,7 @@ TEST(Reload, ASceneThatTheMemoryDoesNotSufficeForKeepsEverything) {
   std::ofstream(root / "proc/meminfo") << "MemAvailable: 1 kB\n";
   DaemonSetup setup = with_file();
   setup.options.load_scene = [root](const SceneFile&) -> Result<ScenePointer> {
-    memory_root() = root;  // what is left once the files are read
+    memory_root() = root;  // the part that remains after the files are read
     return small_scene(true);
   };
   Daemon daemon(setup);
@@ -176,7 +176,7 @@ TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {
   Daemon daemon(setup);
   Client client(daemon.address()), of_left(left), of_rear(rear);
   client.fire(fire_at(PingRate::hz40));
-  auto once = fire_at(PingRate::hz10);  // nothing waits for these clients at the reload: they are read late
+  auto once = fire_at(PingRate::hz10);  // no bytes wait for these clients at the reload, because they read late
   once.settings.flags |= oculus::flag::network_trigger;
   of_left.fire(once);
   of_rear.fire(once);
@@ -199,7 +199,7 @@ TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {
 
   std::uint32_t last = 0;
   std::uint64_t skipped = 0;
-  for (int i = 0; i < 10; ++i) {  // those from before the reload are still to be read
+  for (int i = 0; i < 10; ++i) {  // pings from before the reload come first
     const auto next = client.next_ping();
     ASSERT_TRUE(next);
     EXPECT_GT(next->head.fixed.ping_id, last) << "no ping twice";

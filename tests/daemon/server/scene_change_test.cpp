@@ -120,7 +120,7 @@ TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
   EXPECT_EQ(daemon.figures().refused, 0u);
 }
 
-/// Each engine costs pings some time: one client that changes the scene all the time must not reduce the rate of others.
+/// Making an engine delays pings. A client that changes the scene continuously must not reduce the ping rate of others.
 TEST(SceneChange, WhileADriverIsServedEnginesAreMadeSoOften) {
   Daemon daemon;
   Client client(daemon.address());
@@ -134,7 +134,7 @@ TEST(SceneChange, WhileADriverIsServedEnginesAreMadeSoOften) {
   EXPECT_EQ(objects_in(daemon.status()), 2 + SceneChanges::most_at_once + beyond) << "none is lost";
 }
 
-/// Edits that wait together cost the driver one engine; an edit that cannot be made fails alone.
+/// Edits that wait at the same time need only one new engine. If one of them cannot be made, only that one fails.
 TEST(SceneChange, EditsThatWaitShareAnEngine) {
   auto gate = std::make_shared<Gate>();
   DaemonSetup setup;

@@ -68,7 +68,7 @@ TEST(Status, ComesFromTheSonarsAddressAndFollowsTheConnection) {
   EXPECT_NE(first->from_port, 52102) << "that port belongs to the drivers";
   EXPECT_EQ(first->status.connected_ip, (std::array<std::uint8_t, 4>{}));
   {
-    Client client(daemon.address());  // TCP is up before the first status
+    Client client(daemon.address());  // TCP is ready before the first status
     EXPECT_TRUE(eventually([&] { return listener.next()->status.connected_ip == std::array<std::uint8_t, 4>{127, 0, 0, 1}; }));
   }
   EXPECT_TRUE(eventually([&] { return listener.next()->status.connected_ip == std::array<std::uint8_t, 4>{}; }));
@@ -78,7 +78,7 @@ TEST(Status, ComesOnceASecond) {
   Listener listener;
   DaemonSetup setup;
   setup.sonar_lines = "    status_to: ['127.0.0.1:" + std::to_string(listener.port) + "']\n";
-  const auto begin = Steady::now();  // the first is sent later, however late it is read
+  const auto begin = Steady::now();  // the first is sent after this time, no matter how late it is read
   Daemon daemon(setup);
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(listener.next());
   const auto took = Steady::now() - begin;

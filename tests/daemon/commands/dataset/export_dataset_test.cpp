@@ -23,7 +23,7 @@ using nlohmann::json;
 using std::filesystem::path;
 using ::testing::HasSubstr;
 
-// Beds, coats and radii in turn: parts of scenes come back, and whole scenes.
+// Beds, coats and radii alternate, so parts of scenes are repeated, and whole scenes.
 const std::string job_text = R"(
 dataset: {pings: 14, shard: 6, seed: 3, negatives: 0.3, targets: [ball], license: CC-BY-4.0}
 vary:

@@ -1,4 +1,4 @@
-// A small data set, made whole, in parts, with more threads, after an interruption, and refused.
+// A small data set: made at once, in parts, with more threads, and after an interruption; and refused data sets.
 #include "daemon/commands/dataset/make_dataset.hpp"
 
 #include <gmock/gmock.h>
@@ -113,7 +113,7 @@ TEST_F(MakeDataset, ThreadsAndPartsMakeTheSameBytes) {
 TEST_F(MakeDataset, GoesOnWhereItStopped) {
   ASSERT_TRUE(make("a"));
   const std::string manifest = contents("a/manifest.json");
-  std::filesystem::remove(folder_ / "a/shard-000001.tar");         // as if it had never been committed
+  std::filesystem::remove(folder_ / "a/shard-000001.tar");         // as if it had never been written
   std::filesystem::remove(folder_ / "a/shard-000002.tar.sha256");  // as if killed before the digest
   const path half = folder_ / "a/shard-000001.tar.tmp.elsewhere.1", of_the_user = folder_ / "a/notes.tmp";
   std::ofstream(half) << "half a shard";
@@ -133,11 +133,11 @@ TEST_F(MakeDataset, TwoWritersOfOneFileDoNotMeet) {
   ASSERT_TRUE(a && b);
   ASSERT_TRUE(a->add("one", one));
   ASSERT_TRUE(b->add("two", two));
-  remove_unfinished(folder_, [](const std::string&) { return true; });  // neither is a killed run's
+  remove_unfinished(folder_, [](const std::string&) { return true; });  // neither belongs to a killed run
   ASSERT_TRUE(a->commit());
   EXPECT_EQ(contents("s.tar").size(), 512u + 1024 + 1024);
   const auto other = b->commit();
-  ASSERT_FALSE(other);  // the one that came first stays
+  ASSERT_FALSE(other);  // the first one stays
   EXPECT_EQ(other.error().kind, ErrorKind::bad_data);
   EXPECT_THAT(other.error().text, HasSubstr("other bytes"));
   auto equal = ShardWriter::open(folder_ / "s.tar");

@@ -28,7 +28,7 @@ TEST(Vary, APingIsAFunctionOfSeedNumberAttemptAndName) {
   const auto all = variations("vary: {a: {uniform: [0, 1]}, b: {uniform: [0, 1]}}");
   const auto alone = variations("vary: {b: {uniform: [0, 1]}}");
   const Draws ping = draw(all, Seed{1}, 7000, 0);
-  EXPECT_EQ(ping.words.at("b"), draw(alone, Seed{1}, 7000, 0).words.at("b"));  // whatever else is drawn
+  EXPECT_EQ(ping.words.at("b"), draw(alone, Seed{1}, 7000, 0).words.at("b"));  // no matter what else is drawn
   EXPECT_NE(ping.words.at("a"), ping.words.at("b"));
   EXPECT_NE(ping.words.at("a"), draw(all, Seed{1}, 7001, 0).words.at("a"));
   EXPECT_NE(ping.words.at("a"), draw(all, Seed{2}, 7000, 0).words.at("a"));

@@ -1,4 +1,4 @@
-// Records and files that travel to workers, without a server.
+// Records and files that are sent to workers, without a server.
 #include "daemon/commands/farm/farm_job.hpp"
 
 #include <gmock/gmock.h>
@@ -159,7 +159,7 @@ TEST_F(FarmJobTest, CountsThatNoJobHasAreRefused) {
     ASSERT_FALSE(parsed) << key << ' ' << value;
     EXPECT_THAT(parsed.error().text, HasSubstr(std::string("is invalid: ") + key + " is ")) << value;
   }
-  json words = json::parse(is.to_json());  // fits itself, but not the job file
+  json words = json::parse(is.to_json());  // consistent in itself, but not with the job file
   words["shards"] = 5, words["shard_pings"] = 1;
   const auto parsed = parse_farm_job(is.id, words.dump());
   ASSERT_TRUE(parsed) << parsed.error().text;
@@ -170,7 +170,7 @@ TEST_F(FarmJobTest, CountsThatNoJobHasAreRefused) {
   EXPECT_TRUE(load_files(is, folder_ / "job/set.yaml"));
 }
 
-/// Runs in a separate process, whose reads are confined from then on. Returns the number of the failed check; 0 = none.
+/// Runs in a separate process and restricts which files it can read. Returns the number of the failed check; 0 = none.
 int work_on_foreign_shards(const path& folder) {
   TableInMemory queue;
   const auto job = dataset::load_job(folder / "job/set.yaml").value();
@@ -217,7 +217,7 @@ TEST_F(FarmJobTest, TheStatusShowsNoRawBytesOfTheQueue) {
   EXPECT_THAT(*text, testing::Not(HasSubstr("other.8")));
   EXPECT_EQ(text::printable(*text).size() - text->size(),
             3 * static_cast<std::size_t>(std::count(text->begin(), text->end(), '\n')))
-      << *text;  // nothing but the ends of lines is left to escape
+      << *text;  // only line ends have to be escaped
 }
 
 TEST_F(FarmJobTest, OthersMakeOtherBytes) {

@@ -30,7 +30,7 @@ Config overridden(const std::vector<std::string>& words, const std::string& engi
   return *std::move(config);
 }
 
-/// Overrides a configuration whose controls are off, with these words.
+/// Overrides a configuration whose controls are off with these options.
 Result<void> deaf_with(const std::string& clock, const std::vector<std::string>& words) {
   auto config = parse_config(
       "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: "
@@ -76,7 +76,7 @@ TEST(CommandLine, EveryNamedPartIsSwitchedByItsNameAndNothingElse) {
   for (const NamedSwitch& part : named_switches)
     for (const bool on : {true, false}) {
       SCOPED_TRACE(part.name);
-      // The file says the opposite, so that only this option can have done it.
+      // The file has the opposite value, so that only this option can cause it.
       const std::string file = std::string("{") + part.name + (on ? ": off}" : ": on}");
       Switches expected = product_switches;
       expected.*part.is_on = on;
@@ -176,7 +176,7 @@ TEST(CommandLine, AddressesThatCannotServeAreRefused) {
   EXPECT_THROW(overridden({"--bind", "localhost"}), std::runtime_error);
 }
 
-/// Addresses, ports and device ids, in words: all that two daemons on one computer must not share.
+/// Returns addresses, ports and device ids as text: everything that two daemons on one computer must not share.
 std::string places_of(const Config& c) {
   std::string text;
   for (const SonarConfig& s : c.sonars)

@@ -1,4 +1,4 @@
-// Console lines while a scene loads: none for a short load, then a line now and again.
+// Console lines while a scene loads: none for a short load, then a line from time to time.
 #include "daemon/commands/options/load_progress.hpp"
 
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ TEST(LoadProgress, ALongOneTellsItsStepItsPartAndTheSeconds) {
   const auto wait_for_a_line = [&] {
     std::unique_lock lock(mutex);
     const std::size_t before = lines.size();
-    said.wait(lock, [&] { return lines.size() > before + 1; });  // the next may have been under way
+    said.wait(lock, [&] { return lines.size() > before + 1; });  // one line may already have been in progress
     return lines.back();
   };
   begin_load_step("reading wreck.ply", 1'000'000);

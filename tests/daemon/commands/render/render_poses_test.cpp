@@ -1,4 +1,4 @@
-// The vehicle of a rendered ping: rests, circles, or follows a file in the file's own time.
+// The vehicle of a rendered ping rests, moves on a circle, or follows a file in the file's own time.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// Side lobes are on for products, and off for a sonar without a profile. The echoes of a bed and of an
-// obstacle outside of the main lobe, for a product at its own settings.
+// Side lobes are on for products, and off for a sonar without a profile. Tests the echoes of a bed and of an obstacle outside the
+// main lobe, for a product at its own settings.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -82,9 +82,10 @@ TEST(SideLobesOfProducts, SwitchedOffAPingHasTheBytesOfTheCanonicalModel) {
   EXPECT_NE(ping_of(on, pool).samples, expected.samples);
 }
 
-// The fan of the main lobe ends where the two-way pattern is at -20 dB: a bed that echoes only there begins with a step. With
-// the side lobes it changes across that edge as the closed form does, about 3 dB in 15 cm. What is heard before the edge without
-// side lobes is noise alone, and is subtracted. Speckle has a sigma of 0.2 dB (8 pings, some 800 looks each side): 1 dB is five.
+// The fan of the main lobe ends where the two-way pattern is at -20 dB, so without side lobes the echo of the bed begins with a
+// step. With side lobes the echo changes across that edge as the closed form does, about 3 dB in 15 cm. Without side lobes the
+// signal before the edge is noise alone; it is subtracted. Speckle has a sigma of 0.2 dB (8 pings, some 800 looks each side): 1
+// dB is five.
 TEST(SideLobesOfProducts, ABedBeginsWithoutAStep) {
   const std::string bed = at_depth("{type: plane, material: sand, size_m: [30, 30], pose: {xyz_m: [0, 0, -12]}}", tilt_deg);
   constexpr double nearest_m = 0.04, farthest_m = 0.11;  // from the edge, on either side: three rows

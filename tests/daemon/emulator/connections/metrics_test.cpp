@@ -1,4 +1,4 @@
-// Histograms and the Prometheus text: bounds, quantiles, escaping, and that a scraper accepts every line.
+// Histograms and the Prometheus text: bounds, quantiles, escaping, and lines that a scraper accepts.
 #include "daemon/emulator/connections/metrics.hpp"
 
 #include "daemon/server/system/process_figures.hpp"

@@ -1,4 +1,5 @@
-// The outbox rule of docs/architecture.md: message being written + depth waiting pings, whole messages, drops counted.
+// The rule of the outbox (docs/architecture.md): one message is being written, `depth` pings wait, messages stay whole, drops are
+// counted.
 #include "daemon/emulator/connections/outbox.hpp"
 
 #include <gtest/gtest.h>
@@ -98,7 +99,7 @@ TEST(Outbox, EveryPingOfferedIsWrittenOrDroppedForAReason) {
   push(box, 1);
   ASSERT_TRUE(box.take());
   box.written();
-  for (int i = 2; i <= 5; ++i) push(box, i);  // 4 and 5 wait, 2 and 3 found no place
+  for (int i = 2; i <= 5; ++i) push(box, i);  // 4 and 5 wait, 2 and 3 were dropped
   ASSERT_TRUE(box.take());
   EXPECT_EQ(box.pings_waiting(), 1u);
   box.end(DropReason::gone);  // in the middle of 4

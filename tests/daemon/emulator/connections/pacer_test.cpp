@@ -27,7 +27,7 @@ TEST(Pacer, PeriodIsTheRateOrTheTravelTimePlusTwoMilliseconds) {
 TEST(Pacer, TicksLieOnAGridWithoutDrift) {
   Pacer pacer;
   EXPECT_FALSE(pacer.next_tick());
-  pacer.configure(settings(15), t0);  // 66.666667 ms: not a whole number of anything
+  pacer.configure(settings(15), t0);  // 66.666667 ms: not a whole number of any unit
   const auto period = pacer.period();
   for (int i = 0; i < 1000; ++i) {
     ASSERT_EQ(*pacer.next_tick(), t0 + i * period);
@@ -191,7 +191,7 @@ TEST(Pacer, EveryTickIsFiredOrSkippedForAReason) {
   EXPECT_EQ(pacer.skipped().busy, 1u);
   pacer.configure(settings(10, 5, true), t0 + milliseconds(700));
   pacer.trigger(t0 + milliseconds(750));
-  pacer.trigger(t0 + milliseconds(751), true);  // joins: not one of its own
+  pacer.trigger(t0 + milliseconds(751), true);  // joins the waiting one: no ping of its own
   pacer.trigger(t0 + milliseconds(752));
   pacer.stop();  // the one that waits has no client left
   EXPECT_EQ(pacer.ticks(), 10u);

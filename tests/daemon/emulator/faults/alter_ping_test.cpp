@@ -1,4 +1,4 @@
-// Faults of the samples on range images: strengths and ranges are apart, and no pixel without a return gets one.
+// Faults of the samples on range images: strengths and ranges are altered separately, and no pixel without a return gets one.
 #include "daemon/emulator/faults/alter_ping.hpp"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ struct Images final : RangeImageSettings {
   bool equals(const VendorSettings&) const override { return true; }
 };
 
-/// Two columns by two rows over 15 m: 100 at 5.00 m, none, 200 at 10.00 m, 50 at 1.00 m; a millimetre a unit.
+/// Two columns by two rows over 15 m: 100 at 5.00 m, none, 200 at 10.00 m, 50 at 1.00 m; a unit of range is a millimetre.
 Ping range_image() {
   const auto settings = std::make_shared<Images>();
   settings->range_unit_m = 0.001;

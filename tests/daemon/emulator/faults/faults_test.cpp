@@ -1,4 +1,5 @@
-// Faults of emulated sonars in virtual time: every kind acts, is written down exactly, and leaves nothing behind.
+// Faults of emulated sonars in virtual time: every kind has its effect and an exact entry in the journal, and has no effect after
+// its end.
 #include "daemon/emulator/faults/faults.hpp"
 
 #include <gmock/gmock.h>
@@ -197,7 +198,8 @@ TEST_P(EveryKind, ActsTheSameInEveryRunOnOneSonarAloneAndEnds) {
   if (kind.effect == FaultEffect::delay) fault.with = {{"ms", "250"}};
   const auto play = [&] {
     auto run = std::make_unique<Played>(fault);
-    for (int i = 0; i < 3; ++i) run->time.send(run->front, fire(oculus::PingRate::hz15));  // requests, for those that meet them
+    for (int i = 0; i < 3; ++i)
+      run->time.send(run->front, fire(oculus::PingRate::hz15));  // requests, for the faults that act on requests
     run->time.sonar("front").beacons(run->time.now);
     run->time.run(milliseconds(100));
     return run;

@@ -1,4 +1,4 @@
-// An emulated ARIS in virtual time: what its receivers are sent.
+// An emulated ARIS in virtual time: the datagrams to its receivers.
 #include <gmock/gmock.h>
 
 #include "protocol/aris/encode_frame.hpp"
@@ -31,7 +31,7 @@ struct Talk {
     command.acoustics = {1, 10, 800, 1360, 4920, 4, 6, 9, true, aris::Frequency::high, true, 12};
     time.send(client, aris::framed(command));
   }
-  /// The frames of this time, as datagrams.
+  /// Returns the frames of this time, as datagrams.
   std::vector<std::vector<protocol::Bytes>> frames(milliseconds length) {
     std::vector<std::vector<protocol::Bytes>> all;
     for (const Time end = time.now + length; time.now < end;) {
@@ -43,7 +43,7 @@ struct Talk {
     }
     return all;
   }
-  /// Their indexes.
+  /// Returns the indexes of the frames.
   std::vector<std::int32_t> run(milliseconds length) {
     std::vector<std::int32_t> indexes;
     for (const auto& frame : frames(length)) indexes.push_back(part_of(frame.front()).frame_index);

@@ -1,4 +1,4 @@
-// A Sonar 3D-15, a Surveyor and a Ping1D by UDP in virtual time: what their receivers are sent, with faults too.
+// A Sonar 3D-15, a Surveyor and a Ping1D by UDP in virtual time: the datagrams to their receivers, also during faults.
 #include <gmock/gmock.h>
 
 #include "protocol/ping/messages.hpp"
@@ -172,7 +172,7 @@ TEST(SurveyorInVirtualTime, FieldsOfItsDatagramsFailWithTheRightSum) {
   EXPECT_GT(sounder.atof().ping, 1000u);
 }
 
-/// ping-python reads one message of each packet: several in one would pile up in the host.
+/// ping-python reads one message of each packet: several in one packet would accumulate in the host.
 TEST(SurveyorInVirtualTime, ItsMessagesAreWrittenOneByOneByTcp) {
   Sounder sounder(protocol::Port::Kind::tcp_stream);
   const Outbox::Message message = sounder.ping_by_tcp();
@@ -193,7 +193,7 @@ TEST(SurveyorInVirtualTime, ItsMessagesAreWrittenOneByOneByTcp) {
     EXPECT_FALSE(framer.next()) << "one frame a part";
     begin = end;
   }
-  // Where a fault adds bytes, the ends of the messages are elsewhere.
+  // If a fault adds bytes, the messages end at other places.
   const std::size_t usual = sounder.ping_by_tcp().bytes->size();
   sounder.add_fault("F01");
   const Outbox::Message longer = sounder.ping_by_tcp();
@@ -241,7 +241,7 @@ struct Altimeter : Talk {
     write("value", value);
     time.send(stream, ping::framed(id, 0, payload));
   }
-  /// The distances of the profiles that arrive meanwhile.
+  /// Returns the distances of the profiles that arrive during this time.
   std::vector<ping::Distance> profiles(milliseconds length) {
     std::vector<ping::Distance> all;
     for (const auto& datagrams : pings(length))

@@ -1,4 +1,4 @@
-// The bytes of a ping port by port: of a make with several TCP ports, and of a recording.
+// The bytes of a ping for each port, for a make with several TCP ports and for a recording.
 #include <gmock/gmock.h>
 
 #include "daemon/emulator/sonar/delivery.hpp"

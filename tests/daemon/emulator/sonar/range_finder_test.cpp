@@ -1,4 +1,4 @@
-// A range finder that pings by itself, without a client, in virtual time: when it does, its distances, faults.
+// A range finder that pings by itself, without a client, in virtual time: the times of its pings, its distances, faults.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"

@@ -65,7 +65,7 @@ TEST_F(SlowDevice, WithoutADelayAReportLeavesWithItsPing) {
   EXPECT_GT(first[0]["time_of_transmission"].get<std::int64_t>(), microseconds_of(time.now)) << "it is only stamped";
 }
 
-/// Waiting reports of a slow device do not pile up either.
+/// Waiting reports of a slow device do not accumulate.
 TEST_F(SlowDevice, AClientThatDoesNotReadLosesTheOldestReports) {
   VirtualTime time(dvl("report_delay_ms: 150"));
   const ConnectionId client = time.connect("down");
@@ -78,7 +78,7 @@ TEST_F(SlowDevice, AClientThatDoesNotReadLosesTheOldestReports) {
   EXPECT_LE(count, static_cast<std::size_t>(time.sonar("down").config().outbox.depth) + 2);
 }
 
-/// A client that connects while reports of the client before wait gets only pings fired since it connected.
+/// While reports for the previous client wait, a new client connects; it gets only pings fired after it connected.
 TEST_F(SlowDevice, ItsUnsentReportsAreLostWithTheLastClient) {
   VirtualTime time(dvl("report_delay_ms: 800"));
   const Sonar& sonar = time.sonar("down");

@@ -203,7 +203,7 @@ class CountingVendor final : public protocol::DelegatingVendor {
     return frames ? DelegatingVendor::frame(ping, device) : nullptr;
   }
   bool is_request(const protocol::Port&, protocol::BytesView) const override { return true; }
-  bool frames = true;  // false: the parts of its TCP ports make up a ping
+  bool frames = true;  // false: a ping consists of the parts of its TCP ports
   mutable int messages = 0;
   mutable std::map<const protocol::Port*, int> datagrams_of;
 };
@@ -284,7 +284,7 @@ TEST_F(FramedPings, AreSharedAgainAfterAFault) {
   EXPECT_EQ(after[0].datagrams, after[1].datagrams) << "the fault has ended";
 }
 
-/// Returns the warnings of a sonar each of whose pings takes three of its periods.
+/// Returns the warnings of a sonar for which computing a ping takes three ping periods.
 std::vector<std::string> warnings_of_slow_pings(bool recorded) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   Sonar& sonar = time.sonar("front");
@@ -317,7 +317,7 @@ TEST(SonarInVirtualTime, PingsOfARecordingAreNotTooSlow) {
   EXPECT_THAT(warnings_of_slow_pings(true), ::testing::Not(::testing::Contains(HasSubstr("computing takes"))));
 }
 
-/// Latency is a matter of this computer: it does not follow the clock of the device.
+/// Latency is measured with this computer's clock, not with the device's.
 TEST(SonarInVirtualTime, LatencyIsMeasuredFromTheTrueTimeOfAPing) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   const ConnectionId client = time.connect("front");
@@ -333,7 +333,7 @@ TEST(SonarInVirtualTime, LatencyIsMeasuredFromTheTrueTimeOfAPing) {
   EXPECT_LT(f.latency.sum_s(), 1) << "the device's clock is an hour behind";
 }
 
-/// A mistake in the code of one conversation.
+/// Stands for a bug in the code of one conversation.
 class FaultyDialogue final : public protocol::Dialogue {
  public:
   explicit FaultyDialogue(Time now) : next_(now + milliseconds(100)) {}

@@ -1,4 +1,4 @@
-// The picture that viewers see of each make, made by its own host from its pings.
+// The picture of each make's pings that viewers get: the make's own host draws it.
 #include "daemon/emulator/view/driver_picture.hpp"
 
 #include <gmock/gmock.h>

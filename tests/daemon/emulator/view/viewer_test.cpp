@@ -1,4 +1,4 @@
-// A viewer in virtual time: its allowed requests, the order of its messages, and those that a slow one loses.
+// A viewer in virtual time: its allowed requests, the order of its messages, and the messages that a slow viewer loses.
 #include "daemon/emulator/view/viewer.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Scenes made from scenes: unchanged objects keep their places, and a refusal lists what the scene has.
+// Scenes made from scenes: unchanged objects keep their places, and a refusal lists the objects and materials of the scene.
 #include "daemon/emulator/world/edit_scene.hpp"
 
 #include <gmock/gmock.h>

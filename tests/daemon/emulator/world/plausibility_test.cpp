@@ -1,5 +1,5 @@
-// Notes on probable mistakes: each common mistake has its note, a right value has none, and a running daemon logs
-// each kind once and keeps it in its status as long as it holds.
+// Notes on probable mistakes: each common mistake has its note, and a right value has none. A running daemon logs each kind of
+// note once and keeps it in its status as long as the mistake lasts.
 #include "daemon/emulator/world/plausibility.hpp"
 
 #include <gmock/gmock.h>
@@ -81,7 +81,7 @@ TEST(Plausibility, AVehicleAboveTheWater) {
   EXPECT_THAT(at("xyz_m: [-7, 0, 3]"),
               ElementsAre(AllOf(HasSubstr("the sonar of rov is 3.0 m above the water's surface (z = 0); "),
                                 HasSubstr("was NED taken for ENU, or the reverse?"))));
-  // A boat at the surface with its sonar below the keel is as it should be; one on the mast is not.
+  // A boat at the surface with its sonar below the keel is correct; a sonar on the mast is a mistake.
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: NED_FRD, xyz_m: [0, 0, -0.3]}", "{frame: FRD, xyz_m: [0, 0, 0.6]}")),
               IsEmpty());
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 0]}", "{frame: FLU, xyz_m: [0, 0, 2]}")),
@@ -199,7 +199,8 @@ Config playing(const std::string& lines, const std::string& name = "dive.tum") {
   if (!config) throw std::runtime_error(config.error().text);
   return *std::move(config);
 }
-/// A turn of 360 deg on the spot with small pitch changes, w at the given end; in FRD the body's z is down as NED's is.
+/// A turn of 360 deg on the spot with small pitch changes. The quaternion's w is at the given end. In FRD the body's z is down,
+/// as in NED.
 std::string turning(bool w_first, const char* frame, double z_m, const char* comma = " ", const char* unit = "") {
   std::string lines = std::string("# frame: ") + frame + "\n";
   for (int i = 0; i < 36; ++i) {
@@ -226,7 +227,7 @@ TEST(Plausibility, ATrajectoryWithWAtTheWrongEnd) {
   }
 }
 
-/// A camera that turns and looks down by up to 50 deg, its axes those of pictures or of the IMU beside it (as EuRoC's).
+/// A camera that turns and looks down by up to 50 deg. Its axes are those of pictures or those of the IMU beside it, as in EuRoC.
 std::string looking_around(Quatd body_in_flu, bool w_first, const char* comma = " ", const char* unit = "") {
   std::string lines = "# frame: ENU_FLU\n";
   for (int i = 0; i < 36; ++i) {
@@ -253,7 +254,7 @@ TEST(Plausibility, ATrajectoryOfACamera) {
               ElementsAre(AllOf(HasSubstr("of an IMU beside a camera"), HasSubstr("rpy_deg: [0, -90, 180]"))));
   EXPECT_THAT(notes(playing(looking_around(Quatd{}, false))), IsEmpty());
 
-  // With the mount that the note offers the sonar looks where the camera looks, and the note is gone.
+  // With the mount that the note suggests the sonar looks where the camera looks, and there is no note.
   const struct {
     Quatd body;
     RollPitchYaw mount;
@@ -280,7 +281,7 @@ std::string circling(const char* frame, double z_m, double unit_per_rad, double 
   std::string lines = std::string("# frame: ") + frame + "\nt_s,x_m,y_m,z_m,roll_deg,pitch_deg,yaw_deg\n";
   for (int i = 0; i < 400; ++i) {
     const double angle = 0.0321 * i, yaw = std::remainder(angle + pi / 2, 2 * pi);
-    const double x = radius_m * std::cos(angle), y = radius_m * std::sin(angle);  // in NED the same turns clockwise
+    const double x = radius_m * std::cos(angle), y = radius_m * std::sin(angle);  // in NED this path turns clockwise
     for (const double v : {0.1 * i, x, y, z_m, 0.05 * std::sin(angle) * unit_per_rad, 0.0}) lines += std::to_string(v) + ",";
     lines += std::to_string(yaw * unit_per_rad) + "\n";
   }
@@ -406,7 +407,7 @@ TEST_F(RunningNotes, APoseAboveTheWaterIsLoggedOnceAndInTheStatusWhileItHolds) {
 }
 
 TEST_F(RunningNotes, DegreesSentAsRadians) {
-  send(R"({"position":[0,0,3],"attitude":[0,0,7.1]})");  // a heading that is counted on after a whole turn
+  send(R"({"position":[0,0,3],"attitude":[0,0,7.1]})");  // a heading of more than a whole turn
   EXPECT_THAT(daemon.status().notes(), IsEmpty());
   send(R"({"position":[0,0,3],"attitude":[0,-10,-90]})");
   EXPECT_THAT(

@@ -84,7 +84,7 @@ TEST(PoseHistory, AJumpIsNotExtrapolated) {
   turned.put({t0, pose(0, 0), {}, {}});
   turned.put({t0 + milliseconds(100), pose(1, 180), {}, {}});
   EXPECT_NEAR(std::abs(yaw_deg(turned.at(t0 + milliseconds(200), limit))), 180, 1e-9);
-  PoseHistory thrown;  // a stated velocity counts all the same
+  PoseHistory thrown;  // a stated velocity is used nevertheless
   thrown.put({t0, pose(0), {}, {}});
   thrown.put({t0 + milliseconds(50), pose(20), Vec3d{1, 0, 0}, {}});
   EXPECT_NEAR(thrown.at(t0 + milliseconds(150), limit).position_m.x, 20.1, 1e-12);
@@ -129,7 +129,7 @@ TEST(PoseHistory, MotionIsThatOfThePoseItTells) {
   EXPECT_NEAR(motion(390).angular_velocity_radps.z, rad_from_deg(200), 1e-9) << "carried on";
   EXPECT_EQ(length(motion(401).angular_velocity_radps), 0) << "held";
   EXPECT_EQ(length(motion(-1).velocity_mps), 0) << "before the first";
-  // In steps, against the poses themselves.
+  // Compares with the poses themselves, in steps.
   for (const int ms : {20, 120, 250}) {
     const Time t = t0 + milliseconds(ms), later = t + milliseconds(10);
     const Vec3d moved = h.at(later, limit).position_m - h.at(t, limit).position_m;

@@ -112,7 +112,7 @@ TEST(World, SenderClockIsMappedByTheLeastDelay) {
   EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(160)).position_m.x, 1.5, 1e-9) << "sender time 5150 is our 160";
 }
 
-TEST(World, TheFarthestStampsOverflowNothing) {  // the undefined-behaviour sanitizer watches
+TEST(World, TheFarthestStampsOverflowNothing) {  // the undefined-behaviour sanitizer checks this
   World w = one_rov();
   const std::chrono::nanoseconds far(control::largest_stamp_ns);
   EXPECT_EQ(w.accept(stamped(1, ClockDomain::sim, -far), json, t0).verdict, PoseVerdict::accepted);
@@ -197,7 +197,7 @@ TEST(World, TwoSendersInTurnsAreReportedOnce) {
   for (int i = 0; i < 20; ++i) sent(i % 2 == 0 ? one : other, 50 * i);
   ASSERT_EQ(notices.size(), 1u);
   EXPECT_THAT(notices[0], AllOf(HasSubstr(one.id), HasSubstr(other.id)));
-  sent(one, 5000);  // a program that starts again has another port and is not a rival
+  sent(one, 5000);  // a program that starts again has another port and is not a second sender
   sent(other, 5100);
   EXPECT_EQ(notices.size(), 1u);
   sent(one, 5200);

@@ -1,4 +1,4 @@
-// Bodies that follow trajectories: where they are and how they move, who else may move them, and steering by request.
+// Bodies that follow trajectories: their places and motion, which other senders may move them, and control by requests.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -96,7 +96,7 @@ TEST(WorldTrajectory, RefusesWithASentence) {
 TEST(WorldTrajectory, GoesOnOverAConfigurationThatDoesNotTouchIt) {
   World w = with_rov();
   w.steer(asked({}, {}, 2), t0 + seconds(1));
-  w.use_vehicles({{"buoy", {}, false}, rov()}, t0 + seconds(2));  // read again: the same points in another place of memory
+  w.use_vehicles({{"buoy", {}, false}, rov()}, t0 + seconds(2));  // read again: the same points at another address
   EXPECT_EQ(w.vehicle_at(1, t0 + seconds(3)).position_m.x, 5);
   w.use_vehicles({rov(east({*motion::Speed::from(3), false, seconds(0)}))}, t0 + seconds(4));
   EXPECT_EQ(x_at(w, 5), 3) << "played otherwise, it begins anew";

@@ -1,4 +1,4 @@
-// A client is read at the allowed rate over any stretch of time, and at once after a pause.
+// A client is read at the allowed rate over any interval, and at once after a pause.
 #include "daemon/server/connections/input_rate.hpp"
 
 #include <gtest/gtest.h>
@@ -44,8 +44,8 @@ TEST(InputRate, NoRateIsNoLimit) {
   EXPECT_EQ(rate.pause_after(std::size_t{1} << 40, Steady::time_point{}).count(), 0);
 }
 
-/// Bytes read within 20 s from `floods` floods, and from a client that sends `modest` bytes every 100 ms; `waited`: the
-/// latter's time.
+/// Bytes read within 20 s from `floods` clients that flood, and from one that sends `modest` bytes every 100 ms; `waited`: that
+/// client's waiting time.
 struct Shared {
   std::size_t of_floods = 0;
   Steady::duration waited{};

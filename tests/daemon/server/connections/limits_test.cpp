@@ -1,4 +1,4 @@
-// Limits of untrusted clients: slots of the whole daemon, bytes a second, and accounts that balance whatever they do.
+// Limits of untrusted clients: slots of the whole daemon, bytes a second, and accounts that balance in any case.
 #include <gmock/gmock.h>
 
 #include <fcntl.h>
@@ -57,7 +57,7 @@ TEST(Limits, AClientThatSendsTooMuchIsReadSlowlyAndLosesNothing) {
   neighbour.fire(fire_at(PingRate::hz2, 2));  // slow enough that a busy computer loses no ping
   ASSERT_TRUE(neighbour.next_ping());
   const auto begin = Steady::now();
-  talks.send(std::string(40000, 'x'));  // 5 s worth, of which a second's may come at once
+  talks.send(std::string(40000, 'x'));  // bytes for 5 s; those of one second are allowed at once
   talks.fire(fire_at(PingRate::hz10, 3));
   oculus::PingSequence ids;
   while (true) {
@@ -77,7 +77,7 @@ TEST(Limits, RequestsOfASonarsClientCountAsMoreThanTheirBytes) {
   Daemon daemon(setup);
   Client talks(daemon.address());
   const auto begin = Steady::now();
-  for (int i = 0; i < 900; ++i) talks.fire(fire_at(PingRate::hz10, 2));  // hardly more bytes than may come at once
+  for (int i = 0; i < 900; ++i) talks.fire(fire_at(PingRate::hz10, 2));  // only slightly more bytes than are allowed at once
   talks.fire(fire_at(PingRate::hz10, 3));
   while (true) {
     const auto ping = talks.next_ping();
@@ -234,7 +234,7 @@ TEST(Threads, ThatComputeAreNiceAndSoAreThoseTheyStart) {
 }
 
 TEST(Threads, RealTimeIsTakenOrTheRefusalSaysWhatToDo) {
-  std::thread([] {  // a thread of its own, so that the test's stays as it is
+  std::thread([] {  // a separate thread, so that the test's own is not changed
     const std::string why = schedule_in_real_time(1);
     if (why.empty()) {
       EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_FIFO);

@@ -1,4 +1,4 @@
-// Tokens: what a file may hold, and that only the whole secret matches.
+// Tokens: the valid contents of a file, and that only the whole secret matches.
 #include "daemon/server/connections/token.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,5 @@
-// Limit of the work of an address: counted in virtual time, whatever it sends and however often it connects.
+// Limit of the work of an address: counted in virtual time. It does not depend on what the address sends or how often it
+// connects.
 #include "daemon/server/connections/port_guard.hpp"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// A control server with a fake daemon behind it, in a thread of its own, and clients with deadlines: what the loopback tests of
-// the stream and of HTTP share.
+// Common parts of the loopback tests of the stream and of HTTP: a control server with a fake daemon behind it, in a thread of its
+// own, and clients with deadlines.
 #pragma once
 
 #include <atomic>
@@ -115,7 +115,7 @@ inline v1::Event ping_event(std::uint32_t number) {
   return event;
 }
 
-/// A file with a token, for as long as it lives.
+/// A file with a token, which exists as long as this object.
 struct TokenFile {
   static constexpr const char* text = "0123456789abcdef-lab";
   std::filesystem::path path = own_path("control-token");

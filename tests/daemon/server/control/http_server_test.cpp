@@ -146,7 +146,7 @@ TEST(ControlHttp, EventsAreLinesOfJson) {
     EXPECT_EQ(line[line.size() - 3], '\n');
   }
   client.tcp.close();
-  EXPECT_TRUE(eventually([&] {  // its listener is removed at the next event
+  EXPECT_TRUE(eventually([&] {  // its listener is removed with the next event
     bool heard = true;
     bench.on_io([&] {
       bench.events.publish(ping_event(9));
@@ -161,7 +161,7 @@ TEST(ControlHttp, BodiesAndHeadersAreBounded) {
   {
     HttpClient client(bench);
     client.tcp.send("POST /api/v1/load HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1048577\r\n\r\n");
-    client.tcp.send(std::string(100000, 'x'));  // what is still on its way does not cost it the answer
+    client.tcp.send(std::string(100000, 'x'));  // bytes that still arrive do not prevent the answer
     const auto answer = client.next();
     EXPECT_EQ(answer.status, 413);
     EXPECT_THAT(answer.head, HasSubstr("Connection: close"));
@@ -255,7 +255,7 @@ TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
   EXPECT_EQ(b.get("/healthz").status, 200);
   HttpClient c(bench);
   const auto answer = c.next();
-  EXPECT_TRUE(answer.status == 503 || answer.status == 0);  // on a slow machine a may have been silent for long enough already
+  EXPECT_TRUE(answer.status == 503 || answer.status == 0);  // on a slow machine `a` may already have been silent for too long
   std::this_thread::sleep_for(milliseconds(1200));
   EXPECT_EQ(b.get("/healthz").status, 200);
   HttpClient d(bench);
@@ -264,7 +264,7 @@ TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
   EXPECT_TRUE(a.tcp.ended);
 }
 
-/// A byte now and then of requests that never end, from as many as there are places.
+/// As many clients as there are slots send requests that never end, a byte from time to time.
 TEST(ControlHttp, SlowSendersTakeNobodysPlace) {
   ControlBench bench;
   std::list<Client> slow;
@@ -280,7 +280,7 @@ TEST(ControlHttp, SlowSendersTakeNobodysPlace) {
   }
 }
 
-/// Counted in work, with the time that passed: whatever the machine, no more than this may be done.
+/// The limit is an amount of work in the time that passed, so it holds on any machine.
 TEST(ControlHttp, RequestsCostMoreThanTheirBytes) {
   LimitConfig limits;
   limits.input_bytes_per_s = 65536;
@@ -313,7 +313,7 @@ TEST(ControlHttp, UntrustedClientsEvictNoTrustedOne) {
   HttpClient events(bench);
   events.send("GET", "/api/v1/events?pings=1", "", token);
   ASSERT_FALSE(events.until("\r\n\r\n").empty());
-  std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be pushed out
+  std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be evicted
   std::list<Client> untrusted;
   for (int i = 0; i < 40; ++i) untrusted.emplace_back(bench.address, bench.http_port());
   for (int i = 0; i < 20; ++i) {
@@ -332,7 +332,7 @@ TEST(ControlHttp, ThoseTurnedAwayReadWhyWhateverTheyHaveSent) {
   ControlBench bench({}, limits);
   HttpClient busy(bench);
   for (int i = 0; i < 10; ++i) {
-    if (busy.get("/healthz").status != 200) break;  // a slow machine: it was silent for a second and gave up its place
+    if (busy.get("/healthz").status != 200) break;  // on a slow machine it was silent for a second and lost its slot
     HttpClient newcomer(bench);
     newcomer.send("POST", "/api/v1/load", std::string(20000, ' '));
     const auto answer = newcomer.next();
@@ -367,7 +367,7 @@ TEST(ControlHttp, StopsWithStreamsAndWorkUnderWay) {
 
 TEST(ControlHttp, StopsWithoutWaitingForThoseWhoSentTooMuch) {
   LimitConfig limits;
-  limits.input_bytes_per_s = 1024;  // what follows is worth a quarter of a minute
+  limits.input_bytes_per_s = 1024;  // the next bytes need a quarter of a minute
   ControlBench bench({}, limits);
   HttpClient talks(bench);
   talks.tcp.send("POST /api/v1/pose HTTP/1.1\r\nContent-Length: 100000\r\n\r\n" + std::string(30000, ' '));

@@ -199,7 +199,7 @@ TEST(ControlStream, EventsComeToSubscribersAndLossIsReported) {
   bench.on_io([&] {
     EXPECT_TRUE(bench.events.has_listeners());
     bench.events.publish_scene("s", "not asked for");
-    for (std::uint32_t i = 0; i < 100; ++i) bench.events.publish(ping_event(i));  // more than wait for one
+    for (std::uint32_t i = 0; i < 100; ++i) bench.events.publish(ping_event(i));  // more than can wait for one client
   });
   for (std::uint32_t i = 0; i < EventQueue::deepest; ++i) {
     const auto event = client.next();
@@ -225,7 +225,7 @@ TEST(ControlStream, AClientThatReadsNothingIsReadNoFurtherAndClosed) {
   StreamClient client(bench, 4096);
   client.greet();
   constexpr int requests = 5000;
-  for (int i = 0; i < requests; ++i)  // 20 MB of answers, each with its request's path: more than kernels keep
+  for (int i = 0; i < requests; ++i)  // 20 MB of answers, each with its request's path: more than kernels can store
     client.send({static_cast<std::uint64_t>(i + 2), control::LoadScene{std::string(4000, 'x')}});
   EXPECT_TRUE(eventually([&] { return bench.log_text().find("client does not read") != std::string::npos; }));
   EXPECT_LT(bench.operations.asked, requests);
@@ -277,7 +277,7 @@ TEST(ControlStream, BeforeTheHelloFourKilobytesAreReadAndBusyClientsKeepTheirSlo
   limits.control_clients = 2;
   ControlBench bench({}, limits);
   Client chatter(bench.address, bench.stream_port());
-  chatter.send(std::vector<std::byte>{std::byte{0xff}, std::byte{0xff}, std::byte{0x20}});  // half a megabyte is to come
+  chatter.send(std::vector<std::byte>{std::byte{0xff}, std::byte{0xff}, std::byte{0x20}});  // half a megabyte is announced
   chatter.send(std::string(6000, 'x'));
   chatter.read_to_end();
   EXPECT_TRUE(chatter.ended);
@@ -317,7 +317,7 @@ TEST(ControlStream, HttpIsKnownAndEnds) {
   for (const std::string begins : {"POST /", "GET /%08%01"}) {
     Client page(bench.address, bench.stream_port());
     page.send(begins.substr(0, 2));
-    page.send(begins.substr(2));  // no whole line, no whole message: it need not come
+    page.send(begins.substr(2));  // neither a whole line nor a whole message
     page.read_to_end();
     EXPECT_TRUE(page.ended);
     EXPECT_EQ(page.bytes_read, 0u);
@@ -338,7 +338,7 @@ TEST(ControlStream, UntrustedClientsEvictNoTrustedOne) {
     subscribers.back().send({2, control::Subscribe{true, false, false, false}});
     ASSERT_TRUE(subscribers.back().next());
   }
-  std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be pushed out
+  std::this_thread::sleep_for(milliseconds(1200));  // silent long enough to be evicted
   std::list<Client> untrusted;
   for (int i = 0; i < 40; ++i) untrusted.emplace_back(bench.address, bench.stream_port());
   for (int i = 0; i < 20; ++i) {
@@ -360,14 +360,14 @@ TEST(ControlStream, WithoutAPlaceTheTokenIsAnsweredThatItIsFull) {
   LimitConfig limits;
   limits.control_clients = 1;
   ControlBench bench(config, limits);
-  for (int i = 0; i < 50; ++i) {  // on a slow machine it may have been silent for a second
+  for (int i = 0; i < 50; ++i) {  // on a slow machine it may already have been silent for a second
     StreamClient busy(bench);
     const auto in = [&busy] {
       busy.send({1, control::Hello{1, "test", TokenFile::text}});
       const auto answer = busy.next();
       return answer && answer->has_hello();
     };
-    if (!in()) continue;  // the last one has the place still
+    if (!in()) continue;  // the last client still has the slot
     StreamClient late(bench);
     late.send({1, control::Hello{1, "test", TokenFile::text}});
     const auto answer = late.next();

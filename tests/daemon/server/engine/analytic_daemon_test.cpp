@@ -1,5 +1,5 @@
-// The whole daemon with the real CPU engine over analytic shapes in place of Embree, so that the thread sanitizer sees all that
-// runs: pings go out while control asks, adds and moves objects, and the configuration is read again.
+// The whole daemon with the real CPU engine over analytic shapes in place of Embree, so that the thread sanitizer checks all of
+// its code: pings are sent while control requests status, adds and moves objects, and while the configuration is read again.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -29,7 +29,7 @@ ScenePointer wall_at(double x_m) {
   return *scene;
 }
 
-/// The same below a surface of which only the place matters here.
+/// The same scene below a water surface; only the height of the surface matters here.
 ScenePointer wall_below_the_surface() {
   Scene scene = *wall_at(1.8);
   scene.sea_surface.present = true;
@@ -74,7 +74,7 @@ class RealDaemon {
     std::lock_guard lock(log_mutex_);
     return log_text_;
   }
-  /// Head and body of the answer, over a connection of its own.
+  /// Returns head and body of the answer, over a separate connection.
   std::string http(const std::string& method, const std::string& target, const std::string& body = {}) {
     Client client(address(), 8088);
     client.send(method + " " + target + " HTTP/1.1\r\nHost: " + address() + ":8088\r\nConnection: close\r\n" +
@@ -87,7 +87,7 @@ class RealDaemon {
  private:
   DaemonSetup setup_;
   std::string file_ = ::testing::TempDir() + "/" + setup_.address + "-analytic.yaml";
-  Parallel pool_{2};  // outlives the engines inside App
+  Parallel pool_{2};  // must outlive the engines in App
   std::mutex log_mutex_;
   std::string log_text_;
   std::unique_ptr<Log> log_;
@@ -96,7 +96,7 @@ class RealDaemon {
   int code_ = -1;
 };
 
-/// Range of the loudest row of the middle beam.
+/// Returns the range of the strongest row of the middle beam.
 double nearest_m(const oculus::DecodedPing& ping) {
   std::size_t loudest = 0;
   for (std::size_t row = 0; row < ping.rows(); ++row)
@@ -104,7 +104,7 @@ double nearest_m(const oculus::DecodedPing& ping) {
   return ping.row_range_m(loudest);
 }
 
-/// Reads pings until one shows the wall there.
+/// Reads pings until one shows the wall at that range.
 ::testing::AssertionResult sees_wall(Client& client, double range_m) {
   double last_m = 0;
   for (int i = 0; i < 60; ++i) {

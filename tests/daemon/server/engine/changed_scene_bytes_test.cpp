@@ -1,5 +1,5 @@
-// Uses the real engine. Pings that do not see a change of the scene are equal to the last bit, because all other objects keep
-// their speckle and the coordinates of their rays.
+// Uses the real engine. If a change of the scene is outside a ping's view, the ping is equal to the last bit, because all other
+// objects keep their speckle and the coordinates of their rays.
 #include <gtest/gtest.h>
 
 #include "core/paper/paper_engine.hpp"

@@ -17,7 +17,7 @@ using ::testing::StartsWith;
 
 class ChooseEngine : public ::testing::Test {
  protected:
-  ChooseEngine() { setenv("SONARD_CUDA_MODULE", "/nowhere/libsonard_cuda.so", 1); }  // as on a machine without
+  ChooseEngine() { setenv("SONARD_CUDA_MODULE", "/nowhere/libsonard_cuda.so", 1); }  // as on a machine without CUDA
   Result<std::unique_ptr<PingEngine>> choose(EngineDevice device) {
     auto scene = std::make_shared<Scene>();
     scene->name = "harbour";

@@ -1,5 +1,5 @@
-// Several sonars on one engine: a quick ping interrupts a long one, a sonar that has used more time waits, and a pause gives no
-// credit.
+// Several sonars on one engine: a quick ping interrupts a long one, a sonar that has used more time waits, and a sonar that
+// paused has no advantage later.
 #include "daemon/server/engine/fair_turns.hpp"
 
 #include <gtest/gtest.h>
@@ -101,7 +101,8 @@ TEST(Simulator, AQuickSonarKeepsItsRateBesideASlowOne) {
 
 constexpr std::uint32_t wrong = 99, large = 98;
 
-/// Up to three of a size together; a wrong one spoils the call. The first call waits for the requests of all.
+/// Computes up to three pings of one size together; an invalid one makes the whole call fail. The first call waits for the
+/// requests of all sonars.
 class Together final : public PingEngine {
  public:
   Together(std::vector<std::vector<std::uint32_t>>& calls, std::shared_future<void> all_asked)

@@ -1,4 +1,5 @@
-// An engine that this machine cannot start is a sentence and exit code 69; only our own mistakes are bugs.
+// If this machine cannot start an engine, sonard prints a sentence and ends with exit code 69. Only our own mistakes are reported
+// as bugs.
 #include "daemon/server/engine/start_engine.hpp"
 
 #include <gmock/gmock.h>

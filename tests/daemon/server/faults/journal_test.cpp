@@ -1,4 +1,4 @@
-// The journal of faults in its file: lines are whole, nothing waits for a reader or a disk, and lost lines are counted and
+// The journal of faults in its file: lines are whole, sonard never waits for a reader or a disk, and lost lines are counted and
 // reported.
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -35,7 +35,7 @@ std::vector<std::string> lines_of(const std::string& file) {
   return lines;
 }
 
-/// A FIFO of the smallest size whose reader reads nothing by itself.
+/// A FIFO of the smallest size. It is read only when the test requests it.
 class SlowReader {
  public:
   explicit SlowReader(const std::string& file) {
@@ -118,7 +118,7 @@ TEST(JournalFile, CheckSaysWhatOpenWouldAndMakesNothing) {
   }
 }
 
-/// A daemon whose image is stuck in every ping, which the journal gets a line of each time.
+/// A daemon with the fault of a stuck image in every ping; the journal gets a line for each ping.
 struct Journalled {
   explicit Journalled(const std::string& file) {
     DaemonSetup setup;
@@ -127,7 +127,7 @@ struct Journalled {
     client.emplace(daemon->address());
     client->fire(fire_at(oculus::PingRate::hz40));
   }
-  /// Pings until entries are lost.
+  /// Requests pings until entries are lost.
   bool loses() {
     const auto deadline = Steady::now() + patience;
     while (daemon->status().notes_size() == 0 && Steady::now() < deadline)

@@ -1,4 +1,4 @@
-// Who may look and who may steer: every cell of the table of docs/live-view.md, and the handshake.
+// Which clients may read and which may change settings: every cell of the table in docs/live-view.md, and the handshake.
 #include "daemon/server/http/door.hpp"
 
 #include <gmock/gmock.h>
@@ -68,7 +68,7 @@ TEST_F(Door, TheKeyOpensForAnyOrigin) {
   query = {{"key", std::string(32, '0')}};
   EXPECT_EQ(outcome_from("null"), "403");
   EXPECT_EQ(outcome_from("https://look.example"), "looks");
-  secrets = {};  // none was made
+  secrets = {};  // there is no secret
   query = {{"key", ""}};
   EXPECT_EQ(outcome_from("null"), "403");
 }

@@ -1,4 +1,4 @@
-// Targets, hosts, origins, tokens, routes: what passes and what does not.
+// Targets, hosts, origins, tokens, routes: which are accepted and which are refused.
 #include "daemon/server/http/http_rules.hpp"
 
 #include <gmock/gmock.h>

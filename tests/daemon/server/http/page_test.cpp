@@ -1,4 +1,4 @@
-// The files of the page that answer requests, and their headers.
+// The page's files as answers to requests, and the headers of these answers.
 #include "daemon/server/http/page.hpp"
 
 #include <gmock/gmock.h>

@@ -39,7 +39,7 @@ class Vehicle {
     EXPECT_EQ(::sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&at), sizeof at),
               static_cast<ssize_t>(bytes.size()));
   }
-  /// The next message of this number that comes to us; who sent it, in `from_port`.
+  /// Returns the next message with this number; `from_port` is the sender's port.
   std::optional<mavlink::Frame> next(std::uint32_t id) {
     for (int i = 0; i < 100; ++i) {
       mavlink::Bytes bytes(2048);
@@ -94,7 +94,7 @@ mavlink::Odometry odometry_at(float north_m, std::uint64_t time_us) {
 }
 
 struct Mavlink : ::testing::Test {
-  /// A later ping was requested at y metres north.
+  /// Returns true if a later ping was requested at y metres north.
   static bool asked_from(Daemon& daemon, Client& client, double y) {
     return eventually([&] {
       client.next_ping(milliseconds(100));

@@ -1,4 +1,4 @@
-// Limits of senders of poses by TCP: bytes a second, turns, slots, and the end of a connection with another protocol.
+// Limits of senders of poses by TCP: bytes a second, their turns, slots, and the end of a connection that uses another protocol.
 #include <gmock/gmock.h>
 
 #include <list>
@@ -37,7 +37,8 @@ struct PoseLimits : ::testing::Test {
   bool is_at_x(int x, int vehicle = 0, milliseconds timeout = patience) {
     return eventually([&] { return daemon->status().vehicles().at(vehicle).position().x() == x; }, timeout);
   }
-  /// Connects until it is accepted: there may be no connection yet that can be closed. `meanwhile` is called before each attempt.
+  /// Connects again and again until it is accepted; at first there may be no connection that can be evicted. `meanwhile` is
+  /// called before each attempt.
   bool a_newcomer_moves_the_boat(const std::function<void()>& meanwhile = [] {}) {
     return eventually([&] {
       meanwhile();
@@ -81,7 +82,7 @@ TEST_F(PoseLimits, FloodsThatHaveEndedSteerNothingAndHoldNoPlace) {
   Client honest(daemon->address(), port);
   honest.send(line_at_x(22, "boat"));
   EXPECT_TRUE(is_at_x(22, 1)) << "it is let in";
-  // Played on at the allowed rate, 32 MB would take 2 minutes.
+  // At the allowed rate 32 MB would take 2 minutes.
   EXPECT_TRUE(eventually([&] {
     const auto before = heard();
     std::this_thread::sleep_for(milliseconds(500));
@@ -94,7 +95,7 @@ TEST_F(PoseLimits, FloodsThatHaveEndedSteerNothingAndHoldNoPlace) {
   EXPECT_TRUE(is_at_x(33, 0, milliseconds(0))) << "and nothing moves it away again";
 }
 
-/// The sender's kernel holds megabytes after the close, and hands them over only as fast as this end reads.
+/// The sender's kernel stores megabytes after the close and sends them only as fast as this end reads.
 TEST_F(PoseLimits, WhatTheSendersKernelHoldsAfterItsEndIsDropped) {
   begin("input_bytes_per_s: 1048576");
   constexpr std::size_t sent = 16 << 20;
@@ -148,13 +149,13 @@ TEST_F(PoseLimits, AFloodCostsOthersNeitherPingsNorTime) {
   });
   const auto twenty_poses = [&](int sign) {
     const auto begin = Steady::now();
-    for (int x = 100; x <= 2000; x += 100) {  // jumps: nothing is interpolated
+    for (int x = 100; x <= 2000; x += 100) {  // the jumps prevent interpolation
       friendly.send(line_at_x(sign * x, "boat"));
       EXPECT_TRUE(is_at_x(sign * x, 1)) << x;
     }
     return Steady::now() - begin;
   };
-  const auto alone = twenty_poses(-1);  // what this machine needs now
+  const auto alone = twenty_poses(-1);  // the time that this machine needs
   std::list<Client> flood;
   for (int i = 0; i < 31; ++i) {
     flood.emplace_back(daemon->address(), port);

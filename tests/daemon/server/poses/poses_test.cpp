@@ -31,7 +31,7 @@ struct Poses : ::testing::Test {
     stream_port = daemon.app().control().stream().port;
     json_port = daemon.app().poses().json().port;
   }
-  /// A later ping was requested at x.
+  /// Returns true if a later ping was requested at x.
   bool asked_from(double x) {
     return eventually([&] {
       client.next_ping(milliseconds(100));
@@ -151,7 +151,8 @@ TEST_F(Poses, NonsenseIsRefusedCountedAndChangesNothing) {
   send_udp(daemon.address(), protobuf_port, {});
   send_udp(daemon.address(), json_port, bytes_of("{\"position\":[0,79,NaN],\"attitude\":[0,0,0]}"));
   send_udp(daemon.address(), json_port, bytes_of(std::string(5000, '[')));
-  send_udp(daemon.address(), json_port, bytes_of(R"({"position":[0,15,3],"attitude":[0,0,0]})"));  // the end mark
+  send_udp(daemon.address(), json_port,
+           bytes_of(R"({"position":[0,15,3],"attitude":[0,0,0]})"));  // the last pose, which marks the end
   EXPECT_TRUE(asked_from(15));
   for (const PingRequest& r : daemon.requests()) EXPECT_LT(r.vehicle_in_world.position_m.x, 70);
   EXPECT_THAT(daemon.log_text(), HasSubstr("pose refused: position has a NaN"));
@@ -174,7 +175,7 @@ TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
   ASSERT_TRUE(asked_from(20));
   std::this_thread::sleep_for(milliseconds(1200));
   for (Client& s : senders)
-    if (&s != &senders.back()) s.send(json_at_x(21));  // all but the last
+    if (&s != &senders.back()) s.send(json_at_x(21));  // all senders but the last
   ASSERT_TRUE(eventually([&] { return heard() == 32 + 31; }));
   ASSERT_TRUE(asked_from(21));
   Client late(daemon.address(), json_port);
@@ -186,7 +187,7 @@ TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
   EXPECT_TRUE(asked_from(23)) << "the others keep theirs";
 }
 
-/// Wall stamps are of the clocks as they are, not as ours was when the daemon started.
+/// Wall stamps are compared with the present clock, not with the clock at the daemon's start.
 std::atomic<std::int64_t> clock_set_by_ns{0};
 Time set_wall() { return Clock::system_wall() + std::chrono::nanoseconds(clock_set_by_ns.load()); }
 

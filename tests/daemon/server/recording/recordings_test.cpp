@@ -18,7 +18,7 @@ using oculus::PingRate;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-/// A folder of the test's own, gone with it.
+/// A folder of this test; the destructor removes it.
 struct Folder {
   Folder() {
     static int count = 0;
@@ -207,7 +207,7 @@ TEST(Recordings, ADiskThatDoesNotKeepUpEndsTheRecordingAndSaysSoOnce) {
   EXPECT_FALSE(q.recordings->takes("rear"));
   q.recordings->take("front", ping_at(0));
   EXPECT_TRUE(q.recordings->takes("front"));
-  q.recordings->take("front", ping_at(0.1));  // before anybody heard that the first one is written
+  q.recordings->take("front", ping_at(0.1));  // before the event that the first one is written
   EXPECT_FALSE(q.recordings->takes("front"));
   q.recordings->take("front", ping_at(0.2));
   q.run();

@@ -1,4 +1,4 @@
-// Several clients, slow ones, dead ones, and the end of the daemon: none disturbs another, and no ping is cut.
+// Several clients, slow clients, dead clients, and the end of the daemon: no client disturbs another, and no ping is cut.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
   healthy.fire(large_fire(PingRate::hz10));
   oculus::PingSequence healthy_ids;
   std::uint32_t last = 0;
-  for (int i = 0; i < 8; ++i) {  // more than the outbox and the kernels hold
+  for (int i = 0; i < 8; ++i) {  // more than the outbox and the kernels can store
     setup.gate->allow();
     const auto ping = healthy.next_ping();
     ASSERT_TRUE(ping);
@@ -49,7 +49,8 @@ TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
     last = ping->head.fixed.ping_id;
   }
   EXPECT_EQ(healthy_ids.skipped_ids(), 0u) << "a stalled neighbour costs nothing";
-  // The slow one wakes up: old pings from the kernel's buffers, a gap, then the newest. Nothing cut, nothing mixed.
+  // The slow client reads again: it gets old pings from the kernel's buffers, then a gap, then the newest. No ping is cut or
+  // mixed with another.
   oculus::PingSequence slow_ids;
   for (std::uint32_t id = 0; id < last;) {
     const auto ping = slow.next_ping();
@@ -122,7 +123,7 @@ TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
   EXPECT_TRUE(next.next_ping()) << daemon.log_text();
 }
 
-/// It gets no bytes, as dummies are far apart, so only the kernel's probes can find out.
+/// The client gets no bytes, because dummies are rare, so only the kernel's probes can detect that it is dead.
 TEST(Clients, OneWhoseComputerDiedInSilenceFreesItsPlace) {
   DaemonSetup setup;
   setup.more = "limits: {dead_peer_s: 3}\n";
@@ -165,7 +166,7 @@ TEST(Clients, PingIdsGoOnAcrossClientsAndSettingsDoNot) {
   EXPECT_GT(second.next_ping()->head.fixed.ping_id, last);
 }
 
-/// The first thing `heir` is sent after a ping made for the client before it was still being computed.
+/// Returns the first message to `heir`, which connected while a ping for the previous client was still being computed.
 void expect_only_its_own_pings(Daemon& daemon, Client& heir, PingGate& gate) {
   const std::size_t asked = daemon.requests().size();
   const auto connected = [&] {
@@ -222,7 +223,7 @@ TEST(Admission, CloseNewSendsTheSecondAFinAndNoByte) {
   setup.gate->allow();
   ASSERT_TRUE(first.next_ping());
   Client second(daemon.address());
-  second.fire(fire_at(PingRate::standby));  // bytes on their way must not turn the FIN into a reset
+  second.fire(fire_at(PingRate::standby));  // bytes that still arrive must not turn the FIN into a reset
   EXPECT_TRUE(second.read_to_end());
   EXPECT_EQ(second.bytes_read, 0u);
   oculus::PingSequence ids;
@@ -279,7 +280,7 @@ TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
   auto first = std::make_unique<Client>(daemon.address());
   first->fire(fire_at(PingRate::hz40));
   ASSERT_TRUE(first->next_ping());
-  for (int i = 0; i < 40; ++i) {  // more than may wait; what they sent lies before the end of their streams
+  for (int i = 0; i < 40; ++i) {  // more than can wait; their bytes come before the end of their streams
     Client leaves(daemon.address());
     leaves.fire(fire_at(PingRate::hz40, 2));
   }
@@ -308,7 +309,7 @@ TEST(Admission, TheLastFireWinsAmongSeveral) {
   ASSERT_TRUE(b.next_ping()) << "pings go to all";
   b.fire(fire_at(PingRate::hz40, 3));
   ASSERT_TRUE(eventually([&] { return a.next_ping()->head.fixed.fire.range == 3; }));
-  a.fire(fire_at(PingRate::hz40, 2));  // byte-identical to a's last, but no longer what the device does
+  a.fire(fire_at(PingRate::hz40, 2));  // the same bytes as a's last request, but no longer the device's settings
   EXPECT_TRUE(eventually([&] { return b.next_ping()->head.fixed.fire.range == 2; }));
 }
 
@@ -334,7 +335,7 @@ TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
   Daemon daemon(setup);
   Client healthy(daemon.address());
   Client stalled(daemon.address(), 52100, 16384);
-  healthy.fire(fire_at(PingRate::hz15, 10));  // small enough to be taken in time by a client that reads
+  healthy.fire(fire_at(PingRate::hz15, 10));  // small enough for a client that reads to receive in time
   for (int i = 0; i < 12; ++i) ASSERT_TRUE(healthy.next_ping());
   bool whole = false;
   std::thread reader([&] { whole = healthy.read_to_end(); });

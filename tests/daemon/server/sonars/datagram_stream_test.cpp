@@ -1,4 +1,4 @@
-// A host by datagrams that is silent: when the daemon looks for it, and when it counts as gone.
+// A silent host by datagrams: when the daemon sends it a probe, and when it counts as disconnected.
 #include "daemon/server/sonars/datagram_stream.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ struct SilentHost : ::testing::Test, QuietParent {
   udp::socket socket{io, udp::v4()};
   std::shared_ptr<DatagramStream> stream = std::make_shared<DatagramStream>(*this, socket, 1, std::chrono::nanoseconds(0));
   int looks = 0;
-  int answered_look = 0;  // its computer answers every look of this number; 0: none
+  int answered_look = 0;  // its computer answers each nth probe, with this n; 0: none
 };
 
 TEST_F(SilentHost, IsGivenUpAfterTheLimitWhenNothingAnswers) {

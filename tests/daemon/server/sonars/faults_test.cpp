@@ -1,4 +1,4 @@
-// An exception in one conversation, a fault of sonard: it is logged, and ends that conversation only.
+// An exception in one conversation, which is a bug of sonard, is logged and ends only that conversation.
 #include <gmock/gmock.h>
 
 #include "daemon/server/poses/pose_server.hpp"

@@ -1,4 +1,4 @@
-// Faults on purpose over real sockets: the effects on a driver's computer of the kinds that act on connections and on the stream.
+// Injected faults over real sockets: the effects on a driver's computer of those kinds that act on connections and on the stream.
 #include <gmock/gmock.h>
 
 #include <filesystem>

@@ -82,7 +82,7 @@ protocol::Reaction run_command(const std::string& line, const DeviceState& devic
       if (const auto to = endpoint_of(word)) wanted.to.push_back(*to);
     reaction.events.push_back(std::move(wanted));
   } else if (command == "quiet") {
-    // nothing else
+    // no other behaviour
   } else if (command == "ping") {
     reaction.events.push_back(protocol::RequestPing{});
   } else if (command == "quit") {

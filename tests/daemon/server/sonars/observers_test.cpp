@@ -108,7 +108,8 @@ TEST(Observers, DoNotHoldUpSteppedTime) {
   Client never_reads(daemon.address(), observer_port(daemon), 4096);
   Client driver(daemon.address());
   driver.fire(fire_at(PingRate::hz40, 4));
-  for (int i = 0; i < 100; ++i) ASSERT_TRUE(driver.next_ping()) << i;  // megabytes: more than the kernel keeps for the other
+  for (int i = 0; i < 100; ++i)
+    ASSERT_TRUE(driver.next_ping()) << i;  // megabytes: more than the kernel can store for the observer
 }
 
 }  // namespace

@@ -68,7 +68,7 @@ TEST(Serving, NoDummyWhileAPingTakesLong) {
   }
   enough.set_value();
   auto message = client.next();
-  while (message && std::holds_alternative<oculus::DummyMessage>(*message)) message = client.next();  // from before the message
+  while (message && std::holds_alternative<oculus::DummyMessage>(*message)) message = client.next();  // sent before the message
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(message);
     EXPECT_TRUE(std::holds_alternative<oculus::DecodedPing>(*message));
@@ -93,7 +93,7 @@ TEST(Serving, StandbyIsAcknowledgedAndAnyRateResumes) {
   ASSERT_TRUE(client.next_ping());
   client.fire(fire_at(PingRate::standby));
   int dummies = 0;
-  while (dummies < 4) {  // pings already under way may come first, none between dummies
+  while (dummies < 4) {  // earlier pings may arrive first, but none between dummies
     const auto message = client.next();
     ASSERT_TRUE(message);
     if (std::holds_alternative<oculus::DummyMessage>(*message)) ++dummies;
@@ -124,7 +124,8 @@ TEST(Serving, RepeatedFireMessagesDoNotRestartTheRhythm) {
   Client client(daemon.address());
   const auto begin = Steady::now();
   int pings = 0;
-  while (pings < 10 && Steady::now() - begin < patience) {  // 50 a second; a restarted timer would ping as often, or never
+  while (pings < 10 &&
+         Steady::now() - begin < patience) {  // 50 requests a second; a restarted timer would ping as often, or never
     client.fire(fire_at(PingRate::hz5));
     if (client.next_ping(milliseconds(20))) ++pings;
   }
@@ -220,7 +221,7 @@ TEST(Serving, APingTheEngineRefusesIsDroppedCountedAndSaid) {
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
   for (const std::uint32_t number : {1u, 3u, 5u, 6u}) {
-    setup.gate->allow(number == 3 || number == 5 ? 2 : 1);  // the one before it is refused
+    setup.gate->allow(number == 3 || number == 5 ? 2 : 1);  // the ping before it is refused
     const auto ping = client.next_ping();
     ASSERT_TRUE(ping);
     EXPECT_EQ(ping->head.fixed.ping_id, number);
@@ -276,7 +277,7 @@ TEST(Serving, BusyAndForeignAddressesSayWhatToDo) {
   EXPECT_THAT(busy, HasSubstr("ss -anp"));
   EXPECT_THAT(busy, HasSubstr("ephemeral range"));
   DaemonSetup foreign;
-  foreign.address = "192.0.2.1";  // TEST-NET-1: on no host
+  foreign.address = "192.0.2.1";  // TEST-NET-1: an address of no host
   foreign.more = "poses: {protobuf: off, json: off}\n";
   EXPECT_THAT(why_not(foreign),
               HasSubstr("192.0.2.1:52100: address not on this host. Add it: ip addr add 192.0.2.1/24 dev eth0"));

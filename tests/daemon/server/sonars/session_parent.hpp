@@ -1,4 +1,5 @@
-// A parent of sessions and streams for tests: it has no messages, sets no limits, and keeps why the conversation ended.
+// A parent of sessions and streams for tests: it has no messages, sets no limits, and stores the reason for the end of the
+// conversation.
 #pragma once
 
 #include <gtest/gtest.h>

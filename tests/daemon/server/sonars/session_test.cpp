@@ -1,4 +1,4 @@
-// Messages that a fault shapes: written in pieces, and the end of the connection after exactly their bytes.
+// Messages that a fault changes: they are written in pieces, and the connection ends after exactly their bytes.
 #include "daemon/server/sonars/session.hpp"
 
 #include <gmock/gmock.h>
@@ -46,7 +46,7 @@ struct SessionShapes : ::testing::Test {
     began = Steady::now();
     session->start();
   }
-  /// Runs the session meanwhile; each piece as it arrived with the time since start().
+  /// Runs the session until then. Returns each received piece with its time since start().
   struct Piece {
     std::string text;
     milliseconds at;
@@ -152,7 +152,7 @@ TEST_F(SessionShapes, SaysThatTheClientLeft) {
 TEST_F(SessionShapes, SaysThatTheClientLeftWhileAMessageIsWritten) {
   start({shaped(std::string(16u << 20, 'x'), {})});  // more than the kernels hold
   session->read_from_client(false);
-  client.send(std::string("x"));  // the reader waits with it: only the writer sees the end
+  client.send(std::string("x"));  // the reader keeps it back, so only the writer can detect the end
   io.restart();
   while (io.run_one_for(milliseconds(100)) > 0) continue;
   EXPECT_EQ(parent.why, "");

@@ -134,7 +134,7 @@ std::string ask(Client& client, const std::string& line) {
   return text_of(client.read_raw(3));
 }
 
-/// A ping that was under way when the range changed still has the range before.
+/// A ping that was being computed when the range changed still has the earlier range.
 bool asked_for_range(Daemon& daemon, double metres) {
   return eventually([&] { return daemon.requests().back().settings.range_m == metres; });
 }
@@ -258,7 +258,7 @@ TEST(Transports, AnAddressThatConnectsTooOftenWaitsAndAnotherIsServed) {
   EXPECT_EQ(answer, "ok\n");
 }
 
-/// Hosts of a Ping360 search with a socket at port 30303 of all addresses, where sonard's own computer has it too.
+/// Hosts of a Ping360 search with a socket at port 30303 of all addresses, also if they run on sonard's own computer.
 TEST(Transports, APortThatIsSearchedIsSharedWithHostsOfThisComputer) {
   auto before = std::make_unique<UdpSocket>("0.0.0.0", udp_port);
   Daemon daemon(made_up());
@@ -274,7 +274,7 @@ TEST(Transports, ADialogueByDatagramsBelongsToTheHostThatAskedLast) {
   UdpSocket stranger, one, other;
   stranger.send("junk", daemon.address(), data_port);
   stranger.send("", daemon.address(), data_port);
-  Client tcp(daemon.address(), data_port);  // the same number, another transport
+  Client tcp(daemon.address(), data_port);  // the same port number with another transport
   one.send("range 6\n", daemon.address(), data_port);
   EXPECT_EQ(one.next(), "ok\n");
   EXPECT_EQ(one.sender, daemon.address() + ":" + std::to_string(data_port));
@@ -400,7 +400,8 @@ TEST(Transports, PagesOfTheWebReadAndChangeNothingByHttp) {
     EXPECT_EQ(body_of(http(at, "GET", "/range", "", host)), "5") << host;
 }
 
-/// The same in all makes' ports: requests that a page makes a browser send must have no effect and occupy no driver's slot.
+/// This holds for the ports of all makes: a request that a web page makes a browser send must have no effect and occupy no
+/// driver's slot.
 TEST(Transports, ARequestOfHttpEndsAClientsConnection) {
   Daemon daemon(made_up());
   for (const std::string method : {"GET", "POST", "HEAD", "PUT", "DELETE", "OPTIONS", "CONNECT", "TRACE", "PATCH"})
@@ -436,7 +437,7 @@ TEST(Transports, AReceiverWhosePortIsClosedGetsNothingUntilItOpens) {
     daemon.on_io_thread([&] { bytes = daemon.app().devices().front().figures().bytes_written; });
     return bytes;
   };
-  std::this_thread::sleep_for(milliseconds(200));  // the last one is on its way
+  std::this_thread::sleep_for(milliseconds(200));  // the last one is still being sent
   const auto before = sent();
   std::this_thread::sleep_for(milliseconds(1000));
   EXPECT_LT(sent() - before, 4u * 4000u) << "20 pings of 3200 bytes while it was open";
@@ -476,7 +477,7 @@ TEST(Transports, AHostByDatagramsThatIsSilentIsGivenUpUnlessItsComputerAnswersFo
   next_ping(host);
   EXPECT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 0; }));
   EXPECT_THAT(daemon.log_text(), HasSubstr("client gone: silent for 1 s"));
-  UdpSocket listens;  // on this computer, where a closed port is answered for
+  UdpSocket listens;  // on this computer, so that the kernel answers for a closed port
   listens.send("listens 4\n", daemon.address(), data_port);
   EXPECT_EQ(listens.next(), "ok\n");
   unsigned first = 0, last = 0;

@@ -1,4 +1,4 @@
-// Tests a client that reconnects endlessly: a few log lines count all of its connections.
+// A client that reconnects endlessly gets only a few log lines, which count all of its connections.
 #include "daemon/server/sonars/visit_log.hpp"
 
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ struct Bench {
 TEST(VisitLog, FewVisitsAreToldOneByOne) {
   Bench bench;
   bench.come_and_go(4);
-  bench.io.run();  // the spell ends
+  bench.io.run();  // the series of visits ends
   EXPECT_THAT(bench.lines, SizeIs(8));
   bench.come_and_go(4);
   bench.visits.end();

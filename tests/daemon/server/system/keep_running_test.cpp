@@ -1,4 +1,4 @@
-// Loops of listeners continue after a fault, unless they have ended by themselves or must not survive it.
+// Loops of listeners continue after a fault, unless they have ended by themselves or must end with it.
 #include <gmock/gmock.h>
 
 #include <stdexcept>

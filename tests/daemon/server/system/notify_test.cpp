@@ -1,5 +1,5 @@
-// Messages to a service manager, by a socket of our own: when we are ready, reload and stop, and signs of life only while the
-// simulation thread makes progress.
+// Messages to a service manager, which a socket of the test replaces: sonard reports that it is ready, reloads and stops, and
+// sends signs of life only while the simulation thread makes progress.
 #include "daemon/server/system/notify.hpp"
 
 #include <gmock/gmock.h>
@@ -111,7 +111,7 @@ TEST(Notify, APingThatNeverEndsSilencesTheSignsOfLifeUntilItDoes) {
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz10));
   EXPECT_TRUE(eventually([&] { return daemon.log_text().find("no sign of life") != std::string::npos; }));
-  manager.wait_at_most(milliseconds(600));  // three periods; what was said before is read away first
+  manager.wait_at_most(milliseconds(600));  // three periods; earlier messages are read first
   int signs = 0;
   while (!manager.next().empty() && signs < 1000) ++signs;
   EXPECT_LT(signs, 1000) << "the signs never ended";

@@ -1,4 +1,4 @@
-// Signals, sent to this process as a user or a terminal would: what ends the daemon gracefully, and what must not end it.
+// Signals as a user or a terminal sends them: which end the daemon gracefully, and which must not end it.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -49,7 +49,7 @@ TEST(Signals, TerminateStillEndsGracefullyAfterAHangup) {
 
 TEST(Signals, AHangupThatComesWithTheTerminationDoesNotKeepItAlive) {
   Daemon daemon(with_signals());
-  daemon.on_io_thread([] {  // both are there before either is taken up
+  daemon.on_io_thread([] {  // both have arrived before either is handled
     ASSERT_EQ(raise(SIGTERM), 0);
     ASSERT_EQ(raise(SIGHUP), 0);
   });

@@ -24,8 +24,8 @@ DaemonSetup with_clock(const std::string& mode, const std::string& more = "") {
   return setup;
 }
 
-/// A daemon with one client that requested 40 Hz, once the sonar has served it. It reads all the time, because time waits for
-/// readers.
+/// A daemon with one client that requested 40 Hz, once the sonar has served it. The client reads all the time, because simulated
+/// time waits for readers.
 struct Pinging {
   explicit Pinging(DaemonSetup setup) : daemon(std::move(setup)), client(daemon.address()) {
     client.fire(fire_at(PingRate::hz40));
@@ -320,7 +320,7 @@ TEST(Follow, ASimulatorThatDoesNotWaitLosesTicksAsInRealTime) {
     const v1::PoseFigures poses = p.daemon.status().poses();
     return poses.accepted() + poses.replaced() == 101;
   }));
-  gate->open();  // the first ping took as long as it took all poses to come
+  gate->open();  // the first ping is ready only after all poses have arrived
   ASSERT_TRUE(eventually([&] { return p.daemon.status().now_ns() == 5'000'000'000; }));
   ASSERT_TRUE(eventually([&] {
     const auto figures = p.daemon.status().sonars().at(0).figures();

@@ -36,7 +36,7 @@ struct Host {
     if (interval_ms > 0) link.send(bv::two_numbers(FrameType::subscribe, 2, 0, interval_ms));
     reader = std::thread([this] { was_sent_away = link.read_to_end(); });
   }
-  ~Host() { reader.join(); }  // the daemon goes first
+  ~Host() { reader.join(); }  // the daemon closes first
   Client link;
   bool was_sent_away = false;  // by a FIN
   std::thread reader;
@@ -138,7 +138,7 @@ TEST(SteppedTalk, ASubscriptionTakesTheSonarFromNoClient) {
   other.send(bv::ping(3, 1, 20000));
   const auto answer = other.read_raw(16 + 100);
   EXPECT_GE(answer.size(), 116u) << "pings of the other head came in between";
-  std::thread reader([&other] { other.read_to_end(); });  // time waits for it
+  std::thread reader([&other] { other.read_to_end(); });  // simulated time waits for it
   const auto pings = daemon.requests();
   EXPECT_TRUE(std::any_of(pings.begin(), pings.end(), [](const PingRequest& r) { return r.settings.mode == 1; }));
   EXPECT_TRUE(eventually([&] { return daemon.requests().size() > pings.size() + 5; })) << "the subscription goes on";

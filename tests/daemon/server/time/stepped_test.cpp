@@ -1,4 +1,4 @@
-// Stepped time: one ping after the other, as fast as the client reads, and the same bytes every time.
+// Stepped time: pings follow one another as fast as the client reads, and every run gives the same bytes.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/server/loopback.hpp"
@@ -93,7 +93,7 @@ TEST(Stepped, GainAssistFollowsThePicturesAndTellsItsGain) {
     ASSERT_TRUE(ping);
     const double gain_db = 0.96 * ping->head.fixed.fire.gain_percent;
     EXPECT_NEAR(gain_db, expected_db, 1e-3) << i;
-    // The fake engine's pictures are loud whatever the gain is.
+    // The fake engine's pictures are bright at any gain.
     Ping picture;
     picture.request.settings.format.max_code = 254;
     for (std::size_t row = 0; row < ping->rows(); ++row) {

@@ -1,4 +1,4 @@
-// A recording that is read for a viewer, until the viewer leaves.
+// A recording is read for a viewer until the viewer disconnects.
 #include "daemon/server/view/played_recording.hpp"
 
 #include <gtest/gtest.h>
