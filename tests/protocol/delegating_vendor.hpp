@@ -1,4 +1,4 @@
-// A vendor that does what another does: tests override the part that they change.
+// A vendor that passes every call to another one; tests override the functions that they change.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// Fields by meaning: each is read back from an encoded message at the place that the vendor states.
+// Fields by their meaning: each is read from an encoded message at the place that the vendor states.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -37,7 +37,8 @@ wire::Bytes bytes_at(wire::BytesView message, const Field& field) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// Each of `expected` is found with its value, and no other field is; none in a message that ends before it.
+/// Checks that exactly the fields in `expected` are found, with their values, and that a field is not found in a message that
+/// ends before it.
 void expect_fields(const protocol::Vendor& vendor, Part part, wire::BytesView message,
                    const std::map<FieldName, double>& expected, const std::set<FieldName>& of_bytes = {}) {
   for (std::size_t i = 0; i < protocol::field_names.size(); ++i) {

@@ -1,5 +1,5 @@
-// The host of each make against the device of the same make, in memory and virtual time: settings have effect and pings arrive
-// for any split of the bytes; cut or foreign bytes cause neither a ping nor a crash.
+// The host of each make against the device of the same make, in memory and virtual time: settings have their effect, and pings
+// arrive for any split of the bytes. Cut or foreign bytes cause neither a ping nor a crash.
 #include "protocol/host.hpp"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-/// Its drivers send nothing: `sonarctl set sonar` does.
+/// Its drivers do not set this; `sonarctl set sonar` does.
 bool sets_nothing(const Make& make) {
   Wanted range;
   range.settings.range_m = 3;
@@ -61,7 +61,7 @@ void fill_with_pattern(std::vector<std::byte>& samples) {
 
 class Talk {
  public:
-  /// Streams arrive in pieces of this many bytes; 0: as they are written.
+  /// Streams arrive in pieces of this many bytes; 0: in the pieces that were written.
   Talk(const Make& of, const Wanted& wanted, std::size_t piece = 0, std::size_t model = 0)
       : make(of), device(*of.device), piece_(piece), host(*of.host(sets_nothing(of) ? Wanted{} : wanted)) {
     state.name = "front";
@@ -120,7 +120,7 @@ class Talk {
   std::vector<HostPing> pings;
   std::vector<std::pair<std::size_t, Bytes>> sent;  // by the device, with the host's port
   std::optional<Error> error;
-  bool only_port = false;  // echoes are in the quarter of the beams that is most to port, in some rows
+  bool only_port = false;  // echoes are in some rows of the outermost quarter of the beams to port
   double head_rad = 0;     // head angle of the request before
 
  private:
@@ -152,7 +152,7 @@ class Talk {
     sent.emplace_back(port, bytes);
     in_pieces(port, bytes, [&](BytesView part) { carry_out(host->on_bytes(port, part, now)); });
   }
-  /// Streams in pieces, datagrams whole.
+  /// Passes streams on in pieces and datagrams whole.
   void in_pieces(std::size_t port, const Bytes& bytes, const std::function<void(BytesView)>& give) const {
     const std::size_t step = piece_ == 0 || make.ports[port].kind != HostPort::Kind::tcp ? bytes.size() : piece_;
     for (std::size_t at = 0; at < bytes.size(); at += step) give(BytesView(bytes).subspan(at, std::min(step, bytes.size() - at)));
@@ -253,7 +253,7 @@ TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
 
 TEST_P(Hosts, TellTheRangeWhichTheSonarHasInsteadOfThatWhichItEchoes) {
   Wanted wanted;
-  wanted.settings.range_m = 900;  // no sonar reaches it
+  wanted.settings.range_m = 900;  // beyond the range of every sonar
   if (!GetParam().host(wanted)) return;
   Talk talk(GetParam(), wanted, 0, model_of(GetParam()));
   talk.run(30);
@@ -262,7 +262,7 @@ TEST_P(Hosts, TellTheRangeWhichTheSonarHasInsteadOfThatWhichItEchoes) {
     ASSERT_TRUE(talk.host->expects_echo());
     ASSERT_FALSE(talk.pings.empty());
   }
-  if (talk.pings.empty() || !talk.host->expects_echo()) return;  // it refuses, or shows the range of each ping only
+  if (talk.pings.empty() || !talk.host->expects_echo()) return;  // the host refuses, or reports only the range of each ping
   const HostPing& ping = talk.pings.back();
   EXPECT_LT(ping.facts.range_m, 899);
   EXPECT_THAT(ping.echo_mismatches, testing::IsEmpty());
@@ -318,7 +318,7 @@ TEST_P(Hosts, ShowPortAtPort) {
 TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
   const auto pings_of = [](std::size_t piece) {
     Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), piece, model_of(GetParam()));
-    talk.run(sonar::test::is_sanitized && !GetParam().scans ? 3 : 6);  // single bytes take long there
+    talk.run(sonar::test::is_sanitized && !GetParam().scans ? 3 : 6);  // single bytes take long under sanitizers
     std::vector<std::pair<std::uint32_t, std::vector<float>>> all;
     for (const HostPing& ping : talk.pings) all.emplace_back(ping.facts.number, ping.picture().value_or(PolarImage{}).samples);
     return all;
@@ -328,7 +328,7 @@ TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
   for (const std::size_t piece : {1u, 2u, 7u, 16u, 1000u}) EXPECT_EQ(pings_of(piece), whole) << piece;
 }
 
-/// The device's bytes, cut off anywhere or damaged anywhere, to a host that has received all bytes before.
+/// Sends the device's bytes, cut or damaged at any place, to a host that has received all bytes before them.
 TEST_P(Hosts, SurviveWhatIsCutOffOrDamaged) {
   Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
   talk.run(6);
@@ -340,7 +340,7 @@ TEST_P(Hosts, SurviveWhatIsCutOffOrDamaged) {
     other.run(2);
     const std::size_t before = other.pings.size();
     Bytes bytes(last.begin(), last.begin() + static_cast<std::ptrdiff_t>(i < cuts ? random() % last.size() : last.size()));
-    bool hits_length = false;  // true for any make: such a message may take all bytes that follow
+    bool hits_length = false;  // always true: such a message may include all bytes that follow
     for (std::size_t k = 0; i >= cuts && k < 4; ++k) {
       const std::size_t at = random() % std::min<std::size_t>(bytes.size(), 64);
       hits_length = hits_length || at < 16;
@@ -405,7 +405,7 @@ TEST_P(Hosts, AskForSlowPingsWhenTheRateIsLessThanTheWireCanSay) {
   for (const double rate_hz : {1e-300, 1e-6}) {
     Wanted slow;
     slow.settings.rate_hz = rate_hz;
-    if (!GetParam().host(slow)) continue;  // says that its rate cannot be set
+    if (!GetParam().host(slow)) continue;  // reports that its rate cannot be set
     Talk talk(GetParam(), slow, 0, model_of(GetParam()));
     talk.run(3);
     EXPECT_LE(talk.settings.rate_hz, 2) << "slower than that an Oculus cannot be";
@@ -421,12 +421,12 @@ TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   talk.run(3);
   EXPECT_EQ(talk.settings.range_m, first.range_m);
   EXPECT_EQ(talk.settings.rate_hz, first.rate_hz);
-  if (!GetParam().each_ping_requested) {  // such a request names the head, which becomes the active one
+  if (!GetParam().each_ping_requested) {  // a request of a ping names the head, which then becomes the active one
     EXPECT_EQ(talk.state.settings, before);
   }
 }
 
-/// All that the device sent, as a recording keeps it.
+/// All messages of the device, as a recording stores them.
 std::vector<recording::RecordedMessage> messages_of(const Talk& talk) {
   std::vector<recording::RecordedMessage> messages;
   for (const auto& [port, bytes] : talk.sent) {

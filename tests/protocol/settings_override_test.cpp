@@ -1,4 +1,4 @@
-// Settings overrides, as the control protocol sends them: applied as the request that a client of the vendor would have sent.
+// Settings overrides of the control protocol: they have the same effect as the request of a vendor's client.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace sonar::settings_override_test {
 namespace {
 using testing::HasSubstr;
 
-/// One knob after the other: set().range(5).rate(10).
+/// Sets one setting after another: set().range(5).rate(10).
 struct Override : protocol::SettingsOverride {
   Override& range(double m) { return range_m = m, *this; }
   Override& rate(double hz) { return rate_hz = hz, *this; }

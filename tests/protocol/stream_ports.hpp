@@ -9,7 +9,7 @@
 
 namespace sonar::protocol::test {
 
-/// For each port of the host that is one of the device's conversations: its index and the device's port.
+/// For each of the host's ports that is a conversation of the device: the index and the device's port.
 inline std::vector<std::pair<std::size_t, const Port*>> conversations_of(const Make& make) {
   if (make.is_by_udp()) return {{0, make.device->port(Port::Kind::udp_dialogue)}};
   std::vector<std::pair<std::size_t, const Port*>> all;

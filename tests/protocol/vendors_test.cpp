@@ -1,4 +1,4 @@
-// The list of vendors: profiles by name, options checked, mistakes answered with the nearest valid name.
+// The list of vendors: profiles by name, checks of options, and errors that suggest the nearest valid name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

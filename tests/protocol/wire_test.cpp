@@ -1,4 +1,4 @@
-// The visitors alone, on a message made up for the purpose.
+// The visitors alone, with a message that was made for this test.
 #include "protocol/wire/wire.hpp"
 
 #include <gtest/gtest.h>
@@ -105,7 +105,7 @@ TEST(Wire, ReadsBothByteOrders) {
   }
 }
 
-// Every length in a buffer of exactly that size: a sanitizer sees any byte read past it.
+// Tries every length in a buffer of exactly that size, so that a sanitizer detects any read beyond it.
 TEST(Wire, KeepsTheFirstFailureAndReadsNothingMore) {
   for (std::size_t length = 0; length < little.size(); ++length) {
     const std::unique_ptr<std::byte[]> exact(new std::byte[length]);

@@ -1,4 +1,4 @@
-// A controller's side for tests: commands as bytes, and a device to talk to.
+// A controller's side for tests: commands as bytes, and a device that receives them.
 #pragma once
 
 #include <gtest/gtest.h>

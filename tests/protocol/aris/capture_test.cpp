@@ -1,5 +1,5 @@
-// A recording of a real ARIS 1200 with telephoto lens, outside the repository: our description of the header reads it, and our
-// laws give its window and its beams.
+// A recording of a real ARIS 1200 with telephoto lens, which is stored outside the repository: our description of the header
+// reads it, and our formulas give its window and its beams.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>

@@ -19,7 +19,7 @@ struct Talk {
     state.connected_client = {10, 0, 0, 7};
     dialogue = vendor().converse(vendor().ports().front(), state, tests::at_s(0));
   }
-  /// Carries out its requests, as the daemon does.
+  /// Carries out the dialogue's requests, as the daemon does.
   void say(const Bytes& bytes, double at = 0) {
     const protocol::Reaction reaction = dialogue->on_bytes(bytes, tests::at_s(at));
     EXPECT_TRUE(reaction.replies.empty()) << "the device never answers";

@@ -1,5 +1,5 @@
-// Frames of an emulated ARIS 1200 beside those of a real one: statistics that do not depend on the scene. The model was fitted to
-// frames 1 to 3 of the recording; these are judged by frames 4 to 6.
+// Compares frames of an emulated ARIS 1200 with those of a real one, by statistics that do not depend on the scene. The model was
+// fitted to frames 1 to 3 of the recording; this test compares with frames 4 to 6.
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -16,11 +16,11 @@ namespace {
 constexpr int rows = 2000, beams = 48;
 constexpr double db_per_code = 80.0 / 255;
 
-/// Levels [dB] of some rows; beam 0 most to starboard, as in frames.
+/// Levels [dB] of some rows. Beam 0 is the outermost one to starboard, as in frames.
 struct Levels {
   std::vector<std::vector<double>> db;
 
-  /// Less their mean in a window so high and wide.
+  /// Returns the levels less their mean in a window of this height and width.
   Levels less_local_mean(int high, int wide) const {
     Levels out = *this;
     const int n = static_cast<int>(db.size());
@@ -34,7 +34,7 @@ struct Levels {
     return out;
   }
   double at(int row, int beam) const { return db[static_cast<std::size_t>(row)][static_cast<std::size_t>(beam)]; }
-  /// Mean of (a - mean)^power over all.
+  /// Returns the mean of (a - mean)^power over all levels.
   double moment(int power) const {
     double sum = 0, count = 0;
     for (const auto& row : db)
@@ -46,7 +46,7 @@ struct Levels {
     for (const auto& row : db) sum += std::inner_product(row.begin(), row.end() - 1, row.begin() + 1, 0.0);
     return sum / static_cast<double>(db.size() * (beams - 1)) / moment(2);
   }
-  /// Mean of each channel's beams, less the mean of the channels beside it.
+  /// Returns the mean of each channel's beams, less the mean of the channels beside it.
   std::vector<double> stripes() const {
     std::vector<double> gains(channels);
     for (const auto& row : db)
@@ -77,10 +77,10 @@ Statistics statistics_of(const Levels& levels) {
           levels.less_local_mean(15, 15).next_beam(), levels.stripes()};
 }
 void expect_like_recording(const Statistics& s) {
-  EXPECT_NEAR(s.spread_db, 4.01, 0.15 * 4.01);  // 4.00 to 4.02; 5.5 with one look a sample
-  EXPECT_NEAR(s.skew, -0.39, 0.15);             // -0.37 to -0.40; -1.06
-  EXPECT_NEAR(s.next_row, 0.16, 0.08);          // 0.15 to 0.17
-  EXPECT_NEAR(s.next_beam, 0.02, 0.06);         // 0.02 to 0.03; 0.14 where all beams are of one ping
+  EXPECT_NEAR(s.spread_db, 4.01, 0.15 * 4.01);  // recording: 4.00 to 4.02; with one look a sample: 5.5
+  EXPECT_NEAR(s.skew, -0.39, 0.15);             // recording: -0.37 to -0.40; with one look: -1.06
+  EXPECT_NEAR(s.next_row, 0.16, 0.08);          // recording: 0.15 to 0.17
+  EXPECT_NEAR(s.next_beam, 0.02, 0.06);         // recording: 0.02 to 0.03; with all beams of one ping: 0.14
   const std::vector<double> table = Levels::stripes_of({channel_gain_db.begin(), channel_gain_db.end()});
   EXPECT_GT(test::correlation(s.stripes_db, table), 0.95);
   double error = 0;
@@ -88,8 +88,8 @@ void expect_like_recording(const Statistics& s) {
   EXPECT_LT(std::sqrt(error / static_cast<double>(table.size())), 0.35);  // the table itself has 1.2 dB rms
 }
 
-/// A frame at the recording's settings, of a bed 2 m below, which the sonar passes over at 0.5 m/s; beside it, frames of which
-/// all beams are of one ping.
+/// A frame at the recording's settings, of a bed 2 m below the sonar, which moves at 0.5 m/s; for comparison, frames whose beams
+/// are all of one ping.
 Levels emulated(bool interleaved = true) {
   const auto state = tests::device("aris-1200");
   Settings settings;
@@ -112,7 +112,7 @@ Levels emulated(bool interleaved = true) {
   return levels;
 }
 
-/// Frame 0 to 5 of the recording; empty without it.
+/// Returns frame 0 to 5 of the recording; empty without the recording.
 Levels recorded(int frame) {
   const char* const folder = std::getenv("SONARD_CAPTURES");
   if (folder == nullptr) return {};

@@ -1,4 +1,4 @@
-// A host's side of the link for tests: requests as bytes, replies taken apart, and a device to talk to.
+// A host's side of the link for tests: requests as bytes, decoded replies, and a device that answers them.
 #pragma once
 
 #include <string>

@@ -15,7 +15,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Little protobuf writer of the test's own, so that the decoder is not checked against its own library's writer only.
+/// A small protobuf writer of this test, so that the decoder is not checked only against the writer of its own library.
 struct Wire {
   Bytes out;
   void byte(unsigned v) { out.push_back(static_cast<std::byte>(v)); }

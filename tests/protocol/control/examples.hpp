@@ -1,4 +1,4 @@
-// One example of every request, of a full status and of every event, with no two numbers alike; comparisons by eye of a test.
+// One example of every request, of a full status and of every event, with no two equal numbers; and comparisons of messages.
 #pragma once
 
 #include <vector>
@@ -96,7 +96,7 @@ inline std::vector<v1::Event> every_event() {
           message_from<v1::Event>(R"(scene { scene: "harbour" text: "loaded" })")};
 }
 
-/// Equality of two requests, by their bytes, however they came.
+/// Compares two requests by their bytes.
 inline bool same(const Request& a, const Request& b) { return encode_request(a) == encode_request(b); }
 inline bool same(const v1::Response& a, const v1::Response& b) { return encode_response(a) == encode_response(b); }
 

@@ -175,7 +175,8 @@ TEST(LineParser, TellsWhatBeginsAsAnObject) {
 }
 
 TEST(LineParser, ManyLinesInOneReadTakeTimeInProportion) {
-  // 32 MiB of two-byte lines: moving the rest up after each of them would copy 280 TB, hours of work; a sanitizer's eighth 4 TB.
+  // 32 MiB of two-byte lines: moving the rest forward after each line would copy 280 TB, which takes hours. Under sanitizers an
+  // eighth of the size is used: 4 TB.
   constexpr int many = test::is_sanitized ? 2 << 20 : 16 << 20;
   std::string stream;
   for (int i = 0; i < many; ++i) stream += "x\n";

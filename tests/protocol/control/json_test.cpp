@@ -1,4 +1,4 @@
-// The messages as JSON: what people type is read strictly, what they get is valid JSON with the names of control.proto.
+// The messages as JSON: input is checked strictly, and output is valid JSON with the names of control.proto.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

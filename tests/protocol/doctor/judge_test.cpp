@@ -32,7 +32,7 @@ v1::DaemonStatus two_seconds_before(v1::DaemonStatus status) {
   return status;
 }
 
-/// The only finding of that check which is not well.
+/// Returns the only finding of that check that is not in order.
 Finding trouble(const std::vector<Finding>& findings, const std::string& check) {
   std::vector<Finding> found;
   std::string all;
@@ -221,7 +221,7 @@ TEST(Judge, OneThatAnotherClientReplaced) {
   EXPECT_EQ(trouble(with(pinging + driver + gone), "driver").level, Level::warn);
 }
 
-/// The driver has done what it must; the fault itself is reported as long as it acts.
+/// The driver reacted correctly; the fault itself is reported as long as it is active.
 TEST(Judge, OneThatAFaultDisconnected) {
   const Finding f =
       trouble(with(pinging + driver + R"(gone { address: "10.0.0.7:1" why: "a fault" without_ping: true ago_s: 5 })"), "driver");
@@ -249,7 +249,7 @@ TEST(Judge, AnEngineThatIsTooSlow) {
   EXPECT_EQ(f.cure, less_to_compute);
   now.mutable_sonars(0)->set_profile("omniscan-450");
   EXPECT_EQ(trouble(judge(now, &before), "rate").text, "front makes 7.0 of 10 lines/s: computing takes 138 ms");
-  before.mutable_sonars(0)->mutable_figures()->set_skipped_ticks(30);  // its host asked for no more
+  before.mutable_sonars(0)->mutable_figures()->set_skipped_ticks(30);  // its host requested no further pings
   EXPECT_THAT(troubles(judge(now, &before)), IsEmpty());
   now.mutable_sonars(0)->mutable_figures()->set_refused(3);
   EXPECT_EQ(trouble(judge(now, &before), "rate").text, "The engine refused 3 pings of front");

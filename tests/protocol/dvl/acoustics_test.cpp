@@ -1,4 +1,4 @@
-// The beams of a DVL over ground at known places, through the whole engine.
+// The beams of a DVL over ground at known places, computed by the whole engine.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -39,7 +39,7 @@ struct Dvl {
     settings = next->settings;
     return m;
   }
-  /// After this many pings, in which it may have found the ground.
+  /// Returns the measurement after this many pings, in which the device may find the ground.
   Measurement settled(Vec3d at, RollPitchYaw vehicle = {}, Vec3d moves_mps = {}) {
     for (int i = 0; i < 8; ++i) ping(at, vehicle, moves_mps);
     return ping(at, vehicle, moves_mps);

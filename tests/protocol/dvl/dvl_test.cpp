@@ -1,5 +1,5 @@
-// A DVL against the published protocol: its lines and commands, coordinate frames and signs, and the laws of velocity and dead
-// reckoning.
+// A DVL against the published protocol: its lines and commands, coordinate frames and signs, and the formulas of velocity and
+// dead reckoning.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 constexpr std::array<double, beam_count> level{2, 2, 2, 2};
 
-/// The velocity of a ping of a vehicle that moves so in its own axes: x forward, y to starboard, z down.
+/// Returns the measured velocity for this motion in the vehicle's axes: x forward, y to starboard, z down.
 Measurement moving(Vec3d frd_mps, Settings settings = {}, std::array<double, beam_count> distances = level) {
   const protocol::DeviceState state = device();
   settings.mode = 1;
@@ -80,7 +80,7 @@ TEST(DvlVelocity, MountingRotationTurnsIntoTheVehiclesFrame) {
   EXPECT_NEAR(m.velocity_mps.z, 0.2, 1e-9);
 }
 
-/// Without samples nothing can be measured: what the device says of the ping was found before.
+/// Without samples no measurement is possible; the device reports a measurement that was made before.
 TEST(DvlVelocity, IsMeasuredOnceForAllItsLines) {
   const protocol::DeviceState state = device();
   Settings s;
@@ -133,7 +133,7 @@ TEST(DvlVelocity, NoiseHasTheStatedCovarianceAndRepeats) {
   EXPECT_NEAR(of_squares / pings, stated, 0.1 * stated);
 }
 
-/// The example of the maker's documentation.
+/// The example in the maker's documentation.
 TEST(DvlVelocity, FigureOfMeritIsTheRootOfTheLargestEigenvalue) {
   const Covariance example{{{2.4471841442164077e-08, -3.3937477272871774e-09, -1.6659699175747278e-09},
                             {-3.3937477272871774e-09, 1.4654466085062268e-08, 4.0409570134514183e-10},

@@ -1,4 +1,4 @@
-// Every message is read back with nothing but the descriptors that viewers are sent.
+// Every message is read back with only the descriptors that viewers receive.
 #include "protocol/foxglove/foxglove_messages.hpp"
 
 #include <gmock/gmock.h>
@@ -189,7 +189,7 @@ TEST(FoxgloveMessages, StampsMayBeOthers) {
     bytes.insert(bytes.end(), image.samples->begin(), image.samples->end());
     return bytes;
   };
-  const auto same = [](Time was) { return was; };  // fields come in another order
+  const auto same = [](Time was) { return was; };  // fields are in another order
   EXPECT_EQ(with_stamps(of("foxglove.RawImage"), whole(then), later),
             with_stamps(of("foxglove.RawImage"), whole(later(then)), same));
   // sonar.v1.PingEvent: number = 7, fired_at_ns = 1

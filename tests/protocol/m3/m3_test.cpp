@@ -1,5 +1,5 @@
-// An M3 against the published layout: bytes at the offsets of the tables, samples, windows of real packets, and what its host
-// makes of packets that this file builds without our writer.
+// An M3 against the published layout: bytes at the offsets of the tables, samples, windows of real packets, and how its host
+// decodes packets that this file builds without our writer.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -141,7 +141,7 @@ TEST(M3Packets, HaveNoPhaseWhereThePingHasNone) {
   EXPECT_EQ(float_at(packet, 56 + 8512 + 8 * 5 + 4), 0);
 }
 
-/// Heads of real packets, in seconds after the begin of the ping.
+/// Fields of the headers of real packets, in seconds after the start of the ping.
 TEST(M3Windows, AreThoseOfRealPackets) {
   const Window one = window_of(1, 10), two = window_of(0.2, 10), three = window_of(0.4, 20);
   EXPECT_NEAR(one.start_s + transmit_s, 0.001307, 1e-9);

@@ -1,4 +1,4 @@
-// MAV_CMD_INJECT_FAILURE: possible addressees, the handler's input, and the answer's bytes.
+// MAV_CMD_INJECT_FAILURE: the addresses that are accepted, the handler's input, and the answer's bytes.
 #include <limits>
 #include <tuple>
 

@@ -1,4 +1,5 @@
-// Frames of both versions are found between other frames and junk; damaged frames are refused, and every length is checked.
+// Frames of both versions are found between other frames and other bytes; damaged frames are refused, and every length is
+// checked.
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {

@@ -1,5 +1,5 @@
-// The message table against the rule by which MAVLink derives it: CRC_EXTRA from the names and types of the fields, lengths from
-// their sizes, order by size.
+// The message table against the rule by which MAVLink derives it: CRC_EXTRA follows from the names and types of the fields, the
+// length from their sizes, and their order from their sizes.
 #include "protocol/mavlink/messages.hpp"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ struct Listed : wire::Visitor<Listed> {
   }
 };
 
-/// One bit at a time, unlike the program's table.
+/// Computes the checksum bit by bit; the program uses a table.
 std::uint16_t plain_checksum(const std::string& text) {
   unsigned crc = 0xFFFF;
   for (const char c : text) {

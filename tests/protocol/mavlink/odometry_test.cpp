@@ -23,7 +23,7 @@ Odometry with(std::uint8_t frame, std::uint8_t child, Vec3 at, Quatd q, Vec3 vel
 }
 Quatd about_z(double angle_rad) { return turned_by({0, 0, angle_rad}); }
 
-/// 10 m north, 2 m east, 3 m down; ahead is east; moves ahead and to port, bow up and turning to starboard.
+/// 10 m north, 2 m east, 3 m down, heading east. The vehicle moves ahead and to port, with its bow up, and turns to starboard.
 void expect_the_vehicle(const control::PoseSample& s) {
   expect_near(s.pose.position_m, {2, 10, -3}, 1e-6);
   expect_axes(s.pose, {1, 0, 0}, {0, 1, 0});

@@ -1,4 +1,5 @@
-// A position is paired with the attitude of the same moment, which is interpolated, briefly extrapolated, waited for, or missing.
+// A position is paired with the attitude of the same moment. The attitude is interpolated or briefly extrapolated, or the
+// position waits for it, or it is missing.
 #include "protocol/mavlink/paired_poses.hpp"
 
 #include "tests/protocol/mavlink/mavlink_testing.hpp"

@@ -1,4 +1,4 @@
-// The senders and messages that count, the poses made from them, and the stamps of these poses.
+// The accepted senders and messages, the poses made from them, and the stamps of these poses.
 #include <limits>
 #include <utility>
 
@@ -74,7 +74,7 @@ TEST(MavlinkPoses, DepthAndAttitudeAreEnough) {
   settings.held_m = {3, 4, 0};
   Link link(settings);
   EXPECT_THAT(link(v(autopilot_heartbeat()) + v(attitude(1000, 1)) + v(depth(1000, 3, 0.5)), 1).poses, IsEmpty());
-  // A pose of each attitude; between two depths the vehicle sinks on, for a second at most.
+  // Each attitude gives a pose. Between two depths the vehicle continues to sink, for at most one second.
   for (const auto& [ms, z_m] : {std::pair{1100u, -3.05}, {1200u, -3.1}, {5900u, -3.5}}) {
     const Reaction r = link(v(attitude(ms, static_cast<float>(pi / 2))), 1e-3 * ms);
     ASSERT_EQ(r.poses.size(), 1u) << ms;
@@ -86,7 +86,7 @@ TEST(MavlinkPoses, DepthAndAttitudeAreEnough) {
     EXPECT_EQ(s.fields, "position attitude rates") << "the velocity is not known";
   }
   EXPECT_THAT(link(v(attitude(6100, 0)), 6.1).poses, IsEmpty()) << "the depth is too old";
-  // A position is better, and the depth is forgotten with a fix.
+  // A position is preferred, and the depth is dropped after a fix.
   EXPECT_EQ(link(v(depth(6200, 2)) + v(local(6200, 1, 2, 5)) + v(attitude(6200, 0)), 6.2).poses.at(0).source,
             "system 1 LOCAL_POSITION_NED and attitude");
 }
@@ -119,7 +119,7 @@ TEST(MavlinkPoses, HeartbeatsOfOtherComponentsDoNotChangeTheTypeOfTheVehicle) {
   m.height_mm = -4000;
   Heartbeat other = autopilot_heartbeat();
   other.type = 26;      // a gimbal
-  other.autopilot = 4;  // another one than the autopilot's
+  other.autopilot = 4;  // a value other than the autopilot's
   for (const std::uint8_t component : {std::uint8_t{100}, std::uint8_t{154}}) {
     Sender autopilot{{1, 1, 0}}, second{{1, component, 0}};
     for (const Bytes& order :
@@ -128,13 +128,13 @@ TEST(MavlinkPoses, HeartbeatsOfOtherComponentsDoNotChangeTheTypeOfTheVehicle) {
       EXPECT_EQ(by_hud(order + autopilot(hud) + autopilot(attitude(1000, 0)), 1).poses.size(), 1u) << int{component};
       EXPECT_EQ(by_place(order + autopilot(m) + autopilot(attitude(1000, 0)), 1).poses.size(), 1u) << int{component};
     }
-    // Nor does a submarine's type of another component make a boat one.
+    // If another component has the type of a submarine, the boat still counts as a boat.
     Heartbeat boat = autopilot_heartbeat();
     boat.type = 11;
     Link of_boat;
     EXPECT_THAT(of_boat(autopilot(boat) + second(autopilot_heartbeat()) + autopilot(hud) + autopilot(attitude(1000, 0)), 1).poses,
                 IsEmpty());
-    // Without component 1, the first autopilot counts.
+    // If there is no component 1, the first autopilot is used.
     Sender sole{{1, 2, 0}};
     Link of_sole;
     EXPECT_EQ(of_sole(sole(autopilot_heartbeat()) + second(other) + sole(hud) + sole(attitude(1000, 0)), 1).poses.size(), 1u);
@@ -237,7 +237,7 @@ TEST(MavlinkPoses, GlobalPositionsLieOnTheTangentPlane) {
   m.north_cmps = 150;
   const Reaction r = link(v(attitude(20, 0)) + v(m), 1);
   ASSERT_EQ(r.poses.size(), 1u);
-  // Lengths of a degree at 47.6 N: the first terms of their series.
+  // Lengths of a degree at 47.6 N: from the first terms of their series.
   EXPECT_NEAR(r.poses[0].sample.pose.position_m.y, 111.178, 0.01);
   EXPECT_NEAR(r.poses[0].sample.pose.position_m.x, -75.2, 0.1);
   EXPECT_NEAR(r.poses[0].sample.pose.position_m.z, -3.5, 0.01);
@@ -354,7 +354,7 @@ TEST(MavlinkPoses, TheAutopilotTakesOverFromAComponentThatSendsFirst) {
     ASSERT_EQ(r.poses.size(), 1u) << ms;
     EXPECT_NEAR(heading_rad(r.poses[0].sample.pose.orientation), 0.5, 1e-6) << ms;
   }
-  // A second autopilot does not take turns with the first.
+  // Messages of a second autopilot are ignored.
   const Reaction r = link(
       Sender{{1, 3, 0}}(autopilot_heartbeat()) + Sender{{1, 3, 0}}(attitude(1300, 2)) + autopilot(local(1200, 1, 0, 2)), 1.3);
   ASSERT_EQ(r.poses.size(), 1u);

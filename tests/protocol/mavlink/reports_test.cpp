@@ -140,7 +140,7 @@ TEST(MavlinkReports, TheFirstSentenceSaysWhatIsMissing) {
   EXPECT_THAT(report_of({}, v(broken)), AllOf(HasSubstr("the received messages were refused"), Not(HasSubstr("request_rates"))));
 }
 
-/// The sentences between two times, and the second of each.
+/// Returns the sentences between two times, each with its time in seconds.
 std::vector<std::pair<int, std::string>> notices_of(MavlinkPoses& poses, int from_s, int to_s,
                                                     const std::function<void(int)>& each = {}) {
   std::vector<std::pair<int, std::string>> all;

@@ -1,4 +1,4 @@
-// Scan lines of a Micron of bodies at known places, through the whole engine.
+// Scan lines in which a Micron shows bodies at known places, computed by the whole engine.
 #include <algorithm>
 
 #include "tests/core/pipeline/scenes.hpp"

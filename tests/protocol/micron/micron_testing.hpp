@@ -1,4 +1,4 @@
-// A driver's side for tests: a device to talk to, with messages in and out.
+// A driver's side for tests: a device, its received messages and its sent messages.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ struct Talk {
       if (std::get_if<protocol::Notice>(&event) != nullptr) ++notices;
     }
   }
-  /// Every tick until then; pings take no time.
+  /// Runs every tick until then; pings take no time.
   void run_to(double at) {
     while (dialogue->next_tick() <= at_s(at)) {
       const Time now = dialogue->next_tick();
@@ -72,7 +72,7 @@ struct Talk {
     if (!dialogue->on_ping(aim.with.get(), 0, now).prefixes.empty()) replies.push_back(*vendor().frame(ping, state));
   }
   std::vector<Bytes> take() { return std::exchange(replies, {}); }
-  /// Bearings of the scan lines that came.
+  /// Returns the bearings of the received scan lines.
   std::vector<int> bearings() {
     std::vector<int> all;
     for (const Bytes& reply : take())
@@ -80,7 +80,7 @@ struct Talk {
         all.push_back(read_front<HeadData>(message->payload)->bearing);
     return all;
   }
-  /// Head information of the signs of life that came.
+  /// Returns the head information of the received signs of life.
   std::vector<int> head_infos() {
     std::vector<int> all;
     for (const Bytes& reply : take())

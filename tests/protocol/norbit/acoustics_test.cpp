@@ -1,4 +1,4 @@
-// Bathymetry of a Norbit over a known floor and a ball, through the whole engine.
+// Bathymetry of a Norbit over a known floor and a ball, computed by the whole engine.
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace {
 using namespace tests;
 using namespace sonar::test;
 
-/// Looks ahead, as the engine's tests do: port is +y.
+/// The sonar looks ahead, as in the engine's tests: port is +y.
 Bathymetry bathymetry_of(std::shared_ptr<const Scene> scene) {
   const protocol::DeviceState state = device();
   const Settings settings{.power = true, .stop_m = 6};

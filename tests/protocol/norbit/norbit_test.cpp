@@ -1,4 +1,4 @@
-// The packets of an emulated Norbit by hand-typed offsets, its commands, and what is refused; without a socket.
+// The packets of an emulated Norbit by hand-typed offsets, its commands, and refusals; without a socket.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -125,7 +125,7 @@ TEST_F(Packets, FaultsFindTheirFields) {
   EXPECT_TRUE(read_column(BytesView(changed).subspan(bathymetry.size())));
 }
 
-/// The driver's end, which gets packets by its ports: 0 the bathymetry, 1 the water column.
+/// The driver's side, which gets packets by port: 0 is the bathymetry, 1 is the water column.
 struct Hosts : Packets {
   void hear(std::size_t port, std::uint32_t number, double at) {
     const Bytes& like = port == 0 ? bathymetry : column;
@@ -212,7 +212,7 @@ TEST_F(Hosts, ShowWhatThereIsWhenAPortIsSilent) {
 }
 
 TEST_F(Hosts, ShowPingsOfOnePortAtOnceWhenTheOtherHasSentNothing) {
-  hear(2, 1, 1);  // a recording has the packets of all ports in one stream
+  hear(2, 1, 1);  // a recording stores the packets of all ports in one stream
   hear(2, 2, 2);
   note(host->on_tick(at_s(2)));
   EXPECT_EQ(take(), "");

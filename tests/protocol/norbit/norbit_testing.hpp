@@ -1,4 +1,4 @@
-// A driver's side for tests: a device to talk to, and a ping of it.
+// A driver's side for tests: a device, and a ping of it.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ inline Ping ping_with(const Settings& settings, const protocol::DeviceState& sta
   return ping;
 }
 
-/// A host at one of the ports; applies its events, as the daemon does.
+/// A host at one of the ports; it applies the device's events, as the daemon does.
 struct Talk {
   explicit Talk(std::uint16_t number = command_port) {
     for (const protocol::Port& port : vendor().ports())

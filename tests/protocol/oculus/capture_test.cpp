@@ -1,4 +1,5 @@
-// Real bytes: three pings of an M1200d in mode 2. They stay outside the repository; the folder is named by SONARD_CAPTURES.
+// Real bytes: three pings of an M1200d in mode 2. They are stored outside the repository, in the folder that SONARD_CAPTURES
+// names.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -94,7 +95,7 @@ TEST_F(Capture, OurBearingsAreTheDevices) {
   EXPECT_EQ(answer(device(), request).bearings_cdeg, pings_[0].bearings_cdeg);
 }
 
-// The captured request through our own device: every computed field is as captured.
+// Our own device gets the captured request: every computed field is equal to the captured one.
 TEST_F(Capture, OurDeviceAnswersTheSameRequestAlike) {
   FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
   request.settings.network_speed = 25;

@@ -24,7 +24,7 @@ std::vector<std::string> violations_after(std::size_t offset, const char* bytes,
   return decoded ? decoded->violations : std::vector<std::string>{"unreadable"};
 }
 
-// Offsets of version 1 and 2 typed from the published layouts.
+// Offsets of versions 1 and 2, typed from the published layouts.
 TEST(Identities, EveryBrokenOneHasItsSentence) {
   ASSERT_THAT(violations_after(0, "53 4F"), IsEmpty());
   ASSERT_THAT(violations_after(0, "53 4F", 2), IsEmpty());
@@ -82,7 +82,7 @@ TEST(Decoder, EveryFlippedHeadByteIsSurvived) {
       flipped[i] ^= static_cast<std::byte>(flip);
       const auto decoded = decode_ping(Exact(flipped).view());
       if (!decoded || !decoded->has_image) continue;
-      std::uint64_t sum = 0;  // touch what it says is there
+      std::uint64_t sum = 0;  // reads every sample that the ping claims to have
       for (std::size_t row = 0; row < decoded->rows(); ++row)
         for (std::size_t beam = 0; beam < decoded->beams(); ++beam) sum += decoded->sample(row, beam);
       EXPECT_LE(sum, std::uint64_t{0xFFFFFFFF} * decoded->rows() * decoded->beams());

@@ -1,4 +1,4 @@
-// One client's conversation: the messages of public clients in any pieces, with junk between, and the replies.
+// One client's conversation: the messages of public clients in any pieces, with other bytes between them, and the replies.
 #include "core/base/random.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
@@ -83,7 +83,7 @@ TEST(Dialogue, UnderstandsEveryPublicClient) {
   }
 }
 
-// The whole way: fire message, dialogue, made-up ping, frame, our decoder; the drivers' comparison must be satisfied at once.
+// The whole way: fire message, dialogue, made-up ping, frame, our decoder. The comparison that drivers make must succeed at once.
 TEST(Dialogue, EchoSatisfiesEveryPublicClient) {
   for (const Client& c : clients) {
     Conversation talk;
@@ -176,7 +176,7 @@ TEST(Dialogue, NoDummyComesWhileARateIsAsked) {
   EXPECT_EQ(talk.dummies(90, 93.05), 3u);
   EXPECT_EQ(talk.fire_at(93.1, PingRate::hz2), 0u);
   EXPECT_EQ(talk.dummies(93.1, 120), 0u);
-  talk.state.settings.reset();  // the sonar is put into its stored state by another hand
+  talk.state.settings.reset();  // another client sets the sonar to its stored state
   EXPECT_GE(talk.dummies(120, 121.05), 1u);
 }
 
@@ -280,7 +280,7 @@ bool greets_at(Conversation& talk, double when_s) {
   return false;
 }
 
-// A client may wait for the text before it fires; those that do not must never see it.
+// A client may wait for the text before it fires; clients that do not wait must never receive it.
 TEST(Dialogue, BootTextGreetsTheSilentOnceByDefault) {
   Conversation waits;
   EXPECT_FALSE(greets_at(waits, 1)) << "a dummy";
@@ -343,7 +343,7 @@ TEST(Dialogue, EveryFlippedByteIsSurvived) {
       Bytes flipped = whole;
       flipped[i] ^= static_cast<std::byte>(flip);
       talk.say(flipped);
-      bool heard = false;  // whatever the flip did, the stream comes back within the largest trusted payload
+      bool heard = false;  // after any flipped bit the stream is in step again within the largest trusted payload
       for (int tries = 0; tries < 60 && !heard; ++tries) heard = !events_of<ChangeSettings>(talk.say(whole)).empty();
       EXPECT_TRUE(heard) << "byte " << i << " flip " << flip;
     }

@@ -1,4 +1,4 @@
-// docs/protocols/oculus.md has every option as the code has it; the page of the evidence names every file with a guess.
+// docs/protocols/oculus.md describes every option as the code has it. The page of evidence lists every file with a guess.
 #include <filesystem>
 #include <fstream>
 

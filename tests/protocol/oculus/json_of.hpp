@@ -1,5 +1,5 @@
-// Any Oculus message as a JSON object by the vendor's names, from the one description of its fields. Used by the golden pairs and
-// by dump_oculus, the program by which tests in other languages compare our decoder.
+// Any Oculus message as a JSON object with the vendor's names, from the one description of its fields. The golden pairs use it,
+// and so does dump_oculus, a program with which tests in other languages check our decoder.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// Every message against bytes typed field by field from the published layouts, in both directions.
+// Compares every message with bytes that were typed field by field from the published layouts, in both directions.
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::tests {

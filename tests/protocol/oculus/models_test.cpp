@@ -1,4 +1,4 @@
-// The product table against the figures of public drivers, typed again.
+// Compares the product table with the figures of public drivers, which were typed a second time.
 #include <set>
 
 #include "protocol/oculus/models.hpp"

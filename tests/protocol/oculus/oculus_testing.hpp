@@ -1,4 +1,4 @@
-// Shared by the Oculus tests: bytes typed by hand, buffers of exact size, a device, and a made-up ping.
+// Shared by the Oculus tests: bytes that were typed by hand, buffers of exact size, a device, and a made-up ping.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -63,7 +63,7 @@ class Exact {
 
 inline Time at(double seconds_since_epoch) { return Time{} + nanoseconds_from(seconds_since_epoch); }
 
-/// A device with all options filled in; fresh water of 15 deg C at 5 m depth unless changed.
+/// A device with all options set, by default in fresh water of 15 deg C at 5 m depth.
 inline protocol::DeviceState device(const char* profile = "oculus-m1200d", const protocol::OptionValues& options = {}) {
   const auto found = protocol::find_profile(profile);
   if (!found) throw std::runtime_error(found.error().text);
@@ -91,7 +91,8 @@ inline FireRequest fire(int version, int mode, PingRate rate, int flags, double 
   return request;
 }
 
-/// Bearings by the law, samples that name their place: code = (row * 7 + beam) modulo 251 in the lowest byte.
+/// The bearings follow the formula of the product. The samples depend on their place: code = (row * 7 + beam) modulo 251 in the
+/// lowest byte.
 inline Ping made_up_ping(const protocol::DeviceState& state, const PingSettings& settings, std::uint32_t number = 1) {
   Ping ping;
   ping.request.model = state.model;

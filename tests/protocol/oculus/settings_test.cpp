@@ -70,7 +70,7 @@ TEST(Laws, GainEcho) {
   const auto echo = [](int mode, int flags, double gain, const char* option) {
     return echoed_gain_percent(fire(0, mode, PingRate::hz10, flags, 5, gain).settings, option);
   };
-  EXPECT_DOUBLE_EQ(echo(2, 0x0D, 50, "auto"), 70);  // ENS undoes 40 + 0.6 g in mode 2
+  EXPECT_DOUBLE_EQ(echo(2, 0x0D, 50, "auto"), 70);  // ENS inverts 40 + 0.6 g in mode 2
   EXPECT_DOUBLE_EQ(echo(2, 0x1D, 50, "auto"), 50);  // BLU expects it verbatim; the capture has 0x19 and 50
   EXPECT_DOUBLE_EQ(echo(1, 0x0D, 50, "auto"), 50);
   EXPECT_DOUBLE_EQ(echo(2, 0x0D, 50, "verbatim"), 50);
@@ -197,7 +197,7 @@ TEST(Settle, ScientificData) {
   EXPECT_EQ(s.format.max_code, 0xFFFFFFFFu);
   EXPECT_FALSE(s.tvg);
   EXPECT_FLOAT_EQ(s.gain_db, 48);
-  request.version = 1;  // the extension does not travel with version 1
+  request.version = 1;  // version 1 does not have the extension
   EXPECT_EQ(settings_of(request, state).format.bits, 16);
 }
 

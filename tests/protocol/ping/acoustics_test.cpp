@@ -1,5 +1,5 @@
-// Pictures of a Ping360, an Omniscan, a Surveyor, a Ping1D and an S500 of bodies at known places, through the whole engine, in
-// closed form.
+// Pings of a Ping360, an Omniscan, a Surveyor, a Ping1D and an S500 with bodies at known places, computed by the whole engine and
+// compared with closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -281,7 +281,7 @@ struct Altimeter {
     sounding = std::make_unique<Sounding>(scene, state.model->modes[0], ping1d::ping_settings(settings));
     sounding->request.switches.noise = true;
   }
-  /// The echo of a ping from there, pitched so far from straight down, once range and gain have settled.
+  /// Returns the echo of a ping from that height, pitched by this angle from straight down, after range and gain have settled.
   ping1d::Echo echo(double x_m = 0, double pitch_rad = 0) {
     ping1d::Echo found;
     for (int i = 0; i < 12; ++i) {
@@ -308,7 +308,7 @@ TEST(Ping1DAcoustics, TheBedIsAtItsDistance) {
       Altimeter altimeter(bed(0, altitude_m, strength_db));
       for (const double x_m : {0.0, 0.1, 0.2, 0.3}) {
         const ping1d::Echo echo = altimeter.echo(x_m * altitude_m);
-        const auto pulse_m = static_cast<double>(altimeter.sounding->request.settings.pulse_width_m);  // at least a point
+        const auto pulse_m = static_cast<double>(altimeter.sounding->request.settings.pulse_width_m);  // at least one point
         EXPECT_NEAR(echo.range_m, altitude_m, 1.5 * pulse_m) << altitude_m << " m, " << strength_db << " dB";
         EXPECT_GE(echo.confidence, 50);
       }
@@ -319,12 +319,12 @@ TEST(Ping1DAcoustics, ATiltedBeamMeasuresToTheNearestGround) {
   for (const double pitch_deg : {0.0, 5.0, 10.0, 15.0, 20.0, 30.0}) {
     Altimeter altimeter(bed(0));
     const ping1d::Echo echo = altimeter.echo(0, rad_from_deg(pitch_deg));
-    EXPECT_NEAR(echo.range_m, 5, 0.1) << pitch_deg;  // its beam is wide enough to hear the ground straight below
+    EXPECT_NEAR(echo.range_m, 5, 0.1) << pitch_deg;  // its beam is wide enough for an echo of the ground straight below
   }
 }
 
 TEST(Ping1DAcoustics, AnotherSoundSpeedScalesTheDistance) {
-  Altimeter altimeter(bed(0), 1350);  // the water has 1500 m/s
+  Altimeter altimeter(bed(0), 1350);  // the speed of sound in the water is 1500 m/s
   EXPECT_NEAR(altimeter.echo().range_m, 4.5, 0.1);
 }
 

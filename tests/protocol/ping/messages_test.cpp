@@ -46,14 +46,15 @@ TEST(PingFrames, AFrameBehindAWrongOneIsFound) {
 TEST(PingFrames, AnyBytesSplitAnywhereLeaveTheNextFrameReadable) {
   std::mt19937 draw(7);
   const Bytes good = general(Id::device_information);
-  constexpr int runs = test::is_sanitized ? 20000 : 1000000;  // there devices_fuzz and hosts_fuzz make up more
+  constexpr int runs = test::is_sanitized ? 20000 : 1000000;  // under sanitizers devices_fuzz and hosts_fuzz try more inputs
   for (int run = 0; run < runs; ++run) {
     Bytes bytes(draw() % 24);
     for (std::byte& b : bytes) {
       static constexpr unsigned char likely[] = {0x42, 0x52, 0x00, 0x06, 0xff};
       b = std::byte{draw() % 2 == 0 ? likely[draw() % 5] : static_cast<unsigned char>(draw())};
     }
-    // A false start may wait for as many bytes as a request has at most: the good one is repeated behind those.
+    // After a false start the device may wait for as many bytes as the longest request has, so the valid request is repeated
+    // after these.
     bytes.insert(bytes.end(), longest_request + header_size + sum_size, std::byte{});
     bytes.insert(bytes.end(), good.begin(), good.end());
     Framer framer;

@@ -47,9 +47,9 @@ Ping profile_with(const Parameters& parameters, int row, int peak, int rows = 8,
 
 TEST(Ping1D, AnswersByTheBytesOfTheDefinitions) {
   Talk talk("ping1d");
-  talk.say(hex("42 52 02 00 06 00 00 00 05 00 a1 00"));  // protocol_version, as the definitions' own example asks for it
-  talk.say(hex("42 52 00 00 b9 04 00 00 51 01"));        // speed of sound is 1203: this is 1209, which no message has
-  talk.say(hex("42 52 00 00 b4 04 00 00 4c 01"));        // range, as older hosts ask: its number, without a payload
+  talk.say(hex("42 52 02 00 06 00 00 00 05 00 a1 00"));  // protocol_version, as in the example of the definitions
+  talk.say(hex("42 52 00 00 b9 04 00 00 51 01"));        // 1209 is the number of no message; speed of sound has 1203
+  talk.say(hex("42 52 00 00 b4 04 00 00 4c 01"));        // range, as older hosts ask: its number without a payload
   ASSERT_EQ(talk.replies.size(), 3u);
   EXPECT_EQ(talk.replies[0], hex("42 52 04 00 05 00 01 00 01 00 00 00 9f 00"));
   EXPECT_EQ(frames_in({talk.replies[1]}).at(0).header.id, Id::nack);
@@ -58,7 +58,7 @@ TEST(Ping1D, AnswersByTheBytesOfTheDefinitions) {
 
 TEST(Ping1D, SettingsAreReadBack) {
   Talk talk("ping1d");
-  Bytes all = setting<std::uint8_t>(Id::ping1d_set_mode_auto, 0);  // in one piece, as a stream may bring them
+  Bytes all = setting<std::uint8_t>(Id::ping1d_set_mode_auto, 0);  // in one piece, as a stream may deliver them
   for (const Bytes& more : {framed_message(Id::ping1d_set_range, 0, ScanRange{500, 4000}),
                             setting<std::uint32_t>(Id::set_sound_speed_before, 1444000),
                             setting<std::uint16_t>(Id::ping1d_set_interval, 36), setting<std::uint8_t>(Id::ping1d_set_gain, 6),
@@ -186,7 +186,7 @@ TEST(Ping1D, AnOverrideIsWhatAHostWouldSet) {
 
 TEST(Ping1DDetector, AnEchoIsWhereItBegins) {
   Parameters p;
-  p.range = {1000, 10000};  // 50 mm a point
+  p.range = {1000, 10000};  // 50 mm for each point
   const Echo echo = find_echo(profile_with(p, 100, 200));
   EXPECT_NEAR(echo.range_m, 1 + 0.05 * 100, 0.026);
   EXPECT_EQ(echo.peak, 200);

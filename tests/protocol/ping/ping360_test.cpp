@@ -140,7 +140,7 @@ TEST(Ping360, AnyNewRequestEndsAScan) {
     talk.say(scan(0, 399));
     talk.run_to(0.05);
     talk.take();
-    talk.apply(talk.dialogue->on_tick(talk.dialogue->next_tick(), false));  // a ping is under way
+    talk.apply(talk.dialogue->on_tick(talk.dialogue->next_tick(), false));  // a ping is in progress
     talk.say(end, 0.06);
     talk.deliver(0.061);
     talk.run_to(5);
@@ -185,7 +185,7 @@ TEST(Ping360, ADatagramHasOneAnswerAndDevicesHaveNone) {
   }
 }
 
-/// Hosts behind a bridge to a serial line send such datagrams.
+/// Hosts send such datagrams through a bridge to a serial line.
 TEST(Ping360, FramesOfADatagramAreAnsweredByOneThatIsLittleLonger) {
   Talk talk("ping360");
   Bytes three = request(Id::set_device_id, hex("09"));
@@ -222,7 +222,7 @@ TEST(Ping360, ItsNumberMayBeSet) {
 TEST(Ping360, APingThatIsNotMadeDoesNotEndAScan) {
   Talk talk("ping360");
   talk.say(scan(0, 399));
-  talk.apply(talk.dialogue->on_tick(at_s(0), false));  // asked for, never delivered
+  talk.apply(talk.dialogue->on_tick(at_s(0), false));  // requested, but never delivered
   talk.run_to(3);
   EXPECT_GT(talk.pings, 10);
 }

@@ -1,4 +1,4 @@
-// A host's side for tests: requests as bytes, and a device to talk to.
+// A host's side for tests: requests as bytes, and a device that answers them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -82,7 +82,7 @@ struct Talk {
       }
     }
   }
-  /// Until then; the time of the last tick.
+  /// Runs every tick until then; returns the time of the last one.
   double run_to(double at, double ping_takes = 0) {
     double last = -1;
     while (dialogue->next_tick() <= at_s(at)) {

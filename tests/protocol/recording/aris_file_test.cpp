@@ -1,4 +1,4 @@
-// .aris files: read back by hand at the vendor's offsets.
+// .aris files; the test reads their fields at the vendor's offsets.
 #include <cstdlib>
 #include <cstring>
 
@@ -71,7 +71,7 @@ Bytes three_frames() {
   return file;
 }
 
-/// Messages read, and the reader's complaint.
+/// The read messages, and the reader's error.
 struct ReadBack {
   std::vector<aris::DecodedFrame> frames;
   std::string damage;

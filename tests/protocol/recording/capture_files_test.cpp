@@ -1,4 +1,5 @@
-// Captures as other programs write them: every link type, segments lost, twice and out of order, both byte orders, pcapng.
+// Captures as other programs write them: every link type; segments that are lost, repeated or out of order; both byte orders;
+// pcapng.
 #include "protocol/ping/messages.hpp"
 #include "protocol/recording/pcap/packets.hpp"
 #include "protocol/recording/pcap/tcp_stream.hpp"
@@ -64,7 +65,7 @@ Bytes pcap_of(const std::vector<Bytes>& frames, std::uint32_t link_type, wire::E
   return file;
 }
 
-/// One message in segments of 100 bytes, and another whole.
+/// One message in segments of 100 bytes, and another one in one segment.
 std::vector<Sent> two_pings(std::uint32_t first = 1) {
   std::vector<Sent> sent;
   const Bytes ping = ping_message(1);
@@ -139,7 +140,7 @@ TEST(CaptureFiles, RetransmittedAndOutOfOrder) {
   std::swap(sent[8], sent[9]);
   sent.insert(sent.begin() + 6, sent[1]);
   sent.insert(sent.begin() + 7, sent[5]);
-  Sent longer = sent[0];  // begins before what is known and ends behind it
+  Sent longer = sent[0];  // begins before the known bytes and ends after them
   longer.payload = longer.payload + two_pings()[1].payload;
   sent.insert(sent.begin() + 1, longer);
   const Told told = read(pcap_of(raw_frames(sent), 101));
@@ -169,7 +170,7 @@ TEST(CaptureFiles, BegunInTheMiddle) {
   std::vector<Sent> sent = two_pings();
   sent.erase(sent.begin(), sent.begin() + 2);
   const std::vector<Bytes> frames = raw_frames(sent);
-  // The sonar is found although its first packet begins no message.
+  // The sonar is found although its first packet is not the start of a message.
   const Told told = read(pcap_of(frames, 101));
   EXPECT_EQ(told.stream, ping_message(2));
   EXPECT_THAT(told.damage, HasSubstr("begins within a message"));
@@ -298,7 +299,7 @@ TEST(CaptureFiles, Pcapng) {
   ASSERT_FALSE(messages.empty());
   EXPECT_EQ(messages[0].at, Time(std::chrono::nanoseconds(at_ns)));
   EXPECT_FALSE(opened->reader->damage());
-  Bytes damaged = file;  // the first packet names an interface that is not there
+  Bytes damaged = file;  // the first packet names a missing interface
   const Bytes first = numbers(little, {{4, 1}, {4, static_cast<std::uint32_t>(at_ns >> 32)}});
   const auto place = std::search(damaged.begin(), damaged.end(), first.begin(), first.end());
   ASSERT_NE(place, damaged.end());

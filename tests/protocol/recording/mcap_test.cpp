@@ -1,5 +1,5 @@
-// MCAP: what a chunk must have beyond what a round trip shows, and the messages for viewers. tests/acceptance/mcap_checker.py,
-// written from the format's description alone, checks whole files.
+// MCAP: properties of chunks that a round trip does not check, and the messages for viewers. tests/acceptance/mcap_checker.py,
+// which was written from the format's description alone, checks whole files.
 #include <nlohmann/json.hpp>
 
 #include "protocol/foxglove/foxglove_messages.hpp"
@@ -40,7 +40,7 @@ Bytes session(const std::vector<RecordedMessage>& messages, bool closed = true) 
 
 TEST(Crc32, KnownAnswer) { EXPECT_EQ(crc32(bytes_of("123456789")), 0xCBF43926u); }
 
-/// Messages by topic. Each topic's are numbered from 0, and its channel names their schema.
+/// Messages by topic. The messages of each topic are numbered from 0, and the channel names their schema.
 std::map<std::string, std::vector<mcap::Message>> by_topic(const Bytes& file) {
   auto reader = mcap::Reader::open(source_from("a file", file));
   std::map<std::string, std::vector<mcap::Message>> found;

@@ -1,4 +1,4 @@
-// Log files byte by byte as others write them.
+// Log files, byte by byte as other programs write them.
 #include <zlib.h>
 
 #include "protocol/recorded/zlib.hpp"
@@ -36,7 +36,7 @@ Bytes log_of(std::initializer_list<Bytes> items) {
   return file;
 }
 
-/// zlib behind the plain length, big-endian: Qt's qCompress.
+/// zlib data after the uncompressed length in big-endian: Qt's qCompress.
 Bytes compressed(const Bytes& plain) {
   std::vector<Bytef> in(plain.size()), out(compressBound(plain.size()));
   std::transform(plain.begin(), plain.end(), in.begin(), [](std::byte b) { return std::to_integer<Bytef>(b); });

@@ -1,4 +1,5 @@
-// The work of a reader of .svlog files, by the bytes that it allocates. A program of its own: it replaces operator new.
+// Measures the work of a reader of .svlog files by the bytes that it allocates. It is a separate program, because it replaces
+// operator new.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -14,7 +15,7 @@ thread_local std::uint64_t allocated_bytes = 0;
 
 }  // namespace
 
-// Every way to the heap of this program: counted. (GCC takes the inlined pair for a mismatch.)
+// Counts every allocation of this program. (GCC wrongly reports the inlined pair as a mismatch.)
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 void* operator new(std::size_t size) {
   allocated_bytes += size;
@@ -37,7 +38,7 @@ Bytes short_log() {
   return file;
 }
 
-/// Each start claims the longest payload: a reader that copies or sums it for each takes hours for a file of a disk.
+/// Each frame start claims the longest payload. A reader that copies or sums it for each start would need hours for a large file.
 TEST(PingLogCost, FalseStartsCostWorkInProportionToTheFile) {
   std::vector<std::uint64_t> costs;
   for (const std::size_t starts : {std::size_t{1} << 15, std::size_t{1} << 17}) {

@@ -1,4 +1,4 @@
-// .svlog files: frames as sent, behind a JSON text.
+// .svlog files: a JSON text, then frames as they were sent.
 #include <gmock/gmock.h>
 
 #include "protocol/ping/messages.hpp"

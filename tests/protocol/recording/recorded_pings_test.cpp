@@ -1,4 +1,4 @@
-// How a host is driven over a recording.
+// A host gets the messages of a recording.
 #include "protocol/recording/recorded_pings.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// Rules of every format: written messages are read again, also from a part of the file, and a full disk does not damage what was
-// written.
+// Rules of every format: written messages can be read again, also from a part of the file, and a full disk does not damage
+// messages that were written before.
 #include "tests/protocol/recording/recording_testing.hpp"
 #include "tests/small_disk.hpp"
 
@@ -48,7 +48,7 @@ TEST_P(EveryFormat, GivesWhatIsReadableOfAFileCutShortAnywhere) {
     }
     const std::vector<RecordedMessage> messages = read_all(*opened->reader);
     ASSERT_LE(messages.size(), written.size());
-    ASSERT_GE(messages.size() + 1, most) << size;  // a longer file never says less, but for the order of the last two
+    ASSERT_GE(messages.size() + 1, most) << size;  // a longer file never has fewer messages, apart from the order of the last two
     for (const RecordedMessage& message : messages) {
       const auto same = [&message](const RecordedMessage& other) {
         return other.bytes == message.bytes && other.from == message.from;

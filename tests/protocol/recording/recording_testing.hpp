@@ -65,7 +65,7 @@ inline Bytes status_message() {
   return wire::bytes_of(status);
 }
 
-/// Two settings, keep-alives, three pings, a status: both ends, both carriers.
+/// Two settings, keep-alives, three pings and a status: messages of both ends, by both transports.
 inline std::vector<RecordedMessage> conversation() {
   using enum Origin;
   using enum Carrier;

@@ -1,4 +1,4 @@
-// The splitter loses no byte that is not part of a broken message, however the stream is cut.
+// For any split of the stream the splitter drops only bytes of broken messages.
 #include "protocol/oculus/host.hpp"
 #include "protocol/ping/messages.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"

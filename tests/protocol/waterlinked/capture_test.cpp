@@ -1,4 +1,5 @@
-// A recording of a real unit, outside the repository: 12 packets are read, and our encoder makes the same content of them.
+// A recording of a real unit, which is stored outside the repository: 12 packets are read, and our encoder writes the same
+// content.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>

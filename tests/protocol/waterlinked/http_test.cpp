@@ -1,4 +1,4 @@
-// The HTTP API: every path, what is refused, releases, what settings mean.
+// The HTTP API: every path, refusals, releases, the meaning of settings.
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
 namespace sonar::waterlinked::tests {

@@ -1,5 +1,5 @@
-// Range images of an emulated Sonar 3D-15 beside those of a real one: traces of the device's beams and filters, which any rough
-// scene shows. They were fitted to shots 1 to 3 of the recording; these are judged by shots 4 to 6.
+// Compares range images of an emulated Sonar 3D-15 with those of a real one, by effects of the device's beams and filters that
+// any rough scene shows. The model was fitted to shots 1 to 3 of the recording; this test compares with shots 4 to 6.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -20,13 +20,14 @@
 namespace sonar::waterlinked::likeness_test {
 namespace {
 
-/// Ranges of a shot, row by row, and strengths as codes; 0 = no return.
+/// The ranges of a shot, row by row, and the strengths as codes; 0 = no return.
 struct Image {
   std::vector<std::uint32_t> range;
   std::vector<double> strength;
 
   std::uint32_t at(int row, int column) const { return range[static_cast<std::size_t>(row * columns + column)]; }
-  /// Share of equal ranges among neighbours in the same row; in the same column, of rows of one block or of two.
+  /// Returns the share of equal ranges among neighbours in the same row, or in the same column within one block or across two
+  /// blocks.
   double equal_across() const {
     return share_of_equal(0, 1, [](int) { return true; });
   }
@@ -36,8 +37,8 @@ struct Image {
   double equal_between_blocks() const {
     return share_of_equal(1, 0, [](int row) { return row % block_rows == block_rows - 1; });
   }
-  /// Correlation of strengths, less their local means, with those in the next column, and in the next row of the same block or of
-  /// another.
+  /// Returns the correlation of strengths, less their local means, with those in the next column, or in the next row of the same
+  /// block or of another one.
   double alike_across() const {
     return strengths_alike(0, 1, [](int) { return true; });
   }
@@ -47,8 +48,8 @@ struct Image {
   double alike_between_blocks() const {
     return strengths_alike(1, 0, [](int row) { return row % block_rows == block_rows - 1; });
   }
-  /// Share of the ranges with eight others round them that are the median of those nine; for independent ranges once filtered so
-  /// 0.45, twice 0.70.
+  /// Returns the share of ranges that are the median of their 3 x 3 neighbourhood, if that is complete. For independent ranges it
+  /// is 0.45 after one such filter and 0.70 after two.
   double medians() const {
     double same = 0, all = 0;
     for_each_inside([&](int row, int column, const std::vector<std::uint32_t>& round) {
@@ -60,8 +61,8 @@ struct Image {
     });
     return same / all;
   }
-  /// Share of pixels without a return of those with at least six of eight round them, whose ranges span at least so much and
-  /// less than so much [m].
+  /// Returns the share of pixels without a return, among those with at least six of eight neighbours whose ranges span from the
+  /// first to below the second limit [m].
   double holes(double least_m, double most_m) const {
     double none = 0, all = 0;
     for_each_inside([&](int row, int column, const std::vector<std::uint32_t>& round) {
@@ -113,7 +114,7 @@ struct Image {
     return over;
   }
   template <class F>
-  void for_each_inside(F f) const {  // not at the edges of blocks; with the ranges round it
+  void for_each_inside(F f) const {  // visits pixels that are not at the edge of a block, with the ranges around them
     for (int row = 0; row < rows; ++row)
       for (int column = 1; column + 1 < columns && row % block_rows != 0 && row % block_rows != block_rows - 1; ++column) {
         std::vector<std::uint32_t> round;
@@ -126,21 +127,21 @@ struct Image {
 };
 
 void expect_like_recording(const Image& image) {
-  EXPECT_GT(image.equal_across(), 0.38);  // 0.49 to 0.51; of the slopes 0.42 and 0.46
+  EXPECT_GT(image.equal_across(), 0.38);  // recording: 0.49 to 0.51; slopes: 0.42 and 0.46
   EXPECT_LT(image.equal_across(), 0.55);
-  EXPECT_GT(image.equal_in_blocks(), 0.35);  // 0.49 to 0.50; 0.40 and 0.43
+  EXPECT_GT(image.equal_in_blocks(), 0.35);  // recording: 0.49 to 0.50; slopes: 0.40 and 0.43
   EXPECT_LT(image.equal_between_blocks(), 0.1);
   EXPECT_GT(image.equal_in_blocks() / image.equal_between_blocks(), 4);
-  EXPECT_GT(image.medians(), 0.65);  // 0.69 to 0.70; 0.82 and 0.84
+  EXPECT_GT(image.medians(), 0.65);  // recording: 0.69 to 0.70; slopes: 0.82 and 0.84
   EXPECT_LT(image.holes(0, 0.004), 0.015);
   EXPECT_NEAR(image.holes(0.016, 0.064), 0.04, 0.025);
   EXPECT_NEAR(image.holes(0.064, 15), 0.08, 0.04);
-  EXPECT_NEAR(image.alike_across(), 0.62, 0.12);     // 0.60 to 0.62; 0.69 and 0.72
-  EXPECT_NEAR(image.alike_in_blocks(), 0.58, 0.12);  // 0.56 to 0.59; 0.66 and 0.67
-  EXPECT_LT(image.alike_between_blocks(), 0.4);      // 0.09 to 0.20; 0.21 and 0.32, of the brightness of the slopes
+  EXPECT_NEAR(image.alike_across(), 0.62, 0.12);     // recording: 0.60 to 0.62; slopes: 0.69 and 0.72
+  EXPECT_NEAR(image.alike_in_blocks(), 0.58, 0.12);  // recording: 0.56 to 0.59; slopes: 0.66 and 0.67
+  EXPECT_LT(image.alike_between_blocks(), 0.4);      // recording: 0.09 to 0.20; slopes: 0.21 and 0.32, from their brightness
 }
 
-/// A rough slope, 2 to 8 m away; beside it, one as it would be without what is fitted to the recording.
+/// A rough slope, 2 to 8 m away; for comparison, the same slope without the effects that are fitted to the recording.
 Image emulated(double relief_m, bool fitted = true) {
   const tests::Unit unit;
   const auto settings = std::make_shared<HeldSettings>(settings_from(unit.device.settings.get(), unit.device));

@@ -1,4 +1,4 @@
-// A device for tests, and requests to it.
+// A device for tests, and the requests to it.
 #pragma once
 
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Writes the golden pairs of this folder: name.bin, laid out by hand with struct, and name.json, the same values by the vendor's
-names. Independent of the C++ code on purpose: it was written from the published layouts."""
+"""Writes the golden pairs of this folder: name.bin, laid out by hand with struct, and name.json, the same values by the
+vendor's names. It is deliberately independent of the C++ code: it was written from the published layouts."""
 import json
 import pathlib
 import struct
