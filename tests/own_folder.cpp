@@ -13,12 +13,12 @@ class OwnFolder {
  public:
   OwnFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "sonard-test-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) return;  // cases then write where GoogleTest says
+    if (::mkdtemp(name.data()) == nullptr) return;  // cases then write to GoogleTest's folder
     path_ = name;
     ::setenv("TEST_TMPDIR", name.c_str(), 1);
   }
   ~OwnFolder() {
-    if (path_.empty() || ::getpid() != owner_) return;  // a child that a death test has made
+    if (path_.empty() || ::getpid() != owner_) return;  // a child process of a death test
     std::error_code ignored;
     std::filesystem::remove_all(path_, ignored);
   }

@@ -1,5 +1,5 @@
-// Imitates a small disk, for tests of code that writes files: the files of this process may not grow any further.
-// Used by the tests of recordings, those of protocol/recording and those inside the daemon.
+// Imitates a small disk, for tests of code that writes files: it limits the size of this process's files.
+// The tests of protocol/recording and of the daemon's recordings use it.
 #pragma once
 
 #include <sys/resource.h>
@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// While it exists, files may grow to this many bytes, as if the disk ended there.
+/// While it exists, no file can grow beyond this number of bytes, as if the disk were full.
 class SmallDisk {
  public:
   explicit SmallDisk(rlim_t bytes) {

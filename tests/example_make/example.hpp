@@ -1,4 +1,5 @@
-// The Example, a make of sonar that tests add to the product's: its folder, as protocol/<make>/, and a row.
+// The Example, a make of sonar that tests add to the product's makes: it has a folder like protocol/<make>/ and a row in the
+// list.
 #pragma once
 
 #include "protocol/host.hpp"

@@ -1,5 +1,5 @@
-// The host and the emulated sonar of every make against each other in virtual time, through every kind of fault that takes effect
-// on such a sonar: the host accepts any bytes, and pings return when the fault is over.
+// The host and the emulated sonar of every make talk in virtual time, during every kind of fault that affects such a sonar: the
+// host accepts any bytes, and pings arrive again after the fault.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ class HostsAndFaults : public testing::TestWithParam<protocol::Make> {};
 INSTANTIATE_TEST_SUITE_P(OfEveryMake, HostsAndFaults, testing::ValuesIn(protocol::makes().begin(), protocol::makes().end()),
                          [](const auto& of) { return std::string(of.param.name()); });
 
-/// Under sanitizers few pings: what they read and alter is the same in each of them.
+/// Few pings under sanitizers, because each ping reads and alters the same data.
 constexpr std::optional<double> rate_hz = test::is_sanitized ? std::optional(2.0) : std::nullopt;
 
 TEST_P(HostsAndFaults, PingsComeAgainAfterEveryFault) {

@@ -1,4 +1,4 @@
-// The driver's end, and the functions for recordings.
+// The driver's side, and the functions for recordings.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// The host and the emulated sonar of a make against each other in virtual time, without sockets: tests and fuzzers of every make.
+// The host and the emulated sonar of a make, which talk in virtual time without sockets: for tests and fuzzers of every make.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using protocol::Bytes;
 using protocol::Make;
 
 inline constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
-inline constexpr std::chrono::milliseconds step = 50ms, patience = 3s;  // patience of a driver, which then connects again
+inline constexpr std::chrono::milliseconds step = 50ms, patience = 3s;  // after `patience` without a ping a driver connects again
 
 inline Config surroundings() {
   Config config;
@@ -59,7 +59,7 @@ inline std::shared_ptr<const Ping> computed(PingRequest request) {
 /// A sonar and a driver that connects again when it loses the connection or gets no ping.
 class Link {
  public:
-  /// With a rate its pings come at that rate, in Hz, where drivers or `sonarctl set sonar` can set one; else at the usual one.
+  /// `rate` sets the ping rate in Hz, if drivers or `sonarctl set sonar` can set it; without it the rate is the usual one.
   explicit Link(const Make& make, std::optional<double> rate_hz = {})
       : make_(make),
         world_(pose_rules(config_), vehicles_of(config_), {}, start),
@@ -98,7 +98,7 @@ class Link {
     perform(sonar.add_faults(*faults, true, now_));
     return true;
   }
-  /// Bytes of any kind from the driver, in all its conversations, and to it.
+  /// Sends arbitrary bytes from the driver, in all its conversations, and to it.
   void to_sonar(protocol::BytesView bytes) {
     for (std::size_t port = 0; port < make_.ports.size(); ++port) send(port, bytes);
     drain();
@@ -165,7 +165,7 @@ class Link {
   void connect() {
     close();
     auto host = make_.host(wanted_);
-    host_ = host ? *std::move(host) : *make_.host({});  // drivers of some set nothing
+    host_ = host ? *std::move(host) : *make_.host({});  // drivers of some makes set nothing
     lost_ = false;
     last_sign_ = now_;
     for (Line& line : lines_) {
@@ -228,7 +228,7 @@ class Link {
     }
   }
 
-  /// Writes all that waits, to the host.
+  /// Writes all waiting messages to the host.
   void drain() {
     std::vector<ConnectionId> ids = streams_;
     for (const Line& line : lines_)

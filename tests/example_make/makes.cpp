@@ -1,4 +1,4 @@
-// In place of protocol/make_list.cpp: the makes of the product and one more.
+// Replaces protocol/make_list.cpp: the makes of the product and one more.
 #include "tests/example_make/example.hpp"
 #include "tests/example_make/messages.hpp"
 

@@ -33,7 +33,7 @@ constexpr void fields(V& visit, M& m) {
   visit("payload", m.payload, means::payload_size);
 }
 
-/// Settings that the host sends. The message `accepted` returns them; `refused` has no payload.
+/// Settings from the host. The message `accepted` returns them; `refused` has no payload.
 struct Settings {
   std::uint32_t range_mm = 10000;
   std::uint16_t rate_centihz = 0;  // 0: standby
@@ -47,7 +47,7 @@ constexpr void fields(V& visit, M& m) {
   visit("gain_percent", m.gain_percent);
 }
 
-/// Behind it a bearing for each beam in 1e-4 rad, to port, 16 bits, and a sample for each row and beam, 8 bits.
+/// It is followed by a bearing to port in 1e-4 rad for each beam (16 bits), and a sample for each row and beam (8 bits).
 struct PingHead {
   std::uint32_t number = 0;
   std::uint64_t fired_us = 0;
@@ -95,9 +95,9 @@ inline std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, 
 }
 inline constexpr recording::Framing framing{{'E', 'X'}, header_size, length_of};
 
-/// The kind of a whole message.
+/// Returns the kind of a whole message.
 inline Kind kind_of(BytesView whole) { return static_cast<Kind>(whole[2]); }
-/// The front of its payload; nothing where it is shorter.
+/// Returns the first part of its payload; empty if the payload is shorter.
 template <class M>
 std::optional<M> payload_of(BytesView whole) {
   M read;

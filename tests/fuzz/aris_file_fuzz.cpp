@@ -1,4 +1,4 @@
-// .aris files of any origin: their frames come out as datagrams of a bounded size.
+// .aris files with any content: the reader returns their frames as datagrams of a bounded size.
 #include "protocol/aris/aris_file.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

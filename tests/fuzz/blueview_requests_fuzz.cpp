@@ -1,4 +1,4 @@
-// Bytes of a host over the BlueView link, in two pieces: no byte may crash the dialogue or make it answer without bound.
+// Bytes of a host over the BlueView link, in two pieces. No input may crash the dialogue or cause unlimited answers.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// A sonar's answer to the BlueView libraries' greeting: the head of a frame, and the description that it carries. First
-// byte odd: a frame, else the bare description. What is accepted is written again as the same bytes.
+// A sonar's answer to the greeting of the BlueView libraries: the header of a frame, and the description in it. If the first byte
+// is odd, the input is a frame, otherwise only the description. An accepted input is encoded to the same bytes.
 #include "clients/bvtsdk/core/description.hpp"
 #include "clients/bvtsdk/core/frame.hpp"
 #include "tests/fuzz/byte_script.hpp"
@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(again.size() == frame_header_size && std::memcmp(again.data(), payload.data, again.size()) == 0);
     payload = {payload.data + frame_header_size, payload.size - frame_header_size};
   }
-  // Exactly as large as it is, so that a sanitizer sees one byte too many.
+  // A buffer of exactly the input's size, so that a sanitizer detects a read beyond it.
   const Bytes exact(payload.data, payload.data + payload.size);
   const auto sonar = decode_description(exact);
   if (!sonar) return 0;

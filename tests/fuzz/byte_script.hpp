@@ -1,5 +1,5 @@
-// Reads a fuzzer's bytes as a script: small numbers and pieces, zero after the end. Also has `require`, by which targets report
-// failures.
+// Reads a fuzzer's bytes as a script of small numbers and pieces; after the end every number is zero. Targets report failures
+// with `require`.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// Input of the HTTP port: requests out of a stream, and their routing. First byte: length of the pieces,
-// second: the policy; the rest is the stream. Whatever the pieces, the requests are the same; nothing passes without its Host,
-// and nothing but /healthz and the files of the page without the token.
+// Input of the HTTP port: requests in a stream, and their routing. The first byte is the length of the pieces, the second one the
+// policy; the rest is the stream. The requests do not depend on the pieces. No request is accepted without its Host, and without
+// the token only /healthz and the files of the page are.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -36,7 +36,7 @@ Taken take(std::span<const std::byte> stream, std::size_t piece) {
   return taken;
 }
 
-/// A socket is opened only to who shows a secret or has an Origin that may look.
+/// A socket is opened only to a client that sends a secret or has an allowed Origin.
 void check_door(const HttpRequest& request, const SocketAction& asked, const HttpPolicy& policy) {
   ControlConfig config;
   config.hosts = {"sonar.example"};
@@ -85,7 +85,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const HttpPolicy policy{data[1] % 2 == 1 ? secret : none, Ipv4{192, 168, 1, 2}, hosts};
   const auto stream = std::as_bytes(std::span(data, size)).subspan(2);
   const Taken whole = take(stream, stream.size()), pieces = take(stream, data[0] + std::size_t{1});
-  require(whole.requests.size() == pieces.requests.size());  // half a request may be refused sooner or later
+  require(whole.requests.size() == pieces.requests.size());  // the time at which half a request is refused may differ
   for (std::size_t i = 0; i < whole.requests.size(); ++i) {
     require(same(whole.requests[i], pieces.requests[i]));
     check(whole.requests[i], policy);

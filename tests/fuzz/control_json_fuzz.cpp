@@ -1,5 +1,5 @@
-// Control requests in JSON, as HTTP carries them: the first line names the operation, and after a colon the sonar or object; the
-// rest is the message. What is accepted goes through protobuf and back; a refusal is one sentence, and not of protobuf.
+// Control requests in JSON, as HTTP sends them. The first line is the operation, and after a colon the sonar or object; the rest
+// is the message. An accepted message is converted to protobuf and back. A refusal is one sentence of our own, not of protobuf.
 #include <cmath>
 #include <string_view>
 

@@ -1,4 +1,4 @@
-// The control stream: lengths, requests, and their contents. First byte = length of the pieces, the rest is the stream.
+// The control stream: lengths, requests, and their contents. The first byte is the length of the pieces; the rest is the stream.
 // Checks that the messages do not depend on the pieces, that accepted ones are usable, and that every request gets an answer.
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ using fuzz::require;
 
 void answer(std::span<const std::byte> message) {
   const auto request = control::decode_request(message);
-  // A message that is skipped without being decoded has no answer that a client could wait for.
+  // No client can wait for the answer to a message that is skipped without being decoded.
   if (control::is_unasked_pose(message))
     require(request ? request->id == 0 && std::holds_alternative<control::PoseSample>(request->op) : request.error().id == 0);
   if (!request) {
@@ -32,7 +32,7 @@ void answer(std::span<const std::byte> message) {
   require(back && (*back)->id() == response.id() && (*back)->status().code() == response.status().code());
 }
 
-/// The messages that come out, and whether the stream ended in an error.
+/// Returns the decoded messages, and true if the stream ended in an error.
 struct Taken {
   std::vector<std::vector<std::byte>> messages;
   bool broken = false;

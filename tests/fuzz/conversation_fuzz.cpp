@@ -1,6 +1,6 @@
-// Whole conversations in virtual time, both vendors: clients come, ask, read slowly and go, in the order that a script of bytes
-// says. First byte: vendor, product and options; second: the outbox and the rules for clients; then commands, a letter and its
-// arguments.
+// Whole conversations in virtual time, with both vendors: clients connect, send requests, read slowly and disconnect, in the
+// order of a script of bytes. The first byte selects vendor, product and options, the second one the outbox and the rules for
+// clients. Commands follow: a letter and its arguments.
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/fire.hpp"
 #include "tests/fuzz/byte_script.hpp"

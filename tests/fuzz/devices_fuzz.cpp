@@ -1,5 +1,5 @@
-// Bytes of a driver to the sonars of every make: each input to each of them, at every port. No byte may crash it, be answered by
-// much more than was sent, or lead to settings that no ping can have.
+// Bytes of a driver to the sonars of every make: each input to each sonar, at every port. No input may crash a sonar, cause an
+// answer that is much longer than the input, or lead to settings that no ping can have.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -38,7 +38,7 @@ void carry_out(std::span<const protocol::Event> events, protocol::DeviceState& d
     }
 }
 
-/// The size of the replies.
+/// Returns the size of the replies.
 std::size_t carry_out(const protocol::Reaction& reaction, protocol::DeviceState& device) {
   carry_out(reaction.events, device);
   std::size_t size = 0;

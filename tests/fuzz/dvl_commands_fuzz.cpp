@@ -1,5 +1,5 @@
-// Bytes of a client to a DVL, in two pieces: no byte may crash its dialogue, lead to settings that no ping can have, or be
-// answered by much more than was sent. The same bytes as a line of the device, and as the pixels of a ping.
+// Bytes of a client to a DVL, in two pieces. No input may crash its dialogue, lead to settings that no ping can have, or cause an
+// answer that is much longer than the input. The same bytes are also used as a line of the device, and as the pixels of a ping.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -41,7 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::size_t answered = 0;
     for (const protocol::BytesView part : {protocol::BytesView(bytes).first(half), protocol::BytesView(bytes).subspan(half)})
       apply(client->on_bytes(part, Time{}), device, answered);
-    require(answered <= 400 * (size + 1));  // an object has two bytes
+    require(answered <= 400 * (size + 1));  // the shortest JSON object has two bytes
     for (int tick = 0; tick < 4; ++tick) apply(client->on_tick(client->next_tick(), false), device, answered);
   }
   dvl::read_line(bytes);

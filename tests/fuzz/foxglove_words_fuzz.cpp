@@ -1,4 +1,5 @@
-// JSON that viewers send: accepted values are within their limits, a refusal is one sentence; both may be sent back as a status.
+// JSON that viewers send. Accepted values are within their limits, and a refusal is one sentence; both can be sent back as a
+// status.
 #include <nlohmann/json.hpp>
 #include <string_view>
 

@@ -1,4 +1,4 @@
-// GeoTIFF as heights, and its keys alone: a changed byte of a file seldom leaves them readable.
+// GeoTIFF as heights, and its keys alone, because the keys of a file with a changed byte are seldom readable.
 #include <cstring>
 
 #include "core/scene/files/geo_keys.hpp"
@@ -6,7 +6,7 @@
 
 namespace {
 
-/// Bytes read as values; what is left at the end is dropped.
+/// Returns the bytes as values; a rest at the end is dropped.
 template <class T>
 std::vector<T> values_of(const std::uint8_t* data, std::size_t size) {
   std::vector<T> values(size / sizeof(T));

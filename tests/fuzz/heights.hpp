@@ -1,4 +1,4 @@
-// Conditions of every grid of heights, read from any format, and that its mesh is sound.
+// Checks conditions of every grid of heights from any format, and that its mesh is valid.
 #pragma once
 
 #include <cmath>
@@ -19,7 +19,7 @@ inline void check(const Mesh& mesh) {
   }
 }
 
-/// Grids of a few thousand heights are made into meshes too.
+/// Grids up to a few thousand heights are converted to meshes, too.
 inline void check(const HeightGrid& grid) {
   require(grid.x.size() >= 2 && grid.y.size() >= 2 && grid.z_m.size() == grid.x.size() * grid.y.size());
   require(2 * grid.z_m.size() <= max_mesh_triangles);

@@ -1,5 +1,5 @@
-// Bytes of a sonar to the hosts of every make: each input to each of them. Pieces: port, length in two bytes, bytes. At a port of
-// kind http a piece is the body of a reply.
+// Bytes of a sonar to the hosts of every make: each input to each host. A piece is a port, a length in two bytes, and bytes. At a
+// port of kind http a piece is the body of a reply.
 #include <cstdlib>
 
 #include "core/image/draw_picture.hpp"

@@ -1,4 +1,5 @@
-// JSON lines with poses, in two pieces. What is accepted is usable; a refusal says why; lines beyond the limit are reported.
+// JSON lines with poses, in two pieces. Accepted poses are usable; a refusal gives the reason; lines beyond the limit are
+// reported.
 #include <cmath>
 
 #include "protocol/control/json_pose.hpp"

@@ -1,6 +1,6 @@
-// Datagrams of MAVLink, one after the other over one link. The first byte chooses the settings; then each two bytes of length are
-// followed by a datagram. Frames of known messages get a right checksum where the input made them otherwise sound, or hardly any
-// mutation would get behind it. All results are usable, for any input.
+// Datagrams of MAVLink, one after another over one link. The first byte selects the settings; then follow a length in two bytes
+// and a datagram, repeatedly. Frames of known messages that are otherwise valid get the right checksum, because hardly any
+// mutation would pass this check. All results are usable, for any input.
 #include <cmath>
 
 #include "protocol/mavlink/mavlink_poses.hpp"
@@ -10,7 +10,7 @@ namespace {
 
 using namespace sonar;
 
-/// Version 2 frames at the start of a datagram, mended.
+/// Corrects the checksums of version 2 frames at the start of a datagram.
 void mend(mavlink::Bytes& datagram) {
   std::size_t at = 0;
   while (at + 12 <= datagram.size() && datagram[at] == std::byte{0xFD}) {
@@ -35,7 +35,7 @@ void judge(const mavlink::Reaction& reaction) {
     fuzz::require(!p.source.empty());
   }
   for (const std::string& r : reaction.refusals) fuzz::require(!r.empty());
-  for (const mavlink::Bytes& reply : reaction.replies) {  // ours are sound
+  for (const mavlink::Bytes& reply : reaction.replies) {  // our own replies are valid
     mavlink::FrameReader frames(reply);
     while (frames.next()) continue;
     fuzz::require(frames.counts().frames + frames.counts().unknown == 1 && frames.counts().junk_bytes == 0);

@@ -1,4 +1,4 @@
-// MCAP files of any origin: every message, and the sonar's among them, which replay paces by their times.
+// MCAP files with any content: every message is read, and replay paces the sonar's messages by their times.
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
@@ -11,7 +11,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (!reader->channels().contains(message->channel) || message->data.size() > size) std::abort();
   auto reader = recording::read_mcap(recording::source_from("input", bytes));
   if (!reader) return 0;
-  const auto pace = std::make_unique<ReplayPace>(1, std::nullopt);  // on the stack GCC 12 takes it for uninitialized
+  const auto pace =
+      std::make_unique<ReplayPace>(1, std::nullopt);  // not on the stack, because GCC 12 would report it as uninitialized
   ReplayPace::Steady::time_point now{}, last{};
   while (const auto message = (*reader)->next()) {
     if (message->bytes.size() > size) std::abort();

@@ -1,7 +1,7 @@
-// Mesh files: PLY, glTF, GLB and COLLADA as they are, when the bytes begin as such a file does, else Wavefront lines made from a
-// script of bytes, with faces whose corners may be nowhere. What comes out is a sound mesh, or a sentence that starts with the
-// file's name. The checks that go before the importer run here; the importer, for files as they are, in its own program as in
-// sonard, because its library does not survive them all; for lines, here. Slow: the importer makes itself anew for each file.
+// Mesh files. Bytes that begin like PLY, glTF, GLB or COLLADA are used as they are; other bytes are a script that gives Wavefront
+// lines, with faces whose corners may not exist. The result is a valid mesh, or a sentence that starts with the file's name. The
+// checks before the importer run in this program. For files the importer runs in its own program, as in sonard, because its
+// library does not survive all of them; for lines it runs here. This is slow, because the importer starts again for each file.
 #include <cstdio>
 #include <string>
 
@@ -44,7 +44,7 @@ void check(const MeshFile& request, const Result<LoadedMesh>& made) {
   fuzz::check(made->centred, made->centred.mesh.triangles.size() + made->centred.left_out);
 }
 
-/// The name that a file which begins so would have; null: none.
+/// Returns the name of a file with this beginning; null: none.
 const char* name_of(std::string_view text) {
   if (text.starts_with("ply")) return "m.ply";
   if (text.starts_with("glTF")) return "m.glb";

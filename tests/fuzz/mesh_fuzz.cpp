@@ -1,5 +1,6 @@
-// The validation of imported meshes. A script of bytes makes corners, some of them no numbers, far, the same or in a line; first
-// byte odd: corners of polygons of any size, cut into triangles first. What comes out is a sound mesh, or a sentence.
+// The validation of imported meshes. A script of bytes makes corners; some are not numbers, are far away, are equal or are in a
+// line. If the first byte is odd, they are corners of polygons of any size, which are first cut into triangles. The result is a
+// valid mesh, or a sentence.
 #include <vector>
 
 #include "core/scene/files/clean_mesh.hpp"

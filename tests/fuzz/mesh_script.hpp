@@ -1,4 +1,4 @@
-// Common parts of the fuzz targets of meshes: coordinates out of a script of bytes, and conditions of every cleaned mesh.
+// Common parts of the fuzz targets of meshes: coordinates from a script of bytes, and conditions of every cleaned mesh.
 #pragma once
 
 #include <cmath>
@@ -8,7 +8,8 @@
 
 namespace sonar::fuzz {
 
-/// Mostly places of a small lattice, so that equal corners and flat triangles are common; some far, some no numbers.
+/// Returns mostly places of a small lattice, so that equal corners and flat triangles are common; some are far away or not
+/// numbers.
 inline double coordinate(Script& script) {
   const std::uint8_t kind = script.byte();
   if (kind < 200) return 0.125 * (kind % 16) - 1;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t longest_input = 8192;
 
-/// Draws of one input.
+/// The random numbers of one input.
 class Dice {
  public:
   explicit Dice(std::uint32_t input) : input_(input) {}
@@ -42,7 +42,7 @@ void overwrite(Input& bytes, std::size_t at, const Input& what) {
   for (std::size_t i = 0; i < what.size() && at + i < bytes.size(); ++i) bytes[at + i] = what[i];
 }
 
-/// A piece of another input, or of this one.
+/// Returns a piece of another input or of this one.
 Input piece_of(const Input& from, Dice& dice) {
   if (from.empty()) return {};
   const std::size_t at = dice.below(from.size()), n = 1 + dice.below(std::min<std::size_t>(64, from.size() - at));

@@ -1,4 +1,4 @@
-// .oculus log files and raw dumps of any origin. A compressed item may hold a message of the largest kind.
+// .oculus log files and raw dumps with any content. A compressed item may contain a message of the maximum size.
 #include "protocol/oculus/host.hpp"
 #include "protocol/oculus/messages.hpp"
 #include "protocol/oculus/oculus_log.hpp"

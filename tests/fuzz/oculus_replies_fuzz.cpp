@@ -1,5 +1,5 @@
-// Bytes of a device, through our driver-side decoder: first byte = length of the pieces, the rest is the stream.
-// Every sample, gain and bearing a decoded ping claims to have is read, so that a sanitizer sees one too many.
+// Bytes of a device to our driver-side decoder. The first byte is the length of the pieces; the rest is the stream. The test
+// reads every sample, gain and bearing that a decoded ping claims to have, so that a sanitizer detects missing ones.
 #include <algorithm>
 #include <cstdlib>
 

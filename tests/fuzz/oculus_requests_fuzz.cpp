@@ -1,5 +1,5 @@
-// Bytes of a client, through a whole Dialogue: first byte = length of the pieces, the rest is the stream.
-// Stops when a setting leaves the model's limits, or when the replies are much longer than the requests.
+// Bytes of a client to a whole Dialogue. The first byte is the length of the pieces; the rest is the stream.
+// Fails if a setting exceeds the model's limits, or if the replies are much longer than the requests.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>

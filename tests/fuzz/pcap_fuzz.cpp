@@ -1,4 +1,4 @@
-// Capture files of any origin: pcap and pcapng, down to the messages of a sonar.
+// Capture files with any content: pcap and pcapng, including the messages of a sonar in them.
 #include "protocol/recording/pcap/pcap.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

@@ -1,4 +1,4 @@
-// Logs of the ping protocol of any origin: their frames come out as they are.
+// Logs of the ping protocol with any content: the reader returns their frames unchanged.
 #include "protocol/ping/ping_log.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

@@ -1,5 +1,6 @@
-// PNG images as heights. First byte p: the rest is the file. P: its checksums are put right first, so that what lies behind them
-// is reached. Anything else: width, height, depth, colour and interlacing by single bytes, then the scan lines, packed here.
+// PNG images as heights. First byte p: the rest is the file. P: its checksums are corrected first, so that the code after the
+// checks is reached. Other values: single bytes give width, height, depth, colour and interlacing; the scan lines follow, and
+// this program packs them.
 #include <zlib.h>
 
 #include <cmath>

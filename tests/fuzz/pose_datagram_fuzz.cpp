@@ -1,4 +1,4 @@
-// Datagrams with poses, in protobuf. What is accepted is usable, and survives the way back.
+// Datagrams with poses, in protobuf. Accepted poses are usable, and the same after encoding and decoding.
 #include <cmath>
 
 #include "protocol/control/control.hpp"
@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::require(std::abs(norm_squared(sample->pose.orientation) - 1) < 1e-9);
   fuzz::require(std::abs(sample->stamp.ns) <= control::largest_stamp_ns);
   const control::Bytes again = control::encode_pose_datagram(*sample);
-  if (again.size() > control::largest_datagram) return 0;  // a name just at the limit
+  if (again.size() > control::largest_datagram) return 0;  // a name at the limit of the length
   const auto back = control::decode_pose_datagram(again);
   fuzz::require(back && back->seq == sample->seq && back->name == sample->name && back->stamp.ns == sample->stamp.ns);
   fuzz::require(length(back->pose.position_m - sample->pose.position_m) <= 1e-9 * (1 + length(sample->pose.position_m)));

@@ -1,5 +1,5 @@
-// Properties of every reader of recordings, for any file: it ends, no message is longer than messages may be, and a
-// second reading gives the same.
+// Properties of every reader of recordings, for any file: it ends, no message exceeds the maximum size, and a second reading
+// gives the same messages.
 #pragma once
 
 #include <cstdlib>
@@ -19,7 +19,7 @@ struct ReadThrough {
   bool damaged = false;
   bool operator==(const ReadThrough&) const = default;
 };
-/// `most_bytes` may come out of the file.
+/// The reader may return at most `most_bytes`.
 inline ReadThrough read_through(recording::RecordingReader& reader, std::uint64_t most_bytes) {
   ReadThrough read;
   while (const auto message = reader.next()) {

@@ -1,5 +1,5 @@
-// Stands in for libFuzzer's main in ordinary builds: runs a fuzz entry point over no bytes, over its seeds, and over inputs made
-// from them and from the dictionary, always the same ones.
+// Replaces libFuzzer's main in ordinary builds: runs a fuzz entry point with no bytes, with its seeds, and with inputs made from
+// them and from the dictionary. These inputs are the same in every run.
 // usage: NAME_fuzz [-runs=N] [-dict=FILE] [-only=NUMBER] [seed files and folders]
 #include <signal.h>
 #include <unistd.h>
@@ -52,7 +52,7 @@ void add_seeds(const std::filesystem::path& path, std::vector<Input>& seeds) {
   for (const auto& file : files) seeds.push_back(contents_of(file));
 }
 
-// ---- which input it was, when one ends the program
+// ---- report of the input that ended the program
 
 char last_words[64];
 std::size_t last_words_size = 0;
@@ -71,7 +71,7 @@ void on_signal(int number) {
 }
 
 void run(const Input& input) {
-  // Exactly as large as it is, so that a sanitizer sees one byte too many.
+  // A buffer of exactly the input's size, so that a sanitizer detects a read beyond it.
   const Input exact(input);
   LLVMFuzzerTestOneInput(exact.data(), exact.size());
 }

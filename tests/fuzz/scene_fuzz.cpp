@@ -1,5 +1,5 @@
-// Scene files by fuzzing: whatever the text, the answer is a scene or a sentence that starts with the file's name.
-// Short texts, with no files beside them.
+// Scene files with any text: the result is a scene or a sentence that starts with the file's name.
+// Short texts, without other files.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

@@ -1,6 +1,6 @@
-// Gazebo worlds and URDFs by fuzzing: whatever the text, the answer is a world or a sentence that starts with the file's name,
-// and what is written of a world is a scene that loads. Includes find the text itself, so that circles and floods of them are
-// tried.
+// Gazebo worlds and URDFs with any text: the result is a world or a sentence that starts with the file's name, and the scene file
+// written from a world can be loaded. Includes refer to the text itself, so that circles and large numbers of includes are
+// tested.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -16,7 +16,7 @@ using sonar::scene_tools::ImportedWorld;
 using sonar::scene_tools::PlacedShape;
 using sonar::scene_tools::Shape;
 
-/// Few enough and small enough to be made into triangles ten thousand times.
+/// Few and small enough to be converted to triangles ten thousand times.
 bool is_quick(const ImportedWorld& world) {
   if (world.shapes.size() > 8) return false;
   for (const PlacedShape& placed : world.shapes) {

@@ -6,7 +6,7 @@
 
 namespace sonar::fuzz {
 
-/// Checks every connection: pings offered are written, dropped, waiting, or the one being written.
+/// Checks for every connection that each offered ping is written, dropped, waiting, or being written.
 inline void check_accounts(const Sonar& sonar) {
   for (const Connection& c : sonar.connections().all()) {
     const Outbox& box = c.outbox;

@@ -16,12 +16,12 @@ using namespace std::chrono_literals;
 using protocol::Bytes;
 using protocol::BytesView;
 
-constexpr std::size_t largest_framed = 8u << 10;  // bytes of a BlueView ping that is really framed: a thousand runs a second
+constexpr std::size_t largest_framed = 8u << 10;  // largest BlueView ping that is really framed, for a thousand runs a second
 constexpr int most_rows = 2;                      // rows of an Oculus ping, for the same reason
-constexpr auto longest_silence = 1h;              // until the next tick
+constexpr auto longest_silence = 1h;              // limit of the time until the next tick
 constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
 
-/// A ping's payload for a BlueView host, of one sample.
+/// The payload of a ping with one sample, for a BlueView host.
 Bytes smallest_polar_ping(std::uint32_t number) {
   bvt::PolarPing ping;
   ping.number = number;
@@ -34,7 +34,7 @@ Bytes smallest_polar_ping(std::uint32_t number) {
   return out;
 }
 
-/// The vendor itself, but for large pings.
+/// Calls the vendor, except for large pings.
 class SmallPings final : public protocol::DelegatingVendor {
  public:
   using DelegatingVendor::DelegatingVendor;
@@ -119,7 +119,7 @@ void SonarClients::connect(std::size_t place, Role role) {
 
 void SonarClients::receive(std::size_t place, BytesView bytes) {
   if (!clients_[place] || !clients_[place]->served) return;
-  // Exactly as large as it is, so that a sanitizer sees one byte too many.
+  // A buffer of exactly the input's size, so that a sanitizer detects a read beyond it.
   const std::vector<std::byte> exact(bytes.begin(), bytes.end());
   perform(sonar_.on_bytes(clients_[place]->id, exact, now_));
 }
@@ -128,13 +128,13 @@ void SonarClients::tick(std::size_t place) {
   if (!clients_[place]) return;
   const Connection* const connection = sonar_.connections().find(clients_[place]->id);
   const auto next = connection->next_tick();
-  if (!next || *next == Time::max()) return;  // nothing until bytes or a ping come
+  if (!next || *next == Time::max()) return;  // no event before bytes or a ping arrive
   require(*next <= now_ + longest_silence);
   now_ = std::max(now_, *next);
   tick_all_due();
 }
 
-/// A conversation that is ticked when it is due soon requests a later time; else the daemon would spin.
+/// After its tick a conversation must soon request a later time; otherwise the daemon would loop without pause.
 void SonarClients::tick_all_due() {
   for (int n = 0;; ++n) {
     perform(sonar_.on_tick(now_));
@@ -155,7 +155,7 @@ void SonarClients::wait(std::chrono::nanoseconds time) {
     now_ = std::max(now_, *next);
     tick_all_due();
   }
-  now_ = until;  // the rest at once, as after SIGSTOP and SIGCONT
+  now_ = until;  // all events at once, as after SIGSTOP and SIGCONT
   tick_all_due();
 }
 
@@ -171,7 +171,7 @@ void SonarClients::fire() {
   perform(sonar_.on_ping({.ping = ping, .seconds = 0.01}, now_));
 }
 
-/// The next piece of what is being written; false when there is nothing.
+/// Sets the next piece of the message that is being written; false if there is none.
 bool SonarClients::write_piece(Client& client, std::size_t& bytes) {
   if (!client.writing) {
     client.writing = sonar_.next_message(client.id, now_);

@@ -1,5 +1,5 @@
-// One emulated sonar and up to three clients in virtual time: the product's Sonar, driven without sockets, with clients that read
-// at their own pace, and everything that must hold between them. conversation_fuzz.cpp drives it by a script of bytes.
+// One emulated sonar and up to three clients in virtual time: the product's Sonar without sockets, clients that read at their own
+// pace, and all conditions that must hold between them. conversation_fuzz.cpp runs it with a script of bytes.
 #pragma once
 
 #include <array>
@@ -13,12 +13,12 @@
 
 namespace sonar::fuzz {
 
-/// Decodes a client's stream by the driver's side of its vendor: whole messages only, pings in rising order.
+/// Decodes a client's stream with the driver's side of its vendor: only whole messages, and pings in ascending order.
 class StreamReader {
  public:
   virtual ~StreamReader() = default;
   virtual void read(protocol::BytesView bytes) = 0;
-  /// Whether no part of a message is left over.
+  /// True if no part of a message is left.
   virtual bool at_a_message_end() const = 0;
 };
 std::unique_ptr<StreamReader> oculus_reader();
@@ -28,18 +28,18 @@ class SonarClients {
  public:
   static constexpr std::size_t places = 3;
 
-  /// `sonar` without a vehicle of its own: it rests 3 m deep.
+  /// `sonar` must have no vehicle: it rests at 3 m depth.
   explicit SonarClients(SonarConfig sonar);
 
   void connect(std::size_t place, Role role = Role::client);
   void receive(std::size_t place, protocol::BytesView bytes);  // from the client
   void tick(std::size_t place);                                // at its next tick, which may be later than now
-  void wait(std::chrono::nanoseconds time);                    // whatever falls due on the way is done, up to a bound
-  void fire();                                                 // the engine is done with a ping
-  void write(std::size_t place, std::size_t bytes);            // the client reads that many
-  void finish(std::size_t place);                              // as when its peer is silent
+  void wait(std::chrono::nanoseconds time);                    // events that become due in this time are handled, up to a bound
+  void fire();                                                 // the engine has finished a ping
+  void write(std::size_t place, std::size_t bytes);            // the client reads this number of bytes
+  void finish(std::size_t place);                              // as after a silence of its peer
   void disconnect(std::size_t place);
-  /// The sonar stops; all clients read the rest and disconnect; nothing may be missing.
+  /// Stops the sonar; all clients read the rest and disconnect. No message may be missing.
   void end();
 
  private:
@@ -47,7 +47,7 @@ class SonarClients {
     ConnectionId id = 0;
     bool served = false, finishing = false;
     std::unique_ptr<StreamReader> reader;
-    Outbox::Message writing = {};  // and how far it got: bytes of its copy number `part`
+    Outbox::Message writing = {};  // `part`: index of the copy; and the written bytes of it
     std::size_t part = 0, done = 0;
   };
   void perform(Actions actions);

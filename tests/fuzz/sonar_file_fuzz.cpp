@@ -1,4 +1,4 @@
-// .sonar files of any origin: their packets come out whole, wherever the search for the next one begins.
+// .sonar files with any content: the reader returns whole packets, wherever the search for the next one begins.
 #include "protocol/waterlinked/sonar_file.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

@@ -1,4 +1,4 @@
-// The drivers' sides of a conversation under fuzzing: Oculus by our decoder, the BlueView link by the libraries' own.
+// The drivers' sides of a conversation under fuzzing: our decoder for Oculus, and the decoder of the BlueView libraries.
 #include <cstring>
 
 #include "clients/bvtsdk/core/description.hpp"
@@ -54,7 +54,7 @@ class BlueViewReader final : public StreamReader {
     if (header.type == bvt::FrameType::hello_ok) require(bvt::decode_description(payload).has_value());
     if (header.type != bvt::FrameType::ping_data) return;
     const auto ping = bvt::decode_ping(payload);
-    require(ping && ping->number >= last_);  // a host with several triggers gets the ping as often
+    require(ping && ping->number >= last_);  // a host with several triggers gets the same ping several times
     last_ = ping->number;
   }
   bvt::Bytes buffer_;

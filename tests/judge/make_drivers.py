@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Small drivers of several makes, each with decoders of its own: the judge must find nothing in them without a plant.
+"""Small drivers of several makes, each with its own decoders. Without a planted fault the judge must find no fault in them.
 
 usage: make_drivers.py MAKE ADDRESS PORT [PLANT]
 MAKE: aris, blueview, dvl, m3, micron, norbit, omniscan, ping1d, ping360, s500, surveyor, waterlinked
@@ -17,7 +17,7 @@ SILENT_S = 1.5
 
 
 class Stream:
-    """Whole numbers of bytes of a TCP connection, or of datagrams one behind the other."""
+    """Reads exact numbers of bytes from a TCP connection, or from successive datagrams."""
 
     def __init__(self, address, port, kind=socket.SOCK_STREAM):
         self.socket = socket.socket(socket.AF_INET, kind)
@@ -36,7 +36,7 @@ class Stream:
         return taken
 
     def until(self, mark):
-        """Up to a mark, which is not part of it."""
+        """Reads up to a mark, which is not returned."""
         while (at := self.data.find(mark)) < 0:
             have = len(self.data)
             self.data[:0] = self.take(have + 1)
@@ -45,7 +45,7 @@ class Stream:
 
 
 def m3(address, port):
-    """(number or None, samples, mirrored samples) of each ping, as every function below."""
+    """Yields (number or None, samples, mirrored samples) of each ping, like every function below."""
     sonar = Stream(address, port)
     while True:
         sonar.until(b"\x00\x80" * 4 + b"\x02\x10")
@@ -85,7 +85,7 @@ def micron(address, port):
         sonar.until(b"@")
         size = int(sonar.take(4), 16) + 1
         frame = sonar.take(size)
-        if frame[5] == 4:  # a head that sends no lines; bit 7: it has parameters
+        if frame[5] == 4:  # a head that sends no scan lines; bit 7: it has parameters
             if not frame[8 + 7] & 0x80:
                 send(19, head)
             send(25, bytes(4))
@@ -95,7 +95,8 @@ def micron(address, port):
 
 
 def ping_family(sonar, requests, data, number_at, front, item=1):
-    """Sends requests and reads the messages `data`: a number at `number_at`, and after `front` bytes items that can be turned around."""
+    """Sends requests and reads the messages `data`: a number at `number_at`, and after `front` bytes the items that can be
+    mirrored."""
     for kind, payload in requests:
         body = b"BR" + struct.pack("<HHBB", len(payload), kind, 0, 0) + payload
         sonar.send(body + struct.pack("<H", sum(body) & 0xFFFF))
@@ -160,7 +161,7 @@ def blueview(address, port):
     at = 2
     for _ in range(4):
         at += 2 + int.from_bytes(greeting[at:at + 2], "little")
-    head = greeting[at + 9:at + 13]  # the id of the first one
+    head = greeting[at + 9:at + 13]  # the id of the first head
     asked = time.monotonic()
     send(4, head + bytes(4))
     while True:
@@ -187,7 +188,7 @@ def varint(data, at):
 
 
 def message(data):
-    """The fields of a protobuf message, the last of each number."""
+    """Returns the fields of a protobuf message; of fields with equal numbers the last one."""
     found, at = {}, 0
     while at < len(data):
         key, at = varint(data, at)
@@ -319,7 +320,7 @@ def main():
                     continue
                 seen = number, samples
                 found = {"crc32": zlib.crc32(mirrored if plant == "mirrors" and is_planted else samples)}
-                if not plant and number is not None:  # the judge wants 20 consecutive numbers
+                if not plant and number is not None:  # the judge requires 20 consecutive numbers
                     found["id"] = number
                 print(json.dumps(found), flush=True)
         except (OSError, ValueError, IndexError, KeyError, struct.error) as problem:

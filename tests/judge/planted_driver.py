@@ -88,7 +88,7 @@ class LeaksDescriptor(Driver):
 
 
 class GluesPings(Driver):
-    """Keeps the head of a ping when the connection ends, and appends the bytes of the next connection to it."""
+    """Keeps the first part of a ping when the connection ends, and appends the bytes of the next connection to it."""
 
     def connect(self):
         sonar = socket.create_connection((self.address, self.port), timeout=right_driver.CONNECT_S)
@@ -165,7 +165,7 @@ class NeverTimesOut(Driver):
 
 
 class RepeatsLastPing(Driver):
-    """Publishes the last ping again while none arrives."""
+    """Publishes the last ping again while no ping arrives."""
     last = None
 
     def connect(self):

@@ -14,8 +14,8 @@ import zlib
 HEADER, FIRE = struct.Struct("<2sHHHHIH"), struct.Struct("<BBBBBdddd")
 MAGIC, FIRE_ID, PING_ID, DUMMY_ID = b"SO", 0x15, 0x23, 0xFF
 RESULT = {1: (53, struct.Struct("<IIddddIBdHHIII")), 2: (89, struct.Struct("<IIddddddddBdHH4IIII"))}  # after the fire message
-LONGEST = 4 << 20      # no ping of any product is longer
-SILENT_S = 1.5         # 15 periods without a ping: the connection is made anew
+LONGEST = 4 << 20      # no product has longer pings
+SILENT_S = 1.5         # after 15 periods without a ping the driver connects again
 CONNECT_S = 2.0
 
 
@@ -26,7 +26,7 @@ def fire_message():
 
 
 def sizes_of(head, version):
-    """(number, rows, beams, bytes of a sample, gains, offset, image bytes, message bytes) of a ping."""
+    """Returns (number, rows, beams, bytes of a sample, gains, offset, image bytes, message bytes) of a ping."""
     at, form = RESULT[2 if version == 2 else 1]
     f = form.unpack_from(head, at)
     number, width = f[0], f[7 if version < 2 else 10] + 1
@@ -35,7 +35,7 @@ def sizes_of(head, version):
 
 
 class Stream:
-    """Finds whole pings in the bytes of one connection, whatever is between them."""
+    """Finds whole pings in the bytes of one connection, with any bytes between them."""
 
     def __init__(self):
         self.data, self.skipped = bytearray(), 0
@@ -58,7 +58,7 @@ class Stream:
                 yield ping
 
     def message(self):
-        """(bytes to go on by, ping or None); 0 bytes: wait for more."""
+        """Returns (bytes to skip, ping or None); 0 bytes: wait for more."""
         data = self.data
         if len(data) < HEADER.size:
             return 0, None
@@ -98,7 +98,7 @@ class Driver:
         self.asked_again = 0.0
 
     def log(self, text):
-        """One line a second of each kind."""
+        """Logs at most one line a second of each kind."""
         now = time.monotonic()
         if now - self.last_log.get(text[:20], -9) >= 1:
             self.last_log[text[:20]] = now
@@ -114,7 +114,7 @@ class Driver:
         return sonar
 
     def publish(self, ping):
-        """Prints a ping unless it was the last one published: a sonar that repeats itself says nothing new."""
+        """Prints a ping unless it was the last one published: a repeated ping has no new data."""
         settings = ping.pop("settings")
         if (ping["id"], ping["crc32"]) != self.seen:
             self.seen = ping["id"], ping["crc32"]

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """A correct driver of the ping protocol by UDP. The judge must find no fault in it.
 
-usage: right_ping_driver.py ADDRESS PORT [PERIOD_MS]     a Ping1D's profiles: a tap line for each, and a log on standard error
+usage: right_ping_driver.py ADDRESS PORT [PERIOD_MS]     reads the profiles of a Ping1D; prints a tap line for each, and a log on
+standard error
 """
 import json
 import socket
@@ -10,7 +11,7 @@ import sys
 import zlib
 
 PROFILE, SET_MODE_AUTO, SET_INTERVAL, CONTINUOUS_START = 1300, 1003, 1004, 1400
-SILENT_S = 0.8  # 8 periods: everything is requested anew
+SILENT_S = 0.8  # after 8 periods without a profile all settings are requested again
 
 
 def frame(number, payload):
@@ -19,7 +20,7 @@ def frame(number, payload):
 
 
 def profiles(datagram):
-    """(number of the ping, payload) of each undamaged profile in a datagram."""
+    """Yields (number of the ping, payload) of each undamaged profile in a datagram."""
     at = 0
     while 0 <= (at := datagram.find(b"BR", at)) <= len(datagram) - 10:
         length, number = struct.unpack_from("<HH", datagram, at + 2)

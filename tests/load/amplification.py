@@ -1,7 +1,8 @@
-"""Measures what each emulated sonar sends after one datagram whose sender may be forged: the figures of
-tests/reliability/README.md, "Datagrams with a forged sender". By hand: SONARD_BUILD=build/release python3 tests/load/amplification.py [SECONDS]
+"""Measures how much each emulated sonar sends after one datagram whose sender may be forged: the figures of
+tests/reliability/README.md, "Datagrams with a forged sender". By hand: SONARD_BUILD=build/release python3
+tests/load/amplification.py [SECONDS]
 
-The sender's port stays open and silent, which is the worst case: a closed one ends a stream at once.
+The sender's port stays open and silent, which is the worst case: a closed port ends a stream at once.
 """
 import pathlib
 import socket
@@ -25,7 +26,7 @@ def request(number):
     return frame(6, struct.pack("<H", number))
 
 
-# profile, what is asked, port, datagram
+# profile, request, port, datagram
 ASKED = [
     ("oculus-m1200d", "anything", 52102, b"\0" * 16),
     ("blueview-p900-90", "discovery", 14751, b"BVE?" + struct.pack("<H", 1)),
@@ -45,7 +46,7 @@ ASKED = [
 
 
 def measured(profile, port, datagram):
-    """(bytes of the answers, datagrams, seconds until the last)"""
+    """Returns (bytes of the answers, datagrams, seconds until the last)."""
     with Sonard(profile=profile, scene="demo.yaml") as daemon, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         stranger.bind(("127.0.0.1", 0))
         stranger.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 8 << 20)

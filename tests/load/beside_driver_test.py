@@ -1,5 +1,5 @@
-"""The effect on a driver of viewers of the live view, of faults at another sonar, and of hosts of the UDP families, whose pings are
-all accounted for. --quick takes 3 s a case instead of 60."""
+"""Tests that viewers of the live view, faults at another sonar, and hosts of the UDP families do not disturb a driver, and that
+all pings of these hosts are accounted for. --quick takes 3 s for each case instead of 60 s."""
 import contextlib
 import json
 import pathlib
@@ -37,7 +37,7 @@ def keep(item, figure, bound, good):
 
 
 def numbers_of(client, seconds):
-    """Of the pings that come in that time."""
+    """Returns the numbers of the pings that arrive in this time."""
     end, numbers = time.monotonic() + seconds, []
     while time.monotonic() < end or not numbers:
         numbers.append(next_ping(client)[0])
@@ -56,7 +56,7 @@ def ask(daemon, path, body=None):
 
 
 def figures(daemon):
-    """{"NAME{LABELS}": value} of /metrics."""
+    """Returns {"NAME{LABELS}": value} of /metrics."""
     lines = (line for line in ask(daemon, "/metrics").splitlines() if not line.startswith("#"))
     return {name: float(value) for name, value in (line.rsplit(" ", 1) for line in lines)}
 
@@ -84,7 +84,7 @@ class BesideADriver(unittest.TestCase):
         self.assertEqual(lost, 0)
 
     def test_faults_that_come_and_go(self):
-        """Of another client's connection; the driver's own stays."""
+        """The faults act on the connection of another client; the driver's own connection stays."""
         with tempfile.TemporaryDirectory() as folder:
             journal = pathlib.Path(folder) / "journal.jsonl"
             with Sonard(trajectory="orbit", mount=EIGHT_CLIENTS, arguments=("--faults", "--fault-journal", str(journal))) as daemon, \

@@ -1,5 +1,5 @@
 """Clients use up all file descriptors: a running stream continues, new clients get a FIN, the log reports it once, and all is as
-before when they have gone. Uses the shipped program with a lowered limit; --quick does the same for a shorter time."""
+before after they have disconnected. Uses the shipped program with a lowered limit; --quick takes a shorter time."""
 import pathlib
 import resource
 import select
@@ -22,7 +22,7 @@ PROFILE = "oculus-m1200d\n    clients: {max: 16, when_full: queue}"
 
 
 class Neighbour(threading.Thread):
-    """Reads pings until told to stop, and notices when one is missing."""
+    """Reads pings until it is stopped, and detects missing ones."""
 
     def __init__(self, client):
         super().__init__()
@@ -39,7 +39,7 @@ class Neighbour(threading.Thread):
                     self.missing += number - self.last - 1
                 self.last = number
                 self.pings += 1
-        except Exception as fault:  # told by the test
+        except Exception as fault:  # the test reports it
             self.fault = fault
 
 
@@ -51,7 +51,7 @@ def visit(endpoint):
 
 
 def is_sent_away(endpoint):
-    """A FIN and no byte."""
+    """Returns true if the daemon sends a FIN and no byte."""
     with visit(endpoint) as newcomer:
         return newcomer.recv(1) == b""
 
@@ -67,7 +67,7 @@ class Descriptors(unittest.TestCase):
             data, poses = (daemon.address, 52100), (daemon.address, 14771)
             visitors = [visit(data) for _ in range(60)]
             deadline = time.monotonic() + 60
-            while "file descriptors" not in daemon.log():  # first the clients: they keep theirs
+            while "file descriptors" not in daemon.log():  # the clients connect first and keep their descriptors
                 self.assertLess(time.monotonic(), deadline, daemon.log())
                 time.sleep(0.05)
             visitors += [visit(poses) for _ in range(60)]
@@ -86,7 +86,7 @@ class Descriptors(unittest.TestCase):
             neighbour.join(60)
             self.assertIsNone(neighbour.fault)
             self.assertEqual(neighbour.missing, 0)
-            with Client(daemon.address) as later:  # a place, and a descriptor, is free again
+            with Client(daemon.address) as later:  # a slot and a descriptor are free again
                 readable, _, _ = select.select([later.socket], [], [], 60)
                 self.assertTrue(readable)
                 self.assertNotEqual(later.socket.recv(1), b"")
@@ -120,7 +120,7 @@ class Descriptors(unittest.TestCase):
             resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (64, 64))
             strangers = [visit((daemon.address, port)) for port in (14770, 8088, 14771) for _ in range(33)]
             deadline = time.monotonic() + 60
-            while not self.is_pinged(daemon.address):  # while strangers still arrive it may be sent away, and comes again
+            while not self.is_pinged(daemon.address):  # while strangers still connect, it may be refused; then it connects again
                 self.assertLess(time.monotonic(), deadline, daemon.log())
             with urllib.request.urlopen(f"http://{daemon.address}:8088/healthz", timeout=20) as answer:
                 self.assertEqual(answer.read(), b"ok\n")

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The load tests in full length, about ten minutes on a machine that does nothing else; figures go where SONARD_RELIABILITY says.
+# The load tests in full length, about ten minutes on an idle machine; the figures are written to the folder SONARD_RELIABILITY.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh

@@ -1,4 +1,4 @@
-// Common parts of the load tests: how long they run, and how their figures are kept.
+// Common parts of the load tests: their duration, and the storage of their figures.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,9 +15,9 @@
 
 namespace sonar::load {
 
-/// A few seconds each, with the same assertions but those that only hold on a quiet machine; set by --quick.
+/// --quick sets this: each test takes a few seconds, with the same assertions apart from those that hold only on a quiet machine.
 inline bool quick = false;
-inline constexpr std::chrono::seconds patience{20};          // for anything that must happen
+inline constexpr std::chrono::seconds patience{20};          // time limit of every expected event
 inline constexpr bool memory_is_ours = !test::is_sanitized;  // a sanitizer keeps what was freed
 
 using text::format;
@@ -32,7 +32,7 @@ inline void keep(const std::string& item, const std::string& figure, const std::
   EXPECT_TRUE(test::record_reliability({item, figure, bound, passed, command}));
 }
 
-/// Accounts of every sonar must balance when it has stopped, whatever its clients did.
+/// The accounts of every sonar must balance after it has stopped, for any behaviour of its clients.
 inline void expect_accounts_balance(const DeviceFigures& f) {
   EXPECT_LE(f.pings + f.skipped_ticks, f.ticks);
   EXPECT_LE(f.ticks, f.pings + f.skipped_ticks + 1) << "a ping may be under way at the stop";

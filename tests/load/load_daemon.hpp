@@ -1,5 +1,5 @@
-// A whole daemon in a thread of this process, with pings made beforehand and as many sonars as asked for, each on an address of
-// its own. Its header does not include Asio, so that the tests compile quickly.
+// A whole daemon in a thread of this process, with premade pings and the requested number of sonars, each on its own address. Its
+// header does not include Asio, so that the tests compile quickly.
 #pragma once
 
 #include <memory>
@@ -12,8 +12,8 @@ namespace sonar::load {
 
 struct LoadSetup {
   int sonars = 1;
-  std::string sonar_lines;  // more keys of every sonar: "    clients: {max: 4}\n"
-  std::string more;         // more sections
+  std::string sonar_lines;  // further keys of every sonar: "    clients: {max: 4}\n"
+  std::string more;         // further sections
 };
 
 class LoadDaemon {
@@ -24,7 +24,7 @@ class LoadDaemon {
   /// The address of poses and control: UDP 14770 and 14771, TCP 14770 (control stream), 14771 (JSON poses) and 8088 (HTTP).
   const std::string& pose_address() const { return address(0); }
   int stop();
-  /// After stop().
+  /// Only after stop().
   DeviceFigures figures(std::size_t sonar = 0) const;
   std::string log_text() const;
 

@@ -34,7 +34,7 @@ def seeds_of(profile):
 
 
 def resealed(message):
-    """Frames of the Ping protocol with the sum that belongs to them."""
+    """Yields frames of the Ping protocol with their correct checksums."""
     out, at = bytearray(message), 0
     while at + 10 <= len(out) and out[at:at + 2] == b"BR":
         end = at + 8 + struct.unpack_from("<H", out, at + 2)[0]
@@ -64,7 +64,7 @@ def mutated(message, chance):
 
 
 class Stranger:
-    """Connections to one port, one after another."""
+    """Makes connections to one port, one after another."""
 
     def __init__(self, profile, address, port, kind):
         self.place, self.kind, self.seeds = (address, port), kind, seeds_of(profile)
@@ -95,7 +95,7 @@ class Stranger:
 
 
 def memory_of(process):
-    """{"VmRSS": kB, "RssAnon": kB}"""
+    """Returns {"VmRSS": kB, "RssAnon": kB}."""
     lines = pathlib.Path(f"/proc/{process.pid}/status").read_text(encoding="ascii").splitlines()
     return {name: int(value.split()[0]) for name, value in (line.split(":", 1) for line in lines) if name in ("VmRSS", "RssAnon")}
 

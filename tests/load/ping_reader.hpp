@@ -1,4 +1,4 @@
-// Reads many sockets in one thread, as drivers would, and compares every ping with the one that was made.
+// Reads many sockets in one thread, as drivers do, and compares every ping with the ping that the engine made.
 #pragma once
 
 #include <chrono>
@@ -11,7 +11,7 @@ namespace sonar::load {
 
 using Steady = std::chrono::steady_clock;
 
-/// A connected TCP socket that sends and is closed when it goes; -1 when no program listens.
+/// A connected TCP socket that sends; the destructor closes it. -1: no program listens.
 class Socket {
  public:
   Socket(const std::string& address, std::uint16_t port, int receive_buffer = 0);
@@ -28,25 +28,26 @@ class Socket {
   long receive(std::byte* into, std::size_t size, std::chrono::milliseconds patience);
   void close();
   void reset();          // RST instead of FIN
-  void die();            // as a computer that lost its power: nothing is taken or answered any more
+  void die();            // like a computer that lost its power: it neither receives nor answers
   void close_one_way();  // FIN, and the other direction stays open
 
  private:
   int fd_ = -1;
 };
 
-/// An unmodified driver's request: mode 2, 40 Hz, 2 m, 256 beams of 8 bit. `hz` 0 = standby, else the next rate that exists.
+/// The request of an unmodified driver: mode 2, 40 Hz, 2 m, 256 beams of 8 bit. `hz` 0 = standby; other values give the next
+/// existing rate.
 std::vector<std::byte> fire(int hz = 40);
 
-/// Cuts a stream into messages in a buffer of fixed size and judges each.
+/// Splits a stream into messages in a buffer of fixed size and checks each.
 class PingReader {
  public:
   explicit PingReader(Socket socket) : socket_(std::move(socket)) {}
   Socket& socket() { return socket_; }
-  /// Reads what is there. False when the stream has ended.
+  /// Reads the received bytes. Returns false if the stream has ended.
   bool read_some();
 
-  std::uint64_t pings = 0, garbled = 0;  // garbled: wrong content or order, or an invalid message
+  std::uint64_t pings = 0, garbled = 0;  // garbled: pings with wrong content or order, and invalid messages
   std::uint64_t ids_skipped = 0;         // between two pings of this stream
   std::uint32_t last_id = 0;
   bool ended = false, was_reset = false;
@@ -62,7 +63,7 @@ class PingReader {
   std::size_t filled_ = 0;
 };
 
-/// Reads them all until `until`, or until all have ended.
+/// Reads all sockets until `until`, or until all streams have ended.
 void read_all(std::vector<std::unique_ptr<PingReader>>& readers, Steady::time_point until);
 
 }  // namespace sonar::load

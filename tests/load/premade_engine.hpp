@@ -1,5 +1,5 @@
-// Pings made beforehand, 256 beams x 512 rows of 8 bit: an engine that needs almost no time, so that a load test measures the
-// parts after it. Ping n shows picture n modulo their count, so that its reader can check that it is whole.
+// An engine with premade pings of 256 beams x 512 rows of 8 bit. It needs almost no time, so that a load test measures the code
+// after it. Ping n has picture n modulo the number of pictures, so that its reader can check that it is whole.
 #pragma once
 
 #include <chrono>

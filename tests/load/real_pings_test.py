@@ -1,5 +1,5 @@
-"""40 Hz of 512 beams, simulated by the shipped program: at any speed of the machine, every tick is a ping or counted as skipped,
-and every ping is sent or counted as dropped. --quick takes 5 s instead of 60."""
+"""40 Hz of 512 beams, simulated by the shipped program: on a machine of any speed, every tick is a ping or is counted as skipped,
+and every ping is sent or is counted as dropped. --quick takes 5 s instead of 60 s."""
 import pathlib
 import re
 import signal
@@ -19,7 +19,7 @@ RATE_HZ = 40
 
 
 def next_ping(client):
-    """Number and beams; the picture is not looked at, which takes longer than 25 ms here."""
+    """Returns number and beams of a ping. It does not decode the picture, which would take longer than 25 ms here."""
     while True:
         kind, message = client.message()
         if kind == 0x23:
@@ -55,7 +55,7 @@ class RealPings(unittest.TestCase):
         self.assertIn(pings - served - dropped, (0, 1), "the one under way at the end had nobody left")
         self.assertEqual(ids, sorted(set(ids)))
         self.assertLessEqual(ids[-1] - ids[0] + 1 - len(ids), dropped, "a number that is missing was dropped")
-        # Ticks are what the clock says, not what was done.
+        # Ticks are counted by the clock, not by the computed pings.
         self.assertLessEqual(abs(ticks - RATE_HZ * lasted), 0.02 * RATE_HZ * lasted + RATE_HZ)
         figure = f"{ticks} ticks = {pings} pings + {skipped} skipped; {served} served, {dropped} dropped"
         print(figure)
@@ -65,7 +65,7 @@ class RealPings(unittest.TestCase):
 
 
 def scheduling(process):
-    """Niceness and policy (0 usual, 1 SCHED_FIFO) of every thread; the first is the one that runs sockets and pacing."""
+    """Returns niceness and policy (0 usual, 1 SCHED_FIFO) of every thread; the first thread runs sockets and pacing."""
     tasks = sorted(pathlib.Path(f"/proc/{process.pid}/task").iterdir(), key=lambda task: int(task.name) != process.pid)
     fields = [(task / "stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split() for task in tasks]
     return [(int(f[16]), int(f[38])) for f in fields]
@@ -78,7 +78,8 @@ class Threads(unittest.TestCase):
             next_ping(client)
             first, *others = scheduling(daemon.process)
         self.assertGreaterEqual(len(others), 4, "pool and simulation")
-        # Pings come first, then the live view, whose pictures a person waits for, then recordings and scenes.
+        # Pings have the highest priority, then the live view, because a person waits for its pictures, then recordings and
+        # scenes.
         self.assertEqual(set(others), {(min(first[0] + nice_by, 19), 0) for nice_by in (1, 5, 10)})
 
     def test_real_time_by_wish(self):

@@ -1,10 +1,10 @@
-"""The load that one untrusted client can cause: work is counted, so that requests, frames and handshakes beyond the limit wait
-(docs/control.md, "Access"), 32 clients that send a byte now and then do not block /healthz, and poses of closed connections have
+"""The load that one untrusted client can cause. Work is counted, so that requests, frames and handshakes beyond the limit wait
+(docs/control.md, "Access"), 32 clients that send single bytes do not block /healthz, and poses of closed connections have
 no effect. Uses the shipped program.
 
-In the suite (--quick) the counts alone are asserted, with the time that passed. --measure SECONDS prints beside them the rate of a
-driver that asks for 40 Hz, in turns without and with each stranger. A stranger is a process at the lowest priority, so that what
-the driver loses is the daemon's cost. --stranger NAME ADDRESS is that process; it works until its input ends.
+In the suite (--quick) only the counts are asserted, relative to the time that passed. --measure SECONDS also prints the rate of a
+driver that requests 40 Hz, alternately without and with each stranger. A stranger is a process at the lowest priority, so that
+any loss of the driver is caused by the daemon. --stranger NAME ADDRESS runs such a process; it works until its input ends.
 """
 import base64
 import contextlib
@@ -30,12 +30,12 @@ from running_sonard import Sonard  # noqa: E402
 MEASURES = "--measure" in sys.argv
 SECONDS = float(sys.argv[sys.argv.index("--measure") + 1]) if MEASURES else 1.5
 LIMIT = 1 << 20  # limits.input_bytes_per_s
-REQUEST_S = 10  # to receive a whole request or Hello
+REQUEST_S = 10  # time limit of a whole request or Hello
 TOKEN = "0123456789abcdef-lab"
 
 
 class Driver(threading.Thread):
-    """Reads pings; knows how many came when, and how long none did."""
+    """Reads pings, counts them over time, and measures the longest gap between them."""
 
     def __init__(self, address):
         super().__init__(daemon=True)
@@ -58,13 +58,13 @@ class Driver(threading.Thread):
             self.arrivals.append(time.monotonic())
 
     def between(self, begin, end):
-        """(Hz, longest gap in ms)"""
+        """Returns (Hz, longest gap in ms)."""
         at = [t for t in list(self.arrivals) if begin <= t <= end]
         gaps = [b - a for a, b in zip([begin] + at, at + [end])]
         return len(at) / (end - begin), 1000 * max(gaps)
 
 
-# ---- strangers: each works until `stop`, and returns how much was done for it
+# ---- strangers: each works until `stop`, and returns how much work the daemon did for it
 
 def connect(address, port=8088):
     stranger = socket.create_connection((address, port), timeout=20)
@@ -77,7 +77,7 @@ def get(path, address, more=""):
 
 
 def pipelined(request, answer=b"HTTP/1.1 "):
-    """Requests without end on one connection."""
+    """Sends requests without end on one connection."""
     def run(address, stop):
         stranger, done, tail = connect(address), 0, b""
         many = request(address) * 50
@@ -126,7 +126,7 @@ def frame(first, payload=b""):
 
 
 def frames(begin, one, answer=None):
-    """Frames without end by the socket: how many were taken, by bytes or by their answers."""
+    """Sends frames without end by the socket; returns how many were handled, counted by bytes or by answers."""
     def run(address, stop):
         viewer, sent, pongs = opened(address), 0, 0
         viewer.sendall(begin)
@@ -201,7 +201,7 @@ def poses(address, stop):
 
 
 def connections(address, stop):
-    """Of a driver that leaves at once."""
+    """Acts like a driver that disconnects at once."""
     done = 0
     while not stop.is_set():
         with contextlib.suppress(OSError), socket.create_connection((address, 52100), timeout=5):
@@ -210,7 +210,7 @@ def connections(address, stop):
 
 
 def datagrams(address, stop):
-    """Of poses that cannot be read."""
+    """Sends poses that cannot be read."""
     done = 0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         while not stop.is_set():
@@ -221,7 +221,7 @@ def datagrams(address, stop):
     return done
 
 
-# name, stranger, work of one (bytes of the limit); 0 = counted otherwise
+# name, stranger, work of one action (bytes of the limit); 0 = counted in another way
 OPEN = [
     ("status pipelined", pipelined(lambda a: get("/api/v1/status", a)), 512 + 1000),
     ("metrics pipelined", pipelined(lambda a: get("/metrics", a)), 512 + 1000),
@@ -240,17 +240,17 @@ WITH_TOKEN = [
     ("401 pipelined", pipelined(lambda a: get("/api/v1/status", a)), 512),
     ("upgrades refused", pipelined(handshake), 512),
 ]
-IN_KERNELS = 12 << 20  # bytes that both ends' buffers may hold
+IN_KERNELS = 12 << 20  # bytes that the buffers of both ends may store
 
 
 class Apart:
-    """A stranger in a process of its own, which works from with to the end of the block."""
+    """A stranger in a separate process, which works during the `with` block."""
 
     def __init__(self, name, address):
         self.process = subprocess.Popen([sys.executable, "-B", __file__, "--stranger", name, address], stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True)
         assert self.process.stdout.readline() == "ready\n"
-        self.done = None  # how much was done for it
+        self.done = None  # work that the daemon did for it
 
     def __enter__(self):
         self.began = time.monotonic()
@@ -267,7 +267,7 @@ class Apart:
 def work_as(name, address):
     stop = threading.Event()
     stranger = {kind: run for kind, run, _ in OPEN + WITH_TOKEN}[name]
-    os.setsid()  # a scheduling group of its own, where the kernel has these
+    os.setsid()  # a separate scheduling group, if the kernel has these
     with contextlib.suppress(OSError):
         pathlib.Path("/proc/self/autogroup").write_text("19", encoding="ascii")
     os.nice(19)
@@ -287,7 +287,7 @@ class Strangers(unittest.TestCase):
         rows = []
         for name, _, work in kinds:
             stranger = Apart(name, daemon.address)
-            alone = self.measure(driver) if MEASURES else None  # the suite looks at counts only
+            alone = self.measure(driver) if MEASURES else None  # the suite checks only counts
             with stranger:
                 beside = self.measure(driver)
             self.assertIsNotNone(stranger.done, f"{name}: the stranger failed\n{daemon.log()[-2000:]}")
@@ -344,12 +344,12 @@ class Strangers(unittest.TestCase):
                 s.close()
 
     def test_a_request_that_is_not_whole_in_time_is_ended(self):
-        """Bytes that come now and then extend no limit: neither of a head, nor of a body, nor of the stream's Hello."""
+        """Single bytes from time to time do not extend the time limit of a head, a body or the stream's Hello."""
         with Sonard() as daemon:
             begins = {"head": (8088, f"GET /healthz HTTP/1.1\r\nHost: {daemon.address}\r\nX: ".encode()),
                       "body": (8088, f"POST /api/v1/sonar HTTP/1.1\r\nHost: {daemon.address}\r\nContent-Type: application/json\r\n"
                                      "Content-Length: 100000\r\n\r\n ".encode()),
-                      "Hello": (14770, b"\xff\x0f")}  # 2 KB are to come
+                      "Hello": (14770, b"\xff\x0f")}  # 2 KB are announced
             slow, begin = {}, time.monotonic()
             for name, (port, data) in begins.items():
                 slow[name] = connect(daemon.address, port)

@@ -1,4 +1,4 @@
-// Many streams at once, and streams beside neighbours that behave badly: every loss is counted, and nothing is garbled.
+// Many streams at once, and streams beside clients that misbehave: every loss is counted, and no message is damaged.
 #include <arpa/inet.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -20,7 +20,7 @@ using Readers = std::vector<std::unique_ptr<PingReader>>;
 
 const std::string dummies = "    options: {dummy_period_ms: 50}\n";
 
-/// Connects and waits until it is served: then no ping can be made without it.
+/// Connects and waits until it is served; from then on it gets every ping.
 std::unique_ptr<PingReader> connected(const std::string& address) {
   auto reader = std::make_unique<PingReader>(Socket(address, 52100));
   std::byte first{};
@@ -28,7 +28,7 @@ std::unique_ptr<PingReader> connected(const std::string& address) {
   return reader;
 }
 
-/// Stops the daemon while its clients read on, as drivers do.
+/// Stops the daemon while its clients continue to read, as drivers do.
 void stop(LoadDaemon& daemon, Readers& readers) {
   std::thread stopping([&daemon] { EXPECT_EQ(daemon.stop(), 0); });
   read_all(readers, Steady::now() + patience);
@@ -106,7 +106,7 @@ TEST(Load, OneThatNeverReads) {
     received += r->pings;
     garbled += r->garbled;
   }
-  // The pings that were still waiting when we stopped have no cause but the stop; they are counted as such.
+  // Pings that were still waiting at the stop are counted as dropped by the stop.
   const std::uint64_t at_stop = f.dropped_by[static_cast<std::size_t>(DropReason::stop)];
   EXPECT_LE(lost, at_stop);
   EXPECT_EQ(garbled, 0u);
@@ -122,14 +122,14 @@ TEST(Load, OneThatNeverReads) {
        "exactly equal", f.offered == f.sent + f.dropped);
 }
 
-/// Sends nonsense wherever it can as fast as it is taken.
+/// Sends arbitrary bytes to every port, as fast as they are received.
 class Junk {
  public:
   explicit Junk(const LoadDaemon& daemon) : daemon_(daemon) {
     std::uint32_t state = 7;
     for (std::byte& b : noise_) b = static_cast<std::byte>((state = state * 1664525u + 1013904223u) >> 24);
     const auto real = fire(0);
-    for (std::size_t i = 0; i < noise_.size(); i += 4096)  // now and then what looks like a message, and lies about its length
+    for (std::size_t i = 0; i < noise_.size(); i += 4096)  // sometimes bytes that look like a message with a wrong length
       std::copy(real.begin(), real.begin() + 12, noise_.begin() + static_cast<std::ptrdiff_t>(i));
   }
   ~Junk() {

@@ -1,4 +1,4 @@
-// Thousands of clients that connect and end in many ways, also by a reset: afterwards everything is as before.
+// Thousands of clients connect and disconnect in many ways, including a reset. Afterwards everything is as before.
 #include <algorithm>
 #include <memory>
 #include <vector>
@@ -52,7 +52,7 @@ TEST(Load, ConnectCommandDisconnect) {
     ASSERT_GE(socket.fd(), 0) << "cycle " << i;
     socket.send(fire(i % 3 == 0 ? 0 : 40));
     leave(socket, i);
-    if (i % 100 == 99) {  // not faster than they are taken
+    if (i % 100 == 99) {  // not faster than they are accepted
       ASSERT_TRUE(is_served(daemon.address())) << "cycle " << i;
     }
   };
@@ -60,7 +60,7 @@ TEST(Load, ConnectCommandDisconnect) {
   const auto all_gone = [&](const ProcessFigures& was) {
     return eventually([&] { return figures_of_this_process().open_descriptors <= was.open_descriptors; });
   };
-  const ProcessFigures idle = [&] {  // least of a second's looks: the last visitors are on their way out
+  const ProcessFigures idle = [&] {  // the minimum over one second, because the last visitors still disconnect
     ProcessFigures least = figures_of_this_process();
     eventually(
         [&] {
@@ -92,10 +92,10 @@ TEST(Load, ConnectCommandDisconnect) {
        after.open_descriptors == idle.open_descriptors && after.threads == idle.threads && grown_mib <= 2);
 }
 
-/// Clients connect, request a ping, read it, and disconnect without a message, as drivers do.
+/// Clients connect, request a ping, read it, and disconnect without a further message, as drivers do.
 TEST(Load, ReconnectsOfADriver) {
   const int times = quick ? 60 : 1000;
-  LoadDaemon daemon({1, "", "limits: {input_bytes_per_s: 1073741824}\n"});  // one place, as the product has
+  LoadDaemon daemon({1, "", "limits: {input_bytes_per_s: 1073741824}\n"});  // one slot, like the product
   int served = 0, attempts = 0;
   std::chrono::duration<double> longest{0};
   std::uint64_t garbled = 0;
@@ -127,7 +127,7 @@ TEST(Load, ReconnectsOfADriver) {
        "every one served", served == times && garbled == 0);
 }
 
-/// One in the middle of a stream, one in standby.
+/// One client is in the middle of a stream, one is in standby.
 TEST(Load, DeadPeers) {
   const double promised_s = quick ? 4 : 15;
   LoadDaemon daemon({2, "", quick ? "limits: {dead_peer_s: 4, stall_s: 3}\n" : ""});

@@ -39,7 +39,7 @@ bool loopback_up() {
   return up;
 }
 
-/// A user namespace gives its first process every capability: a test of permissions would then find none refused.
+/// A user namespace gives its first process every capability; then tests of permissions would see no refusal.
 bool drop_capabilities() {
   __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
   std::array<__user_cap_data_struct, 2> none{};
@@ -65,7 +65,7 @@ bool may_isolate() {
   return child > 0 && status == 0;
 }
 
-/// The lock is held until this process ends and, where it becomes another program, until that one ends.
+/// The lock is held until this process ends. If it becomes another program by exec, the lock is held until that program ends.
 void wait_for_turn() {
   const std::string path = std::filesystem::temp_directory_path() / "sonard-tests.lock";
   int fd = open(path.c_str(), O_RDONLY);  // it may belong to another user
@@ -79,7 +79,7 @@ void wait_for_turn() {
 void enter_own_network() {
   const char* const entered = "SONARD_OWN_NETWORK";
   if (getenv(entered) != nullptr) return;
-  const bool forbidden = getenv("SONARD_SHARED_NETWORK") != nullptr;  // for the test of what follows
+  const bool forbidden = getenv("SONARD_SHARED_NETWORK") != nullptr;  // for the test of the code below
   if (forbidden || !may_isolate() || !isolate()) {
     std::fputs("no network namespaces here: tests that open sockets run one at a time\n", stderr);
     wait_for_turn();

@@ -8,7 +8,7 @@ import sys
 import unittest
 
 PROGRAM = sys.argv.pop()
-# Says "bound" when it has the port, and holds it until its input ends.
+# Prints "bound" when it has the port, and keeps the port until its input ends.
 HOLD = """
 import socket, sys
 a = socket.socket(); a.bind(("127.0.0.2", 52100)); a.listen()

@@ -27,7 +27,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-/// Its drivers do not set this; `sonarctl set sonar` does.
+/// True if hosts of this make set nothing; `sonarctl set sonar` does it.
 bool sets_nothing(const Make& make) {
   Wanted range;
   range.settings.range_m = 3;

@@ -1,5 +1,5 @@
-// Keeps what a reliability test measured beside its bound: one JSON file a figure, in the folder that SONARD_RELIABILITY names.
-// reliability_table.py makes the table of reliability from them; it contains the list of items.
+// Stores the figure of a reliability test with its bound: one JSON file for each figure, in the folder that SONARD_RELIABILITY
+// names. reliability_table.py makes the table of reliability from them; it contains the list of items.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@ namespace sonar::test {
 
 struct ReliabilityFigure {
   std::string item;    // a key of ITEMS in reliability_table.py
-  std::string figure;  // what was measured, with units: "0.02 % of 57600"
-  std::string bound;   // what was promised: "at most 0.5 %"
+  std::string figure;  // the measured figure, with units: "0.02 % of 57600"
+  std::string bound;   // the promised bound: "at most 0.5 %"
   bool passed = false;
-  std::string command;  // what a reader runs to measure it again, from the root of the tree
+  std::string command;  // the command that measures it again, from the root of the tree
 };
 
 /// Writes the figure to FOLDER/ITEM.json, with date and machine, and replaces an older one. Without SONARD_RELIABILITY it

@@ -1,4 +1,4 @@
-"""Keeps what a reliability test measured beside its bound; record.hpp beside it does the same for C++ and explains the fields.
+"""Stores the figure of a reliability test with its bound. record.hpp does the same for C++ and explains the fields.
 
 From a shell: record.py ITEM FIGURE BOUND yes|no COMMAND
 """
@@ -11,7 +11,7 @@ import sys
 
 
 def machine():
-    """'2 x Some Processor, Linux 6.1.0': no name of the computer."""
+    """'2 x Some Processor, Linux 6.1.0': without the name of the computer."""
     model = "processors"
     cpuinfo = pathlib.Path("/proc/cpuinfo")
     for line in cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []:
@@ -22,7 +22,8 @@ def machine():
 
 
 def record(item, figure, bound, passed, command):
-    """Writes the figure to FOLDER/ITEM.json, FOLDER from SONARD_RELIABILITY; nothing without it. Returns `passed`."""
+    """Writes the figure to FOLDER/ITEM.json, with FOLDER from SONARD_RELIABILITY; without that it writes nothing. Returns
+    `passed`."""
     folder = os.environ.get("SONARD_RELIABILITY")
     if folder:
         pathlib.Path(folder).mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-// A figure becomes one file with all that the table needs; without the folder nothing happens.
+// Each figure is written to one file with all data for the table; without the folder nothing is written.
 #include "tests/reliability/record.hpp"
 
 #include <gtest/gtest.h>

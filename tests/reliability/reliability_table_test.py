@@ -53,7 +53,7 @@ class Table(unittest.TestCase):
         steps = "".join((tests / script).read_text(encoding="utf-8") for script in ("tools/long_checks.sh", "load/load.sh"))
         listed = {key for rows in reliability_table.items().values() for key, _, _ in rows if not key.startswith("fuzz-")}
         listed -= set(reliability_table.read_records(reliability_table.BY_HAND))
-        recorded = {"asan", "tsan"}  # by sanitized_tests.sh, whose argument it is
+        recorded = {"asan", "tsan"}  # by sanitized_tests.sh with that argument
         for source in [*tests.glob("*/*.py"), *tests.glob("load/*.cpp")]:
             text = source.read_text(encoding="utf-8")
             if source.parent == HERE or not re.search(r'"tests/reliability"|"reliability"|load_case.hpp', text):
