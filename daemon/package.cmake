@@ -111,10 +111,10 @@ set(CPACK_COMPONENT_SONARD_DESCRIPTION "emulates imaging sonars on the network, 
 sonard holds a 3D scene, receives the pose of a vehicle, computes the echoes
 that a multibeam sonar would receive, and serves them as an Oculus, a BlueView
 sonar, an ARIS, a Sonar 3D-15, a Ping360, a Surveyor, an Omniscan, a Ping1D,
-an S500, a DVL, an M3, a Micron or a Norbit: drivers written for the real
-device connect unchanged, those of BlueView with libraries of sonard's. With
-sonarctl, which listens to, looks at and steers sonars, and with a systemd
-unit, which is not started by the installation.")
+an S500, a DVL, an M3, a Micron or a Norbit. Drivers written for the real
+device connect unchanged. Drivers of BlueView sonars use sonard's libraries.
+The package has sonarctl, which checks, displays and controls sonars, and a
+systemd unit, which the installation does not start.")
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_NAME sonard-bvtsdk)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SUGGESTS sonard)

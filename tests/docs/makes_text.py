@@ -27,17 +27,17 @@ def texts(makes, demos):
     plural = listed([re.sub(r"^an? ", "", title) for title, _ in makes], "and")
     table = "\n".join(f".It {title.split(' ', 1)[1]}\n{roff(', '.join(products))}" for title, products in makes)
     package = "\n".join(textwrap.wrap("sonard holds a 3D scene, receives the pose of a vehicle, computes the echoes that a multibeam sonar would "
-                                      f"receive, and serves them as {sonars}: drivers written for the real device connect unchanged, those of BlueView "
-                                      "with libraries of sonard's. With sonarctl, which listens to, looks at and steers sonars, and with a "
-                                      "systemd unit, which is not started by the installation.", 78, break_on_hyphens=False))
+                                      f"receive, and serves them as {sonars}. Drivers written for the real device connect unchanged. Drivers of "
+                                      "BlueView sonars use sonard's libraries. The package has sonarctl, which checks, displays and controls "
+                                      "sonars, and a systemd unit, which the installation does not start.", 78, break_on_hyphens=False))
     return {
         "docs/man/sonard.8": [
             (r"(?<=holds a 3D scene, receives the pose)(?s:.*?)(?=\n\.Pp\nWithout\n)",
              " of a vehicle, computes the echoes that a multibeam sonar would receive, and serves them as\n" + roff(sonars + ".")
-             + "\nDrivers written for the real device connect unchanged, those of BlueView with libraries of sonard's.\n"
+             + "\nDrivers written for the real device connect unchanged. Drivers of BlueView sonars use sonard's libraries.\n"
              "The viewer ViewPoint of Oculus very likely shows no picture."),
             (r"(?<=\n\.It Fl -demo Op Ar )[^\n]*", " | ".join(demos)),
-            (r"(?<=\n\.Sh PRODUCTS\nOf\n\.Fl -profile\nand of the key\n\.Li profile :\n\.Bl -tag -width Ds\n)(?s:.*?)(?=\n\.El\n)", table)],
+            (r"(?<=\n\.Sh PRODUCTS\nThese are the values of\n\.Fl -profile\nand of the key\n\.Li profile :\n\.Bl -tag -width Ds\n)(?s:.*?)(?=\n\.El\n)", table)],
         "docs/man/sonarctl.1": [(r"(?<=connects to sonars as a driver \()[^)]*(?=\))", "\n" + roff(plural) + "\n")],
         "daemon/package.cmake": [(r"(?<=from a 3D scene\n)(?s:sonard holds.*?)(?=\"\))", package)],
     }
