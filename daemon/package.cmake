@@ -1,5 +1,5 @@
-# What is installed beside the programs (unit, manual pages, documents), and the Debian packages made of it by `cpack -G DEB`.
-# Included last by the root CMakeLists.txt: by then it is known what there is. See docs/operations.md, "The package".
+# Installs further files (unit, manual pages, documents), and defines the Debian packages for `cpack -G DEB`. The root
+# CMakeLists.txt includes it last, when all targets are known. See docs/operations.md, "The package".
 include(GNUInstallDirs)
 set(documents ${CMAKE_INSTALL_DATADIR}/doc/sonard)
 set(made ${PROJECT_BINARY_DIR}/package)
@@ -8,7 +8,7 @@ set(made ${PROJECT_BINARY_DIR}/package)
 install(TARGETS sonarctl RUNTIME COMPONENT sonard)
 install(FILES daemon/systemd/sonard.service DESTINATION lib/systemd/system COMPONENT sonard)
 
-# ---- manual pages, as packages carry them
+# ---- manual pages, compressed for packages
 find_program(SONAR_GZIP gzip)
 foreach(page sonard.8 sonarctl.1 sonard.yaml.5)
   string(REGEX MATCH "[0-9]$" section ${page})
@@ -23,7 +23,7 @@ foreach(page sonard.8 sonarctl.1 sonard.yaml.5)
   endif()
 endforeach()
 
-# ---- documents: the licence as Debian wants it, the example configuration, the pages that errors and manuals point at
+# ---- documents: the licence in Debian's form, the example configuration, the pages that errors and manuals refer to
 if(SONAR_FFTW)
   set(binaries_licence "GPL-3+")
   set(binaries_comment " These binaries are linked with FFTW, which is under the GPL-2 or later, so they may be passed on only
@@ -52,8 +52,8 @@ install(FILES protocol/micron/README.md DESTINATION ${documents}/protocol/micron
 install(FILES protocol/norbit/README.md DESTINATION ${documents}/protocol/norbit COMPONENT sonard)
 install(FILES protocol/ping/README.md DESTINATION ${documents}/protocol/ping COMPONENT sonard)
 install(FILES protocol/control/control.proto DESTINATION ${CMAKE_INSTALL_DATADIR}/sonard/protocol/control COMPONENT sonard)
-# What pages link to beyond the documents is installed below share/sonard; symbolic links lead there from where it lies in the
-# source tree. tests/acceptance/package_test.py follows every link.
+# Other files that pages link to are installed below share/sonard. Symbolic links lead there from their places in the source tree.
+# tests/acceptance/package_test.py follows every link.
 function(sonar_install_link folder name target)
   file(MAKE_DIRECTORY ${made}/links)
   file(CREATE_LINK ${target} ${made}/links/${name} SYMBOLIC)
@@ -74,14 +74,14 @@ endif()
 install(FILES ${changelogs} DESTINATION ${documents} COMPONENT sonard)
 install(FILES ${changelogs} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 
-# Everything above that is built; what ./run.sh --package asks for.
+# Target of ./run.sh --package: everything above that has to be built.
 add_custom_target(installed)
 add_dependencies(installed sonard sonarctl bvtsdk3 bvtsdk3_colour_maps bvtsdk4 bvtsdk4_colour_maps)
 if(SONAR_GZIP)
   add_dependencies(installed package_documents)
 endif()
 
-# ---- the packages: one for the daemon and its tools, one for those who build BlueView drivers
+# ---- the packages: one with the daemon and its tools, one for building BlueView drivers
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME sonard)
 set(CPACK_PACKAGE_VENDOR "sonard")
@@ -97,7 +97,7 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS OFF)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 if(CMAKE_CROSSCOMPILING AND CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
-  set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)  # else that of the machine that builds
+  set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)  # otherwise the architecture of the build machine
 endif()
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)

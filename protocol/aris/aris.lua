@@ -1,13 +1,13 @@
 -- Wireshark dissector for Sound Metrics ARIS sonars: commands on TCP 56888, beacons on UDP 56124, parts of frames on UDP 56444 and
--- on the ports that a SET_FRAMESTREAM_RECEIVER of the same capture names. It shares nothing with the C++ code, so that the two can
--- judge each other (tests/acceptance/aris_link_test.py). Layouts: docs/protocols/aris.md; use: clients/wireshark/README.md.
+-- on the ports that a SET_FRAMESTREAM_RECEIVER of the same capture names. It shares nothing with the C++ code, so that each can
+-- check the other (tests/acceptance/aris_link_test.py). Layouts: docs/protocols/aris.md; use: clients/wireshark/README.md.
 
 local aris = Proto("aris", "Sound Metrics ARIS sonar")
 local aris_beacon = Proto("aris_beacon", "Sound Metrics ARIS sonar, beacon")
 local aris_frame = Proto("aris_frame", "Sound Metrics ARIS sonar, part of a frame")
 local COMMAND_LIMIT = 4096
 
--- Messages: number of a field -> name, kind, or the fields of a message inside ------------------------------------
+-- Messages: number of a field -> name, kind, or the fields of an inner message ------------------------------------
 
 local command_names = {
   [0] = "SET_DATETIME", "SET_FRAMESTREAM_RECEIVER", "SET_FRAMESTREAM_SETTINGS", "SET_ACOUSTICS", "SET_SALINITY", "SET_TELEPHOTO",
@@ -89,7 +89,7 @@ aris.experts = {broken, doubt}
 
 -- Reading --------------------------------------------------------------------------------------------------
 
--- Value and the place behind it, or nil where the bytes end.
+-- Returns the value and the place after it, or nil at the end of the bytes.
 local function varint(tvb, at, stop)
   local value, factor = 0, 1
   for _ = 1, 10 do
@@ -114,7 +114,7 @@ local function add_header(tree, range, values)
   if range:len() < 744 then inside:add_proto_expert_info(doubt, "a header has 744 bytes") end
 end
 
--- Adds the fields of a message between two places; values by path go into `values`. False: the bytes are no message.
+-- Adds the fields of a message between two places; values by path go into `values`. Returns false if the bytes are not a message.
 local function add_message(tree, tvb, at, stop, described, prefix, values, path)
   while at < stop do
     local start = at

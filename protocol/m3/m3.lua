@@ -1,11 +1,11 @@
 -- Wireshark dissector for the beam-formed data of a Kongsberg Mesotech M3, TCP 20001 (for other ports: "Decode as"). It shares
--- nothing with the C++ code, so that the two can judge each other (tests/acceptance/m3_link_test.py). Layout: docs/protocols/m3.md;
+-- nothing with the C++ code, so that each can check the other (tests/acceptance/m3_link_test.py). Layout: docs/protocols/m3.md;
 -- how to install it: clients/wireshark/README.md.
 
 local m3 = Proto("m3", "Mesotech M3")
 local HEAD, DATA, FOOT, SAMPLE, LARGEST = 56, 8512, 44, 8, 33554432
 
--- Of the data header: offset, size, kind, name, meaning.
+-- Fields of the data header: offset, size, kind, name, meaning.
 local rows = {
   {0, 4, "uint32", "version", "version of the header"}, {4, 4, "uint32", "sonarId", "sonar"}, {8, 4, "uint32", "sonarInfo", "information"},
   {40, 4, "uint32", "seconds", "time [s]"}, {44, 4, "uint32", "milliseconds", "time [ms]"}, {48, 4, "float", "soundSpeed", "sound speed [m/s]"},

@@ -1,5 +1,5 @@
 -- Wireshark dissector for the serial protocol of a Tritech Micron, wrapped in TCP 4001 (for other ports: "Decode as"). It shares
--- nothing with the C++ code, so that the two can judge each other (tests/acceptance/micron_link_test.py). Layout:
+-- nothing with the C++ code, so that each can check the other (tests/acceptance/micron_link_test.py). Layout:
 -- docs/protocols/micron.md; how to install it: clients/wireshark/README.md.
 
 local micron = Proto("micron", "Tritech Micron")

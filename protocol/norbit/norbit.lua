@@ -1,5 +1,5 @@
 -- Wireshark dissector for a NORBIT WBMS: commands on TCP 2209, bathymetry on 2210, water column on 2211 (for other ports: "Decode as").
--- It shares nothing with the C++ code, so that the two can judge each other (tests/acceptance/norbit_link_test.py). Layout:
+-- It shares nothing with the C++ code, so that each can check the other (tests/acceptance/norbit_link_test.py). Layout:
 -- docs/protocols/norbit.md; how to install it: clients/wireshark/README.md.
 
 local norbit = Proto("norbit", "Norbit WBMS")

@@ -1,14 +1,14 @@
 -- Wireshark dissector for Blueprint Oculus sonars: the stream on TCP 52100, the status datagrams on UDP 52102.
--- It shares nothing with the C++ code, so that the two can judge each other (tests/acceptance/dissector_test.py). The layouts are
+-- It shares nothing with the C++ code, so that each can check the other (tests/acceptance/dissector_test.py). The layouts are
 -- those of docs/protocols/oculus.md; use: clients/wireshark/README.md. One file, because it is installed by copying.
 
 local oculus = Proto("oculus", "Blueprint Oculus sonar")
-local oculus_status = Proto("oculus_status", "Blueprint Oculus sonar, status datagram")  -- hands on to the one above
+local oculus_status = Proto("oculus_status", "Blueprint Oculus sonar, status datagram")  -- its packets go to the one above
 
 local HEADER = 16
-local REQUEST_LIMIT = 4096              -- payload of a client's message; a larger size is junk
+local REQUEST_LIMIT = 4096              -- largest payload of a client's message; a larger size is invalid
 local REPLY_LIMIT = 4 * 1024 * 1024     -- bytes of a device's message; the largest real ping has 1.5 MB
-local LISTED = 4096                     -- beams and rows shown one by one, whatever the message claims
+local LISTED = 4096                     -- largest number of beams and rows that are shown one by one
 local FIXED_V1, FIXED_V2 = 122, 202     -- fixed part of a ping result: the bearing table follows
 
 -- What values mean ------------------------------------------------------------------------------------------
@@ -33,7 +33,7 @@ local part_names = {  -- names of the older and the newer list of the vendor
   [2599] = "MT3000d", [2658] = "MD3000d Impulse", [2659] = "MD3000d Burton", [2924] = "MA3000d", [4713] = "C550d",
 }
 
--- Numbers without the ".0" that Lua 5.3 and later print, and without noise digits.
+-- Prints numbers without the ".0" of Lua 5.3 and later, and without rounding digits.
 local function short(value) return string.format("%.6g", value) end
 local function finite(value) return value == value and value ~= math.huge and value ~= -math.huge end
 local function bit_set(value, bit) return math.floor(value / 2 ^ bit) % 2 == 1 end
