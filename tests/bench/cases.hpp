@@ -15,10 +15,10 @@ namespace sonar::bench {
 
 struct BenchCase {
   std::string name;           // "P3d"
-  std::string description;    // for the table
+  std::string description;    // text for the table
   protocol::Profile profile;  // vendor is null if no protocol has this model
   PingSettings settings;
-  bool near_bottom = false;  // for short ranges: fly closer to the bed
+  bool near_bottom = false;  // for short ranges: the sonar moves closer to the bed
   Mode mode = Mode::canonical;
   int fixed_fan = 0;  // rays per column, each a scatterer; 0 = surface cells
 };

@@ -15,7 +15,7 @@ using nlohmann::json;
 
 constexpr int pings_a_point = 16;
 
-/// Pings of one point of a curve. The cheapest of them by processor time is the one that other programs disturbed least.
+/// Pings of one point of a curve. The ping with the least processor time is the one that other programs disturbed least.
 class Samples {
  public:
   /// `fire` runs `pings` pings; the first two calls warm up and are not counted.
@@ -58,7 +58,7 @@ class Samples {
 
  private:
   static constexpr auto stages = static_cast<std::size_t>(Stage::stages);
-  struct Sample {  // one ping, or the mean of a round of them
+  struct Sample {  // one ping, or the mean of a round of pings
     double wall_ms = 0, processor_ms = 0;
     std::array<double, stages> stage_ms{};
     PingStatistics last;
@@ -84,7 +84,7 @@ json curve(const char* name, const std::string& of, json points) {
   return {{"name", name}, {"case", of}, {"points", std::move(points)}};
 }
 
-/// The bed of the scene again, as rough, on another grid or of another size; the sonar's place in it stays.
+/// The same bed, equally rough, on another grid or of another size; the sonar's place on it stays.
 ScenePointer bed_of(const Scene& scene, double spacing_m, double size_m, double bed_z_m) {
   SeabedShape shape;
   shape.size_x_m = shape.size_y_m = shape.fine_x_m = shape.fine_y_m = size_m;

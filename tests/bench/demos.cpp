@@ -19,17 +19,17 @@ namespace {
 using nlohmann::json;
 
 constexpr std::chrono::seconds patience{20};
-constexpr double warm_up_s = 1, measured_s = 3;  // at most
+constexpr double warm_up_s = 1, measured_s = 3;  // upper limits
 
-/// When each ping of an engine took its pose, and when it was computed, by the clock of the daemon.
+/// The times at which each ping of an engine got its pose and was computed, by the clock of the daemon.
 class Course {
  public:
   void add(Time fired, Time computed) {
     const std::lock_guard lock(mutex_);
     pings_.emplace_back(fired, computed);
   }
-  /// When the ping took its pose whose last byte arrived at `at`: the last that was computed by then. A ping is sent sooner than
-  /// the next is computed.
+  /// Returns the pose time of the ping whose last byte arrived at `at`: the last ping computed by then. A ping is sent before the
+  /// next one is computed.
   std::optional<Time> fired_of(Time at) const {
     const std::lock_guard lock(mutex_);
     const auto later = std::partition_point(pings_.begin(), pings_.end(), [at](const auto& p) { return p.second <= at; });
@@ -41,7 +41,7 @@ class Course {
   std::vector<std::pair<Time, Time>> pings_;
 };
 
-/// An engine whose pings are noted in a Course.
+/// An engine that writes its pings to a Course.
 class Watched final : public PingEngine {
  public:
   Watched(std::unique_ptr<PingEngine> engine, Course& course, const Clock& clock)
@@ -61,7 +61,7 @@ class Watched final : public PingEngine {
   const Clock& clock_;
 };
 
-/// As `sonard --profile` has it, on an address of this process and without listeners of its own.
+/// The configuration of `sonard --profile`, on an address of this process and without further listeners.
 Result<Config> demo_of(const std::string& profile, const BenchOptions& options) {
   auto found = find_config("", true);
   if (!found) return tl::make_unexpected(found.error());
@@ -82,7 +82,7 @@ v1::SonarStatus status_of(Service& service, const Clock& clock) {
   return status.get_future().get();
 }
 
-/// `rate_hz`: absent = the rate that a usual driver requests.
+/// Without `rate_hz` the rate is that of a usual driver.
 Result<json> serve(const protocol::Make& make, const std::string& profile, std::optional<double> rate_hz,
                    const ScenePointer& scene, const BenchOptions& options) {
   auto config = demo_of(profile, options);
@@ -164,7 +164,7 @@ Result<json> find_demos(const BenchOptions& options) {
       print(*usual);
       found.push_back(*usual);
       if (!is_demo || (*usual)["on_request"]) continue;
-      // Where its drivers may choose one: the demo at the product's highest rate, too.
+      // If its drivers can set the rate, the demo also runs at the product's highest rate.
       auto fastest = serve(make, model->profile, model->max_rate_hz, *scene, options);
       if (!fastest && fastest.error().kind == ErrorKind::usage) continue;
       if (!fastest) return tl::make_unexpected(fastest.error());

@@ -1,4 +1,4 @@
-// P10 and P11: what a device does when it gets pings in batches, as `sonard render --batch` and data sets give them.
+// P10 and P11: the performance of a device with batches of pings, as in `sonard render --batch` and data sets.
 #include <algorithm>
 #include <cstdio>
 #include <initializer_list>
@@ -20,17 +20,18 @@ Result<std::unique_ptr<PingEngine>> engine_of(const ScenePointer& scene, Paralle
                                               bool steps) {
   cuda::DeviceEngineOptions device;
   device.batch = batch;
-  device.cpu_after_failure = false;  // its rate would be taken for the device's
+  device.cpu_after_failure = false;  // otherwise its rate would be reported as the device's
   return make_cuda_engine(scene, pool, {.simd = options.engine.simd, .now_s = steps ? now_s : nullptr}, device);
 }
 
 struct BatchRate {
-  double pings_per_second = 0;  // as a user has it
-  // Means a ping, in a run of its own whose steps are timed: finding tiles and points, in one thread; the device's steps.
+  double pings_per_second = 0;  // as in normal use
+  // Means for each ping, from a separate run with timed steps: finding tiles and points in one thread, and the device's steps.
   double processor_ms = 0, device_ms = 0;
 };
 
-/// Warm: an idle device runs at a fraction of its clock and takes about a second to rise. Then the median of several rounds.
+/// First warms up, because an idle device runs at a fraction of its clock and needs about a second to rise. Returns the median of
+/// several rounds.
 double rate(PingEngine& engine, Parallel& pool, Pinger& pinger, const std::vector<PingRequest>& requests, std::size_t batch) {
   const auto round = [&] {
     if (batch > 1) return pinger.fire(engine, pool, requests, batch);
@@ -54,7 +55,7 @@ Result<BatchRate> rate_of(const ScenePointer& scene, Parallel& pool, Pinger& pin
   if (!engine) return tl::make_unexpected(engine.error());
   BatchRate found;
   found.pings_per_second = rate(**engine, pool, pinger, requests, a_call);
-  engine->reset();  // its memory is the next one's
+  engine->reset();  // frees its memory for the next engine
   engine = engine_of(scene, pool, options, batch, true);
   if (!engine) return tl::make_unexpected(engine.error());
   const auto few = std::span(requests).first(std::min(requests.size(), 8 * a_call));

@@ -52,7 +52,7 @@ json find_cold_pings(const ScenePointer& scene, const BenchScene& where, const B
     for (const int threads : options.threads) {
       Bench bench(scene, threads, options);
       int number = 0;
-      // Warm where the first jump starts; then to the corners of the bed.
+      // Warm pings at the start of the first jump; then jumps to the corners of the bed.
       for (; number < 5; ++number) pinger.fire(*bench.engine, pinger.request(number, bench_pose_at(c, where, -3, 0, pi)));
       std::vector<double> cold, warm;
       double built = 0, seen = 0;
@@ -64,7 +64,7 @@ json find_cold_pings(const ScenePointer& scene, const BenchScene& where, const B
         warm.push_back(1e3 * pinger.fire(*bench.engine, pinger.request(++number, at)));
       }
       const Times cold_ms(cold), warm_ms(warm);
-      const double share = seen > 0 ? std::min(1.0, built / seen) : 0;  // empty tiles are built too
+      const double share = seen > 0 ? std::min(1.0, built / seen) : 0;  // also counts empty tiles
       std::printf(
           "P3e  %-4s after a jump, %d thread%s: cold %.1f ms (worst %.1f), the next %.1f; %.0f %% of the tiles were new\n", name,
           threads, threads == 1 ? "" : "s", cold_ms.median, cold_ms.max, warm_ms.median, 100 * share);

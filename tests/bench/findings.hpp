@@ -21,7 +21,8 @@ nlohmann::json find_cost_of_objects(const ScenePointer& scene, const BenchScene&
 nlohmann::json find_cost_of_side_lobes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 /// P9: SHA-256 of the samples of P1, P3a and P3d with 1, 2 and 4 threads, each twice.
 nlohmann::json find_hashes(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
-/// P12: bins of a level bed 10 dB or more below their closed form, in expected power; cells, and one scatterer a ray.
+/// P12: bins of a level bed whose expected power is 10 dB or more below the closed form, with cells and with one scatterer for
+/// each ray.
 Result<nlohmann::json> find_empty_bins(const BenchOptions& options);
 
 /// P10 and P11: pings per second of P1 and P3a in batches on the device, by batch size; the shares of processor and device; the
@@ -32,8 +33,8 @@ Result<nlohmann::json> find_device_rates(const ScenePointer& scene, const BenchS
 nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 
 /// P0: the demo of every product through its socket, at the rate that a usual driver requests; that of each make's demo also at
-/// its highest rate. From the moment of a ping's pose to its last byte at the driver, processor time of the daemon, ticks
-/// skipped.
+/// its highest rate. Measures the time from a ping's pose to its last byte at the driver, the processor time of the daemon, and
+/// skipped ticks.
 Result<nlohmann::json> find_demos(const BenchOptions& options);
 /// P5: time from sending a pose and a trigger to the last received byte, for a whole daemon on loopback.
 Result<nlohmann::json> find_latency(const ScenePointer& scene, const BenchOptions& options);
@@ -44,8 +45,8 @@ Result<nlohmann::json> find_first_pings(const ScenePointer& scene, const BenchOp
 Result<nlohmann::json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options);
 /// P13: rates of P1, P3a and P3d with 1, 2 and 4 threads.
 nlohmann::json find_rates_of_threads(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
-/// P13: pings per second of several P900-90 (2 to 10 m) in one daemon, whose clients request the next ping when they have the
-/// last: in all, of the slowest and of the fastest.
+/// P13: pings per second of several P900-90 (2 to 10 m) in one daemon, whose clients request the next ping when they have
+/// received the last: the total, the slowest and the fastest.
 Result<nlohmann::json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double seconds, const BenchOptions& options);
 
 }  // namespace sonar::bench

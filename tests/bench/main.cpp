@@ -1,5 +1,5 @@
 // sonard_bench: times whole pings, from pose to framed bytes, case by case and stage by stage, and the other figures of
-// docs/benchmarks.md, as a table and as JSON. The figures depend on the machine, so its processor is named.
+// docs/benchmarks.md, as a table and as JSON. The figures depend on the machine, so the output names its processor.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -84,7 +84,7 @@ Result<void> time_pings(const BenchScene& where, const ScenePointer& loaded, con
           scene);
       if (!engine) return tl::make_unexpected(engine.error());
       Figures f = measure(c, where, *loaded, **engine, threads, own);
-      if (own.engine.device != EngineDevice::cpu) {  // its steps, apart from the rate
+      if (own.engine.device != EngineDevice::cpu) {  // the device's steps, measured separately from the rate
         BenchOptions few = own;
         few.pings = std::min(own.pings, 20);
         f.stage_ms = measure(c, where, *loaded, *Bench(scene, threads, own, true).engine, threads, few).stage_ms;
@@ -96,7 +96,7 @@ Result<void> time_pings(const BenchScene& where, const ScenePointer& loaded, con
   return {};
 }
 
-/// Everything else, over the first scene.
+/// All other measurements, over the first scene.
 Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, const BenchOptions& options, json& report) {
   bool all_hold = true;
   const auto asked = [&](const char* name) { return wanted(options.cases, name); };
@@ -184,7 +184,7 @@ int run(BenchOptions options) {
   const std::string note = note_of_parts_left_out(options.engine.switches);
   if (!note.empty()) std::printf("%s\n", note.c_str());
   json report{{"processor", processor()}, {"results", json::array()}};
-  // Load of other programs, which lengthens wall times.
+  // The load of other programs, which increases wall times.
   if (double load[1]; ::getloadavg(load, 1) == 1) report["load_average"] = load[0];
   std::printf("%s\n", processor().c_str());
   if (options.engine.device != EngineDevice::cpu) std::printf("%s\n", cuda_status().c_str());

@@ -65,7 +65,7 @@ Bench::Bench(std::shared_ptr<const Scene> scene, int threads, const BenchOptions
                            [](const std::string& what) { std::fprintf(stderr, "sonard_bench: %s\n", what.c_str()); });
     return;
   }
-  // One thread's processor time is that of a stage, and other programs do not lengthen it.
+  // The processor time of one thread is the time of a stage, and other programs do not increase it.
   const auto clock = threads == 1 ? this_thread_s : now_s;
   const auto sum = options.frequency_sum == "direct" ? paper::FrequencySum::direct : paper::FrequencySum::fast;
   engine = make_engine(std::move(scene), pool, {.simd = options.engine.simd, .now_s = clock}, sum);

@@ -5,7 +5,7 @@
 namespace sonar::bench {
 namespace {
 
-// unknown: chosen as plausible audible figures; a part costs the same at any level.
+// unknown: plausible values with a visible effect; a part costs the same at any level.
 constexpr float texture_shape = 2, volume_db = -70, crosstalk_db = -40, leak_upa = 4e5f, none_db = -150;
 
 bool asked(const std::vector<std::string>& parts, const char* part) {

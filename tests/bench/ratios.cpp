@@ -30,7 +30,7 @@ void fill_with_noise(Floats& values) {
   }
 }
 
-/// Couples a whole record, window by window; `kept`: the beams of the last window.
+/// Applies the coupling to a whole record, window by window; `kept`: the beams of the last window.
 double form_beams_ms(const ColumnSignals& columns, const PingPlan& plan, const BeamWeights& beam_weights,
                      const simd::Kernels& kernels, BeamSignals& kept) {
   BeamScratch scratch;
@@ -146,7 +146,7 @@ std::vector<Ratio> measure_detection(const BenchOptions& options) {
       receive(beams, plan, kernels, scratch, ping);
     }
   });
-  // The portable loops gain by their tiles alone; without vectors that is no more than the machine's noise.
+  // The portable loops gain only by their tiles; without vectors this gain is within the machine's noise.
   const double least = &kernels == &simd::portable_kernels ? 0 : 2;
   return {{"samples: one by one / tiles", naive_ms, ours_ms, least, 1, 0}};
 }

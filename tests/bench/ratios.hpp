@@ -27,7 +27,7 @@ struct Ratio {
   std::string name;  // "synthesis: complex exponentials / pulses in time"
   double slow_ms = 0, fast_ms = 0;
   double least = 0;           // required minimum; 0 = none
-  double share_measured = 1;  // measured fraction of the slow side, whose time is extrapolated
+  double share_measured = 1;  // measured fraction of the slow implementation; its time is extrapolated
   double difference = 0;      // relative rms difference of both results, if they are comparable; 0 = not compared
   double ratio() const { return fast_ms > 0 ? slow_ms / fast_ms : 0; }
   bool holds() const { return ratio() >= least; }

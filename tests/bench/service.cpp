@@ -35,7 +35,7 @@ std::string sonars_of(const std::string& profile, int count) {
   return list;
 }
 
-/// Pings follow each other as fast as the engine and the sound's way allow: the product's own limit is lifted.
+/// Pings follow one another as fast as the engine and the travel time of sound allow; the product's own limit is disabled.
 void lift_rate(SonarConfig& sonar) {
   auto model = std::make_shared<SonarModel>(*sonar.profile.model);
   model->max_rate_hz = 1000;
@@ -128,7 +128,7 @@ Result<json> find_latency(const ScenePointer& scene, const BenchOptions& options
   std::vector<double> latency_ms;
   const int triggers = std::max(200, 2 * options.pings), warm_up = 10;
   for (int k = 0; k < triggers + warm_up; ++k) {
-    const double t = k / 40.0;  // NED: one swims north at 8 m below the surface
+    const double t = k / 40.0;  // NED: the vehicle moves north at 8 m depth
     char pose[160];
     const int length = std::snprintf(pose, sizeof pose, "{\"position\":[%.4f,%.4f,8],\"attitude\":[0,-0.25,%.4f]}\n",
                                      0.35 * std::sin(t), 0.9 * t, pi / 2 + 0.3 * std::sin(t));
@@ -151,11 +151,11 @@ Result<json> find_latency(const ScenePointer& scene, const BenchOptions& options
 
 namespace {
 
-/// One of `settings_in_grid` combinations of what a driver may ask for; neighbours differ in most of them.
+/// One of `settings_in_grid` combinations of settings that a driver may request; neighbours differ in most settings.
 constexpr int settings_in_grid = 144;
 struct GridSetting {
   oculus::FireRequest fire;
-  double period_ms;  // that rate and range allow
+  double period_ms;  // the period that rate and range allow
   std::string text;
 };
 GridSetting grid_setting(int k) {
@@ -196,7 +196,7 @@ Result<json> find_first_pings(const ScenePointer& scene, const BenchOptions& opt
   constexpr int warm_pings = 3;
   std::vector<double> first_ms, late_ms, first_cpu_ms, warm_cpu_ms;
   std::string slowest;
-  // The last setting is requested once before, because the first ping of a daemon takes longer at any setting.
+  // The last setting is requested once at the start, because the first ping of a daemon takes longer with any setting.
   for (int k = -1; k < settings_in_grid; ++k) {
     const GridSetting setting = grid_setting(k < 0 ? settings_in_grid - 1 : k);
     const double begin_s = now_s(), used_s = processor_s();
@@ -278,7 +278,7 @@ Result<json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double 
   if (!service) return tl::make_unexpected(service.error());
   std::vector<clients::PingStream> streams;
   for (int i = 0; i < sonars; ++i) {
-    // A head's own interval is 1 s; sound alone sets the limit then.
+    // The head's own interval would be 1 s; here only the travel time of sound limits the rate.
     clients::Wanted fast;
     fast.settings.rate_hz = 1000;
     auto stream = clients::PingStream::open({own_address(i), 0}, clients::find_make("blueview"), fast, patience);

@@ -41,7 +41,7 @@ std::vector<Column> draw_columns() {
 
 using Sums = std::vector<std::complex<double>>;
 
-/// Eq. (1) of the paper as it is printed.
+/// Eq. (1) of the paper as printed.
 Sums exponentials(const Column& c, int count) {
   Sums sums(static_cast<std::size_t>(count));
   for (int m = 0; m < count; ++m)

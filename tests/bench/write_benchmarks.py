@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/benchmarks.md with its two pictures, and the tables behind it, from results of `sonard_bench --json`.
+"""Writes docs/benchmarks.md with its two pictures, and its detailed tables, from results of `sonard_bench --json`.
 
 usage: write_benchmarks.py BENCH.json [SET.json...] DOCS_FOLDER TABLES_FOLDER
        write_benchmarks.py --instruction-sets SET.json... TABLES_FOLDER
@@ -18,7 +18,7 @@ import sys
 from datetime import date
 from pathlib import Path
 
-# name: required, and the goals with two threads by instruction set [pings/s]; no goal where none is named.
+# name: required rate, and the goals with two threads by instruction set [pings/s]; instruction sets without a value have no goal.
 GOALS = {
     "P1": (75, {"avx512": 400, "avx2": 160}),
     "P2": (60, {"avx512": 200, "avx2": 90}),
@@ -33,7 +33,7 @@ GOALS = {
 FLOOR = {"trace": 2.9 + 0.44, "cull": 0.09, "scatter": 1.9, "synthesize": 1.4, "noise": 0.17, "couple": 0.42, "receive": 0.2}
 NAME = "benchmarks"  # of both pages
 PEER = "## Beside a peer"  # a chapter that is written by hand
-# Why a ping costs what it costs, by the quantity that grows.
+# Reasons for the cost of a ping, by the quantity that grows.
 KNEES = {
     "rays a column": "every ray is traced and is a scatterer; a ray costs less the denser the fan is; the knee is weak",
     "rows": "cells are as many up to 437 rows; finer rows need finer cells in both directions, 14.6 times as many from 874 to 3,496 rows",
@@ -60,7 +60,7 @@ def table(head, rows):
 
 
 def instruction_set(result):
-    """"avx2" of "cpu, avx2, 2 threads, Embree 3.13.5"."""
+    """Returns "avx2" for "cpu, avx2, 2 threads, Embree 3.13.5"."""
     return result["engine"].split(", ")[1]
 
 
@@ -69,7 +69,7 @@ def measured_on(report):
 
 
 def other_machines(text, measured):
-    """The sub-chapters of `text` of machines with another instruction set than `measured`: "### avx512: ..."."""
+    """Returns the sub-chapters of `text` for machines whose instruction set is not `measured`: "### avx512: ..."."""
     chapters = re.findall(r"^### (\w+)(: .*?)(?=^##|\Z)", text, flags=re.M | re.S)
     return [line for name, rest in chapters if name != measured for body in [f"### {name}{rest}"] for line in body.rstrip("\n").split("\n") + [""]]
 
@@ -174,7 +174,7 @@ def empty_bins(report):
 
 
 def cores(report):
-    """Rates by threads, and of several sonars in one daemon."""
+    """Returns the rates by threads, and those of several sonars in one daemon."""
     count = sorted({r["threads"] for r in report["threads"]})
     found = {(r["case"], r["threads"]): r for r in report["threads"]}
     rows = []
@@ -201,7 +201,7 @@ def text(x, y, words, size=12, anchor="start"):
 
 
 def bars(entries):
-    """Rates on a logarithmic axis from 0.1 to 1000 pings a second."""
+    """Draws rates on a logarithmic axis from 0.1 to 1000 pings a second."""
     left, width, row = 300, 420, 26
     x = lambda rate: left + width * (math.log10(max(rate, 0.1)) + 1) / 4
     height = row * len(entries) + 50
@@ -220,12 +220,12 @@ def bars(entries):
 
 
 def cost(point):
-    """Milliseconds a ping: the least processor time where the report has it."""
+    """Returns the milliseconds of a ping: the least processor time if the report has it."""
     return point.get("least_processor_ms", point["median_ms"])
 
 
 def slope(points):
-    """Exponent of the cost over x: least squares in logarithms; and the squares that remain."""
+    """Returns the exponent of the cost over x by least squares in logarithms, and the remaining squares."""
     xs, ys = [math.log(p["x"]) for p in points], [math.log(cost(p)) for p in points]
     x, y = sum(xs) / len(xs), sum(ys) / len(ys)
     exponent = sum((a - x) * (b - y) for a, b in zip(xs, ys)) / sum((a - x) ** 2 for a in xs)
@@ -233,8 +233,8 @@ def slope(points):
 
 
 def exponents(points):
-    """(before, index of the knee, after): the two straight lines through a common point that fit best; (all, None, all) where
-    they differ by less than 0.2 or are shorter than two points."""
+    """Returns (before, index of the knee, after): the two straight lines through a common point that fit best; (all, None, all)
+    if they differ by less than 0.2 or are shorter than two points."""
     splits = [(slope(points[:i + 1]), i, slope(points[i:])) for i in range(1, len(points) - 1)]
     if splits:
         before, knee, after = min(splits, key=lambda split: split[0][1] + split[2][1])
@@ -250,7 +250,7 @@ def in_words(exponents_found, points):
 
 
 def growth(report):
-    """The chapter on curves: the picture, exponents, and the stages that make the growth before and after a knee."""
+    """Returns the chapter on curves: the picture, exponents, and the stages that make the growth before and after a knee."""
     first = report["results"][0]
     rows = []
     for c in report["curves"]:
@@ -278,7 +278,7 @@ def growth(report):
 
 
 def with_chapter(text, chapter):
-    """The page `text` with the lines `chapter` in place of the chapter of the same title, or at its end."""
+    """Returns the page `text` with the lines `chapter` in place of the chapter of the same title, or at its end."""
     body = "\n".join(chapter).rstrip("\n") + "\n"
     pattern = re.compile(rf"^{re.escape(chapter[0])}\n.*?(?=^## |\Z)", flags=re.M | re.S)
     if pattern.search(text):
@@ -287,7 +287,7 @@ def with_chapter(text, chapter):
 
 
 def lines_of(curves):
-    """Pings/s over each quantity, both axes logarithmic, three pictures a row."""
+    """Draws pings/s over each quantity, both axes logarithmic, three pictures in a row."""
     wide, high, columns = 330, 250, 3
     rows = (len(curves) + columns - 1) // columns
     out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide * columns}" height="{high * rows}">',
@@ -328,7 +328,7 @@ SETS_INTRODUCTION = (
 
 
 def instruction_sets(reports, scene="local-search"):
-    """The chapter: rates and stages with each instruction set of one processor, the best first."""
+    """Returns the chapter on rates and stages with each instruction set of one processor, the best first."""
     found = [{r["case"]: r for r in report["results"] if r["scene"] == scene} for report in reports]
     engines = [next(iter(results.values()))["engine"] for results in found]
     names = [instruction_set(next(iter(results.values()))) for results in found]
@@ -350,7 +350,8 @@ def instruction_sets(reports, scene="local-search"):
 
 
 def with_sets(text, chapter, before):
-    """The tables `text` with this machine's `chapter` on instruction sets, and those of other machines that the page `before` has."""
+    """Returns the tables `text` with this machine's `chapter` on instruction sets, and those of other machines in the page
+    `before`."""
     anchor = "## Stages"
     if f"\n{anchor}\n" not in text:
         sys.exit(f'the page has no chapter "{anchor}" to put "{SETS}" before; make the whole page first')
@@ -362,7 +363,7 @@ def with_sets(text, chapter, before):
 
 
 def by_case_and_threads(report, scene):
-    """(case and threads, result) of the cases that the paper's figures are compared with."""
+    """Returns (case and threads, result) of the cases that are compared with the paper's figures."""
     for case in ("P1", "P2"):
         for threads, r in sorted(by_threads(report["results"], case, scene).items()):
             yield f"{case}, {threads} thread{'s' if threads > 1 else ''}", r
@@ -452,7 +453,7 @@ def write(report, folder, tables_folder, sets=()):
             entries.append((f"{case}: {r['description']}", r["pings_per_second"], True))
     overview = file_of(folder, NAME)
     text = page(report, scene, other_machines(old(overview), instruction_set(report["results"][0])))
-    peer = re.search(rf"^{PEER}\n.*?(?=^## |\Z)", old(overview), flags=re.M | re.S)  # of a run of its own
+    peer = re.search(rf"^{PEER}\n.*?(?=^## |\Z)", old(overview), flags=re.M | re.S)  # from a separate run
     overview.write_text(with_chapter(text, peer.group().split("\n")) if peer else text, encoding="utf-8")
     text = tables(report, scene)
     if sets:

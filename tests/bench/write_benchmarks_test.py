@@ -1,4 +1,4 @@
-"""The pages of benchmarks agree with the results: verdicts, missing parts, and pictures that are XML."""
+"""The pages of benchmarks agree with the results: verdicts, missing parts, and pictures that are valid XML."""
 
 import unittest
 import xml.etree.ElementTree as ElementTree

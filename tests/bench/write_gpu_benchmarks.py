@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Writes the page of the CUDA engine's benchmarks from what `tests/tools/gpu_check.sh run` left in a folder.
+"""Writes the page of the CUDA engine's benchmarks from the folder that `tests/tools/gpu_check.sh run` wrote.
 
 usage: write_gpu_benchmarks.py FOUND PAGE
-FOUND has batches.json and single.json (sonard_bench --json) and, where those parts ran, facts.txt, digests.txt, ceiling.txt,
+FOUND has batches.json and single.json (sonard_bench --json) and, if those parts ran, facts.txt, digests.txt, ceiling.txt,
 memcheck.txt, initcheck.txt and the tests' *_test.txt.
 """
 
@@ -11,7 +11,7 @@ import pathlib
 import re
 import sys
 
-# case: (required, goal) [pings/s], as for the CPU; P10 is that of batches.
+# case: (required, goal) [pings/s], as for the CPU; P10 is the value for batches.
 FLOORS = {"P1": (75, 250), "P3a": (40, 200), "P3b": (40, 160), "P3c": (40, 170), "P3d": (40, 100)}
 BATCH_FLOOR, BATCH_GOAL = 1000, 5000
 RATIO_FLOOR, RATIO_GOAL = 100, 1000
@@ -29,7 +29,7 @@ def table(titles, rows):
 
 
 def alone(results):
-    """One ping at a time: what a live sonar gets."""
+    """Returns the rates of one ping at a time, as for a live sonar."""
     by_device = [r for r in results if r["engine"].startswith("cuda")]
     yield "## One ping at a time"
     yield ""
@@ -94,13 +94,13 @@ def page(report, facts):
 
 
 def last_word(path, pattern, otherwise):
-    """What a tool or a test program said at its end."""
+    """Returns the last message of a tool or a test program."""
     found = re.findall(pattern, path.read_text(encoding="utf-8", errors="replace")) if path.exists() else []
     return found[-1].strip() if found else otherwise
 
 
 def load(folder):
-    """The report of both runs as one, and the facts."""
+    """Returns the reports of both runs as one, and the facts."""
     report = json.loads((folder / "single.json").read_text(encoding="utf-8"))
     report["device"] = json.loads((folder / "batches.json").read_text(encoding="utf-8"))["device"]
     facts = {}

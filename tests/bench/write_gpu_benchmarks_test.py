@@ -1,4 +1,4 @@
-"""The page of the CUDA engine's benchmarks: its verdicts, and the whole way to it with host loops for a device."""
+"""The page of the CUDA engine's benchmarks: its verdicts, and all steps that make it, with host loops as the device."""
 import json
 import os
 import pathlib
