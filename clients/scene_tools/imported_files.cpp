@@ -21,7 +21,7 @@ void append(std::string& out, double v) {
   out.append(text.data(), std::to_chars(text.data(), text.data() + text.size(), v).ptr);
 }
 
-/// Gazebo and RViz take the coordinates of every mesh as they are: z is up even if the file says otherwise.
+/// Gazebo and RViz use the coordinates of every mesh unchanged: z is up, even if the file states another axis.
 MeshFile mesh_at(const fs::path& file) {
   MeshFile request;
   request.file = file;

@@ -77,7 +77,7 @@ class MavlinkPoses {
   /// Without `inject` the command to inject a failure is answered as unsupported.
   /// Without `has_range_finder` the commands that ask for DISTANCE_SENSOR are answered as unsupported.
   explicit MavlinkPoses(Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = {});
-  /// `now` never runs backwards, whatever its origin.
+  /// `now` may have any origin, but never goes back.
   Reaction on_datagram(BytesView datagram, Time now);
   /// Call several times a second. Sends heartbeats and requests. Reports the selected system and the missing parts of a pose:
   /// when poses start or stop, and at growing intervals while none arrive.

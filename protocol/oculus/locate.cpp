@@ -5,7 +5,7 @@
 namespace sonar::oculus {
 namespace {
 
-/// An empty `ping` asks for the layout with the most fields, which is that of version 2.
+/// For an empty `ping` it returns the layout with the most fields, which is that of version 2.
 bool has_long_form(wire::BytesView ping) {
   MessageHeader header{.version = 2};
   wire::Reader reader(ping);

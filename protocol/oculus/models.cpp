@@ -15,7 +15,7 @@ namespace {
 // oculus_driver. BAS: bastianschildknecht sonar_driver. TID: tidewise drivers-sonar_oculus_m750d. CAT: the payload catalogue of
 // the open simulator OceanSim, which quotes the vendor's data sheet DA-148-P01443-10 (2026) for the M series and integrators'
 // pages for the C550d; the data sheet itself was not read. CAP: the captured M1200d pings. unknown: no public source; the value
-// is assumed, or fitted as the comment says.
+// is assumed, or fitted as described in the comment.
 
 /// unknown: fitted. The pressure that reaches full scale at TVG 0 dB and gain 0 dB. With it, the demo scene at gain 50 and gamma
 /// 127 has an 8-bit median of 30 to 60. The other products were fitted to the same brightness at half their range. The captured

@@ -25,8 +25,8 @@ bool is_of(Id id, BytesView frame) {
   return reader.ok() && header.id == id;
 }
 
-/// Offset of the frame with that message among the frames of a ping. nullopt: there is none. If `frames` is empty, the caller
-/// asks for the layout alone, and the offset is 0.
+/// Offset of the frame with that message among the frames of a ping. nullopt: there is none. If `frames` is empty, only the
+/// layout is requested, and the offset is 0.
 std::optional<std::size_t> frame_of(Id id, BytesView frames) {
   std::size_t at = 0;
   while (!frames.empty() && at < frames.size() && !is_of(id, frames.subspan(at))) {

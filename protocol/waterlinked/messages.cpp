@@ -85,7 +85,7 @@ Bytes packet_of(const ImuMessage& message) {
   return packed(m);
 }
 
-// A packet holds a google.protobuf.Any, whose type says which of the three messages it is.
+// A packet holds a google.protobuf.Any, whose type identifies one of the three messages.
 Decoded decode(BytesView bytes) {
   Decoded out;
   pb::Packet packet;

@@ -17,7 +17,7 @@ namespace sonar::bvt {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr in_addr_t loopback_broadcast = 0x7FFFFFFF;  // 127.255.255.255: sonars of this machine, whatever their 127.x.y.z
+constexpr in_addr_t loopback_broadcast = 0x7FFFFFFF;  // 127.255.255.255: sonars of this machine at any 127.x.y.z
 
 in_addr_t ipv4_of(const sockaddr* address) {
   sockaddr_in in;

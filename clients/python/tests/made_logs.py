@@ -313,7 +313,7 @@ def nmea_log(steps=20, began_s=43200, kinds=("HDT", "PHTRO", "GGA", "DBT")):
 # --- recordings of ROS 2 in SQLite ---
 
 def db3(path, topics):
-    """Writes [(topic, type, [(log time [s], message)])] as rosbag2's sqlite3 storage does."""
+    """Writes [(topic, type, [(log time [s], message)])] like rosbag2's sqlite3 storage."""
     with contextlib.closing(sqlite3.connect(path)) as base, base:
         base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, "
                      "serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)")

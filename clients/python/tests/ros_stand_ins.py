@@ -14,7 +14,7 @@ PATIENCE_S = 60
 
 
 def wait_for(found):
-    """Waits until found() gives something, and returns it."""
+    """Waits until found() returns a value, and returns it."""
     for _ in range(100 * PATIENCE_S):
         if result := found():
             return result
@@ -23,7 +23,7 @@ def wait_for(found):
 
 
 class Message:
-    """Of any type: nested messages appear when they are touched."""
+    """A message of any type: nested messages are made when they are accessed."""
 
     def __init__(self, **values):
         vars(self).update(values)
@@ -52,7 +52,7 @@ class ExternalShutdown(Exception):
 
 
 class Ros:
-    """One node's surroundings. `parameters`: as on its command line."""
+    """The environment of one node. `parameters`: as on its command line."""
 
     def __init__(self, **parameters):
         ros = self
@@ -125,7 +125,7 @@ class Ros:
 
     @contextlib.contextmanager
     def module(self):
-        """sonard_bridge.node with these surroundings."""
+        """Returns sonard_bridge.node in this environment."""
         with mock.patch.dict(sys.modules, self.modules):
             sys.modules.pop("sonard_bridge.node", None)
             try:
@@ -142,7 +142,7 @@ def modules_of(made):
 
 
 def launch_modules():
-    """launch and launch_ros: every action is a Recorded, a LaunchConfiguration has the value of its context."""
+    """launch and launch_ros: every action is a Recorded, and a LaunchConfiguration has the value in its context."""
     class LaunchConfiguration(Recorded):
         def perform(self, context):
             return context[self.arguments[0]]

@@ -183,7 +183,7 @@ class Command(WithFolder):
         self.assertEqual(text.splitlines()[-1].split(",")[1:3], ["-1.500000", "2.000000"])
 
     def test_dead_reckoning_is_done_when_asked(self):
-        """Ahead along the heading of each moment, at the speed that is given."""
+        """The vehicle moves along its heading at the given speed."""
         log = self.file(made.telemetry_without_place(("ATTITUDE", "GLOBAL_POSITION_INT")), "rov.tlog")
         code, text, said = self.run_main(log, "-o", "-", "--at=10,20", "--dead-reckon", "0.5")
         self.assertEqual(code, 0, said)

@@ -1,4 +1,5 @@
-"""Conversion of recordings of ROS 2, .db3 files and folders: poses are compared with their source; damaged ones give one error."""
+"""Conversion of recordings of ROS 2, .db3 files and folders: poses are compared with their source; damaged ones give one
+error."""
 import contextlib
 import shutil
 import sqlite3
@@ -57,7 +58,7 @@ class RecordingsOfRos2(WithFolder):
     def test_a_folder_of_several_files(self):
         for kind in ("db3", "mcap"):
             with self.subTest(kind):
-                folder = self.folder_of(f"r_10.{kind}", f"r_9.{kind}")  # in this order, whatever their names
+                folder = self.folder_of(f"r_10.{kind}", f"r_9.{kind}")  # in this order, independent of their names
                 parts = [(f"r_10.{kind}", range(3)), (f"r_9.{kind}", range(3, 6))]
                 for name, steps in parts:
                     messages = [(100 + i, made.odometry(i)) for i in steps]
@@ -99,7 +100,7 @@ class RecordingsOfRos2(WithFolder):
         made.db3(folder / "r_0.db3", made.ROS2_TOPICS)
         for text in ("\n" * (1 << 20), " " * (1 << 20), "- " + " " * (1 << 20), "- a.db3" * (1 << 17) + " x", "- \n" * (1 << 18)):
             (folder / "metadata.yaml").write_text(text)
-            self.assertEqual(len(files_of(folder)), 1)  # a quadratic search takes hours
+            self.assertEqual(len(files_of(folder)), 1)  # a quadratic search would take hours
 
     def test_messages_that_are_not_merged_yet(self):
         path, copy = self.folder / "live.db3", self.folder / "copy.db3"
@@ -174,7 +175,7 @@ class RecordingsOfRos2(WithFolder):
         return path
 
     def test_tables_that_list_more_than_the_file_holds(self):
-        for topic_id, steps in ((1, rosbag2.STEPS_PER_BYTE), (2, 0.05)):  # its messages are read, or only stepped over
+        for topic_id, steps in ((1, rosbag2.STEPS_PER_BYTE), (2, 0.05)):  # its messages are read or skipped
             path = self.repeating(topic_id)
             with self.subTest(topic_id), mock.patch.object(rosbag2, "STEPS_PER_BYTE", steps), \
                     mock.patch.object(rosbag2, "_STEPS_AT_ONCE", 1000), \
@@ -209,7 +210,7 @@ class RecordingsOfRos2(WithFolder):
                      self.file(made.bag([("/path", "nav_msgs/Path", of_ros1)]), "b.bag")):
             with self.subTest(path.name):
                 self.assert_track(convert(path, topic="/path"), range(6), t0=100, metres=1e-9, radians=1e-6)
-        self.assertEqual(convert(self.folder / "a.db3").source, "/odom")  # a path is rather a plan
+        self.assertEqual(convert(self.folder / "a.db3").source, "/odom")  # a path is probably a plan
         plan = made.mcap([("/plan", "cdr", "nav_msgs/msg/Path", [(100, made.path(range(4), stamped=False))])])
         with self.assertRaisesRegex(ConvertError, "the poses of /plan have no time stamps, so they are not a track"):
             self.convert(plan)

@@ -222,7 +222,7 @@ class Telemetry(WithFolder):
         middle = made.telemetry_log(steps=120)[len(made.telemetry_log(steps=100)):]
         self.assertEqual(len(self.convert(log + middle).rows), 119)
         self.assertEqual(self.warned, ["no position for 8.2 s after second 1.8, interpolated linearly"])
-        pause = made.telemetry_log(steps=20) + middle  # nothing at all is no lack
+        pause = made.telemetry_log(steps=20) + middle  # a pause of all messages is not a missing message
         self.convert(pause)
         self.assertEqual(self.warned, [])
 
@@ -373,7 +373,7 @@ class WithoutHorizontalPosition(WithFolder):
             self.convert(log("SCALED_PRESSURE2", lambda down: 1012.0))  # never in the water
 
     def test_depths_before_the_vehicles_clock_is_known(self):
-        """VFR_HUD has no time; that of receipt would be decades after the vehicle's start."""
+        """VFR_HUD has no time; the time of receipt would be decades after the vehicle's start."""
         first = (1_699_999_999_000_000).to_bytes(8, "big") + made.mavlink_frame("VFR_HUD", (0, 0, -1, 0, 0, 0))
         self.assert_held(self.convert(first + made.telemetry_without_place(("HEARTBEAT", "ATTITUDE", "VFR_HUD"))), range(20), t0=25)
 
@@ -439,7 +439,7 @@ class Px4(WithFolder):
         self.assertIn("origin: 47.60000000,-122.33000000,10.000", track.comments)
 
     def test_the_lowest_instance_with_values_is_used(self):
-        track = self.convert(made.ulog(local=1))  # of two instances of the attitude the first counts
+        track = self.convert(made.ulog(local=1))  # the first of two instances of the attitude is used
         self.assert_track(track, range(1, 50), metres=1e-5, radians=1e-5)
         self.assertIn("origin: 47.60000000,-122.33000000,10.000", track.comments)
         self.assertEqual(self.warned, ["without values of the first instance; used: vehicle_local_position 1"])

@@ -1,4 +1,4 @@
-"""Faults of a running sonard as a driver's test uses them: a block, what the driver did about it, and the fixture of pytest."""
+"""Faults of a running sonard as a driver's test uses them: a block, the reaction of the driver, and the fixture of pytest."""
 import importlib.util
 import os
 import pathlib

@@ -158,7 +158,7 @@ class Verdicts(unittest.TestCase):
         found = verdict(observed([], tapped=False))
         self.assertEqual(found.words(), ("UNSEEN", "NONE NEEDED"))
         self.assertTrue(found.must_holds)
-        found = verdict(observed(truth_known=False, true_pings=[], delivered=[]))  # a tap, but no right to read packets
+        found = verdict(observed(truth_known=False, true_pings=[], delivered=[]))  # a tap, but no permission to read packets
         self.assertEqual(found.words(), ("UNSEEN", "NONE NEEDED"))
 
 
@@ -236,7 +236,7 @@ class Table(unittest.TestCase):
             self.assertEqual(len(record["for"]), 1)
 
     def test_tier_1_is_complete(self):
-        """All kinds of the first release, less those that a later look moved to tier 3."""
+        """All kinds of the first release, without those that were later moved to tier 3."""
         tiers = {"L": "1-7 10 13 14 17 18", "S": "1-4 6 7", "F": "1-8 10-16 19 20 22 24", "D": "1-8 11-19 21 22 26-28",
                  "U": "1-8 12 13", "T": "1-6 8 10-12", "M": "1-6 8-10", "P": "1-6 9 11-13", "B": "1 2 4-6 8-10 12 13 15",
                  "G": "1-7"}
@@ -302,7 +302,7 @@ class Clock:
 
 
 class Waiting(unittest.TestCase):
-    """A busy computer is slow; a driver that does nothing is stuck."""
+    """A busy computer makes a driver slow; a driver without any activity is stuck."""
 
     def waited(self, happens_s, timeout_s, stalls=(), most=8):
         """happens_s: times after the start at which something happens."""

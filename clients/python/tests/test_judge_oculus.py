@@ -22,7 +22,7 @@ def numbers(*pieces):
 
 
 class Oculus(unittest.TestCase):
-    """What a driver may publish. Offsets of fields: docs/protocols/oculus.md, version 0."""
+    """The pings that a driver may publish. Offsets of fields: docs/protocols/oculus.md, version 0."""
 
     def setUp(self):
         self.a, self.b, self.c = (made_ping(rows=12, beams=16, number=n) for n in (7, 8, 9))

@@ -17,7 +17,7 @@ def datagram(content, version=b"2", crc=0):
 
 
 def literals(content):
-    """As Snappy would write it without finding anything twice."""
+    """Snappy data without any repetition."""
     out = varint(len(content))
     for at in range(0, len(content), 60):
         piece = content[at:at + 60]

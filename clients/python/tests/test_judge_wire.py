@@ -40,7 +40,7 @@ class Packets(unittest.TestCase):
     def test_settings_ends_and_zero_windows(self):
         fire = b"SO" + bytes(4) + b"\x15\0" + bytes(45)
         self.connection.from_driver(1.0, 5, 1000, wire._ACK, 100, fire)
-        self.connection.from_driver(1.1, 5, 1000, wire._ACK, 100, fire)  # sent again by TCP, not by the driver
+        self.connection.from_driver(1.1, 5, 1000, wire._ACK, 100, fire)  # a retransmission by TCP, not by the driver
         self.connection.from_driver(1.2, 58, 1000, wire._ACK, 0, b"")
         self.connection.from_driver(1.3, 58, 1000, wire._ACK | wire._FIN, 100, b"")
         self.connection.from_device(1.4, 1000, wire._RST, b"")

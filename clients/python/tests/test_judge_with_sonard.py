@@ -1,6 +1,6 @@
-"""The judge's verdicts are right: a driver that is right passes, and each planted fault is found by its case and by no other MUST.
+"""The judge's verdicts are right: a correct driver passes, and each planted fault is found by its case and by no other MUST.
 
-SONARD_JUDGE_CASES=some runs the proof, which takes minutes; =all takes the right driver through every case."""
+SONARD_JUDGE_CASES=some runs the proof, which takes minutes; =all runs every case with the correct driver."""
 import contextlib
 import io
 import json
@@ -16,7 +16,7 @@ from sonard_client import lab
 from sonard_client.judge import __main__ as judge_main
 from sonard_client.judge import report
 
-# The planted fault, the case that finds it, whether by a MUST or a SHOULD, and further cases whose MUST it breaks too.
+# The planted fault, the case that finds it, its level (MUST or SHOULD), and further cases whose MUST it violates.
 PLANTS = (("ignores-fin", "L02.1", "must", {"L01.1", "L02.2", "L03.1"}),
           ("trusts-lengths", "F10.1", "must", {"F05.1"}),
           ("never-sends-settings-again", "L04.1", "must", {"L01.1", "L02.1", "L02.2", "L03.1", "L05.1", "L06.1"}),
@@ -63,7 +63,7 @@ FEW = ("--case", "N00.1", "--case", "L02.1", "--case", "F01.1")
 
 
 class Few(Judging):
-    """Run at every change: the judge runs, and distinguishes a right driver from one that never returns."""
+    """Run at every change: the judge runs, and distinguishes a correct driver from one that never recovers."""
 
     def test_a_right_driver_passes_what_it_must(self):
         index = self.judged("right_driver.py {ip}", *FEW)
@@ -113,7 +113,7 @@ class Proof(Judging):
 @unittest.skipUnless(os.environ.get("SONARD_JUDGE_CASES"), LONG)
 @unittest.skipIf(lab.missing(), lab.missing())
 class InTheLaboratory(Judging):
-    """Faults of the network need no faults of sonard."""
+    """Faults of the network do not need sonard's faults."""
     CHOSEN = ("--case", "N00.1", "--case", "L06.1", "--case", "L17.2")
 
     def test_right_and_wrong_drivers(self):

@@ -64,7 +64,7 @@ class Namespaces(unittest.TestCase):
             try:
                 wait_for('"number"', 3)
                 request("L06 seconds=500")
-                wait_for("timed out; reconnecting")  # after what it had received already
+                wait_for("timed out; reconnecting")  # after the pings that it had already received
                 request("end L06")
                 wait_for("L06 ended")
                 wait_for('"number"', 3)

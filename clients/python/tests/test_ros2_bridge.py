@@ -1,4 +1,4 @@
-"""The ROS 2 bridge without ROS: frames, the line it sends, what it reads of sonard, and its package files."""
+"""The ROS 2 bridge without ROS: frames, the line that it sends, the data that it reads from sonard, and its package files."""
 import ast
 import importlib.util
 import json
@@ -139,7 +139,7 @@ class Lines(unittest.TestCase):
 
 
 class Package(unittest.TestCase):
-    MODULES = {"tf2_ros": "tf2_ros_py"}  # of packages whose name is another
+    MODULES = {"tf2_ros": "tf2_ros_py"}  # of packages with another name
 
     def test_files_are_complete(self):
         package = xml.etree.ElementTree.parse(BRIDGE / "package.xml").getroot()

@@ -1,4 +1,5 @@
-"""The node of the ROS 2 bridge and its launch files, with stand-ins for ROS: poses, whatever else is slow; parameters; the end."""
+"""The node of the ROS 2 bridge and its launch files, with stand-ins for ROS: poses while other work is slow; parameters; the
+end."""
 import contextlib
 import http.server
 import importlib.util
@@ -41,7 +42,7 @@ def transform(sec, nanosec):
 
 
 class SlowServer:
-    """Answers the status when it may; counts requests and answers, and keeps the last request's header."""
+    """Answers the status when the test allows it; counts requests and answers, and stores the last request's header."""
 
     def __init__(self, may_answer=True):
         outer = self
@@ -86,7 +87,7 @@ class WithNode(unittest.TestCase):
         self.there.settimeout(PATIENCE_S)
 
     def bridge(self, **parameters):
-        """The surroundings of a node that sends its poses here."""
+        """Returns the environment of a node that sends its poses here."""
         ros = Ros(**{"sonard": "127.0.0.1:%d" % self.there.getsockname()[1], **parameters})
         module = ros.module()
         node_module = module.__enter__()
@@ -181,7 +182,7 @@ class Helpers(WithNode):
     """Threads that continue after errors."""
 
     def connections(self, *streams):
-        """Stands in for the live view's connections, one after the other; the last one stays open. Returns those made."""
+        """Replaces the live view's connections, one after another; the last one stays open. Returns the connections."""
         made, self.may_go_on = [], threading.Event()
         may_go_on = self.may_go_on
 
@@ -323,7 +324,7 @@ class TheClock(WithNode):
         with mock.patch("sonard_bridge.live_view.LiveView.run"):
             ros = self.bridge(clock=True)
         ros.node.view.clock = "stepped"
-        for topic, ns in (("", 5), ("/tf", 3), ("/tf", 7), ("", 7), ("", 1)):  # the last one: sonard began anew
+        for topic, ns in (("", 5), ("/tf", 3), ("/tf", 7), ("", 7), ("", 1)):  # the last one: sonard started again
             ros.node.on_view(topic, ns, b"")
         self.assertEqual([m.clock.nanosec for m in ros.published["/clock"]], [5, 7, 1])
         ros.node.view.clock = "follow"

@@ -61,7 +61,7 @@ class WithRos(unittest.TestCase):
             there.bind(("127.0.0.1", 0))
             there.setblocking(False)
             for end in (signal.SIGTERM, signal.SIGINT):
-                name = str(int(end))  # lines of the process before it may still be waiting
+                name = str(int(end))  # lines of the previous process may still wait
                 process, said = self.start("odometry:=/odom", "sonard:=127.0.0.1:%d" % there.getsockname()[1],
                                            f"vehicle:={name}", "tf_rate_hz:=50")
                 publisher = self.node.create_publisher(Odometry, "/odom", 10)
@@ -84,7 +84,7 @@ class WithRos(unittest.TestCase):
                 self.assertNotIn("rosout", said())
 
     def test_a_signal_at_any_moment_ends_the_node(self):
-        for wait_s in (0.0, 0.001, 0.003, 0.01, 0.03, 0.1):  # since its first line, while the executor is made and waits
+        for wait_s in (0.0, 0.001, 0.003, 0.01, 0.03, 0.1):  # time since its first line, while the executor is created and waits
             process, said = self.start("odometry:=/odom")
             self.spin_until(lambda said=said: "poses from" in said())
             time.sleep(wait_s)

@@ -22,7 +22,7 @@ A, B = (3.76, 1.37), (3.94, -0.69)  # m ahead and to port: the near spheres of s
 
 
 def next_with_settings(sonar, settings, attempts=50):
-    """The first ping that echoes these settings. The echoed gain may differ."""
+    """Returns the first ping that echoes these settings. The echoed gain may differ."""
     for ping in sonar.pings(timeout=60, count=attempts):
         echo = ping.settings
         if all(getattr(echo, name) == getattr(settings, name) for name in ("flags", "extended", "range", "mode")):

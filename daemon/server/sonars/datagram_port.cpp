@@ -22,7 +22,7 @@ bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   return !ec;
 }
 
-/// On loopback, which is 127.0.0.0/8 whatever the netmask is, the broadcast address is 127.255.255.255.
+/// On loopback (127.0.0.0/8 with any netmask) the broadcast address is 127.255.255.255.
 Ipv4 broadcast_of(const SonarConfig& sonar) {
   if (sonar.bind_ip[0] == 127) return {127, 255, 255, 255};
   Ipv4 address{};

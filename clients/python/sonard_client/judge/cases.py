@@ -1,7 +1,7 @@
 """The table of cases. run_case.py runs them; verdicts.py judges them.
 
-row(NUMBER, given, DURATION, SENTENCE, ...). NUMBER begins with the code of the kind of fault. DURATION is "2 s", "3 pings", "once"
-or "5 times".
+row(NUMBER, given, DURATION, SENTENCE, ...). NUMBER begins with the code of the kind of fault. DURATION is "2 s", "3 pings",
+"once" or "5 times".
 at      when the fault begins: "ping 6" (the default), "every 5 pings", "start" (before the driver connects)
 limit seconds after the fault's end within which the driver must have recovered
 must    limits of this case in addition to those of all cases (verdicts.judge): {"rss_mib": 64}
@@ -119,7 +119,7 @@ def row(number: str, given: Dict[str, Any], duration: str, sentence: str, **more
 _FREE = {"lost": None}                        # the fault itself loses pings
 _LONG = {"recover_s": 5.0, "lost": None}      # a reboot takes a few seconds
 _CHANGED = {"lost": None, "rss_mib": 64.0}    # pings of another size need new buffers
-_LEAN = {"rss_mib": 256.0}                    # as `must`: a driver must not allocate what a length field says
+_LEAN = {"rss_mib": 256.0}                    # limits as in `must`: a driver must not allocate the size in a length field
 
 CASES: List[Case] = [
     row("N00.1", {}, "2 s", "Nothing is wrong.", measured=True),

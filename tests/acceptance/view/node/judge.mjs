@@ -1,5 +1,5 @@
-// Checks a running sonard: node judge.mjs CHECK URL; or a schema file: node judge.mjs schemas FILE.proto. What must hold is asserted
-// here; what foxglove_judge_test.py compares is printed as JSON.
+// Checks a running sonard: node judge.mjs CHECK URL; or a schema file: node judge.mjs schemas FILE.proto. Conditions are asserted
+// here; values that foxglove_judge_test.py compares are printed as JSON.
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
 import { validateBytes } from 'gltf-validator';
@@ -59,7 +59,7 @@ const meaning = {
   },
 };
 
-// Every advertised channel is read by its own schema. The pictures are printed by ping number, to be compared with
+// Every advertised channel is read with its own schema. The pictures are printed with their ping numbers, for a comparison with
 // those of a TCP client.
 async function channels(url) {
   const viewer = await new Viewer(url).greeted();
@@ -90,7 +90,7 @@ async function channels(url) {
     assert(Math.abs(content.stamp_s - Number(ns) / 1e9) < 1e-3);
     assert.deepEqual([content.range_m, content.rate_hz, content.clients], [10, 10, 1]);
   }
-  // After the answer to a question that came later than `unsubscribe`, nothing of that channel may come.
+  // After the answer to a request that was sent after `unsubscribe`, no message of that channel may arrive.
   const [subscription] = [...viewer.topics].find(([, topic]) => topic === '/front/image');
   viewer.client.unsubscribe(subscription);
   await viewer.parameters('/front/range_m');
@@ -108,7 +108,7 @@ async function channels(url) {
   };
 }
 
-// Parameters: list, write, refuse, updates; what this server does not do; nothing ends the connection.
+// Parameters: list, write, refusals, updates, and unsupported requests; none of them ends the connection.
 async function parameters(url) {
   const viewer = await new Viewer(url).greeted();
   const other = await new Viewer(url).greeted();
@@ -116,7 +116,7 @@ async function parameters(url) {
   for (const name of ['/front/range_m', '/front/transmit', '/water/temperature_c', '/faults/armed', '/clock/mode']) assert(name in all, name);
   for (const { name, value, type } of viewer.all('parameterValues')[0].parameters) {
     assert(value !== undefined, name);
-    if (typeof value === 'number' && !Number.isInteger(value)) assert.equal(type, 'float64', name);  // else it is an integer
+    if (typeof value === 'number' && !Number.isInteger(value)) assert.equal(type, 'float64', name);  // otherwise it is an integer
   }
   other.client.subscribeParameterUpdates([]);
   assert.deepEqual(await viewer.set('/front/range_m', 7.5), { '/front/range_m': 7.5 });
@@ -160,7 +160,7 @@ async function parameters(url) {
   await Promise.all([viewer.close(), other.close()]);
 }
 
-// Services on a daemon in lockstep: time stands until a step, and viewers are told of each.
+// Services on a daemon in lockstep: time advances only with steps, and viewers receive each new time.
 async function services(url) {
   const viewer = await new Viewer(url).greeted();
   assert(viewer.all('serverInfo')[0].capabilities.includes('time'));
@@ -198,7 +198,7 @@ async function services(url) {
   return { times: times.map(Number) };
 }
 
-// Stepped time, while a driver takes pings: viewers are told the time in order, at most 30 times a second, and the last one.
+// Stepped time, while a driver receives pings: viewers receive the times in order, at most 30 a second, and the last one.
 async function stepped(url) {
   const viewer = await new Viewer(url).greeted();
   viewer.subscribe('/front/image');
@@ -213,7 +213,7 @@ async function stepped(url) {
   return { times: times.length };
 }
 
-// A viewer that does not read for 8 s is told, then gets the newest picture instead of those that waited.
+// A viewer that does not read for 8 s gets a message, then the newest picture instead of those that waited.
 async function stalled(url) {
   const viewer = await new Viewer(url).greeted();
   viewer.subscribe('/front/image');
@@ -245,4 +245,4 @@ function schemas(file) {
 const [what, where] = process.argv.slice(2);
 const judges = { channels, parameters, schemas, services, stalled, stepped, subprotocols };
 console.log(JSON.stringify((await judges[what](where)) ?? {}));
-process.exit(0);  // a failure has thrown before; sockets may still be open
+process.exit(0);  // a failure would have thrown before; sockets may still be open

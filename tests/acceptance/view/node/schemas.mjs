@@ -1,5 +1,5 @@
-// Our messages beside Foxglove's, as @foxglove/schemas generates their .proto files: the same package and names, and each of our
-// fields with the same number, type and plurality. Fields that we lack are no difference.
+// Compares our messages with Foxglove's .proto files from @foxglove/schemas: package and names must be equal, and each of our
+// fields must have the same number, type and plurality. Fields that we lack are not reported.
 import { createRequire } from 'node:module';
 import { isDeepStrictEqual } from 'node:util';
 
@@ -34,7 +34,7 @@ const shapeOf = (field) => ({
   repeated: field.repeated,
 });
 
-// What differs, in words; and how many fields were compared.
+// Returns the differences as text, and the number of compared fields.
 export function compare(ours, theirs) {
   const differences = [];
   let fields = 0;

@@ -1,9 +1,9 @@
-// A viewer made of libraries that viewers use: ws, @foxglove/ws-protocol, protobufjs, @lichtblick/rosmsg2-serialization. It keeps
-// all that comes.
+// A viewer made of libraries that viewers use: ws, @foxglove/ws-protocol, protobufjs, @lichtblick/rosmsg2-serialization. It
+// stores all messages.
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 
-// As CommonJS: the modules that @foxglove/ws-protocol has for `import` name no extensions, which node demands.
+// Loaded as CommonJS, because the modules of @foxglove/ws-protocol for `import` have no file extensions, which node requires.
 const require = createRequire(import.meta.url);
 const { FoxgloveClient } = require('@foxglove/ws-protocol');
 const { parse } = require('@lichtblick/rosmsg');
@@ -19,7 +19,7 @@ const kinds = ['open', 'error', 'serverInfo', 'status', 'removeStatus', 'adverti
 
 export class Viewer {
   constructor(url, protocols = names) {
-    this.received = [];  // in order: {kind, value}, kind as FoxgloveClient's events
+    this.received = [];  // in order: {kind, value}, kind is the name of FoxgloveClient's event
     this.channels = new Map();  // by topic
     this.services = new Map();  // by name
     this.topics = new Map();  // by subscription
@@ -38,7 +38,7 @@ export class Viewer {
     this.wake?.();
   }
 
-  // What comes, in order, from number `from` on; an error or the end of the connection fails.
+  // Yields the received messages in order, from number `from` on; fails on an error or the end of the connection.
   async *coming({ from = 0, patience_s = 60, expected = [], missing = () => expected } = {}) {
     const deadline = performance.now() + 1000 * patience_s;
     for (let i = from; ; ++i) {
@@ -78,7 +78,7 @@ export class Viewer {
     for (const topic of topics) this.topics.set(this.client.subscribe(this.channels.get(topic).id), topic);
   }
 
-  // The answer; {name: value} of those asked for, all without names.
+  // Returns the answer: {name: value} of the requested parameters; without names, of all.
   async parameters(...wanted) {
     const id = `get ${this.received.length}`;
     this.client.getParameters(wanted, id);
@@ -100,7 +100,7 @@ export class Viewer {
     return JSON.parse(bytes(data).toString());
   }
 
-  // A message, read by nothing but its advertised schema.
+  // Reads a message with only its advertised schema.
   decode({ topic, data }) {
     if (!this.readers.has(topic)) this.readers.set(topic, readerOf(this.channels.get(topic)));
     return this.readers.get(topic)(bytes(data));
@@ -123,7 +123,7 @@ function readerOf(channel) {
   const type = typesOf(channel.schema).lookupType(channel.schemaName);
   return (data) => {
     const message = type.decode(data);
-    // Reading drops fields that the schema lacks: written again they would be missing.
+    // Reading drops fields that the schema lacks, so the message that is written again would differ.
     assert.equal(type.encode(message).finish().length, data.length, `${channel.topic} has fields that its schema lacks`);
     return type.toObject(message, { defaults: true, longs: BigInt });
   };

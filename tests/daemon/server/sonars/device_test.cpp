@@ -1,4 +1,4 @@
-// Network actions of a device when its sonar asks for a closed port, a reset or a client that is not read.
+// Network actions of a device when its sonar requests a closed port, a reset or a client that is not read.
 #include "daemon/server/sonars/device.hpp"
 
 #include <gmock/gmock.h>
