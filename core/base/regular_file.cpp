@@ -62,8 +62,9 @@ Result<OpenFile> open_regular(const std::filesystem::path& file) {
                                                 ", the only folder whose files this program reads; put a copy there");
   struct stat status {};
   const auto is_other = [&] {
-    return failure(ErrorKind::missing_file, file.string() + ": is a " + kind_of(status.st_mode) + ", not a regular file; " +
-                                                (S_ISDIR(status.st_mode) ? "name a file in it" : "save the contents in one"));
+    return failure(ErrorKind::missing_file,
+                   file.string() + ": is a " + kind_of(status.st_mode) + ", not a regular file; " +
+                       (S_ISDIR(status.st_mode) ? "name a file in it" : "save its contents in a regular file"));
   };
   if (::stat(file.c_str(), &status) != 0) return not_opened(file);
   if (!S_ISREG(status.st_mode)) return is_other();  // opening a device may start an action
