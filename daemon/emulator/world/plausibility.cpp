@@ -30,8 +30,7 @@ constexpr const char* surface_cure =
     "in the other; state the frame that was sent";
 constexpr const char* depth_cure =
     "the scene is less deep than that: see the origin that depths are counted from, and the unit (metres)";
-constexpr const char* exchanged_cure =
-    "it would be in the scene if x and y were exchanged: ENU_FLU has east first, NED_FRD north";
+constexpr const char* exchanged_cure = "it is in the scene with x and y exchanged: ENU_FLU has east first, NED_FRD north";
 constexpr const char* far_cure =
     "positions are metres from the world's 0, 0, 0: see the unit and the origin that they are sent in";
 constexpr const char* turned_cure =

@@ -118,7 +118,7 @@ TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
   strip.objects[0].in_world.position_m = {0, 500, -5};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [500, 0, -2]}"), strip),
               ElementsAre(AllOf(HasSubstr("m from everything in the scene, but its range is at most 40 m"),
-                                HasSubstr("it would be in the scene if x and y were exchanged"))));
+                                HasSubstr("it is in the scene with x and y exchanged"))));
   EXPECT_THAT(at("xyz_m: [3000, 0, -3]"), ElementsAre(HasSubstr("positions are metres from the world's 0, 0, 0")));
 }
 
