@@ -1,5 +1,6 @@
 #include <cstdio>
 
+#include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/terminal.hpp"
 #include "clients/sonarctl/view_caption.hpp"
@@ -127,6 +128,7 @@ class LiveView {
                                           "; it stopped, or another client holds it (clients.max)");
       if (item.what == Wait::data) heard_s = now_s();
       received = received || item.what == Wait::data;
+      item.notices = notice_log_.kept(item.notices);
       if (!has_screen) print_notices(item.notices);
       for (std::string& notice : item.notices)
         if (has_screen && notices_.size() < most_notices) notices_.push_back(std::move(notice));
@@ -164,6 +166,7 @@ class LiveView {
   std::optional<PingStream> stream_;
   PicturePainter painter_;
   ViewCaption figures_;
+  NoticeLog notice_log_;
   std::vector<std::string> notices_;
   bool lost_ = false;  // the device is gone, or silent
   Outage outage_;
