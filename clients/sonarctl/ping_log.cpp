@@ -108,7 +108,7 @@ std::string text_from(const PingSummary& s, bool asked, std::string_view rate_un
   if (asked) text += "\nsettings echoed as asked: " + echo_text(s);
   std::string limits;
   for (const std::string& limit : s.limited) limits += (limits.empty() ? "" : "; ") + limit;
-  if (!limits.empty()) text += "\nthe sonar limits them: its pings have " + limits;
+  if (!limits.empty()) text += ", but the sonar limits them: its pings have " + limits;  // only of settings that were asked
   return text;
 }
 
