@@ -199,16 +199,17 @@ void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodeti
 /// Adds a note if large cells may be in degrees although the ground is flat: the coordinates are possible on Earth, and the
 /// grid neither begins nor has its middle at 0, 0, as local grids usually do, or is deeper than wide.
 void hint_at_degrees(HeightGrid& grid) {
-  constexpr double least_cell = 0.05, all_around = 300;
+  constexpr double least_cell = 0.05, all_around = 300, pole_to_pole = 175;
   const double cell = grid.x[1] - grid.x[0], near = cell;
   const auto is_local = [&](const std::vector<double>& axis) {
     return std::abs(axis.front()) <= near || std::abs(axis.back()) <= near || std::abs(axis.front() + axis.back()) <= near;
   };
   if (cell < least_cell || grid.x.front() < -180 || grid.x.back() > 360 || grid.y.front() < -90 || grid.y.back() > 90) return;
-  const double width = std::max(grid.x.back() - grid.x.front(), grid.y.back() - grid.y.front()) + cell;
-  const bool is_deep =
-      std::any_of(grid.z_m.begin(), grid.z_m.end(), [&](float z) { return std::abs(static_cast<double>(z)) > width; });
-  if (is_local(grid.x) && is_local(grid.y) && width < all_around && !is_deep) return;
+  const double width_x = grid.x.back() - grid.x.front() + cell, width_y = grid.y.back() - grid.y.front() + cell;
+  const bool is_deep = std::any_of(grid.z_m.begin(), grid.z_m.end(), [width = std::max(width_x, width_y)](float z) {
+    return std::abs(static_cast<double>(z)) > width;
+  });
+  if (is_local(grid.x) && is_local(grid.y) && width_x < all_around && width_y < pole_to_pole && !is_deep) return;
   grid.notes.push_back(
       text::format("its coordinates (%.6g, %.6g, cells of %.6g) are read as metres; write geographic: true if they "
                    "are degrees, or false",
@@ -228,13 +229,15 @@ Result<void> set_origin_of_degrees(HeightGrid& grid, const HeightOptions& option
   for (double& x : grid.x) x += 360 * turns;
   const double far = std::max({std::abs(grid.x.front() - from_longitude), std::abs(grid.x.back() - from_longitude),
                                std::abs(grid.y.front() - from_latitude), std::abs(grid.y.back() - from_latitude)});
+  const char* const else_metres = guessed ? "; write geographic: false if its coordinates are metres" : "";
   if (far > farthest_deg)
     return failure(ErrorKind::bad_data,
                    text::format("the grid, in degrees, reaches %.3g degrees from the origin (%s); at most 5: cut a part out "
-                                "(gdal_translate -projwin WEST NORTH EAST SOUTH IN OUT.tif), or set origin",
-                                far, place_text(*grid.origin).c_str()));
+                                "(gdal_translate -projwin WEST NORTH EAST SOUTH IN OUT.tif), or set origin%s",
+                                far, place_text(*grid.origin).c_str(), else_metres));
   if (std::max(std::abs(grid.y.front()), std::abs(grid.y.back())) > nearest_pole_deg)
-    return failure(ErrorKind::bad_data, "the grid, in degrees, reaches within 1 degree of a pole; project it to metres");
+    return failure(ErrorKind::bad_data,
+                   "the grid, in degrees, reaches within 1 degree of a pole; project it to metres" + std::string(else_metres));
   return {};
 }
 

@@ -280,6 +280,11 @@ TEST(UnnamedSystem, ANoteTellsOfMetresThatCouldBeDegrees) {
   EXPECT_EQ(notes(at_0, "0.25", {.z_scale = 0.001}), "") << "1 m wide and 30 mm deep";
   EXPECT_THAT(notes("xllcorner 4\nyllcorner 52", "0.25", {.centred = true}), HasSubstr("are read as metres"));
   EXPECT_EQ(notes("xllcorner 400\nyllcorner 52", "0.25"), "");
+  std::string meridian = "ncols 2\nnrows 180\nxllcorner 0\nyllcorner -90\ncellsize 1\n";
+  for (int i = 0; i < 360; ++i) meridian += "-1 ";
+  const auto grid = read_esri_heights(files.write("m.asc", meridian), {});
+  ASSERT_TRUE(grid) << grid.error().text;
+  EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("are read as metres"))) << "from pole to pole";
   files.write("g.prj", "PROJCS[\"mine\"]");
   EXPECT_EQ(notes("xllcorner 4\nyllcorner 52", "0.25").find("read as metres;"), std::string::npos);
 }
@@ -297,7 +302,9 @@ TEST(UnnamedSystem, CoarseCellsAreDegreesIfMostStepsAreSteep) {
   EXPECT_EQ(said(steep, "10"), "metres");
   EXPECT_EQ(said(steep, "0.25", {.z_scale = 0.001}), "metres") << "heights in millimetres";
   EXPECT_THAT(said("-1000 -4000 -2500 -6000\n-1200 -5500 -4000 -900\n-3000 -3500 -7000 -2000", "9"),
-              HasSubstr("at most 5: cut a part out (gdal_translate -projwin WEST NORTH EAST SOUTH IN OUT.tif), or set origin"));
+              HasSubstr("at most 5: cut a part out (gdal_translate -projwin WEST NORTH EAST SOUTH IN OUT.tif), or set origin; "
+                        "write geographic: false "
+                        "if its coordinates are metres"));
   EXPECT_EQ(said("-10 -10.2 -500 -10.1\n-10 -10.2 -10.3 -10.1\n-10 -10.2 -10.3 -10.1"), "metres") << "one false height";
 }
 
