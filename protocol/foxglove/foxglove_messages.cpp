@@ -8,10 +8,10 @@
 #include <set>
 
 #include "control.pb.h"
+#include "core/base/base64.hpp"
 #include "core/sonar/sample_code.hpp"
 #include "foxglove.pb.h"
 #include "protocol/foxglove/ros_cdr.hpp"
-#include "protocol/wire/base64.hpp"
 #include "view.pb.h"
 
 namespace sonar::foxglove {
@@ -115,7 +115,7 @@ Bytes descriptor_set(const std::string& name) {
   return bytes_of(set);
 }
 
-Schema protobuf_schema(const std::string& name) { return {name, "protobuf", wire::base64(descriptor_set(name))}; }
+Schema protobuf_schema(const std::string& name) { return {name, "protobuf", base64(descriptor_set(name))}; }
 
 // Viewers show no integers of more than 16 bits, so those become floats from 0 to 1.
 Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes) {

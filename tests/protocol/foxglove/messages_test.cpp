@@ -11,9 +11,9 @@
 #include <bit>
 #include <nlohmann/json.hpp>
 
+#include "core/base/base64.hpp"
 #include "protocol/foxglove/glb.hpp"
 #include "protocol/foxglove/ros_cdr.hpp"
-#include "protocol/wire/base64.hpp"
 
 namespace sonar::foxglove {
 namespace {
@@ -22,22 +22,7 @@ namespace pb = google::protobuf;
 using nlohmann::json;
 using nlohmann::literals::operator""_json;
 
-std::string decoded(const std::string& base64) {
-  std::string bytes;
-  std::uint32_t bits = 0;
-  int count = 0;
-  for (const char c : base64) {
-    if (c == '=') break;
-    const int digit = c >= 'A' && c <= 'Z'   ? c - 'A'
-                      : c >= 'a' && c <= 'z' ? c - 'a' + 26
-                      : c >= '0' && c <= '9' ? c - '0' + 52
-                      : c == '+'             ? 62
-                                             : 63;
-    bits = bits << 6 | static_cast<std::uint32_t>(digit);
-    if ((count += 6) >= 8) bytes += static_cast<char>(bits >> (count -= 8) & 0xFF);
-  }
-  return bytes;
-}
+std::string decoded(const std::string& text) { return from_base64(text).value_or("not base64"); }
 
 json read_back(const std::string& name, const Bytes& message) {
   pb::FileDescriptorSet set;
@@ -73,19 +58,6 @@ std::shared_ptr<Ping> ping_of(int bits) {
 }
 
 json read_image(int bits) { return read_back("foxglove.RawImage", raw_image(at, "front", image_of(ping_of(bits)))); }
-
-TEST(Base64, KnownAnswers) {
-  const auto base64 = [](const std::string& text) {
-    Bytes bytes;
-    for (const char c : text) bytes.push_back(static_cast<std::byte>(c));
-    return wire::base64(bytes);
-  };
-  EXPECT_EQ(base64(""), "");
-  EXPECT_EQ(base64("f"), "Zg==");
-  EXPECT_EQ(base64("fo"), "Zm8=");
-  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
-  EXPECT_EQ(base64(std::string("\xFB\xFF\0", 3)), "+/8A");
-}
 
 TEST(FoxgloveMessages, Images) {
   const json image = read_image(8);
