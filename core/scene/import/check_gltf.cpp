@@ -22,8 +22,9 @@ class GltfWalk final : public Json::json_sax_t {
   std::vector<std::vector<std::string>> scenes;              // the nodes of each scene
   std::size_t scene = 0;                                     // the scene that is shown
   struct Primitive {
-    std::string positions, indices;  // accessors
-    std::uint64_t mode = 4;          // triangles
+    std::string positions, indices;    // accessors
+    std::vector<std::string> weights;  // accessors
+    std::uint64_t mode = 4;            // triangles
   };
   std::map<std::string, std::vector<Primitive>> primitives;  // primitives of each mesh
   std::map<std::string, std::string> mesh_of;                // mesh of each node
@@ -87,6 +88,8 @@ class GltfWalk final : public Json::json_sax_t {
     if (Primitive* p = primitive()) {
       if (levels_.size() == 5 && levels_[4].key == "indices") p->indices = v;
       if (levels_.size() == 6 && levels_[4].key == "attributes" && levels_[5].key == "POSITION") p->positions = v;
+      if (levels_.size() == 6 && levels_[4].key == "attributes" && levels_[5].key.starts_with("WEIGHTS_"))
+        p->weights.push_back(v);
     }
     if (is_at(3, "nodes", "mesh")) mesh_of[levels_[1].name()] = v;
     if (levels_.size() == 2 && levels_[0].key == "extensionsRequired") required.push_back(v);
@@ -118,13 +121,14 @@ class GltfWalk final : public Json::json_sax_t {
   std::vector<Level> levels_;
 };
 
-std::string_view json_of(std::string_view file) {
-  constexpr std::size_t head = 20;  // magic, version, length, length of the first part, its kind
-  if (!file.starts_with("glTF") || file.size() < head) return file;
-  std::uint64_t length = 0;
-  for (std::size_t k = 4; k-- > 0;) length = length << 8 | static_cast<unsigned char>(file[12 + k]);
-  return file.substr(head, length);
+/// A whole number of four bytes; 0 beyond the end.
+std::uint64_t number_at(std::string_view file, std::size_t at) {
+  std::uint64_t v = 0;
+  for (std::size_t k = 4; k-- > 0;) v = v << 8 | (at + k < file.size() ? static_cast<unsigned char>(file[at + k]) : 0u);
+  return v;
 }
+
+constexpr std::size_t json_at = 20;  // behind magic, version, length, length of the first part, its kind
 
 std::uint64_t triangles_of(const GltfWalk& walk, const GltfWalk::Primitive& primitive) {
   const auto at = walk.accessors.find(primitive.indices.empty() ? primitive.positions : primitive.indices);
@@ -137,7 +141,9 @@ std::uint64_t triangles_of(const GltfWalk& walk, const GltfWalk::Primitive& prim
 /// Finds extensions that change surfaces or the storage of their data. The importer would ignore them without an error.
 MeshFault unread_extension(const GltfWalk& walk) {
   const auto unread = [](const std::string& name) {
-    return "needs the extension " + name.substr(0, 64) + ", which is not read; export it without";
+    const bool packed = name.find("meshopt_compression") != name.npos;
+    return "needs the extension " + name.substr(0, 64) + ", which is not read; " +
+           (packed ? "unpack it: gltf-transform copy IN OUT.glb" : "export it without");
   };
   static constexpr std::array<std::string_view, 10> harmless{
       "KHR_materials_", "KHR_texture_",  "KHR_lights_", "KHR_draco_mesh_compression", "KHR_xmp",
@@ -149,13 +155,20 @@ MeshFault unread_extension(const GltfWalk& walk) {
     return unread("EXT_mesh_gpu_instancing");
   if (walk.is_morphed)
     return "is shaped by morph targets (its weights are not 0), which are not read; apply them, then export it again";
+  return std::nullopt;
+}
+
+/// True if the importer would take positions, or weights of bones, for floating-point numbers that they are not.
+bool has_whole_numbers(const GltfWalk& walk) {
   constexpr std::uint64_t floating = 5126;
+  const auto is_whole = [&](const std::string& accessor) {
+    const auto at = walk.accessors.find(accessor);
+    return at != walk.accessors.end() && at->second.type != floating;
+  };
   for (const auto& [name, primitives] : walk.primitives)
     for (const GltfWalk::Primitive& p : primitives)
-      if (const auto at = walk.accessors.find(p.positions); at != walk.accessors.end() && at->second.type != floating)
-        return "has vertices that are not floating-point numbers (KHR_mesh_quantization), which are not read; export it "
-               "without, or convert it: gltf-transform dequantize IN OUT.glb";
-  return std::nullopt;
+      if (is_whole(p.positions) || std::any_of(p.weights.begin(), p.weights.end(), is_whole)) return true;
+  return false;
 }
 
 /// Numbers of triangles of a file of version 2.
@@ -179,7 +192,7 @@ ListedFaces faces_of(const GltfWalk& walk, const NodeGraph& graph, const std::ma
 }  // namespace
 
 MeshFault check_gltf(std::string_view file, ListedFaces* faces) {
-  const std::string_view text = json_of(file);
+  const std::string_view text = json_of_gltf(file);
   GltfWalk walk;
   Json::sax_parse(text.begin(), text.end(), &walk, Json::input_format_t::json, false);
   if (walk.fault) return walk.fault;
@@ -199,17 +212,29 @@ MeshFault check_gltf(std::string_view file, ListedFaces* faces) {
   if (MeshFault fault = graph.fault(roots)) return fault;
   if (file.starts_with("glTF") && file.substr(4, 1) == "\1") return std::nullopt;  // version 1
   if (MeshFault fault = unread_extension(walk)) return fault;
-  if (faces) *faces = faces_of(walk, graph, number, roots);
+  if (faces) {
+    *faces = faces_of(walk, graph, number, roots);
+    faces->whole_numbers = has_whole_numbers(walk);
+  }
   return std::nullopt;
+}
+
+std::string_view json_of_gltf(std::string_view file) {
+  if (!file.starts_with("glTF") || file.size() < json_at) return file;
+  return file.substr(json_at, number_at(file, json_at - 8));
+}
+
+std::string_view binary_part_of_glb(std::string_view file) {
+  constexpr std::size_t chunk_head = 8;
+  if (!file.starts_with("glTF") || file.size() < json_at) return {};
+  const std::uint64_t at = json_at + number_at(file, json_at - 8);
+  if (at + chunk_head > file.size() || file.substr(at + 4, 4) != std::string_view("BIN\0", 4)) return {};
+  return file.substr(at + chunk_head, number_at(file, at));
 }
 
 MeshFault glb_fault(std::string_view file) {
   constexpr std::size_t head = 12, chunk_head = 8;
-  const auto number = [&](std::size_t at) {
-    std::uint64_t v = 0;
-    for (std::size_t k = 4; k-- > 0;) v = v << 8 | static_cast<unsigned char>(file[at + k]);
-    return v;
-  };
+  const auto number = [&](std::size_t at) { return number_at(file, at); };
   const auto bytes = [](std::uint64_t n) { return std::to_string(n) + " bytes"; };
   if (!file.starts_with("glTF"))
     return "not a GLB file: it does not begin with glTF; it may be a .gltf, or a link of Git LFS in place of the file";

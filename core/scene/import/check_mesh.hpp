@@ -15,8 +15,9 @@ using MeshFault = std::optional<std::string>;
 
 /// Numbers of triangles that the text of a file with named parts contains.
 struct ListedFaces {
-  std::uint64_t shown = 0;   // triangles in the file's scene, counted as often as they are shown
-  std::uint64_t hidden = 0;  // triangles of parts that the scene does not refer to
+  std::uint64_t shown = 0;     // triangles in the file's scene, counted as often as they are shown
+  std::uint64_t hidden = 0;    // triangles of parts that the scene does not refer to
+  bool whole_numbers = false;  // positions or weights of a glTF file of version 2 are not floating-point numbers
 };
 
 /// `head`: the beginning of a file of `file_bytes`, with at least the whole header.
@@ -25,6 +26,10 @@ MeshFault check_ply(std::string_view head, std::uint64_t file_bytes);
 /// Text or binary (GLB), version 1 or 2.
 MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr);
 MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
+/// The JSON of a glTF file, text or GLB; empty or cut short if the file is.
+std::string_view json_of_gltf(std::string_view file);
+/// The binary chunk of a GLB file of version 2, up to the end of the file; empty if there is none.
+std::string_view binary_part_of_glb(std::string_view file);
 /// The fault in the container of a GLB file, version 2. The importer calls every such fault an unknown format.
 MeshFault glb_fault(std::string_view file);
 

@@ -271,6 +271,15 @@ bool ImportFiles::Exists(const char* file) const {
   return is_ours(place) && open_regular(place).has_value();
 }
 
+std::optional<std::string> ImportFiles::bytes_of(const std::string& file) {
+  if (folders_.empty()) return std::nullopt;
+  const std::unique_ptr<Assimp::IOStream> stream(Open((folders_[0] / file).c_str(), "rb"));
+  if (!stream) return std::nullopt;
+  std::string bytes(stream->FileSize(), '\0');
+  bytes.resize(stream->Read(bytes.data(), 1, bytes.size()));
+  return bytes;
+}
+
 Assimp::IOStream* ImportFiles::Open(const char* file, const char* mode) {
   const std::filesystem::path place = std::filesystem::path(file).lexically_normal();
   if (!is_ours(place)) {

@@ -11,6 +11,7 @@
 #include "core/base/regular_file.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/import/check_mesh.hpp"
+#include "core/scene/import/gltf_floats.hpp"
 #include "core/scene/import/import_files.hpp"
 #include "core/scene/import/node_graph.hpp"
 #include "core/scene/import/skins.hpp"
@@ -89,6 +90,8 @@ Result<std::string> text_of(const MeshFile& request, std::size_t most) {
 std::string better_reason(const MeshFile& request, const std::string& extension, std::string reason) {
   if (extension == ".stl") return reason + "; is it cut short? Export it again";
   if (extension != ".glb" && extension != ".gltf") return reason;
+  if (reason.find("Draco") != reason.npos)  // Assimp can be built without it
+    return reason + " (KHR_draco_mesh_compression); unpack it: gltf-transform copy IN OUT.glb";
   const auto text = text_of(request, max_mesh_bytes);
   if (extension == ".gltf")
     return text && text->starts_with("glTF") ? "is a GLB file; name it .glb"
@@ -158,10 +161,18 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
   const bool dae = extension == ".dae";
   const bool y_up_by_default = is_y_up_by_default(extension);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
+  std::string held;
+  std::string_view in_memory = request.in_memory, kind = std::string_view(extension).substr(1);
+  if (faces.whole_numbers) {
+    if (in_memory.empty()) in_memory = held = files->bytes_of(request.file.filename()).value_or("");
+    auto with_floats = gltf_with_floats(in_memory, [&](const std::string& name) { return files->bytes_of(name); });
+    if (fault) return tl::make_unexpected(*std::move(fault));
+    if (!with_floats) return bad_mesh(request, with_floats.error().text);
+    in_memory = held = *std::move(with_floats), kind = "glb";
+  }
   const aiScene* scene =  // without post-processing, whose asserts fail on unusual files
-      request.in_memory.empty()
-          ? importer.ReadFile(files->mesh(), 0)
-          : importer.ReadFileFromMemory(request.in_memory.data(), request.in_memory.size(), 0, extension.c_str() + 1);
+      in_memory.empty() ? importer.ReadFile(files->mesh(), 0)
+                        : importer.ReadFileFromMemory(in_memory.data(), in_memory.size(), 0, std::string(kind).c_str());
   if (!scene || !scene->mRootNode) {
     if (fault) return tl::make_unexpected(*std::move(fault));
     return bad_mesh(request, "cannot be read: " + better_reason(request, extension, first_line(importer.GetErrorString())));

@@ -1,0 +1,246 @@
+#include "core/scene/import/gltf_floats.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/base/base64.hpp"
+#include "core/scene/import/check_mesh.hpp"
+
+namespace sonar {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int type_float = 5126;
+constexpr std::size_t bytes_of_float = 4;
+
+tl::unexpected<Error> bad_gltf(const std::string& what) { return failure(ErrorKind::bad_data, what); }
+
+/// How an accessor stores a number.
+struct Component {
+  std::size_t bytes = 0;
+  double full = 1;  // what normalised numbers are divided by
+  double (*number)(const char* at) = nullptr;
+};
+template <class T>
+double stored_number(const char* at) {
+  T value;
+  std::memcpy(&value, at, sizeof value);
+  return static_cast<double>(value);
+}
+Component component_of(std::int64_t type) {
+  switch (type) {
+    case 5120:
+      return {1, 127, stored_number<std::int8_t>};
+    case 5121:
+      return {1, 255, stored_number<std::uint8_t>};
+    case 5122:
+      return {2, 32767, stored_number<std::int16_t>};
+    case 5123:
+      return {2, 65535, stored_number<std::uint16_t>};
+    default:
+      return {};
+  }
+}
+
+/// A number of a JSON object that must not be negative; nullopt if it is missing or something else.
+std::optional<std::uint64_t> number_in(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number_unsigned() ? std::optional(found->get<std::uint64_t>()) : std::nullopt;
+}
+const Json& list_in(const Json& object, const char* key) {
+  static const Json empty = Json::array();
+  const auto found = object.find(key);
+  return found != object.end() && found->is_array() ? *found : empty;
+}
+
+/// Replaces "%20" by a blank, and so on.
+std::string without_percents(const std::string& name) {
+  std::string plain;
+  const auto digit = [](char c) { return std::string_view("0123456789abcdef").find(static_cast<char>(c | 32)); };
+  for (std::size_t at = 0; at < name.size(); ++at) {
+    const bool escaped = name[at] == '%' && at + 2 < name.size() && digit(name[at + 1]) < 16 && digit(name[at + 2]) < 16;
+    plain += escaped ? static_cast<char>(16 * digit(name[at + 1]) + digit(name[at + 2])) : name[at];
+    if (escaped) at += 2;
+  }
+  return plain;
+}
+
+class Rewriter {
+ public:
+  Rewriter(std::string_view file, const ReadBeside& beside) : file_(file), beside_(beside) {}
+
+  Result<std::string> rewrite() {
+    in_ = Json::parse(json_of_gltf(file_), nullptr, false);
+    if (!in_.is_object()) return bad_gltf("has JSON that is damaged; export it again");
+    if (auto r = take_buffers(); !r) return tl::make_unexpected(r.error());
+    take_views();
+    out_["accessors"] = list_in(in_, "accessors");
+    if (auto r = take_meshes(); !r) return tl::make_unexpected(r.error());
+    out_["asset"] = {{"version", "2.0"}};
+    for (const char* key : {"scene", "scenes", "nodes", "skins"})
+      if (const auto found = in_.find(key); found != in_.end()) out_[key] = *found;
+    if (out_.contains("nodes") && out_["nodes"].is_array())
+      for (Json& node : out_["nodes"])
+        if (node.is_object())
+          for (const char* key : {"camera", "extensions", "extras", "weights"}) node.erase(key);
+    for (const Json& material : list_in(in_, "materials")) {
+      Json named = Json::object();
+      if (material.is_object() && material.contains("name") && material["name"].is_string()) named["name"] = material["name"];
+      out_["materials"].push_back(std::move(named));
+    }
+    out_["buffers"] = {{{"byteLength", data_.size()}}};
+    return glb();
+  }
+
+ private:
+  struct Buffer {
+    std::size_t at = 0, bytes = 0;  // in data_
+  };
+
+  void align() { data_.resize((data_.size() + 3) / 4 * 4); }
+
+  /// Puts all buffers behind each other.
+  Result<void> take_buffers() {
+    for (const Json& buffer : list_in(in_, "buffers")) {
+      const auto uri = buffer.is_object() ? buffer.find("uri") : buffer.end();
+      const std::string number = std::to_string(buffers_.size());
+      align();
+      const std::size_t at = data_.size();
+      if (!buffer.is_object() || uri == buffer.end() || !uri->is_string()) {
+        if (buffers_.empty()) data_ += binary_part_of_glb(file_);
+      } else if (const std::string& name = uri->get_ref<const std::string&>(); name.starts_with("data:")) {
+        const std::size_t comma = name.find(',');
+        const bool is_base64 = comma != name.npos && name.substr(0, comma).ends_with(";base64");
+        const auto bytes = is_base64 ? from_base64(std::string_view(name).substr(comma + 1)) : std::nullopt;
+        if (!bytes) return bad_gltf("has a buffer (" + number + ") that is no base64; export it again");
+        data_ += *bytes;
+      } else {
+        auto bytes = beside_(name);
+        if (!bytes) bytes = beside_(without_percents(name));
+        if (!bytes) return bad_gltf("names the file " + name.substr(0, 200) + ", which cannot be read; put it beside the mesh");
+        data_ += *bytes;
+      }
+      buffers_.push_back({at, data_.size() - at});
+    }
+    align();
+    return {};
+  }
+
+  /// Views beyond the end of their buffer stay as they are; the importer rejects them if it needs them.
+  void take_views() {
+    out_["bufferViews"] = list_in(in_, "bufferViews");
+    for (Json& view : out_["bufferViews"]) {
+      sound_.push_back(false);
+      if (!view.is_object()) continue;
+      view.erase("extensions");
+      const auto number = number_in(view, "buffer");
+      const Buffer buffer = number && *number < buffers_.size() ? buffers_[*number] : Buffer();
+      const std::uint64_t offset = number_in(view, "byteOffset").value_or(0);
+      const bool inside = offset <= buffer.bytes && number_in(view, "byteLength").value_or(0) <= buffer.bytes - offset;
+      if (!inside) continue;
+      view["buffer"] = 0;
+      view["byteOffset"] = buffer.at + offset;
+      sound_.back() = true;
+    }
+  }
+
+  Result<void> take_meshes() {
+    out_["meshes"] = list_in(in_, "meshes");
+    for (Json& mesh : out_["meshes"]) {
+      if (!mesh.is_object()) continue;
+      for (const char* key : {"extensions", "extras", "weights"}) mesh.erase(key);
+      if (!mesh.contains("primitives") || !mesh["primitives"].is_array()) continue;
+      for (Json& primitive : mesh["primitives"]) {
+        if (!primitive.is_object()) continue;
+        if (primitive.contains("extensions") && primitive["extensions"].is_object() &&
+            primitive["extensions"].contains("KHR_draco_mesh_compression"))
+          return bad_gltf(
+              "has whole numbers that are compressed (KHR_draco_mesh_compression), which are not read; convert it: "
+              "gltf-transform dequantize IN OUT.glb");
+        for (const char* key : {"extensions", "extras", "targets"}) primitive.erase(key);
+        Json kept = Json::object();
+        const Json attributes = primitive.value("attributes", Json::object());
+        if (!attributes.is_object()) continue;
+        for (const auto& [name, accessor] : attributes.items()) {
+          const bool is_weight = name.starts_with("WEIGHTS_");
+          if (name != "POSITION" && !is_weight && !name.starts_with("JOINTS_")) continue;
+          kept[name] = accessor;
+          if (name == "POSITION" || is_weight)
+            if (auto r = make_floats(accessor, is_weight ? "VEC4" : "VEC3"); !r) return r;
+        }
+        primitive["attributes"] = std::move(kept);
+      }
+    }
+    return {};
+  }
+
+  /// Converts the numbers of an accessor, unless they are floating-point numbers already.
+  Result<void> make_floats(const Json& index, const std::string& kind) {
+    Json& accessors = out_["accessors"];
+    if (!index.is_number_unsigned() || index.get<std::size_t>() >= accessors.size()) return {};  // the importer rejects it
+    Json& accessor = accessors[index.get<std::size_t>()];
+    if (!accessor.is_object() || number_in(accessor, "componentType") == type_float) return {};
+    const std::string of = "accessor " + std::to_string(index.get<std::size_t>());
+    if (accessor.contains("sparse"))
+      return bad_gltf("has sparse vertices that are whole numbers (" + of +
+                      "), which are not read; convert it: gltf-transform dequantize IN OUT.glb");
+    const Component component = component_of(static_cast<std::int64_t>(number_in(accessor, "componentType").value_or(0)));
+    const std::uint64_t count = number_in(accessor, "count").value_or(0), per_vertex = kind == "VEC4" ? 4 : 3;
+    const auto view_index = number_in(accessor, "bufferView");
+    const Json& views = out_["bufferViews"];
+    if (component.number == nullptr || accessor.value("type", Json()) != kind || !view_index || *view_index >= sound_.size())
+      return bad_gltf("has vertices in a form that glTF does not have (" + of + "); export it again");
+    const Json& view = views[*view_index];
+    const std::uint64_t element = component.bytes * per_vertex, stride = number_in(view, "byteStride").value_or(element);
+    const std::uint64_t begin = number_in(view, "byteOffset").value_or(0), length = number_in(view, "byteLength").value_or(0),
+                        offset = number_in(accessor, "byteOffset").value_or(0);
+    const bool inside = sound_[*view_index] && offset <= length && stride >= element &&
+                        (count == 0 || (element <= length - offset && count - 1 <= (length - offset - element) / stride));
+    if (!inside) return bad_gltf("has vertices beyond the end of their data (" + of + "); fetch or export it again");
+    const bool normalized = accessor.value("normalized", Json(false)) == true;
+    const std::size_t at = data_.size();
+    data_.resize(at + bytes_of_float * per_vertex * static_cast<std::size_t>(count));
+    for (std::uint64_t v = 0; v < count; ++v)
+      for (std::uint64_t k = 0; k < per_vertex; ++k) {
+        const double stored = component.number(data_.data() + begin + offset + v * stride + k * component.bytes);
+        const auto value = static_cast<float>(normalized ? std::max(stored / component.full, -1.0) : stored);
+        std::memcpy(data_.data() + at + bytes_of_float * (v * per_vertex + k), &value, bytes_of_float);
+      }
+    accessor = {{"bufferView", views.size()}, {"componentType", type_float}, {"count", count}, {"type", kind}};
+    out_["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", data_.size() - at}});
+    return {};
+  }
+
+  std::string glb() const {
+    std::string text = out_.dump();
+    text.resize((text.size() + 3) / 4 * 4, ' ');
+    const auto word = [](std::size_t v) {
+      std::string bytes;
+      for (int k = 0; k < 4; ++k) bytes += static_cast<char>(v >> 8 * k & 0xFF);
+      return bytes;
+    };
+    constexpr std::size_t head = 12, chunk_head = 8;
+    std::string file = "glTF" + word(2) + word(head + 2 * chunk_head + text.size() + (data_.size() + 3) / 4 * 4);
+    file += word(text.size()) + "JSON" + text + word((data_.size() + 3) / 4 * 4) + std::string("BIN\0", 4);
+    file += data_;
+    file.resize((file.size() + 3) / 4 * 4);
+    return file;
+  }
+
+  std::string_view file_;
+  const ReadBeside& beside_;
+  Json in_, out_ = Json::object();
+  std::vector<Buffer> buffers_;
+  std::vector<bool> sound_;  // by view of the file: it lies within its buffer
+  std::string data_;         // of all buffers, and the new numbers
+};
+
+}  // namespace
+
+Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside) { return Rewriter(file, beside).rewrite(); }
+
+}  // namespace sonar

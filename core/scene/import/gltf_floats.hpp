@@ -1,0 +1,22 @@
+// Rewrites glTF files whose vertices are whole numbers (KHR_mesh_quantization), which the importer would take for floating-point
+// numbers.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/base/result.hpp"
+
+namespace sonar {
+
+/// Reads a file that the glTF file names; nullopt if it cannot be read.
+using ReadBeside = std::function<std::optional<std::string>(const std::string& name)>;
+
+/// A GLB file, version 2, with the nodes, meshes and skins of `file`, and with floating-point positions and weights of bones.
+/// It has no normals, colours, textures or animations; of materials it has the names. `file`: text or GLB, version 2. Errors do
+/// not contain the file's name.
+Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside);
+
+}  // namespace sonar
