@@ -133,6 +133,37 @@ class ASurveyor(WithSonard):
         self.assertAlmostEqual(down[2], -1)
 
 
+class OneBeamAtATime(WithSonard):
+    """A scanning sonar and a DVL. Their echoes are weak parts of the full scale."""
+
+    def listen(self, daemon, make):
+        host = subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", make], stdin=subprocess.DEVNULL,
+                                stdout=subprocess.DEVNULL)
+        self.addCleanup(host.wait)
+        self.addCleanup(host.terminate)
+
+    def test_the_head_of_a_ping360_turns_on_tf(self):
+        daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "ping360").replace("rpy_deg: [0, -90, 0]", "rpy_deg: [0, 0, 0]"))
+        ros = self.bridge(daemon, clouds=True, cloud_threshold=0.1, tf_static=True)
+        self.listen(daemon, "ping360")
+        wait_for(lambda: ros.published["/tf"][1:])
+        turns = [message.transforms[0].transform.rotation for message in ros.published["/tf"][:2]]
+        before, after = (2 * math.atan2(turn.z, turn.w) for turn in turns)
+        self.assertLess((after - before + math.pi) % (2 * math.pi) - math.pi, 0)  # to starboard
+        self.assertEqual([[t.child_frame_id for t in message] for message in ros.static], [["down"], []])
+        cloud = wait_for(lambda: [m for m in ros.published.get("~/down/cloud", []) if m.width])[0]
+        points = [struct.unpack_from("<3f", cloud.data, i * cloud.point_step) for i in range(cloud.width)]
+        self.assertEqual([(y, z) for _, y, z in points], [(0.0, 0.0)] * len(points))  # in the axes of the head
+
+    def test_the_cloud_of_a_dvl(self):
+        daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "dvl-a50"))
+        ros = self.bridge(daemon, clouds=True, cloud_threshold=0)
+        self.listen(daemon, "dvl")
+        cloud = wait_for(lambda: [m for m in ros.published.get("~/down/cloud", []) if m.width])[0]
+        for i in range(cloud.width):  # the ground: 1.9 m below, tilted and rippled
+            self.assertAlmostEqual(struct.unpack_from("<f", cloud.data, i * cloud.point_step)[0], 1.9, delta=0.4)
+
+
 class Mounts(WithSonard):
     def test_they_follow_the_daemon(self):
         daemon = self.start(config())
