@@ -177,7 +177,7 @@ TEST(Recording, BytesBetweenMessagesAreKept) {
     EXPECT_EQ(damage->kind, ErrorKind::bad_data);
     const std::vector<RecordedMessage> before(messages.begin(), messages.begin() + 3);
     const std::string from = std::to_string(device_stream(before).size());
-    EXPECT_THAT(damage->text, HasSubstr("8 bytes from byte " + from + " on belong to no message"));
+    EXPECT_THAT(damage->text, HasSubstr("9 bytes from byte " + from + " on belong to no message"));
   }
 }
 
