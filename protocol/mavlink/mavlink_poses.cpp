@@ -142,7 +142,7 @@ Reaction MavlinkPoses::on_datagram(BytesView datagram, Time now) {
     if (is_selected_component(*frame, now))
       on_frame(*frame, {now, out});
     else if (contains_pose(frame->id))
-      tell_ignored(*frame, {now, out});
+      report_ignored(*frame, {now, out});
   }
   add_counts(frames.counts(), out);
   return out;

@@ -163,7 +163,7 @@ class MavlinkPoses {
   bool received_within(std::uint32_t message, Time now, std::chrono::nanoseconds within) const;
   bool has_poses(Time now) const;
   void note_ignored(const Frame& frame, Moment at);
-  void tell_ignored(const Frame& frame, Moment at);
+  void report_ignored(const Frame& frame, Moment at);
   void request_messages(Reaction& out);
 
   Settings settings_;
@@ -183,7 +183,7 @@ class MavlinkPoses {
   std::chrono::nanoseconds reminder_period_{0};
   std::optional<std::pair<int, int>> ignored_;  // system and component of the last ignored message
   /// Text of the notice for each system and component that one has named since the vehicle was selected.
-  std::map<std::pair<int, int>, std::string> told_ignored_;
+  std::map<std::pair<int, int>, std::string> reported_ignored_;
   std::pair<int, int> rival_{};  // the last of them that sent, of another system than the vehicle's
   Time rival_at_{};
   std::map<std::uint32_t, Arrival> received_;

@@ -98,18 +98,18 @@ bool MavlinkPoses::identifies_vehicle(const Frame& frame) {
 void MavlinkPoses::note_ignored(const Frame& frame, Moment at) {
   if (frame.component == own_component) return;
   ignored_ = {frame.system, frame.component};
-  if (system_ && !is_excluded(frame) && identifies_vehicle(frame)) tell_ignored(frame, at);
+  if (system_ && !is_excluded(frame) && identifies_vehicle(frame)) report_ignored(frame, at);
 }
 
 /// Each system and component is named once: two vehicles at one port are a mistake that nothing else shows.
-void MavlinkPoses::tell_ignored(const Frame& frame, Moment at) {
+void MavlinkPoses::report_ignored(const Frame& frame, Moment at) {
   const std::pair<int, int> sender(frame.system, frame.component);
-  if (!told_ignored_.contains(sender) && told_ignored_.size() >= most_told) return;
+  if (!reported_ignored_.contains(sender) && reported_ignored_.size() >= most_reported) return;
   if (frame.system != *system_) {
     rival_ = sender;
     rival_at_ = at.now;
   }
-  if (told_ignored_.contains(sender)) return;
+  if (reported_ignored_.contains(sender)) return;
   const auto name_of = [](int system, int component) {
     return "system " + std::to_string(system) + ", component " + std::to_string(component);
   };
@@ -119,13 +119,13 @@ void MavlinkPoses::tell_ignored(const Frame& frame, Moment at) {
                            " and is ignored: " + name_of(*system_, steering) + " steers " + settings_.vehicle +
                            (frame.system == *system_ ? "; component_id selects another"
                                                      : "; give each vehicle a port of its own, or select one by system_id");
-  told_ignored_.emplace(sender, text);
+  reported_ignored_.emplace(sender, text);
   at.out.notices.push_back(text);
 }
 
 std::string MavlinkPoses::rival(Time now) const {
-  const auto told = told_ignored_.find(rival_);
-  return told != told_ignored_.end() && now - rival_at_ <= system_silence ? told->second : std::string();
+  const auto report = reported_ignored_.find(rival_);
+  return report != reported_ignored_.end() && now - rival_at_ <= system_silence ? report->second : std::string();
 }
 
 /// The reason why x and y do not change, and the messages that would change them.

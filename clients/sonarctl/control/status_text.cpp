@@ -48,7 +48,7 @@ std::string client_text(const v1::ClientStatus& c) {
   text +=
       c.commands_only() ? "commands only" : format("%llu pings, %llu dropped", wide(c.pings_written()), wide(c.pings_dropped()));
   text += format(", %.1f MB, ", static_cast<double>(c.bytes_written()) / 1e6) + duration_text(c.connected_s());
-  return text + (c.silent_s() >= told_silence_s ? format(", last heard %.0f s ago", c.silent_s()) : "");
+  return text + (c.silent_s() >= reported_silence_s ? format(", last heard %.0f s ago", c.silent_s()) : "");
 }
 
 std::string sonar_text(const v1::SonarStatus& s) {

@@ -42,13 +42,14 @@ TEST(MavlinkOdometry, EveryPairOfFramesMeansTheSameVehicle) {
   expect_the_vehicle(sent(enu, body_flu, Vec3{2, 10, -3}, Quatd{}, moves_flu, turns_flu));
   expect_the_vehicle(sent(enu, body_frd, Vec3{2, 10, -3}, Quatd{0, 1, 0, 0}, moves_frd, turns_frd));
   expect_the_vehicle(sent(flu, body_flu, Vec3{10, -2, -3}, about_z(-quarter), moves_flu, turns_flu));
-  for (const std::uint8_t old_ned : {14, 16, 18}) {  // frames of older senders, described in common.xml
+  for (const auto old_ned :
+       std::initializer_list<std::uint8_t>{14, 16, 18}) {  // frames of older senders, described in common.xml
     expect_the_vehicle(sent(old_ned, body_frd, Vec3{10, 2, 3}, about_z(quarter), moves_frd, turns_frd));
     expect_the_vehicle(sent(old_ned, old_ned, Vec3{10, 2, 3}, about_z(quarter), Vec3{0.5f, 1, 0}, turns_frd));
   }
-  for (const std::uint8_t old_enu : {15, 17, 19})
+  for (const auto old_enu : std::initializer_list<std::uint8_t>{15, 17, 19})
     expect_the_vehicle(sent(old_enu, body_flu, Vec3{2, 10, -3}, Quatd{}, moves_flu, turns_flu));
-  for (const std::uint8_t old_body : {8, 9})
+  for (const auto old_body : std::initializer_list<std::uint8_t>{8, 9})
     expect_the_vehicle(sent(ned, old_body, Vec3{10, 2, 3}, about_z(quarter), moves_frd, turns_frd));
 }
 
