@@ -16,8 +16,8 @@ if [ $# -eq 0 ]; then
   ! grep -qw avx512f /proc/cpuinfo 2>/dev/null || set -- avx2:avx2 "$@"
 fi
 
-# The programs of kind LEVELS (tests/CMakeLists.txt), without those that repeat one stage over thousands of pings to measure a
-# figure and those that set the instruction set of every case themselves.
+# The programs of kind LEVELS (tests/CMakeLists.txt). Left out are those that measure a figure over thousands of pings or over all
+# products, and those that set the instruction set of every case themselves.
 mapfile -t programs < <(tests/tools/run_programs.py "$build" --list LEVELS)
 [ ${#programs[@]} -gt 0 ] || exit 66
 unset SONARD_ORACLES SONARD_RELIABILITY  # recorded figures are those of the full processor
