@@ -102,6 +102,7 @@ Result<json> find_device_rates(const ScenePointer& scene, const BenchScene& wher
     for (const int threads : options.threads) {
       Parallel pool(threads);
       for (const int batch : {1, 2, 4, 8, 16, 32}) {
+        if (static_cast<std::size_t>(batch) > requests.size()) continue;  // no such batch would be full
         const auto found = rate_of(scene, pool, pinger, requests, batch, options);
         if (!found) return tl::make_unexpected(found.error());
         rates.push_back(told(*found, c, threads, batch));
