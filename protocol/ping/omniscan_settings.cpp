@@ -43,6 +43,31 @@ SonarModel make_model() {
   return model;
 }
 
+/// The powers of a ping, scaled so that its own lowest is 0 and its highest 65535 (REC).
+struct Powers {
+  float lowest_db = 0, highest_db = 0;
+  Bytes codes;
+};
+Powers scaled(BytesView samples, const SampleFormat& format) {
+  std::vector<std::uint16_t> values(samples.size() / 2);
+  wire::Reader reader(samples);
+  for (std::uint16_t& value : values) reader("power", value);
+  if (values.empty()) return {};
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const double first = *low, steps = std::max(*high - *low, 1);
+  const auto db_of = [&format](std::uint16_t value) {
+    return format.floor_db +
+           (format.ceiling_db - format.floor_db) * static_cast<float>(value) / static_cast<float>(format.max_code);
+  };
+  Powers powers{db_of(*low), db_of(*high), {}};
+  for (const std::uint16_t value : values) {
+    const auto code = static_cast<std::uint16_t>(std::lround((value - first) / steps * 65535));
+    powers.codes.push_back(static_cast<std::byte>(code & 0xFF));
+    powers.codes.push_back(static_cast<std::byte>(code >> 8));
+  }
+  return powers;
+}
+
 /// Heading of the middle of the beam, clockwise from north.
 double heading_deg(const Pose& sonar_in_world) {
   const Vec3d ahead = rotate(sonar_in_world.orientation, Vec3d{1, 0, 0});
@@ -133,11 +158,12 @@ Bytes profile_of(const Ping& ping, const protocol::DeviceState& device) {
   profile.speed_dmps = static_cast<std::uint16_t>(std::lround(10 * s.speed_mps));
   profile.pulse_s = 2 * made.pulse_width_m / s.speed_mps;
   profile.analog_gain = made.gain_db;
-  profile.highest_db = made.format.ceiling_db;
-  profile.lowest_db = made.format.floor_db;
+  const Powers powers = scaled(ping.samples, made.format);
+  profile.highest_db = powers.highest_db;
+  profile.lowest_db = powers.lowest_db;
   profile.transducer_heading_deg = static_cast<float>(heading_deg(ping.request.sonar_in_world));
   Bytes payload = wire::bytes_of(profile);
-  payload.insert(payload.end(), ping.samples.begin(), ping.samples.end());
+  payload.insert(payload.end(), powers.codes.begin(), powers.codes.end());
   return framed(Id::os_mono_profile, s.id, payload);
 }
 
