@@ -17,7 +17,7 @@ constexpr double db_per_gain = 6;  // unknown: assumed, as are full scale and th
 constexpr int most_gain = 7;
 constexpr double longest_m = 150;
 constexpr std::uint32_t least_length_mm = 100;
-constexpr double processing_s = 0.01;  // assumed: time from the last echo to the next ping
+constexpr double processing_s = 0.0018;  // from the last echo to the next ping (REC)
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 

@@ -21,7 +21,7 @@ TEST(Omniscan, ASessionStartsAndEndsByEnable) {
   EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "it says nothing by itself";
   talk.say(pings());
   EXPECT_GE(talk.settings.rate_hz, 2.5) << "hosts wait half a second for a profile of 5 m";
-  EXPECT_NEAR(talk.settings.rate_hz, 1 / (10 / 1500.0 + 0.01), 1e-3) << "as fast as sound allows";
+  EXPECT_NEAR(talk.settings.rate_hz, 1 / (10 / 1500.0 + 0.0018), 1e-3) << "as fast as sound allows";
   talk.say(pings({.start_mm = 2000, .length_mm = 30000, .period_ms = 200, .results = 1200, .enable = 1}));
   EXPECT_EQ(talk.settings.rate_hz, 5);
   EXPECT_DOUBLE_EQ(talk.settings.range_start_m, 2);
