@@ -125,12 +125,14 @@ class Rewriter {
         data_ += *bytes;
       }
       buffers_.push_back({at, data_.size() - at});
+      if (buffer.is_object() && number_in(buffer, "byteLength").value_or(0) > buffers_.back().bytes)
+        return bad_gltf("has a buffer (" + number + ") that is cut short; fetch or export it again");
     }
     align();
     return {};
   }
 
-  /// Views beyond the end of their buffer stay as they are; the importer rejects them if it needs them.
+  /// Views beyond the end of their buffer get a buffer that does not exist, so the importer rejects them if it needs them.
   void take_views() {
     out_["bufferViews"] = list_in(in_, "bufferViews");
     for (Json& view : out_["bufferViews"]) {
@@ -141,8 +143,8 @@ class Rewriter {
       const Buffer buffer = number && *number < buffers_.size() ? buffers_[*number] : Buffer();
       const std::uint64_t offset = number_in(view, "byteOffset").value_or(0);
       const bool inside = offset <= buffer.bytes && number_in(view, "byteLength").value_or(0) <= buffer.bytes - offset;
+      view["buffer"] = inside ? 0 : 1;  // the result has only buffer 0
       if (!inside) continue;
-      view["buffer"] = 0;
       view["byteOffset"] = buffer.at + offset;
       sound_.back() = true;
     }

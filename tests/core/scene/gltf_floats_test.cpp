@@ -230,6 +230,28 @@ TEST_F(GltfFloats, DracoIsReadOrNamedWithTheCommandThatUnpacksIt) {
   EXPECT_THAT(refusal(file.dump()), HasSubstr("whole numbers that are compressed (KHR_draco_mesh_compression)"));
 }
 
+/// The indices are behind the positions in the same buffer, whose end is missing.
+TEST_F(GltfFloats, FilesThatAreCutWithinTheirIndicesAreRefused) {
+  Triangle whole(5122, false, shorts, 8);
+  const std::size_t begin = whole.data.size();
+  whole.data += bytes_of(std::vector<std::uint16_t>{0, 1, 2});
+  whole.description["buffers"][0]["byteLength"] = whole.data.size();
+  whole.description["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", begin}, {"byteLength", 6}});
+  whole.description["accessors"].push_back({{"bufferView", 1}, {"componentType", 5123}, {"count", 3}, {"type", "SCALAR"}});
+  whole.description["meshes"][0]["primitives"][0]["indices"] = 1;
+  const auto cut = [&](std::size_t missing, bool says_so) {
+    Triangle file = whole;
+    file.data.resize(whole.data.size() - missing);
+    if (!says_so) file.description["buffers"][0]["byteLength"] = file.data.size();
+    return load_mesh({.file = files.write("cut.gltf", file.embedded())});
+  };
+  ASSERT_TRUE(cut(0, true)) << cut(0, true).error().text;
+  for (const std::size_t missing : {1u, 3u, 6u}) {
+    EXPECT_THAT(cut(missing, true).error().text, HasSubstr("has a buffer (0) that is cut short"));
+    EXPECT_FALSE(cut(missing, false)) << missing;
+  }
+}
+
 TEST_F(GltfFloats, MembersOfEveryOtherTypeDoNoHarm) {
   const Triangle triangle(5122, false, shorts, 8);
   const auto rewritten = [](const json& description, const std::string& data) {
