@@ -135,12 +135,16 @@ MeshFault check_stl_text(std::string_view file) {
       if (numbers_left > 0) {
         if (!is_like_number(word)) return which() + " has a corner with fewer than 3 numbers" + std::string(cut_short);
         --numbers_left;
-      } else if (same_letters(word, "solid") || same_letters(word, "endsolid")) {
-        ended = word.size() > 5;
-        if (ended && in_facet && corners != 3) return wrong_corners();
-        in_facet = in_facet && !ended;
-        // Its name follows, up to the end of the line unless the file has only one.
-        line.remove_prefix(std::min(small_letters(line).find("facet normal"), line.size()));
+      } else if (const bool ends = same_letters(word, "endsolid") || same_letters(word, "end");
+                 ends || same_letters(word, "solid")) {
+        ended = ended || ends;
+        if (ends && in_facet && corners != 3) return wrong_corners();
+        in_facet = in_facet && !ends;
+        // Its name follows, up to the end of the line unless the file has only one line.
+        constexpr std::string_view begin = "facet normal";
+        const auto* const next_facet = std::search(line.begin(), line.end(), begin.begin(), begin.end(),
+                                                   [](char a, char b) { return small_letter(a) == b; });
+        line.remove_prefix(static_cast<std::size_t>(next_facet - line.begin()));
       } else if (same_letters(word, "facet")) {
         if (in_facet && corners != 3) return wrong_corners();
         in_facet = true, ended = false, corners = 0, ++facets;
@@ -153,7 +157,8 @@ MeshFault check_stl_text(std::string_view file) {
     }
   }
   if (numbers_left > 0 || in_facet) return "ends within " + which() + std::string(cut_short);
-  if (!ended) return "ends after " + which() + " without endsolid" + std::string(cut_short);
+  if (!ended)
+    return (facets == 0 ? "ends without a facet" : "ends after " + which() + " without endsolid") + std::string(cut_short);
   return std::nullopt;
 }
 
@@ -167,7 +172,7 @@ MeshFault check_obj(std::string_view file) {
     const bool is_vertex = statement == "v", is_face = statement == "f";
     if (!is_vertex && !is_face) continue;
     vertices += is_vertex;
-    const std::string place = at_line(lines);
+    const Lines first = lines;
     std::uint64_t words = 0, numbers = 0;
     for (std::string_view word = take_word(line); !word.starts_with('#'); word = take_word(line)) {
       if (word == "\\" || (word.empty() && lines.line().ends_with('\\'))) {
@@ -176,14 +181,14 @@ MeshFault check_obj(std::string_view file) {
         continue;
       }
       if (word.empty()) break;
+      numbers += numbers == words && is_like_number(word);  // words after the numbers are a remark
       ++words;
-      numbers += is_like_number(word);
     }
-    if (is_vertex && (numbers != words || (words != 3 && words != 4 && words != 6)))
-      return "vertex " + std::to_string(vertices) + place + " has " + std::to_string(numbers) + " numbers, not 3, 4 or 6" +
-             (words > 4 ? "; export it without further ones" : std::string(cut_short));
+    if (is_vertex && numbers != 3 && numbers != 4 && numbers != 6)
+      return "vertex " + std::to_string(vertices) + at_line(first) + " has " + std::to_string(numbers) +
+             " numbers, not 3, 4 or 6" + (numbers > 4 ? "; export it without further ones" : std::string(cut_short));
     if (is_face && words < 3 && !lines.has_end())
-      return "ends within a face" + place + " of " + std::to_string(words) + " corners" + std::string(cut_short);
+      return "ends within a face" + at_line(first) + " of " + std::to_string(words) + " corners" + std::string(cut_short);
   }
   return std::nullopt;
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 
 #include "core/scene/files/load_mesh.hpp"
 #include "core/scene/import/check_mesh.hpp"
@@ -107,9 +108,22 @@ TEST_F(CutMeshes, UnusualTextsWithoutAFaultAreRead) {
     EXPECT_EQ(loaded("a.ply", text), "4 triangles") << text;
   for (const std::string& text : {stl + "\n", one_line, unclosed, "\n" + stl}) EXPECT_EQ(loaded("a.stl", text), "2 triangles");
   EXPECT_EQ(loaded("a.stl", stl + stl), "4 triangles");
-  for (const char* by : {"v 2 0 0 1", "v 2 0 0 0.5 0.5 0.5", "v 2 0 0 # corner", "v 2 0 \\\n0", "v\t2\t0\t0\r"})
+  for (const std::string& text : {replaced(stl, "endsolid part", "end solid part"), stl + "made by a solid program\n"})
+    EXPECT_EQ(check_stl_text(text), std::nullopt) << text;
+  for (const char* by :
+       {"v 2 0 0 1", "v 2 0 0 0.5 0.5 0.5", "v 2 0 0 # corner", "v 2 0 0 // base", "v 2 0 \\\n0", "v\t2\t0\t0\r"})
     EXPECT_EQ(loaded("a.obj", replaced(obj, "v 2 0 0", by)), "4 triangles") << by;
   EXPECT_EQ(loaded("a.obj", obj + "f 1 2\n"), "4 triangles") << "a line, not a face";
+}
+
+// The search for a facet behind the name of a solid must not read the rest of the line again for each solid.
+TEST(CutMeshTexts, OneLineOfManySolidsTakesLittleTime) {
+  std::string text;
+  for (int k = 0; k < 40'000; ++k)
+    text += "solid a facet normal 0 0 0 outer loop vertex 0 0 0 vertex 0 1 0 vertex 2 0 0 endloop endfacet endsolid a ";
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(check_stl_text(text), std::nullopt);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));  // 0.3 s; copies of each rest took 70 s and more
 }
 
 // Only the vertices of a face are needed; the number 0 instead of a texture coordinate or normal does no harm.
