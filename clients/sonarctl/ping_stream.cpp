@@ -358,7 +358,7 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
                                          ": sonarctl record keeps the messages of both ends");
   const int opened = open_to_write(file, O_CREAT);  // a stream would wait for the reader of a pipe
   const int error = errno;
-  if (opened < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(error));
+  if (opened < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(file, error));
   record_.open(file, std::ios::binary | std::ios::trunc);
   ::close(opened);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": check that its folder exists and is writable");

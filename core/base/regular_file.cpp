@@ -108,8 +108,10 @@ int open_to_write(const std::filesystem::path& file, int flags) {
   return descriptor;
 }
 
-std::string why_not_written(int error) {
-  return error == ENXIO ? "it is a pipe that no program reads; start its reader first" : std::strerror(error);
+std::string why_not_written(const std::filesystem::path& file, int error) {
+  std::error_code ec;
+  return error == ENXIO && std::filesystem::is_fifo(file, ec) ? "it is a pipe that no program reads; start its reader first"
+                                                              : std::strerror(error);
 }
 
 }  // namespace sonar

@@ -30,6 +30,6 @@ Result<std::string> read_regular(const std::filesystem::path& file, std::size_t 
 
 /// open() for writing, without the wait for the reader of a FIFO. -1: errno has the reason, and why_not_written() its words.
 int open_to_write(const std::filesystem::path& file, int flags);
-std::string why_not_written(int error);
+std::string why_not_written(const std::filesystem::path& file, int error);
 
 }  // namespace sonar

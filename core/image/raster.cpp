@@ -118,7 +118,7 @@ Result<void> write_whole_file(const std::filesystem::path& file, std::initialize
     std::error_code ignored;
     if (lock >= 0 && replaces) std::filesystem::remove(unfinished, ignored);
     if (lock >= 0) ::close(lock);
-    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(why));
+    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(target, why));
   };
   if (lock < 0) return failed(errno);
   const int descriptor = ::fcntl(lock, F_DUPFD_CLOEXEC, 0);

@@ -159,7 +159,7 @@ Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int mor
   const int fd = open_to_write(file, O_CREAT | more_flags);
   const int error = errno;
   if (fd < 0 && error == EEXIST) return failure(ErrorKind::io, file.string() + " exists already: give another name");
-  if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(error));
+  if (fd < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(file, error));
   Descriptor opened(fd);
   struct stat about {};
   if (::fstat(fd, &about) == 0 && S_ISREG(about.st_mode)) {
