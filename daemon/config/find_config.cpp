@@ -29,7 +29,10 @@ Result<FoundConfig> find_config(const std::string& file, bool demo) {
   if (!file.empty()) return found(load_config(file), file, file);
   std::string searched;
   for (const auto& path : search_path()) {
-    if (!is_absent(path)) return found(load_config(path), path.string(), path);
+    std::error_code error;
+    (void)std::filesystem::symlink_status(path, error);
+    const bool is_closed = error == std::errc::permission_denied;  // `sudo -u` may keep the HOME of another user
+    if (!is_closed && !is_absent(path)) return found(load_config(path), path.string(), path);
     searched += (searched.empty() ? "" : ", ") + path.string();
   }
   return found(demo_config(), "none found (looked in " + searched + ") -> demo");

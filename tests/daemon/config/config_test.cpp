@@ -5,10 +5,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 
 #include "daemon/config/products.hpp"
+#include "tests/core/scene/temporary_files.hpp"
 
 namespace sonar::config_test {
 namespace {
@@ -380,6 +385,24 @@ TEST(FindConfig, TakesTheFileItIsGivenUnlessTheDemoIsAskedFor) {
   EXPECT_TRUE(demo->file.empty());
   EXPECT_EQ(demo->how, "built-in demo");
   EXPECT_FALSE(find_config("no such file.yaml", false));
+}
+
+/// A service or `sudo -u` may keep the HOME of a user whose folders are closed to the new user.
+TEST(FindConfig, PassesOverAHomeThatIsClosedToThisUser) {
+  tests::TemporaryFiles files;
+  const auto home = files.folder();
+  const char* const home_before = std::getenv("HOME");
+  const std::string before = home_before != nullptr ? home_before : "";
+  ASSERT_EQ(::setenv("HOME", home.c_str(), 1), 0);
+  ASSERT_EQ(::chmod(home.c_str(), 0), 0);
+  const bool is_root = ::geteuid() == 0;
+  if (is_root) ASSERT_EQ(::seteuid(65534), 0);  // may enter every folder otherwise
+  const auto found = find_config("", false);
+  if (is_root) ASSERT_EQ(::seteuid(0), 0);
+  ::chmod(home.c_str(), 0700);
+  ::setenv("HOME", before.c_str(), 1);
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_THAT(found->how, HasSubstr("-> demo"));
 }
 
 std::string two_sonars(const std::string& first, const std::string& second_ip) {
