@@ -158,7 +158,9 @@ class Instruments:
                 self.heading_deg = numbers[2]
         elif kind == "PASHR" and len(numbers) >= 5 and fields[2] == "T" and None not in numbers[3:5]:
             self.roll_deg, self.pitch_deg = numbers[3], numbers[4]
-            if numbers[1] is not None and not self.received & TRUE_HEADINGS:
+            if numbers[1] is None:
+                return "attitude"  # HDG still gives the heading
+            if not self.received & TRUE_HEADINGS:
                 self.heading_deg = numbers[1]
         elif kind == "PHTRO" and len(numbers) >= 4 and numbers[0] is not None and numbers[2] is not None and \
                 fields[1] in ("M", "P") and fields[3] in ("B", "T"):

@@ -59,6 +59,9 @@ class Signs(unittest.TestCase):
         self.assertEqual((now.pitch_deg, now.roll_deg, now.heading_deg), (-2, 3, 123.4))
         now = self.after("PASHR,123519.00,123.40,T,+03.00,-02.00,+0.10,0.02,0.02,0.05,2,1")
         self.assertEqual((now.pitch_deg, now.roll_deg, now.heading_deg), (-2, 3, 123.4))
+        now = self.after("PASHR,123519.00,,T,+03.00,-02.00,+0.10", "HCHDG,98.3,0.0,E,12.6,W")
+        self.assertEqual((now.pitch_deg, now.roll_deg), (-2, 3))
+        self.assertAlmostEqual(now.heading_deg, 85.7)  # PASHR had no heading
         for other in ("PASHR,123519.00,123.40,T,,-02.00", "PASHR,POS,0,08,123519", "PASHR,1,2"):
             self.assertEqual((self.after(other).pitch_deg, self.after(other).received), (None, set()), other)
 
