@@ -92,7 +92,7 @@ TEST(Doctor, KnowsMachinesWhoseNetworkIsTheirOwn) {
   expect(line(facts, "network"), Level::ok, "172.17.0.2 is reached via this WSL2 machine", "status_to");
   facts.status.received.push_back(received("172.17.0.2"));  // on this computer
   facts.machine = Machine::container;
-  expect(line(facts, "network"), Level::ok, "by way of this container", "status_to");
+  expect(line(facts, "network"), Level::ok, "via this container", "status_to");
   facts.sonars[0].at.host = "127.0.0.2";  // for drivers here
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("may not pass")));
 }

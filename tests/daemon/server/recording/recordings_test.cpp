@@ -68,7 +68,7 @@ TEST(RecordingName, SaysTheKindAndNoFolder) {
                                   std::string("run\0.mcap", 9), std::string("r\xc3\xbc.mcap"), "a" + longest})
     EXPECT_THAT(RecordingFile::kind_of(name, "oculus").error().text, HasSubstr("no folder")) << name;
   for (const char* name : {"-run.mcap", "-.raw", "--overwrite.pcap", "-"})
-    EXPECT_THAT(RecordingFile::kind_of(name, "oculus").error().text, HasSubstr("does not begin with -")) << name;
+    EXPECT_THAT(RecordingFile::kind_of(name, "oculus").error().text, HasSubstr("must not begin with -")) << name;
   for (const char* name : {"run", "run.txt", "mcap", "run.mcap.gz"})
     EXPECT_THAT(RecordingFile::kind_of(name, "oculus").error().text, HasSubstr("by its end")) << name;
 }
