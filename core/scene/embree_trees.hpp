@@ -36,10 +36,10 @@ inline std::string device_settings(int threads) {
 }
 
 inline std::string why_not(RTCError error) {
-  constexpr const char* cure = "; use a smaller scene, or allow more (ulimit -v, LimitAS=, MemoryMax=)";
+  const std::string cure = "; use a smaller scene, or raise the limits of memory (ulimit -v, LimitAS=, MemoryMax=)";
   if (error == RTC_ERROR_UNSUPPORTED_CPU) return " on this processor";
-  if (error == RTC_ERROR_OUT_OF_MEMORY) return std::string(": not enough memory") + cure;
-  return ": code " + std::to_string(error) + "; memory or threads may be short" + cure + ", and threads (ulimit -u)";
+  if (error == RTC_ERROR_OUT_OF_MEMORY) return ": not enough memory" + cure;
+  return ": code " + std::to_string(error) + "; memory or threads may be short" + cure + " and threads (ulimit -u)";
 }
 
 // Owners of Embree's reference-counted handles.

@@ -10,7 +10,7 @@ bool is_loopback(Ipv4 ip) { return ip[0] == 127; }
 
 std::string why_not_of_a_computer(Ipv4 ip) {
   if (ip[0] < 224 && ip != Ipv4{127, 255, 255, 255}) return {};
-  return text_of(ip) + " is a multicast or broadcast address; give an address of this computer";
+  return text_of(ip) + " is a multicast, broadcast or reserved address; give an address of this computer";
 }
 
 bool AddressRange::contains(Ipv4 address) const {

@@ -21,7 +21,7 @@ struct AddressRange {  // 10.0.0.0/8
 std::string text_of(Ipv4 ip);
 std::string text_of(Endpoint endpoint);
 bool is_loopback(Ipv4 ip);
-/// The reason why no computer can have this address: it is a multicast or broadcast address. Empty for others.
+/// The reason why no computer can have this address: it is a multicast, broadcast or reserved address. Empty for others.
 std::string why_not_of_a_computer(Ipv4 ip);
 /// Error config: a sentence that shows a valid address.
 Result<Ipv4> parse_ipv4(std::string_view text);

@@ -73,7 +73,7 @@ TEST(ConfigMistakes, SaysWhyAFileThatIsThereCannotBeRead) {
 
 TEST(ConfigMistakes, ListenersAtMulticastAndBroadcastAddressesAreRefused) {
   for (const std::string ip : {"224.0.0.1", "239.255.0.1", "255.255.255.255", "240.0.0.1", "127.255.255.255"}) {
-    const std::string words = ": " + ip + " is a multicast or broadcast address; give an address of this computer";
+    const std::string words = ": " + ip + " is a multicast, broadcast or reserved address; give an address of this computer";
     const auto with = [&](const std::string& more) { return why(world + vehicles + sonar + more); };
     for (const char* key : {"protobuf", "json"})
       EXPECT_THAT(with(std::string("poses: {allow_from: [10.0.0.0/8], ") + key + ": '" + ip + ":14990'}\n"),

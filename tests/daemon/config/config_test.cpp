@@ -330,7 +330,7 @@ TEST(Config, AddressesAndNamesThatCannotWorkAreRefused) {
   for (const char* mask : {"255.0.255.0", "0.0.0.255", "255.255.255.1"})
     EXPECT_THAT(with("front", std::string("bind_ip: 192.168.2.4, netmask: ") + mask), HasSubstr("is not a netmask")) << mask;
   for (const char* ip : {"224.0.0.1", "239.1.2.3", "255.255.255.255", "240.0.0.1"}) {
-    EXPECT_THAT(with("front", std::string("bind_ip: ") + ip), HasSubstr("is a multicast or broadcast address")) << ip;
+    EXPECT_THAT(with("front", std::string("bind_ip: ") + ip), HasSubstr("is a multicast, broadcast or reserved address")) << ip;
     EXPECT_THAT(with("front", std::string("bind_ip: 0.0.0.0, advertise_ip: ") + ip), HasSubstr("advertise_ip")) << ip;
   }
   EXPECT_THAT(with("front", "bind_ip: 0.0.0.0, advertise_ip: 0.0.0.0"), HasSubstr("drivers cannot connect to 0.0.0.0"));
