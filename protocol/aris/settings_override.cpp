@@ -12,7 +12,7 @@ constexpr std::uint32_t shortest_period_us = 4, longest_period_us = 100, longest
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
-/// Sets the wanted mode; without one, the ping mode with the wanted number of beams.
+/// Sets the wanted mode, or else the ping mode with the wanted number of beams.
 Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   const Product& product = product_of(*device.model);
   if (wanted.mode) {
@@ -24,15 +24,18 @@ Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, con
     s.acoustics.frequency = choice.frequency;
     s.telephoto = choice.telephoto;
   }
-  if (!wanted.beams || find_ping_mode(product, s.acoustics.ping_mode)->beams() == static_cast<int>(*wanted.beams)) return {};
+  const int beams = find_ping_mode(product, s.acoustics.ping_mode)->beams();
+  if (!wanted.beams || beams == static_cast<int>(*wanted.beams)) return {};
+  const std::string asked = ", not " + std::to_string(*wanted.beams);
+  if (wanted.mode) return refused(device.model->name + " forms " + std::to_string(beams) + " beams in this mode" + asked);
   std::string counts;
   for (const PingMode& mode : product.ping_modes) {
     counts += (counts.empty() ? "" : " or ") + std::to_string(mode.beams());
-    if (mode.beams() != static_cast<int>(*wanted.beams) || wanted.mode) continue;
+    if (mode.beams() != static_cast<int>(*wanted.beams)) continue;
     s.acoustics.ping_mode = mode.number;
     return {};
   }
-  return refused(device.model->name + " forms " + counts + " beams in this mode, not " + std::to_string(*wanted.beams));
+  return refused(device.model->name + " forms " + counts + " beams" + asked);
 }
 
 /// Changes the end of the window and keeps its start. Keeps the sample period too if the resulting number of samples is valid.
@@ -65,7 +68,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Acoustics& a = s.acoustics;
   if (wanted.rate_hz) {
     if (*wanted.rate_hz < 1 || *wanted.rate_hz > highest_rate_hz)
-      return refused("the rate of an ARIS is 1 to 15 Hz; a controller stops it");
+      return refused("an ARIS pings at 1 to 15 Hz; only a controller can stop it");
     a.frame_rate_hz = static_cast<float>(*wanted.rate_hz);
   }
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);

@@ -6,6 +6,7 @@
 namespace sonar::aris {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 const Product& product(const std::string& profile) { return product_of(*protocol::find_profile(profile)->model); }
@@ -147,11 +148,24 @@ TEST(ArisOverride, IsWhatAControllerWouldHaveSet) {
   };
   protocol::SettingsOverride wanted;
   wanted.beams = 100;
-  EXPECT_THAT(why(wanted), HasSubstr("64 or 128"));
+  EXPECT_THAT(why(wanted), HasSubstr("forms 64 or 128 beams, not 100"));
   EXPECT_THAT(why({30, {}, {}, {}, {}}), HasSubstr("to 20 m, not 30 m"));
   EXPECT_THAT(why({{}, 0, {}, {}, {}}), HasSubstr("1 to 15"));
   EXPECT_THAT(why({{}, {}, 101, {}, {}}), HasSubstr("0 to 100"));
   EXPECT_THAT(why({{}, {}, {}, 9u, {}}), HasSubstr("4 mode(s)"));
+}
+
+TEST(ArisOverride, RefusalNamesOnlyTheBeamsOfTheWantedMode) {
+  const auto state = tests::device();
+  for (const std::uint32_t mode : {0u, 1u, 2u, 3u}) {
+    const auto in_mode = vendor().apply_override({{}, {}, {}, mode, {}}, state);
+    ASSERT_TRUE(in_mode) << in_mode.error().text;
+    const int beams = in_mode->settings.beam_count, others = 64 + 128 - beams;
+    const auto result = vendor().apply_override({{}, {}, {}, mode, static_cast<std::uint32_t>(others)}, state);
+    ASSERT_FALSE(result);
+    EXPECT_THAT(result.error().text,
+                EndsWith("forms " + std::to_string(beams) + " beams in this mode, not " + std::to_string(others)));
+  }
 }
 
 }  // namespace
