@@ -121,8 +121,8 @@ std::string without_escapes(std::string_view text) {
 }
 
 /// Searches the folders, then beside and above the referencing file: models lie next to each other, packages contain their files.
-/// Last, it searches the referring model itself for a file of that model, because its folder may have another name. It never
-/// returns the referencing file, because a model may have the same name as the one on Fuel that it includes.
+/// Last, it searches the referring model's folder, whatever its name, for that model's files. It never returns the referencing
+/// file: a model may include a Fuel model of the same name.
 fs::path look_around(const fs::path& wanted, const fs::path& from_file, const std::vector<fs::path>& folders, int version = -1) {
   std::error_code error;
   const fs::path from = fs::absolute(from_file, error).lexically_normal(), here = from.parent_path();
@@ -141,7 +141,7 @@ fs::path look_around(const fs::path& wanted, const fs::path& from_file, const st
       if (const fs::path found = another(above / wanted.lexically_relative(first)); !found.empty()) return found;
     if (above == above.parent_path()) break;
   }
-  if (wanted == fs::path(first)) return {};  // a model as a whole, which is not the one that refers to it
+  if (wanted == fs::path(first)) return {};  // a whole model, never the referring one
   above = here;
   for (int up = 0; up < 4 && above != above.parent_path(); ++up, above = above.parent_path())
     if (!model_in(above).empty())
@@ -149,7 +149,7 @@ fs::path look_around(const fs::path& wanted, const fs::path& from_file, const st
   return {};
 }
 
-/// A file of a ROS package in one of the folders that is named otherwise than the package.
+/// Finds a file of a ROS package whose folder, in one of `folders`, has another name than the package.
 fs::path find_in_packages(const fs::path& wanted, const std::vector<fs::path>& folders) {
   const std::string package = wanted.empty() ? std::string() : wanted.begin()->string();
   for (const fs::path& folder : folders) {
@@ -257,7 +257,7 @@ Result<std::string> read_text(const fs::path& path) {
   if (!is_file(path)) return failure(ErrorKind::bad_data, path.string() + ": not a file");
   std::error_code error;
   if (fs::file_size(path, error) > max_xml_bytes)
-    return failure(ErrorKind::bad_data, path.string() + ": is larger than 16 MiB; such files hold meshes elsewhere");
+    return failure(ErrorKind::bad_data, path.string() + ": is larger than 16 MiB; meshes belong in other files");
   const auto size = static_cast<std::size_t>(fs::file_size(path, error));
   std::ifstream in(path, std::ios::binary);
   std::string text(size, '\0');

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
 constexpr double tiny_ground_m = 1, steepest_ground = 10;  // width of the ground; its height over its width
-constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // the same limits for ground that is a mesh, which may be long
+constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // the same limits for mesh ground, of any length
 constexpr double at_surface_m = 0.001;                     // a height that is rounded to 0
 constexpr std::size_t many_triangles = 2'000'000;
 

@@ -79,7 +79,7 @@ Result<std::shared_ptr<const XmlFile>> parse_xml(std::string_view text, const st
   const auto bad = [&](int line, const std::string& what) {
     return failure(ErrorKind::bad_data, path.string() + ":" + std::to_string(std::max(line, 1)) + ": " + what);
   };
-  if (text.size() > max_xml_bytes) return bad(1, "is larger than 16 MiB; such files hold meshes elsewhere");
+  if (text.size() > max_xml_bytes) return bad(1, "is larger than 16 MiB; meshes belong in other files");
   if (text.find('\0') != std::string_view::npos) return bad(1, "is not a text file");
   auto document = std::make_shared<tinyxml2::XMLDocument>();
   const auto bad_nesting = [&](int line) { return bad(line, "elements nest more than " + std::to_string(deepest) + " deep"); };

@@ -80,11 +80,10 @@ void ReplayServer::spawn(Coroutine coroutine) {
 }
 
 // One client at a time. Its serve() plays messages at their times and also writes the replies; listen_to() reads its requests.
-// The replay ends when the recording was served to its end, or after stop(): by then the client has got FIN, or RST when
-// goodbye_limit has passed.
+// The replay ends after the recording or stop(), once the client has got FIN or, after goodbye_limit, RST.
 void ReplayServer::start() {
   if (!device_.is_only_seen.empty()) {
-    // Serves only the page, until a signal comes.
+    // Only the page is served, until a signal comes.
   } else if (http_) {
     http_->start();
     spawn(serve(client_));
@@ -262,7 +261,7 @@ asio::awaitable<void> ReplayServer::send_datagram(ClientPointer client, const pr
   }
 }
 
-/// Sends the replies of the stream, which one coroutine writes.
+/// Sends the replies; only one coroutine writes the stream.
 asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
   while (!client->replies.empty()) {
     const protocol::Bytes replies = std::exchange(client->replies, {});
@@ -270,7 +269,7 @@ asio::awaitable<void> ReplayServer::send_replies(ClientPointer client) {
   }
 }
 
-/// False: the client has left, or was reset. The bytes must live until it is done.
+/// Returns false if the client has left or was reset. The bytes must outlive the write.
 asio::awaitable<bool> ReplayServer::write(ClientPointer client, protocol::BytesView bytes) {
   error_code ec;
   while (!bytes.empty() && !ec) {
@@ -322,8 +321,8 @@ void ReplayServer::apply(Client& client, const protocol::Event& event) {
       if (stream != nullptr && may_receive(ip, *stream, network_))
         client.receivers.emplace_back(address_of(ip), to.port);
       else
-        log_limited(log_, unsent_limit_, LogLevel::warning, "no frames are sent to a broadcast address or a group of others",
-                    {{"to", text_of(ip)}});
+        log_limited(log_, unsent_limit_, LogLevel::warning,
+                    "no frames are sent to broadcast addresses or foreign multicast groups", {{"to", text_of(ip)}});
     }
   };
   error_code ec;

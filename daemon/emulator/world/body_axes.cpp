@@ -8,12 +8,10 @@ namespace {
 
 constexpr const char* camera_cure =
     "mount its sonars with rpy_deg: [0, -90, 90], which turns a camera's axes to ours (x ahead, y left, z up); if no camera "
-    "wrote "
-    "the file, see the order of the quaternion (TUM: w last; EuRoC: w first)";
+    "wrote the file, check the order of the quaternion (TUM: w last; EuRoC: w first)";
 constexpr const char* camera_imu_cure =
     "mount its sonars with rpy_deg: [0, -90, 180], which turns these axes to ours (x ahead, y left, z up); if the axes are "
-    "others, "
-    "see the order of the quaternion (TUM: w last; EuRoC: w first)";
+    "others, check the order of the quaternion (TUM: w last; EuRoC: w first)";
 
 constexpr std::array<OtherAxes, 2> other_axes{
     {{"have the axes of a camera: x right, y down, z ahead", camera_cure, {0, -1, 0}},

@@ -19,7 +19,7 @@ using text::format;
 
 constexpr double turned_over = -0.5;           // the z axis points more than 30 deg below the horizon
 constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
-constexpr double ground_flatness = 0.05;       // height over width; flatter objects are ground, which may be long
+constexpr double ground_flatness = 0.05;       // height over width; flatter objects are ground, of any length
 constexpr double least_ground_m = 2;           // width; a flat plate that is narrower is not ground
 constexpr double far_from_origin_m = 1000;     // vehicles may drive this far to the scene
 constexpr double long_ranges = 5;              // an object may be this many times as long as the longest range
@@ -29,16 +29,15 @@ constexpr const char* surface_cure =
     "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
     "in the other; state the frame that was sent";
 constexpr const char* depth_cure =
-    "the scene is less deep than that: see the origin that depths are counted from, and the unit (metres)";
+    "the scene is less deep than that: check the origin that depths are counted from, and the unit (metres)";
 constexpr const char* exchanged_cure = "it is in the scene with x and y exchanged: ENU_FLU has east first, NED_FRD north";
-constexpr const char* far_cure =
-    "positions are metres from the world's 0, 0, 0: see the unit and the origin that they are sent in";
+constexpr const char* far_cure = "positions are metres from the world's 0, 0, 0: check their unit and origin";
 constexpr const char* turned_cure =
-    "see the order of the quaternion (JSON and EuRoC: w first; TUM and ROS: w last), the unit of angles (JSON: radians), and the "
+    "check the quaternion's order (JSON and EuRoC: w first; TUM and ROS: w last), the unit of angles (JSON: radians), and the "
     "body's axes (FLU: z up; FRD: z down; a camera's: z ahead)";
 constexpr const char* order_cure =
     "write w where the format has it: last in a TUM line (t x y z qx qy qz qw), first in one of EuRoC";
-constexpr const char* angle_cure = "angles are radians there: were degrees sent? Multiply them by 0.0174533";
+constexpr const char* angle_cure = "angles must be in radians: were degrees sent? Multiply them by 0.0174533";
 constexpr const char* degrees_cure = "were degrees written? Call the columns roll_deg, pitch_deg and yaw_deg";
 constexpr const char* radians_cure = "call the columns roll_rad, pitch_rad and yaw_rad, or multiply the angles by 57.2958";
 constexpr const char* mount_cure =
@@ -46,8 +45,8 @@ constexpr const char* mount_cure =
     "aft, set yaw 180";
 constexpr const char* origin_cure =
     "vehicles with latitudes and longitudes are placed about world.origin: does it belong to this scene? A height map in degrees "
-    "or UTM is placed about it, without origin and centred";
-constexpr const char* lift_cure = "move the scene down: sonarctl scene import --offset 0,0,-10, or the poses of its objects";
+    "or UTM without `origin` and `centred` is too";
+constexpr const char* lift_cure = "lower the scene (sonarctl scene import --offset 0,0,-10) or the poses of its objects";
 
 struct Doubt {
   std::string text;
@@ -106,15 +105,15 @@ std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
   return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
 }
 
-/// True if a body is upright, in the frame of the file, if w is at the other end of the four numbers.
+/// True if w at the other end of the four numbers makes a body upright in the frame of the file.
 bool is_upright_in_another_order(Quatd q) {
   const auto reordered = [](Quatd r) { return std::array{upright({r.x, r.y, r.z, r.w}), upright({r.z, r.w, r.x, r.y})}; };
   const auto as_enu = reordered(q), as_ned = reordered(enu_flu_from_ned_frd(q));
   return std::max({as_enu[0], as_enu[1], as_ned[0], as_ned[1]}) > tilted;
 }
 
-/// True if w can be at the wrong end: CSV files name their columns, and KITTI files have matrices. `about` begins with the
-/// format.
+/// True if w can be at the wrong end. It cannot in CSV (its columns have names) and KITTI (it has matrices). `about` begins with
+/// the format.
 bool has_nameless_quaternions(const motion::Plan& plan) {
   const auto is = [&](motion::Format format) {
     return plan.about.starts_with((plan.file + ": ").append(name_of(format)).append(","));
@@ -341,7 +340,7 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
   return notes;
 }
 
-// ---- of a running daemon
+// ---- in a running daemon
 
 std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
   std::vector<Note> fresh;

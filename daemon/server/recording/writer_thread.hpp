@@ -1,5 +1,5 @@
-// The thread that writes files: recordings and the journal of faults. The I/O thread passes jobs to it, so that it need not wait
-// for a disk; jobs run in order. App owns it.
+// The thread that writes files: recordings and the journal of faults. The I/O thread passes jobs to it so as not to wait for a
+// disk; jobs run in order. App owns it.
 #pragma once
 
 #include <unistd.h>
@@ -28,8 +28,7 @@ class WriterThread {
   WriterThread(const WriterThread&) = delete;
   WriterThread& operator=(const WriterThread&) = delete;
 
-  /// `job` runs on this thread and returns a Result<void>; `after` is called with it on the I/O thread, whose loop stays alive
-  /// until then.
+  /// `job` runs on this thread; its Result<void> goes to `after` on the I/O thread, whose loop stays alive until then.
   template <class Job, class After>
   void run(Job job, After after) {
     ++under_way_;
@@ -49,7 +48,7 @@ class WriterThread {
     } catch (const std::bad_alloc&) {
       return failure(ErrorKind::unavailable, "not enough memory to record");
     } catch (const std::exception& e) {
-      return failure(ErrorKind::bug, std::string("writing it failed: ").append(e.what()));
+      return failure(ErrorKind::bug, std::string("writing failed: ").append(e.what()));
     }
   }
   /// True if no job runs or waits.

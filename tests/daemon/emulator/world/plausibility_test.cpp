@@ -157,7 +157,7 @@ TEST(Plausibility, ASceneThatLiesAboveTheWaterIsTheMistakeItself) {
   dry.sea_surface.present = true;
   dry.objects[0].in_world.position_m = {0, 0, 0};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry),
-              ElementsAre(HasSubstr("nothing of the scene lies below the water's surface, z = 0; move the scene down")));
+              ElementsAre(HasSubstr("nothing of the scene lies below the water's surface, z = 0; lower the scene")));
   dry.sea_surface.present = false;
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry), IsEmpty()) << "a tank on its floor";
 }

@@ -1,4 +1,4 @@
-// Network actions of a device when its sonar requests a closed port, a reset or a client that is not read.
+// Network actions of a device whose sonar asks it to close a port, reset a client or stop reading it.
 #include "daemon/server/sonars/device.hpp"
 
 #include <gmock/gmock.h>
@@ -40,7 +40,7 @@ struct DeviceActions : ::testing::Test {
   }
   ~DeviceActions() override {
     device.stop();
-    run(milliseconds(300));  // a listener must live for 100 ms after its end
+    run(milliseconds(300));  // a stopped listener must live for 100 ms
   }
   void run(milliseconds time) {
     io.restart();
@@ -83,7 +83,7 @@ TEST_F(DeviceActions, ListenClosesAndOpensThePortOfClientsOnly) {
   for (int round = 0; round < 3; ++round) {
     device.perform({Listen{false}});
     EXPECT_EQ(device.data_endpoint().port, 52100);
-    EXPECT_EQ(device.problem(), "") << "as it was asked to";
+    EXPECT_EQ(device.problem(), "") << "closed on request";
     EXPECT_TRUE(refuses(52100));
     EXPECT_FALSE(refuses(52101));
     run(milliseconds(20));

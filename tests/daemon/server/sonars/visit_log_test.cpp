@@ -33,7 +33,7 @@ TEST(VisitLog, FewVisitsAreToldOneByOne) {
   EXPECT_THAT(bench.lines, SizeIs(8));
   bench.come_and_go(4);
   bench.visits.end();
-  EXPECT_THAT(bench.lines, SizeIs(16)) << "another spell has its own lines";
+  EXPECT_THAT(bench.lines, SizeIs(16)) << "a new period has its own lines";
 }
 
 TEST(VisitLog, ManyAreSummedUpAndNoneIsForgotten) {
@@ -47,11 +47,11 @@ TEST(VisitLog, ManyAreSummedUpAndNoneIsForgotten) {
   EXPECT_THAT(bench.lines.back(), HasSubstr("closed by the client"));
   bench.come_and_go(3);
   bench.io.run_one();
-  EXPECT_THAT(bench.lines, SizeIs(VisitLog::lines_a_spell + 2)) << "after a crowded spell one line for all";
+  EXPECT_THAT(bench.lines, SizeIs(VisitLog::lines_a_spell + 2)) << "a crowded period is followed by one summary";
   EXPECT_THAT(bench.lines.back(), HasSubstr("connected=3  gone=3"));
   bench.io.run();
   bench.come_and_go(1);
-  EXPECT_THAT(bench.lines, SizeIs(VisitLog::lines_a_spell + 4)) << "and one by one again";
+  EXPECT_THAT(bench.lines, SizeIs(VisitLog::lines_a_spell + 4)) << "then visits are logged singly again";
   bench.visits.end();
 }
 
@@ -61,7 +61,7 @@ TEST(VisitLog, TheEndSaysWhatIsUnsaid) {
   bench.visits.end();
   EXPECT_THAT(bench.lines.back(), HasSubstr("connected=6  gone=6"));
   bench.visits.say(Kind::gone, "client gone: sonard stops", {});
-  EXPECT_THAT(bench.lines.back(), HasSubstr("sonard stops")) << "those that the end sends away, too";
+  EXPECT_THAT(bench.lines.back(), HasSubstr("sonard stops")) << "clients disconnected after end() are logged";
   EXPECT_EQ(bench.io.run(), 1u) << "nothing but the cancelled timer is left";
 }
 
