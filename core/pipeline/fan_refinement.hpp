@@ -19,7 +19,7 @@ namespace sonar {
 struct SurfaceHit {
   std::uint32_t object = RayPacket::miss;
   float range_m = 0, inverse_x = 0;  // 1 / x, x = forward coordinate in the sonar's frame; 0 = no hit
-  Vec3 normal;                       // normal of the facet, of any length, in world axes as seen along the last leg of the path
+  Vec3 normal;                       // normal of the facet, of any length, in world axes
   float offset = 0;                  // the facet's plane is normal . p = offset; p is relative to the sonar's last image
   Vec3 direction;                    // unit direction of the last leg, in the same axes
 
@@ -56,8 +56,8 @@ struct FanInterval {
 template <class Sample>
 class FanRefinement {
  public:
-  /// The caller keeps the buffers from ping to ping. `first_column`: number of the first column in the plan, so that the hits
-  /// of a column do not depend on the columns traced with it.
+  /// The caller keeps the buffers from ping to ping. `first_column`: the first column's number in the plan; it makes a column's
+  /// hits independent of the columns traced with it.
   FanRefinement(std::vector<Sample>& samples, std::vector<FanInterval>& open, std::vector<FanInterval>& halves,
                 float pulse_width_m, int first_column)
       : samples_(samples), open_(open), halves_(halves), tolerance_m_(pulse_width_m), first_column_(first_column) {
@@ -95,10 +95,9 @@ class FanRefinement {
  private:
   // Edges are located to 1/16 of a base interval. A surface that cannot be interpolated even then counts as an edge.
   static constexpr int deepest = 4;
-  // A surface deviates from the straight line between two hits by about a quarter of the maximum that its slopes allow, which
-  // is half a pulse width here. The middle may deviate by one pulse width more. The sum is the 1.5 of
-  // PingPlan::depth_tolerance_m. With larger slopes a middle on the line proves nothing, because the rays may hit equal phases
-  // of ripples.
+  // A surface deviates from the straight line between two hits by about a quarter (here half a pulse width) of the maximum
+  // that its slopes allow. The middle may deviate by one pulse width more. The sum is the 1.5 of PingPlan::depth_tolerance_m.
+  // With larger slopes a middle on the line proves nothing, because the rays may hit equal phases of ripples.
   static constexpr float slope_tolerance_in_pulses = 2;
   static constexpr float golden_turn = 0.61803399f;  // the multiples of this fraction of a turn are evenly distributed
   static constexpr float widest_skew = 0.15f;        // fraction of an interval, to either side of its middle
@@ -149,7 +148,7 @@ class FanRefinement {
     }
     return true;
   }
-  /// True if the plane of each hit crosses the ray of the other hit near that hit.
+  /// True if each hit's plane crosses the other hit's ray near the other hit.
   bool planes_agree(const SurfaceHit& a, const SurfaceHit& b) const {
     const float most = slope_tolerance_in_pulses * tolerance_m_;
     return std::abs(a.offset / dot(a.normal, b.direction) - b.range_m) <= most &&

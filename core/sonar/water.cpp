@@ -1,5 +1,5 @@
 // Absorption, sound speed, density and pressure of the water, by published formulae with their published digits.
-// A ping uses them once. Vendors use them for the values that their devices assume.
+// A ping computes each value once; the code of vendors uses the formulae for values that their devices assume.
 #include "core/sonar/water.hpp"
 
 #include <algorithm>

@@ -35,7 +35,7 @@ struct Ownership {
   std::vector<FacetOfCells> facets;
 };
 
-/// Columns (or rows) of the lattice in this tile that an interval of the plane overlaps.
+/// The tile's lattice columns (or rows) that overlap an interval of the plane.
 struct CellRange {
   int from, to;
 };
@@ -103,7 +103,7 @@ void own(const lattice::Facet& f, const TileAddress& a, Ownership& all) {
     }
 }
 
-/// The cells of a tile in their order. Copies of the last cell with a root of 0 fill the last block.
+/// The cells of a tile in their order. Copies of the last cell, but with root 0, fill the last block.
 struct CellList {
   explicit CellList(std::size_t most)
       : doubles(std::make_unique_for_overwrite<double[]>(4 * most)),
@@ -169,7 +169,7 @@ void find_roots(const Ownership& all, const TileAddress& a, const TextureField* 
   }
 }
 
-/// Scales the weights to the magnitude of their roots. Returns the largest weight.
+/// Scales each weight to the magnitude of its cell's root. Returns the largest weight.
 float scale_to_one_magnitude(const CellList& cells) {
   double most = 0;
   for (int n = 0; n < cells.size; ++n) {

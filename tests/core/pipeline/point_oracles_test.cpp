@@ -55,9 +55,9 @@ TEST(PointOracles, Oracle01_RangeOfAPoint) {
     for (const double r : ranges) {
       const double row = s.row_of_range(r);
       const Peak peak = peak_near(s, row, settings.beam_count / 2);
-      record_oracle(1, "peak by log-parabola, off its range", 0, peak.offset - row, 0.1, "rows");
-      // The sample that contains the range. At half a row, two samples have equal levels.
-      record_oracle(1, "loudest row, off its range", 0, loudest_near(s, row, settings.beam_count / 2) - row, 0.5 + 0.01, "rows");
+      record_oracle(1, "log-parabola peak minus range", 0, peak.offset - row, 0.1, "rows");
+      // The sample that contains the range. Halfway between rows, two samples have equal levels.
+      record_oracle(1, "loudest row minus range", 0, loudest_near(s, row, settings.beam_count / 2) - row, 0.5 + 0.01, "rows");
     }
   }
 }
@@ -71,7 +71,7 @@ TEST(PointOracles, Oracle02_SoundSpeedMismatchScalesRange) {
     s.ping();
     for (const double r : {4.0, 9.0}) {
       const Peak peak = peak_near(s, s.row_of_range(r * 1500 / c), 256);
-      record_oracle(2, "seen over true range, over c_dev / c", 1, s.range_of_row(peak.offset) / r / (1500 / c), 1e-3, "");
+      record_oracle(2, "(seen / true range) / (c_dev / c)", 1, s.range_of_row(peak.offset) / r / (1500 / c), 1e-3, "");
     }
   }
 }
@@ -110,7 +110,7 @@ TEST(PointOracles, Oracle03_LevelOfAPoint) {
       const double alpha = 8.685889638 * s.medium().absorption_np_per_m;
       const double expected = static_cast<double>(c.mode.source_level_db) - 40 * std::log10(r) - 2 * alpha * r - 15;
       const Peak peak = peak_near(s, s.row_of_range(r), 256);
-      record_oracle(3, "peak over SL - 40 log r - 2 alpha r + TS", 0, 20 * std::log10(peak.height) - expected, 0.1, "dB");
+      record_oracle(3, "peak minus (SL - 40 log r - 2 alpha r + TS)", 0, 20 * std::log10(peak.height) - expected, 0.1, "dB");
     }
   }
 }
@@ -163,7 +163,7 @@ TEST(PointOracles, Oracle14_WidthOfAPointAcrossBeams) {
       const double a = s.pressure(row, j), b = s.pressure(row, j + step), part = (a - half) / (a - b);
       return std::asin(s.beam_sine(j)) * (1 - part) + std::asin(s.beam_sine(j + step)) * part;
     };
-    record_oracle(14, "width across beams over the data sheet's", 1, (crossing(-1) - crossing(1)) / width, 0.02, "");
+    record_oracle(14, "width across beams / data sheet's", 1, (crossing(-1) - crossing(1)) / width, 0.02, "");
   }
 }
 
@@ -179,7 +179,8 @@ TEST(PointOracles, Oracle15_SideLobesOfAPointAcrossBeams) {
   for (int j = 0; j < s.beams(); ++j) {
     if (std::abs(s.beam_sine(j)) > 1.3 * width) highest = std::max(highest, s.pressure(row, j));  // beyond the first null
   }
-  record_oracle(15, "of a point across beams, Taylor", -30.3, 20 * std::log10(highest / s.pressure(row, top)), 0.5, "dB");
+  record_oracle(15, "side lobe of a point across beams, Taylor", -30.3, 20 * std::log10(highest / s.pressure(row, top)), 0.5,
+                "dB");
 }
 
 TEST(PointOracles, Oracle17_WidthOfAPointInRange) {
@@ -198,7 +199,7 @@ TEST(PointOracles, Oracle17_WidthOfAPointInRange) {
       const double a = s.pressure(n, 256), b = s.pressure(n + step, 256);
       return s.range_of_row(n + step * (a - half) / (a - b));
     };
-    record_oracle(17, "width of a point over the pulse's", 1, (crossing(1) - crossing(-1)) / width, 0.02, "");
+    record_oracle(17, "width of a point / pulse's", 1, (crossing(1) - crossing(-1)) / width, 0.02, "");
   }
 }
 
@@ -227,7 +228,7 @@ TEST(PointOracles, Oracle42_TvgFlattensAPoint) {
     for (const int row : rows) {
       const std::size_t i = 2 * (static_cast<std::size_t>(row) * 512 + 256);
       const int code = std::to_integer<int>(ping.samples[i]) + 256 * std::to_integer<int>(ping.samples[i + 1]);
-      record_oracle(42, "samples of points at 1 m to the greatest range, X = 40", 0, 20 * std::log10(code / expected), 0.2, "dB");
+      record_oracle(42, "samples of points at 1 m to the greatest range, TVG 40", 0, 20 * std::log10(code / expected), 0.2, "dB");
     }
   }
 }
@@ -239,7 +240,7 @@ TEST(PointOracles, Oracle43_EchoesBeyondTheRecordDoNotWrap) {
   s.ping();
   const auto loudest = [](const Ping& ping) { return static_cast<double>(*std::ranges::max_element(ping.pressure_upa)); };
   record_oracle(43, "points at 1.05 to 2 R_max: greatest sample", 0, loudest(s.last()), 0, "uPa");
-  // A surface beyond the range has no effect either, neither with one scatterer per ray nor with cells.
+  // A surface beyond the range has no effect either, with one scatterer per ray or cells.
   for (const int fan : {0, 64}) {
     Sounding w(SceneMaker().add(wall(20, 20), -10, {13, 0, 0}).make(), p900(), settings);
     w.request.switches.fixed_fan = fan;
@@ -270,7 +271,7 @@ TEST(PointOracles, Oracle46_ConicalShift) {
   }
 }
 
-// Port is left: targets on the left, above and near must appear on the left, above and near.
+// Port is left: a target on the left must appear on the left, targets ahead in the middle, all at their ranges.
 TEST(PointOracles, AsymmetricTargetsLandWhereTheyStand) {
   const PingSettings settings = native_rows(8, 0.0254);
   const Vec3d sonar{1000, -2000, -50};
