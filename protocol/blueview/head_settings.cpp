@@ -10,7 +10,7 @@
 namespace sonar::blueview {
 namespace {
 
-constexpr int most_bins = 2400;     // in a ping; longer ranges get longer bins (chosen)
+constexpr int most_bins = 2400;     // in a ping; longer ranges get longer bins (our choice)
 constexpr float base_gain_db = 48;  // unknown: gain at an adjustment of 0 dB
 constexpr float longest_interval_ms = 3600e3f;
 

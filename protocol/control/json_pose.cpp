@@ -81,7 +81,7 @@ Result<std::array<double, 4>> orientation_of(const json& object, std::string& fi
   return std::array<double, 4>{q.w, q.x, q.y, q.z};
 }
 
-/// Reads and checks a pose. `velocity` is in world axes, unlike that of the protobuf messages, so it is rotated into the body's.
+/// Reads and checks a pose. `velocity` is in world axes (protobuf: body axes) and is rotated into body axes.
 Result<PoseSample> sample_from(const json& object) {
   PoseSample sample;
   RawPose raw;
@@ -133,7 +133,7 @@ bool is_json_object(std::string_view line) {
 }
 
 void LineParser::feed(std::span<const std::byte> received) {
-  buffer_.erase(0, start_);  // erases all lines at once that next() has returned
+  buffer_.erase(0, start_);  // erases at once all lines that next() has returned
   start_ = 0;
   if (in_gap_) {  // the rest of a line whose start was lost
     const auto end = std::find(received.begin(), received.end(), std::byte{'\n'});

@@ -11,7 +11,7 @@ namespace {
 using protocol::Reaction;
 
 constexpr std::size_t longest_command = 4096;
-constexpr int deepest_command = 8;  // nested braces (chosen)
+constexpr int deepest_command = 8;  // nested braces (our choice)
 
 /// Finds the JSON objects in a stream by counting braces. Lines do not separate them: libwaterlinked sends no line ends.
 class ObjectSplitter {

@@ -18,7 +18,7 @@ enum Orientation : std::uint8_t {
   down = 25,  // MAV_SENSOR_ROTATION_PITCH_270
   custom = 100,
 };
-constexpr double axis_tolerance = 0.966;  // cosine of 15 degrees (chosen): within it a sensor counts as along an axis
+constexpr double axis_tolerance = 0.966;  // cosine of 15 deg (our choice): within 15 deg a sensor counts as along an axis
 
 std::uint16_t centimetres(double m) { return static_cast<std::uint16_t>(std::lround(std::clamp(100 * m, 0.0, 65535.0))); }
 

@@ -137,7 +137,7 @@ bool has_non_finite(const FireSettings& fire) {
          !std::isfinite(fire.salinity_ppt);
 }
 
-// The wire counts modes from 1: 1 is the low frequency, 2 the high one. Other values count as 1 (chosen).
+// The wire counts modes from 1: 1 is the low frequency, 2 the high one. Other values count as 1 (our choice).
 int mode_index(const SonarModel& model, std::uint8_t wire_mode) { return wire_mode == 2 && model.modes.size() > 1 ? 1 : 0; }
 
 double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt) {

@@ -26,7 +26,7 @@ struct RowGrid {
 };
 RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz = row_rate_hz);
 
-/// The rate of a code [Hz]; 0 = standby. Unknown codes count as 10 Hz (chosen).
+/// The rate of a code [Hz]; 0 = standby. Unknown codes count as 10 Hz (our choice).
 double table_rate_hz(PingRate rate);
 /// Exponent of the samples: value / 255, but 1 for the value 0.
 float gamma_from_byte(std::uint8_t value);

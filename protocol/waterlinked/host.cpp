@@ -78,7 +78,7 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
       shot.sequence, static_cast<unsigned>(width), static_cast<unsigned>(height), 16, scale_m, far_m, centre_hz_of(shot), 0};
   found.facts.note =
       returns == 0 ? "no returns" : text::format("%zu returns from %.2f to %.2f m", returns, nearest_m, farthest_m);
-  if (strengths == nullptr) found.facts.note += ", without their strengths";
+  if (strengths == nullptr) found.facts.note += "; no strengths given";
   seen.image.azimuth_rad = image.azimuth_rad;
   found.picture = [image = std::move(image)]() -> Result<PolarImage> { return image; };
   found.drawing = [seen = std::move(seen)] { return seen; };

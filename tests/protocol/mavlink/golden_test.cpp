@@ -1,5 +1,5 @@
-// Frames of an independent writer (tests/acceptance/mavlink_frames.py), made from the message definitions: every field is read
-// correctly, and our own writer makes the same bytes.
+// An independent writer (tests/acceptance/mavlink_frames.py) made frames from the message definitions: we read every field
+// correctly and write the same bytes.
 #include <cstdio>
 #include <fstream>
 #include <map>

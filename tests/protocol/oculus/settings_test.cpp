@@ -24,7 +24,7 @@ TEST(RowGrid, IsTheCapturedOne) {
   EXPECT_DOUBLE_EQ(law.spacing_m, 0.0028421889710794315);
 }
 
-// The capture's request: its double must be echoed in the packet, bit for bit.
+// For the capture's request, the packet has the captured spacing bit for bit.
 TEST(RowGrid, SpacingReachesThePacketUnrounded) {
   FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
   request.settings.sound_speed_mps = 1490.658551265436;
@@ -43,7 +43,7 @@ TEST(RowGrid, SpacingDoublesUntilTheRowsFit) {
     if (doublings > 0.5) {
       EXPECT_GT(range / (law.spacing_m / 2), 720) << range << ": a finer spacing would fit";
     }
-    EXPECT_LE(std::abs(range - law.count * law.spacing_m), law.spacing_m) << "full scale within a row of the range";
+    EXPECT_LE(std::abs(range - law.count * law.spacing_m), law.spacing_m) << "the rows end within one row of the range";
   }
 }
 
@@ -71,7 +71,7 @@ TEST(Laws, GainEcho) {
     return echoed_gain_percent(fire(0, mode, PingRate::hz10, flags, 5, gain).settings, option);
   };
   EXPECT_DOUBLE_EQ(echo(2, 0x0D, 50, "auto"), 70);  // ENS inverts 40 + 0.6 g in mode 2
-  EXPECT_DOUBLE_EQ(echo(2, 0x1D, 50, "auto"), 50);  // BLU expects it verbatim; the capture has 0x19 and 50
+  EXPECT_DOUBLE_EQ(echo(2, 0x1D, 50, "auto"), 50);  // BLU expects the gain verbatim; the capture has flags 0x19 and gain 50
   EXPECT_DOUBLE_EQ(echo(1, 0x0D, 50, "auto"), 50);
   EXPECT_DOUBLE_EQ(echo(2, 0x0D, 50, "verbatim"), 50);
   EXPECT_DOUBLE_EQ(echo(2, 0x1D, 50, "mapped"), 70);
@@ -116,7 +116,8 @@ TEST(Settle, ClampsWhatIsOutOfRangeAndSaysSo) {
     EXPECT_EQ(odd.settings.rate_hz, 10);
     EXPECT_EQ(odd.clamped.size(), 2u);
   }
-  EXPECT_EQ(resolve(fire(0, 2, PingRate::hz10, 0x49, 5, 50), device("oculus-m370s")).settings.mode, 0) << "it has one mode only";
+  EXPECT_EQ(resolve(fire(0, 2, PingRate::hz10, 0x49, 5, 50), device("oculus-m370s")).settings.mode, 0)
+      << "an M370s has only one mode";
   FireRequest odd_water = fire(0, 1, PingRate::hz10, 0x49, 5, 50);
   odd_water.settings.sound_speed_mps = 1e6;
   odd_water.settings.salinity_ppt = -4;
@@ -187,7 +188,7 @@ TEST(Settle, SampleFormats) {
   EXPECT_TRUE(sixteen.row_gains);
 }
 
-// liboculus issue 13: analogue and digital TVG off, gain per cent is 0 to 96 dB.
+// liboculus issue 13: analogue and digital TVG are off, and a gain of 0 to 100 % is 0 to 96 dB.
 TEST(Settle, ScientificData) {
   const auto state = device();
   FireRequest request = fire(2, 2, PingRate::hz10, 0x4F, 4, 50);
@@ -228,7 +229,7 @@ TEST(Settle, PulseFollowsTheRows) {
   EXPECT_EQ(rows.samples_per_row, 1);
   const PingSettings native = settings_of(request, device("oculus-m1200d", {{"pulse", "native"}}));
   EXPECT_FLOAT_EQ(native.pulse_width_m, 0.0025f);
-  EXPECT_EQ(native.samples_per_row, 22) << "22.9 mm rows at F_s = 2b, 1.06 mm";
+  EXPECT_EQ(native.samples_per_row, 22) << "22.9 mm rows / 1.06 mm samples (F_s = 2b)";
 }
 
 TEST(Settle, OnlyTheRecordedModeHasTheRecordedPulse) {
@@ -243,7 +244,7 @@ TEST(Settle, OnlyTheRecordedModeHasTheRecordedPulse) {
     EXPECT_NEAR(rows_of(profile, static_cast<std::uint8_t>(mode)), 0.9, 1e-6) << profile;
 }
 
-/// A shorter one would halve the width of the surface cells, and double the time of a ping (`recorded_pulse_rows`).
+/// A shorter pulse would halve the width of the surface cells and double the time of a ping (`recorded_pulse_rows`).
 TEST(Settle, RecordedPulseHasCellsAsWideAsTheUsualOne) {
   for (const double sound_speed_mps : {1447.0, 1475.0, 1500.0, 1550.0}) {
     FireRequest request = fire(0, 2, PingRate::hz10, 0x49, 2, 50);

@@ -51,7 +51,7 @@ TEST(WaterlinkedHost, DrawsAReturnAtItsColumnAndHorizontalRange) {
 
 TEST(WaterlinkedHost, DrawsRangesWithoutTheirStrengthsAndSaysSo) {
   auto ranges = nothing_there();
-  EXPECT_THAT(ping_from(ranges, nullptr)->facts.note, HasSubstr("no returns, without their strengths"));
+  EXPECT_THAT(ping_from(ranges, nullptr)->facts.note, HasSubstr("no returns; no strengths given"));
   ranges.pixels[columns + 2] = 10;
   EXPECT_EQ(ping_from(ranges, nullptr)->picture()->at(100, 2), 255) << "5 m of 15, ahead";
 }
