@@ -66,14 +66,14 @@ struct Datagram {
   std::string error;
 };
 Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chrono::milliseconds patience);
-/// Waits for the end of a connection without reading. Returns false if a byte arrives, there or at one of the `others`, or
-/// nothing happens within `patience`.
+/// Waits for the end of a connection without reading. Returns false if a byte arrives on `socket` or one of `others`,
+/// or `patience` expires.
 bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 
-/// Set by Ctrl-C and SIGTERM. Commands then end as at their time limit; nothing connects any more.
+/// Set by Ctrl-C and SIGTERM. Commands then end as at a time-out and make no connections.
 extern volatile int interrupted;
-/// Waits take steps of this length, so that a signal which comes between a look at `interrupted` and the wait is noticed soon.
+/// Waits are cut into steps of this length: a signal that comes between a check of `interrupted` and the wait is noticed soon.
 constexpr std::chrono::milliseconds longest_step{100};
 
 }  // namespace sonar::clients

@@ -50,7 +50,7 @@ class ColourMapper {
   Code set_thresholds(int top, int bottom);
   /// Returns bad_parameter unless 0 < gamma <= 100.
   Code set_gamma(float gamma);
-  /// Automatic top: the 99.5th percentile of the pixels that are not 0, at least lowest_auto_top (our assumption).
+  /// Automatic top: the larger of lowest_auto_top and the 99.5th percentile of the non-zero pixels (our assumption).
   void set_auto_mode(bool on);
   int top() const { return top_; }  // in auto mode: the top of the last image
   int bottom() const { return bottom_; }

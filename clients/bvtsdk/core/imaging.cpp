@@ -92,7 +92,7 @@ void plan_r_theta(const Extent& extent, const ImageSettings& settings, int beams
 }
 
 /// Row 0 is the far end (inferred from one client that flips the image). A pixel shows the strongest of the samples that
-/// it covers. If it covers no whole sample, it shows the one at its centre (chosen). So no echo falls between the rows.
+/// it covers. If it covers no whole sample, it shows the one at its centre (our choice). So no echo falls between the rows.
 void fill_r_theta(const PolarGrid& grid, const Extent& extent, MagImage& image) {
   struct Bins {
     int from, to;

@@ -18,7 +18,7 @@ namespace sonar::bvt {
 
 enum class ImageType { xy = 0, r_theta = 1 };
 
-/// Rows of an image (chosen): low 256, medium 512, high 1000; automatic as many as the ping has bins, 200 to 1000, and with
+/// Rows of an image (our choice): low 256, medium 512, high 1000; automatic as many as the ping has bins, 200 to 1000, and with
 /// XY no more than make a million pixels, because a client keeps whole images on its stack. Off: as automatic.
 enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 
@@ -31,7 +31,7 @@ struct ImageSettings {
   ImageRes resolution = ImageRes::automatic;
   XyBottom xy_bottom = xy_bottom_from_environment();
   /// Requests of the program; 0 = none. A size has priority over a range resolution, which has priority over `resolution`
-  /// (chosen).
+  /// (our choice).
   float range_resolution_m = 0;                   // metres per row; at most a million pixels are made for it
   int requested_height = 0, requested_width = 0;  // XY keeps the height and adjusts the width (verified); a width alone sets both
   int r_theta_width = 0;                          // columns; has priority over requested_width

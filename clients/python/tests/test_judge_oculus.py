@@ -1,4 +1,4 @@
-"""The judge's reader of an Oculus: docs/protocols/oculus.md."""
+"""The judge's reader for Oculus pings: docs/protocols/oculus.md."""
 import struct
 import unittest
 import zlib
