@@ -5,13 +5,13 @@ import numpy as np
 from runs import db
 from texts import table
 
-GRAZING_DEG = [(60, 0), (45, 0), (30, 0), (20, 1), (10, 1), (5, 2)]  # height, and the fan of scenes/grazing.yaml that contains it
+GRAZING_DEG = [(60, 0), (45, 0), (30, 0), (20, 1), (10, 1), (5, 2)]  # grazing angle, and the fan of scenes/grazing.yaml that contains it
 HEIGHT_M = 2.0
 KINDS = [("canonical", []), ("paper", ["--mode", "paper"]), ("raster", ["--mode", "raster"])]
 
 
 def grazing(sonard):
-    """Level of a level bed in paper mode less canonical, against grazing angle; both without elevation pattern."""
+    """Level of a flat bed, paper mode minus canonical, by grazing angle; both without elevation pattern."""
     canonical = sonard.expected("grazing", "--specular", "off")
     paper = sonard.expected("grazing", "--mode", "paper", "--fixed-fan", 20000)
     rows, first = [], None
@@ -23,11 +23,11 @@ def grazing(sonard):
         sine = HEIGHT_M / ours.range[row]  # sine of the row that was used
         first = first or (off, sine)
         rows.append([f"{degrees} deg", f"{off - first[0]:+.2f} dB", f"{10 * np.log10(sine / first[1]):+.2f} dB"])
-    return table(["grazing angle", "paper less canonical, re 60 deg", "10 log cos of incidence, re 60 deg"], rows)
+    return table(["grazing angle", "paper minus canonical, re 60 deg", "10 log cos of incidence, re 60 deg"], rows)
 
 
 def width_deg(azimuth, power):
-    """-3 dB width about the loudest beam, straight between beams."""
+    """-3 dB width about the loudest beam, interpolated linearly between beams."""
     at = int(np.argmax(power))
     half = power[at] / 2
 
@@ -86,7 +86,7 @@ def mean_db(ping, window_m):
 def rays(sonard):
     counts, window = [11, 30, 100, 300, 1000], (3.8, 9.8)
     rows = []
-    for name, arguments in [("paper mode", ["--mode", "paper"]), ("raster mode", ["--mode", "raster"]), ("ours, a ray a scatterer", [])]:
+    for name, arguments in [("paper mode", ["--mode", "paper"]), ("raster mode", ["--mode", "raster"]), ("ours, one scatterer per ray", [])]:
         means = [mean_db(sonard.expected("flat-sand", *arguments, "--fixed-fan", n)[0], window) for n in [*counts, 6000]]
         rows.append([name, *(f"{m - means[-1]:+.2f} dB" for m in means[:-1])])
     text = table(["mean energy, re 6000 rays", *(f"{n} rays" for n in counts)], rows)
@@ -109,18 +109,18 @@ def chapter(sonard, folder):
 PAGE = "../acoustics" + ".md"
 INTRODUCTION = """## Differences of the comparison modes
 
-`mode: paper` is Choi 2025 as printed, with the beamforming of its code; `mode: raster` takes its rays on an image plane. Section
-8 of [the model's page](PAGE) lists what is left out and what is different. Measured effects:
+`mode: paper` is Choi 2025 as printed, with the beamforming of its code; `mode: raster` places its rays on an image plane.
+Section 8 of [the model's page](PAGE) lists omissions and differences. Measured effects:
 
 """
 LAW = """The printed footprint multiplies Lambert's law by another cosine of the incidence: on a bed, low grazing angles are too dark.
 """
 BEAMS = """
 The published beam pattern is |sinc| as wide as the beams' *spacing*, divided by the root of the sum of its squares over all
-beams. Neighbours share almost nothing and side lobes add up. Where the beams double, points lose 3 dB and surfaces 6. The
-spectrum, cut to b, has side lobes in range that fall slowly: a strong near bed covers the far one.
+beams. Neighbours barely overlap and side lobes add up. With twice the beams, points lose 3 dB and surfaces 6. The
+spectrum, cut to bandwidth b, has side lobes in range that fall slowly: a strong near bed covers the far one.
 """
 RAYS = """
-Mean energy of the local search's level sand against rays a column. The mean is correct with few rays; it does not show the holes
+Mean energy of the local search's flat sand, by rays per column. The mean is correct with few rays; it does not show the holes
 between them, which the previous chapter counts.
 """

@@ -6,11 +6,11 @@ import page
 from runs import db
 from texts import table
 
-# Ranges of the cylinders' nearest points in the beam straight ahead [m], see scenes/tank-two-cylinders.yaml: axes 2.5 m ahead
-# and 0.5 m below, 3.5 m ahead; radius 0.1 m.
+# Ranges of the cylinders' nearest points in the beam straight ahead [m], see scenes/tank-two-cylinders.yaml: the lying axis
+# is 2.5 m ahead and 0.5 m below, the standing one 3.5 m ahead; radius 0.1 m.
 LYING_M, STANDING_M = float(np.hypot(2.5, 0.5)) - 0.1, 3.4
 WINDOW_M = 0.15
-# Table 2 of the paper has 228 rays, its text 300. Its raster run had 11 rows left.
+# Table 2 of the paper has 228 rays, its text 300. The paper's raster kept 11 rows.
 KINDS = [("raster, 11 rows", ["--mode", "raster"]), ("raster, 228 rows", ["--mode", "raster", "--fixed-fan", "228"]),
          ("ray, 228 rays", ["--mode", "paper", "--fixed-fan", "228"]), ("ray, 300 rays", ["--mode", "paper"]),
          ("default, Lambert part", ["--specular", "off"])]
@@ -26,9 +26,9 @@ def peak_near(ping, range_m):
 
 
 def floor_gaps(ping, reference):
-    """Share of the bins with tank floor that lie more than 6 dB below the default's level, both re their own mean."""
+    """Share of the bins with tank floor that lie more than 6 dB below the default's level, each re its own mean."""
     r = ping.range
-    rows = (r > 4.75) & (r < 5.15)  # at shorter ranges the fan of the comparison modes ends
+    rows = (r > 4.75) & (r < 5.15)  # the comparison modes' fan covers no shorter ranges
     wide = (np.abs(np.degrees(ping.azimuth)) > 8) & (np.abs(np.degrees(ping.azimuth)) < 25)
     nearest = [reference.beam_at(a) for a in ping.azimuth[wide]]
     ours, theirs = ping.power[rows][:, wide], reference.power[rows][:, nearest]
@@ -37,8 +37,8 @@ def floor_gaps(ping, reference):
 
 
 def likeness(a, b):
-    """Two pictures in expected power where either is within 40 dB of its brightest (30 log r), their median difference taken
-    off: the share of these bins that are within 3 dB of each other, and the median distance."""
+    """Compares two pictures where either's expected power is within 40 dB of its brightest (30 log r). Subtracts their median
+    difference; returns the share of these bins within 3 dB of each other, and the median distance."""
     levels = [db(p.power) + 30 * np.log10(p.range)[:, None] for p in (a, b)]
     seen = (levels[0] > levels[0].max() - 40) | (levels[1] > levels[1].max() - 40)
     off = (levels[0] - levels[1])[seen]
@@ -48,9 +48,9 @@ def likeness(a, b):
 
 def verdict(share, median_db, raster_dark, ray_dark):
     equal = share >= EQUAL_SHARE and abs(raster_dark - ray_dark) < EQUAL_DARK
-    return (f"\nVerdict: of equal quality would be {EQUAL_SHARE} % of the bins, and dark floor that differs by less than {EQUAL_DARK} "
-            f"points. With 228 rows each, {share:.0f} % of the bins are within 3 dB (median distance {median_db:.1f} dB) and "
-            f"{raster_dark:.1f} against {ray_dark:.1f} % of the floor are dark: the claim {'holds' if equal else 'does not hold'} here.\n")
+    return (f"\nVerdict: equal quality needs {EQUAL_SHARE} % of the bins within 3 dB, and dark floor within {EQUAL_DARK} "
+            f"points. With 228 rows each, {share:.0f} % of the bins are within 3 dB (median distance {median_db:.1f} dB); "
+            f"dark floor: raster {raster_dark:.1f} %, ray {ray_dark:.1f} %: the claim {'holds' if equal else 'does not hold'} here.\n")
 
 
 def chapter(sonard, folder):
@@ -61,9 +61,9 @@ def chapter(sonard, folder):
         rows.append([name, f"{lying[1]:.3f} m", f"{standing[1]:.3f} m", f"{standing[0] - lying[0]:+.1f} dB",
                      f"{floor_gaps(ping, expected[-1]):.1f} %"])
     text = table(["", f"lying cylinder, nearest point at {LYING_M:.3f} m", f"standing cylinder, nearest point at {STANDING_M:.3f} m",
-                       "standing less lying", "floor bins more than 6 dB too dark"], rows)
+                       "standing minus lying", "floor bins more than 6 dB too dark"], rows)
     alike = [(KINDS[i][0], KINDS[j][0], *likeness(expected[i], expected[j])) for i, j in PAIRS]
-    text += EQUAL_QUALITY + table(["", "beside", "bins within 3 dB", "median distance"],
+    text += EQUAL_QUALITY + table(["", "compared with", "bins within 3 dB", "median distance"],
                                   [[a, b, f"{share:.0f} %", f"{median:.1f} dB"] for a, b, share, median in alike])
     text += verdict(*alike[0][2:], *(floor_gaps(expected[i], expected[-1]) for i in PAIRS[0]))
     figure, axes = page.plt.subplots(1, 4, figsize=(14, 3.4))
@@ -77,18 +77,18 @@ def chapter(sonard, folder):
 
 
 EQUAL_QUALITY = """
-The paper claims that rays keep the quality of the raster. Expected power, the pictures' median difference
-taken off, bins within 40 dB of the brightest:
+The paper claims that rays keep the quality of the raster. Below: expected power of bins within 40 dB of the
+brightest, less the pictures' median difference:
 
 """
 INTRODUCTION = """## Two cylinders in a square tank
 
-The world of the paper's section 4.1: an upright and a lying cylinder under a P900. Only a rate of 3 Hz is published for it.
-Expected are returns from both cylinders, shadows behind them, and walls bright over all beams. Sizes missing in the published
+The world of the paper's section 4.1: an upright and a lying cylinder under a P900. The paper gives only a rate: 3 Hz.
+We expect returns from both cylinders, shadows behind them, and walls bright over all beams. Sizes missing in the published
 world are ours.
 
 Measured: the range of the cylinders' peaks in the beam straight ahead (expected power, Lambert part, rows of one inch), and the
-share of the tank's floor that stays dark for lack of rays. A cylinder's echo is as long as its surface is deep in the beam, so
+share of the tank's floor that stays dark for lack of rays. A cylinder's echo spans all ranges of its surface in the beam, so
 peaks lie a little behind the nearest point.
 
 """
