@@ -175,7 +175,7 @@ json find_curves(const ScenePointer& scene, const BenchScene& where, const Bench
   }
   finish("triangles, wider", "P1 over a rough bed with a grid of 0.1 m");
   for (const int count : {1, 2, 4, 8, 16}) points.push_back(sonars(count, scene, where, options));
-  finish("sonars", "P3a, in turns, a ping");
+  finish("sonars", "P3a, alternating, per ping");
   return curves;
 }
 

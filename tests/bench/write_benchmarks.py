@@ -36,10 +36,10 @@ PEER = "## Beside a peer"  # a chapter that is written by hand
 # Reasons for the cost of a ping, by the quantity that grows.
 KNEES = {
     "rays a column": "every ray is traced and is a scatterer; a ray costs less the denser the fan is; the knee is weak",
-    "rows": "cells are as many up to 437 rows; finer rows need finer cells in both directions, 14.6 times as many from 874 to 3,496 rows",
+    "rows": "the cell count is constant up to 437 rows; finer rows need finer cells in both directions, 14.6 times as many from 874 to 3,496 rows",
     "beams": "cells do not depend on beams; beyond the columns of the default fan, rays and coupling grow with beams",
-    "triangles, finer": "cells stay as many; as many rays trace a larger tree; likely its memory, which was not measured",
-    "triangles, wider": "what is out of range is not visited",
+    "triangles, finer": "cells and rays stay constant; the tree grows; likely cause: its memory, not measured",
+    "triangles, wider": "triangles out of range are not visited",
     "sonars": "sonars share scene and cells; a ping costs what it costs alone",
 }
 PAPER = [  # Choi 2025, Table 3: 512 beams, 10 m, RTX 2080 Ti and i9-9900K
@@ -153,8 +153,8 @@ def service(report):
                      f"{o['place']['median_ms']:.3f} ms; {o['added']['median_ms']:+.2f} ms", "0.5 ms", "0.1 ms",
                      verdict(o["place"]["median_ms"], 0.5, 0.1, True)])
     for s in report.get("side_lobes", []):
-        rows.append(["P15", f"{s['case']} with side lobes (the default) over without, in turns",
-                     f"{s['with']['median_ms']:.2f} over {s['without']['median_ms']:.2f} processor ms; median ratio {round(100 * s['ratio'] - 100):+d} %",
+        rows.append(["P15", f"{s['case']} with side lobes (the default) / without, alternating",
+                     f"{s['with']['median_ms']:.2f} / {s['without']['median_ms']:.2f} processor ms; median ratio {round(100 * s['ratio'] - 100):+d} %",
                      "", "+10 %", "goal" if s["ratio"] <= 1.1 else "**missed**"])
     for c in report.get("clients", []):
         share = 100 * c["sender_share"]
@@ -181,7 +181,7 @@ def cores(report):
     for case in dict.fromkeys(r["case"] for r in report["threads"]):
         rate = [found[case, n]["pings_per_second"] for n in count]
         rows.append([case, found[case, count[0]]["description"], f"{rate[0]:.0f}"] + [f"{r:.0f} ({r / rate[0]:.2f})" for r in rate[1:]])
-    lines = ["Pings/s by threads; in brackets, how many times one thread's.", ""]
+    lines = ["Pings/s by threads; in brackets, multiples of one thread's.", ""]
     lines += table(["case", "what"] + [f"{n} thread{'s' if n > 1 else ''}" for n in count], rows)
     lines += ["P900-90 sonars (2 to 10 m) in one daemon with all threads, without the product's limit of 15 Hz. Each has a client on "
               "loopback that requests the next ping when it has the last; sound's way to 10 m and back allows 75 Hz.", ""]
@@ -269,10 +269,10 @@ def growth(report):
                      f"{1e3 / cost(points[0]):.0f} to {1e3 / cost(points[-1]):.0f}", in_words(found, points), "; then ".join(grown),
                      KNEES.get(c["name"], "")])
     return ["## How times grow", "",
-            f"Pings/s of one thread, by its processor time, of the ping that other programs disturbed least "
+            f"Pings/s of one thread, from the processor time of the ping least disturbed by other programs "
             f"(`sonard_bench --scene local-search --case P1 --curves`; {rates_title(report)}). The exponent is the slope of the processor "
             f"time over the quantity in logarithms; the dashed line is the knee, where two slopes fit better than one. Stages are in "
-            f"processor ms a ping, up to the knee and beyond it.", "",
+            f"processor ms per ping, up to the knee and beyond it.", "",
             "![curves](benchmarks-curves.svg)", ""] + table(
                 ["what grows", "from, to", "pings/s", "exponent", "stages that change", "why"], rows)
 
@@ -342,7 +342,7 @@ def instruction_sets(reports, scene="local-search"):
     lines += table(["case", "what"] + names, rows)
     both = [case for case in ("P1", "P3d") if all(case in results for results in found)]
     stage_names = sorted({stage for results in found for case in both for stage, ms in results[case]["thread_ms"].items() if ms >= 0.005})
-    lines += ["Stages, thread ms a ping:", ""]
+    lines += ["Stages, thread ms per ping:", ""]
     lines += table(["case", "instruction set"] + stage_names,
                    [[case, name] + [f"{results[case]['thread_ms'].get(stage, 0):.2f}" for stage in stage_names]
                     for case in both for name, results in zip(names, found)])
@@ -379,25 +379,25 @@ def rates_title(report):
 def page(report, scene="local-search", other_rates=()):
     """`other_rates`: lines of `other_machines`."""
     results, other_rates = report["results"], list(other_rates)
-    times = [f"{name}: {r['pings_per_second'] / PAPER[0][1]:.0f} times the paper's" for name, r in by_case_and_threads(report, scene)]
+    times = [f"{name}: {r['pings_per_second'] / PAPER[0][1]:.0f}" for name, r in by_case_and_threads(report, scene)]
     lines = ["# Benchmarks", "",
              "Written by `tests/tools/benchmarks.sh` from results of `sonard_bench`. Stages, instruction sets, ratios of the hot loops and "
              "the values of the curves are in the tables that it leaves in the build folder.", "",
-             "A ping is timed from pose to framed bytes: median of many, warm cells, default quality (noise, specular echoes, motion, side lobes on). "
+             "A ping is timed from pose to framed bytes: median of many, warm cells, default quality (noise, specular echoes, motion; side lobes unless a heading says off). "
              f"The sonar moves at 0.9 m/s and up to 20 deg/s over rough sand of {results[0]['triangles'] if results else 0:,} triangles "
              f"(scene `{scene}`). Processor ms are those of all threads together. Other programs on the machine lengthen wall times, not "
              "ratios.", "",
              "## Rates", "",
              "Pings/s, by the instruction set of the machine that measured them. The goals are for two threads; why some are missed, and "
-             "what comes next, is in [decision 0017](decisions/0017-cpu-engine-speed.MD). The chapters below are of the machine "
-             "named last.".replace(".MD", ".md"), ""]
+             "what comes next, is in [decision 0017](decisions/0017-cpu-engine-speed.MD). The chapters below are of the "
+             "machine named last, unless they name another.".replace(".MD", ".md"), ""]
     lines += other_rates + [f"### {rates_title(report)}", ""] + rates(report, scene)
     lines += ["## Beside the published times", "",
               "Choi 2025, Table 3 (512 beams, 10 m; NVIDIA RTX 2080 Ti, Intel i9-9900K): 0.9 s for the rays and 2.31 s for the sum, "
-              "0.3 Hz with 300 rays a beam. Its public successor reports about 36 ms a frame. Ours without a GPU: "
-              + ("; ".join(times) or "not measured") + ".", "", "![rates](benchmarks-rates.svg)", ""]
+              "0.3 Hz with 300 rays a beam. Its public successor reports about 36 ms a frame. Our rates without a GPU, in multiples "
+              f"of the paper's {PAPER[0][1]:g} Hz: " + ("; ".join(times) or "not measured") + ".", "", "![rates](benchmarks-rates.svg)", ""]
     lines += ["## As a service", "",
-              "P0: each demo as `sonard --profile NAME` serves it, from a ping's pose to its last byte at a driver on loopback "
+              "P0 times each demo (`sonard --profile NAME`) from a ping's pose to its last byte at a driver on loopback "
               "(`build/release/tests/own_network/in_own_network build/release/tests/bench/sonard_bench --scene local-search --case P0`; "
               "the tables have a row for every product).", ""] + service(report)
     if report.get("curves"):
@@ -413,9 +413,9 @@ def tables(report, scene="local-search"):
     rows += [[f"{name}: {r['description']}", f"{r['pings_per_second']:.1f}", f"{r['pings_per_second'] / PAPER[0][1]:.0f} times the paper's"]
              for name, r in by_case_and_threads(report, scene)]
     lines += table(["", "pings/s", ""], rows)
-    lines += ["## Stages", "", "Thread ms a ping, by the engine's own clock.", ""] + stages(report, scene)
+    lines += ["## Stages", "", "Thread ms per ping, by the engine's own clock.", ""] + stages(report, scene)
     if report.get("demos"):
-        lines += ["## Demos (P0)", "", "From a ping's pose to its last byte at a driver on loopback; processor time of the daemon a ping.", ""]
+        lines += ["## Demos (P0)", "", "From a ping's pose to its last byte at a driver on loopback; processor time of the daemon per ping.", ""]
         lines += demos(report)
     if report.get("empty_bins"):
         lines += ["## Range bins without energy (P12)", "",
@@ -424,7 +424,7 @@ def tables(report, scene="local-search"):
         lines += ["## Threads and sonars (P13)", ""] + cores(report)
     if report.get("ratios"):
         lines += ["## Ratios (P6)", "",
-                  "The hot loops against plain implementations of the same: one process, one thread, in turns, best of several. They hold "
+                  "The hot loops against plain implementations of the same: one process, one thread, alternating, best of several. They hold "
                   "on a busy machine, and a test requires them. \"differ by\": relative, in the least squares.", ""]
         lines += ratios(report)
     if report.get("curves"):
