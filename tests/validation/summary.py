@@ -69,7 +69,7 @@ def tank(text):
     off = largest([first_number(r[1]) - first_number(r[2]) for r in totals])
     turned = largest([first_number(r[2]) - first_number(r[3]) for r in differences])
     yield ["tank: total echo of the rod", "independent integration, array without taper", f"{off:+.2f} dB", "0.15 dB without taper"]
-    yield ["tank: 1.2 MHz less 2.1 MHz", "the same integration", f"{turned:+.2f} dB", "none"]
+    yield ["tank: 1.2 MHz minus 2.1 MHz", "the same integration", f"{turned:+.2f} dB", "none"]
 
 
 def two_cylinders(text):

@@ -132,7 +132,7 @@ shipped model's tapered array, measured here, collects a little less:
 
 """
 DIFFERENCES = """
-Validation less calibration, Lambert part: total echo and peak. Each includes 0.65 dB from the lower absorption at 1.2 MHz. The
+Validation minus calibration, Lambert part: total echo and peak. Each includes 0.65 dB from the lower absorption at 1.2 MHz. The
 predicted peaks are sums over bins of 2.5 mm and depend on where in its bin the front lies; ours are those of a pulse as long.
 Only the totals can be expected to agree:
 
