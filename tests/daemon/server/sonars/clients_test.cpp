@@ -161,7 +161,7 @@ TEST(Clients, PingIdsGoOnAcrossClientsAndSettingsDoNot) {
   Client second(daemon.address());
   const auto message = second.next();
   ASSERT_TRUE(message);
-  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*message)) << "no pings before its own fire";
+  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*message)) << "a client gets no pings before its own fire message";
   second.fire(fire_at(PingRate::hz10));
   EXPECT_GT(second.next_ping()->head.fixed.ping_id, last);
 }
@@ -270,7 +270,7 @@ TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
   EXPECT_FALSE(second.next(milliseconds(200)));
   EXPECT_FALSE(second.ended);
   first.reset();
-  EXPECT_TRUE(second.next_ping()) << "and its fire message was kept";
+  EXPECT_TRUE(second.next_ping()) << "the waiting client's fire message was kept";
 }
 
 TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
@@ -296,7 +296,7 @@ TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
   first.reset();
   const auto ping = stays.next_ping();
   ASSERT_TRUE(ping);
-  EXPECT_EQ(ping->head.fixed.fire.range, 3) << "no client that had gone was asked";
+  EXPECT_EQ(ping->head.fixed.fire.range, 3) << "the range is that of the client that stays";
 }
 
 TEST(Admission, TheLastFireWinsAmongSeveral) {
@@ -344,7 +344,7 @@ TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
   const auto took = Steady::now() - begin;
   reader.join();
   EXPECT_TRUE(whole) << "FIN";
-  EXPECT_EQ(healthy.decoder.buffered_bytes(), 0u) << "no message was cut";
+  EXPECT_EQ(healthy.decoder.buffered_bytes(), 0u) << "no message was cut off";
   EXPECT_GE(took, Session::finish_limit) << "the stalled one had its time";
   EXPECT_LT(took, patience) << "the promise is 2 s; this allows for a busy machine";
   EXPECT_THAT(daemon.log_text(), HasSubstr("did not receive its last message in time"));

@@ -89,7 +89,7 @@ TEST_F(DeviceActions, ListenClosesAndOpensThePortOfClientsOnly) {
     run(milliseconds(20));
     EXPECT_TRUE(refuses(52100));
     device.perform({Listen{true}, Listen{true}});
-    EXPECT_FALSE(refuses(52100)) << "at once";
+    EXPECT_FALSE(refuses(52100)) << "the port opens at once";
   }
   EXPECT_EQ(device.sonar().connections().clients(), 1u) << "the connection is kept";
   EXPECT_FALSE(early.ended);
@@ -104,7 +104,7 @@ TEST_F(DeviceActions, ListenTriesAgainWhileAnotherProgramHasThePort) {
     device.perform({Listen{true}});
     run(milliseconds(200));
     EXPECT_THAT(log_text, HasSubstr("port in use by another program"));
-    EXPECT_EQ(log_text.find("port in use"), log_text.rfind("port in use")) << "said once";
+    EXPECT_EQ(log_text.find("port in use"), log_text.rfind("port in use")) << "the log has one line on it";
     EXPECT_NE(device.problem(), "");
   }
   EXPECT_TRUE(soon([&] { return !refuses(52100); }));

@@ -28,7 +28,7 @@ TEST(Faults, EndTheSessionTheyHappenIn) {
   io.run_for(patience);
   EXPECT_EQ(parent.fault, "no such luck");
   EXPECT_EQ(parent.why, "an internal fault");
-  EXPECT_EQ(session.use_count(), 1) << "no part of it goes on";
+  EXPECT_EQ(session.use_count(), 1) << "no coroutine holds the session";
   EXPECT_FALSE(client.read_to_end());
   EXPECT_TRUE(client.was_reset);
 }

@@ -80,7 +80,7 @@ TEST(Transports, ARequestOfHttpEndsAClientsConnection) {
     }
   EXPECT_THAT(daemon.log_text(), HasSubstr("it speaks HTTP"));
   Client driver(daemon.address(), command_port);
-  EXPECT_EQ(ask(driver, "who"), "front 5\n") << "no range was set";
+  EXPECT_EQ(ask(driver, "who"), "front 5\n") << "the HTTP request set no range";
   EXPECT_EQ(ask(driver, "range 6"), "ok\n");
 }
 

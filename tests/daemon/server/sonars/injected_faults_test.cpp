@@ -109,7 +109,7 @@ TEST_F(InjectedFaults, NewConnectionsWaitInSilenceOrAreReset) {
   EXPECT_FALSE(waits.next(milliseconds(200)));
   EXPECT_FALSE(waits.ended);
   ASSERT_TRUE(done(daemon.ask(control::EndFaults{})));
-  EXPECT_TRUE(waits.next_ping()) << "it is served now";
+  EXPECT_TRUE(waits.next_ping()) << "the waiting client is served after the fault";
   waits.close();
   ASSERT_TRUE(done(daemon.ask(fault("no-free-slot", {}, 600))));
   Client refused(daemon.address());

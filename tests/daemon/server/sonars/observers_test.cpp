@@ -30,7 +30,7 @@ TEST(Observers, GetTheDriversPingsAndChangeNothing) {
     const auto seen = observer.next_ping();
     ASSERT_TRUE(seen);
     EXPECT_THAT(seen->violations, IsEmpty());
-    EXPECT_EQ(seen->head.fixed.fire.range, 2) << "as the driver asked";
+    EXPECT_EQ(seen->head.fixed.fire.range, 2) << "the range that the driver requested";
     EXPECT_EQ(seen->sample(1, 1), FakeEngine::sample(seen->head.fixed.ping_id, 1, 1));
     ASSERT_TRUE(driver.next_ping());
   }
@@ -82,7 +82,7 @@ TEST(Observers, HaveSoManyPlacesOrNone) {
     ASSERT_TRUE(first.next());
     Client second(daemon.address(), observer_port(daemon));
     EXPECT_TRUE(second.read_to_end());
-    EXPECT_TRUE(first.next()) << "it looks on";
+    EXPECT_TRUE(first.next()) << "the first observer still receives";
   }
   setup.sonar_lines = "    observers: {max: 0}\n";
   Daemon daemon(setup);

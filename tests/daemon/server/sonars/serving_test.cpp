@@ -116,7 +116,7 @@ TEST(Serving, NetworkTriggerMeansOnePingPerFire) {
     ASSERT_TRUE(ping);
     EXPECT_EQ(ping->head.fixed.ping_id, i);
   }
-  EXPECT_FALSE(client.next_ping(milliseconds(300))) << "no fifth was requested";
+  EXPECT_FALSE(client.next_ping(milliseconds(300))) << "no fifth ping was requested";
 }
 
 TEST(Serving, RepeatedFireMessagesDoNotRestartTheRhythm) {

@@ -45,7 +45,7 @@ TEST(Transports, ReceiversOfSeveralConnectionsGetTheSameDatagrams) {
   while (same < ping) next_ping(one, &same);
   EXPECT_EQ(same, ping);
   next_ping(one, &same);
-  EXPECT_GT(same, ping) << "not twice";
+  EXPECT_GT(same, ping) << "no ping is sent twice";
 }
 
 TEST(Transports, TwoTcpPortsHaveConversationsOfTheirOwn) {
@@ -60,7 +60,7 @@ TEST(Transports, TwoTcpPortsHaveConversationsOfTheirOwn) {
   const std::size_t at = received.find('\n') + 1;
   EXPECT_EQ(received.substr(at, size), pattern(ping));
   EXPECT_THAT(received.substr(at + size), StartsWith(head + std::to_string(ping + 1)));
-  EXPECT_EQ(ask(commands, "range 3"), "ok\n") << "no ping came between";
+  EXPECT_EQ(ask(commands, "range 3"), "ok\n") << "no ping came before the reply";
   EXPECT_EQ(daemon.status().sonars(0).listens(), daemon.address() + ":15000");
 }
 
@@ -166,7 +166,7 @@ TEST(Transports, ADialogueByDatagramsBelongsToTheHostThatAskedLast) {
   EXPECT_EQ(daemon.status().sonars(0).clients_size(), 2);
   other.send("quit\n", daemon.address(), data_port);
   EXPECT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 1; }));
-  EXPECT_TRUE(stranger.next(milliseconds(100)).empty()) << "it is sent nothing";
+  EXPECT_TRUE(stranger.next(milliseconds(100)).empty()) << "a stranger is sent nothing";
 }
 
 TEST(Transports, AHostByDatagramsWhosePortIsClosedIsGivenUpAndAnotherLosesNothing) {
