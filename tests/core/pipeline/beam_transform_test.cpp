@@ -69,7 +69,7 @@ TEST_P(BeamTransform, IsTheSumOverColumns) {
       worst = std::max(worst, error);
     }
   EXPECT_LT(std::sqrt(off / all), 2e-6);
-  EXPECT_LT(std::sqrt(worst * c.beams * 7 / all), 1e-4) << "no beam is off, the outermost included";
+  EXPECT_LT(std::sqrt(worst * c.beams * 7 / all), 1e-4) << "no beam is wrong, not even the outermost";
 }
 
 constexpr auto in_sine = BeamSpacing::uniform_in_sine, in_angle = BeamSpacing::uniform_in_angle;

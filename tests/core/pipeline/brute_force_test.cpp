@@ -213,7 +213,7 @@ TEST(Truths, ShadowsOnReliefAreThoseOfOneRayForEveryCell) {
   s.ping_from(truth.sonar, {0, truth.tilt_rad, 0});
   const Difference d = compare(s, truth, truth.scatterers(s, 2, 11, -2, 2), 4, 4, 8.5);
   EXPECT_GT(d.lit, 2000);
-  EXPECT_GT(d.shadowed, 50) << "no shadows, no test";
+  EXPECT_GT(d.shadowed, 50) << "without shadows the test shows nothing";
   record_at_least(no_number, "relief of 1.5 cm rms: share of lit samples within 1 dB of one shadow ray for every cell", 0.95,
                   d.within_1_db, "");
   record_below(no_number, "the same relief: mean level in deep shadow, re the smooth bed", -12, db(d.shadow_re_bed), "dB");

@@ -131,10 +131,10 @@ TEST(Leak, RingsByItsTable) {
     const double expected = at < 1 ? -20 * at : at < 2 ? -20 + 15 * (at - 1) : -5 - 25 * (at - 2);
     EXPECT_NEAR(db(mean_row_power(s, row)), 160 + expected, 0.1) << row;
   }
-  EXPECT_EQ(s.power(110, 100), 0) << "over";
+  EXPECT_EQ(s.power(110, 100), 0) << "the interference is over";
   const std::vector<float> first = s.last().pressure_upa;
   ++s.request.sonar_id;
-  EXPECT_EQ(s.ping().pressure_upa, first) << "in expected power it is its mean";
+  EXPECT_EQ(s.ping().pressure_upa, first) << "in expected power interference is its mean, whatever the seed";
 }
 
 TEST(Leak, GoesOnBehindANullOfItsTable) {
@@ -187,7 +187,7 @@ TEST(Interference, IsAStreakOfItsPulseAtItsBearingAndLevel) {
   ASSERT_FALSE(loud.empty());
   EXPECT_EQ(loud.back() - loud.front() + 1, static_cast<int>(loud.size())) << "one streak";
   const double row_m = s.range_of_row(1) - s.range_of_row(0);
-  EXPECT_NEAR(static_cast<double>(loud.size()) * row_m, 1500 * 4e-4 / 2, 2 * row_m) << "as long as the pulse";
+  EXPECT_NEAR(static_cast<double>(loud.size()) * row_m, 1500 * 4e-4 / 2, 2 * row_m) << "the streak is as long as the pulse";
   const int middle = (loud.front() + loud.back()) / 2;
   // One way: 1e6 uPa at 1 m over 25 m with absorption, in the beam that looks almost exactly at it.
   const double weight = receive_pattern(s.mode().pattern)(std::sin(azimuth) - s.beam_sine(beam));

@@ -103,7 +103,7 @@ TEST(Moving, AnInvisibleObjectHasNeitherEchoNorShadow) {
   const Sounding hidden = sounding_of("objects:\n  - " + front + ", visible: false}\n" + back);
   const Sounding alone = sounding_of("objects:\n" + back);
   EXPECT_GT(mean_power(both, 3.8, 4.1), 0);
-  EXPECT_LT(mean_power(both, 5.8, 6.1), 0.01 * mean_power(alone, 5.8, 6.1)) << "in the shadow of the first";
+  EXPECT_LT(mean_power(both, 5.8, 6.1), 0.01 * mean_power(alone, 5.8, 6.1)) << "the back box is in the shadow of the front one";
   EXPECT_LT(mean_power(hidden, 3.8, 4.1), 1e-4 * mean_power(both, 3.8, 4.1));
   EXPECT_NEAR(mean_power(hidden, 5.8, 6.1) / mean_power(alone, 5.8, 6.1), 1, 0.1);
 }
@@ -115,7 +115,7 @@ TEST(Moving, TheSeaSurfaceIsASheetAtZeroSeenFromBelow) {
     return s;
   };
   const Sounding rough = with_surface(-20), rougher = with_surface(-10);
-  EXPECT_EQ(mean_power(rough, 0.3, 0.9), 0) << "nothing is nearer than the surface overhead";
+  EXPECT_EQ(mean_power(rough, 0.3, 0.9), 0) << "the surface overhead is the nearest object";
   const double level = mean_power(rough, 4, 6);
   EXPECT_GT(level, 0);
   EXPECT_NEAR(10 * std::log10(mean_power(rougher, 4, 6) / level), 10, 0.01);

@@ -70,7 +70,8 @@ TEST(SeaSurface, TheRougherTheLessItMirrorsTheMoreItScatters) {
     EXPECT_GE(straight_up, last) << roughness;
     last = straight_up;
   }
-  EXPECT_EQ(scattering_strength(sea("roughness_m: 0")->materials.at(0), 0.7, 900e3, 1500, true), 0) << "still water only mirrors";
+  EXPECT_EQ(scattering_strength(sea("roughness_m: 0")->materials.at(0), 0.7, 900e3, 1500, true), 0)
+      << "still water mirrors only, and scatters nothing back";
   EXPECT_NEAR(last, std::pow(10.0, -3.0), 1e-9);
 }
 
@@ -181,7 +182,7 @@ TEST(SeaSurface, OneAtItSeesAsOneJustBelow) {
 TEST(SeaSurface, OneAboveItReceivesNoise) {
   OverABed bed, without("");
   const Ping& in_air = bed.from(0.0011);
-  EXPECT_TRUE(in_air.request.blank) << "so that it can be told";
+  EXPECT_TRUE(in_air.request.blank) << "the ping is marked blank, so that its encoder can report it";
   const auto noise = in_air.samples;
   bed.sounding.request.blank = true;
   EXPECT_EQ(bed.from(-1).samples, noise);

@@ -405,7 +405,7 @@ TEST(Truncation, IsOfAReceiverThatTruncates) {
       other += code != wanted;
     }
   }
-  EXPECT_LT(other, 200) << "of 179,200: at the very edge of a code";
+  EXPECT_LT(other, 200) << "of 179,200 samples; these lie at the very edge of a code";
   EXPECT_NE(cut.samples, round.samples);
   s.request.switches.truncation = false;
   EXPECT_EQ(s.ping().samples, round.samples);

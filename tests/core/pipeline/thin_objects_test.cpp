@@ -177,7 +177,7 @@ TEST(ThinObjects, OpenMeshesEchoFromBothSides) {
   EXPECT_EQ(skin_of(muddled).outward, 0);
   Sounding s = looking_at(SceneMaker().add(muddled, lambert_db, {look.range_m, 0, 0}).make(), look);
   s.ping();
-  EXPECT_GT(db(echo_per_m2(s)), level[0] - 0.3) << "no side of it is lost";
+  EXPECT_GT(db(echo_per_m2(s)), level[0] - 0.3) << "no side of the muddled box is lost";
 }
 
 TEST(ThinObjects, AClosedRoomIsSeenFromWithin) {
