@@ -66,7 +66,7 @@ TEST(ArisDialogue, FramesFlowOnceReceiverAndValidSettingsAreThere) {
     }
     EXPECT_EQ(talk.settings.rate_hz, 12);
     ASSERT_EQ(talk.receivers.size(), 1u);
-    EXPECT_EQ(talk.receivers[0], (protocol::Endpoint{{}, 56444})) << "no address: the controller's own";
+    EXPECT_EQ(talk.receivers[0], (protocol::Endpoint{{}, 56444})) << "without an address, frames go to the controller's own";
     EXPECT_EQ(talk.held().first_ping, 17u);
     EXPECT_EQ(talk.held().applied, 1u);
     EXPECT_EQ(talk.settings.beam_count, 128);
@@ -98,7 +98,7 @@ TEST(ArisDialogue, CommandsAddUpWhileAFaultHoldsThemBack) {
   wanted.gain_percent = 0;
   talk.state.settings = vendor().apply_override(wanted, talk.state)->vendor_settings;
   talk.say(set_salinity(0));
-  EXPECT_EQ(talk.held().acoustics.gain_db, 0) << "of the override, not of the last command";
+  EXPECT_EQ(talk.held().acoustics.gain_db, 0) << "the gain is that of the override, not of the last command";
   talk.state.settings = vendor().initial_settings(talk.state).vendor_settings;
   talk.say(tests::set_acoustics(tests::acoustics()));
   EXPECT_EQ(talk.settings.rate_hz, 12) << "the receiver belongs to the connection";

@@ -170,7 +170,7 @@ TEST(ArisFrame, OlderFirmwareAndLongerDatagramsAreOptions) {
   EXPECT_LE(longest, 9000u);
   ASSERT_TRUE(frame);
   EXPECT_EQ(frame->header.applied_cookie, 9u);
-  EXPECT_EQ(frame->header.go_time_us, 0u) << "of a field that older firmware lacks";
+  EXPECT_EQ(frame->header.go_time_us, 0u) << "older firmware lacks this field";
 }
 
 TEST(ArisFrame, OfATelephotoLens) {

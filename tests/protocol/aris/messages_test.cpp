@@ -46,7 +46,7 @@ TEST(ArisCommands, ZerosMayBeLeftOut) {
   ASSERT_TRUE(command.salinity);
   EXPECT_EQ(command.salinity->value, 0u);
   command = {};
-  ASSERT_TRUE(protobuf::read(hex("12 03 0A 01 41"), command)) << "no type: set the date";
+  ASSERT_TRUE(protobuf::read(hex("12 03 0A 01 41"), command)) << "a command without a type sets the date";
   EXPECT_EQ(command.type, CommandType::set_date_time);
 }
 

@@ -51,7 +51,7 @@ TEST(ArisSettings, WhatIsOutOfRangeIsRefusedByName) {
   EXPECT_THAT(why([](Acoustics& a) { a.frame_rate_hz = std::numeric_limits<float>::quiet_NaN(); }), HasSubstr("frame rate"));
   EXPECT_THAT(why([](Acoustics& a) { a.samples_per_beam = 4097; }), HasSubstr("samples per beam"));
   EXPECT_THAT(why([](Acoustics& a) { a.gain_db = 25; }), HasSubstr("receiver gain"));
-  EXPECT_THAT(why([](Acoustics& a) { a.ping_mode = 3; }), HasSubstr("no ping mode 3")) << "of another product";
+  EXPECT_THAT(why([](Acoustics& a) { a.ping_mode = 3; }), HasSubstr("no ping mode 3")) << "a ping mode of another product";
   EXPECT_THAT(why([](Acoustics&) {}, "aris-1800"), HasSubstr("no ping mode 9"));
   EXPECT_THAT(why([](Acoustics& a) { a.cycle_us = 4500; }), HasSubstr("too short"));
   EXPECT_THAT(why([](Acoustics& a) { a.cycle_us = 12000; }), HasSubstr("do not fit"));

@@ -52,7 +52,7 @@ TEST(MavlinkPoses, AttitudeAndLocalPositionMeetByTheBootClock) {
   Sender v;
   Link link;
   EXPECT_THAT(link(v(attitude(1000, 0)), 1.0).poses, IsEmpty());
-  EXPECT_THAT(link(v(local(1050, 1, 0, 2)), 1.05).poses, IsEmpty()) << "it waits for the next attitude";
+  EXPECT_THAT(link(v(local(1050, 1, 0, 2)), 1.05).poses, IsEmpty()) << "the position waits for the next attitude";
   const Reaction r = link(v(attitude(1100, static_cast<float>(pi / 2))), 1.1);
   ASSERT_EQ(r.poses.size(), 1u);
   EXPECT_EQ(r.poses[0].sample.stamp.ns, 1'050'000'000);
@@ -197,12 +197,12 @@ TEST(MavlinkPoses, WhereTimeIsWhatPosesSayThoseWithoutAreNoSource) {
   Odometry timeless = odometry(0, 0);
   timeless.time_us = 0;
   const Reaction r = link(v(sim) + v(timeless) + v(attitude(1000, 0)) + v(local(1000, 1, 1, 1)), 1);
-  ASSERT_EQ(r.poses.size(), 1u) << "they do not hold back the others";
+  ASSERT_EQ(r.poses.size(), 1u) << "messages without a time stamp do not delay the others";
   EXPECT_EQ(r.poses[0].source, "system 1 LOCAL_POSITION_NED and attitude");
   EXPECT_THAT(r.refusals, IsEmpty());
   ASSERT_EQ(r.notices.size(), 2u);
   EXPECT_THAT(r.notices[0], HasSubstr("SIM_STATE has no time stamp and is not used"));
-  EXPECT_THAT(link(v(sim), 1.1).notices, IsEmpty()) << "said once";
+  EXPECT_THAT(link(v(sim), 1.1).notices, IsEmpty()) << "a notice is given once";
 }
 
 TEST(MavlinkPoses, ARefusedSourceIsNotAlive) {

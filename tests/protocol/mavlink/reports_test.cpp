@@ -40,7 +40,7 @@ std::vector<std::pair<int, int>> requests(const std::vector<Bytes>& datagrams) {
 std::string report_of(Settings settings, const Bytes& datagram) {
   MavlinkPoses poses(std::move(settings));
   poses.on_datagram(datagram, at_s(10));
-  EXPECT_THAT(poses.on_tick(at_s(10.9)).notices, IsEmpty()) << "it waits for a second first";
+  EXPECT_THAT(poses.on_tick(at_s(10.9)).notices, IsEmpty()) << "the first report comes after a second";
   const auto notices = poses.on_tick(at_s(11)).notices;
   EXPECT_THAT(poses.on_tick(at_s(12)).notices, IsEmpty()) << "reported once";
   return notices.size() == 1 ? notices[0] : "";
@@ -73,7 +73,7 @@ TEST(MavlinkReports, RatesAreRequestedOnlyWhenWantedAndUntilPosesCome) {
   settings.request_rates = true;
   settings.rate_hz = 20;
   MavlinkPoses asks(settings);
-  EXPECT_THAT(requests(asks.on_tick(at_s(0)).replies), IsEmpty()) << "no message yet";
+  EXPECT_THAT(requests(asks.on_tick(at_s(0)).replies), IsEmpty()) << "no rates are requested before the first message";
   asks.on_datagram(v(autopilot_heartbeat()), at_s(1));
   using Pairs = std::vector<std::pair<int, int>>;
   const Pairs wanted{{331, 50000}, {31, 50000}, {32, 50000}, {33, 50000}};

@@ -107,7 +107,8 @@ TEST(Dialogue, AnIdenticalRepeatMeansTheSame) {
   const auto first = events_of<ChangeSettings>(talk.say(message)), again = events_of<ChangeSettings>(talk.say(message));
   ASSERT_THAT(first, SizeIs(1));
   ASSERT_THAT(again, SizeIs(1));
-  EXPECT_TRUE(first[0].vendor_settings->equals(*again[0].vendor_settings)) << "by this the daemon recognises a repeat";
+  EXPECT_TRUE(first[0].vendor_settings->equals(*again[0].vendor_settings))
+      << "the daemon recognises a repeated message by equal settings";
   EXPECT_EQ(first[0].summary, again[0].summary);
 }
 
@@ -249,7 +250,7 @@ TEST(Dialogue, UserConfigIsReadAndWritten) {
   auto reaction = talk.say(read, 0.9);
   ASSERT_THAT(reaction.replies, SizeIs(1));
   EXPECT_EQ(reaction.replies[0], hex("53 4F 59 1B 00 00 55 00 00 00 0C 00 00 00 00 00  02 01 A8 C0 00 FF FF FF 00 00 00 00"))
-      << "as advertised";
+      << "the reply has the advertised address";
   EXPECT_EQ(talk.dialogue->next_tick(), at(1.9)) << "quiet after the reply";
   reaction = talk.say(joined({write, read}));
   ASSERT_THAT(events_of<StoreAddress>(reaction), SizeIs(1));

@@ -82,7 +82,7 @@ TEST(EncodePing, RowGainsAreDigitalOrUndoTheTvg) {
   EXPECT_NEAR(digital.row_gains.front(), 21260, 100);
   EXPECT_NEAR(10 * std::log10(digital.row_gains.back() / 1922146.0), 0, 1) << "dB";
   EXPECT_TRUE(std::is_sorted(digital.row_gains.begin(), digital.row_gains.end()));
-  EXPECT_EQ(answer(device("oculus-m750d", {{"row_gain", "tvg"}}), request).row_gains[4], 5u) << "those of the ping";
+  EXPECT_EQ(answer(device("oculus-m750d", {{"row_gain", "tvg"}}), request).row_gains[4], 5u) << "the gains are those of the ping";
 
   const DecodedPing none = answer(device(), fire(0, 1, PingRate::hz10, 0x4D, 6, 0));
   EXPECT_EQ(none.row_gains.front(), 1u) << "never 0: clients divide by the root";

@@ -117,7 +117,7 @@ TEST(WaterLinkedShot, ImuSamplesGoOnFromTheShotBefore) {
   unit.device.framed_at = at_s(3.25) - std::chrono::milliseconds(333);
   EXPECT_EQ(read(shot(unit)[2]).imu->samples.size(), 33u);
   unit.device.framed_at = at_s(3.25) - std::chrono::minutes(1);
-  EXPECT_EQ(read(shot(unit)[2]).imu->samples.size(), 20u) << "those of one period after a pause";
+  EXPECT_EQ(read(shot(unit)[2]).imu->samples.size(), 20u) << "after a pause, a batch has the samples of one period";
 }
 
 }  // namespace
