@@ -29,7 +29,7 @@ int end_of_set(const BeamMixView& v, int j, int first_sample, int n, std::int32_
 void blend_in_place(const BeamMixView& v, BeamSignals& beams, std::vector<float>& before) {
   const int floats = 2 * beams.samples;
   before.assign(static_cast<std::size_t>(v.step + 1) * static_cast<std::size_t>(floats), 0.0f);
-  const float* nothing = before.data() + static_cast<std::ptrdiff_t>(v.step) * floats;  // beyond the last beam
+  const float* nothing = before.data() + static_cast<std::ptrdiff_t>(v.step) * floats;  // stands for beams beyond the last one
   for (int j = 0; j < beams.beams; ++j) {
     const float own = v.own[j], share = v.share[j];
     float* __restrict to = beams.beam(j);

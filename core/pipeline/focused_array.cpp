@@ -20,7 +20,7 @@ constexpr float whole = 12582912;
 inline void turn(float turns, float& cosine, float& sine) {
   const float part = turns - ((turns + whole) - whole);
   cosine = sine_of_quarter(0.25f - std::fabs(part));
-  sine = std::copysign(sine_of_quarter(0.25f - std::fabs(std::fabs(part) - 0.25f)), part);  // no branch, for vectors
+  sine = std::copysign(sine_of_quarter(0.25f - std::fabs(std::fabs(part) - 0.25f)), part);  // no branches, for vector code
 }
 
 void add(double weight, const float* __restrict from, std::size_t count, float* __restrict to) {

@@ -329,7 +329,7 @@ void LabelWork::label_window(std::size_t window_index, std::span<const Point> po
   alignas(64) float four[4 * window];
   for (auto source = sources.begin(); source != sources.end();) {
     const std::size_t object = source->object;
-    std::size_t low = padded, high = 0;  // beams that receive it
+    std::size_t low = padded, high = 0;  // beams that receive the object
     for (; source != sources.end() && source->object == object; ++source) {
       if (const Part* part = source->part) {
         const float* power = part->power.data() + (first_row - part->first_row);

@@ -20,7 +20,7 @@ constexpr double flat_margin_in_beams = 1.5;     // part of the margin with full
 constexpr int base_elevations = 48;              // docs/acoustics.md, section 2
 constexpr double fan_edge_amplitude = 0.1;       // the fan reaches the -20 dB points of the two-way pattern
 constexpr double side_lobe_two_way = 5.62e-3;    // -45 dB: lower side lobes are left out
-constexpr double side_step_rad = 0.19;           // between rays in side lobes; planes are exact between rays
+constexpr double side_step_rad = 0.19;           // step between rays in side lobes; interpolation is exact on planes
 constexpr int side_bins = 32;                    // bins of the depth map on either side
 // Least number of cells in the area that a beam and a pulse cover in side lobes. Cell sizes are powers of two, so there are up
 // to four times as many.
@@ -311,7 +311,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
   for (const double u : p.beam_sine) p.beam_azimuth_rad.push_back(static_cast<float>(std::asin(u)));
   if (bearing_scale != 1) scale_beam_sines(p);
   p.beam_pattern = receive_patterns(mode, p.beam_sine.size());
-  FrequencyMode formed = mode;  // as for one ping, if all beams come from one ping
+  FrequencyMode formed = mode;  // without `interleave`, one ping forms all beams
   if (!switches.interleave) formed.interleaved_pings = 1;
   p.beam_weights = make_beam_weights(formed, p.columns, p.beam_sine, p.expected_power);
   lay_out_samples(p);

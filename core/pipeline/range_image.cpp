@@ -33,7 +33,7 @@ class Profile {
     last_ = 0;
   }
   void add(const RangeReturns& returns, const RangeReturn& r, int block, double weight) {
-    if (r.last + 2 > size()) return;  // beyond the picture
+    if (r.last + 2 > size()) return;  // the echo ends beyond the picture
     first_ = std::min<std::ptrdiff_t>(first_, r.first);
     last_ = std::max<std::ptrdiff_t>(last_, r.last);
     if (re_.empty()) return add_steps(steps_, r, weight * r.of_first, weight * r.of_each, weight * r.of_last);

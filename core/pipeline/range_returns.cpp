@@ -246,8 +246,9 @@ void RangeReturns::add(const RangeReturn& r, const RayPacket& p, int lane, std::
   draw_speckle(p, lane, to.back());
 }
 
+/// Calls `f` for the cell and its neighbours.
 template <class F>
-void RangeReturns::for_each_neighbour(Cell cell, F f) const {  // and for the cell itself
+void RangeReturns::for_each_neighbour(Cell cell, F f) const {
   for (int row = std::max(cell.row - 1, 0); row <= std::min(cell.row + 1, grid_.rows - 1); ++row)
     for (int column = std::max(cell.column - 1, 0); column <= std::min(cell.column + 1, grid_.columns - 1); ++column)
       f(Cell{column, row});
@@ -284,7 +285,7 @@ std::vector<RangeReturns::Cell> RangeReturns::thin_cells(std::vector<std::uint8_
 
 template <class F>
 void RangeReturns::for_each_hit(Cell cell, Lattice lattice, F f) const {
-  const int rays = lattice.across * lattice.up;  // whole packets
+  const int rays = lattice.across * lattice.up;  // fills whole packets
   for (int ray = 0; ray < rays; ray += RayPacket::size) {
     RayPacket p{};
     aim_around(cell.column, cell.row, lattice, ray, RayPacket::size, p, 0);
@@ -329,7 +330,7 @@ void RangeReturns::look_closer(Parallel& pool) {
   const std::vector<Cell> cells = crossed_cells(pool);
   if (cells.empty() || cells.size() > most_thin_cells) return;
   const double for_each = std::sqrt(static_cast<double>(most_close_rays) / static_cast<double>(cells.size()));
-  const int across = std::clamp(static_cast<int>(for_each) / 4 * 4, 8, most_across);  // whole packets
+  const int across = std::clamp(static_cast<int>(for_each) / 4 * 4, 8, most_across);  // rays fill whole packets
   std::vector<std::vector<RangeReturn>> seen(cells.size());
   pool.for_each(cells.size(), [&](std::size_t n, int) {
     for_each_hit(cells[n], {across, across}, [&](const RayPacket& p, int lane) {

@@ -101,7 +101,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
       kernels.quantise_levels(power, gain, per_octave, at_full_scale, max_code, scratch.codes.data(), width);
     else
       kernels.quantise(power, gain, scale, scratch.codes.data(), width);
-    if (bytes == 2) {  // the case of most sonars; the loop becomes vector code
+    if (bytes == 2) {  // most sonars send two bytes; the loop becomes vector code
       for (int j = 0; j < s.beam_count; ++j) {
         const auto code = static_cast<std::uint16_t>(static_cast<std::int32_t>(scratch.codes[static_cast<std::size_t>(j)]));
         std::memcpy(out + 2 * j, &code, 2);

@@ -115,7 +115,7 @@ void SurfaceCells::plant(std::size_t o) {
     const Vec3d n = lattice::normal_of(*object.mesh, t);
     const int axis = lattice::dominant_axis(n);
     const double along = axis == 0 ? n.x : axis == 1 ? n.y : n.z;
-    if (along == 0) continue;  // no area
+    if (along == 0) continue;  // the triangle has no area
     sorted[{object.mesh->material[t], axis, along < 0}].push_back(t);
   }
   for (const auto& [key, triangles] : sorted) {
@@ -221,7 +221,7 @@ void SurfaceCells::visit(SurfacePatch& patch, CellNode& node, const Look& look, 
 void SurfaceCells::raise_roots(const CellView& view) {
   for (; raised_ > coarsest_wanted(view); --raised_)
     for (auto& patch : patches_) {
-      patch->raise(raised_ - 1);  // a patch of an earlier scene may already have them
+      patch->raise(raised_ - 1);  // a patch of an earlier scene may already have these roots
       for (auto& root : patch->roots)
         if (root->alone && root->address.level == raised_ - 1) roots_.push_back({patch.get(), root.get()});
     }

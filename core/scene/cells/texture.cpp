@@ -60,7 +60,7 @@ struct Blend {
 };
 Blend blend_at(double x) {
   const auto whole = static_cast<std::int32_t>(x + 0.5);
-  const std::int32_t nearest = whole - (whole > x + 0.5);  // the floor, without a call
+  const std::int32_t nearest = whole - (whole > x + 0.5);  // floor(x + 0.5), without a call
   const double t = x - nearest;
   // Quadratic B-spline weights at distance t from the nearest lattice point.
   const double w[3] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
