@@ -23,7 +23,7 @@ void take(ReplayDevice& device, const recording::SentBy& by) {
   device.vendor = by.make->device;
   device.state = std::make_shared<protocol::DeviceState>();
   device.state->model = by.sender.model;
-  if (device.http() != nullptr) {  // its resources hold both
+  if (device.http() != nullptr) {  // HTTP resources contain id and power-up time
     device.state->id = 1;
     device.state->powered_up_at = Clock::system_wall();
   }

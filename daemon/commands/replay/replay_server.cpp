@@ -101,9 +101,9 @@ asio::awaitable<void> ReplayServer::watch_signals() {
   co_await signals_.async_wait(into(ec));
   if (ec || over_) co_return;
   stop();
-  if (over_) co_return;  // no client was connected
+  if (over_) co_return;  // stop() has ended a replay without a client
   co_await signals_.async_wait(into(ec));
-  if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // a second signal
+  if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // a second signal ends the program at once
 }
 
 /// Ends after the present message. A client that does not receive it within the limit is reset.
@@ -142,7 +142,7 @@ asio::awaitable<void> ReplayServer::accept() {
     tcp::socket socket(io_);
     co_await acceptor_.async_accept(socket, into(ec));
     if (over_ || stopping_) co_return;
-    if (ec) {  // for example no descriptor is free, which may pass
+    if (ec) {  // for example, no descriptor is free: tries again
       asio::steady_timer pause(io_, std::chrono::milliseconds(100));
       co_await pause.async_wait(into(ec));
       continue;
@@ -155,7 +155,7 @@ asio::awaitable<void> ReplayServer::accept() {
       ++figures_.refused;
       log_limited(log_, refused_limit_, LogLevel::info, "client refused: another one is being served",
                   {{"client", client->name}});
-      continue;  // closes it
+      continue;  // closes the socket
     }
     client->ip = peer.address().to_v4().to_bytes();
     client->socket.set_option(tcp::no_delay(true), ec);

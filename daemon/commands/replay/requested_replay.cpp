@@ -65,7 +65,7 @@ void RequestedReplay::start() {
     stop();
     if (over_) return;
     signals_.async_wait([](const error_code& e, int) {
-      if (!e) std::_Exit(EXIT_FAILURE);  // a second signal
+      if (!e) std::_Exit(EXIT_FAILURE);  // a second signal ends the program at once
     });
   });
 }
@@ -147,7 +147,7 @@ asio::awaitable<Simulator::Outcome> RequestedReplay::outcome_for(PingRequest req
 void RequestedReplay::compute(const Device&, PingRequest request, Simulator::Done done) {
   asio::co_spawn(io_, outcome_for(std::move(request)),
                  [done = std::move(done)](const std::exception_ptr& fault, Simulator::Outcome outcome) {
-                   if (fault) outcome.failure = text_of(fault);  // and there is no ping
+                   if (fault) outcome.failure = text_of(fault);  // an outcome without a ping
                    done(std::move(outcome));
                  });
 }

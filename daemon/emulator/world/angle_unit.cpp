@@ -12,10 +12,10 @@ namespace {
 using Direction = std::complex<double>;
 
 constexpr double largest_as_rad = 2 * pi;       // angles are -pi to pi, or 0 to 2 pi
-constexpr std::size_t least_steps = 20;         // of the way; fewer prove nothing
-constexpr double least_step_m = 1e-3;           // a shorter one has no direction
+constexpr std::size_t least_steps = 20;         // steps of the way; fewer prove nothing
+constexpr double least_step_m = 1e-3;           // a shorter step has no direction
 constexpr double agrees = 0.97, differs = 0.7;  // length of the mean of unit vectors: 1 if all are equal, 0 if evenly spread
-constexpr double most_short_of_turn_deg = 0.3;  // a jump from pi to -pi, less the turn of that step
+constexpr double most_short_of_turn_deg = 0.3;  // a jump from pi to -pi is shorter than a turn by at most this
 constexpr double steady_deg = 0.3;              // largest turn of other steps; if they are radians, 17 deg
 
 double heading_deg(const Pose& pose) { return deg_from_rad(rpy_from_quat(pose.orientation).yaw_rad); }

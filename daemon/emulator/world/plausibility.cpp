@@ -372,7 +372,7 @@ void Plausibility::judge(const Carrier& carrier, LastPose& last) const {
   last.notes = notes_on_pose(carrier, last.vehicle_in_world, around_);
   auto degrees = notes_on_angles(carrier.vehicle, last.largest_angle_rad);
   if (degrees.empty()) return;
-  std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });  // a consequence of the other note
+  std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });  // angles in degrees cause this note
   add(last.notes, std::move(degrees));
 }
 
