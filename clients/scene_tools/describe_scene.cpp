@@ -20,7 +20,7 @@ struct Outline {
     std::string type, file;
   };
   std::vector<Kind> objects;           // in the order of Scene::objects
-  std::vector<std::string> materials;  // the scene's own
+  std::vector<std::string> materials;  // defined by the scene
   std::set<std::string> started_from;  // materials that a `like` names
 };
 

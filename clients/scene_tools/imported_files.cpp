@@ -69,7 +69,7 @@ void FileResolver::report_missing() {
                      ": the file was not found; give the folder that holds it with --model-path, or continue without it with "
                      "--skip-missing";
   for (std::size_t i = 1; i < missing_.size(); ++i) text += (i == 1 ? "; also missing: " : ", ") + missing_[i].what;
-  std::vector<std::string> commands;  // one a model
+  std::vector<std::string> commands;  // one per model
   for (const Missing& m : missing_)
     if (!m.fetch.empty() && std::find(commands.begin(), commands.end(), m.fetch) == commands.end()) commands.push_back(m.fetch);
   for (const std::string& command : commands) text += (&command == &commands.front() ? "; fetch from Fuel: " : "; ") + command;

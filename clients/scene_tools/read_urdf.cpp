@@ -67,7 +67,7 @@ class UrdfReader {
     if (element.child("parent").attribute("link").empty() || joint.child.empty()) {
       if (element.child("parent") || element.child("child"))
         findings_.fail(element.place(), called(element) + ": needs <parent link=\"..\"/> and <child link=\"..\"/>");
-      return;  // a joint inside a transmission has neither
+      return;  // joints inside transmissions have no parent and no child
     }
     const std::string_view type = element.attribute("type");
     if (type != "fixed") findings_.leave_out(element.place(), called(element) + " (" + plain(type) + "): stays at zero");
@@ -129,8 +129,8 @@ class UrdfReader {
   ImportedWorld world_;
   std::set<std::string> links_;
   std::vector<Joint> joints_;
-  std::map<std::string, std::size_t> joint_of_;               // by child
-  std::map<std::string, std::vector<std::size_t>> children_;  // by parent
+  std::map<std::string, std::size_t> joint_of_;               // index of a joint by its child link
+  std::map<std::string, std::vector<std::size_t>> children_;  // indices of joints by their parent link
   std::map<std::string, Pose> in_world_;
 };
 

@@ -118,7 +118,7 @@ void SdfTree::add_frame(SdfModel& model, const Element& element, std::string bas
   if (is_new || !is_link) return;
   if (place->second.element.name() == "link")
     return findings_.fail(element.place(), called(element) + ": the name is used twice");
-  place->second = std::move(frame);  // replaces that of a joint with the same name
+  place->second = std::move(frame);  // replaces the frame of a joint with the same name
 }
 
 void SdfTree::add_model(SdfModel& parent, const Element& element, const Element& include, int include_depth) {
