@@ -81,7 +81,7 @@ TEST(EditScene, MovingObjectsComeAndGoWithTheirBodies) {
   const auto less = without_object(**more, "crate");
   ASSERT_TRUE(less);
   EXPECT_THAT((*less)->body_names, ElementsAre("whale"));
-  EXPECT_EQ((*less)->objects[3].body, 0) << "bodies move up";
+  EXPECT_EQ((*less)->objects[3].body, 0) << "the index of the later body decreases";
 }
 
 TEST(EditScene, ABodyStaysWhileSomethingRidesOnIt) {

@@ -126,7 +126,7 @@ TEST(Plausibility, ASceneFarFromTheOriginOfLatitudesIsToldBeforeTheFirstPose) {
   Config config = config_with("");
   Scene far = bed_scene();
   far.objects[0].in_world.position_m = {500'000, 6'651'411, -5};
-  EXPECT_THAT(notes(config, far), IsEmpty()) << "poses may be metres there";
+  EXPECT_THAT(notes(config, far), IsEmpty()) << "poses may be in metres from the same far origin";
   config.origin = Geodetic{rad_from_deg(60), rad_from_deg(15), 0};
   EXPECT_THAT(notes(config, far),
               ElementsAre(AllOf(HasSubstr("the scene is 6670.2 km from world.origin; vehicles with latitudes"),
@@ -350,7 +350,7 @@ TEST(Plausibility, TheLastPoseIsJudgedAgainWhenTheSceneChanges) {
   EXPECT_THAT(plausibility.all(), IsEmpty());
   sample.pose.position_m = {480, 0, -9};
   EXPECT_EQ(plausibility.use(sample).size(), 1u) << "below that ground";
-  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "far away again: said before";
+  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "the vehicle is far away again, which was reported before";
   EXPECT_THAT(texts_of(plausibility.all()), ElementsAre(HasSubstr("m from everything in the scene")));
 }
 
@@ -426,7 +426,7 @@ TEST(StartNotes, OfTheConfigurationAreLoggedAtTheStartAndGiveWayToPoses) {
               AllOf(HasSubstr("sonar front is mounted upside down on rov"), HasSubstr("1.0 m above the water")));
   EXPECT_EQ(daemon.status().notes_size(), 2);
   send_udp(daemon.address(), daemon.app().poses().json().port, bytes_of(R"({"position":[0,0,6],"attitude":[0,0,0]})"));
-  EXPECT_TRUE(eventually([&] { return daemon.status().notes_size() == 1; })) << "where it started counts no more";
+  EXPECT_TRUE(eventually([&] { return daemon.status().notes_size() == 1; })) << "the start is no longer judged";
 }
 
 TEST(MavlinkNotes, ALinkWithoutUsablePosesIsInTheStatusUntilTheyCome) {

@@ -126,8 +126,8 @@ TEST(PoseHistory, MotionIsThatOfThePoseItTells) {
   EXPECT_NEAR(motion(50).angular_velocity_radps.z, rad_from_deg(100), 1e-9);
   EXPECT_NEAR(motion(100).velocity_mps.x, 0, 1e-9) << "from that moment on";
   EXPECT_NEAR(motion(200).angular_velocity_radps.z, rad_from_deg(200), 1e-9);
-  EXPECT_NEAR(motion(390).angular_velocity_radps.z, rad_from_deg(200), 1e-9) << "carried on";
-  EXPECT_EQ(length(motion(401).angular_velocity_radps), 0) << "held";
+  EXPECT_NEAR(motion(390).angular_velocity_radps.z, rad_from_deg(200), 1e-9) << "the rate is extrapolated";
+  EXPECT_EQ(length(motion(401).angular_velocity_radps), 0) << "the last pose is held";
   EXPECT_EQ(length(motion(-1).velocity_mps), 0) << "before the first";
   // Compares with the poses themselves, in steps.
   for (const int ms : {20, 120, 250}) {

@@ -58,7 +58,7 @@ TEST_F(Follows, AVehicleThatFellSilentDelaysNoOther) {
   EXPECT_FALSE(world.is_stale(0, now));
   take("b", seconds(101) + milliseconds(200), 7);
   EXPECT_EQ(now, Time(seconds(101) + milliseconds(200)));
-  EXPECT_EQ(world.vehicle_at(1, now).position_m.x, 7) << "it came back by the same clock";
+  EXPECT_EQ(world.vehicle_at(1, now).position_m.x, 7) << "vehicle b came back by the same clock";
 }
 
 TEST_F(Follows, TwoClocksAreBothOurs) {
@@ -100,7 +100,7 @@ TEST_F(Follows, OrbitsAndTrajectoriesStandWhileTimeIsSkipped) {
   s.stamp = {ClockDomain::sim, nanoseconds(seconds(1'700'000'000)).count()};
   orbits.accept(s, {"test", "test"}, Time{});
   EXPECT_EQ(orbits.take_skipped(), seconds(1'700'000'000));
-  EXPECT_EQ(orbits.take_skipped().count(), 0) << "told once";
+  EXPECT_EQ(orbits.take_skipped().count(), 0) << "skipped time is returned once";
   EXPECT_NEAR(orbits.vehicle_at(1, Time(seconds(1'700'000'000))).position_m.x, 5, 1e-9);
 }
 

@@ -216,7 +216,7 @@ TEST(World, PosesBeyondOneKilohertzReplaceTheNewestAndAreCounted) {
   }
   EXPECT_EQ(w.counters().accepted, 1001u);
   EXPECT_NEAR(static_cast<double>(w.counters().over_rate), 1001 - 4 - 100, 2) << "100 ms at 1 kHz, and the first clump";
-  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 0.5, 1e-3) << "what was kept still interpolates";
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 0.5, 1e-3) << "the kept poses are still interpolated";
 }
 
 TEST(World, OneKilohertzAndClumpsAreKeptWhole) {
@@ -260,7 +260,7 @@ TEST(World, PosesGoStaleOnceAndComeBack) {
   ASSERT_EQ(stale.size(), 1u);
   EXPECT_EQ(stale[0].vehicle, "rov");
   EXPECT_THAT(stale[0].sentence, HasSubstr("no pose for rov"));
-  EXPECT_TRUE(w.newly_stale(t0 + milliseconds(1600)).empty()) << "said once";
+  EXPECT_TRUE(w.newly_stale(t0 + milliseconds(1600)).empty()) << "each vehicle is reported once";
   EXPECT_EQ(w.vehicle_at(0, t0 + seconds(60)).position_m.x, 4) << "held";
   EXPECT_THAT(w.accept(at_x(4, 2), udp, t0 + seconds(2)).notice, HasSubstr("are back"));
   EXPECT_EQ(w.counters().stale, 1u);
@@ -311,7 +311,7 @@ TEST(World, AnOrbitMovesAsItsPosesDo) {
 
 TEST(World, AVehicleMovesByItsPosesAndNotByAJump) {
   World w = one_rov();
-  EXPECT_EQ(length(w.vehicle_moves(0, t0).velocity_mps), 0) << "at rest where it was put";
+  EXPECT_EQ(length(w.vehicle_moves(0, t0).velocity_mps), 0) << "at its initial pose the vehicle is at rest";
   w.accept(stamped(0, ClockDomain::wall, t0.time_since_epoch(), 1), udp, t0);
   w.accept(stamped(0.2, ClockDomain::wall, (t0 + milliseconds(100)).time_since_epoch(), 2), udp, t0 + milliseconds(100));
   EXPECT_NEAR(w.vehicle_moves(0, t0 + milliseconds(110)).velocity_mps.x, 2, 1e-6);
@@ -326,11 +326,11 @@ TEST(World, VehiclesOfAnotherConfigurationKeepTheirPosesByName) {
   w.use_vehicles({{"buoy", {{1, 1, 0}, {}}, false}, {"rov", {{0, 0, -9}, {}}, true}}, t0);
   EXPECT_EQ(w.vehicle_at(0, t0).position_m.x, 1);
   EXPECT_EQ(w.source_of(0), "initial pose");
-  EXPECT_EQ(w.vehicle_at(1, t0).position_m.x, 7) << "where its sender put it";
+  EXPECT_EQ(w.vehicle_at(1, t0).position_m.x, 7) << "the vehicle keeps the pose that its sender gave";
   EXPECT_EQ(w.source_of(1), "json 127.0.0.1");
   PoseSample next = at_x(8);
   next.name = "rov";
-  EXPECT_TRUE(w.accept(next, json, t0 + milliseconds(100)).notice.empty()) << "and its sender goes on";
+  EXPECT_TRUE(w.accept(next, json, t0 + milliseconds(100)).notice.empty()) << "the same sender may continue";
 }
 
 TEST(World, AVehicleWithoutPosesFollowsTheConfiguration) {
@@ -351,7 +351,7 @@ TEST(World, ObjectsOfAnotherSceneKeepTheirPosesAndStayHidden) {
   EXPECT_EQ(w.objects_at(t0).size(), 2u);
   EXPECT_EQ(w.object_at(0, t0).position_m.x, 2);
   EXPECT_TRUE(w.is_hidden(1));
-  EXPECT_GT(w.object_at(1, t0).position_m.z, 1000) << "hidden is far away";
+  EXPECT_GT(w.object_at(1, t0).position_m.z, 1000) << "a hidden object is far away";
   w.hide(1, false);
   EXPECT_EQ(w.object_at(1, t0).position_m.x, 3);
 }

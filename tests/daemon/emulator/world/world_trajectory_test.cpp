@@ -37,7 +37,7 @@ TEST(WorldTrajectory, IsFollowedWithItsMotion) {
   EXPECT_DOUBLE_EQ(speed_at(w, 2.5), 1);
   EXPECT_NEAR(w.vehicle_moves(0, t0 + seconds(1)).angular_velocity_radps.z, pi / 20, 1e-12);
   EXPECT_EQ(x_at(w, 60), 10);
-  EXPECT_EQ(speed_at(w, 60), 0) << "it has arrived";
+  EXPECT_EQ(speed_at(w, 60), 0) << "the vehicle rests at the end";
 }
 
 TEST(WorldTrajectory, MovesAsFastAsItIsPlayed) {
@@ -55,7 +55,7 @@ TEST(WorldTrajectory, GivesWayToTheFirstPose) {
   EXPECT_EQ(x_at(w, 1), -5);
   EXPECT_FALSE(w.vehicle_plays(0));
   EXPECT_THAT(w.steer(asked(true), t0 + seconds(2)), HasSubstr("moved by poses from json 127.0.0.1"));
-  EXPECT_EQ(x_at(w, 30), -5) << "and does not come back";
+  EXPECT_EQ(x_at(w, 30), -5) << "the trajectory does not continue";
 }
 
 TEST(WorldTrajectory, IsSteered) {
@@ -64,7 +64,7 @@ TEST(WorldTrajectory, IsSteered) {
   EXPECT_EQ(x_at(w, 8), 3);
   EXPECT_EQ(speed_at(w, 8), 0);
   EXPECT_TRUE(w.vehicle_plays(0)->playback.paused());
-  EXPECT_EQ(w.steer(asked(true), t0 + seconds(9)), "") << "again is no mistake";
+  EXPECT_EQ(w.steer(asked(true), t0 + seconds(9)), "") << "a second pause is no mistake";
   EXPECT_EQ(w.steer(asked(false, 6, 2), t0 + seconds(10)), "");
   EXPECT_EQ(x_at(w, 11), 8);
   const auto played = w.vehicle_plays(0);
@@ -82,7 +82,7 @@ TEST(WorldTrajectory, RefusesWithASentence) {
   EXPECT_THAT(w.steer(asked({}, 10.5), t0), HasSubstr("from 0 to 10"));
   EXPECT_THAT(w.steer(asked({}, -1), t0), HasSubstr("from 0 to 10"));
   EXPECT_THAT(w.steer(asked({}, 5, 0), t0), HasSubstr("0.001 to 1000"));
-  EXPECT_EQ(x_at(w, 0), 0) << "nothing of it was done";
+  EXPECT_EQ(x_at(w, 0), 0) << "refused requests change nothing";
   SetTrajectory other = asked(true);
   other.name = "auv";
   EXPECT_THAT(w.steer(other, t0), HasSubstr("no vehicle is called \"auv\"; known: rov"));
@@ -99,7 +99,7 @@ TEST(WorldTrajectory, GoesOnOverAConfigurationThatDoesNotTouchIt) {
   w.use_vehicles({{"buoy", {}, false}, rov()}, t0 + seconds(2));  // read again: the same points at another address
   EXPECT_EQ(w.vehicle_at(1, t0 + seconds(3)).position_m.x, 5);
   w.use_vehicles({rov(east({*motion::Speed::from(3), false, seconds(0)}))}, t0 + seconds(4));
-  EXPECT_EQ(x_at(w, 5), 3) << "played otherwise, it begins anew";
+  EXPECT_EQ(x_at(w, 5), 3) << "a trajectory with another speed begins anew";
   w.use_vehicles({rov(east({}, -4))}, t0 + seconds(6));
   EXPECT_EQ(x_at(w, 6), 0) << "another file";
   w.use_vehicles({{"rov", {{99, 0, 0}, {}}, false}}, t0 + seconds(7));
