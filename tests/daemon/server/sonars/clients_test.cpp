@@ -101,7 +101,7 @@ TEST(Clients, OneThatTakesNothingIsReset) {
   ASSERT_TRUE(eventually([&] { return daemon.log_text().find("read no byte for 300 ms") != std::string::npos; }));
   Client next(daemon.address());
   next.fire(fire_at(PingRate::hz10));
-  EXPECT_TRUE(next.next_ping()) << "its place is free again";
+  EXPECT_TRUE(next.next_ping()) << "the place of the client that read nothing is free again";
   EXPECT_FALSE(stalled.read_to_end());
   EXPECT_TRUE(stalled.was_reset);
 }

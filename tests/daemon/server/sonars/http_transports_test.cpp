@@ -55,7 +55,7 @@ TEST(Transports, PagesOfTheWebReadAndChangeNothingByHttp) {
   EXPECT_THAT(http(at, "GET", "/range", "", "evil.example"), StartsWith("HTTP/1.1 403 ")) << "a name that was rebound";
   EXPECT_THAT(http(at, "PUT", "/range", "9", "", "Origin: http://evil.example\r\n"), StartsWith("HTTP/1.1 403 "));
   EXPECT_THAT(http(at, "PUT", "/range", "9", "", "Origin: null\r\n"), StartsWith("HTTP/1.1 403 "));
-  EXPECT_EQ(body_of(http(at, "GET", "/range")), "5") << "unchanged";
+  EXPECT_EQ(body_of(http(at, "GET", "/range")), "5") << "refused requests change nothing";
   EXPECT_THAT(daemon.log_text(), HasSubstr("a page of Origin http://evil.example"));
   for (const std::string& host : {std::string("sonar.lab"), std::string("localhost:15080"), at + ":15080"})
     EXPECT_EQ(body_of(http(at, "GET", "/range", "", host)), "5") << host;

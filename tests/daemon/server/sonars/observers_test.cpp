@@ -49,7 +49,7 @@ TEST(Observers, GetTheDriversPingsAndChangeNothing) {
   reader.join();
   const DeviceFigures f = daemon.figures();
   EXPECT_EQ(f.clients, 1u);
-  EXPECT_LE(f.offered, f.pings) << "one client's";
+  EXPECT_LE(f.offered, f.pings) << "pings are offered to one client";
 }
 
 TEST(Observers, ADriverThatComesWhileOneLooksOnIsTheDriver) {

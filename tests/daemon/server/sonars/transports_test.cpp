@@ -26,7 +26,8 @@ TEST(Transports, ATcpCommandNamesAReceiverOfDatagramsUntilItsConnectionEnds) {
   }
   EXPECT_TRUE(asked_for_range(daemon, 8));
   client.reset();
-  EXPECT_TRUE(eventually([&] { return receiver.next(milliseconds(500)).empty(); })) << "its list of receivers ended with it";
+  EXPECT_TRUE(eventually([&] { return receiver.next(milliseconds(500)).empty(); }))
+      << "the list of receivers ends with its connection";
   daemon.stop();
   const DeviceFigures f = daemon.figures();
   EXPECT_EQ(f.offered, f.sent + f.dropped);
@@ -115,13 +116,13 @@ TEST(Transports, AnAddressThatConnectsTooOftenWaitsAndAnotherIsServed) {
   EXPECT_TRUE(eventually([&] {
     for (int i = 0; i < 300; ++i) Client(daemon.address(), command_port);
     return refused() > 0;
-  })) << "few wait at a time";
+  })) << "only few connections wait at a time";
   EXPECT_THAT(daemon.log_text(), HasSubstr("its address connects too often"));
   EXPECT_TRUE(eventually([&] {
     Client late(daemon.address(), command_port);
     late.send("range 7\n");
     return late.read_raw(3, std::chrono::seconds(5)).size() >= 3;
-  })) << "served after the storm";
+  })) << "a client is served after the storm";
   asio::io_context io;
   tcp::socket other(io, {asio::ip::make_address("127.0.0.5"), 0});
   other.connect({asio::ip::make_address(daemon.address()), command_port});
@@ -157,7 +158,7 @@ TEST(Transports, ADialogueByDatagramsBelongsToTheHostThatAskedLast) {
   EXPECT_TRUE(asked_for_range(daemon, 6));
   EXPECT_THAT(text_of(tcp.read_raw(20)), StartsWith("PING "));
   stranger.send("junk", daemon.address(), data_port);
-  EXPECT_FALSE(one.next().empty()) << "junk does not take it over";
+  EXPECT_FALSE(one.next().empty()) << "junk does not take the stream over";
   other.send("nothing\n", daemon.address(), data_port);
   EXPECT_EQ(other.next(), "no: unknown command\n");
   const std::string taken_over = next_ping(other, &ping);
