@@ -53,7 +53,7 @@ TEST(Leak, FallsFromItsLevelByItsDecay) {
     const double expected = 160 - 60 * s.range_of_row(row);
     EXPECT_NEAR(db(mean_row_power(s, row)), expected, 0.1) << row;
   }
-  EXPECT_EQ(s.power(699, 100), 0) << "forgotten";
+  EXPECT_EQ(s.power(699, 100), 0) << "the weak rest of the leak is dropped";
   // With speckle: the mean of many rows over beams and pings, each divided by its expected value.
   s.request.switches.expected_power = false;
   double ratio = 0;

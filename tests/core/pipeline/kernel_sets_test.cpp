@@ -52,7 +52,7 @@ TEST(KernelSets, AgreeOnAPing) {
           const int off = std::abs(static_cast<int>(first_bytes[i]) - static_cast<int>(ping.samples[i]));
           other += off > 0, far_off += off > 2, lit += first_bytes[i] != std::byte{0} && first_bytes[i] != std::byte{255};
         }
-        EXPECT_GT(lit, 1000) << "codes that say something";
+        EXPECT_GT(lit, 1000) << "the test needs codes that are neither 0 nor saturated";
         EXPECT_LE(other, static_cast<int>(first_bytes.size()) / 100) << s.engine().description();
         EXPECT_LE(far_off, static_cast<int>(first_bytes.size()) / 10000) << s.engine().description();
       }
@@ -159,7 +159,7 @@ TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
                                     {"neon", SimdLevel::neon}}) {
     const tests::HeldVariable held("SONARD_SIMD", name);
     EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(level)) << name;
-    EXPECT_EQ(&simd::kernels_for(SimdLevel::portable), &simd::portable_kernels) << "what was asked for by itself stays";
+    EXPECT_EQ(&simd::kernels_for(SimdLevel::portable), &simd::portable_kernels) << "SONARD_SIMD changes no explicit level";
   }
   const tests::HeldVariable none("SONARD_SIMD", "");
   EXPECT_EQ(&simd::kernels_for(SimdLevel::automatic), &simd::kernels_for(SimdLevel::avx512)) << "the best there is";

@@ -114,7 +114,8 @@ TEST(ScatteringLaw, TrendWithFrequency) {
     EXPECT_EQ(strength(3e6), strength(3e5));
     m.trend_db_per_decade = 40;
     m.trend_reference_hz = 1e4f;
-    EXPECT_NEAR(scattering_strength(m, 1, 3e6, 1500, false), 1 / pi, 1e-6) << "never more than comes in";
+    EXPECT_NEAR(scattering_strength(m, 1, 3e6, 1500, false), 1 / pi, 1e-6)
+        << "a surface never scatters more power than it receives";
   }
 }
 

@@ -167,7 +167,7 @@ TEST(SeaSurface, OneAtItSeesAsOneJustBelow) {
   for (const double z : {0.0, -1e-9, 5e-4, 0.001}) {
     const Ping& ping = bed.from(z);
     EXPECT_EQ(ping.samples, below) << z;
-    EXPECT_EQ(ping.request.sonar_in_world.position_m.z, z) << "told where it is";
+    EXPECT_EQ(ping.request.sonar_in_world.position_m.z, z) << "the ping states the requested position";
     EXPECT_FALSE(ping.request.blank);
   }
   double at_it = 0, deeper = 0;
@@ -196,8 +196,8 @@ TEST(SeaSurface, ASonarStaysInTheWaterDuringAPing) {
   OverABed bed;
   const auto at_rest = bed.from(-0.001).samples;
   EXPECT_EQ(bed.from(-0.001, 5).samples, at_rest) << "5 m/s for 6.7 ms would be 33 mm";
-  EXPECT_EQ(bed.sounding.last().request.sonar_moves.velocity_mps.z, 5) << "told as it moves";
-  EXPECT_NE(bed.from(-0.001, -5).samples, at_rest) << "down it may";
+  EXPECT_EQ(bed.sounding.last().request.sonar_moves.velocity_mps.z, 5) << "the ping states the requested speed";
+  EXPECT_NE(bed.from(-0.001, -5).samples, at_rest) << "a sonar may sink";
 }
 
 TEST(SeaSurface, TheModesForComparisonKnowIt) {
