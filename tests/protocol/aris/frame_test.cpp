@@ -51,7 +51,7 @@ TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
   const auto datagrams = vendor().datagrams(vendor().ports()[2], ping_of(state, s, 42), state);
   FramePart part;
   ASSERT_TRUE(protobuf::read(datagrams.at(0), part));
-  EXPECT_EQ(part.frame_index, 2) << "counted from the connection on";
+  EXPECT_EQ(part.frame_index, 2) << "frames are counted from the connection on";
   ASSERT_TRUE(part.header);
   const auto read = [&](std::size_t at, auto value) {
     std::memcpy(&value, part.header->data() + at, sizeof value);
@@ -87,7 +87,7 @@ TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
   EXPECT_EQ(u32(480), 0u);
   EXPECT_EQ(u32(516), 0u);
   EXPECT_EQ(u32(520), 35u);
-  EXPECT_NEAR((f32(524) - 14.6959f) * 0.702398f, 10, 1e-3) << "clients compute the depth from it";
+  EXPECT_NEAR((f32(524) - 14.6959f) * 0.702398f, 10, 1e-3) << "clients compute the depth from the pressure";
   EXPECT_EQ(u32(680), 9u);
   EXPECT_EQ(u32(700), static_cast<std::uint32_t>(1.7e9));
 }
@@ -191,7 +191,8 @@ TEST(ArisFrame, OfATelephotoLens) {
   EXPECT_EQ(frame->header.large_lens, 1u);
   EXPECT_EQ(frame->beams, 96u);
   const FrequencyMode& mode = state.model->modes[static_cast<std::size_t>(ping.request.settings.mode)];
-  EXPECT_NEAR(mode.beam_azimuths_rad.front(), 7.42 * 3.14159265 / 180, 0.001) << "half as wide as without it";
+  EXPECT_NEAR(mode.beam_azimuths_rad.front(), 7.42 * 3.14159265 / 180, 0.001)
+      << "with the telephoto lens the fan is half as wide";
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST(DistanceSensorMessage, EachFieldStandsInItsPlace) {
 
 TEST(DistanceSensorMessage, ZerosAtTheEndAreLeftOut) {
   Identity sender;
-  EXPECT_EQ(std::to_integer<int>(framed(at_ms(1), sender).at(1)), 14) << "up to the covariance";
+  EXPECT_EQ(std::to_integer<int>(framed(at_ms(1), sender).at(1)), 14) << "the payload ends with the covariance";
 }
 
 TEST(DistanceSensorMessage, WithoutAnEchoTheDistanceIsBeyondTheFarthest) {

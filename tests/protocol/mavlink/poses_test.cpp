@@ -295,7 +295,8 @@ TEST(MavlinkPoses, ARebootIsAReset) {
 
   Link whole;
   const auto counter = whole(v(odometry(90'000'000, 0)), 1).poses.at(0).sample.reset_counter;
-  EXPECT_EQ(whole(v(odometry(89'500'000, 0)), 1).poses.at(0).sample.reset_counter, counter) << "late, and for the World to judge";
+  EXPECT_EQ(whole(v(odometry(89'500'000, 0)), 1).poses.at(0).sample.reset_counter, counter)
+      << "a late packet is no restart; World decides about it";
   EXPECT_NE(whole(v(odometry(1'000'000, 0)), 2).poses.at(0).sample.reset_counter, counter);
 }
 

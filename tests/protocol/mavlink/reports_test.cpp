@@ -79,7 +79,7 @@ TEST(MavlinkReports, RatesAreRequestedOnlyWhenWantedAndUntilPosesCome) {
   const Pairs wanted{{331, 50000}, {31, 50000}, {32, 50000}, {33, 50000}};
   EXPECT_EQ(requests(asks.on_tick(at_s(1.1)).replies), wanted);
   EXPECT_THAT(requests(asks.on_tick(at_s(2)).replies), IsEmpty());
-  EXPECT_EQ(requests(asks.on_tick(at_s(6.2)).replies), wanted) << "again: nothing came of it";
+  EXPECT_EQ(requests(asks.on_tick(at_s(6.2)).replies), wanted) << "rates are requested again, because none of the messages came";
   asks.on_datagram(v(odometry(1, 0)), at_s(7));
   EXPECT_THAT(requests(asks.on_tick(at_s(11.5)).replies), IsEmpty());
 
@@ -167,7 +167,7 @@ TEST(MavlinkReports, WhatIsMissingIsSaidAgainEverMoreSeldomAndWhenItIsThere) {
   const auto tilts = [&](int s) { poses.on_datagram(v(attitude(static_cast<std::uint32_t>(1000 * s), 0)), at_s(s)); };
   EXPECT_THAT(notices_of(poses, 121, 230, tilts),
               ElementsAre(Pair(226, AllOf(HasSubstr("a position is missing"), Not(HasSubstr("an attitude is missing"))))))
-      << "what has come is missing no more";
+      << "the attitude, which has come, is not reported as missing";
   const auto poses_come = [&](int s) { poses.on_datagram(v(odometry(1'000'000ull * static_cast<unsigned>(s), 1)), at_s(s)); };
   EXPECT_THAT(notices_of(poses, 230, 900, poses_come), ElementsAre(Pair(230, HasSubstr("poses from ODOMETRY"))));
   EXPECT_THAT(poses.health_error(at_s(900)), IsEmpty());
@@ -220,8 +220,9 @@ TEST(MavlinkReports, WhoIsIgnoredBesideTheVehicleIsNamedOnce) {
   EXPECT_THAT(poses.on_datagram(two(autopilot_heartbeat()), at_s(0.2)).notices,
               ElementsAre(AllOf(HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored"),
                                 HasSubstr("system 7, component 1 steers rov; give each vehicle a port of its own"))));
-  EXPECT_THAT(poses.on_datagram(two(odometry(1, 0)), at_s(0.3)).notices, IsEmpty()) << "once";
-  EXPECT_THAT(poses.rival(at_s(5.2)), HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored")) << "while it sends";
+  EXPECT_THAT(poses.on_datagram(two(odometry(1, 0)), at_s(0.3)).notices, IsEmpty()) << "each is reported once";
+  EXPECT_THAT(poses.rival(at_s(5.2)), HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored"))
+      << "system 8 is a rival while it sends";
   EXPECT_THAT(poses.rival(at_s(5.4)), IsEmpty());
   EXPECT_THAT(poses.on_datagram(companion(odometry(1, 0)), at_s(0.4)).notices,
               ElementsAre(AllOf(HasSubstr("system 7, component 191 sends ODOMETRY and is ignored"),

@@ -166,12 +166,12 @@ struct Asking : Conversation {
 // ENS stores standby as its rate when a dummy arrives, and requests it when it connects again.
 TEST(Dialogue, NoDummyComesWhileARateIsAsked) {
   Asking talk;
-  EXPECT_EQ(talk.dummies(0, 3.05), 3u) << "before the first fire message";
+  EXPECT_EQ(talk.dummies(0, 3.05), 3u) << "dummies come before the first fire message";
   EXPECT_EQ(talk.fire_at(3.5, PingRate::hz10), 0u);
   EXPECT_EQ(talk.dialogue->next_tick(), Time::max());
   EXPECT_EQ(talk.dummies(3.5, 60), 0u) << "the first ping takes a minute";
   talk.dialogue->on_ping_queued(at(60));
-  EXPECT_EQ(talk.fire_at(60.1, PingRate::hz40), 0u) << "another rate";
+  EXPECT_EQ(talk.fire_at(60.1, PingRate::hz40), 0u) << "no dummy comes after a fire message with another rate";
   EXPECT_EQ(talk.dummies(60.1, 90), 0u);
   EXPECT_EQ(talk.fire_at(90, PingRate::standby), 1u);
   EXPECT_EQ(talk.dummies(90, 93.05), 3u);

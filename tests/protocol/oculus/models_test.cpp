@@ -84,7 +84,7 @@ TEST(Tuning, EveryFigureReachesItsMode) {
   }
   EXPECT_EQ(model->part_number, 4713);
   const FrequencyMode& shared = protocol::find_profile("oculus-c550d")->model->modes[0];
-  EXPECT_NEAR(deg_from_rad(shared.horizontal_aperture_rad), 120, 1e-4) << "other sonars of the product keep theirs";
+  EXPECT_NEAR(deg_from_rad(shared.horizontal_aperture_rad), 120, 1e-4) << "other sonars of the product keep their aperture";
 }
 
 TEST(Tuning, WhatCannotBeIsRefused) {

@@ -141,7 +141,7 @@ TEST(WaterLinkedHttp, ClockBeforeNtp) {
   Unit synchronised;
   EXPECT_EQ(synchronised.post("/time/manual", R"({"now":"2026-01-02T03:04:05Z"})"), 409u);
   EXPECT_EQ(synchronised.post("/time/ntp/force-sync", R"({"timeout_seconds":5})"), 200u);
-  EXPECT_EQ(synchronised.post("/time/ntp/force-sync", ""), 200u) << "its time limit is optional";
+  EXPECT_EQ(synchronised.post("/time/ntp/force-sync", ""), 200u) << "the time limit of force-sync is optional";
 }
 
 TEST(WaterLinkedOverride, IsWhatAClientWouldHavePosted) {

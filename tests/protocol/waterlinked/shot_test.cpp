@@ -88,7 +88,7 @@ TEST(WaterLinkedShot, DamagedPacketsAreRefused) {
   const Bytes junk(20, std::byte{0xFF});
   Bytes no_snappy = rip_packet(junk, Rip::one);
   no_snappy[3] = std::byte{'2'};
-  EXPECT_FALSE(rip_content(no_snappy)) << "its CRC is of RIP1";
+  EXPECT_FALSE(rip_content(no_snappy)) << "the packet has the CRC of RIP1";
   EXPECT_FALSE(decode(junk).ranges);
 }
 
