@@ -111,7 +111,7 @@ class LiveView {
       }
     }
     if (interrupted != 0) ran = {};
-    print_notices(notices_);  // the screen would have hidden them
+    print_notices(notices_);  // printed now, because the screen would have hidden the notices
     return ran;
   }
 

@@ -15,7 +15,7 @@ namespace sonar::control {
 namespace {
 
 using google::protobuf::Message;
-constexpr std::size_t deepest_request = 16, most_values = 4096;  // chosen: the longest request has some dozen values
+constexpr std::size_t deepest_request = 16, most_values = 4096;  // our choice: the longest request has some dozen values
 
 /// The name in the form in which protobuf compares names: "range_m" and "rangeM" are the same field.
 std::string as_protobuf_reads(const std::string& name) {

@@ -8,8 +8,8 @@
 namespace sonar::control {
 namespace {
 
-constexpr double largest_position_m = 1e8;  // chosen: larger than any local world, and sums stay exact to micrometres
-constexpr double largest_speed_mps = 1e4;   // chosen, as the next: faster than anything that carries a sonar
+constexpr double largest_position_m = 1e8;  // our choice: larger than any local world; sums stay exact to micrometres
+constexpr double largest_speed_mps = 1e4;   // our choice: faster than anything that carries a sonar
 constexpr double largest_turn_radps = 1e3;
 
 template <std::size_t N>

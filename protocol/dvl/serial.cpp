@@ -18,7 +18,7 @@ namespace {
 using protocol::Reaction;
 using text::format;
 
-constexpr std::size_t longest_sentence = 512;                  // chosen
+constexpr std::size_t longest_sentence = 512;                  // our choice
 constexpr std::size_t events_per_call = 32;                    // limits the events that a hostile host can cause
 constexpr auto longest_pause = std::chrono::milliseconds(10);  // between the bytes of a sentence (DOC)
 constexpr std::string_view no_sentence = "wr?", wrong_checksum = "wr!", done = "wra", failed = "wrn";

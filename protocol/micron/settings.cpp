@@ -13,7 +13,7 @@ namespace sonar::micron {
 namespace {
 
 constexpr double receiver_db = 80;  // ENS: span of an 8-bit bin, and of the gain
-constexpr double farthest_m = 200;  // chosen: range of the last bin, which bounds the work for a ping; the device's is unknown
+constexpr double farthest_m = 200;  // our choice: end of the last bin, which bounds the work for a ping; the device's is unknown
 constexpr double pulse_m = 0.0075;  // length after compression of a chirp of 100 kHz: recalled from the data sheet
 constexpr auto turn_of_a_sixteenth = std::chrono::microseconds(500);  // unknown: time for 1/16 grad; a turn takes 3.2 s
 constexpr double fastest_hz = 1000;                                   // no limit: hosts request each scan line
@@ -32,7 +32,7 @@ SonarModel make_model() {
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(3));     // ROCK
   mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(35));  // ROCK
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
-  mode.receiver.tvg_slope_db = 20;  // chosen: the law of the device is unknown
+  mode.receiver.tvg_slope_db = 20;  // our choice: the law of the device is unknown
   mode.receiver.tvg_ceiling_db = 60;
   mode.receiver.full_scale_upa = 2e7f;
   SonarModel model;

@@ -15,7 +15,7 @@ namespace {
 constexpr double rest_per_ping_s = 0.002;  // assumed: time from the last echo to the next transmission
 constexpr double surface_pressure_bar = 1.013;
 
-constexpr int most_samples_per_row = 32;  // chosen: bounds the computing time of a row at long ranges
+constexpr int most_samples_per_row = 32;  // our choice: bounds the computing time of a row at long ranges
 
 /// Clamps a value and adds a message if that changed it: "range 20 m is outside 0.1..10 m, 10 m is used".
 double clamped(double value, double low, double high, const char* what, const char* unit, std::vector<std::string>& messages) {

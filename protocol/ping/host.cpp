@@ -191,7 +191,7 @@ class Ping360Host final : public PingHost {
     return ping;
   }
 
-  static constexpr std::chrono::milliseconds answer_within{1000};  // chosen
+  static constexpr std::chrono::milliseconds answer_within{1000};  // our choice
 
   bool is_open_ = false;
   Time ask_again_at_{};

@@ -43,7 +43,7 @@ SonarModel make_model() {
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(2));     // recalled from the data sheet
-  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(25));  // likewise
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(25));  // recalled from the data sheet
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
   mode.receiver.tvg_slope_db = 20;
   mode.receiver.tvg_ceiling_db = 60;
