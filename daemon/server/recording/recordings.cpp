@@ -34,7 +34,7 @@ struct Recordings::Recording {
   bool labels = false;
   v1::RecordingStatus status;
   std::size_t waiting_bytes = 0;
-  bool failed = false;    // true: it failed, and the failure was logged
+  bool failed = false;    // true: the recording failed, and the failure was logged
   std::string ends_with;  // reason, if the sonar stopped while the file was being opened
   std::vector<Done> at_end;
   std::shared_ptr<Work> work = std::make_shared<Work>();

@@ -75,7 +75,7 @@ asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place)
   deadline.cancel();
   // The handler above must finish with `socket` before this coroutine frame is destroyed.
   co_await asio::post(network_.io, asio::use_awaitable);
-  socket.close(ec);  // before its slot is free
+  socket.close(ec);  // closed before its slot is free
   place.reset();
 }
 

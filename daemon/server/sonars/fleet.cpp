@@ -99,7 +99,7 @@ bool Fleet::add(const SonarConfig& sonar, std::uint32_t index, Change& change) {
     return true;
   }
   change.errors.push_back("sonar " + sonar.name + ": " + opened.error().text);
-  retire(std::prev(devices_.end()));  // operations that it began may still run
+  retire(std::prev(devices_.end()));  // operations that the device began may still run
   return false;
 }
 
@@ -170,7 +170,7 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   for (const Opening& o : after)
     if (!add(*o.sonar, o.index, change)) outcomes[o.sonar->name] = "missing";
 
-  for (const SonarConfig& sonar : next.sonars) {  // the configuration's order
+  for (const SonarConfig& sonar : next.sonars) {  // in the configuration's order
     const auto device =
         std::find_if(devices_.begin(), devices_.end(), [&](const Device& d) { return d.config().name == sonar.name; });
     if (device != devices_.end()) devices_.splice(devices_.end(), devices_, device);
