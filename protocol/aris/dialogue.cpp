@@ -185,7 +185,7 @@ class ArisDialogue final : public protocol::Dialogue {
   std::vector<std::string> refusals_;  // refusals of SET_ACOUSTICS since the last command of another type
   bool accepts_ = false;               // a SET_ACOUSTICS since then was accepted
   CommandFramer framer_;
-  Settings settings_;  // those of base(), changed by the commands of this call
+  Settings settings_;  // the settings of base(), changed by the commands of this call
   bool changed_ = false;
   std::size_t notices_ = 0;
 };

@@ -17,7 +17,7 @@ using protocol::HostActions;
 constexpr auto ping_after = 1s;                   // keep-alive; the device disconnects a controller after 10 s of silence
 constexpr double nominal_sound_speed_mps = 1490;  // converts a wanted range to time before a frame states the sound speed
 constexpr std::uint32_t most_pulse_us = 80;
-constexpr std::size_t commands = 0, frames = 1;  // ports
+constexpr std::size_t commands = 0, frames = 1;  // indices of ports
 
 /// The acoustic settings for a product. nullopt: it has no such range or mode.
 std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::SettingsOverride& wanted) {

@@ -308,7 +308,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   const DeviceState& device_;
   Framer framer_;
-  SonarSettings settings_;  // the device's, read at the start of each call, and changed by it
+  SonarSettings settings_;  // the device's settings, read at the start of each call and changed by the call
   bool greeted_ = false;
   std::deque<Waiting> waiting_;  // oldest first
   std::optional<Subscription> subscription_;

@@ -112,7 +112,7 @@ std::string in_message(const json& value, const Descriptor& type, const std::str
     const std::string inner = place.empty() ? key : place + '.' + key;
     const FieldDescriptor* const field = field_of(type, key);
     if (field == nullptr) return in_quotes(inner) + ": unknown key";
-    if (member.is_null()) continue;  // as if it were not there
+    if (member.is_null()) continue;  // null counts as a missing member
     if (std::string why = in_field(member, *field, inner); !why.empty()) return why;
   }
   return {};

@@ -95,7 +95,7 @@ class DvlHost final : public protocol::Host {
     return ping;
   }
 
-  const Product& product_ = product_of(*models().front());  // the first: reports do not name the model
+  const Product& product_ = product_of(*models().front());  // the first product, because reports do not name the model
   std::optional<Bytes> request_;
   double window_m_ = 0;  // the picture has at least the wanted range
   Bytes line_;

@@ -7,7 +7,7 @@ using protocol::Reaction;
 
 constexpr int most_waiting = 15;  // triggered pings (DOC)
 constexpr std::chrono::nanoseconds report_period = std::chrono::milliseconds(200);
-constexpr auto longest_wait = std::chrono::seconds(2);  // after that a triggered ping counts as lost and is requested again
+constexpr auto longest_wait = std::chrono::seconds(2);  // a triggered ping that takes longer is lost and requested again
 
 }  // namespace
 

@@ -16,7 +16,7 @@ using control::RawPose;
 enum MavFrame : std::uint8_t {
   local_ned = 1,
   local_enu = 4,
-  body_ned = 8,  // deprecated, as the next one; both mean body_frd
+  body_ned = 8,  // deprecated; this and the next one mean body_frd
   body_offset_ned = 9,
   body_frd = 12,
   body_flu = 13,
@@ -148,7 +148,7 @@ Result<RawPose> raw_pose(const Odometry& m) {
     case mocap_enu:
     case vision_enu:
     case estim_enu:
-      ned_m = enu_from_ned(ned_m);  // its own inverse
+      ned_m = enu_from_ned(ned_m);  // enu_from_ned() is its own inverse
       in_ned = enu_and_ned * in_ned;
       break;
     case local_flu:

@@ -239,11 +239,11 @@ class NorbitHost final : public protocol::Host {
   std::optional<Bytes> request_;
   static recording::MessageSplitter splitter() { return {recording::Origin::device, framing}; }
   std::array<recording::MessageSplitter, 3> splitters_{splitter(), splitter(), splitter()};
-  std::deque<Parts> waiting_;  // the first lacks a packet
+  std::deque<Parts> waiting_;  // the first ping of the queue lacks a packet
   std::size_t waiting_bytes_ = 0;
   std::optional<Time> begun_;
   std::array<std::optional<Time>, kinds> heard_at_;
-  std::array<std::set<std::uint32_t>, kinds> shown_without_;  // numbers of pings; the packet may still come
+  std::array<std::set<std::uint32_t>, kinds> shown_without_;  // numbers of pings whose packet may still come
   double shown_m_ = usual_range_m;                            // far end of the last water column
   std::optional<std::uint32_t> last_;
   Counts counts_;

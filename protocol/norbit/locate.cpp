@@ -23,7 +23,7 @@ std::optional<protocol::Field> in_packet(protocol::FieldName name, BytesView pac
 }  // namespace
 
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packets) {
-  if (packets.empty()) return in_packet<ColumnFront>(name, {});  // has the most fields
+  if (packets.empty()) return in_packet<ColumnFront>(name, {});  // the packet with the most fields
   const auto header = header_of(packets);
   if (!header) return std::nullopt;
   if (header->type == Type::column) return in_packet<ColumnFront>(name, packets);

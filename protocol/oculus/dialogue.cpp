@@ -179,7 +179,7 @@ class OculusDialogue final : public protocol::Dialogue {
   Time dummy_at_{};
   std::shared_ptr<const VendorSettings> fired_;  // settings of the last fire message
   bool is_heard_ = false;                        // the device has used settings of this client at some time
-  bool requested_ping_ = false;                  // by network trigger, and the ping has not been sent yet
+  bool requested_ping_ = false;                  // a network trigger requested a ping, which is not sent yet
   std::optional<Time> greeting_at_;
   bool greets_silent_ = false;  // a fire message, or a ping to the client, cancels the greeting
   std::size_t notices_ = 0;

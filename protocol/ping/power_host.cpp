@@ -44,8 +44,8 @@ struct Product {
 constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, omniscan_request};
 constexpr Product s500_product{"an S500", Id::s500_set_ping_params, s500_request};
 
-constexpr Id only_s500_has = Id::ping1d_range;           // an Omniscan refuses the request for it
-constexpr std::chrono::milliseconds answer_within{500};  // then the sonar is taken for an Omniscan
+constexpr Id only_s500_has = Id::ping1d_range;           // an Omniscan refuses the request for this message
+constexpr std::chrono::milliseconds answer_within{500};  // a sonar that has not answered by then counts as an Omniscan
 
 /// A ping of `rows` powers; its note, such as the distance, is not set yet.
 HostPing ping_of(std::uint32_t number, std::uint32_t start_mm, double row_m, std::size_t rows, double hz,
