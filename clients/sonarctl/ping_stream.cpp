@@ -334,7 +334,7 @@ PingStream::Item PingStream::next(milliseconds patience) {
 
 bool PingStream::is_rejected(milliseconds patience) const {
   if (make_->ports.front().kind != Kind::tcp || has_answered_) return false;
-  std::vector<int> others;  // some sonars send pings only there, and nothing at the first port
+  std::vector<int> others;  // other ports, which alone have the pings of some sonars
   for (std::size_t port = 1; port < sockets_.size(); ++port)
     if (sockets_[port]) others.push_back(sockets_[port]->fd());
   return ends_without_a_byte(*sockets_.front(), others, patience);

@@ -179,7 +179,7 @@ std::shared_ptr<const PolarLookup> Imager::lookup_for(const PolarLookup::Key& ke
     const std::lock_guard<std::mutex> lock(mutex_);
     if (auto known = find()) return known;
   }
-  auto made = std::make_shared<const PolarLookup>(key);  // outside the lock: others need not wait for it
+  auto made = std::make_shared<const PolarLookup>(key);  // outside the lock, so that other threads do not wait
   const std::lock_guard<std::mutex> lock(mutex_);
   std::rotate(recent_.begin(), recent_.end() - 1, recent_.end());
   return recent_.front() = std::move(made);

@@ -36,7 +36,7 @@ int Head::set_start(float start_m) {
   const int code = set(Key::start_range, start_m, now.start_m);
   RangeLimits limits{now.start_m, now.stop_m};
   if (code == success && source_->get(now.id, limits) == success)
-    now.stop_m = limits.stop_m;  // the sonar may have changed it too
+    now.stop_m = limits.stop_m;  // the sonar may have changed the end, too
   return code;
 }
 
