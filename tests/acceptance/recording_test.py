@@ -274,7 +274,8 @@ class OneIntoAnother(Files):
             image = bytes((number + i) % 255 for i in range(256 * rows))
             fixed = struct.pack("<IIddddIBdHHIII", number + 1, 0, 2.1e6, 15.0, 1.2, 1500.0, 0, 0, 0.01, rows, 256, 2048, len(image),
                                 2048 + len(image))
-            message = HEADER.pack(0x4F53, 7001, 0, 0x23, 0, 2032 + len(image), 0) + body + fixed
+            bearings = struct.pack("<256h", *range(-6400, 6400, 50))  # hundredths of a degree
+            message = HEADER.pack(0x4F53, 7001, 0, 0x23, 0, 2032 + len(image), 0) + body + fixed + bearings
             stream += message + bytes(2048 - len(message)) + image
         return stream
 
