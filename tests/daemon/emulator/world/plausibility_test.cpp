@@ -223,7 +223,7 @@ TEST(Plausibility, ATrajectoryWithWAtTheWrongEnd) {
                     "the format has it: last in a TUM line")));
     EXPECT_THAT(notes(playing(turning(true, frame, z_m, ",", "000000000"), "dive.csv")), IsEmpty()) << "EuRoC";
     EXPECT_THAT(notes(playing(turning(false, frame, z_m, ",", "000000000"), "dive.csv")),
-                ElementsAre(HasSubstr("with w at the other end")));
+                ElementsAre(HasSubstr("if w were at the other end")));
   }
 }
 
