@@ -61,9 +61,10 @@ double ripple_profile(double cycles) {
 std::vector<std::string> notes_on(const Ripples& r, double spacing_m) {
   const double share = carried(r.wavelength_m, spacing_m);
   if (share >= noted_share) return {};
-  const std::string has = share <= 0 ? "do not appear" : text::format("have %.0f %% of their height at most", 100 * share);
+  const std::string has = share < 0.005 ? "do not appear" : text::format("have %.0f %% of their height at most", 100 * share);
   return {text::format("its ripples of wavelength %g m ", r.wavelength_m) + has +
-          text::format(": the grid has a spacing of %.3g m there; set spacing_m: %.3g", spacing_m, r.wavelength_m / 6)};
+          text::format(": the finest spacing of its grid is %.3g m; set spacing_m: %.3g, and fine_size_m if the bed is large",
+                       spacing_m, r.wavelength_m / 6)};
 }
 
 }  // namespace

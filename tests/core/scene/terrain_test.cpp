@@ -79,9 +79,12 @@ TEST(Seabed, NotesRipplesThatAreTooFineForItsGrid) {
     shape.ripples = {.wavelength_m = wavelength_m, .height_m = height_m, .direction_rad = direction_rad};
     return make_seabed(shape).notes;
   };
-  EXPECT_THAT(notes(0.5, 0, 0.1), testing::ElementsAre("its ripples of wavelength 0.5 m do not appear: the grid has a spacing of "
-                                                       "0.2 m there; set spacing_m: 0.0833"));
+  EXPECT_THAT(notes(0.5, 0, 0.1),
+              testing::ElementsAre("its ripples of wavelength 0.5 m do not appear: the finest spacing of its "
+                                   "grid is 0.2 m; set spacing_m: 0.0833, and fine_size_m if the bed is large"));
   EXPECT_THAT(notes(0.72, 0, 0.1), testing::ElementsAre(HasSubstr("have 20 % of their height at most")));
+  EXPECT_THAT(notes(0.6, 0, 0.1), testing::ElementsAre(HasSubstr("do not appear")))
+      << "three grid points a wave, but for rounding";
   EXPECT_THAT(notes(1.3, 0, 0.1), testing::IsEmpty());
   EXPECT_THAT(notes(0.5, pi / 2, 0.1), testing::IsEmpty()) << "the grid is finer along y";
   EXPECT_THAT(notes(0.5, 0, 0), testing::IsEmpty()) << "no ripples";
