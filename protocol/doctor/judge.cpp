@@ -180,10 +180,16 @@ class SonarJudge {
 
   void check_client(const v1::ClientStatus& client) {
     const bool has_fired = client.requests() > 0 || client.pings_written() > 0;
-    if (client.commands_only() && (has_fired || sonar_.pinging()))
-      return add(Level::ok, "driver", client.address() + " is connected to " + sonar_.name() + " for commands, and gets no pings",
-                 "", client.address());
-    if (has_fired)
+    const bool nobody_gets_pings = std::all_of(sonar_.clients().begin(), sonar_.clients().end(),
+                                               [](const v1::ClientStatus& other) { return other.commands_only(); });
+    if (client.commands_only() && nobody_gets_pings && has_fired && client.connected_s() >= soon_s)
+      add(Level::warn, "driver",
+          client.address() + " is connected to " + sonar_.name() + " for commands, but nobody is connected for its pings",
+          "connect to the sonar's other ports too; sonarctl status lists them", client.address());
+    else if (client.commands_only() && (has_fired || sonar_.pinging()))
+      add(Level::ok, "driver", client.address() + " is connected to " + sonar_.name() + " for commands, and gets no pings", "",
+          client.address());
+    else if (has_fired)
       add(Level::ok, "driver", client.address() + " is connected to " + sonar_.name() + " and has asked for pings", "",
           client.address());
     else if (client.connected_s() >= soon_s)

@@ -295,8 +295,11 @@ class SonarChecks {
         now.uptime_s() - facts_.control.status->uptime_s() >= soon_s ? facts_.control.status.get() : nullptr;
     const v1::SonarStatus* const reported = find(now);
     if (reported == nullptr) return;
-    const bool all_get_pings = std::all_of(reported->clients().begin(), reported->clients().end(),
-                                           [](const v1::ClientStatus& c) { return c.pings_written() > 0 || c.commands_only(); });
+    const auto gets_pings = [](const v1::ClientStatus& c) { return c.pings_written() > 0; };
+    const bool all_get_pings = reported->clients().empty() ||
+                               (std::any_of(reported->clients().begin(), reported->clients().end(), gets_pings) &&
+                                std::all_of(reported->clients().begin(), reported->clients().end(),
+                                            [&](const v1::ClientStatus& c) { return gets_pings(c) || c.commands_only(); }));
     std::vector<Finding> found;
     for (Finding& finding : sonar::doctor::judge(now, before)) {
       if (finding.sonar != reported->name() || finding.level == Level::ok || finding.check == "rate") continue;

@@ -141,7 +141,8 @@ TEST(Judge, ConnectedAndNeverFired) {
 TEST(Judge, AConnectionForCommandsNeedsNoPings) {
   const std::string commands = R"(clients { address: "127.0.0.1:40123" connected_s: 9 commands_only: true )";
   EXPECT_THAT(troubles(judge(with(pinging + driver + commands + "}"), nullptr)), IsEmpty());
-  EXPECT_THAT(troubles(judge(with(commands + "requests: 1 }"), nullptr)), IsEmpty());
+  EXPECT_THAT(trouble(with(commands + "requests: 1 }"), "driver").text, HasSubstr("but nobody is connected for its pings"));
+  EXPECT_EQ(trouble(with(pinging + driver + commands + "unread_s: 8 }"), "read").level, Level::fail);
   EXPECT_THAT(trouble(with(commands + "}"), "driver").text, HasSubstr("has not asked for pings")) << "nobody gets pings yet";
 }
 
