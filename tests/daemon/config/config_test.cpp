@@ -396,9 +396,9 @@ TEST(FindConfig, PassesOverAHomeThatIsClosedToThisUser) {
   ASSERT_EQ(::setenv("HOME", home.c_str(), 1), 0);
   ASSERT_EQ(::chmod(home.c_str(), 0), 0);
   const bool is_root = ::geteuid() == 0;
-  if (is_root) ASSERT_EQ(::seteuid(65534), 0);  // may enter every folder otherwise
+  ASSERT_EQ(is_root ? ::seteuid(65534) : 0, 0);  // the superuser may enter every folder
   const auto found = find_config("", false);
-  if (is_root) ASSERT_EQ(::seteuid(0), 0);
+  ASSERT_EQ(is_root ? ::seteuid(0) : 0, 0);
   ::chmod(home.c_str(), 0700);
   ::setenv("HOME", before.c_str(), 1);
   ASSERT_TRUE(found) << found.error().text;
