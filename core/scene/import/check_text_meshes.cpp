@@ -92,6 +92,15 @@ std::string fault_of_record(std::string_view line, const PlyElement& element) {
   return {};
 }
 
+/// True if `word` is "endsolid", or "end" before the word "solid", which then is removed from the line.
+bool is_end_of_solid(std::string_view word, std::string_view& line) {
+  if (same_letters(word, "endsolid")) return true;
+  std::string_view rest = line;
+  if (!same_letters(word, "end") || !same_letters(take_word(rest), "solid")) return false;
+  line = rest;
+  return true;
+}
+
 }  // namespace
 
 bool is_text_ply(std::string_view head) {
@@ -135,8 +144,7 @@ MeshFault check_stl_text(std::string_view file) {
       if (numbers_left > 0) {
         if (!is_like_number(word)) return which() + " has a corner with fewer than 3 numbers" + std::string(cut_short);
         --numbers_left;
-      } else if (const bool ends = same_letters(word, "endsolid") || same_letters(word, "end");
-                 ends || same_letters(word, "solid")) {
+      } else if (const bool ends = is_end_of_solid(word, line); ends || same_letters(word, "solid")) {
         ended = ended || ends;
         if (ends && in_facet && corners != 3) return wrong_corners();
         in_facet = in_facet && !ends;
