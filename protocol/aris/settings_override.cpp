@@ -68,7 +68,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Acoustics& a = s.acoustics;
   if (wanted.rate_hz) {
     if (*wanted.rate_hz < 1 || *wanted.rate_hz > highest_rate_hz)
-      return refused("an ARIS pings at 1 to 15 Hz; only a controller can stop it");
+      return refused("the rate of an ARIS is 1 to 15 Hz; only a controller can stop it");
     a.frame_rate_hz = static_cast<float>(*wanted.rate_hz);
   }
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);

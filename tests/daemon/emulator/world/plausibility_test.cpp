@@ -130,7 +130,7 @@ TEST(Plausibility, ASceneFarFromTheOriginOfLatitudesIsToldBeforeTheFirstPose) {
   config.origin = Geodetic{rad_from_deg(60), rad_from_deg(15), 0};
   EXPECT_THAT(notes(config, far),
               ElementsAre(AllOf(HasSubstr("the scene is 6670.2 km from world.origin; vehicles with latitudes"),
-                                HasSubstr("A height map in degrees or UTM is placed about it"))));
+                                HasSubstr("A height map in degrees or UTM without `origin` and `centred` is too"))));
   EXPECT_THAT(notes(config, bed_scene()), IsEmpty());
   far.objects[0].in_world.position_m = {900, 0, -5};
   EXPECT_THAT(notes(config, far), IsEmpty()) << "a drive away";
