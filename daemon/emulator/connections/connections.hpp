@@ -54,7 +54,7 @@ struct Connection {
 
   /// True if it gets datagrams: its port is of kind udp_stream or udp_dialogue.
   bool takes_datagrams() const { return port != nullptr && port->kind != protocol::Port::Kind::tcp_stream; }
-  /// Whether its port never has pings, only answers to commands.
+  /// True if its port never has pings, only answers to commands.
   bool is_for_commands() const { return port != nullptr && !port->has_pings; }
   /// Pings sent to it by its own connection or a stream.
   std::uint64_t pings_written() const { return outbox.pings_written() + streamed_pings; }
