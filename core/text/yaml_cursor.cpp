@@ -96,6 +96,8 @@ std::string Node::location() const {
 }
 void Node::fail(std::string_view what) const {
   const YamlNode* at = node_ ? node_ : parent_;
+  // finish() reports a missing required key, and names an unknown key that resembles it.
+  if (!node_ && at && std::find(at->missing.begin(), at->missing.end(), key_) != at->missing.end()) return;
   if (at && tree_) tree_->record(at->line, at->column, path(), what);
 }
 bool Node::expect_scalar(std::string_view wanted) const {

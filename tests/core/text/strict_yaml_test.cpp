@@ -202,6 +202,17 @@ TEST(StrictYaml, MissingKeyIsSaidUnlessASlipExplainsIt) {
             "f.yaml:2:1: scnee: unknown key; did you mean \"scene\"?");
 }
 
+TEST(StrictYaml, AReaderThatRefusesAMissingValueHidesNeitherTheMissingKeyNorTheSlip) {
+  const auto reader = [](Map m) {
+    const Node scene = m.required("scene");
+    if (scene.text().empty()) scene.fail("no such file");
+  };
+  EXPECT_EQ(read("b: 1", reader), "f.yaml:1:1: b: unknown key; valid keys: scene");
+  EXPECT_EQ(read("{}", reader), "f.yaml:1:1: scene: required key is missing");
+  EXPECT_EQ(read("scnee: a", reader), "f.yaml:1:1: scnee: unknown key; did you mean \"scene\"?");
+  EXPECT_EQ(read("{}", [](Map m) { m.optional("scene").fail("give a scene"); }), "f.yaml:1:1: scene: give a scene");
+}
+
 TEST(StrictYaml, TheFirstWrongValueWins) {
   EXPECT_EQ(read("a: x\nb: y\nc: 1", [](Map m) { m.required("a").number(), m.required("b").number(); }),
             "f.yaml:1:4: a: must be a finite decimal number, found \"x\"");

@@ -250,9 +250,11 @@ TEST(Config, EveryRefusalSaysWhatAndWhere) {
   const auto with = [&](const std::string& more) { return why(world + vehicles + sonar + more); };
   EXPECT_THAT(why("world: {scene: nowhere.yaml}\n" + vehicles + sonar),
               HasSubstr("sonard.yaml:1:16: world.scene: no such file: \"nowhere.yaml\"; looked in "));
-  EXPECT_THAT(why(vehicles + sonar), HasSubstr("world"));
-  EXPECT_THAT(why(world + sonar), HasSubstr("vehicles"));
-  EXPECT_THAT(why(world + vehicles), HasSubstr("sonars"));
+  EXPECT_EQ(why("world: {seed: 2}\n" + vehicles + sonar), "sonard.yaml:1:8: world.scene: required key is missing");
+  EXPECT_THAT(why("world: {sceen: scene.yaml}\n" + vehicles + sonar), HasSubstr("unknown key; did you mean \"scene\"?"));
+  EXPECT_THAT(why(vehicles + sonar), HasSubstr("world: required key is missing"));
+  EXPECT_THAT(why(world + sonar), HasSubstr("vehicles: required key is missing"));
+  EXPECT_THAT(why(world + vehicles), HasSubstr("sonars: required key is missing"));
   EXPECT_THAT(why(world + vehicles + "sonars: [{name: a, profile: oculus-m12, bind_ip: 127.0.0.2}]\n"),
               HasSubstr("oculus-m1200d"));
   EXPECT_THAT(why(world + vehicles + "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.256}]\n"),
