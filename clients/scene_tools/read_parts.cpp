@@ -24,10 +24,17 @@ class GeometryReader {
     return read_numbers(text_of(key), count, (child ? child : element_).place(), std::string(element_.name()) + " " + key,
                         findings_);
   }
-  double length(const char* key) { return checked(numbers(key, 1)[0], key); }
+  double length(const char* key, const char* otherwise) { return checked(numbers_or(key, 1, otherwise)[0], key); }
   Vec3d lengths(const char* key) {
-    const auto v = numbers(key, 3);
+    const auto v = numbers_or(key, 3, "1 1 1");
     return {checked(v[0], key), checked(v[1], key), checked(v[2], key)};
+  }
+  /// Without the key, the default of the SDF specification is used, as in Gazebo.
+  std::vector<double> numbers_or(const char* key, std::size_t count, const char* otherwise) {
+    if (element_.child(key) || has(key)) return numbers(key, count);
+    findings_.leave_out(element_.place(),
+                        std::string(element_.name()) + ": has no " + key + "; the default of SDF is used, " + otherwise + " m");
+    return read_numbers(otherwise, count, element_.place(), key, findings_);
   }
   double checked(double v, const char* key) {
     if (v > 0 && v <= most_m) return std::max(v, least_m);
@@ -115,22 +122,24 @@ std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, 
   for (const Element& element : geometry.children()) {
     GeometryReader in(element, findings);
     const std::string_view kind = element.name();
-    const auto round = [&](Shape::Kind of) { return Shape{.kind = of, .radius_m = in.length("radius")}; };
-    const auto long_one = [&](Shape::Kind of) {
-      Shape shape = round(of);
-      shape.length_m = in.length("length");
+    const auto round = [&](Shape::Kind of, const char* otherwise) {
+      return Shape{.kind = of, .radius_m = in.length("radius", otherwise)};
+    };
+    const auto long_one = [&](Shape::Kind of, const char* otherwise) {
+      Shape shape = round(of, otherwise);
+      shape.length_m = in.length("length", "1");
       return shape;
     };
     if (kind == "box") return in.finish({.kind = Shape::Kind::box, .size_m = in.lengths("size")});
-    if (kind == "sphere") return in.finish(round(Shape::Kind::sphere));
+    if (kind == "sphere") return in.finish(round(Shape::Kind::sphere, "1"));
     if (kind == "ellipsoid") {
       const Vec3d d = 2.0 * in.lengths("radii");
       return in.finish({.kind = Shape::Kind::ellipsoid,
                         .size_m = {in.checked(d.x, "radii"), in.checked(d.y, "radii"), in.checked(d.z, "radii")}});
     }
-    if (kind == "cylinder") return in.finish(long_one(Shape::Kind::cylinder));
-    if (kind == "capsule") return in.finish(long_one(Shape::Kind::capsule));
-    if (kind == "cone") return in.finish(long_one(Shape::Kind::cone));
+    if (kind == "cylinder") return in.finish(long_one(Shape::Kind::cylinder, "1"));
+    if (kind == "capsule") return in.finish(long_one(Shape::Kind::capsule, "0.5"));
+    if (kind == "cone") return in.finish(long_one(Shape::Kind::cone, "1"));
     if (kind == "plane") return in.finish(read_plane(in, offset));
     if (kind == "mesh") return in.finish(read_mesh(element, in));
     if (kind == "heightmap") return in.finish(read_heightmap(in, offset));

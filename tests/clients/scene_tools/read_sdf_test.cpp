@@ -160,6 +160,24 @@ TEST(ReadSdf, EveryShapeIsUnderstood) {
   EXPECT_THAT(r.findings.left_out(), ElementsAre());
 }
 
+TEST(ReadSdf, MissingLengthsAreTheDefaultsOfSdfAndAreTold) {
+  Reading r;
+  const auto part = [](const std::string& geometry) {
+    return std::string("<visual name='v'><geometry>") + geometry + "</geometry></visual>\n";
+  };
+  const auto world = r.read(sdf(model("m", std::string("<link name='l'>") + part("<sphere><size>3 3 3</size></sphere>") +
+                                               part("<box/>") + part("<capsule><length>4</length></capsule>") + "</link>")));
+  ASSERT_TRUE(world) << world.error().text;
+  ASSERT_EQ(world->shapes.size(), 3u);
+  EXPECT_EQ(world->shapes[0].shape.radius_m, 1);
+  EXPECT_EQ(world->shapes[1].shape.size_m.y, 1);
+  EXPECT_EQ(world->shapes[2].shape.radius_m, 0.5);
+  EXPECT_EQ(world->shapes[2].shape.length_m, 4);
+  EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: sphere: has no radius; the default of SDF is used, 1 m",
+                                                 "w.sdf:4: box: has no size; the default of SDF is used, 1 1 1 m",
+                                                 "w.sdf:5: capsule: has no radius; the default of SDF is used, 0.5 m"));
+}
+
 TEST(ReadSdf, CollisionsInsteadOfVisuals) {
   Reading r;
   const std::string text = sdf(model("m",
