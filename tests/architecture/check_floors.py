@@ -159,16 +159,20 @@ def tracked_files(root):
     return sorted(n for n in names if (root / n).is_file())
 
 
+def blank(text):
+    return "\n".join(" " * len(line) for line in text.split("\n"))
+
+
 def without_comments(text):
     """Returns the text with blank lines in place of comments; strings stay."""
     pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.S)
-    return pattern.sub(lambda m: m.group() if m.group().startswith('"') else re.sub(r"[^\n]", " ", m.group()), text)
+    return pattern.sub(lambda m: m.group() if m.group().startswith('"') else blank(m.group()), text)
 
 
 def comments_of(text):
     """Returns the text with only its comments; other lines become blank."""
-    pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|[^\n"/]+|.', re.S)
-    return pattern.sub(lambda m: m.group() if m.group().startswith(("//", "/*")) else re.sub(r"[^\n]", " ", m.group()), text)
+    pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|[^"/]+|.', re.S)
+    return pattern.sub(lambda m: m.group() if m.group().startswith(("//", "/*")) else blank(m.group()), text)
 
 
 def citation_violations(root, name, text):
@@ -239,10 +243,13 @@ def circle_violations(includes, part_of, parts):
             yield f'{name}:{number}: includes "{header}": the {parts} {here} and {there} include each other; give them one direction'
 
 
-def wording_violations(name, text):
+def wording_violations(comments):
     """The first line of a comment must not begin as a fragment; no line may have a word of PERSONS, IDIOMS or RIDDLES."""
     before = ""
-    for number, line in enumerate(comments_of(text).splitlines(), 1):
+    for number, line in enumerate(comments.splitlines(), 1):
+        if not line.strip():
+            before = ""
+            continue
         if not before.startswith("//") and (match := FRAGMENT.match(line)):
             yield number, f'comment: begins with "{match[1]}"; write a sentence, or a noun phrase that names the thing'
         if match := PERSONS.search(line):
@@ -285,9 +292,9 @@ def violations(root):
         except UnicodeDecodeError:
             continue  # a binary without an extension
         is_code = path.suffix in CODE
-        code = without_comments(text) if is_code else text
+        code, comments = (without_comments(text), comments_of(text)) if is_code else (text, text)
         if is_code:
-            for number, what in [*include_violations(name, code), *wording_violations(name, text)]:
+            for number, what in [*include_violations(name, code), *wording_violations(comments)]:
                 yield f"{name}:{number}: {what}"
             if re.match(ONE_DIRECTION, name) and name not in LISTS:
                 includes += [(name, line_of(code, m.start(1)), m[1])
@@ -299,7 +306,7 @@ def violations(root):
         if is_code or path.suffix in {".py", ".lua", ".js"}:
             for number, what in make_violations(name, code):
                 yield f"{name}:{number}: {what}"
-        for position, what in citation_violations(root, name, comments_of(text) if is_code else text):
+        for position, what in citation_violations(root, name, comments):
             yield f"{name}:{line_of(text, position)}: {what}"
         for rule, where, excepted, pattern, why in FORBIDDEN:
             if not re.match(where, name) or (where and not is_code) or (excepted and re.match(excepted, name)):
