@@ -4,4 +4,4 @@ set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 mode=(--dry-run -Werror)
 [ "${1:-}" = --fix ] && mode=(-i)
-git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' | xargs -0 --no-run-if-empty clang-format-14 "${mode[@]}"
+git ls-files -z '*.hpp' '*.cpp' '*.cu' '*.cuh' | xargs -0 --no-run-if-empty -n 40 -P "$(nproc)" clang-format-14 "${mode[@]}"
