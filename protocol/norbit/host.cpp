@@ -44,30 +44,35 @@ std::vector<std::pair<double, double>> points_of(const Bathymetry& bathymetry) {
   return points;
 }
 
-/// The picture of a water column. nullopt: the angles do not rise from port to starboard, or the samples have no range.
-std::optional<PolarImage> image_of(const Column& column) {
-  PolarImage image;
-  image.rows = column.front.samples;
-  image.beams = column.front.beams;
-  image.row_spacing_m = column.sample_m();
-  image.start_m = std::max(0.0, (column.front.first_sample - 0.5) * image.row_spacing_m);  // a sample is in the middle of its row
+/// The picture of a water column without its samples. nullopt: the angles do not rise from port to starboard, or the samples have
+/// no range.
+std::optional<PolarImage> fan_of(const Column& column) {
+  PolarImage fan;
+  fan.rows = column.front.samples;
+  fan.beams = column.front.beams;
+  fan.row_spacing_m = column.sample_m();
+  fan.start_m = std::max(0.0, (column.front.first_sample - 0.5) * fan.row_spacing_m);  // a sample is in the middle of its row
   wire::Reader angles(column.directions);
-  for (std::size_t n = 0; n < image.beams; ++n) {
+  for (std::size_t n = 0; n < fan.beams; ++n) {
     float angle = 0;
     angles("direction", angle);
-    image.azimuth_rad.push_back(-static_cast<double>(angle));
-    if (!std::isfinite(angle) || (n > 0 && !(image.azimuth_rad[n] < image.azimuth_rad[n - 1]))) return std::nullopt;
+    fan.azimuth_rad.push_back(-static_cast<double>(angle));
+    if (!std::isfinite(angle) || (n > 0 && !(fan.azimuth_rad[n] < fan.azimuth_rad[n - 1]))) return std::nullopt;
   }
-  if (!(image.row_spacing_m > 0 && std::isfinite(image.row_spacing_m)) || image.rows < 1 || image.beams < 2) return std::nullopt;
-  image.samples.resize(image.rows * image.beams);
+  if (!(fan.row_spacing_m > 0 && std::isfinite(fan.row_spacing_m)) || fan.rows < 1 || fan.beams < 2) return std::nullopt;
+  return fan;
+}
+
+PolarImage with_samples(PolarImage fan, const Column& column) {
+  fan.samples.resize(fan.rows * fan.beams);
   wire::Reader pixels(column.pixels);
-  for (float& sample : image.samples) {
+  for (float& sample : fan.samples) {
     std::uint16_t pixel = 0;
     pixels("pixel", pixel);
     sample = pixel;
   }
-  image.shade(shades);
-  return image;
+  fan.shade(shades);
+  return fan;
 }
 
 /// A fan without samples. Points are drawn on it if there is no water column.
@@ -170,7 +175,7 @@ class NorbitHost final : public protocol::Host {
   /// reader loses different pings at each port. If the port is silent at `now`, the ping is shown incomplete.
   void show(std::optional<Time> now, HostActions& actions) {
     while (!waiting_.empty()) {
-      const Parts& ping = waiting_.front();
+      Parts& ping = waiting_.front();
       const bool is_left_out = !ping.is_whole() && std::any_of(waiting_.begin() + 1, waiting_.end(),
                                                                [&](const Parts& p) { return p.has(ping.missing()); });
       if (!ping.is_whole() && !is_left_out) {
@@ -181,11 +186,13 @@ class NorbitHost final : public protocol::Host {
         if (shown.size() > most_waiting) shown.erase(shown.begin());
       }
       waiting_bytes_ -= ping.bytes;
-      if (!is_left_out) emit(ping, actions);
+      if (!is_left_out) emit(std::make_shared<const Parts>(std::move(ping)), actions);
       waiting_.pop_front();
     }
   }
-  void emit(const Parts& parts, HostActions& actions) {
+  /// The picture is decoded only if the caller asks for it.
+  void emit(std::shared_ptr<const Parts> kept, HostActions& actions) {
+    const Parts& parts = *kept;
     HostPing ping;
     SonarPicture seen{.kind = PictureKind::points, .image = {}};
     ping.facts.bits = 16;
@@ -207,7 +214,7 @@ class NorbitHost final : public protocol::Host {
       ping.facts.note =
           seen.points.empty() ? "no bottom" : format("%zu points from %.2f to %.2f m", seen.points.size(), nearest_m, farthest_m);
     }
-    std::optional<PolarImage> image;
+    std::optional<PolarImage> fan;
     if (parts.column) {
       const Column& column = *parts.column;
       const ColumnFront& front = column.front;
@@ -218,21 +225,25 @@ class NorbitHost final : public protocol::Host {
       ping.facts.range_m = (front.first_sample - 0.5 + static_cast<double>(front.samples)) * column.sample_m();
       ping.facts.frequency_hz = 1e3 * static_cast<double>(front.frequency_khz);
       ping.fired_s = front.time_s;
-      image = image_of(column);
-      if (!image) ping.errors.emplace_back("the directions of the beams do not rise, or its samples have no range");
+      fan = fan_of(column);
+      if (!fan) ping.errors.emplace_back("the directions of the beams do not rise, or its samples have no range");
     }
     if (last_ && ping.facts.number > *last_ + 1) counts_.missing_pings += ping.facts.number - *last_ - 1;
     if (last_ && ping.facts.number <= *last_)
       ping.errors.push_back("number " + std::to_string(ping.facts.number) + " after " + std::to_string(*last_));
     last_ = ping.facts.number;
-    if (image) shown_m_ = ping.facts.range_m;
-    seen.column = image ? SonarPicture::Column::sent : SonarPicture::Column::none;
-    seen.image = image ? *image : empty_fan(std::max(ping.facts.range_m, shown_m_));
-    ping.picture = [image]() -> Result<PolarImage> {
-      if (image) return *image;
+    if (fan) shown_m_ = ping.facts.range_m;
+    seen.column = fan ? SonarPicture::Column::sent : SonarPicture::Column::none;
+    if (!fan) seen.image = empty_fan(std::max(ping.facts.range_m, shown_m_));
+    ping.picture = [kept, fan]() -> Result<PolarImage> {
+      if (fan) return with_samples(*fan, *kept->column);
       return failure(ErrorKind::usage, "a picture needs the water column, port 2211: sonarctl listen prints the points");
     };
-    ping.drawing = [seen = std::move(seen)] { return seen; };
+    ping.drawing = [kept = std::move(kept), fan = std::move(fan), seen = std::move(seen)] {
+      SonarPicture drawn = seen;
+      if (fan) drawn.image = with_samples(*fan, *kept->column);
+      return drawn;
+    };
     actions.emplace_back(std::move(ping));
   }
 

@@ -53,6 +53,7 @@ inline std::shared_ptr<const Ping> computed(PingRequest request) {
     ping->beam_azimuth_rad.push_back(beams < 2 ? 0.0f : 0.5f - static_cast<float>(b) / static_cast<float>(beams - 1));
   if (s.format.row_gains) ping->row_gain.assign(rows, 1);
   ping->request = std::move(request);
+  look_at(*ping);  // as the engine's thread does; otherwise every message of the ping makes the findings again
   return ping;
 }
 
