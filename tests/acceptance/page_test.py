@@ -240,6 +240,20 @@ class Page(PageChecks, unittest.TestCase):
         page.click("#clear-faults")
         page.wait("!document.querySelector('.fault-card')")
 
+    def test_a_fault_does_not_move_the_panes_of_a_phone(self):
+        page = self.open(390, 844, touch=True)
+        shown(page)
+        below_head = page.run("document.querySelector('main').offsetTop")
+        page.touch("#tabs [data-tab=faults]")
+        page.run("document.querySelector('#fault-seconds').value = '300'")
+        page.touch("[data-trouble=thin_tether]")
+        page.wait("document.querySelector('#tab-faults').innerText === '1'")
+        self.assertEqual(page.run("document.querySelector('main').offsetTop"), below_head)
+        self.assert_fits(page, 390, "fault-")
+        page.touch("#tabs [data-tab=faults]")
+        page.touch("#clear-faults")
+        page.wait("document.querySelector('#tab-faults').hidden")
+
     def test_lost_and_found_again(self):
         page = self.open(1100, 760)
         shown(page)
