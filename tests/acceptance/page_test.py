@@ -232,6 +232,7 @@ class Page(PageChecks, unittest.TestCase):
         self.assertEqual(page.text("[data-trouble=lease_renewal] small"),
                          "The address is withdrawn and returns. Cannot act here: the sonar needs two network namespaces: sonarctl lab.")
         self.assertTrue(page.run("document.querySelector('[data-trouble=lease_renewal]').disabled"))
+        self.assertEqual(page.run("[...document.querySelectorAll('#troubles button')].at(-1).dataset.trouble"), "lease_renewal", "those that can act come first")
         self.assertIn("Lasts 21 s.", page.text("[data-trouble=power_cycle]"))
         self.assertIn("Does not put back the settings that it changed.", page.text("[data-trouble=second_operator]"))
         self.assertIn("Begins with a ping.", page.text("[data-trouble=bad_connector]"))
@@ -239,6 +240,15 @@ class Page(PageChecks, unittest.TestCase):
         page.wait("document.querySelector('.fault-card .left')?.innerText === 'waits for a ping'")
         page.click("#clear-faults")
         page.wait("!document.querySelector('.fault-card')")
+
+    def test_why_a_fault_cannot_act_can_be_read(self):
+        for theme in ("dark", "light"):
+            with self.subTest(theme=theme):
+                page = self.open(theme=theme)
+                page.wait("document.querySelector('[data-trouble=lease_renewal]:disabled small')?.innerText")
+                self.assertEqual([words for words in page.run(FAINT_WORDS.replace(":disabled, ", "")) if "withdrawn" in words], [])
+                self.assertEqual(page.run("getComputedStyle(document.querySelector('[data-trouble=lease_renewal]')).opacity"), "1")
+                page.close()
 
     def test_a_fault_does_not_move_the_panes_of_a_phone(self):
         page = self.open(390, 844, touch=True)

@@ -28,8 +28,8 @@ TOPICS = {"/front/image": "foxglove.RawImage", "/front/fan": "foxglove.RawImage"
           "/front/ping": "sonar.v1.PingEvent", "/tf": "foxglove.FrameTransforms", "/scene": "foxglove.SceneUpdate",
           "/swath": "foxglove.SceneUpdate", "/log": "foxglove.Log", "/status": "sonar.v1.DaemonStatus",
           "/doctor": "sonar.v1.Findings", "/faults": "sonar.v1.FaultReport"}
-TROUBLES = ["bad_connector", "thin_tether", "power_cycle", "wrong_subnet", "second_operator", "other_firmware", "overheating",
-            "clock_step", "electrical_noise", "lease_renewal"]
+TROUBLES = ["lease_renewal", "bad_connector", "thin_tether", "power_cycle", "wrong_subnet", "second_operator", "other_firmware",
+            "overheating", "clock_step", "electrical_noise"]
 # The part of the fault report about troubles.
 ABOUT = {"thin_tether": {"sentence": "The tether is slow and late."}, "power_cycle": {"own_s": 21},
          "second_operator": {"stays": "the settings that it changed"}, "bad_connector": {"waits_for": "a ping"},

@@ -48,10 +48,14 @@ function card(group, about) {
   );
 }
 
-/// Begins a trouble. Returns its description, or the reason why it cannot begin.
+const aboutOf = (trouble, facts) => facts.troubles.get(trouble.replace(/_/g, '-'));
+/// The reason why the trouble cannot act on the sonar; undefined if it can.
+const whyNot = (trouble, facts) => aboutOf(trouble, facts)?.cannot_act.find((entry) => entry.key === facts.sonar)?.value;
+
+/// A button that begins a trouble, with its description or the reason why it cannot act.
 function button({ name, trouble }, facts, able, steering) {
-  const about = facts.troubles.get(trouble.replace(/_/g, '-'));
-  const cannot = about?.cannot_act.find((entry) => entry.key === facts.sonar)?.value;
+  const about = aboutOf(trouble, facts);
+  const cannot = whyNot(trouble, facts);
   const notes = [
     about?.sentence,
     cannot ? `Cannot act here: the sonar ${cannot}.` : about?.waits_for && `Begins with ${about.waits_for}.`,
@@ -84,6 +88,7 @@ export function drawFaults(facts, steering) {
   });
 
   const troubles = armed ? offered(facts) : [];
+  troubles.sort((a, b) => Boolean(whyNot(a.trouble, facts)) - Boolean(whyNot(b.trouble, facts)));  // those that can act come first
   const able = facts.maySteer && facts.connection === 'open';
   showList($('troubles'), [troubles, able, armed, [...facts.troubles.values()]], () => {
     if (armed === undefined) return [];
