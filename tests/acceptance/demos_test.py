@@ -48,6 +48,34 @@ NOTE_FOCUSED = f"""window.reached = new Set(), document.activeElement.blur(),
 REACHED = "[...window.reached]"
 
 
+# Notes the words that are on the canvas of the marks now, with the middle of each.
+NOTE_WORDS = """window.words = new Map();
+{
+  const { clearRect, fillText: write } = CanvasRenderingContext2D.prototype;
+  CanvasRenderingContext2D.prototype.clearRect = function (...box) {
+    if (this.canvas.id === 'fan-marks') window.words.clear();
+    clearRect.apply(this, box);
+  };
+  CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+    const half = this.measureText(text).width / 2;
+    window.words.set(text, [x + (this.textAlign === 'left' ? half : 0), y - 4, half]);
+    write.call(this, text, x, y);
+  };
+}"""
+# The range labels of which a corner lies in the picture that sonard has drawn; undefined until they are written.
+LABELS_INSIDE = """(() => {
+  const picture = document.querySelector('#drawn');
+  const labels = [...window.words].filter(([text]) => / m$/.test(text));
+  if (!labels.length || !picture.offsetWidth) return undefined;
+  const copy = Object.assign(document.createElement('canvas'), { width: picture.offsetWidth, height: picture.offsetHeight }).getContext('2d');
+  copy.drawImage(picture, 0, 0, picture.offsetWidth, picture.offsetHeight);
+  const colour = (x, y) => copy.getImageData(x, y, 1, 1).data.join();
+  const outside = [colour(0, 0), '0,0,0,0'];  // beside the canvas nothing is drawn
+  return labels.filter(([, [x, y, half]]) => [[-half, -4], [half, -4], [-half, 4], [half, 4]].some(([dx, dy]) =>
+    !outside.includes(colour(x + dx - picture.offsetLeft, y + dy - picture.offsetTop)))).map(([text]) => text).join() || 'none';
+})()"""
+
+
 def demo(maker):
     return Daemon(None, str(SONARD), [maker])
 
@@ -260,6 +288,14 @@ class Pages(PageChecks, unittest.TestCase):
                 theirs = b"".join(bytes((v, v, v)) if v else drawn[2][3 * i:3 * i + 3] for i, v in enumerate(image["data"]))
                 limits = {"most_mean": 4, "most_p99": 45, "most_above": 0.2} if script else {"most_mean": 1, "most_p99": 4, "most_above": 0.01}
                 self.compare(drawn, (image["width"], image["height"], theirs), **limits)
+
+    def test_range_labels_lie_beside_a_picture_that_opens_downwards(self):
+        for maker in ("norbit", "surveyor"):
+            with self.subTest(demo=maker), demo(maker):
+                page = self.opened(self.browser.open(f"http://{HTTP}:8088/", 1600, 1000, script=NOTE_WORDS + ";" + WITHOUT_WEBGL))
+                shown(page)
+                self.assertEqual(page.wait(LABELS_INSIDE), "none")
+                page.close()
 
     def test_a_setting_by_keys_and_a_refusal_beside_it(self):
         for width, height in ((1600, 1000), (390, 844)):
