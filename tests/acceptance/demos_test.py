@@ -289,6 +289,17 @@ class Pages(PageChecks, unittest.TestCase):
                 limits = {"most_mean": 4, "most_p99": 45, "most_above": 0.2} if script else {"most_mean": 1, "most_p99": 4, "most_above": 0.01}
                 self.compare(drawn, (image["width"], image["height"], theirs), **limits)
 
+    def test_a_preview_has_a_rate_and_not_the_latency_of_the_last_driver(self):
+        with demo("oculus"):
+            page = self.opened(self.browser.open(f"http://{HTTP}:8088/?test=300", 1600, 1000))
+            with subprocess.Popen([SONARCTL, "listen", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+                page.wait("/^\\d+ ms$/.test(document.querySelector('#latency').textContent)")
+                driver.terminate()
+            page.wait("document.querySelector('#rate-word').textContent === 'preview'")
+            page.wait("document.querySelector('#latency').textContent === '–'")
+            page.wait("sonardTest.facts.preview && sonardTest.facts.history.at(-1).rate > 0")
+            page.close()
+
     def test_range_labels_lie_beside_a_picture_that_opens_downwards(self):
         for maker in ("norbit", "surveyor"):
             with self.subTest(demo=maker), demo(maker):

@@ -243,7 +243,7 @@ export class Facts {
     const made = this.sonarStatus?.figures?.pings;
     if (made !== undefined) {
       const last = this.history.at(-1);
-      const rate = last && made >= last.made && time_s > last.time_s ? (made - last.made) / (time_s - last.time_s) : undefined;
+      const rate = this.preview ? this.numbered.rate : last && made >= last.made && time_s > last.time_s ? (made - last.made) / (time_s - last.time_s) : undefined;
       if (!last || time_s - last.time_s > 0.5 || made < last.made) this.history.push({ time_s, made, rate });
       this.history = this.history.filter((h) => h.time_s > time_s - history_s && h.time_s <= time_s);
     }

@@ -76,7 +76,8 @@ export function drawConnections(facts) {
 export function drawHistory(canvas, facts) {
   const ratio = Math.min(2, devicePixelRatio || 1);
   const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(34 * ratio)];
-  const shown = [width, height, facts.sonar, facts.history.at(-1)?.time_s, facts.wantedRate, document.documentElement.dataset.theme].join();
+  const asked = facts.preview ? 0 : facts.wantedRate;  // previews have a rate of their own
+  const shown = [width, height, facts.sonar, facts.history.at(-1)?.time_s, asked, document.documentElement.dataset.theme].join();
   if (width === 0 || canvas.shown === shown) return;
   canvas.shown = shown;
   if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
@@ -84,7 +85,6 @@ export function drawHistory(canvas, facts) {
   g.clearRect(0, 0, width, height);
   const style = getComputedStyle(canvas);
   const points = facts.history.filter((h) => h.rate !== undefined);
-  const asked = facts.wantedRate;
   const top = Math.max(asked, ...points.map((p) => p.rate), 1) * 1.15;
   const y = (rate) => height - 2 - (rate / top) * (height - 4);
   g.fillStyle = style.getPropertyValue('--line');

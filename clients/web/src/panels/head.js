@@ -36,7 +36,7 @@ export function drawHead(facts) {
   const sonar = facts.sonarStatus;
   setHidden($('frequency-chip'), !sonar);
   setText($('frequency'), frequency(sonar?.frequency_hz));
-  const latency = sonar?.figures?.latency_ms_p50;
+  const latency = facts.listened ? sonar?.figures?.latency_ms_p50 : 0;  // without a driver it would be that of the last one
   setText($('latency'), latency > 0 ? `${fixed(latency, 0)} ms` : dash);
   const faults = new Set(facts.faults.map((f) => f.do + f.sonar)).size;
   setHidden($('chip-faults'), faults === 0);
