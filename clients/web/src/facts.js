@@ -84,6 +84,11 @@ export class Facts {
   get sonarStatus() {
     return this.status?.sonars.find((s) => s.name === this.sonar) ?? null;
   }
+  /// Who changed the settings last, as the page names it: "a page", or the address of a driver; '' = nobody.
+  get asker() {
+    const by = this.sonarStatus?.asked_by ?? '';
+    return by.startsWith('live view ') ? 'a page' : by;
+  }
   /// True if a driver is connected or a group of receivers gets the pings.
   get listened() {
     const sonar = this.sonarStatus;

@@ -79,6 +79,7 @@ export function drawSettings(facts, steering) {
     const text = value === 0 && field.placeholder ? '' : typeof value === 'number' ? short(value, 2) : String(value ?? '');
     if (document.activeElement !== field && field.value !== text) field.value = text;
   }
-  const by = facts.sonarStatus?.asked_by;
-  setText($('asked-by'), by ? `last asked by ${by === facts.info?.metadata?.['sonard.viewer'] ? 'this page' : by}` : '');
+  const { asker } = facts;
+  setText($('asked-by'), asker ? `last asked by ${asker}` : '');
+  $('asked-by').title = asker ? facts.sonarStatus.asked_by : '';
 }
