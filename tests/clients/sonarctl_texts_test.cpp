@@ -88,7 +88,7 @@ TEST(StatusText, NamesEverything) {
        {"sonard 0.1.0  up 62 min  120 MB\n", "config    a.yaml\n", "scene     demo:harbour  seed 1  clock realtime\n",
         "water     12 C, 30 psu, pH 8, sound speed computed\n",
         "sonar     front  oculus-m1200d  2.1 MHz  10 m  standby  gain 0 dB  512 beams x 437 rows  transmitter off\n",
-        "tcp        0.0.0.0:52100              settings, pings; waits for the driver\n",
+        "tcp        0.0.0.0:52100              settings, pings\n",
         "status     10.0.0.255:52102           sends without a request\n", "advertised as 10.0.0.5\n",
         "place   -6.00 0.00 -3.00 m, heading 90.0, pitch -10.0, roll 0.0 deg\n",
         "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n",
@@ -96,6 +96,16 @@ TEST(StatusText, NamesEverything) {
         "from trajectory way.csv  at 60.0 of 60.0 s x1 ended\n", "moving  hidden\n",
         "mavlink   udpin:127.0.0.1:14551  rov  7 distances sent, 2 dropped\n"})
     EXPECT_THAT(text, HasSubstr(part));
+}
+
+TEST(StatusText, ASonarWaitsOnlyWhileNoDriverIsConnected) {
+  const auto text_of = [](const std::string& client) {
+    return text_from(control::message_from<v1::DaemonStatus>(
+        R"(sonars { addresses { protocol: "tcp" address: "10.0.0.5:1" carries: "pings" } )" + client + " }"));
+  };
+  EXPECT_THAT(text_of(""), HasSubstr("tcp        10.0.0.5:1                 pings; waits for the driver\n"));
+  for (const char* listener : {R"(clients { address: "10.0.0.9:4000" })", R"(receivers: "224.0.0.96:4747")"})
+    EXPECT_THAT(text_of(listener), HasSubstr("tcp        10.0.0.5:1                 pings\n"));
 }
 
 TEST(StatusText, HasTheMeasuredRateBesideTheOneThatIsSet) {

@@ -51,10 +51,17 @@ std::string client_text(const v1::ClientStatus& c) {
   return text + (c.silent_s() >= reported_silence_s ? format(", last heard %.0f s ago", c.silent_s()) : "");
 }
 
+/// The line of the banner. The sonar waits for the driver only while no client or receiver gets its pings.
+std::string address_text(const v1::SonarAddress& a, bool is_listened) {
+  if (is_listened && !a.sonar_speaks_first())
+    return format("%-10s %-26s %s", a.protocol().c_str(), a.address().c_str(), a.carries().c_str());
+  return protocol::line_of(a.protocol(), a.address(), a.carries(), a.sonar_speaks_first());
+}
+
 std::string sonar_text(const v1::SonarStatus& s) {
   std::string text = line("sonar", s.name() + "  " + s.profile() + "  " + settings_text(s));
-  for (const v1::SonarAddress& a : s.addresses())
-    text += "          " + protocol::line_of(a.protocol(), a.address(), a.carries(), a.sonar_speaks_first()) + "\n";
+  const bool is_listened = !s.clients().empty() || !s.receivers().empty();
+  for (const v1::SonarAddress& a : s.addresses()) text += "          " + address_text(a, is_listened) + "\n";
   if (!s.advertised().empty() && !s.listens().empty() && !s.listens().starts_with(s.advertised() + ":"))
     text += line("", "advertised as " + s.advertised());
   if (!s.observers().empty()) text += line("", format("observers at %s (%u now)", s.observers().c_str(), s.observing()));
