@@ -18,6 +18,9 @@ TEST(Doctor, LeavesABusySonarAlone) {
   facts.sonars[0].stream = {};
   facts.sonars[0].clients = {"127.0.0.1:41022"};
   expect(line(facts, "ping"), Level::ok, "127.0.0.2 is busy: 127.0.0.1:41022 is connected; not connecting (--take", "");
+  facts.sonars[0].clients.push_back("127.0.0.1:41023");
+  EXPECT_THAT(line(facts, "ping").text, HasSubstr("127.0.0.1:41022, 127.0.0.1:41023 are connected; not connecting"));
+  facts.sonars[0].clients.pop_back();
   v1::SonarFigures& figures = *report(facts).mutable_figures();
   figures.set_served(120);
   figures.set_latency_ms_p99(33);
@@ -107,6 +110,12 @@ TEST(Doctor, MeasuresTheRate) {
   expect(line(facts, "rate"), Level::warn, "rate 3.0 Hz (asked 10)", "fewer beams");
   s.pings = 1;
   expect(line(facts, "rate"), Level::warn, "one ping only", "sonarctl listen 127.0.0.2");
+}
+
+TEST(Doctor, CountsOneBeamAsOne) {
+  Facts facts = healthy();
+  facts.sonars[0].stream.beams = 1;
+  EXPECT_THAT(line(facts, "ping").text, HasSubstr(": 1 beam x 437 ranges, 8 bit"));
 }
 
 TEST(Doctor, SaysWhatComputingAllows) {

@@ -108,6 +108,11 @@ TEST(StatusText, ASonarWaitsOnlyWhileNoDriverIsConnected) {
     EXPECT_THAT(text_of(listener), HasSubstr("tcp        10.0.0.5:1                 pings\n"));
 }
 
+TEST(StatusText, CountsOneTickAsOne) {
+  const auto status = control::message_from<v1::DaemonStatus>("sonars { figures { skipped_ticks: 1 } }");
+  EXPECT_THAT(text_from(status), HasSubstr("0 refused, 1 tick skipped\n"));
+}
+
 TEST(StatusText, HasTheMeasuredRateBesideTheOneThatIsSet) {
   const auto text_of = [](const std::string& sonar) {
     return text_from(control::message_from<v1::DaemonStatus>("sonars { range_m: 10 pinging: true " + sonar + " }"));

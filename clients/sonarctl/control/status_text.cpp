@@ -67,8 +67,9 @@ std::string sonar_text(const v1::SonarStatus& s) {
   if (!s.observers().empty()) text += line("", format("observers at %s (%u now)", s.observers().c_str(), s.observing()));
   text += line("  place", place_text(control::pose_of(s)));
   const v1::SonarFigures& f = s.figures();
-  text += line("  pings", format("%llu simulated, %llu served, %llu dropped, %llu refused, %llu ticks skipped", wide(f.pings()),
-                                 wide(f.served()), wide(f.dropped()), wide(f.refused()), wide(f.skipped_ticks())));
+  text +=
+      line("  pings", format("%llu simulated, %llu served, %llu dropped, %llu refused, %s skipped", wide(f.pings()),
+                             wide(f.served()), wide(f.dropped()), wide(f.refused()), counted(f.skipped_ticks(), "tick").c_str()));
   text += line("  times", format("simulation %.1f ms, latency p50 %.1f ms, p99 %.1f ms, late p99 %.1f ms", f.simulation_ms(),
                                  f.latency_ms_p50(), f.latency_ms_p99(), f.late_ms_p99()));
   text += line("  clients", format("%d now, %llu since the start, %llu refused", s.clients_size(), wide(f.clients()),

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "clients/sonarctl/doctor/checks.hpp"
+#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/doctor/judge.hpp"
@@ -84,7 +85,7 @@ class SonarChecks {
     const double asked_hz = sonar_.reported->rate_hz();
     const v1::SonarFigures& figures = sonar_.reported->figures();
     const std::string text = at + ": images by UDP, " + format("%.1f Hz (%g requested), ", figures.made_hz(), asked_hz) +
-                             std::to_string(figures.skipped_ticks()) + " ticks skipped";
+                             text::counted(figures.skipped_ticks(), "tick") + " skipped";
     if (too_slow_for(asked_hz))
       add(Level::warn, "ping", text + ", " + computing_text(computing_ms()), less_to_compute);
     else
@@ -141,7 +142,8 @@ class SonarChecks {
     switch (s.outcome) {
       case Outcome::not_tried:
         return add(Level::ok, "ping",
-                   sonar_.at.host + " is busy: " + joined(sonar_.clients) + " is connected; not connecting" + stats_of_daemon(),
+                   sonar_.at.host + " is busy: " + joined(sonar_.clients) + (sonar_.clients.size() > 1 ? " are" : " is") +
+                       " connected; not connecting" + stats_of_daemon(),
                    "");
       case Outcome::refused:
         return add(Level::fail, "ping",
@@ -160,7 +162,7 @@ class SonarChecks {
         break;
     }
     const std::string first = at_ + " accepts, first ping decoded after " + format("%.0f", s.first_ping_ms) +
-                              " ms: " + std::to_string(s.beams) + " beams x " + std::to_string(s.rows) + " ranges, " +
+                              " ms: " + text::counted(s.beams, "beam") + " x " + text::counted(s.rows, "range") + ", " +
                               std::to_string(s.bits) + " bit, ";
     if (s.broken > 0 || s.junk_bytes > 0)
       return add(Level::fail, "ping",
@@ -283,7 +285,8 @@ class SonarChecks {
       return;
     add(Level::warn, "rate",
         "rate " + format("%g", sonar_.reported->rate_hz()) + " Hz requested by " + joined(sonar_.clients) + ", " +
-            computing_text(computing_ms()) + ", " + std::to_string(sonar_.reported->figures().skipped_ticks()) + " ticks skipped",
+            computing_text(computing_ms()) + ", " + text::counted(sonar_.reported->figures().skipped_ticks(), "tick") +
+            " skipped",
         less_to_compute);
   }
 
