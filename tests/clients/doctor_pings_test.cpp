@@ -129,6 +129,8 @@ TEST(Doctor, SaysWhatComputingAllows) {
   sonar.stream.computing_ms = 193, sonar.stream.rate_hz = 5.2;
   expect(line(facts, "rate"), Level::warn, "computing takes 193 ms per ping: 5.2 Hz at most here: the simulation is slower",
          "engine.threads");
+  sonar.stream.computing_ms = 555, sonar.stream.rate_hz = 9.1;
+  EXPECT_THAT(line(facts, "rate").text, Not(HasSubstr("at most here"))) << "the measured rate is higher";
 
   // A sonar with another client, by the statistics of the daemon.
   sonar.stream = {};
