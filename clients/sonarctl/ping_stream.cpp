@@ -112,7 +112,15 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
       if (failed.kind == ErrorKind::usage) return tl::unexpected(failed);
     }
     if (interrupted != 0) return failure(ErrorKind::io, "interrupted before " + device.host + " answered");
-    if (is_last) return tl::unexpected(failed);
+    if (is_last) {
+      std::string silent;
+      for (const auto& [one, at] : others)
+        silent += (silent.empty() ? "" : " and ") + std::string(one->ports.front().kind == Kind::http ? "http " : "udp ") +
+                  text_from(at);
+      if (make == nullptr && !silent.empty())
+        failed.text += "; " + silent + " did not answer: on a busy computer name the make (--make)";
+      return tl::unexpected(failed);
+    }
     for (const Candidate& candidate : others) {
       const bool by_http = candidate.first->ports.front().kind == Kind::http;
       auto within = make != nullptr ? std::max(left_until(deadline), 1ms) : probe_patience;
