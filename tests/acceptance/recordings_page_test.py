@@ -166,6 +166,18 @@ class Recordings(PageChecks, unittest.TestCase):
                     page.close()
 
     @unittest.skipIf(WHY_NOT, WHY_NOT)
+    def test_playing_requests_nothing_that_a_recording_refuses(self):
+        with demo("3d15"), Browser() as browser:
+            path = record("3d15", 5)
+            page = self.opened(browser.open(f"http://{HTTP}:8088/?recording={path.name}", 1600, 1000))
+            shown(page)
+            page.wait("document.querySelector('#fan-glass').dataset.kind === 'range image'")
+            page.press(" ")  # answers come in the order of the requests
+            page.wait("document.querySelector('#play').getAttribute('aria-label') === 'Play'")
+            self.assertEqual(page.run("document.querySelector('#refusal').innerText"), "")
+            page.close()
+
+    @unittest.skipIf(WHY_NOT, WHY_NOT)
     def test_a_recording_without_pings_is_not_offered(self):
         with demo("oculus"), Browser() as browser:
             page = self.opened(browser.open(f"http://{HTTP}:8088/", 1600, 1000))

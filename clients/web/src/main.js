@@ -110,9 +110,10 @@ function choose() {
   connection.want(topics);
 }
 
-/// Called once for each sonar that makes range images and each connection.
+/// Called once for each sonar that makes range images and each connection. A recording has no cloud and no settings.
 function showAllEchoes(threshold) {
-  const wanted = facts.pictureKind === 'range image' && facts.maySteer && facts.connection === 'open' ? facts.sonar : '';
+  const able = facts.maySteer && facts.connection === 'open' && !facts.recording;
+  const wanted = able && facts.pictureKind === 'range image' ? facts.sonar : '';
   if (wanted && wanted !== allEchoesOf) steering.set(threshold, 0, 'float64');
   allEchoesOf = wanted;
 }
