@@ -140,7 +140,7 @@ std::vector<Make> product_makes() {
       {.device = &m3::vendor(),
        .title = "an M3",
        .request = "message",
-       .remedy = "send nothing: pings come to each driver that connects",
+       .remedy = "it need not ask: pings come to each driver that connects, once they are computed",
        .ports = m3::host_ports,
        .host = m3::make_host,
        .codec = m3::codec(),

@@ -261,6 +261,18 @@ TEST(Doctor, FailsWhileAnotherDriverGetsNoPing) {
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("8 checks, 0 errors"));
 }
 
+TEST(Doctor, DoesNotTellADriverThatNeedsNoRequestToAsk) {
+  Facts facts = healthy();
+  facts.sonars[0].stream = {};
+  facts.sonars[0].clients = {"127.0.0.1:40122"};
+  daemon_in(facts).mutable_sonars(0)->MergeFrom(control::message_from<v1::SonarStatus>(
+      R"(profile: "m3" transmits: true pinging: true clients { address: "127.0.0.1:40122" connected_s: 5 })"));
+  report(facts);
+  EXPECT_THAT(text_from(run_checks(facts)),
+              AllOf(HasSubstr("127.0.0.1:40122 is connected and gets no ping; it need not ask: pings come to each driver"),
+                    Not(HasSubstr("send nothing"))));
+}
+
 TEST(Doctor, OnlyWarnsOfAClientTurnedAwayFromPlacesThatAreUsedWell) {
   Facts facts = healthy();
   facts.sonars[0].stream = {};
