@@ -276,6 +276,21 @@ class FanTracer {
   std::vector<Elevation> base_;
 };
 
+/// The hit of a ray of the fixed fan; its object is RayPacket::miss if the ray does not scatter.
+FanHit hit_of(const RayPacket& p, std::size_t i, int column, int ray, float elevation_rad) {
+  FanHit hit{column, ray, p.far[i], elevation_rad, 0, p.object[i], p.triangle[i]};
+  // Cosine of incidence on the facet, the same from both sides: |n . d| / |n|.
+  const Vec3 normal{p.normal_x[i], p.normal_y[i], p.normal_z[i]};
+  const Vec3 along{p.direction_x[i], p.direction_y[i], p.direction_z[i]};
+  const float size = length(normal);
+  // Triangles without an area have no normal.
+  if (size > 0)
+    hit.cosine = std::abs(dot(normal, along)) / size;
+  else
+    hit.object = RayPacket::miss;
+  return hit;
+}
+
 }  // namespace
 
 std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
@@ -289,33 +304,35 @@ void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScal
   // Every ray is a scatterer, as in P25 (section 8). Elevations are uniform and the same in every column.
   const int rays = plan.fixed_fan;
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
-  for (int column = first; column < last; ++column) {
-    const ColumnSine sine = sines[static_cast<std::size_t>(column - first)];
-    // No direction has |u| of 1 or more.
-    if (!(sine.across > 0)) continue;
-    for (int from = 0; from < rays; from += RayPacket::size) {
-      const int to = std::min(from + RayPacket::size, rays);
-      const auto elevation = [&](int ray) {
-        const FixedFanRay& r = plan.fixed_fan_rays[static_cast<std::size_t>(ray)];
+  // A packet is a tile of neighbouring columns and rays. Its rays visit more of the same boxes and triangles than those of one
+  // column do.
+  constexpr int widest = 4;
+  for (int from = first; from < last; from += widest) {
+    const int columns = std::min(widest, last - from), at_once = RayPacket::size / columns;
+    const std::size_t begin = hits.size();
+    hits.resize(begin + static_cast<std::size_t>(columns) * static_cast<std::size_t>(rays));  // in the order of columns
+    for (int ray = 0; ray < rays; ray += at_once) {
+      const int end = std::min(ray + at_once, rays);
+      const auto for_each_lane = [&](auto&& act) {
+        for (int i = ray, lane = 0; i < end; ++i)
+          for (int k = from; k < from + columns; ++k) act(k, i, lane++);
+      };
+      const auto elevation = [&](int i) {
+        const FixedFanRay& r = plan.fixed_fan_rays[static_cast<std::size_t>(i)];
         return Elevation{r.elevation_rad, r.cosine, r.sine};
       };
       filler.clear();
-      for (int ray = from; ray < to; ++ray) filler.add(sine, elevation(ray));
+      for_each_lane([&](int k, int i, int) { filler.add(sines[static_cast<std::size_t>(k - first)], elevation(i)); });
       filler.trace(scene);
-      for (int ray = from; ray < to; ++ray) {
-        const auto i = static_cast<std::size_t>(ray - from);
-        const RayPacket& p = filler.packet;
-        if (p.object[i] == RayPacket::miss) continue;
-        // Cosine of incidence on the facet, the same from both sides: |n . d| / |n|.
-        const Vec3 normal{p.normal_x[i], p.normal_y[i], p.normal_z[i]};
-        const Vec3 along{p.direction_x[i], p.direction_y[i], p.direction_z[i]};
-        const float size = length(normal);
-        // Triangles without an area have no normal.
-        if (!(size > 0)) continue;
-        hits.push_back(
-            {column, ray, p.far[i], elevation(ray).angle_rad, std::abs(dot(normal, along)) / size, p.object[i], p.triangle[i]});
-      }
+      for_each_lane([&](int k, int i, int lane) {
+        const std::size_t to = begin + static_cast<std::size_t>((k - from) * rays + i);
+        hits[to] = hit_of(filler.packet, static_cast<std::size_t>(lane), k, i, elevation(i).angle_rad);
+        // No direction has |u| of 1 or more.
+        if (!(sines[static_cast<std::size_t>(k - first)].across > 0)) hits[to].object = RayPacket::miss;
+      });
     }
+    const auto is_miss = [](const FanHit& hit) { return hit.object == RayPacket::miss; };
+    hits.erase(std::remove_if(hits.begin() + static_cast<std::ptrdiff_t>(begin), hits.end(), is_miss), hits.end());
   }
 }
 

@@ -1,10 +1,12 @@
 // The hot loops with every instruction set: all give the same picture. Simple loops also give the picture of their definition.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/scatter.hpp"
+#include "core/pipeline/trace_fan.hpp"
 #include "tests/core/held_variable.hpp"
 #include "tests/core/pipeline/kernel_sets.hpp"
 #include "tests/core/pipeline/scenes.hpp"
@@ -147,6 +150,37 @@ TEST(KernelSets, AFixedFanOfAnyNumberOfRaysIsTraced) {
       }
       ASSERT_GT(power, 0) << rays << " rays, " << isa;
       EXPECT_LT(error, 1e-4 * power) << rays << " rays, " << isa;
+    }
+  }
+}
+
+// A packet holds rays of several columns. The hits of a column do not depend on the columns that are traced with it.
+TEST(KernelSets, HitsOfTheFixedFanDoNotDependOnTheColumnsTracedTogether) {
+  SceneMaker maker;
+  maker.add(height_field(-2, 14, -10, 10, 0.1, rough_relief(0.03, 40)), -20).add(sphere(0.4, 3), -10, {5, 1, 0.4});
+  const auto scene = maker.make();
+  PingRequest request = Sounding(scene, p900(), default_rows(10, 394)).request;
+  request.switches.fixed_fan = 37;
+  request.sonar_in_world = {{0, 0, 2}, quat_from_rpy({0, 0.25, 0})};
+  const PingPlan plan = make_plan(p900(), request.settings, request.switches);
+  const auto fields = [](const FanHit& h) {
+    return std::tuple(h.column, h.ray, h.range_m, h.elevation_rad, h.cosine, h.object, h.triangle);
+  };
+  for (const char* isa : {"sse2", "avx2", ""}) {
+    const tests::HeldVariable held("SONARD_EMBREE_ISA", isa);
+    const RayScene rays(scene, 1);
+    const PingScalars scalars = make_scalars(plan, request, rays.origin());
+    std::vector<FanHit> alone;
+    for (int k = 0; k < plan.columns.count; ++k) trace_fixed_fan(rays, plan, scalars, k, k + 1, alone);
+    ASSERT_GT(alone.size(), 10u * static_cast<std::size_t>(plan.columns.count)) << "the test needs hits and misses";
+    ASSERT_LT(alone.size(), 37u * static_cast<std::size_t>(plan.columns.count));
+    for (const int together : {2, 3, 7, plan.columns.count}) {
+      std::vector<FanHit> hits;
+      for (int k = 0; k < plan.columns.count; k += together)
+        trace_fixed_fan(rays, plan, scalars, k, std::min(k + together, plan.columns.count), hits);
+      ASSERT_EQ(hits.size(), alone.size()) << together << " columns, " << isa;
+      for (std::size_t i = 0; i < hits.size(); ++i)
+        ASSERT_EQ(fields(hits[i]), fields(alone[i])) << together << " columns, " << isa << ", hit " << i;
     }
   }
 }
