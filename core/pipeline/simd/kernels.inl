@@ -198,6 +198,7 @@ void refocus(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int f
 
 #include "core/pipeline/simd/cells.inl"
 #include "core/pipeline/simd/hits.inl"
+#include "core/pipeline/simd/lane_pairs.inl"
 #include "core/pipeline/simd/quantise.inl"
 #include "core/pipeline/simd/spread.inl"
 #include "core/pipeline/simd/transform.inl"

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include "core/pipeline/simd/kernels.hpp"
 
 namespace sonar::simd {

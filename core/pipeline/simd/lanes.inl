@@ -10,6 +10,16 @@ inline Lanes load(const float* at) { return *reinterpret_cast<const Lanes*>(at);
 inline void store(float* at, Lanes v) { *reinterpret_cast<Lanes*>(at) = v; }
 inline Lanes all(float x) { return Lanes{} + x; }
 
+/// The lane numbers of(0), of(1), ... as a constant. A shuffle by a constant needs fewer instructions.
+template <class Of, int... lane>
+inline LaneNumbers lane_numbers(const Of& of, std::integer_sequence<int, lane...>) {
+  return LaneNumbers{of(lane)...};
+}
+template <class Of>
+inline LaneNumbers lane_numbers(const Of& of) {
+  return lane_numbers(of, std::make_integer_sequence<int, lanes>{});
+}
+
 #if defined(__clang__)  // clang has no shuffle by variable lane numbers
 inline Lanes shuffle(Lanes a, Lanes b, LaneNumbers from) {
   Lanes v;
@@ -93,8 +103,13 @@ inline LaneMask bits_differ(Lanes v, std::int32_t bits, std::int32_t among) {
   return ((reinterpret_cast<LaneNumbers>(v) ^ bits) & among) != 0;
 }
 inline Lanes choose(LaneMask m, Lanes a, Lanes b) { return m ? a : b; }
+#if defined(__AVX2__)  // the comparisons below in one instruction; the results are the same
+inline Lanes larger(Lanes a, Lanes b) { return Lanes(_mm256_max_ps(__m256(a), __m256(b))); }
+inline Lanes smaller(Lanes a, Lanes b) { return Lanes(_mm256_min_ps(__m256(a), __m256(b))); }
+#else
 inline Lanes larger(Lanes a, Lanes b) { return a > b ? a : b; }
 inline Lanes smaller(Lanes a, Lanes b) { return a < b ? a : b; }
+#endif
 inline Lanes magnitude(Lanes a) { return a < 0 ? -a : a; }
 inline LaneNumbers whole_part(Lanes v) { return __builtin_convertvector(v, LaneNumbers); }
 inline Lanes as_floats(LaneNumbers n) { return __builtin_convertvector(n, Lanes); }

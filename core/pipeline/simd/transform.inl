@@ -16,17 +16,17 @@ inline ComplexLanes times_conjugate(ComplexLanes v, const float* w) {
 }
 inline ComplexLanes times_i(ComplexLanes v) { return {-v.im, v.re}; }
 
-/// Converts between the order of lanes in memory, (re, im, re, im ...), and ComplexLanes.
+/// Converts between the order of lanes in memory, (re, im, re, im ...), and ComplexLanes. Lane i of ComplexLanes is not value i
+/// but value_of_lane(i): only lanes of the same four are exchanged, which takes one instruction on every instruction set.
+constexpr int value_of_lane(int i) { return (i % 4 < 2 ? 0 : lanes / 2) + i / 4 * 2 + i % 2; }
 struct Shuffles {
   LaneNumbers even, odd, low, high;
 };
 inline Shuffles shuffles() {
-  Shuffles s{};
-  for (int i = 0; i < lanes; ++i) {
-    s.even[i] = 2 * i, s.odd[i] = 2 * i + 1;
-    s.low[i] = i / 2 + (i % 2) * lanes, s.high[i] = lanes / 2 + i / 2 + (i % 2) * lanes;
-  }
-  return s;
+  const auto memory = [](int i) { return i % 4 < 2 ? i / 4 * 4 + 2 * (i % 4) : lanes + i / 4 * 4 + 2 * (i % 4 - 2); };
+  const auto lane = [](int i) { return i / 4 * 4 + i % 4 / 2 + (i % 2) * lanes; };
+  return {lane_numbers(memory), lane_numbers([memory](int i) { return memory(i) + 1; }), lane_numbers(lane),
+          lane_numbers([lane](int i) { return lane(i) + 2; })};
 }
 inline ComplexLanes load_interleaved(const float* at, const Shuffles& s) {
   const Lanes a = *reinterpret_cast<const Lanes*>(at), b = *reinterpret_cast<const Lanes*>(at + lanes);
@@ -179,17 +179,23 @@ void transform_beams(const BeamTransform& t, const float* columns, std::ptrdiff_
   }
 }
 
+/// Transposes a square tile: the steps 1, 2, 4 ... exchange blocks of that size across the diagonal.
+template <int step = 1>
+inline __attribute__((always_inline)) void transpose(Lanes* tile) {
+  const LaneNumbers keep = lane_numbers([](int i) { return (i & step) == 0 ? i : lanes + i - step; });
+  const LaneNumbers swap = lane_numbers([](int i) { return (i & step) == 0 ? i + step : lanes + i; });
+  for (int block = 0; block < lanes; block += 2 * step)
+    for (int k = block; k < block + step; ++k) {
+      const Lanes a = tile[k], b = tile[k + step];
+      tile[k] = shuffle(a, b, keep);
+      tile[k + step] = shuffle(a, b, swap);
+    }
+  if constexpr (2 * step < lanes) transpose<2 * step>(tile);
+}
+
 /// Computes squared magnitudes, and transposes them from beams of rows to rows of beams, `lanes` of both at a time.
 void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows, float* power, int width) {
   const Shuffles s = shuffles();
-  // Transposes a square tile: the steps 1, 2, 4 ... exchange blocks of that size across the diagonal.
-  LaneNumbers keep[5], swap[5];
-  int steps = 0;
-  for (int step = 1; step < lanes; step *= 2, ++steps)
-    for (int i = 0; i < lanes; ++i) {
-      keep[steps][i] = (i & step) == 0 ? i : lanes + i - step;
-      swap[steps][i] = (i & step) == 0 ? i + step : lanes + i;
-    }
   for (int j = 0; j < beam_count; j += lanes)
     for (int row = 0; row < rows; row += lanes) {
       // Handles beams or rows at the edges that do not fill a vector.
@@ -207,13 +213,7 @@ void detect(const float* beams, std::ptrdiff_t stride, int beam_count, int rows,
         const ComplexLanes v = load_interleaved(beams + (j + k) * stride + 2 * row, s);
         tile[k] = v.re * v.re + v.im * v.im;
       }
-      for (int n = 0, step = 1; n < steps; ++n, step *= 2)
-        for (int block = 0; block < lanes; block += 2 * step)
-          for (int k = block; k < block + step; ++k) {
-            const Lanes a = tile[k], b = tile[k + step];
-            tile[k] = shuffle(a, b, keep[n]);
-            tile[k + step] = shuffle(a, b, swap[n]);
-          }
-      for (int k = 0; k < lanes; ++k) *reinterpret_cast<Lanes*>(power + (row + k) * width + j) = tile[k];
+      transpose(tile);
+      for (int k = 0; k < lanes; ++k) *reinterpret_cast<Lanes*>(power + (row + value_of_lane(k)) * width + j) = tile[k];
     }
 }

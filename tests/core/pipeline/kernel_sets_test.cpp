@@ -185,6 +185,47 @@ TEST(KernelSets, HitsOfTheFixedFanDoNotDependOnTheColumnsTracedTogether) {
   }
 }
 
+// Kernels compute several vectors of values together. A value's code does not depend on the values beside it.
+TEST(KernelSets, CodesDoNotDependOnTheNumberOfValues) {
+  constexpr int most = 80;
+  std::vector<float> power;
+  for (int i = 0; i < most; ++i) power.push_back(std::pow(1.1f, static_cast<float>(i - 70)));
+  const simd::CodeScale scale{0.25f, 255, 0.5f, 255};
+  for (const simd::Kernels* kernels : kernel_sets()) {
+    const auto codes = [&](int at_once) {
+      std::vector<float> all(3 * most);
+      std::vector<std::uint8_t> bytes(most);
+      for (int i = 0; i < most; i += at_once) {
+        kernels->quantise(power.data() + i, 0.9f, scale, all.data() + i, at_once);
+        kernels->quantise_levels(power.data() + i, 0.9f, 10, 200, 255, all.data() + most + i, at_once);
+        kernels->quantise_bytes(power.data() + i, 0.9f, scale, bytes.data() + i, at_once);
+      }
+      std::copy(bytes.begin(), bytes.end(), all.begin() + 2 * most);
+      return all;
+    };
+    const std::vector<float> apart = codes(16), together = codes(most);
+    EXPECT_EQ(apart, together) << kernels->name;
+    for (std::size_t i = 0; i < most; ++i) EXPECT_EQ(apart[i], apart[2 * most + i]) << kernels->name << ", value " << i;
+    EXPECT_LT(apart[0] + 20, apart[most - 1]);
+  }
+}
+
+// The powers of rows and beams are at their own places, also those at the edges that do not fill a vector.
+TEST(KernelSets, DetectsEveryRowOfEveryBeam) {
+  constexpr int beams = 37, rows = 45, width = 48, stride = 96;
+  std::vector<float> signals(beams * stride);
+  for (std::size_t i = 0; i < signals.size(); ++i) signals[i] = std::sin(static_cast<float>(i));
+  for (const simd::Kernels* kernels : kernel_sets()) {
+    std::vector<float> power(rows * width);
+    kernels->detect(signals.data(), stride, beams, rows, power.data(), width);
+    for (std::size_t row = 0; row < rows; ++row)
+      for (std::size_t j = 0; j < beams; ++j) {
+        const float re = signals[j * stride + 2 * row], im = signals[j * stride + 2 * row + 1];
+        ASSERT_NEAR(power[row * width + j], re * re + im * im, 1e-6f) << kernels->name << ", row " << row << ", beam " << j;
+      }
+  }
+}
+
 // SONARD_SIMD limits every engine without an explicit level, including those of the tests.
 TEST(KernelSets, TheEnvironmentNamesTheAutomaticOne) {
   for (const auto& [name, level] : {std::pair{"portable", SimdLevel::portable},
