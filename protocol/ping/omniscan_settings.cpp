@@ -19,6 +19,11 @@ constexpr double longest_m = 150;
 constexpr std::uint32_t least_length_mm = 100;
 constexpr double processing_s = 0.0018;  // from the last echo to the next ping (REC)
 
+constexpr double usual_speed_mps = 1500;
+
+/// From one ping to the next.
+double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
+
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
 SonarModel make_model() {
@@ -38,7 +43,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "omniscan-450";
   model.name = "Omniscan 450";
-  model.max_rate_hz = 50;
+  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(1e-3 * least_length_mm, usual_speed_mps));
   model.modes = {mode};
   return model;
 }
@@ -101,7 +106,7 @@ PingSettings ping_settings(const Settings& settings) {
   s.range_bin_count = p.results;
   s.range_bin_m = length_m / p.results;
   s.pulse_width_m = static_cast<float>(std::max(static_cast<double>(p.pulse_part) * s.range_m, s.range_bin_m / 2));
-  const double shortest_s = 2 * s.range_m / static_cast<double>(settings.speed_mps) + processing_s;
+  const double shortest_s = shortest_period_s(s.range_m, static_cast<double>(settings.speed_mps));
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(db_per_gain * std::max<int>(p.gain, 0));
   s.tvg = false;  // powers are sent without a time-varied gain

@@ -37,7 +37,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "ping1d";
   model.name = "Ping1D";
-  model.max_rate_hz = 50;
+  model.max_rate_hz = 1000;  // the shortest interval; sound takes longer
   model.modes = {mode};
   return model;
 }

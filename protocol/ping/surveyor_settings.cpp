@@ -21,7 +21,11 @@ constexpr double above_db = 15;                    // unknown: assumed; level of
 constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with which the device follows the bottom
 constexpr double longest_m = 200, least_m = 0.01;  // highest end of the range; least length of the range
 constexpr double db_per_gain = 0.4;                // unknown: assumed
-constexpr auto processing = std::chrono::milliseconds(10);
+constexpr double processing_s = 0.01;
+constexpr double usual_speed_mps = 1500;
+
+/// From one ping to the next.
+double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
 
 tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
@@ -42,7 +46,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "surveyor-240";
   model.name = "Surveyor 240-16";
-  model.max_rate_hz = 50;
+  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(least_m, usual_speed_mps));
   model.modes = {mode};
   return model;
 }
@@ -105,7 +109,7 @@ PingSettings ping_settings(const Settings& settings) {
   s.range_bin_count = p.steps;
   s.range_bin_m = (s.range_m - s.range_start_m) / p.steps;
   s.pulse_width_m = static_cast<float>(std::max(static_cast<double>(p.pulse_steps), 0.5) * s.range_bin_m);
-  const double shortest_s = 2 * s.range_m / speed + seconds(processing);
+  const double shortest_s = shortest_period_s(s.range_m, speed);
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(p.gain < 0 ? 0 : db_per_gain * p.gain);
   s.tvg = false;  // the detector compares with the median of a beam, so the noise must be the same at all ranges

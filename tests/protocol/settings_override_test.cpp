@@ -60,6 +60,24 @@ TEST(Overrides, OfEachProductAreRefusedInTheWordsOfTheirSettingsWithThePermitted
     }
 }
 
+/// A rate that the range does not permit is not refused: sonars then ping as fast as they can.
+TEST(Overrides, SetNoRateAboveThatOfTheProduct) {
+  const std::regex ends("the range of .* is ([0-9.e+]+) to .*");
+  for (const protocol::Vendor* vendor : protocol::vendors())
+    for (const auto& model : vendor->models()) {
+      SCOPED_TRACE(model->profile);
+      const protocol::DeviceState device = device_of(model->profile);
+      std::smatch found;
+      const std::string refusal = vendor->apply_override(set().range(-1), device).error().text;
+      ASSERT_TRUE(std::regex_match(refusal, found, ends)) << refusal;
+      const double least_m = 1.001 * std::stod(found[1]);
+      for (const double rate_hz : {1e6, 1.01 * static_cast<double>(model->max_rate_hz)})
+        if (const auto change = vendor->apply_override(set().range(least_m).rate(rate_hz), device)) {
+          EXPECT_LE(change->settings.rate_hz, 1.001f * model->max_rate_hz);
+        }
+    }
+}
+
 TEST(OculusOverride, IsTheFireMessageThatADriverWouldHaveSent) {
   protocol::DeviceState device = oculus_device();
   oculus::FireRequest held = oculus::fire_of(device.settings.get());
