@@ -79,6 +79,7 @@ class PowerHost final : public PingHost {
     return actions;
   }
   std::optional<Time> next_tick() const override { return ask_at_; }
+  bool is_open() const override { return !ask_at_; }
   /// Both products until the sonar shows which one it is: they share the port.
   std::string about() const override {
     return shown_.empty() ? std::string(title_) + " or " + std::string(other_.title) : std::string(shown_);

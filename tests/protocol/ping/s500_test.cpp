@@ -220,6 +220,7 @@ TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
   const auto opened = [&] {
     auto host = *omniscan::make_host({});
     EXPECT_THAT(sent(host->on_open({}, at_s(0))), ElementsAre(Id::general_request)) << "no settings yet";
+    EXPECT_FALSE(host->is_open()) << "pings are not requested yet";
     return host;
   };
   const Bytes range = framed_message(Id::ping1d_range, 1, ScanRange{0, 5000}),
@@ -227,13 +228,17 @@ TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
   const auto beside_an_s500 = opened();
   EXPECT_THAT(sent(beside_an_s500->on_bytes(0, range, at_s(0.1))), ElementsAre(Id::s500_set_ping_params));
   EXPECT_EQ(beside_an_s500->about(), "an S500");
+  EXPECT_TRUE(beside_an_s500->is_open());
   const auto beside_an_omniscan = opened();
   EXPECT_THAT(sent(beside_an_omniscan->on_bytes(0, unknown, at_s(0.1))), ElementsAre(Id::os_ping_params));
   EXPECT_FALSE(beside_an_omniscan->next_tick());
+  EXPECT_TRUE(beside_an_omniscan->is_open());
   EXPECT_THAT(sent(beside_an_omniscan->on_bytes(0, range, at_s(0.2))), ElementsAre()) << "of another host's request";
   const auto unanswered = opened();
   EXPECT_THAT(unanswered->on_tick(at_s(0.4)), testing::IsEmpty());
+  EXPECT_FALSE(unanswered->is_open());
   EXPECT_THAT(sent(unanswered->on_tick(*unanswered->next_tick())), ElementsAre(Id::os_ping_params));
+  EXPECT_TRUE(unanswered->is_open());
   EXPECT_THAT(sent(unanswered->on_bytes(0, nack(Id::os_ping_params, 1, "unknown message"), at_s(1))),
               ElementsAre(Id::s500_set_ping_params));
 }
