@@ -30,6 +30,20 @@ class Listener {
   /// Runs until the requested time or number of pings. It is an error if the device stops earlier or, in a run without a limit,
   /// does not come back.
   Result<void> run() {
+    const Result<void> ran = run_until_end();
+    print_notices(notices_.rest());
+    return ran;
+  }
+
+  PingSummary summary() const { return log_.summary(counts()); }
+  /// True if settings were sent that pings echo.
+  bool asked() const { return asked_; }
+  std::string_view rate_unit() const { return rate_unit_; }
+  const std::optional<HostPing>& last_ping() const { return last_ping_; }
+  std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
+
+ private:
+  Result<void> run_until_end() {
     for (;;) {
       const Result<void> ran = run_once();
       if (ran || interrupted != 0 || log_.counts().pings == 0 || options_.seconds > 0 || options_.pings > 0 ||
@@ -46,14 +60,6 @@ class Listener {
     }
   }
 
-  PingSummary summary() const { return log_.summary(counts()); }
-  /// True if settings were sent that pings echo.
-  bool asked() const { return asked_; }
-  std::string_view rate_unit() const { return rate_unit_; }
-  const std::optional<HostPing>& last_ping() const { return last_ping_; }
-  std::optional<double> first_ping_after_s() const { return first_ping_after_s_; }
-
- private:
   void use(PingStream stream) {
     stream_.emplace(std::move(stream));
     received_ = !stream_->host().counts();

@@ -51,16 +51,26 @@ std::vector<std::string> NoticeLog::kept(const std::vector<std::string>& notices
   for (const std::string& notice : notices) {
     std::string kind = notice;
     std::erase_if(kind, [](char c) { return c >= '0' && c <= '9'; });
-    if (counts_.size() >= most_kinds && !counts_.contains(kind)) kind.clear();  // all further kinds count as one
-    const std::uint64_t count = ++counts_[kind];
+    if (kinds_.size() >= most_kinds && !kinds_.contains(kind)) kind.clear();  // all further kinds count as one
+    Kind& of = kinds_[kind];
+    of.last = notice;
+    const std::uint64_t count = ++of.count;
     std::uint64_t ten = 1;
     while (ten < count) ten *= 10;
-    if (count <= first_ones)
-      kept.push_back(notice);
-    else if (count == ten)
-      kept.push_back(notice + "  (the " + std::to_string(count) + "th message of this kind)");
+    if (count > first_ones && count != ten) continue;
+    of.kept = count;
+    kept.push_back(count <= first_ones ? notice : notice + "  (the " + std::to_string(count) + "th message of this kind)");
   }
   return kept;
+}
+
+std::vector<std::string> NoticeLog::rest() const {
+  std::vector<std::string> rest;
+  for (const auto& [kind, of] : kinds_)
+    if (of.count > of.kept)
+      rest.push_back(of.last + "  (the last of " + std::to_string(of.count) + " messages of " +
+                     (kind.empty() ? "further kinds)" : "this kind)"));
+  return rest;
 }
 
 double percentile(std::vector<double> values, double share) {

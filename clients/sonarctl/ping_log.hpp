@@ -46,10 +46,16 @@ class PingLog {
 class NoticeLog {
  public:
   std::vector<std::string> kept(const std::vector<std::string>& notices);
+  /// Call it at the end: the last notice of each kind of which some were not kept, with their number.
+  std::vector<std::string> rest() const;
 
  private:
   static constexpr std::size_t most_kinds = 100;
-  std::map<std::string, std::uint64_t> counts_;  // by text without digits
+  struct Kind {
+    std::uint64_t count = 0, kept = 0;  // kept: the count when one was last kept
+    std::string last;
+  };
+  std::map<std::string, Kind> kinds_;  // by text without digits
 };
 
 /// The value below which the fraction `share` (0..1) of the values lies; 0 if there are none.

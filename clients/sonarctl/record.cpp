@@ -82,6 +82,8 @@ class Recorder {
     return {};
   }
   double seconds() const { return seconds_since(start_); }
+  /// Notices that were not printed.
+  std::vector<std::string> rest_of_notices() const { return notices_.rest(); }
 
  private:
   bool enough() const {
@@ -198,6 +200,7 @@ Result<void> record_device(const RecordOptions& options) {
   Recorder recorder(options, std::move(stream), std::move(status), std::move(steering), *files, waits);
   const Result<void> ran = recorder.run();
   const double took_s = recorder.seconds();
+  print_notices(recorder.rest_of_notices());
   const Result<void> closed = files->close();
   report(*files, took_s);
   if (ran && closed && files->messages() == 0 && interrupted == 0)

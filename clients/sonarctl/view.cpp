@@ -112,6 +112,7 @@ class LiveView {
     }
     if (interrupted != 0) ran = {};
     print_notices(notices_);  // printed now, because the screen would have hidden the notices
+    print_notices(notice_log_.rest());
     return ran;
   }
 
