@@ -50,11 +50,20 @@ TEST(DoctorPlaces, AWrongUdpAddressNamesWhatIsServedElsewhere) {
 }
 
 TEST(DoctorPlaces, ListsWhatEachAddressOfASonarCarries) {
-  Facts facts = facts_by_udp("127.0.0.2", Outcome::refused);
+  Facts facts = facts_by_udp("127.0.0.2", Outcome::pings);
   serve(facts, R"(advertised: "127.0.0.2" addresses { protocol: "status" address: "127.255.255.255:9" sonar_speaks_first: true
     carries: "state" } addresses { protocol: "udp" address: "127.0.0.2:7777" carries: "settings, lines" })");
+  const std::string all = "status 127.255.255.255:9 (state), udp 127.0.0.2:7777 (settings, lines)";
+  EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("ok    front: " + all + "\n"));
+  for (const Outcome outcome : {Outcome::refused, Outcome::unreachable}) {
+    facts.sonars[0].stream.outcome = outcome;
+    EXPECT_THAT(text_from(run_checks(facts)), AllOf(HasSubstr("fail  "), Not(HasSubstr("ok    front")))) << "not there";
+  }
+  facts.sonars[0].stream.outcome = Outcome::refused;
   EXPECT_THAT(text_from(run_checks(facts)),
-              HasSubstr("ok    front: status 127.255.255.255:9 (state), udp 127.0.0.2:7777 (settings, lines)\n"));
+              AllOf(HasSubstr("the sonard at 127.0.0.1:14770 serves it at " + all + ": sonarctl fault list"),
+                    Not(HasSubstr("start it"))));
+  facts.sonars[0].stream.outcome = Outcome::pings;
   serve(facts, there);
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("ok    front: status 127.255.255.255:9, udp 127.0.0.2:7777\n"))
       << "an older daemon";

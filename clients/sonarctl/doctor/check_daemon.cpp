@@ -11,12 +11,6 @@ namespace {
 
 constexpr double largest_clock_difference_s = 0.5;  // stamps of WALL poses are refused from about one second on
 
-bool serves(const v1::DaemonStatus& status, const SonarFacts& sonar) {
-  return std::any_of(status.sonars().begin(), status.sonars().end(), [&sonar](const v1::SonarStatus& s) {
-    return s.advertised() == sonar.at.host || s.listens() == text_from(sonar.at);
-  });
-}
-
 void check_control(const Facts& facts, std::vector<Finding>& findings) {
   const ControlFacts& control = facts.control;
   const std::string at = "control tcp " + text_from(control.at);
@@ -41,7 +35,7 @@ void check_control(const Facts& facts, std::vector<Finding>& findings) {
                           (status.sonars_size() == 1 ? " sonar, " : " sonars, ") + status.clock() + " clock",
                       ""});
   for (const SonarFacts& sonar : facts.sonars)
-    if (!serves(status, sonar))
+    if (served_at(status, sonar) == nullptr)
       findings.push_back({Level::warn, "control",
                           "that sonard does not serve " + sonar.at.host + "; it serves " + served_by(status),
                           "examine one of these, or give the control stream of the sonard that does with --control"});
@@ -74,16 +68,20 @@ bool was_examined(const Facts& facts, const v1::SonarStatus& sonar) {
                                              [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised(); });
 }
 
+/// True if nothing answers at the address of the sonar. Another finding says so and names it.
+bool is_missing(const Facts& facts, const v1::SonarStatus& sonar) {
+  return std::any_of(facts.sonars.begin(), facts.sonars.end(), [&](const SonarFacts& s) {
+    const bool is_there =
+        s.stream.outcome != StreamFacts::Outcome::refused && s.stream.outcome != StreamFacts::Outcome::unreachable;
+    return !is_there && served_at(*facts.control.status, s) == &sonar;
+  });
+}
+
 /// Lists the addresses of each sonar, and what drivers send and get there.
 void list_addresses(const Facts& facts, std::vector<Finding>& findings) {
-  for (const v1::SonarStatus& sonar : facts.control.status->sonars()) {
-    if (sonar.addresses().empty() || !was_examined(facts, sonar)) continue;
-    std::string all;
-    for (const v1::SonarAddress& address : sonar.addresses())
-      all += (all.empty() ? ": " : ", ") + address.protocol() + " " + address.address() +
-             (address.carries().empty() ? "" : " (" + address.carries() + ")");
-    findings.push_back({Level::ok, "addresses", sonar.name() + all, ""});
-  }
+  for (const v1::SonarStatus& sonar : facts.control.status->sonars())
+    if (const std::string all = addresses_of(sonar); !all.empty() && was_examined(facts, sonar) && !is_missing(facts, sonar))
+      findings.push_back({Level::ok, "addresses", sonar.name() + ": " + all, ""});
 }
 
 /// Reports the sonars of makes that hosts search for.
@@ -117,6 +115,20 @@ void check_clocks(const ControlFacts& control, std::vector<Finding>& findings) {
 }
 
 }  // namespace
+
+const v1::SonarStatus* served_at(const v1::DaemonStatus& status, const SonarFacts& sonar) {
+  for (const v1::SonarStatus& s : status.sonars())
+    if (s.advertised() == sonar.at.host || s.listens() == text_from(sonar.at)) return &s;
+  return nullptr;
+}
+
+std::string addresses_of(const v1::SonarStatus& sonar) {
+  std::string all;
+  for (const v1::SonarAddress& address : sonar.addresses())
+    all += (all.empty() ? "" : ", ") + address.protocol() + " " + address.address() +
+           (address.carries().empty() ? "" : " (" + address.carries() + ")");
+  return all;
+}
 
 std::string served_by(const v1::DaemonStatus& status) {
   std::string all;

@@ -222,6 +222,11 @@ class SonarChecks {
 
   /// Names an address at which a sonar listens.
   std::string where_else() const {
+    const v1::SonarStatus* const here = facts_.control.status ? served_at(*facts_.control.status, sonar_) : nullptr;
+    if (here != nullptr)
+      return "the sonard at " + text_from(facts_.control.at) + " serves it at " +
+             (here->addresses().empty() ? here->listens() : addresses_of(*here)) +
+             ": sonarctl fault list shows whether a fault has closed its ports";
     if (facts_.daemons.empty() && is_replay(facts_.http))
       return "sonard replay shows this recording only on its page, http://" + text_from(facts_.http.at);
     std::string others;
@@ -232,11 +237,7 @@ class SonarChecks {
       if (received.advertised != sonar_.at.host)
         return "a status broadcast names a sonar at " + received.advertised + ": sonarctl doctor " + received.advertised;
     const auto& status = facts_.control.status;
-    const bool is_served_here =
-        status && std::any_of(status->sonars().begin(), status->sonars().end(), [this](const auto& sonar) {
-          return sonar.advertised() == sonar_.at.host || sonar.listens() == text_from(sonar_.at);
-        });
-    if (status && status->sonars_size() > 0 && !is_served_here)
+    if (status && status->sonars_size() > 0)
       return "the sonard at " + text_from(facts_.control.at) + " serves " + served_by(*status) + ": sonarctl doctor ADDRESS";
     if (sonar_.on_this_host)
       return "start it: sonard serves its demo on 127.0.0.2 (sonard --help lists those of other makes), sonard FILE the sonars "
