@@ -1,5 +1,6 @@
 #include "clients/sonarctl/net.hpp"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
@@ -10,7 +11,9 @@
 
 #include <cerrno>
 #include <charconv>
+#include <csignal>
 #include <cstring>
+#include <future>
 #include <memory>
 #include <thread>
 
@@ -20,18 +23,16 @@ volatile int interrupted = 0;
 
 namespace {
 
-using AddressList = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
+/// The socket interface requires this cast.
+const sockaddr* generic(const sockaddr_in& address) { return reinterpret_cast<const sockaddr*>(&address); }
 
-Result<AddressList> resolve(const Endpoint& endpoint, int type) {
-  addrinfo hints{};
-  hints.ai_family = AF_INET;
-  hints.ai_socktype = type;
-  addrinfo* found = nullptr;
-  const int rc = ::getaddrinfo(endpoint.host.c_str(), std::to_string(endpoint.port).c_str(), &hints, &found);
-  if (rc != 0)
-    return failure(ErrorKind::usage, "no address for \"" + endpoint.host + "\": " + ::gai_strerror(rc) +
-                                         "; give an IPv4 address such as 127.0.0.2");
-  return AddressList(found, &::freeaddrinfo);
+/// Runs a task in a thread that gets no signals, so that they interrupt the waits of this thread.
+void run_without_signals(std::packaged_task<Result<in_addr>()> task) {
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, &before);
+  std::thread(std::move(task)).detach();
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 Result<Socket> open_socket(int type) {
@@ -52,10 +53,10 @@ bool is_connected_to_itself(const Socket& socket) {
 }
 
 /// Tries to connect once, for at most `patience`. Returns 0 or the errno.
-int try_connect(const Socket& socket, const addrinfo& address, std::chrono::milliseconds patience) {
+int try_connect(const Socket& socket, const sockaddr_in& address, std::chrono::milliseconds patience) {
   const int flags = ::fcntl(socket.fd(), F_GETFL);
   ::fcntl(socket.fd(), F_SETFL, flags | O_NONBLOCK);
-  int error = ::connect(socket.fd(), address.ai_addr, address.ai_addrlen) == 0 ? 0 : errno;
+  int error = ::connect(socket.fd(), generic(address), sizeof address) == 0 ? 0 : errno;
   if (error == EINPROGRESS) {
     pollfd ready{socket.fd(), POLLOUT, 0};
     socklen_t size = sizeof error;
@@ -89,6 +90,37 @@ Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallbac
   return endpoint;
 }
 
+Result<in_addr> look_up(const std::string& host) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_STREAM;  // one element for each address
+  addrinfo* list = nullptr;
+  const int rc = ::getaddrinfo(host.c_str(), nullptr, &hints, &list);
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found(list, &::freeaddrinfo);
+  if (rc != 0)
+    return failure(ErrorKind::usage,
+                   "no address for \"" + host + "\": " + ::gai_strerror(rc) + "; give an IPv4 address such as 127.0.0.2");
+  sockaddr_in address{};
+  std::memcpy(&address, found->ai_addr, sizeof address);
+  return address.sin_addr;
+}
+
+Result<sockaddr_in> resolve(const Endpoint& endpoint, const Lookup& lookup) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(endpoint.port);
+  if (::inet_pton(AF_INET, endpoint.host.c_str(), &address.sin_addr) == 1) return address;
+  std::packaged_task<Result<in_addr>()> task([lookup, host = endpoint.host] { return lookup(host); });
+  auto found = task.get_future();
+  run_without_signals(std::move(task));
+  while (found.wait_for(longest_step) != std::future_status::ready)
+    if (interrupted != 0) return failure(ErrorKind::io, "interrupted before the address of " + endpoint.host + " was found");
+  const Result<in_addr> ip = found.get();
+  if (!ip) return tl::unexpected(ip.error());
+  address.sin_addr = *ip;
+  return address;
+}
+
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience) {
   auto connected = connect_first({to}, patience);
   if (!connected) return tl::unexpected(connected.error());
@@ -98,12 +130,12 @@ Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patienc
 Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono::milliseconds patience) {
   using namespace std::chrono_literals;
   const auto deadline = std::chrono::steady_clock::now() + patience;
-  std::vector<AddressList> addresses;
+  std::vector<sockaddr_in> addresses;
   std::string names;
   for (const Endpoint& place : places) {
-    auto found = resolve(place, SOCK_STREAM);
+    const auto found = resolve(place);
     if (!found) return tl::unexpected(found.error());
-    addresses.push_back(std::move(*found));
+    addresses.push_back(*found);
     names += (names.empty() ? "" : " or ") + text_from(place);
   }
   for (;;) {
@@ -113,7 +145,7 @@ Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono
       auto socket = open_socket(SOCK_STREAM);
       if (!socket) return tl::unexpected(socket.error());
       const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-      error = try_connect(*socket, *addresses[i],
+      error = try_connect(*socket, addresses[i],
                           std::max<std::chrono::milliseconds>(left / static_cast<int>(places.size() - i), 100ms));
       if (error != 0) continue;
       const int yes = 1;
@@ -128,10 +160,10 @@ Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono
 }
 
 Result<Socket> connect_udp(const Endpoint& to) {
-  auto addresses = resolve(to, SOCK_DGRAM);
-  if (!addresses) return tl::unexpected(addresses.error());
+  const auto address = resolve(to);
+  if (!address) return tl::unexpected(address.error());
   auto socket = open_socket(SOCK_DGRAM);
-  if (socket && ::connect(socket->fd(), (*addresses)->ai_addr, (*addresses)->ai_addrlen) != 0)
+  if (socket && ::connect(socket->fd(), generic(*address), sizeof *address) != 0)
     return failure(ErrorKind::unavailable, "cannot send to udp " + text_from(to) + ": " + std::strerror(errno));
   return socket;
 }
@@ -141,9 +173,9 @@ Result<Socket> listen_udp(const Endpoint& at) {
   if (!socket) return socket;
   const int yes = 1;
   ::setsockopt(socket->fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  auto place = resolve(at, SOCK_DGRAM);
+  const auto place = resolve(at);
   if (!place) return tl::unexpected(place.error());
-  if (::bind(socket->fd(), (*place)->ai_addr, (*place)->ai_addrlen) != 0)
+  if (::bind(socket->fd(), generic(*place), sizeof *place) != 0)
     return failure(ErrorKind::unavailable,
                    "cannot listen on udp " + std::to_string(at.port) + ": " + std::strerror(errno) +
                        ". A driver without address reuse may hold it: stop it, or give the address instead");

@@ -1,9 +1,12 @@
 // Blocking sockets with deadlines, for the client side. Only IPv4, like the devices.
 #pragma once
 
+#include <netinet/in.h>
+
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,6 +24,13 @@ struct Endpoint {
 std::string text_from(const Endpoint& endpoint);  // "127.0.0.2:52100"
 /// Parses "host", "host:port" or ":port"; missing parts are taken from `fallback`.
 Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallback);
+
+using Lookup = std::function<Result<in_addr>(const std::string& host)>;
+/// Looks up a name in the hosts file and by DNS, which may take many seconds and ignores signals. Error usage: no address.
+Result<in_addr> look_up(const std::string& host);
+/// The first IPv4 address of a host. A name is looked up in a thread, which is abandoned when `interrupted` is set. Errors:
+/// usage (no address), io (interrupted).
+Result<sockaddr_in> resolve(const Endpoint& endpoint, const Lookup& lookup = look_up);
 
 /// Owns a file descriptor.
 class Socket {

@@ -2,7 +2,6 @@
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -90,19 +89,10 @@ std::chrono::milliseconds left_until(Steady::time_point deadline) {
 }
 
 Result<std::string> ipv4_of(const std::string& host) {
-  addrinfo hints{};
-  hints.ai_family = AF_INET;
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  const int rc = ::getaddrinfo(host.c_str(), nullptr, &hints, &found);
-  if (rc != 0)
-    return failure(ErrorKind::usage,
-                   "no address for \"" + host + "\": " + ::gai_strerror(rc) + "; give an IPv4 address such as 127.0.0.2");
-  sockaddr_in address{};
-  std::memcpy(&address, found->ai_addr, sizeof address);
-  ::freeaddrinfo(found);
+  const auto address = resolve({host, 0});
+  if (!address) return tl::unexpected(address.error());
   char text[INET_ADDRSTRLEN] = "";
-  ::inet_ntop(AF_INET, &address.sin_addr, text, sizeof text);
+  ::inet_ntop(AF_INET, &address->sin_addr, text, sizeof text);
   return std::string(text);
 }
 

@@ -1,0 +1,58 @@
+// The look-up of a host name, with a look-up that the test ends.
+#include "clients/sonarctl/net.hpp"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+
+#include <future>
+
+namespace sonar::clients::resolve_test {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Resolve, AnAddressNeedsNoLookup) {
+  const auto found = resolve({"127.0.0.2", 9}, [](const std::string&) -> Result<in_addr> {
+    ADD_FAILURE();
+    return failure(ErrorKind::usage, "");
+  });
+  ASSERT_TRUE(found);
+  EXPECT_EQ(ntohl(found->sin_addr.s_addr), 0x7F000002u);
+  EXPECT_EQ(ntohs(found->sin_port), 9);
+}
+
+TEST(Resolve, ANameIsLookedUpOrSaidToHaveNoAddress) {
+  const auto found = resolve({"localhost", 9});
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_EQ(ntohl(found->sin_addr.s_addr), 0x7F000001u);
+  const auto none = resolve({"no host has spaces", 9});
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().kind, ErrorKind::usage);
+  EXPECT_THAT(none.error().text, HasSubstr("no address for \"no host has spaces\""));
+}
+
+TEST(Resolve, TheFirstSignalEndsALookupThatDoesNotEnd) {
+  std::promise<void> begun, answer, ended;
+  const auto answers = answer.get_future().share();
+  auto found = std::async(std::launch::async, [&] {
+    return resolve({"slow", 9}, [&, answers](const std::string&) -> Result<in_addr> {
+      begun.set_value();
+      answers.wait();
+      ended.set_value();
+      return in_addr{};
+    });
+  });
+  begun.get_future().wait();
+  interrupted = 1;
+  EXPECT_EQ(found.wait_for(std::chrono::seconds(20)), std::future_status::ready);
+  interrupted = 0;
+  answer.set_value();
+  ended.get_future().wait();
+  const auto got = found.get();
+  ASSERT_FALSE(got);
+  EXPECT_EQ(got.error().kind, ErrorKind::io);
+  EXPECT_THAT(got.error().text, HasSubstr("interrupted before the address of slow was found"));
+}
+
+}  // namespace
+}  // namespace sonar::clients::resolve_test
