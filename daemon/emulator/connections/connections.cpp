@@ -92,11 +92,7 @@ bool Connections::settled() const {
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
     return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::refuse;
-  // A host without a connection has left when its dialogue begins to end. The request of the next host may have arrived already.
-  const auto left = std::count_if(all_.begin(), all_.end(), [](const Connection& c) {
-    return c.role == Role::client && c.state == State::served && c.finishing && c.takes_datagrams();
-  });
-  if (clients() - static_cast<std::size_t>(left) < static_cast<std::size_t>(config_.max_clients)) return Verdict::serve;
+  if (clients() < static_cast<std::size_t>(config_.max_clients)) return Verdict::serve;
   if (config_.when_full == WhenClientsFull::take_over) return Verdict::take_over;
   const bool waits = config_.when_full == WhenClientsFull::queue && waiting() < longest_queue;
   return waits ? Verdict::wait : Verdict::refuse;

@@ -27,7 +27,7 @@ struct Connection {
   enum class State {
     waiting,  // for a slot
     served,
-    leaving,  // ending: it gets the rest of its message; after a take-over it does not count as a client
+    leaving,  // ending: it gets the rest of its message, but does not count as a client any more
   };
   ConnectionId id = 0;
   Role role = Role::client;

@@ -48,9 +48,6 @@ class Audience {
 
   /// Ends a connection: waiting pings are dropped, the current message and replies are still sent.
   void finish(Connection& connection);
-  void finish(ConnectionId id) {
-    if (Connection* const connection = connections_.find(id)) finish(*connection);
-  }
   void begin_finish(Connection& connection, const std::string& why, Actions& actions);
   /// Ends all connections as finish() does, and admits no more.
   void stop(const std::string& why, Actions& actions);

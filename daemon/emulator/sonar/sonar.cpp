@@ -172,7 +172,7 @@ Actions Sonar::open_stream(ConnectionId id, const protocol::Port& port, Time now
   return {};
 }
 
-/// Counts the connection's traffic before removing it, then assigns its slot to the client that has waited longest.
+/// Counts the connection's traffic before removing it.
 Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool by_client) {
   Actions actions;
   Connection* const connection = audience_.connections().find(id);
@@ -181,19 +181,32 @@ Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool
   const bool was_client = role == Role::client && connection->state == Connection::State::served;
   audience_.remove(*connection, why, by_client, actions);
   if (role == Role::stream) source_.update_pacer(now);
-  if (!was_client) return actions;
+  if (was_client) on_left(now, actions);
+  return actions;
+}
+
+Actions Sonar::finish(ConnectionId id, Time now) {
+  Actions actions;
+  Connection* const connection = audience_.connections().find(id);
+  if (connection == nullptr) return actions;
+  audience_.finish(*connection);
+  if (connection->role != Role::client || connection->state != Connection::State::served || !connection->takes_datagrams())
+    return actions;
+  connection->state = Connection::State::leaving;
+  on_left(now, actions);
+  return actions;
+}
+
+/// Called after a client has left: assigns its slot to the client that has waited longest.
+void Sonar::on_left(Time now, Actions& actions) {
   faults_.on(Occasion::disconnect, now);
   apply_fault_orders(now, actions);
   const bool kept_waiting = faults_.admission() == Faults::Admission::wait;
   Connection* const next = kept_waiting ? nullptr : audience_.next_waiting();
-  if (next == nullptr) {
-    on_membership(now, actions);
-    return actions;
-  }
+  if (next == nullptr) return on_membership(now, actions);
   // Must come before serve(): after it, the next client would count as audience and the settings would stay.
   if (!audience_.has_audience()) source_.use_initial_settings();
   serve(*next, now, actions);
-  return actions;
 }
 
 // Clients still get the current message completely; connections that wait for a slot are reset.

@@ -49,8 +49,9 @@ class Sonar {
   void on_written(ConnectionId id, const Outbox::Message& message, Time now) { delivery_.on_written(id, message, now); }
   /// Reports that a stream's last message had no receiver, or that none of its datagrams could be sent.
   void on_not_sent(ConnectionId id) { delivery_.on_not_sent(id); }
-  /// Ends the connection after the message that is being written.
-  void finish(ConnectionId id) { audience_.finish(id); }
+  /// Ends the connection after the message that is being written. A host by datagrams, which has no connection, has left then:
+  /// it counts as a client no more, because the request of the next host may arrive before on_closed().
+  Actions finish(ConnectionId id, Time now);
   /// Reports that a connection, served or waiting, is closed. `why` is for the log.
   Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);
   /// Counts a client that the caller refused for lack of a slot.
@@ -153,6 +154,7 @@ class Sonar {
   void serve(Connection& connection, Time now, Actions& actions);
   void serve_waiting(Time now, Actions& actions);
   void on_membership(Time now, Actions& actions);
+  void on_left(Time now, Actions& actions);
   void apply_fault_orders(Time now, Actions& actions);
   void apply(const FaultOrder& order, Time now, Actions& actions);
   void change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions);

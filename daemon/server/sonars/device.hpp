@@ -142,7 +142,7 @@ class Device final : public SessionParent {
   void on_not_sent(ConnectionId stream) override;
   std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const override;
   void look_for_host(ConnectionId stream) override;
-  void on_finish(ConnectionId session) override { sonar_.finish(session); }
+  void on_finish(ConnectionId session) override { perform(sonar_.finish(session, network_.clock.now())); }
   void on_fault(const std::string& what) override;
   void on_send_error(const Endpoint& to, const std::string& why) override;
   void on_over(ConnectionId session, const std::string& why, bool by_client) override;

@@ -211,18 +211,39 @@ TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
   EXPECT_NEAR(static_cast<double>(sounder.atof().utc_ms - utc_ms), 100, 100);
 }
 
-/// Its host's port is closed, and the request of the next host arrives before the dialogue has ended.
-TEST(SurveyorInVirtualTime, AHostThatLeavesFreesItsSlotAtOnce) {
-  Sounder sounder;
-  const auto next = [&](ConnectionId id) {
-    const protocol::Port& port = *sounder.sonar().vendor().port(protocol::Port::Kind::udp_dialogue);
-    sounder.sonar().on_connect(id, Role::client, {"next", {10, 0, 0, 6}, 5000}, sounder.time.now, &port);
-    const Connection* const connection = sounder.sonar().connections().find(id);
-    return connection != nullptr && connection->state == Connection::State::served;
-  };
-  EXPECT_FALSE(next(stream + 1)) << "it has one slot";
-  sounder.sonar().finish(stream);
-  EXPECT_TRUE(next(stream + 2));
+// ---- hosts of any make
+
+/// Its port is closed, and the request of the next host arrives before the dialogue has ended.
+TEST(HostByDatagrams, HasLeftAtOnceAndLeavesNothing) {
+  for (const protocol::Vendor* const vendor : protocol::vendors()) {
+    const protocol::Port* const port = vendor->port(protocol::Port::Kind::udp_dialogue);
+    if (port == nullptr) continue;
+    SCOPED_TRACE(vendor->name());
+    Talk talk(vendor->models().front()->profile, "    clients: {max: 2, when_full: take_over}\n");
+    Sonar& sonar = talk.sonar();
+    const auto connect = [&](ConnectionId id) {
+      sonar.on_connect(id, Role::client, {"host", {10, 0, 0, static_cast<std::uint8_t>(id)}, 5000}, talk.time.now, port);
+    };
+    const double range_m = sonar.settings().range_m;
+    connect(1);
+    protocol::SettingsOverride wanted;
+    wanted.range_m = 7;
+    ASSERT_TRUE(sonar.change(wanted, "host", talk.time.now));
+    sonar.finish(1, talk.time.now);
+    EXPECT_EQ(sonar.connections().clients(), 0u);
+    connect(2);
+    EXPECT_EQ(sonar.settings().range_m, range_m) << "not the setting of the host before";
+    EXPECT_EQ(sonar.state().connected_client, (protocol::Ipv4{10, 0, 0, 2}));
+    connect(3);
+    sonar.finish(2, talk.time.now);
+    connect(4);
+    EXPECT_EQ(sonar.connections().find(3)->state, Connection::State::served) << "a slot was free";
+    connect(5);
+    EXPECT_EQ(sonar.connections().clients(), 2u);
+    EXPECT_EQ(sonar.connections().find(3)->state, Connection::State::leaving) << "the oldest that has not left";
+    for (const ConnectionId id : {1, 2, 3}) sonar.on_closed(id, "it has left", talk.time.now);
+    EXPECT_EQ(sonar.connections().clients(), 2u);
+  }
 }
 
 // ---- Ping1D

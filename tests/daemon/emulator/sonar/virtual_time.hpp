@@ -170,7 +170,7 @@ class VirtualTime {
       client.pauses.insert(client.pauses.end(), message.shape->pauses.begin(), message.shape->pauses.end());
       if (message.shape->end == Outbox::Shape::End::none) continue;
       client.reset = message.shape->end == Outbox::Shape::End::reset;
-      client.sonar->finish(id);
+      perform(*client.sonar, client.sonar->finish(id, now));
       return close(id, "a fault");
     }
     if (client.finished) close(id, client.why);
