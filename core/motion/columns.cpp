@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "core/base/letters.hpp"
-#include "core/base/plausible_angles.hpp"
 #include "core/motion/stamp.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/nearest.hpp"
@@ -240,7 +239,7 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
     const auto in_rad = [this](double angle) { return radians_ ? angle : rad_from_deg(angle); };
     const RollPitchYaw rpy{in_rad(v[0]), in_rad(v[1]), in_rad(v[2])};
     out.pose.orientation = quat_from_rpy(rpy);
-    out.largest_angle_rad = radians_ ? angle_beyond_radians(rpy) : 0;
+    if (radians_) out.written = rpy;
     return std::nullopt;
   }
   if (auto wrong = fill({qw, qx, qy, qz})) return wrong;

@@ -21,8 +21,8 @@ struct Row {
   std::int64_t stamp_ns = 0;
   Pose pose;
   Vec3d velocity_mps, angular_velocity_radps;
-  std::string_view body;         // from the column "body"
-  double largest_angle_rad = 0;  // angle_beyond_radians() if the columns of angles are radians; else 0
+  std::string_view body;      // from the column "body"
+  RollPitchYaw written = {};  // the angles if their columns are radians; else 0
 };
 
 /// A word of a file, made printable and short for an error text.

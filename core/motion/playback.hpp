@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "core/base/plausible_angles.hpp"
 #include "core/base/units.hpp"
 #include "core/motion/trajectory.hpp"
 
@@ -33,9 +34,9 @@ struct PlaybackRules {
 struct Plan {
   std::shared_ptr<const Trajectory> trajectory = {};  // null = none
   PlaybackRules rules = {};
-  std::string file = {};         // name of the file as the user wrote it
-  std::string about = {};        // format, frame, length, for people
-  double largest_angle_rad = 0;  // as in TrajectoryFile::Body
+  std::string file = {};                // name of the file as the user wrote it
+  std::string about = {};               // format, frame, length, for people
+  ImplausibleAngle largest_angle = {};  // as in TrajectoryFile::Body
   explicit operator bool() const { return trajectory != nullptr; }
 };
 /// True if both plans have the same points and the same rules.

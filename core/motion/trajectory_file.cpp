@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
@@ -72,8 +73,22 @@ std::optional<Frame> frame_called(std::string_view word) {
 /// The points of one body while the file is read. Their times are still the stamps of the file.
 struct Track {
   std::string body;
-  Points points;
-  double largest_angle_rad = 0;
+  Points points = {};
+  ImplausibleAngle largest_angle = {};
+  TurnCount turns = {};
+  ImplausibleAngle since_jump = {};  // the largest angle since the yaw last jumped; without the yaw if turns are counted
+
+  void look_at(const RollPitchYaw& written, std::int64_t stamp_ns) {
+    if (!turns.add(written.yaw_rad, Time(Ns(stamp_ns)))) largest_angle.include(std::exchange(since_jump, {}));
+    since_jump.include(angle_beyond_radians(written));
+    largest_angle.include(angle_beyond_radians(written, true));
+    if (turns.has_counted()) since_jump = {};
+  }
+  ImplausibleAngle angle() const {
+    ImplausibleAngle all = largest_angle;
+    all.include(since_jump);
+    return all;
+  }
 };
 
 class Reader {
@@ -235,7 +250,7 @@ class Reader {
     }
     p.times.emplace_back(row.stamp_ns);
     p.poses.push_back(row.pose);
-    track->largest_angle_rad = std::max(track->largest_angle_rad, row.largest_angle_rad);
+    track->look_at(row.written, row.stamp_ns);
     if (columns_->has_velocity()) p.velocities_mps.push_back(row.velocity_mps);
     if (columns_->has_angular_velocity()) p.angular_velocities_radps.push_back(row.angular_velocity_radps);
   }
@@ -246,7 +261,7 @@ class Reader {
     for (last_ = 0; last_ < tracks_.size(); ++last_)
       if (tracks_[last_].body == body) return &tracks_[last_];
     if (tracks_.size() == most_bodies) return nullptr;
-    return &tracks_.emplace_back(Track{std::string(body), {}, 0});
+    return &tracks_.emplace_back(Track{.body = std::string(body)});
   }
 
   void check_whole_file() {
@@ -279,7 +294,7 @@ class Reader {
       // Converts poses to ENU and FLU, which all other code uses (docs/glossary.md).
       if (file.frame == Frame::ned_frd) turn_to_enu_flu(t.points);
       file.bodies.push_back(
-          {std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration), t.largest_angle_rad});
+          {std::move(t.body), std::make_shared<const Trajectory>(std::move(t.points), file.duration), t.angle()});
     }
     return file;
   }

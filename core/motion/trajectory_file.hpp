@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/plausible_angles.hpp"
 #include "core/base/result.hpp"
 #include "core/motion/trajectory.hpp"
 
@@ -30,7 +31,7 @@ struct TrajectoryFile {
   struct Body {
     std::string name;  // empty if the file has no names
     std::shared_ptr<const Trajectory> trajectory;
-    double largest_angle_rad = 0;  // the largest of angle_beyond_radians(); 0 if all angles are plausible
+    ImplausibleAngle largest_angle = {};  // the angle of all poses, if the columns of angles are radians
   };
   std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;

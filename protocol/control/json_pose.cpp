@@ -4,7 +4,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/base/plausible_angles.hpp"
 #include "protocol/control/json_depth.hpp"
 #include "protocol/control/refused.hpp"
 
@@ -62,7 +61,7 @@ Result<Frame> frame_of(const json& object) {
 }
 
 /// The orientation of the body in the world, in the axes of the message, from `quaternion` or, without it, from `attitude`.
-Result<std::array<double, 4>> orientation_of(const json& object, std::string& fields, double& largest_angle_rad) {
+Result<std::array<double, 4>> orientation_of(const json& object, std::string& fields, RollPitchYaw& sent_angles) {
   const auto quaternion = numbers<4>(object, "quaternion");
   if (!quaternion) return tl::unexpected(quaternion.error());
   const auto attitude = numbers<3>(object, "attitude");
@@ -75,9 +74,8 @@ Result<std::array<double, 4>> orientation_of(const json& object, std::string& fi
   for (const double angle : **attitude)
     if (!std::isfinite(angle)) return refused("attitude has a NaN or infinite component");
   fields += " attitude";
-  const RollPitchYaw rpy{(**attitude)[0], (**attitude)[1], (**attitude)[2]};
-  largest_angle_rad = angle_beyond_radians(rpy);
-  const Quatd q = quat_from_rpy(rpy);
+  sent_angles = {(**attitude)[0], (**attitude)[1], (**attitude)[2]};
+  const Quatd q = quat_from_rpy(sent_angles);
   return std::array<double, 4>{q.w, q.x, q.y, q.z};
 }
 
@@ -99,7 +97,7 @@ Result<PoseSample> sample_from(const json& object) {
   sample.fields = stamp->domain == ClockDomain::sim ? "timestamp position" : "position";
   raw.frame = *frame;
   raw.position_m = **position;
-  const auto orientation = orientation_of(object, sample.fields, raw.largest_angle_rad);
+  const auto orientation = orientation_of(object, sample.fields, raw.sent_angles);
   if (!orientation) return tl::unexpected(orientation.error());
   raw.orientation_wxyz = *orientation;
   const auto velocity = numbers<3>(object, "velocity");

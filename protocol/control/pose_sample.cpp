@@ -49,7 +49,7 @@ Result<PoseSample> checked(PoseSample sample, const RawPose& raw) {
   const Pose as_sent{vec(raw.position_m), normalized(Quatd{o[0], o[1], o[2], o[3]})};
   const bool ned = *raw.frame == Frame::ned_frd;
   sample.sent_in = *raw.frame;
-  sample.largest_angle_rad = raw.largest_angle_rad;
+  sample.sent_angles = raw.sent_angles;
   sample.pose = ned ? enu_flu_from_ned_frd(as_sent) : as_sent;
   if (raw.velocity_mps) sample.velocity_mps = ned ? flu_from_frd(vec(*raw.velocity_mps)) : vec(*raw.velocity_mps);
   if (raw.angular_velocity_radps)

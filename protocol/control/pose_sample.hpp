@@ -43,7 +43,7 @@ struct PoseSample {
   std::optional<Vec3d> angular_velocity_radps;  // body axes, FLU
   std::uint32_t reset_counter = 0;              // after a change, do not interpolate from the pose before
   bool hidden = false;                          // objects only: removed from the scene until a pose without it
-  double largest_angle_rad = 0;                 // largest roll, pitch or yaw if it is implausible as radians; else 0
+  RollPitchYaw sent_angles = {};                // as sent, in radians and not wrapped; 0 if a quaternion was sent
   Frame sent_in = Frame::enu_flu;               // for the log
   std::string fields;                           // for the log: what the message contained
 };
@@ -55,7 +55,7 @@ struct RawPose {
   std::array<double, 4> orientation_wxyz{};
   std::optional<std::array<double, 3>> velocity_mps;
   std::optional<std::array<double, 3>> angular_velocity_radps;
-  double largest_angle_rad = 0;  // as in PoseSample
+  RollPitchYaw sent_angles = {};  // as in PoseSample
 };
 /// Fills pose and velocities of `sample` from `raw`, or returns an error in one sentence: no frame, NaN or infinity, an absurd
 /// size, or a quaternion whose norm differs from 1 by more than 1e-3 (smaller errors are corrected).

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <string>
 
-#include "core/base/plausible_angles.hpp"
-
 namespace sonar::mavlink {
 namespace {
 
@@ -128,8 +126,9 @@ RawPose raw_pose(const SimState& m) {
 
 RawPose raw_pose(const AttPosMocap& m) { return raw_pose({m.north_m, m.east_m, m.down_m}, quat_of(m.wxyz)); }
 RawPose raw_pose(const VisionPositionEstimate& m) {
-  RawPose pose = raw_pose({m.north_m, m.east_m, m.down_m}, quat_from_rpy({m.roll_rad, m.pitch_rad, m.yaw_rad}));
-  pose.largest_angle_rad = angle_beyond_radians({m.roll_rad, m.pitch_rad, m.yaw_rad});
+  const RollPitchYaw rpy{m.roll_rad, m.pitch_rad, m.yaw_rad};
+  RawPose pose = raw_pose({m.north_m, m.east_m, m.down_m}, quat_from_rpy(rpy));
+  pose.sent_angles = rpy;
   return pose;
 }
 

@@ -302,9 +302,9 @@ std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_w
   return notes;
 }
 
-std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad) {
-  if (!(largest_angle_rad > 0)) return {};
-  return {{vehicle, "the attitude of " + vehicle + format(" has an angle of %.4g rad", largest_angle_rad), angle_cure}};
+std::vector<Note> notes_on_angles(const std::string& vehicle, const ImplausibleAngle& largest) {
+  if (!(largest.rad > 0)) return {};
+  return {{vehicle, "the attitude of " + vehicle + format(" has an angle of %.4g rad", largest.rad), angle_cure}};
 }
 
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around) {
@@ -314,12 +314,11 @@ std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan
   std::vector<Note> notes;
   add(notes, carrier.vehicle,
       doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
-  if (plan.largest_angle_rad > 0) {
-    const std::string angle = format(" has an angle of %.4g rad", plan.largest_angle_rad);
-    add(notes, carrier.vehicle, Doubt{plan.file + angle, degrees_cure});
-    return notes;  // doubts about attitudes would be consequences of this one
-  }
-  if (const auto why = radians_read_as_degrees(poses))
+  if (plan.largest_angle.rad > 0) {
+    add(notes, carrier.vehicle, Doubt{plan.file + format(" has an angle of %.4g rad", plan.largest_angle.rad), degrees_cure});
+    // Further doubts would be consequences of a roll or pitch in degrees. A heading turns nothing over.
+    if (plan.largest_angle.is_tilt) return notes;
+  } else if (const auto why = radians_read_as_degrees(poses))
     add(notes, carrier.vehicle, Doubt{"the headings of " + plan.file + " " + *why, radians_cure});
   if (const OtherAxes* axes = axes_of(poses)) {
     if (!are_upright(carrier.mounts, *axes))
@@ -370,19 +369,21 @@ std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
 
 void Plausibility::judge(const Carrier& carrier, LastPose& last) const {
   last.notes = notes_on_pose(carrier, last.vehicle_in_world, around_);
-  auto degrees = notes_on_angles(carrier.vehicle, last.largest_angle_rad);
-  if (degrees.empty()) return;
-  std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });  // angles in degrees cause this note
-  add(last.notes, std::move(degrees));
+  if (last.largest_angle.is_tilt)  // angles in degrees cause this note
+    std::erase_if(last.notes, [](const Note& n) { return n.cure == turned_cure; });
+  add(last.notes, notes_on_angles(carrier.vehicle, last.largest_angle));
 }
 
-std::vector<Note> Plausibility::use(const control::PoseSample& sample) {
+std::vector<Note> Plausibility::use(const control::PoseSample& sample, Time now) {
   const auto carrier = std::find_if(carriers_.begin(), carriers_.end(), [&](const Carrier& c) {
     return c.vehicle == sample.name || sample.name.empty();  // an empty name means the only vehicle
   });
   if (carrier == carriers_.end()) return {};
   LastPose& last = of_poses_[carrier->vehicle];
-  last = {sample.pose, sample.largest_angle_rad, {}};
+  if (sample.stamp.domain != control::ClockDomain::arrival) now = Time(std::chrono::nanoseconds(sample.stamp.ns));
+  last.turns.add(sample.sent_angles.yaw_rad, now);
+  last.vehicle_in_world = sample.pose;
+  last.largest_angle = angle_beyond_radians(sample.sent_angles, last.turns.has_counted());
   judge(*carrier, last);
   return untold(last.notes);
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/plausible_angles.hpp"
 #include "core/scene/extent.hpp"
 #include "daemon/config/config.hpp"
 #include "protocol/control/pose_sample.hpp"
@@ -56,8 +57,8 @@ std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around)
 std::vector<Note> notes_on_origin(const Surroundings& around);
 /// Returns at most one note on the position and one on the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
-/// `largest_angle_rad`: as in PoseSample.
-std::vector<Note> notes_on_angles(const std::string& vehicle, double largest_angle_rad);
+/// `largest`: of the angles of its newest pose.
+std::vector<Note> notes_on_angles(const std::string& vehicle, const ImplausibleAngle& largest);
 /// Notes on at most about 10,000 poses, evenly spread. A carrier without mounts is a moving object, whose position is not
 /// checked.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
@@ -72,15 +73,17 @@ class Plausibility {
   /// again if positions in the scene have changed.
   std::vector<Note> use(const Config& config, const Scene& scene);
   /// Checks an accepted pose of a vehicle; returns only notes that are new for this vehicle.
-  std::vector<Note> use(const control::PoseSample& sample);
+  /// `now`: its time if it has no stamp.
+  std::vector<Note> use(const control::PoseSample& sample, Time now);
   /// The present notes. Notes on poses replace those on a vehicle's start or trajectory.
   std::vector<Note> all() const;
 
  private:
   struct LastPose {
     Pose vehicle_in_world;
-    double largest_angle_rad = 0;
-    std::vector<Note> notes;
+    ImplausibleAngle largest_angle = {};
+    std::vector<Note> notes = {};
+    TurnCount turns = {};
   };
   std::vector<Note> untold(const std::vector<Note>& notes);
   void judge(const Carrier& carrier, LastPose& last) const;

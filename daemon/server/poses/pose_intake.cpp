@@ -32,7 +32,7 @@ std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
   if (!outcome.notice.empty() && events_ != nullptr) events_->publish_pose(outcome.body, false, outcome.notice);
   if (!outcome.notice.empty()) log_limited(log_, notices_, LogLevel::info, outcome.notice);
   if (plausibility_ != nullptr && outcome.verdict == PoseVerdict::accepted && sample.of == control::PoseSample::Of::vehicle)
-    for (const Note& note : plausibility_->use(sample)) log_.warning(text_of(note), {{"from", sender.id}});
+    for (const Note& note : plausibility_->use(sample, clock_.now())) log_.warning(text_of(note), {{"from", sender.id}});
   on_pose_();
   return outcome.refusal;
 }

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "core/base/plausible_angles.hpp"
 #include "tests/is_sanitized.hpp"
 
 namespace sonar::control {
@@ -46,11 +47,15 @@ TEST(JsonPose, ReadsQuaternionFrameAndVehicle) {
   EXPECT_NEAR(rotate(s->pose.orientation, {1, 0, 0}).x, 1, 1e-12);
 }
 
-TEST(JsonPose, KeepsTheLargestAngleThatWasSent) {
-  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"attitude":[1,-90,45]})")->largest_angle_rad, 90);
-  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"attitude":[0,-5,45]})")->largest_angle_rad, 45) << "no pitch is half a turn";
-  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"attitude":[0,1.5,-45]})")->largest_angle_rad, 0) << "a heading of 7 turns";
-  EXPECT_EQ(parse_json_pose(R"({"position":[0,0,3],"quaternion":[1,0,0,0]})")->largest_angle_rad, 0);
+TEST(JsonPose, KeepsTheAnglesThatWereSent) {
+  const auto largest = [](const std::string& orientation) {
+    return angle_beyond_radians(parse_json_pose(R"({"position":[0,0,3],)" + orientation + "}")->sent_angles).rad;
+  };
+  EXPECT_EQ(largest(R"("attitude":[1,-90,45])"), 90);
+  EXPECT_EQ(largest(R"("attitude":[0,-5,45])"), 45) << "no pitch is half a turn";
+  EXPECT_EQ(largest(R"("attitude":[0,1.5,-45])"), 0) << "a heading of 7 turns";
+  EXPECT_EQ(largest(R"("attitude":[0,1.5,-65])"), 65);
+  EXPECT_EQ(largest(R"("quaternion":[1,0,0,0])"), 0);
 }
 
 TEST(JsonPose, RefusesWithASentence) {

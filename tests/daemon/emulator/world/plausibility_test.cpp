@@ -345,11 +345,11 @@ TEST(Plausibility, TheLastPoseIsJudgedAgainWhenTheSceneChanges) {
   EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty());
   control::PoseSample sample;
   sample.name = "rov", sample.pose.position_m = {480, 0, -3};
-  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("m from everything in the scene")));
+  EXPECT_THAT(texts_of(plausibility.use(sample, {})), ElementsAre(HasSubstr("m from everything in the scene")));
   EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
   EXPECT_THAT(plausibility.all(), IsEmpty());
   sample.pose.position_m = {480, 0, -9};
-  EXPECT_EQ(plausibility.use(sample).size(), 1u) << "below that ground";
+  EXPECT_EQ(plausibility.use(sample, {}).size(), 1u) << "below that ground";
   EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "the vehicle is far away again, which was reported before";
   EXPECT_THAT(texts_of(plausibility.all()), ElementsAre(HasSubstr("m from everything in the scene")));
 }
@@ -359,9 +359,9 @@ TEST(Plausibility, AboveTheWaterAndBelowTheGroundAreTwoMistakes) {
   EXPECT_THAT(plausibility.use(config_with(""), bed_scene()), IsEmpty());
   control::PoseSample sample;
   sample.name = "rov", sample.pose.position_m = {0, 0, -30};
-  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("below the lowest point of the ground")));
+  EXPECT_THAT(texts_of(plausibility.use(sample, {})), ElementsAre(HasSubstr("below the lowest point of the ground")));
   sample.pose.position_m.z = 3;
-  EXPECT_THAT(texts_of(plausibility.use(sample)), ElementsAre(HasSubstr("above the water's surface")));
+  EXPECT_THAT(texts_of(plausibility.use(sample, {})), ElementsAre(HasSubstr("above the water's surface")));
 }
 
 TEST(Plausibility, ATrajectoryIsJudgedAgainWhenTheSceneChanges) {
