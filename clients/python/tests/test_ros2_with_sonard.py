@@ -157,7 +157,7 @@ class OneBeamAtATime(WithSonard):
 
     def test_the_cloud_of_a_dvl(self):
         daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "dvl-a50"))
-        ros = self.bridge(daemon, clouds=True, cloud_threshold=0)
+        ros = self.bridge(daemon, clouds=True)
         self.listen(daemon, "dvl")
         cloud = wait_for(lambda: [m for m in ros.published.get("~/down/cloud", []) if m.width])[0]
         for i in range(cloud.width):  # the ground: 1.9 m below, tilted and rippled

@@ -50,15 +50,17 @@ foxglove::CloudPoint point_of(double range_m, double azimuth_rad, double elevati
           static_cast<float>(range_m * std::sin(elevation_rad)), static_cast<std::uint8_t>(std::lround(255 * part))};
 }
 
-/// Converts every pixel of a range image to a point in space.
+/// Converts the returns of a range image to points in space. Their strengths depend on range and ground, and some makes send
+/// none; so the threshold is a fraction of the strongest.
 std::vector<foxglove::CloudPoint> points_of(const Ping& ping, const RangeImageSettings& settings, double threshold) {
   const RangeImageGrid grid(ping.request);
-  const auto full = static_cast<float>(ping.request.settings.format.max_code >> 16);
-  const auto columns = static_cast<std::size_t>(grid.columns);
+  const std::size_t count = ping.samples.size() / 4, columns = static_cast<std::size_t>(grid.columns);
+  std::uint32_t strongest = 1;
+  for (std::size_t i = 0; i < count; ++i) strongest = std::max(strongest, range_pixel(ping, i).strength);
   std::vector<foxglove::CloudPoint> points;
-  for (std::size_t i = 0; i < ping.samples.size() / 4; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     const RangePixel pixel = range_pixel(ping, i);
-    const float part = std::min(1.0f, static_cast<float>(pixel.strength) / full);
+    const float part = static_cast<float>(pixel.strength) / static_cast<float>(strongest);
     if (pixel.range == 0 || part <= static_cast<float>(threshold)) continue;
     points.push_back(point_of(pixel.range * settings.range_unit_m, grid.azimuth_rad(static_cast<double>(i % columns)),
                               grid.elevation_rad(static_cast<double>(i / columns)), part));

@@ -11,6 +11,12 @@
 namespace sonar {
 namespace {
 
+void set_pixel(Ping& ping, std::size_t column, std::size_t row, std::uint32_t strength) {
+  const RangePixel pixel{strength, static_cast<std::uint32_t>(6 / (50.0 / 65536))};
+  for (std::size_t b = 0; b < 4; ++b)
+    ping.samples[4 * (256 * row + column) + b] = static_cast<std::byte>(pixel.code() >> (8 * b) & 0xFF);
+}
+
 /// One pixel with a return, at 6 m and full strength.
 Ping ping_with(std::size_t column, std::size_t row) {
   const protocol::Profile profile = *protocol::find_profile("waterlinked-3d15");
@@ -25,9 +31,7 @@ Ping ping_with(std::size_t column, std::size_t row) {
   const RangeImageGrid grid(ping.request);
   for (int c = 0; c < grid.columns; ++c) ping.beam_azimuth_rad.push_back(static_cast<float>(grid.azimuth_rad(c)));
   ping.samples.resize(4 * 256 * 64);
-  const RangePixel pixel{400, static_cast<std::uint32_t>(6 / (50.0 / 65536))};
-  for (std::size_t b = 0; b < 4; ++b)
-    ping.samples[4 * (256 * row + column) + b] = static_cast<std::byte>(pixel.code() >> (8 * b) & 0xFF);
+  set_pixel(ping, column, row, 400);
   return ping;
 }
 
@@ -48,6 +52,19 @@ TEST(RangeView, OnePointForEachReturn) {
   Ping none = ping_with(0, 0);
   std::fill(none.samples.begin(), none.samples.end(), std::byte{0});
   EXPECT_GT(size(ping_with(200, 60)), size(none));
+}
+
+/// A DVL has no full scale: its echoes are a small part of that of its samples.
+TEST(RangeView, ThePointsAreThoseThatAreNotMuchWeakerThanTheStrongest) {
+  Ping ping = ping_with(200, 60);
+  const auto size = [&](double threshold) { return cloud_payload("front", ping, threshold)->pieces.front().bytes->size(); };
+  const std::size_t one = size(0);
+  set_pixel(ping, 200, 60, 0);
+  for (std::size_t column = 0; column < 3; ++column) set_pixel(ping, column, 60, 10);
+  set_pixel(ping, 3, 60, 1);
+  const std::size_t all = size(0), strong = size(0.35);
+  EXPECT_GT(all, strong);
+  EXPECT_EQ(strong - one, 2 * (all - strong)) << "three of four";
 }
 
 }  // namespace
