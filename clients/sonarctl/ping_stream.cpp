@@ -185,7 +185,6 @@ Result<void> PingStream::start(std::optional<Socket> connected, milliseconds pat
   const std::optional<Error> why = std::exchange(ended_, std::nullopt);
   is_started_ = host_->is_open() && !why;
   if (is_started_) return {};
-  interrupted_ = false;
   if (interrupted != 0) return failure(ErrorKind::io, "interrupted before " + place() + " answered");
   if (!why || why->kind == ErrorKind::unavailable)
     return failure(ErrorKind::unavailable,
@@ -231,7 +230,7 @@ void PingStream::carry_out(protocol::HostActions actions) {
   if (!notices.empty()) items_.push_back({Wait::data, {}, std::move(notices), std::exchange(kept_, {}), {}});
 }
 
-void PingStream::receive(milliseconds patience) {
+bool PingStream::receive(milliseconds patience) {
   if (const auto tick = host_->next_tick()) {
     const auto until_tick = std::chrono::ceil<milliseconds>(*tick - now());
     patience = std::clamp(until_tick, 0ms, patience);
@@ -239,16 +238,15 @@ void PingStream::receive(milliseconds patience) {
   std::vector<pollfd> ready;
   for (const auto& socket : sockets_) ready.push_back({socket ? socket->fd() : -1, POLLIN, 0});
   const int polled = ::poll(ready.data(), ready.size(), static_cast<int>(patience.count()));
+  if (polled < 0 && errno == EINTR) return false;
   if (polled < 0) {
-    if (errno == EINTR)
-      interrupted_ = true;
-    else
-      ended_ = Error{ErrorKind::io, std::strerror(errno)};
-    return;
+    ended_ = Error{ErrorKind::io, std::strerror(errno)};
+    return true;
   }
   for (std::size_t port = 0; port < ready.size() && !ended_; ++port)
     if (ready[port].revents != 0) read_port(port);
   if (!ended_) carry_out(host_->on_tick(now()));
+  return true;
 }
 
 void PingStream::read_port(std::size_t port) {
@@ -334,8 +332,7 @@ PingStream::Item PingStream::next(milliseconds patience) {
       return item;
     }
     if (ended_) return {Wait::closed, {}, {}, std::exchange(kept_, {}), ended_->text, ended_->kind};
-    receive(left_until(deadline));
-    if (std::exchange(interrupted_, false)) return {Wait::interrupted, {}, {}, {}, {}};
+    if (!receive(left_until(deadline))) return {Wait::interrupted, {}, {}, {}, {}};
     if (items_.empty() && !ended_ && Clock::now() >= deadline) return {};
   }
 }

@@ -79,7 +79,8 @@ class PingStream {
   void carry_out(protocol::HostActions actions);
   void take(std::size_t port, std::span<const std::byte> bytes);
   void keep(std::size_t port, recording::Origin from, std::span<const std::byte> bytes);
-  void receive(std::chrono::milliseconds patience);
+  /// False: a signal ended the wait.
+  bool receive(std::chrono::milliseconds patience);
   void read_port(std::size_t port);
   std::string place() const;  // "tcp 127.0.0.2:14750"
 
@@ -89,10 +90,10 @@ class PingStream {
   std::vector<std::optional<Socket>> sockets_;  // by port; none of kind http
   std::uint32_t device_ip_ = 0;                 // in network order
   std::chrono::milliseconds answer_patience_{};
-  std::deque<Item> items_;                           // items that next() has not returned yet
-  std::optional<Error> ended_;                       // set when the conversation has ended; empty text: the sonar closed it
-  bool interrupted_ = false, has_answered_ = false;  // has_answered_: at the first port
-  bool is_started_ = false;                          // the host must send what on_leave() returns
+  std::deque<Item> items_;      // items that next() has not returned yet
+  std::optional<Error> ended_;  // set when the conversation has ended; empty text: the sonar closed it
+  bool has_answered_ = false;   // at the first port
+  bool is_started_ = false;     // the host must send what on_leave() returns
   std::ofstream record_;
   bool keeps_ = false;
   std::vector<recording::RecordedMessage> kept_;  // messages since the last item
