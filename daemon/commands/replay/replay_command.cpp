@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <csignal>
+#include <optional>
 
 #include "core/text/arguments.hpp"
 #include "core/text/counted.hpp"
@@ -65,19 +66,25 @@ Result<Endpoint> listener_from(const std::string& place, const std::string& opti
   return why.empty() ? at : failure(ErrorKind::usage, option + ": " + why);
 }
 
-/// Returns the line of the banner; empty if the page is off or its default address is in use.
-Result<std::string> open_page(ReplayPage& page, const ReplayCommand& command, Log& log) {
-  if (command.http == "off") return std::string();
-  const auto at = listener_from(command.http, "--http");
-  if (!at) return tl::make_unexpected(at.error());
+/// Returns the line of the banner; empty if the page is off, or if its address is in use and `must_open` is false.
+Result<std::string> open_page(ReplayPage& page, const std::optional<Endpoint>& at, bool must_open, Log& log) {
+  if (!at) return std::string();
   if (const auto opened = page.open(*at); !opened) {
     const std::string what = opened.error().text + "; --http can set another address, or off";
-    if (command.http != ReplayCommand::default_page) return failure(opened.error().kind, what);
+    if (must_open) return failure(opened.error().kind, what);
     log.warning("continuing without the page: " + what);
     return std::string();
   }
   page.start();
   return "open      http://" + text_of(page.at()) + "   the recording, in a browser\n";
+}
+
+/// The address of the page; nullopt if it is off.
+Result<std::optional<Endpoint>> page_from(const ReplayCommand& command) {
+  if (command.http == "off") return std::optional<Endpoint>();
+  const auto at = listener_from(command.http, "--http");
+  if (!at) return tl::make_unexpected(at.error());
+  return std::optional(*at);
 }
 
 Result<ReplayOptions> options_from(const ReplayCommand& command) {
@@ -87,8 +94,6 @@ Result<ReplayOptions> options_from(const ReplayCommand& command) {
   if (!ip) return usage(ip.error());
   if (const std::string why = why_not_of_a_computer(*ip); !why.empty()) return failure(ErrorKind::usage, "--ip: " + why);
   options.at = {*ip, command.port};
-  if (command.http != "off")
-    if (const auto page = listener_from(command.http, "--http"); !page) return tl::make_unexpected(page.error());
   for (const std::string& place : command.status_to) {
     const auto to = endpoint_from(place, "--status-to");
     if (!to) return tl::make_unexpected(to.error());
@@ -108,6 +113,8 @@ Result<void> run_replay(const ReplayCommand& command) {
   std::signal(SIGPIPE, SIG_IGN);
   auto options = options_from(command);
   if (!options) return tl::make_unexpected(options.error());
+  const auto page_at = page_from(command);
+  if (!page_at) return tl::make_unexpected(page_at.error());
   auto opened = recording::open_recording(std::filesystem::path(command.file), command.sonar);
   if (!opened) return tl::make_unexpected(opened.error());
   auto device = find_replay_device(*opened->reader, command.file, command.part_number);
@@ -130,7 +137,7 @@ Result<void> run_replay(const ReplayCommand& command) {
   options->on_end = [&page] { page.stop(); };
   const auto serve = [&](auto& server, const std::string& place) -> Result<void> {
     if (!opened->reader->note().empty()) log.info(opened->reader->note());
-    const auto where = open_page(page, command, log);
+    const auto where = open_page(page, *page_at, command.http != ReplayCommand::default_page, log);
     if (!where) return tl::make_unexpected(where.error());
     if (!device->is_only_seen.empty() && where->empty()) return failure(ErrorKind::bad_data, device->is_only_seen);
     if (!device->is_only_seen.empty())
