@@ -22,8 +22,8 @@ Result<void> run_check(const CheckCommand& command) {
               text::counted(config.sonars.size(), "sonar").c_str(), config.scene.name().c_str(), scene.triangle_count());
   for (const SonarConfig& sonar : config.sonars) {
     std::printf("sonar %s, %s\n", sonar.name.c_str(), sonar.profile.model->name.c_str());
-    const Ipv4 ip = sonar.bind_ip == Ipv4{} ? sonar.advertise_ip : sonar.bind_ip;
-    for (const protocol::DriverAddress& a : protocol::driver_addresses(*sonar.profile.vendor, ip, sonar.status_to))
+    for (const protocol::DriverAddress& a :
+         protocol::driver_addresses(*sonar.profile.vendor, address_for_drivers(sonar), sonar.status_to))
       std::printf("  %s\n", protocol::line_of(a.protocol, text_of(a.at), a.carries, a.sonar_speaks_first).c_str());
   }
   for (const std::string& note : scene.notes) std::printf("note: %s\n", note.c_str());

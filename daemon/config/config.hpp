@@ -183,6 +183,8 @@ std::vector<std::string> range_finders_of(const Config& config, const std::strin
 
 /// Fills netmask and status_to from advertise_ip, unless the file gives them.
 void derive_addresses(SonarConfig& sonar);
+/// The address to which drivers connect.
+inline Ipv4 address_for_drivers(const SonarConfig& sonar) { return sonar.bind_ip == Ipv4{} ? sonar.advertise_ip : sonar.bind_ip; }
 /// Moves the first sonar to another address, and changes all derived values. Errors are sentences for the command line.
 Result<void> rebind(Config& config, std::string_view address);
 

@@ -185,8 +185,7 @@ bool Device::end_faults(const std::string& name) {
 std::vector<protocol::DriverAddress> Device::addresses() const {
   std::vector<Endpoint> status_to;
   for (const udp::endpoint& to : status_destinations()) status_to.push_back({to.address().to_v4().to_bytes(), to.port()});
-  const Ipv4 ip = config().bind_ip == Ipv4{} ? sonar_.state().advertise_ip : config().bind_ip;
-  return protocol::driver_addresses(sonar_.vendor(), ip, status_to);
+  return protocol::driver_addresses(sonar_.vendor(), address_for_drivers(config()), status_to);
 }
 
 std::vector<StreamDigest> Device::digests() const {
