@@ -7,6 +7,7 @@
 #include <string>
 
 #include "daemon/emulator/world/world.hpp"
+#include "daemon/server/time/has_left.hpp"
 #include "protocol/control/operations.hpp"
 
 namespace sonar {
@@ -29,11 +30,10 @@ struct OperationResult {
 class Operations {
  public:
   using Done = std::function<void(OperationResult)>;
-  using HasLeft = std::function<bool()>;
   virtual ~Operations() = default;
 
-  /// `done` is called once: before this returns, or later when the operation takes time (scenes); never after stop(). `has_left`
-  /// returns true once the client has closed its end of the connection, or half of it; a step then ends.
+  /// `done` is called once: before this returns, or later when the operation takes time (scenes); never after stop(). A step
+  /// ends when `has_left` returns true.
   virtual void perform(const control::Operation& operation, const Sender& sender, Done done, HasLeft has_left = {}) = 0;
   /// Counters and histograms as Prometheus text, version 0.0.4.
   virtual std::string metrics() const = 0;

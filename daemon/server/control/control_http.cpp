@@ -78,7 +78,7 @@ asio::awaitable<HttpAnswer> ControlHttp::perform(control::Operation operation, H
     // The operation may end after its connection.
     if (const auto connection = weak.lock()) connection->wait_timer().cancel();
   };
-  const Operations::HasLeft has_left = [weak = from.weak_from_this()] {
+  const HasLeft has_left = [weak = from.weak_from_this()] {
     const auto connection = weak.lock();
     return !connection || connection->over() || sonar::has_left(connection->socket());
   };

@@ -24,7 +24,7 @@ void TimeOperations::take(const control::PoseSample& sample, const Sender& sende
 
 /// The answer comes when the step is over, with the pings made since the answer before. A client that has shut down only its half
 /// of the connection still gets an answer.
-void TimeOperations::step(const control::Step& asked, Operations::Done done, Operations::HasLeft has_left) {
+void TimeOperations::step(const control::Step& asked, Operations::Done done, HasLeft has_left) {
   if (std::string why = time_.step(asked.dt_s); !why.empty()) return done(refused(std::move(why)));
   const auto reached = [this, done = std::move(done)](Time then, bool is_whole) {
     if (!is_whole)

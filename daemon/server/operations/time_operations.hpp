@@ -17,7 +17,7 @@ class TimeOperations {
       : time_(time), poses_(poses), fleet_(fleet), on_change_(std::move(on_change)) {}
 
   void take(const control::PoseSample& sample, const Sender& sender, Operations::Done done);
-  void step(const control::Step& asked, Operations::Done done, Operations::HasLeft has_left);
+  void step(const control::Step& asked, Operations::Done done, HasLeft has_left);
   OperationResult steer(const control::SetTrajectory& asked, const Sender& sender);
 
  private:

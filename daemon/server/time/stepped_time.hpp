@@ -10,6 +10,7 @@
 #include "daemon/config/clock_mode.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/time/clock.hpp"
+#include "daemon/server/time/has_left.hpp"
 
 namespace sonar {
 
@@ -40,7 +41,6 @@ class SteppedTime {
 
   /// `is_whole`: every ping that bound() allowed when the wait began has been served. False: the client has left before.
   using Reached = std::function<void(Time then, bool is_whole)>;
-  using HasLeft = std::function<bool()>;
   /// `reached` is called once. While a step is under way, `has_left` is asked before each ping; a step ends when it is true.
   void wait(Reached reached, HasLeft has_left = {});
   /// Ends the step that is under way if its client has left: the rest of its time does not pass, and later steps move forward.

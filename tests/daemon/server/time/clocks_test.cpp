@@ -146,7 +146,7 @@ TEST(Lockstep, TheStepOfAClientThatHasLeftEndsAndLaterStepsKeepTheirLength) {
   SteppedTime time(ClockMode::lockstep, clock, world);
   std::vector<std::string> ended;
   bool first_left = false;
-  const auto wait = [&](const std::string& name, SteppedTime::HasLeft has_left) {
+  const auto wait = [&](const std::string& name, HasLeft has_left) {
     time.wait(
         [&ended, name](Time then, bool is_whole) {
           ended.push_back(name + (is_whole ? " whole at " : " cut at ") +
