@@ -5,6 +5,7 @@
 
 #include "daemon/server/sonars/session.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/host.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {
@@ -256,6 +257,28 @@ TEST(Admission, TakeOverEndsTheOldOneAtAMessageBoundary) {
   ASSERT_TRUE(eventually([&] { return daemon.status().sonars(0).has_gone(); }));
   const auto status = daemon.status();
   EXPECT_GT(status.sonars(0).gone().connected_s(), status.sonars(0).clients(0).connected_s()) << "the old one connected first";
+}
+
+/// Its port never has pings.
+TEST(Admission, AConnectionForCommandsIsNotBlamedForGettingNoPings) {
+  DaemonSetup setup;
+  setup.profile = "norbit-wbms";
+  Daemon daemon(setup);
+  const auto gone_from = [&](const protocol::Port& port) {
+    auto client = std::make_unique<Client>(daemon.address(), port.number);
+    EXPECT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 1; }));
+    const v1::ClientStatus served = daemon.status().sonars(0).clients(0);
+    EXPECT_EQ(served.commands_only(), !port.has_pings);
+    client.reset();
+    EXPECT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 0; }));
+    const v1::Visit gone = daemon.status().sonars(0).gone();
+    EXPECT_EQ(gone.address(), served.address());
+    return gone;
+  };
+  for (const protocol::Port& port : protocol::find_make("norbit")->device->ports())
+    if (port.kind == protocol::Port::Kind::tcp_stream) {
+      EXPECT_EQ(gone_from(port).without_ping(), port.has_pings) << port.number;
+    }
 }
 
 TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
