@@ -11,16 +11,19 @@ using protocol::Reaction;
 constexpr auto port_table = streaming_ports(62312, "settings, points");
 constexpr auto utc_period = std::chrono::seconds(10);
 
-/// One host's conversation. The device asks each host for the time, at once and every 10 s; pings flow while they are enabled.
+/// One host's conversation. The device asks a host for the time every 10 s, for the first time when the host enables pings.
+/// unknown: the moment of the first question. A question at once would delay ping-python's initialization by 10 s if it came in
+/// the packet of the answer for which ping-python waits, because ping-python reads one message of each packet.
 class SurveyorDialogue final : public StreamingConversation<Settings, settings_from> {
  public:
   SurveyorDialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
-      : StreamingConversation(device, port), ask_utc_at_(now) {}
+      : StreamingConversation(device, port), ask_utc_at_(now + utc_period) {}
 
   Reaction on_tick(Time now, bool) override {
     Reaction reaction;
     if (now < ask_utc_at_) return reaction;
     ask_utc_at_ = now + utc_period;
+    has_asked_ = true;
     reaction.replies.push_back(framed(Id::utc_request, id_, {}));
     return reaction;
   }
@@ -33,6 +36,7 @@ class SurveyorDialogue final : public StreamingConversation<Settings, settings_f
         PingParameters parameters;
         if (!read(frame, parameters, reaction)) return true;
         if (const std::string why = complaint(parameters); !why.empty()) return refuse(frame, why, reaction), true;
+        if (parameters.enable != 0 && !has_asked_) ask_utc_at_ = now;
         change(reaction, [&](Settings& s) { s.parameters = parameters; });
         return true;
       }
@@ -64,6 +68,7 @@ class SurveyorDialogue final : public StreamingConversation<Settings, settings_f
 
  private:
   Time ask_utc_at_;
+  bool has_asked_ = false;
 };
 
 class SurveyorVendor final : public StreamingVendor {

@@ -56,12 +56,14 @@ TEST(Surveyor, WhatComesWithEveryPingIsAnsweredByTheNext) {
 
 TEST(Surveyor, ItsClockIsWhatAHostTold) {
   Talk talk("surveyor-240");
+  talk.say(pings());
   talk.run_to(0);
   const auto asked = talk.take();
   ASSERT_EQ(asked.size(), 1u);
   EXPECT_EQ(asked[0].header.id, Id::utc_request);
   EXPECT_EQ(talk.dialogue->next_tick(), at_s(10));
   talk.say(pings());
+  EXPECT_EQ(talk.dialogue->next_tick(), at_s(10)) << "it has asked";
   const auto utc = [&](double at) {
     return message_in<AttitudeReport>(frames_in({*talk.vendor.frame(ping_of(talk, at), talk.state)}).front()).utc_ms;
   };
@@ -69,6 +71,25 @@ TEST(Surveyor, ItsClockIsWhatAHostTold) {
   talk.say(framed_message(Id::utc_response, 0, UtcResponse{1800000000000, 0}), 1);
   EXPECT_NEAR(static_cast<double>(utc(1.5)), 1800000000500.0, 1);
   EXPECT_EQ(talk.settings.rate_hz, 10) << "the settings stay";
+}
+
+/// A question in the packet of an answer would hold back the answer from a host that reads one message of each packet.
+TEST(Surveyor, AHostIsAskedForTheTimeOnceItEnablesPings) {
+  Talk talk("surveyor-240");
+  const auto times_asked = [&] {
+    const auto said = talk.take();
+    return std::count_if(said.begin(), said.end(), [](const Frame& frame) { return frame.header.id == Id::utc_request; });
+  };
+  talk.say(general(Id::device_information));
+  talk.say(pings({.end_mm = 5000, .enable = 0}));
+  talk.run_to(9);
+  EXPECT_EQ(times_asked(), 0);
+  talk.say(pings(), 9);
+  talk.run_to(9);
+  EXPECT_EQ(times_asked(), 1);
+  Talk other("surveyor-240");
+  other.run_to(10);
+  EXPECT_EQ(other.take().size(), 1u) << "asked without pings, too";
 }
 
 TEST(Surveyor, OneFrameADatagramAndTheSameFramesOverTcp) {
