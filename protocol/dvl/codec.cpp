@@ -1,7 +1,7 @@
 // The messages of a DVL, for recordings.
 #include "protocol/dvl/host.hpp"
 #include "protocol/dvl/models.hpp"
-#include "protocol/dvl/reports.hpp"
+#include "protocol/dvl/sentences.hpp"
 
 namespace sonar::dvl {
 namespace {
@@ -9,14 +9,37 @@ namespace {
 // Messages are lines: Framing::length is null, so a message ends with the line.
 constexpr recording::Framing framing{.magic = {'{', '"'}, .header_size = 2};
 
+bool is_json(BytesView message) { return recording::begins_with(message, {'{', '"'}) && message.size() <= longest_line; }
+
+std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
+  if (!is_json(message.bytes) || !read_line(message.bytes).velocity) return std::nullopt;
+  return recording::Sender{recorded_model()};
+}
+
+/// Each report counts as a ping.
+std::optional<recording::PingPart> ping_part(BytesView message) {
+  if (recording::begins_with(message, {'w', 'r'})) return recording::PingPart{.port = serial_port};
+  if (!is_json(message)) return std::nullopt;
+  const Line line = read_line(message);
+  return line.velocity || line.position ? std::optional(recording::PingPart{.port = tcp_port}) : std::nullopt;
+}
+
+/// The recorded line, and the same report in the sentences of the serial line.
+std::vector<Bytes> answer(BytesView message, const VendorSettings* request) {
+  std::vector<Bytes> lines{Bytes(message.begin(), message.end())};
+  const Line line = read_line(message);
+  const SerialOutput output = settings_from(request).serial_output;
+  Bytes sentences;
+  if (line.velocity)
+    sentences = velocity_sentences(line.velocity->measured, line.velocity->since_last, line.velocity->sent_at, output);
+  else if (line.position && output != SerialOutput::none)
+    sentences = position_sentence(line.position->reckoning, line.position->at);
+  if (!sentences.empty()) lines.push_back(std::move(sentences));
+  return lines;
+}
+
 }  // namespace
 
-recording::Codec codec() {
-  return {.framing = &framing, .sender = [](const recording::RecordedMessage& message) -> std::optional<recording::Sender> {
-            if (!recording::begins_with(message.bytes, {'{', '"'}) || message.bytes.size() > longest_line) return std::nullopt;
-            // Reports do not have the model, so the first model is assumed.
-            return read_line(message.bytes).velocity ? std::optional(recording::Sender{models().front()}) : std::nullopt;
-          }};
-}
+recording::Codec codec() { return {.framing = &framing, .sender = sender_of, .ping_part = ping_part, .answer = answer}; }
 
 }  // namespace sonar::dvl

@@ -66,14 +66,14 @@ class DvlHost final : public protocol::Host {
  private:
   void on_line(HostActions& actions) {
     const Line line = read_line(line_);
-    if (line.velocity) actions.emplace_back(ping_from(*line.velocity));
+    if (line.velocity) actions.emplace_back(ping_from(line.velocity->measured));
     if (line.response && !line.response->success)
       actions.emplace_back(Error{ErrorKind::usage, "refuses " + line.response->to + ": " + line.response->error});
   }
 
-  HostPing ping_from(const VelocityReport& report) {
+  HostPing ping_from(const Measurement& report) {
     double farthest_m = 0;
-    for (const auto& beam : report.transducers)
+    for (const Beam& beam : report.beams)
       if (beam.is_valid) farthest_m = std::max(farthest_m, beam.distance_m);
     const double range_m = std::max(window_m(farthest_m), window_m_), row_m = range_m / points;
     HostPing ping;
@@ -81,12 +81,12 @@ class DvlHost final : public protocol::Host {
     ping.facts.note = report.is_valid ? text::format("velocity %.3f %.3f %.3f m/s, altitude %.2f m", report.velocity_mps.x,
                                                      report.velocity_mps.y, report.velocity_mps.z, report.altitude_m)
                                       : "no velocity";
-    if (report.reflected_s > 0) ping.fired_s = report.reflected_s;
+    if (report.reflected_at > Time{}) ping.fired_s = seconds(report.reflected_at.time_since_epoch());
     ping.picture = []() -> Result<PolarImage> {
       return failure(ErrorKind::usage, "the report of a DVL is not a picture: sonarctl listen prints its velocities");
     };
     std::vector<float> echoes(points, silent_db);
-    for (const auto& beam : report.transducers) {
+    for (const Beam& beam : report.beams) {
       if (!beam.is_valid || !(beam.distance_m >= 0 && beam.distance_m < range_m)) continue;
       float& point = echoes[static_cast<std::size_t>(beam.distance_m / row_m)];
       point = std::max(point, static_cast<float>(std::clamp(beam.rssi_dbm, -200.0, 200.0)));

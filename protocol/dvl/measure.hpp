@@ -6,12 +6,14 @@
 
 namespace sonar::dvl {
 
+inline constexpr double usual_nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all
+
 struct Beam {
   bool is_valid = false;
   double velocity_mps = 0;  // the device's velocity along the beam, positive towards the ground
   double sigma_mps = 0;     // standard deviation of the velocity's noise
   double distance_m = -1;   // by the device's speed of sound; -1: no echo
-  double rssi_dbm = 0;
+  double rssi_dbm = 0, nsd_dbm = usual_nsd_dbm;
 };
 
 using Covariance = std::array<std::array<double, 3>, 3>;
@@ -24,6 +26,7 @@ struct Measurement {
   Covariance covariance{};
   double fom = 0, altitude_m = -1;
   Time reflected_at{}, heard_at{};  // when the ground reflects the middle of the ping; when the last echo ends
+  int status = 0;                   // 1 if the device is too hot, which is not emulated
 };
 
 /// The velocities of the beams follow from PingRequest::sonar_moves. World computes it from the poses of the vehicle, and from

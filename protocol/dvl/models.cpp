@@ -64,6 +64,11 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
+const std::shared_ptr<const SonarModel>& recorded_model() {
+  static const auto only = std::make_shared<const SonarModel>(model_of(products.front()));
+  return only;
+}
+
 RangeMode range_mode(int index, const Product& product) {
   constexpr std::array<RangeMode, range_mode_count> all{
       {{0.05, 0.6, 15, 0.01}, {0.3, 3, 10, 0.03}, {1.5, 14, 5.5, 0.1}, {7.7, 36, 7.5, 0.2}, {15, 0, 3, 0.4}}};

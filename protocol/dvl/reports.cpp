@@ -1,5 +1,6 @@
 #include "protocol/dvl/reports.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -26,25 +27,65 @@ std::string text(const Json& from, const char* name) {
   return found != from.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
-/// A report without time_of_validity is accepted; the time of the ping is then unknown.
+/// Whole microseconds since 1970. Time{}: there are none, or more than Time holds.
+Time time_in(const Json& from, const char* name, double unit_us) {
+  const double at_us = unit_us * number(from, name).value_or(0);
+  return Time(std::chrono::microseconds(std::abs(at_us) < 9e15 ? std::llround(at_us) : 0));
+}
+Covariance covariance_in(const Json& message) {
+  Covariance covariance{};
+  const auto rows = message.find("covariance");
+  for (std::size_t i = 0; rows != message.end() && rows->is_array() && i < std::min(rows->size(), covariance.size()); ++i)
+    for (std::size_t j = 0; (*rows)[i].is_array() && j < std::min((*rows)[i].size(), covariance[i].size()); ++j)
+      if ((*rows)[i][j].is_number()) covariance[i][j] = (*rows)[i][j].get<double>();
+  return covariance;
+}
+
+/// A report of older software, without its times, is accepted; the time of the ping is then unknown.
 std::optional<VelocityReport> velocity_from(const Json& message) {
   const auto vx = number(message, "vx"), vy = number(message, "vy"), vz = number(message, "vz");
-  const auto altitude = number(message, "altitude"), at_us = number(message, "time_of_validity");
+  const auto altitude = number(message, "altitude");
   const auto valid = truth(message, "velocity_valid");
   const auto transducers = message.find("transducers");
   if (!vx || !vy || !vz || !altitude || !valid || transducers == message.end() || !transducers->is_array() ||
       transducers->size() != beam_count)
     return std::nullopt;
-  VelocityReport report{.velocity_mps = {*vx, *vy, *vz}, .altitude_m = *altitude, .is_valid = *valid, .transducers = {}};
-  report.reflected_s = 1e-6 * at_us.value_or(0);
+  VelocityReport report;
+  Measurement& m = report.measured;
+  m.velocity_mps = {*vx, *vy, *vz};
+  m.altitude_m = *altitude;
+  m.is_valid = *valid;
+  m.fom = number(message, "fom").value_or(0);
+  m.covariance = covariance_in(message);
+  m.status = static_cast<int>(std::clamp(number(message, "status").value_or(0), 0.0, 255.0));
+  m.reflected_at = time_in(message, "time_of_validity", 1);
+  report.sent_at = time_in(message, "time_of_transmission", 1);
+  report.since_last = time_in(message, "time", 1e3).time_since_epoch();
   for (std::size_t i = 0; i < beam_count; ++i) {
     const Json& beam = (*transducers)[i];
     if (!beam.is_object()) return std::nullopt;
     const auto distance = number(beam, "distance"), rssi = number(beam, "rssi");
     const auto beam_valid = truth(beam, "beam_valid");
     if (!distance || !rssi || !beam_valid) return std::nullopt;
-    report.transducers[i] = {*distance, *rssi, *beam_valid};
+    m.beams[i].is_valid = *beam_valid;
+    m.beams[i].velocity_mps = number(beam, "velocity").value_or(0);
+    m.beams[i].distance_m = *distance;
+    m.beams[i].rssi_dbm = *rssi;
+    m.beams[i].nsd_dbm = number(beam, "nsd").value_or(usual_nsd_dbm);
   }
+  return report;
+}
+
+std::optional<PositionReport> position_from(const Json& message) {
+  const auto x = number(message, "x"), y = number(message, "y"), z = number(message, "z");
+  const auto roll = number(message, "roll"), pitch = number(message, "pitch"), yaw = number(message, "yaw");
+  if (!x || !y || !z || !roll || !pitch || !yaw) return std::nullopt;
+  PositionReport report;
+  report.at = time_in(message, "ts", 1e6);
+  report.reckoning.is_started = true;
+  report.reckoning.position_m = {*x, *y, *z};
+  report.reckoning.last = quat_from_rpy({rad_from_deg(*roll), rad_from_deg(*pitch), rad_from_deg(*yaw)});
+  report.reckoning.std_m = number(message, "std").value_or(0);
   return report;
 }
 
@@ -71,7 +112,7 @@ Bytes velocity_line(const Measurement& m, std::chrono::nanoseconds since_last, T
                            {"velocity", beam.velocity_mps},
                            {"distance", beam.distance_m},
                            {"rssi", beam.rssi_dbm},
-                           {"nsd", nsd_dbm},
+                           {"nsd", beam.nsd_dbm},
                            {"beam_valid", beam.is_valid}});
   }
   return line_of({{"time", 1e3 * seconds(since_last)},
@@ -83,7 +124,7 @@ Bytes velocity_line(const Measurement& m, std::chrono::nanoseconds since_last, T
                   {"altitude", m.altitude_m},
                   {"transducers", std::move(transducers)},
                   {"velocity_valid", m.is_valid},
-                  {"status", 0},
+                  {"status", m.status},
                   {"format", format_name},
                   {"type", "velocity"},
                   {"time_of_validity", microseconds(m.reflected_at)},
@@ -111,10 +152,10 @@ Line read_line(BytesView line) {
   const Json message = Json::parse(received, nullptr, false);
   if (!message.is_object()) return {};
   const std::string type = text(message, "type");
-  if (type == "velocity") return {.velocity = velocity_from(message), .response = {}};
+  if (type == "velocity") return {.velocity = velocity_from(message)};
+  if (type == "position_local") return {.position = position_from(message)};
   if (type == "response")
-    return {.velocity = {},
-            .response = Response{text(message, "response_to"), text(message, "error_message"),
+    return {.response = Response{text(message, "response_to"), text(message, "error_message"),
                                  truth(message, "success").value_or(false)}};
   return {};
 }

@@ -14,8 +14,6 @@ using protocol::BytesView;
 inline constexpr std::string_view format_name = "json_v3.3", line_end = "\r\n";
 inline constexpr std::size_t longest_line = 16384;
 
-inline constexpr double nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all
-
 /// Unix time, the unit of the reports.
 std::int64_t microseconds(Time at);
 /// The angles of the vehicle since the start of dead reckoning.
@@ -25,25 +23,26 @@ Bytes line_of(std::string text);
 Bytes velocity_line(const Measurement& measured, std::chrono::nanoseconds since_last, Time sent_at);
 Bytes position_line(const Reckoning& reckoning, Time at);
 
+/// The content of a velocity_line(). Times that a line of older software does not have are 0.
 struct VelocityReport {
-  Vec3d velocity_mps;
-  double altitude_m = -1;
-  bool is_valid = false;
-  double reflected_s = 0;  // time_of_validity
-  struct Transducer {
-    double distance_m = -1, rssi_dbm = 0;
-    bool is_valid = false;
-  };
-  std::array<Transducer, beam_count> transducers;
+  Measurement measured;
+  std::chrono::nanoseconds since_last{0};
+  Time sent_at{};
+};
+/// The content of a position_line(). The axes of its reckoning are those at its start.
+struct PositionReport {
+  Reckoning reckoning;
+  Time at{};
 };
 struct Response {
   std::string to, error;
   bool success = false;
 };
-/// A line of the device. Both members are absent for lines of other kinds and for text that is not JSON.
+/// A line of the device. All members are absent for lines of other kinds and for text that is not JSON.
 struct Line {
-  std::optional<VelocityReport> velocity;
-  std::optional<Response> response;
+  std::optional<VelocityReport> velocity = {};
+  std::optional<PositionReport> position = {};
+  std::optional<Response> response = {};
 };
 Line read_line(BytesView line);
 

@@ -35,18 +35,20 @@ Bytes velocity_sentences(const Measurement& m, std::chrono::nanoseconds since_la
   const Vec3d& v = m.velocity_mps;
   const double since_ms = 1e3 * seconds(since_last);
   if (output == SerialOutput::old_and_new) {
-    add(format("wrx,%.2f,%.3f,%.3f,%.3f,%.3f,%.2f,%s,0", since_ms, v.x, v.y, v.z, m.fom, m.altitude_m, yes_or_no(m.is_valid)));
+    add(format("wrx,%.2f,%.3f,%.3f,%.3f,%.3f,%.2f,%s,%d", since_ms, v.x, v.y, v.z, m.fom, m.altitude_m, yes_or_no(m.is_valid),
+               m.status));
     const auto& b = m.beams;
     add(format("wrt,%.2f,%.2f,%.2f,%.2f", b[0].distance_m, b[1].distance_m, b[2].distance_m, b[3].distance_m));
   }
   std::string covariance;
   for (const auto& row : m.covariance)
     for (const double value : row) covariance += (covariance.empty() ? "" : ";") + format("%g", value);
-  add(format("wrz,%.3f,%.3f,%.3f,%s,%.2f,%.3f,%s,%lld,%lld,%.2f,0", v.x, v.y, v.z, yes_or_no(m.is_valid), m.altitude_m, m.fom,
+  add(format("wrz,%.3f,%.3f,%.3f,%s,%.2f,%.3f,%s,%lld,%lld,%.2f,%d", v.x, v.y, v.z, yes_or_no(m.is_valid), m.altitude_m, m.fom,
              covariance.c_str(), static_cast<long long>(microseconds(m.reflected_at)),
-             static_cast<long long>(microseconds(sent_at)), since_ms));
+             static_cast<long long>(microseconds(sent_at)), since_ms, m.status));
   for (std::size_t i = 0; i < beam_count; ++i)
-    add(format("wru,%zu,%.3f,%.2f,%.0f,%.0f", i, m.beams[i].velocity_mps, m.beams[i].distance_m, m.beams[i].rssi_dbm, nsd_dbm));
+    add(format("wru,%zu,%.3f,%.2f,%.0f,%.0f", i, m.beams[i].velocity_mps, m.beams[i].distance_m, m.beams[i].rssi_dbm,
+               m.beams[i].nsd_dbm));
   return lines;
 }
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "protocol/dvl/dvl.hpp"
+#include "protocol/dvl/host.hpp"
 #include "protocol/dvl/reports.hpp"
 
 using namespace sonar;
@@ -45,6 +46,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (int tick = 0; tick < 4; ++tick) apply(client->on_tick(client->next_tick(), false), device, answered);
   }
   dvl::read_line(bytes);
+  const recording::Codec codec = dvl::codec();
+  if (codec.ping_part(bytes)) require(codec.answer(bytes, nullptr).size() == 2);
 
   Ping ping;
   ping.request.model = device.model;

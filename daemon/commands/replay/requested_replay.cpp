@@ -130,8 +130,10 @@ asio::awaitable<Simulator::Outcome> RequestedReplay::outcome_for(PingRequest req
     if (codec_.answer == nullptr)
       recorded->emplace_back(port, std::move(message));
     else
-      for (recording::Bytes& one : codec_.answer(message, request.vendor_settings.get()))
-        recorded->emplace_back(port, std::move(one));
+      for (recording::Bytes& one : codec_.answer(message, request.vendor_settings.get())) {
+        const auto part = codec_.ping_part(one);  // an answer may be for another port than the recorded message
+        recorded->emplace_back(part ? part->port : port, std::move(one));
+      }
   Simulator::Outcome outcome;
   outcome.recorded = std::move(recorded);
   auto made = std::make_shared<Ping>();
