@@ -9,6 +9,8 @@
 
 #include "clients/gazebo_bridge/model_poses.hpp"
 #include "clients/sonarctl/net.hpp"
+#include "core/base/stack_limit.hpp"
+#include "core/base/standard_streams.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -94,4 +96,8 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace sonar::clients
 
-int main(int argc, char** argv) { return sonar::clients::run(argc, argv); }
+int main(int argc, char** argv) {
+  sonar::open_closed_standard_streams();
+  if (const auto room = sonar::make_room_for_stacks(); !room) return sonar::clients::complain(room.error());
+  return sonar::clients::run(argc, argv);
+}

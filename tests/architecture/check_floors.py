@@ -135,6 +135,8 @@ TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", 
 # A page of ours, and what of it is cited: docs/acoustics.md, section 8; docs/protocols/oculus.md, 5.1; docs/architecture.md, "Errors".
 PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
+# Programs that only the build runs.
+BUILD_TOOLS = r"clients/web/print_colour_maps\.cpp|clients/bvtsdk/core/make_colour_maps\.cpp"
 LONGEST_FILE = 400  # lines; tests may be longer
 # A comment is a sentence, or a noun phrase that names the thing: these beginnings make fragments, and these words are for
 # persons.
@@ -277,6 +279,13 @@ def make_violations(name, code):
         yield 1, "make: names none any more: take it out of NAME_MAKES"
 
 
+def program_violations(name, code):
+    """Checks that every program makes room for its stacks: one with a small limit otherwise ends by a signal, without a message."""
+    found = re.search(r"\bint main\(", code)
+    if found and re.match(ONE_DIRECTION, name) and not re.match(BUILD_TOOLS, name) and "make_room_for_stacks()" not in code:
+        yield line_of(code, found.start()), "program: main() does not call make_room_for_stacks() (core/base/stack_limit.hpp)"
+
+
 def line_of(text, position):
     return text.count("\n", 0, position) + 1
 
@@ -294,7 +303,7 @@ def violations(root):
         is_code = path.suffix in CODE
         code, comments = (without_comments(text), comments_of(text)) if is_code else (text, text)
         if is_code:
-            for number, what in [*include_violations(name, code), *wording_violations(comments)]:
+            for number, what in [*include_violations(name, code), *wording_violations(comments), *program_violations(name, code)]:
                 yield f"{name}:{number}: {what}"
             if re.match(ONE_DIRECTION, name) and name not in LISTS:
                 includes += [(name, line_of(code, m.start(1)), m[1])

@@ -44,6 +44,12 @@ class Planted(unittest.TestCase):
             with self.subTest(name=name, header=header):
                 self.expect(name, f'\n#include "{header}"\n', 2, "must not include")
 
+    def test_programs_make_room_for_their_stacks(self):
+        self.expect("clients/a/main.cpp", "\nint main(int argc, char** argv) { return run(argc, argv); }\n", 2, "make_room_for_stacks()")
+        room = "int main() { if (!make_room_for_stacks()) return 1; }\n"
+        bare = "int main() { return 0; }\n"
+        self.assertEqual(found_in({"daemon/main.cpp": room, "clients/web/print_colour_maps.cpp": bare, "tests/a_test.cpp": bare}), [])
+
     def test_folders_of_the_daemon_include_each_other_in_one_direction(self):
         def include(folder):
             return f'#pragma once\n#include "daemon/server/{folder}/a.hpp"\n'
