@@ -1,6 +1,8 @@
 #include "protocol/recorded/raw_dump.hpp"
 
-#include <algorithm>
+#include <utility>
+
+#include "protocol/recorded/junk_report.hpp"
 
 namespace sonar::recording {
 namespace {
@@ -16,19 +18,26 @@ class RawReader final : public RecordingReader {
   std::optional<RecordedMessage> next() override {
     while (true) {
       if (auto message = next_of_block()) return message;
-      if (scan_.left() == 0) return end();
-      const BytesView block = scan_.read(dump_block_bytes);
-      if (block.empty()) return unreadable();
-      splitter_.append({}, block);
+      if (ended_) break;
+      if (const BytesView block = scan_.read(dump_block_bytes); !block.empty()) {
+        splitter_.append({}, block);
+        continue;
+      }
+      ended_ = true;
+      unfinished_ = splitter_.waiting_bytes();
+      splitter_.finish();
     }
+    report_end();
+    return std::nullopt;
   }
   std::optional<Error> damage() const override { return damages_.error(source_->name()); }
   void rewind() override {
     scan_.seek(0);
     splitter_ = MessageSplitter(Origin::device, framing_);
+    junk_ = JunkReport(&framing_);
     damages_.clear();
-    returned_ = junk_bytes_ = 0;
-    ended_ = false;
+    returned_ = 0;
+    ended_ = reported_ = false;
   }
   bool knows_times() const override { return false; }
 
@@ -37,47 +46,19 @@ class RawReader final : public RecordingReader {
   std::optional<RecordedMessage> next_of_block() {
     auto next = splitter_.next();
     if (!next) return next;
-    if (is_message(next->bytes)) {
-      report_junk();
-    } else {
-      if (junk_bytes_ == 0) junk_begin_ = returned_ + splitter_.lost_bytes();
-      junk_bytes_ += next->bytes.size();
-    }
+    junk_.take(
+        next->bytes, [this] { return "byte " + std::to_string(returned_ + splitter_.lost_bytes()); }, damages_);
     returned_ += next->bytes.size();
     return next;
   }
-  bool is_message(BytesView bytes) const {
-    const auto begins_with_magic = [&] {
-      return bytes[0] == std::byte{framing_.magic[0]} && bytes[1] == std::byte{framing_.magic[1]};
-    };
-    if (bytes.size() < std::max<std::size_t>(framing_.header_size, 2) || !begins_with_magic()) return false;
-    if (framing_.length == nullptr) return bytes.back() == std::byte{'\n'};
-    return framing_.length(bytes.first(framing_.header_size), Origin::device, false) == bytes.size();
-  }
-  void report_junk() {
-    if (const std::uint64_t bytes = std::exchange(junk_bytes_, 0); bytes > 0)
-      damages_.add((bytes == 1 ? "1 byte" : std::to_string(bytes) + " bytes") + " from byte " + std::to_string(junk_begin_) +
-                   " on belong to no message");
-  }
-  /// Ends the stream. The first call reports an unfinished message and returns the first of the remaining bytes outside
-  /// messages.
-  std::optional<RecordedMessage> end() {
-    if (std::exchange(ended_, true)) {
-      report_junk();
-      return std::nullopt;
-    }
-    const std::size_t unfinished = splitter_.waiting_bytes();
-    splitter_.finish();
-    auto last = next_of_block();
-    if (!last) report_junk();
-    if (splitter_.losses() > 0)
+  void report_end() {
+    if (std::exchange(reported_, true)) return;
+    junk_.end(damages_);
+    if (scan_.left() > 0)
+      damages_.add("cannot be read from byte " + std::to_string(scan_.position()) + " on");
+    else if (splitter_.losses() > 0)
       damages_.add("the file ends at byte " + std::to_string(source_->size()) + " within a message: only " +
-                   std::to_string(unfinished) + " bytes of it are there");
-    return last;
-  }
-  std::optional<RecordedMessage> unreadable() {
-    if (!std::exchange(ended_, true)) damages_.add("cannot be read from byte " + std::to_string(scan_.position()) + " on");
-    return std::nullopt;
+                   std::to_string(unfinished_) + " bytes of it are there");
   }
 
   std::unique_ptr<Source> source_;
@@ -85,9 +66,10 @@ class RawReader final : public RecordingReader {
   Scan scan_;
   MessageSplitter splitter_{Origin::device, framing_};
   Damages damages_;
-  std::uint64_t returned_ = 0, junk_begin_ = 0,
-                junk_bytes_ = 0;  // junk: the run of bytes outside messages that is not reported yet
-  bool ended_ = false;
+  JunkReport junk_{&framing_};
+  std::uint64_t returned_ = 0;
+  std::size_t unfinished_ = 0;  // bytes of the message within which the stream ends
+  bool ended_ = false, reported_ = false;
 };
 
 /// Writes the bytes of the device as they are. Times and the client's messages are lost.

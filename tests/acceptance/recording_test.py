@@ -369,10 +369,15 @@ class OneIntoAnother(Files):
         sound = self.made()
         junk = self.folder / "junk.raw"
         junk.write_bytes(sound + b"what is this?" + sound)
-        done = self.convert(junk, "--mcap", self.path("mcap"))
+        done = self.convert(junk, "--mcap", self.path("mcap"), "--pcap", self.path("pcap"))
         told = f"junk.raw: 13 bytes from byte {len(sound)} on belong to no message"
         self.assertEqual(done.returncode, 65)
         self.assertIn(told, done.stderr)
+        for kind, place in (("mcap", "the record at byte "), ("pcap", "packet ")):  # these still have the junk
+            done = self.convert(self.path(kind), "--raw", self.folder / f"again-{kind}.raw")
+            self.assertEqual(done.returncode, 65)
+            self.assertIn(f": 13 bytes from {place}", done.stderr)
+            self.assertEqual((self.folder / f"again-{kind}.raw").read_bytes(), junk.read_bytes())
         for number, words in ((3, ""), (4, f"sonarctl: {self.folder}/{told}; the ping is one of the rest\n")):
             done = run(SONARCTL, "view", "--from", junk, "--ping", str(number), "--png", self.folder / "a.png")
             self.assertEqual((done.returncode, done.stderr), (0, words))

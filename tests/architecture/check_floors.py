@@ -34,7 +34,7 @@ FLOORS = {
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     **{f"protocol/{make}": [*DEVICE, f"protocol/{make}/"] for make in MAKE_FOLDERS},
     "protocol/recorded": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/recorded/"],
-    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp",
+    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp", "protocol/stream_framing.hpp",
                            "protocol/wire/", "protocol/recorded/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.

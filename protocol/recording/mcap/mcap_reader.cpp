@@ -11,6 +11,12 @@ constexpr std::size_t most_channels = 4096;
 constexpr std::size_t most_summary_records = 1 << 20;
 constexpr std::uint64_t most_described_bytes = 16 << 20;  // limit for all schemas and channels that are kept
 
+/// True for records without messages that files may have here.
+bool is_skipped(Opcode code, bool in_chunk) {
+  constexpr auto first_private = Opcode{0x80};
+  return code >= first_private || (!in_chunk && code <= Opcode::data_end);
+}
+
 std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
 
 }  // namespace
@@ -79,14 +85,18 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
     enter_chunk(at, end - scan_.position(), true);
     return std::nullopt;
   }
+  if (code == Opcode::none) {  // zeros of a file that a crash left incomplete
+    give_up("the record" + at_byte(at) + " has the opcode 0, which no record has");
+    return std::nullopt;
+  }
   if (!front.ok() || length > end - scan_.position()) {
     give_up("the record" + at_byte(at) + " is cut short by the end of the " + (in_chunk ? "chunk" : "file"));
     return std::nullopt;
   }
   const std::uint64_t behind = scan_.position() + length;
-  if (code == Opcode::data_end || code == Opcode::footer) {
-    if (!in_chunk) end_at(at);
-    if (ended_) return std::nullopt;
+  if (!in_chunk && (code == Opcode::data_end || code == Opcode::footer)) {
+    end_at(at);
+    return std::nullopt;
   } else if (code == Opcode::chunk && !in_chunk) {
     enter_chunk(at, length, false);
     if (chunk_end_ != 0) return std::nullopt;
@@ -102,6 +112,9 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
     } else {
       take_description(code, content, at);
     }
+  } else if (!is_skipped(code, in_chunk)) {
+    damages_.add("the record" + at_byte(at) + " has the opcode " + std::to_string(static_cast<unsigned>(code)) +
+                 ", which no record " + (in_chunk ? "of a chunk " : "") + "has");
   }
   scan_.seek(behind);
   return std::nullopt;
@@ -149,6 +162,7 @@ void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) 
 std::optional<Message> Reader::take_message(BytesView content, std::uint64_t at) {
   RecordReader record(content);
   Message message;
+  message.at = at;
   message.channel = record.number<std::uint16_t>();
   message.sequence = record.number<std::uint32_t>();
   message.logged_at = record.time();

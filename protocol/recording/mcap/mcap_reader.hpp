@@ -20,6 +20,8 @@ class Reader {
   const std::map<std::uint16_t, Channel>& channels() const { return channels_; }
   const std::map<std::uint16_t, Schema>& schemas() const { return schemas_; }
   std::optional<Error> damage() const { return damages_.error(source_->name()); }
+  /// For damage within messages; cleared by rewind().
+  Damages& damages() { return damages_; }
   void rewind();
 
  private:

@@ -16,6 +16,7 @@ namespace sonar::recording::mcap {
 inline constexpr std::array<std::uint8_t, 8> magic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
 
 enum class Opcode : std::uint8_t {
+  none = 0x00,  // no record has it
   header = 0x01,
   footer = 0x02,
   schema = 0x03,
@@ -49,6 +50,7 @@ struct Message {
   std::uint32_t sequence = 0;
   Time logged_at{}, published_at{};
   Bytes data;
+  std::uint64_t at = 0;  // position of its record in the file, in bytes; set by the reader
 };
 
 /// Appends fields; a record is closed by end_record.

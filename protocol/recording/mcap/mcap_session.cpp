@@ -4,6 +4,8 @@
 #include <set>
 
 #include "protocol/foxglove/foxglove_messages.hpp"
+#include "protocol/recorded/junk_report.hpp"
+#include "protocol/stream_framing.hpp"
 
 namespace sonar::recording {
 namespace {
@@ -27,7 +29,8 @@ class McapRecordingReader final : public RecordingReader {
   std::optional<RecordedMessage> next() override {
     while (auto message = reader_.next()) {
       const mcap::Channel& channel = reader_.channels().at(message->channel);
-      if (protocol::find_make(channel.message_encoding) == nullptr) continue;
+      const protocol::Make* const make = protocol::find_make(channel.message_encoding);
+      if (make == nullptr) continue;
       const auto metadata = [&channel](const char* key) {
         const auto found = channel.metadata.find(key);
         return found == channel.metadata.end() ? std::string() : found->second;
@@ -40,9 +43,12 @@ class McapRecordingReader final : public RecordingReader {
         continue;
       }
       if (profile_.empty()) profile_ = metadata("profile");
-      return RecordedMessage{message->logged_at, metadata("from") == "client" ? Origin::client : Origin::device,
-                             metadata("carrier") == "udp" ? Carrier::datagram : Carrier::stream, std::move(message->data)};
+      RecordedMessage found{message->logged_at, metadata("from") == "client" ? Origin::client : Origin::device,
+                            metadata("carrier") == "udp" ? Carrier::datagram : Carrier::stream, std::move(message->data)};
+      if (found.from == Origin::device && found.by == Carrier::stream) find_junk(*make, found.bytes, message->at);
+      return found;
     }
+    if (junk_) junk_->end(reader_.damages());
     return std::nullopt;
   }
   std::optional<Error> damage() const override { return reader_.damage(); }
@@ -51,13 +57,23 @@ class McapRecordingReader final : public RecordingReader {
     for (const std::string& name : others_) names += (names.empty() ? "" : ", ") + name;
     return names.empty() ? "" : "the file holds other sonars too: " + names;
   }
-  void rewind() override { reader_.rewind(); }
+  void rewind() override {
+    reader_.rewind();
+    junk_.reset();
+  }
   std::string profile() const override { return profile_; }
 
  private:
+  void find_junk(const protocol::Make& make, BytesView bytes, std::uint64_t at) {
+    if (!junk_) junk_.emplace(only_framing(make));
+    junk_->take(
+        bytes, [at] { return "the record at byte " + std::to_string(at); }, reader_.damages());
+  }
+
   mcap::Reader reader_;
   std::string requested_, sonar_, profile_;
   bool chosen_ = false;
+  std::optional<JunkReport> junk_;  // by the framing of the first message's make
   std::set<std::string> others_;
 };
 

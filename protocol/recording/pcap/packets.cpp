@@ -81,6 +81,8 @@ std::optional<Packet> PacketReader::next_classic() {
   const BytesView header = scan_.read(16);
   if (header.size() < 16) return stop("the packet at " + at + " is cut short by the end of the file");
   const std::uint32_t whole_s = u32_at(header, 0, endian_), rest = u32_at(header, 4, endian_), size = u32_at(header, 8, endian_);
+  if (size == 0 && u32_at(header, 12, endian_) == 0)  // zeros of a file that a crash left incomplete
+    return stop("the packet at " + at + " has a length of 0 bytes on the wire");
   if (size > longest_packet) return stop("the packet at " + at + " would have " + std::to_string(size) + " bytes");
   const std::uint64_t per_s = interfaces_.front().ticks_per_s;
   const BytesView bytes = scan_.read(size);

@@ -3,11 +3,13 @@
 #include <map>
 #include <set>
 
+#include "protocol/recorded/junk_report.hpp"
 #include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/pcap/packets.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/pcap/tcp_stream.hpp"
 #include "protocol/sender.hpp"
+#include "protocol/stream_framing.hpp"
 
 namespace sonar::recording {
 namespace {
@@ -98,10 +100,12 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
 
 /// A TCP connection of a client with the sonar. Each direction is put in order (TcpStream), then split into messages.
 struct Connection {
-  explicit Connection(const Framing& framing) : device(Origin::device, framing), client(Origin::client, framing) {}
+  explicit Connection(const Make& make)
+      : device(Origin::device, *make.codec.framing), client(Origin::client, *make.codec.framing), junk(only_framing(make)) {}
 
   TcpStream device_stream, client_stream;
   MessageSplitter device, client;
+  JunkReport junk;
   std::uint64_t last_packet = 0;
 
   std::size_t held_bytes() const {
@@ -189,7 +193,7 @@ class PcapReader final : public RecordingReader {
     if (place == connections_.end()) {
       if (!syn && segment.payload.empty()) return;
       if (connections_.size() >= most_connections) finish_oldest();
-      place = connections_.try_emplace(client, *found_.make->codec.framing).first;
+      place = connections_.try_emplace(client, *found_.make).first;
     }
     place->second.last_packet = packet_number_;
     stream_of(place->second, from).add(at, segment.sequence, segment.payload, syn);
@@ -220,7 +224,8 @@ class PcapReader final : public RecordingReader {
       MessageSplitter& splitter = from == Origin::device ? place->second.device : place->second.client;
       const std::uint64_t losses = splitter.losses();
       splitter.finish();
-      while (auto message = splitter.next()) ready_.push_back(std::move(*message));
+      take_messages(place->second, place->first, from);
+      place->second.junk.end(damages_);
       if (splitter.losses() > losses)
         damages_.add("the last message from " + text_of(from == Origin::device ? found_.device.at : place->first) + " to " +
                      text_of(from == Origin::device ? place->first : found_.device.at) + " is incomplete");
@@ -232,6 +237,16 @@ class PcapReader final : public RecordingReader {
     return from == Origin::device ? connection.device_stream : connection.client_stream;
   }
 
+  void take_messages(Connection& connection, const IpEnd& client, Origin from) {
+    while (auto message = (from == Origin::device ? connection.device : connection.client).next()) {
+      if (from == Origin::device)
+        connection.junk.take(
+            message->bytes,
+            [&] { return "packet " + std::to_string(packet_number_) + " of the connection with " + text_of(client); }, damages_);
+      ready_.push_back(std::move(*message));
+    }
+  }
+
   void drain(Connection& connection, const IpEnd& client, Origin from) {
     MessageSplitter& splitter = from == Origin::device ? connection.device : connection.client;
     while (const auto run = stream_of(connection, from).next()) {
@@ -239,7 +254,7 @@ class PcapReader final : public RecordingReader {
       // After a gap, or at the start of a capture, the bytes may lie within a message.
       if (run->missing_before > 0 || run->from_middle) splitter.break_off();
       splitter.append(run->at, run->bytes);
-      while (auto message = splitter.next()) ready_.push_back(std::move(*message));
+      take_messages(connection, client, from);
       if (run->missing_before > 0)
         damages_.add("before packet " + std::to_string(packet_number_) + " the capture lacks " +
                      std::to_string(run->missing_before) + " bytes of the connection with " + text_of(client));

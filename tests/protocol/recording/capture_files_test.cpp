@@ -270,6 +270,15 @@ TEST(CaptureFiles, SaysWherePacketsEnd) {
   EXPECT_THAT(told.damage, HasSubstr("the packet at byte " + std::to_string(last - 8) + " would have "));
 }
 
+TEST(CaptureFiles, ZerosAreNoPackets) {
+  Bytes file = pcap_of(raw_frames(two_pings()), 101);
+  const std::size_t whole = file.size();
+  file.resize(whole + 100);
+  const Told told = read(file);
+  EXPECT_EQ(told.stream, both_pings);
+  EXPECT_THAT(told.damage, HasSubstr("the packet at byte " + std::to_string(whole) + " has a length of 0 bytes on the wire"));
+}
+
 Bytes block(std::uint32_t type, Bytes body) {
   while (body.size() % 4 != 0) body.push_back(std::byte{0});
   const auto size = static_cast<std::uint32_t>(body.size() + 12);

@@ -217,6 +217,30 @@ TEST(Mcap, WhatIsWholeInACutChunkIsRead) {
   EXPECT_THAT(opened->reader->damage()->text, HasSubstr("is cut short by the end of the file"));
 }
 
+TEST(Mcap, RecordsThatNoFileHasAreReported) {
+  const auto damage_with = [](const Bytes& record, bool reads_on) {
+    Bytes file = session(conversation());
+    file.insert(file.begin() + static_cast<std::ptrdiff_t>(mcap::magic.size()), record.begin(), record.end());
+    auto opened = open_bytes(file);
+    if (!opened) return opened.error().text;
+    EXPECT_EQ(read_all(*opened->reader).size(), reads_on ? conversation().size() : 0u);
+    const auto damage = opened->reader->damage();
+    return damage ? damage->text : std::string();
+  };
+  const auto record_of = [](unsigned opcode) {
+    Bytes record;
+    mcap::RecordWriter writer(record);
+    writer.begin(static_cast<mcap::Opcode>(opcode));
+    writer.bytes(bytes_of("ten bytes."));
+    writer.end();
+    return record;
+  };
+  EXPECT_EQ(damage_with(record_of(0x0C), true), "") << "metadata";
+  EXPECT_EQ(damage_with(record_of(0x80), true), "") << "a record of an application";
+  EXPECT_THAT(damage_with(record_of(0x42), true), HasSubstr("the record at byte 8 has the opcode 66, which no record has"));
+  EXPECT_THAT(damage_with(Bytes(20), false), HasSubstr("the record at byte 8 has the opcode 0, which no record has"));
+}
+
 TEST(Mcap, SaysThatItReadsNoCompression) {
   Bytes file;
   const auto sink = sink_into(file);
