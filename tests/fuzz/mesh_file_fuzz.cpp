@@ -53,7 +53,7 @@ const char* name_of(std::string_view text) {
 }
 
 void read(std::string_view text, const char* name) {
-  for (const MeshFault& fault : {check_ply(text.substr(0, ply_head_bytes), text.size()), check_gltf(text), check_collada(text)})
+  for (const MeshFault& fault : {check_ply(ply_head_of(text), text.size()), check_gltf(text), check_collada(text)})
     require(!fault || !fault->empty());
   const MeshFile request{.file = name, .in_memory = text};
   check(request, load_mesh(request));

@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/scene/import/ply_head.hpp"
+
 namespace sonar {
 
 /// The fault of a file, as a sentence without the file's name; nullopt: no fault was found.
@@ -20,9 +22,8 @@ struct ListedFaces {
   bool whole_numbers = false;  // positions or weights of a glTF file of version 2 are not floating-point numbers
 };
 
-/// `head`: the beginning of a file of `file_bytes`, with at least the whole header.
-/// Words may be in capitals.
-MeshFault check_ply(std::string_view head, std::uint64_t file_bytes);
+/// `head`: the header of a file of `file_bytes`.
+MeshFault check_ply(const PlyHead& head, std::uint64_t file_bytes);
 /// Text or binary (GLB), version 1 or 2.
 MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr);
 MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
@@ -35,17 +36,11 @@ MeshFault glb_fault(std::string_view file);
 
 /// Complete texts. These find records that are not complete, which the importer leaves out or misreads. Binary files, which make
 /// it fail if they are cut short, pass.
-bool is_text_ply(std::string_view head);
 MeshFault check_ply_text(std::string_view file);
 MeshFault check_stl_text(std::string_view file);
 MeshFault check_obj(std::string_view file);
 
-/// Number of faces in the header of a PLY file, or number of facets in a text STL file.
-std::uint64_t faces_of_ply(std::string_view head);
-/// Bytes of the header of a PLY file with its last line end; 0 if it is not whole.
-std::uint64_t bytes_of_ply_head(std::string_view head);
+/// Number of facets in a text STL file.
 std::uint64_t facets_of_stl(std::string_view file);
-
-constexpr std::size_t ply_head_bytes = 64 << 10;
 
 }  // namespace sonar

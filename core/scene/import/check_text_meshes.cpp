@@ -53,38 +53,17 @@ bool is_like_number(std::string_view word) {
 
 std::string at_line(const Lines& lines) { return " (line " + std::to_string(lines.number()) + ")"; }
 
-struct PlyElement {
-  std::string name;
-  std::uint64_t count = 0;
-  std::vector<bool> is_list;  // one for each property
-};
-
-std::vector<PlyElement> elements_of(const std::string& head, bool& is_text) {
-  std::vector<PlyElement> elements;
-  Lines lines(head);
-  while (lines.next()) {
-    std::string_view rest = lines.line();
-    const std::string_view word = take_word(rest), second = take_word(rest), third = take_word(rest);
-    if (word == "format") is_text = second == "ascii";
-    if (word == "property" && !elements.empty()) elements.back().is_list.push_back(second == "list");
-    if (word != "element") continue;
-    elements.push_back({std::string(second.substr(0, 32)), 0, {}});
-    std::from_chars(third.data(), third.data() + third.size(), elements.back().count);
-  }
-  return elements;
-}
-
 /// The fault of one record, a line with the values of all properties; empty if there is none.
 std::string fault_of_record(std::string_view line, const PlyElement& element) {
-  std::uint64_t values = 0, needed = element.is_list.size();
+  std::uint64_t values = 0, needed = element.properties.size();
   std::uint64_t in_list = 0;  // values of a list that are left
-  for (std::size_t property = 0; property < element.is_list.size() || in_list > 0; ++values) {
+  for (std::size_t property = 0; property < element.properties.size() || in_list > 0; ++values) {
     const std::string_view word = take_word(line);
     if (word.empty()) return " has " + std::to_string(values) + " of " + std::to_string(needed) + " values";
     if (!is_like_number(word)) return " has \"" + std::string(word.substr(0, 32)) + "\", which is not a number";
     if (in_list > 0) {
       --in_list;
-    } else if (element.is_list[property++]) {
+    } else if (element.properties[property++].is_list) {
       std::from_chars(word.data(), word.data() + word.size(), in_list);
       needed += std::min<std::uint64_t>(in_list, std::uint64_t{1} << 62);
     }
@@ -103,21 +82,13 @@ bool is_end_of_solid(std::string_view word, std::string_view& line) {
 
 }  // namespace
 
-bool is_text_ply(std::string_view head) {
-  bool is_text = false;
-  elements_of(small_letters(head.substr(0, bytes_of_ply_head(head))), is_text);
-  return is_text;
-}
-
 MeshFault check_ply_text(std::string_view file) {
-  const std::size_t head_bytes = bytes_of_ply_head(file.substr(0, ply_head_bytes));
-  bool is_text = false;
-  const std::string head = small_letters(file.substr(0, head_bytes));
-  const auto elements = elements_of(head, is_text);
-  if (!is_text) return std::nullopt;
-  Lines lines(file.substr(head_bytes), static_cast<std::uint64_t>(std::count(head.begin(), head.end(), '\n')));
-  for (const PlyElement& element : elements)
-    for (std::uint64_t k = 0; k < element.count && !element.is_list.empty(); ++k) {
+  const PlyHead head = ply_head_of(file);
+  if (!head.is_text) return std::nullopt;
+  const std::string_view lines_before = file.substr(0, head.bytes);
+  Lines lines(file.substr(head.bytes), static_cast<std::uint64_t>(std::count(lines_before.begin(), lines_before.end(), '\n')));
+  for (const PlyElement& element : head.elements)
+    for (std::uint64_t k = 0; k < element.count && !element.properties.empty(); ++k) {
       const std::string which = element.name + " " + std::to_string(k + 1) + " of " + std::to_string(element.count);
       bool there = lines.next();
       // The importer skips one blank line, and takes further ones for records.

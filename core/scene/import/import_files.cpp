@@ -231,7 +231,7 @@ class PlainStream final : public Assimp::DefaultIOStream {
 /// The header of a PLY file, or all of a text STL file; binary STL files on disk are read elsewhere.
 PlainText plain_text_of(const std::filesystem::path& file, std::uintmax_t bytes) {
   const std::string head = read_regular(file, ply_head_bytes).value_or("");
-  if (mesh_extension(file) == ".ply") return {0, bytes_of_ply_head(head)};
+  if (mesh_extension(file) == ".ply") return {0, ply_head_of(head).bytes};
   const std::size_t word = head.find_first_not_of(" \t\r\n");
   return word != head.npos && same_letters(head.substr(word, 5), "solid") ? PlainText{word, static_cast<std::size_t>(bytes)}
                                                                           : PlainText();

@@ -112,7 +112,7 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
   if (extension == ".stl") return std::max(imported, facets_of_stl(*text));
   std::uint64_t faces = 0;
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) faces += scene.mMeshes[m]->mNumFaces;
-  const std::uint64_t listed = faces_of_ply(*text);
+  const std::uint64_t listed = ply_head_of(*text).faces();
   return imported + (listed > faces ? listed - faces : 0);  // at least one triangle each
 }
 
@@ -131,8 +131,9 @@ Result<MeshFault> check_text(const MeshFile& request, const std::string& extensi
     if (auto head = read(ply_head_bytes); !head) return tl::make_unexpected(head.error());
     std::error_code error;
     if (request.in_memory.empty()) bytes = std::filesystem::file_size(request.file, error);
-    if (auto fault = check_ply(text.substr(0, ply_head_bytes), bytes)) return fault;
-    if (!is_text_ply(text.substr(0, ply_head_bytes))) return MeshFault();
+    const PlyHead head = ply_head_of(text);
+    if (auto fault = check_ply(head, bytes)) return fault;
+    if (!head.is_text) return MeshFault();
   }
   if (auto all = read(max_mesh_bytes); !all) return tl::make_unexpected(all.error());
   return extension == ".ply"   ? check_ply_text(text)

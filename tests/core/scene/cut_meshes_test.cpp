@@ -50,6 +50,27 @@ TEST(CutMeshTexts, EveryCutOfAPlyIsFoundUpToItsLastRecord) {
   EXPECT_FALSE(check_ply_text(ply.substr(0, ply.size() - 1))) << "the last line end may be missing";
 }
 
+TEST_F(CutMeshes, EveryCheckReadsTheSameHeaderOfAPly) {
+  std::string returns = ply;
+  for (std::size_t at = 0; (at = returns.find('\n', at)) != returns.npos; at += 2) returns.insert(at, "\r");
+  const std::string capitals = replaced(replaced(ply, "element vertex", "ELEMENT VERTEX"), "format ascii", "Format\tASCII");
+  for (const std::string& text : {returns, capitals}) {
+    const PlyHead head = ply_head_of(text);
+    EXPECT_EQ(text.substr(head.bytes, 5), "0 0 0");
+    EXPECT_TRUE(head.is_text);
+    EXPECT_EQ(head.faces(), 4u);
+    ASSERT_EQ(head.elements.size(), 3u);
+    EXPECT_EQ(head.elements[1].properties.size(), 1u);
+    EXPECT_EQ(check_ply(head, text.size()), std::nullopt);
+    EXPECT_EQ(check_ply_text(text), std::nullopt);
+    EXPECT_EQ(loaded("a.ply", text), "4 triangles");
+  }
+  // The importer, too, takes a carriage return within a comment for the end of the line.
+  const std::string many = replaced(ply, "made by hand", "made by\relement vertex 1000000");
+  EXPECT_EQ(ply_head_of(many).elements.size(), 4u);
+  EXPECT_THAT(check_ply(ply_head_of(many), many.size()).value_or(""), HasSubstr("says that it has 1000000 of \"vertex\""));
+}
+
 TEST(CutMeshTexts, EveryCutOfAnStlIsFoundUpToItsEnd) {
   ASSERT_EQ(check_stl_text(stl), std::nullopt);
   for (std::size_t n = 0; n < stl.rfind(" part"); ++n) EXPECT_TRUE(check_stl_text(stl.substr(0, n))) << n;
