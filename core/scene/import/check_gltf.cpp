@@ -17,6 +17,8 @@ using Json = nlohmann::json;
 /// Reads the text without storing it. Names of nodes are numbers; in glTF 1 they are words.
 class GltfWalk final : public Json::json_sax_t {
  public:
+  explicit GltfWalk(const std::function<bool(const std::string&)>& is_itself) : is_itself_(is_itself) {}
+
   MeshFault fault;
   std::map<std::string, std::vector<std::string>> children;  // children of each node
   std::vector<std::vector<std::string>> scenes;              // the nodes of each scene
@@ -98,6 +100,8 @@ class GltfWalk final : public Json::json_sax_t {
     if (is_at(4, "scenes", "nodes")) scenes.back().push_back(v);
     if (is_at(3, "buffers", "uri") && (v.starts_with("/") || v.starts_with("\\") || v.substr(1, 1) == ":"))
       fault = "names the file " + v.substr(0, 200) + ", an absolute path; put the file beside it and name it without a folder";
+    if (is_at(3, "buffers", "uri") && is_itself_ && is_itself_(v))  // each such buffer would take the memory of the file again
+      fault = "names itself as the file of a buffer (" + v.substr(0, 200) + "); export it again";
     step();
     return !fault;
   }
@@ -118,6 +122,7 @@ class GltfWalk final : public Json::json_sax_t {
     if (!levels_.empty() && levels_.back().array) ++levels_.back().index;
   }
 
+  const std::function<bool(const std::string&)>& is_itself_;
   std::vector<Level> levels_;
 };
 
@@ -191,9 +196,9 @@ ListedFaces faces_of(const GltfWalk& walk, const NodeGraph& graph, const std::ma
 
 }  // namespace
 
-MeshFault check_gltf(std::string_view file, ListedFaces* faces) {
+MeshFault check_gltf(std::string_view file, ListedFaces* faces, const std::function<bool(const std::string& uri)>& is_itself) {
   const std::string_view text = json_of_gltf(file);
-  GltfWalk walk;
+  GltfWalk walk(is_itself);
   Json::sax_parse(text.begin(), text.end(), &walk, Json::input_format_t::json, false);
   if (walk.fault) return walk.fault;
   NodeGraph graph;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -24,8 +25,9 @@ struct ListedFaces {
 
 /// `head`: the header of a file of `file_bytes`.
 MeshFault check_ply(const PlyHead& head, std::uint64_t file_bytes);
-/// Text or binary (GLB), version 1 or 2.
-MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr);
+/// Text or binary (GLB), version 1 or 2. `is_itself` returns true if the URI of a buffer names the file.
+MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr,
+                     const std::function<bool(const std::string& uri)>& is_itself = {});
 MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
 /// The JSON of a glTF file, text or GLB; empty or cut short if the file is.
 std::string_view json_of_gltf(std::string_view file);

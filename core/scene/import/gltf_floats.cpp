@@ -57,21 +57,10 @@ const Json& list_in(const Json& object, const char* key) {
   return found != object.end() && found->is_array() ? *found : empty;
 }
 
-/// Replaces "%20" by a blank, and so on.
-std::string without_percents(const std::string& name) {
-  std::string plain;
-  const auto digit = [](char c) { return std::string_view("0123456789abcdef").find(static_cast<char>(c | 32)); };
-  for (std::size_t at = 0; at < name.size(); ++at) {
-    const bool escaped = name[at] == '%' && at + 2 < name.size() && digit(name[at + 1]) < 16 && digit(name[at + 2]) < 16;
-    plain += escaped ? static_cast<char>(16 * digit(name[at + 1]) + digit(name[at + 2])) : name[at];
-    if (escaped) at += 2;
-  }
-  return plain;
-}
-
 class Rewriter {
  public:
-  Rewriter(std::string_view file, const ReadBeside& beside) : file_(file), beside_(beside) {}
+  Rewriter(std::string_view file, const ReadBeside& beside, std::uint64_t most_bytes)
+      : file_(file), beside_(beside), most_bytes_(most_bytes) {}
 
   Result<std::string> rewrite() {
     in_ = Json::parse(json_of_gltf(file_), nullptr, false);
@@ -93,13 +82,25 @@ class Rewriter {
       out_["materials"].push_back(std::move(named));
     }
     out_["buffers"] = {{{"byteLength", data_.size()}}};
-    return glb();
+    const std::string text = out_.dump();
+    if (auto r = make_room(text.size()); !r) return tl::make_unexpected(r.error());
+    return glb(text);
   }
 
  private:
   struct Buffer {
     std::size_t at = 0, bytes = 0;  // in data_
   };
+
+  static constexpr std::size_t head = 12, chunk_head = 8;
+
+  /// Error if the file exceeds its limit with this many more bytes.
+  Result<void> make_room(std::uint64_t more) const {
+    constexpr std::size_t filling = 2 * 3;
+    if (data_.size() <= most_bytes_ && more + head + 2 * chunk_head + filling <= most_bytes_ - data_.size()) return {};
+    return bad_gltf("has vertices that take more than " + std::to_string(most_bytes_) +
+                    " bytes as floating-point numbers; split it into several files");
+  }
 
   void align() { data_.resize((data_.size() + 3) / 4 * 4); }
 
@@ -205,6 +206,7 @@ class Rewriter {
     if (!inside) return bad_gltf("has vertices beyond the end of their data (" + of + "); fetch or export it again");
     const bool normalized = accessor.value("normalized", Json(false)) == true;
     const std::size_t at = data_.size();
+    if (auto r = make_room(bytes_of_float * per_vertex * count); !r) return r;
     data_.resize(at + bytes_of_float * per_vertex * static_cast<std::size_t>(count));
     for (std::uint64_t v = 0; v < count; ++v)
       for (std::uint64_t k = 0; k < per_vertex; ++k) {
@@ -217,15 +219,13 @@ class Rewriter {
     return {};
   }
 
-  std::string glb() const {
-    std::string text = out_.dump();
+  std::string glb(std::string text) const {
     text.resize((text.size() + 3) / 4 * 4, ' ');
     const auto word = [](std::size_t v) {
       std::string bytes;
       for (int k = 0; k < 4; ++k) bytes += static_cast<char>(v >> 8 * k & 0xFF);
       return bytes;
     };
-    constexpr std::size_t head = 12, chunk_head = 8;
     std::string file = "glTF" + word(2) + word(head + 2 * chunk_head + text.size() + (data_.size() + 3) / 4 * 4);
     file += word(text.size()) + "JSON" + text + word((data_.size() + 3) / 4 * 4) + std::string("BIN\0", 4);
     file += data_;
@@ -235,6 +235,7 @@ class Rewriter {
 
   std::string_view file_;
   const ReadBeside& beside_;
+  std::uint64_t most_bytes_;
   Json in_, out_ = Json::object();
   std::vector<Buffer> buffers_;
   std::vector<bool> sound_;  // by view of the file: it lies within its buffer
@@ -243,6 +244,19 @@ class Rewriter {
 
 }  // namespace
 
-Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside) { return Rewriter(file, beside).rewrite(); }
+std::string without_percents(const std::string& uri) {
+  std::string plain;
+  const auto digit = [](char c) { return std::string_view("0123456789abcdef").find(static_cast<char>(c | 32)); };
+  for (std::size_t at = 0; at < uri.size(); ++at) {
+    const bool escaped = uri[at] == '%' && at + 2 < uri.size() && digit(uri[at + 1]) < 16 && digit(uri[at + 2]) < 16;
+    plain += escaped ? static_cast<char>(16 * digit(uri[at + 1]) + digit(uri[at + 2])) : uri[at];
+    if (escaped) at += 2;
+  }
+  return plain;
+}
+
+Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside, std::uint64_t most_bytes) {
+  return Rewriter(file, beside, most_bytes).rewrite();
+}
 
 }  // namespace sonar

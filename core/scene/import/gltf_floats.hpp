@@ -2,7 +2,9 @@
 // numbers.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,6 +19,11 @@ using ReadBeside = std::function<std::optional<std::string>(const std::string& n
 /// A GLB file, version 2, with the nodes, meshes and skins of `file`, and with floating-point positions and weights of bones.
 /// It has no normals, colours, textures or animations; of materials it has the names. `file`: text or GLB, version 2. Errors do
 /// not contain the file's name.
-Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside);
+/// `most_bytes`: limit of its size; GLB files have sizes of 32 bits.
+Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside,
+                                     std::uint64_t most_bytes = std::numeric_limits<std::uint32_t>::max());
+
+/// Replaces "%20" by a blank, and so on.
+std::string without_percents(const std::string& uri);
 
 }  // namespace sonar

@@ -116,6 +116,17 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
   return imported + (listed > faces ? listed - faces : 0);  // at least one triangle each
 }
 
+/// True if the URI of a buffer names the mesh itself.
+bool is_itself(const MeshFile& request, const std::string& uri) {
+  std::error_code error;
+  const std::filesystem::path parent = request.file.parent_path();
+  const std::filesystem::path folder = std::filesystem::canonical(parent.empty() ? "." : parent, error);
+  const auto names_it = [&](const std::string& name) {
+    return (folder / name).lexically_normal() == folder / request.file.filename();
+  };
+  return names_it(uri) || names_it(without_percents(uri));
+}
+
 Result<MeshFault> check_text(const MeshFile& request, const std::string& extension, ListedFaces& faces) {
   std::string held;
   std::string_view text = request.in_memory;
@@ -140,7 +151,7 @@ Result<MeshFault> check_text(const MeshFile& request, const std::string& extensi
          : extension == ".obj" ? check_obj(text)
          : extension == ".stl" ? check_stl_text(text)
          : extension == ".dae" ? check_collada(text, &faces)
-                               : check_gltf(text, &faces);
+                               : check_gltf(text, &faces, [&](const std::string& uri) { return is_itself(request, uri); });
 }
 
 }  // namespace

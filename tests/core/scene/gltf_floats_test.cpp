@@ -252,6 +252,24 @@ TEST_F(GltfFloats, FilesThatAreCutWithinTheirIndicesAreRefused) {
   }
 }
 
+/// The sizes in the header of the result have 32 bits.
+TEST_F(GltfFloats, AResultThatIsTooLargeIsRefused) {
+  const Triangle triangle(5122, false, shorts, 8);
+  const auto rewritten = [&](std::uint64_t most_bytes) {
+    return gltf_with_floats(
+        triangle.glb(), [](const std::string&) { return std::nullopt; }, most_bytes);
+  };
+  const auto whole = rewritten(std::numeric_limits<std::uint32_t>::max());
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(*rewritten(whole->size() + 6), *whole);
+  for (const std::size_t most : {whole->size() - 1, whole->size() / 2, std::size_t{50}, std::size_t{10}}) {
+    const auto refused = rewritten(most);
+    ASSERT_FALSE(refused) << most;
+    EXPECT_EQ(refused.error().text, "has vertices that take more than " + std::to_string(most) +
+                                        " bytes as floating-point numbers; split it into several files");
+  }
+}
+
 TEST_F(GltfFloats, MembersOfEveryOtherTypeDoNoHarm) {
   const Triangle triangle(5122, false, shorts, 8);
   const auto rewritten = [](const json& description, const std::string& data) {

@@ -99,6 +99,8 @@ inline std::vector<HostileMesh> hostile_meshes() {
       {"absolute.gltf", gltf_with_buffer("/etc/passwd"), "names the file /etc/passwd, an absolute path"},
       {"outside.gltf", gltf_with_buffer("../../../../../../etc/passwd"),
        "etc/passwd, which is outside of its folder and the scene's"},
+      {"own.gltf", gltf_with_buffer("own.gltf"), "names itself as the file of a buffer (own.gltf)"},
+      {"own-dots.gltf", gltf_with_buffer("x/.././own%2ddots.gltf"), "names itself as the file of a buffer"},
   };
 }
 
