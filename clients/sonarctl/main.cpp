@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   sigaction(SIGHUP, nullptr, &on_hangup);
   if (on_hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &on_interrupt, nullptr);  // nohup ignores it
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of file sizes (ulimit -f) fails, and does not end the program
   sonar::open_closed_standard_streams();
   if (const auto room = sonar::make_room_for_stacks(); !room) {
     std::fprintf(stderr, "sonarctl: %s\n", room.error().text.c_str());

@@ -1,5 +1,6 @@
 // sonard: parses the command line, runs the command, and turns its errors and exceptions into a line and an exit code.
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -65,6 +66,7 @@ Result<int> run_command(const Command& command, std::chrono::steady_clock::time_
 
 int main(int argc, char** argv) {
   sonar::open_closed_standard_streams();
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of file sizes (ulimit -f) fails, and does not end the program
   const auto begin = std::chrono::steady_clock::now();
   bool json = false;
   if (const auto room = sonar::make_room_for_stacks(); !room) return sonar::report_error(room.error(), json);

@@ -138,12 +138,11 @@ class Dataset(unittest.TestCase):
 
     def test_a_full_disk_ends_with_a_sentence(self):
         def small_disk():
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (30000, 30000))
         self.job.write_text(small_job(2, 2), encoding="utf-8")
         result = subprocess.run([str(SONARD), "dataset", str(self.job), "--out", str(self.path / "full"), "--quiet"],
                                 stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=False,
-                                preexec_fn=small_disk, restore_signals=False)
+                                preexec_fn=small_disk)
         self.assertEqual(result.returncode, 74, result.stderr)
         self.assertIn("cannot write", result.stderr)
         self.assertEqual(list((self.path / "full").glob("*.tar*")), [])

@@ -295,14 +295,13 @@ class Undisturbed(unittest.TestCase):
 
     def test_a_render_on_a_full_disk_ends_with_a_sentence(self):
         def small_disk():
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.RLIM_INFINITY))
         with tempfile.TemporaryDirectory() as folder:
             for kind in ("npy", "png", "raw"):
                 with self.subTest(format=kind):
                     result = subprocess.run([str(SONARD), "render", str(ROOT / "scenes/sonard.yaml"), "--out", f"{folder}/{kind}",
                                              "--format", kind, "--quiet"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                                            timeout=120, check=False, preexec_fn=small_disk, restore_signals=False)
+                                            timeout=120, check=False, preexec_fn=small_disk)
                     self.assertEqual(result.returncode, 74, result.stderr)
                     self.assertRegex(result.stderr, rf"sonard: .*{kind}")
 

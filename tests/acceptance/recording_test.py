@@ -328,7 +328,6 @@ class OneIntoAnother(Files):
 
     def test_a_full_disk_ends_it_with_one_sentence(self):
         def small_disk():
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (1_500_000, 1_500_000))
 
         self.path("raw").write_bytes(self.made(pings=12, rows=700))

@@ -30,7 +30,6 @@ void let_hangups_through(bool let) {
 void prepare_process() {
   let_hangups_through(false);     // a hangup that arrives while the scene loads stays pending until it is handled
   std::signal(SIGPIPE, SIG_IGN);  // a closed log pipe (sonard 2>&1 | head) must not end the daemon
-  std::signal(SIGXFSZ, SIG_IGN);  // a recording that reaches the limit of file sizes ends; clients stay connected
   raise_descriptor_limit();
 }
 
