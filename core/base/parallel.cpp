@@ -27,6 +27,16 @@ struct Parallel::Pool {
 
   std::exception_ptr fault;  // the first exception of a call
 
+  // Also called if one of the workers cannot be started.
+  ~Pool() {
+    {
+      std::lock_guard lock(mutex);
+      stop = true;
+    }
+    start.notify_all();
+    for (auto& t : workers) t.join();
+  }
+
   /// Runs the items of the current call. Exceptions are caught, because an exception in a worker thread would end the whole
   /// program. If memory runs out in a ping, only this ping must fail.
   void run_items(int worker) {
@@ -69,15 +79,7 @@ Parallel::Parallel(int threads, int nice) : threads_(threads < 1 ? 1 : threads) 
     pool_->workers.emplace_back([pool = pool_.get(), worker, nice] { pool->work(worker, nice); });
 }
 
-Parallel::~Parallel() {
-  if (!pool_) return;
-  {
-    std::lock_guard lock(pool_->mutex);
-    pool_->stop = true;
-  }
-  pool_->start.notify_all();
-  for (auto& t : pool_->workers) t.join();
-}
+Parallel::~Parallel() = default;
 
 void Parallel::run(std::size_t count, void* body, Call call) {
   if (!pool_ || count < 2) {

@@ -3,10 +3,17 @@
 #include "core/base/parallel.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <new>
+#include <system_error>
 #include <vector>
+
+#include "core/base/memory_left.hpp"
+#include "tests/is_sanitized.hpp"
 
 namespace sonar {
 namespace {
@@ -72,6 +79,27 @@ TEST_P(ParallelPool, AnExceptionEndsTheLoopAndReachesTheCaller) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, ParallelPool, testing::Values(1, 2, 4), testing::PrintToStringParamName());
+
+// A child process whose limit of addresses leaves room for the stacks of a few workers, but not of all.
+TEST(ParallelPoolLimits, AWorkerThatCannotStartIsAnException) {
+  if (test::is_sanitized) GTEST_SKIP() << "sanitizers need terabytes of addresses";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const rlim_t bytes = address_space_bytes().value() + (rlim_t{40} << 20);
+    const rlimit limit{bytes, bytes};
+    if (::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(2);
+    try {
+      const Parallel many(64);
+    } catch (const std::system_error&) {
+      ::_exit(0);
+    }
+    ::_exit(1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
 
 }  // namespace
 }  // namespace sonar
