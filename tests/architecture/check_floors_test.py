@@ -112,6 +112,8 @@ class Planted(unittest.TestCase):
                 ("protocol/oculus/a.cpp", "#include <sys/socket.h>", "socket"),
                 ("protocol/recording/piece.cpp", "std::ifstream in(file);", "file"),
                 ("protocol/oculus/a.cpp", 'auto* in = std::fopen(name, "rb");', "file"),
+                ("clients/a.cpp", 'std::setlocale(LC_ALL, "");', "locale"),
+                ("daemon/a.cpp", "std::locale::global(german);", "locale"),
                 ("core/sonar/a.cpp", "const int fd = ::open(name, 0);", "file"),
                 ("daemon/a.cpp", "std::mutex guard;", "mutex"),
                 ("core/scene/a.cpp", "std::mt19937 engine;", "global random"),
