@@ -1,6 +1,5 @@
 #include "protocol/aris/aris.hpp"
 
-#include "protocol/aris/dialogue.hpp"
 #include "protocol/aris/encode_frame.hpp"
 #include "protocol/aris/messages.hpp"
 #include "protocol/aris/models.hpp"

@@ -1,9 +1,9 @@
 // The messages and files of ARIS, for recordings.
 #include <array>
 
+#include "protocol/aris/aris.hpp"
 #include "protocol/aris/aris_file.hpp"
 #include "protocol/aris/encode_frame.hpp"
-#include "protocol/aris/host.hpp"
 #include "protocol/aris/models.hpp"
 
 namespace sonar::aris {

@@ -1,5 +1,3 @@
-#include "protocol/aris/dialogue.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <deque>
@@ -7,6 +5,7 @@
 #include <string_view>
 
 #include "core/text/ipv4.hpp"
+#include "protocol/aris/aris.hpp"
 #include "protocol/aris/messages.hpp"
 #include "protocol/aris/options.hpp"
 #include "protocol/aris/settings.hpp"

@@ -1,10 +1,9 @@
-#include "protocol/aris/host.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include "protocol/aris/aris.hpp"
 #include "protocol/aris/encode_frame.hpp"
 #include "protocol/aris/models.hpp"
 

@@ -1,6 +1,5 @@
 #include "protocol/blueview/blueview.hpp"
 
-#include "protocol/blueview/dialogue.hpp"
 #include "protocol/blueview/encode_ping.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"

@@ -1,10 +1,30 @@
-// Teledyne BlueView: the implementation of Vendor. Its clients are the drop-in SDK libraries of clients/bvtsdk.
+// Teledyne BlueView on sonard's link (docs/protocols/blueview-link.md): the device, whose clients are the drop-in SDK libraries
+// of clients/bvtsdk, the driver, which requests pings one by one, and the codec for recordings.
 #pragma once
 
-#include "protocol/vendor.hpp"
+#include <array>
+#include <memory>
+
+#include "protocol/blueview/link.hpp"
+#include "protocol/host.hpp"
 
 namespace sonar::blueview {
 
 const protocol::Vendor& vendor();
+/// One host's conversation over BVE1: greeting, settings, triggers, subscription, keep-alives.
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now);
+/// The answer to a discovery datagram; empty for other datagrams.
+protocol::Bytes answer_discovery(protocol::BytesView datagram, const protocol::DeviceState& device);
+
+inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
+
+/// Samples are linear. The brightest 1 % saturate in pictures; otherwise weak samples would be black.
+inline constexpr Shades shades{.per_mille = 990};
+
+extern const protocol::Search search;
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+
+recording::Codec codec();
 
 }  // namespace sonar::blueview

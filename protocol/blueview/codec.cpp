@@ -1,8 +1,8 @@
 // The messages and files of BlueView, for recordings.
 #include <algorithm>
 
+#include "protocol/blueview/blueview.hpp"
 #include "protocol/blueview/frames.hpp"
-#include "protocol/blueview/host.hpp"
 #include "protocol/blueview/models.hpp"
 
 namespace sonar::blueview {

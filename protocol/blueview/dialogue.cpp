@@ -1,9 +1,8 @@
-#include "protocol/blueview/dialogue.hpp"
-
 #include <algorithm>
 #include <deque>
 #include <optional>
 
+#include "protocol/blueview/blueview.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/options.hpp"

@@ -1,9 +1,8 @@
-#include "protocol/blueview/host.hpp"
-
 #include <cmath>
 #include <deque>
 
 #include "core/base/geometry.hpp"
+#include "protocol/blueview/blueview.hpp"
 #include "protocol/blueview/deflate.hpp"
 #include "protocol/blueview/encode_ping.hpp"
 #include "protocol/blueview/settings_override.hpp"

@@ -1,5 +1,5 @@
 // The messages of a DVL, for recordings.
-#include "protocol/dvl/host.hpp"
+#include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/models.hpp"
 #include "protocol/dvl/sentences.hpp"
 

@@ -1,7 +1,6 @@
-#include "protocol/dvl/dialogue.hpp"
-
 #include <utility>
 
+#include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/reports.hpp"
 #include "protocol/dvl/session.hpp"
 

@@ -1,7 +1,5 @@
 #include "protocol/dvl/dvl.hpp"
 
-#include "protocol/dvl/dialogue.hpp"
-#include "protocol/dvl/host.hpp"
 #include "protocol/dvl/reports.hpp"
 #include "protocol/dvl/sentences.hpp"
 

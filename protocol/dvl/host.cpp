@@ -1,9 +1,8 @@
-#include "protocol/dvl/host.hpp"
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/text/format.hpp"
+#include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/reports.hpp"
 #include "protocol/waterfall.hpp"
 

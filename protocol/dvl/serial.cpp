@@ -8,7 +8,7 @@
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
 #include "core/text/printable.hpp"
-#include "protocol/dvl/dialogue.hpp"
+#include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/sentences.hpp"
 #include "protocol/dvl/session.hpp"
 

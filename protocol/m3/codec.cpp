@@ -2,7 +2,7 @@
 // (CLI).
 #include <array>
 
-#include "protocol/m3/host.hpp"
+#include "protocol/m3/m3.hpp"
 #include "protocol/m3/models.hpp"
 #include "protocol/m3/packet.hpp"
 #include "protocol/recorded/raw_dump.hpp"

@@ -1,10 +1,9 @@
-#include "protocol/m3/host.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/base/geometry.hpp"
+#include "protocol/m3/m3.hpp"
 #include "protocol/m3/packet.hpp"
 
 namespace sonar::m3 {

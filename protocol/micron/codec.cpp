@@ -1,5 +1,5 @@
 // The messages of a Micron, for recordings.
-#include "protocol/micron/host.hpp"
+#include "protocol/micron/micron.hpp"
 #include "protocol/micron/settings.hpp"
 
 namespace sonar::micron {

@@ -1,9 +1,8 @@
-#include "protocol/micron/dialogue.hpp"
-
 #include <algorithm>
 #include <utility>
 
 #include "protocol/awaited_ping.hpp"
+#include "protocol/micron/micron.hpp"
 #include "protocol/micron/settings.hpp"
 
 namespace sonar::micron {

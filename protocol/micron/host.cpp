@@ -1,10 +1,9 @@
-#include "protocol/micron/host.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/text/format.hpp"
+#include "protocol/micron/micron.hpp"
 #include "protocol/micron/settings.hpp"
 #include "protocol/sweep.hpp"
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "protocol/micron/dialogue.hpp"
-#include "protocol/micron/host.hpp"
 #include "protocol/micron/settings.hpp"
 
 namespace sonar::micron {

@@ -1,6 +1,6 @@
 // The packets of a Norbit, for recordings.
-#include "protocol/norbit/host.hpp"
 #include "protocol/norbit/models.hpp"
+#include "protocol/norbit/norbit.hpp"
 #include "protocol/norbit/packet.hpp"
 
 namespace sonar::norbit {

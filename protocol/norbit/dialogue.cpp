@@ -1,5 +1,3 @@
-#include "protocol/norbit/dialogue.hpp"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -11,6 +9,7 @@
 #include "core/text/format.hpp"
 #include "core/text/printable.hpp"
 #include "protocol/norbit/messages.hpp"
+#include "protocol/norbit/norbit.hpp"
 #include "protocol/norbit/settings.hpp"
 
 namespace sonar::norbit {

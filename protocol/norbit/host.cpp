@@ -1,5 +1,3 @@
-#include "protocol/norbit/host.hpp"
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -10,6 +8,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
+#include "protocol/norbit/norbit.hpp"
 #include "protocol/norbit/packet.hpp"
 #include "protocol/norbit/settings.hpp"
 

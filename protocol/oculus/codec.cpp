@@ -3,8 +3,8 @@
 #include <array>
 
 #include "protocol/oculus/decode.hpp"
-#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/models.hpp"
+#include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/oculus_log.hpp"
 
 namespace sonar::oculus {

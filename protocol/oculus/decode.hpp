@@ -1,5 +1,5 @@
 // The driver's side: an incremental decoder for the messages of a device, and the checks that real drivers make. The host of the
-// make (host.hpp), its codec and tests use them; make_fire (fire.hpp) makes the fire messages.
+// make (host.cpp), its codec and tests use them; make_fire (fire.hpp) makes the fire messages.
 #pragma once
 
 #include <optional>

@@ -1,10 +1,9 @@
-#include "protocol/oculus/dialogue.hpp"
-
 #include <algorithm>
 #include <cstdio>
 #include <optional>
 
 #include "protocol/oculus/framer.hpp"
+#include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/options.hpp"
 #include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"

@@ -1,10 +1,9 @@
-#include "protocol/oculus/host.hpp"
-
 #include <charconv>
 #include <cmath>
 
 #include "core/text/format.hpp"
 #include "protocol/oculus/decode.hpp"
+#include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/settings_override.hpp"
 
 namespace sonar::oculus {

@@ -1,6 +1,5 @@
 #include "protocol/oculus/oculus.hpp"
 
-#include "protocol/oculus/dialogue.hpp"
 #include "protocol/oculus/encode_ping.hpp"
 #include "protocol/oculus/locate.hpp"
 #include "protocol/oculus/models.hpp"

@@ -3,17 +3,12 @@
 #include <array>
 #include <initializer_list>
 
-#include "protocol/ping/host.hpp"
 #include "protocol/ping/messages.hpp"
-#include "protocol/ping/omniscan.hpp"
-#include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping1d_settings.hpp"
-#include "protocol/ping/ping360.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 #include "protocol/ping/ping_log.hpp"
-#include "protocol/ping/s500.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/s500_settings.hpp"
-#include "protocol/ping/surveyor.hpp"
 #include "protocol/recorded/raw_dump.hpp"
 
 namespace sonar::ping {

@@ -1,5 +1,3 @@
-#include "protocol/ping/host.hpp"
-
 #include <algorithm>
 #include <cmath>
 
@@ -7,7 +5,7 @@
 #include "core/text/format.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_host.hpp"
-#include "protocol/ping/surveyor.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/sweep.hpp"
 
 namespace sonar::ping {

@@ -1,9 +1,8 @@
-#include "protocol/ping/omniscan.hpp"
-
 #include <algorithm>
 
 #include "protocol/ping/locate.hpp"
 #include "protocol/ping/omniscan_settings.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/streaming.hpp"
 
 namespace sonar::ping::omniscan {

@@ -1,8 +1,7 @@
-#include "protocol/ping/ping1d.hpp"
-
 #include "protocol/ping/locate.hpp"
 #include "protocol/ping/ping1d_dialogue.hpp"
 #include "protocol/ping/ping1d_settings.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/streaming.hpp"
 
 namespace sonar::ping::ping1d {

@@ -1,10 +1,9 @@
 #include <cmath>
 
 #include "core/text/format.hpp"
-#include "protocol/ping/host.hpp"
-#include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping1d_settings.hpp"
 #include "protocol/ping/ping_host.hpp"
+#include "protocol/ping/products.hpp"
 
 namespace sonar::ping::ping1d {
 namespace {

@@ -1,5 +1,3 @@
-#include "protocol/ping/ping360.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include "protocol/ping/locate.hpp"
 #include "protocol/ping/ping360_dialogue.hpp"
 #include "protocol/ping/ping360_settings.hpp"
+#include "protocol/ping/products.hpp"
 
 namespace sonar::ping::ping360 {
 namespace {

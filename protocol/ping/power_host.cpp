@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "core/text/format.hpp"
-#include "protocol/ping/host.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping_host.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/s500_messages.hpp"
 
 namespace sonar::ping {

@@ -1,8 +1,7 @@
-#include "protocol/ping/s500.hpp"
-
 #include "protocol/ping/locate.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/s500_settings.hpp"
 #include "protocol/ping/sounding.hpp"
 

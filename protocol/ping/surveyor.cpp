@@ -1,6 +1,5 @@
-#include "protocol/ping/surveyor.hpp"
-
 #include "protocol/ping/locate.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/streaming.hpp"
 #include "protocol/ping/surveyor_settings.hpp"
 

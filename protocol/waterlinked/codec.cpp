@@ -2,10 +2,10 @@
 #include <array>
 
 #include "protocol/recorded/raw_dump.hpp"
-#include "protocol/waterlinked/host.hpp"
 #include "protocol/waterlinked/models.hpp"
 #include "protocol/waterlinked/rip.hpp"
 #include "protocol/waterlinked/sonar_file.hpp"
+#include "protocol/waterlinked/waterlinked.hpp"
 
 namespace sonar::waterlinked {
 namespace {

@@ -1,5 +1,3 @@
-#include "protocol/waterlinked/host.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -9,6 +7,7 @@
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/waterlinked.hpp"
 
 namespace sonar::waterlinked {
 namespace {

@@ -1,10 +1,28 @@
-// The Water Linked Sonar 3D-15: the implementation of Vendor. Settings over HTTP, images by UDP.
+// The Water Linked Sonar 3D-15 (docs/protocols/waterlinked.md): the device and its client, with settings over HTTP and images by
+// multicast, and the codec for recordings.
 #pragma once
 
-#include "protocol/vendor.hpp"
+#include <array>
+
+#include "protocol/host.hpp"
+#include "protocol/waterlinked/messages.hpp"
+#include "protocol/waterlinked/settings.hpp"
 
 namespace sonar::waterlinked {
 
 const protocol::Vendor& vendor();
+
+inline constexpr std::uint16_t http_port = 80;
+inline constexpr std::array<protocol::HostPort, 2> host_ports{
+    {{protocol::HostPort::Kind::http, http_port},
+     {protocol::HostPort::Kind::udp_listen, multicast_group.port, multicast_group.ip}}};
+
+/// Builds a top-view ping: each column of pixels becomes a beam with its strengths at their horizontal ranges. Without
+/// `strengths` all returns are equally bright. nullopt: the messages do not describe one image.
+std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const StrengthMessage* strengths);
+
+Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
+
+recording::Codec codec();
 
 }  // namespace sonar::waterlinked

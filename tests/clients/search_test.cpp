@@ -12,8 +12,8 @@
 #include "clients/sonarctl/doctor/watch_pings.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 #include "protocol/blueview/frames.hpp"
-#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/messages.hpp"
+#include "protocol/oculus/oculus.hpp"
 #include "protocol/ping/messages.hpp"
 #include "tests/clients/bound_socket.hpp"
 

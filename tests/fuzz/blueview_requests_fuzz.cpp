@@ -4,7 +4,6 @@
 #include <cstdlib>
 
 #include "protocol/blueview/blueview.hpp"
-#include "protocol/blueview/dialogue.hpp"
 
 using namespace sonar;
 

@@ -1,6 +1,6 @@
 // .oculus log files and raw dumps with any content. A compressed item may contain a message of the maximum size.
-#include "protocol/oculus/host.hpp"
 #include "protocol/oculus/messages.hpp"
+#include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/oculus_log.hpp"
 #include "protocol/recorded/raw_dump.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"

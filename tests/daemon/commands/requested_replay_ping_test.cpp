@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "protocol/ping/host.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/s500_messages.hpp"
 #include "tests/daemon/commands/requested_replay_testing.hpp"
 

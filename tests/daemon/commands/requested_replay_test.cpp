@@ -5,8 +5,8 @@
 
 #include <array>
 
-#include "protocol/norbit/host.hpp"
-#include "protocol/ping/host.hpp"
+#include "protocol/norbit/norbit.hpp"
+#include "protocol/ping/products.hpp"
 #include "tests/daemon/commands/requested_replay_testing.hpp"
 #include "tests/protocol/micron/micron_testing.hpp"
 #include "tests/protocol/norbit/norbit_testing.hpp"

@@ -3,8 +3,7 @@
 
 #include <deque>
 
-#include "protocol/aris/dialogue.hpp"
-#include "protocol/aris/host.hpp"
+#include "protocol/aris/aris.hpp"
 #include "tests/protocol/aris/aris_testing.hpp"
 
 namespace sonar::aris {

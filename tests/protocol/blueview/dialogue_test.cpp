@@ -1,4 +1,4 @@
-#include "protocol/blueview/dialogue.hpp"
+#include "protocol/blueview/blueview.hpp"
 
 #include <gtest/gtest.h>
 

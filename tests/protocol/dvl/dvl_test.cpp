@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "protocol/dvl/host.hpp"
+#include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/reports.hpp"
 #include "tests/protocol/dvl/dvl_testing.hpp"
 

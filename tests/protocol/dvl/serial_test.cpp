@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "protocol/dvl/host.hpp"
+#include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/sentences.hpp"
 #include "tests/protocol/dvl/dvl_testing.hpp"
 

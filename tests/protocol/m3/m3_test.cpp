@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "core/pipeline/arithmetic/receiver.hpp"
-#include "protocol/m3/host.hpp"
 #include "protocol/m3/m3.hpp"
 #include "protocol/m3/models.hpp"
 #include "protocol/m3/packet.hpp"

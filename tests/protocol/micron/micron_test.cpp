@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "core/base/geometry.hpp"
-#include "protocol/micron/host.hpp"
+#include "protocol/micron/micron.hpp"
 #include "tests/protocol/micron/micron_testing.hpp"
 
 namespace sonar::micron {

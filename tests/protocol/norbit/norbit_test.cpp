@@ -5,7 +5,7 @@
 #include <cstring>
 
 #include "core/image/draw_picture.hpp"
-#include "protocol/norbit/host.hpp"
+#include "protocol/norbit/norbit.hpp"
 #include "protocol/recorded/zlib.hpp"
 #include "tests/protocol/norbit/norbit_testing.hpp"
 

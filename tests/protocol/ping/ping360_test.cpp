@@ -4,9 +4,9 @@
 #include <variant>
 
 #include "core/base/geometry.hpp"
-#include "protocol/ping/host.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 #include "protocol/ping/ping_host.hpp"
+#include "protocol/ping/products.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
 namespace sonar::ping::ping360 {

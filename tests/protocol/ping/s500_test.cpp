@@ -4,9 +4,9 @@
 
 #include <variant>
 
-#include "protocol/ping/host.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/s500_settings.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "protocol/ping/host.hpp"
+#include "protocol/ping/products.hpp"
 #include "protocol/ping/surveyor_settings.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 

@@ -1,5 +1,5 @@
 // For any split of the stream the splitter drops only bytes of broken messages.
-#include "protocol/oculus/host.hpp"
+#include "protocol/oculus/oculus.hpp"
 #include "protocol/ping/messages.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 

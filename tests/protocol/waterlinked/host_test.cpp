@@ -1,5 +1,5 @@
 // The images of a Sonar 3D-15 as its host draws and lists them.
-#include "protocol/waterlinked/host.hpp"
+#include "protocol/waterlinked/waterlinked.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

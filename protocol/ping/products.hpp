@@ -1,4 +1,4 @@
-// The driver's side of the ping protocol (docs/protocols/ping.md): over UDP for a Ping360, over TCP for the others.
+// The products of the ping protocol (docs/protocols/ping.md): of each the device, its driver, and the codec of its recordings.
 #pragma once
 
 #include <array>
@@ -7,32 +7,43 @@
 
 namespace sonar::ping {
 
+/// Ping360: a mechanically scanned single beam. It has one UDP dialogue, and answers the discovery of its Ethernet interface.
 namespace ping360 {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::udp, 12345}}};
+const protocol::Vendor& vendor();
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace ping360
 
+/// Surveyor 240-16: a multibeam echo sounder that sends points of the bottom, over TCP and UDP. Drivers use TCP.
 namespace surveyor {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 62312}}};
+const protocol::Vendor& vendor();
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace surveyor
 
+/// Omniscan 450: a side-scan sonar with one beam, narrow along the track and wide across it. TCP and UDP; it pings as soon as a
+/// host enables pings.
 namespace omniscan {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 51200}}};
+const protocol::Vendor& vendor();
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace omniscan
 
+/// Ping1D: an altimeter with one wide beam. TCP and UDP; a host requests single measurements or a stream of them.
 namespace ping1d {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 9090}}};
+const protocol::Vendor& vendor();
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace ping1d
 
+/// S500: an echo sounder with one narrow beam. TCP and UDP; a host requests single pings or a stream of them.
 namespace s500 {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 51200}}};
+const protocol::Vendor& vendor();
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace s500
