@@ -4,11 +4,15 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "core/base/result.hpp"
 #include "core/text/format.hpp"
 #include "protocol/dialogue.hpp"
 
 namespace sonar::protocol {
+
+inline tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
 /// The refusal of a range, such as "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)". Empty if `range_m` is from
 /// `low_m` to `high_m`. `of`: the sonar, such as "a Surveyor".

@@ -3,7 +3,6 @@
 #include "protocol/aris/encode_frame.hpp"
 #include "protocol/aris/messages.hpp"
 #include "protocol/aris/models.hpp"
-#include "protocol/aris/options.hpp"
 #include "protocol/aris/settings.hpp"
 
 namespace sonar::aris {

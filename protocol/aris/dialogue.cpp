@@ -7,7 +7,6 @@
 #include "core/text/ipv4.hpp"
 #include "protocol/aris/aris.hpp"
 #include "protocol/aris/messages.hpp"
-#include "protocol/aris/options.hpp"
 #include "protocol/aris/settings.hpp"
 
 namespace sonar::aris {

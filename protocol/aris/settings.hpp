@@ -3,7 +3,9 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "core/sonar/ping_settings.hpp"
 #include "protocol/aris/models.hpp"
@@ -71,5 +73,14 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
 
 /// The change that a SET_ACOUSTICS with the override's values would cause.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+/// Options of a sonar in the configuration, under `options:`: properties that the public sources do not state.
+namespace option_name {
+inline constexpr std::string_view cycle = "cycle", reordered = "reordered", receivers = "receivers", silence_s = "silence_s",
+                                  header_bytes = "header_bytes", datagram_bytes = "datagram_bytes";
+}
+std::span<const protocol::Option> options();
+using protocol::number_option;
+using protocol::text_option;
 
 }  // namespace sonar::aris

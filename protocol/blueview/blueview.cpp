@@ -4,8 +4,6 @@
 #include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
-#include "protocol/blueview/options.hpp"
-#include "protocol/blueview/settings_override.hpp"
 
 namespace sonar::blueview {
 namespace {

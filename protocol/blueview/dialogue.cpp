@@ -5,7 +5,6 @@
 #include "protocol/blueview/blueview.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
-#include "protocol/blueview/options.hpp"
 
 namespace sonar::blueview {
 namespace {

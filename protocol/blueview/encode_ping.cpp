@@ -7,7 +7,6 @@
 #include "protocol/blueview/deflate.hpp"
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
-#include "protocol/blueview/options.hpp"
 
 namespace sonar::blueview {
 namespace {

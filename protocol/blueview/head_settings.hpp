@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/sonar/ping_settings.hpp"
@@ -64,5 +66,23 @@ PingSettings ping_settings(const SonarSettings& settings, const protocol::Device
 
 /// One line for the log.
 std::string describe(const SonarSettings& settings, const protocol::DeviceState& device);
+
+/// Options of a sonar in the configuration, by name, under `options:`.
+namespace option_name {
+inline constexpr std::string_view heads_base = "heads_base", strict_range = "strict_range", compression = "compression";
+}
+std::span<const protocol::Option> options();
+using protocol::text_option;
+
+/// Converts between per cent and the gain adjustment [dB]: 0 % is -48 dB, 100 % is 48 dB.
+float gain_db_from(double percent);
+double gain_percent_from(double gain_db);
+
+/// The interval between pings, limited to 1 ms up to one hour. `rate_hz` must be above 0.
+std::int32_t ping_interval_ms(double rate_hz);
+
+/// Converts an override to the settings that a host would set: selects the head `wanted.mode`, if set, and changes on the active
+/// head only the fields that are set. Refuses values that the product does not support.
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
 }  // namespace sonar::blueview

@@ -5,7 +5,7 @@
 #include "protocol/blueview/blueview.hpp"
 #include "protocol/blueview/deflate.hpp"
 #include "protocol/blueview/encode_ping.hpp"
-#include "protocol/blueview/settings_override.hpp"
+#include "protocol/blueview/head_settings.hpp"
 
 namespace sonar::blueview {
 namespace {

@@ -1,7 +1,6 @@
 #include "protocol/dvl/dvl.hpp"
 
 #include "protocol/dvl/reports.hpp"
-#include "protocol/dvl/sentences.hpp"
 
 namespace sonar::dvl {
 namespace {

@@ -1,8 +1,10 @@
-// Writes and reads the lines that the device sends: JSON, one object per line.
+// Writes and reads the lines that the device sends: JSON, one object per line, and the sentences of the serial line, which are
+// comma-separated texts with a checksum.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "protocol/dvl/measure.hpp"
 
@@ -45,5 +47,14 @@ struct Line {
   std::optional<Response> response = {};
 };
 Line read_line(BytesView line);
+
+/// CRC-8 with the polynomial 0x07 and the initial value 0.
+std::uint8_t crc8(std::string_view text);
+/// The sentence with its checksum, as a line.
+Bytes sentence_line(std::string_view sentence);
+
+/// The sentences of a ping; empty if `output` selects none.
+Bytes velocity_sentences(const Measurement& measured, std::chrono::nanoseconds since_last, Time sent_at, SerialOutput output);
+Bytes position_sentence(const Reckoning& reckoning, Time at);
 
 }  // namespace sonar::dvl

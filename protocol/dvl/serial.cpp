@@ -9,7 +9,7 @@
 #include "core/text/format.hpp"
 #include "core/text/printable.hpp"
 #include "protocol/dvl/dvl.hpp"
-#include "protocol/dvl/sentences.hpp"
+#include "protocol/dvl/reports.hpp"
 #include "protocol/dvl/session.hpp"
 
 namespace sonar::dvl {

@@ -1,10 +1,28 @@
-// The part that the conversations in JSON and on the serial line share: commands, triggered pings and the times of reports.
+// The part that the conversations in JSON and on the serial line share: the commands of clients, triggered pings and the times of
+// reports.
 #pragma once
 
-#include "protocol/dvl/commands.hpp"
+#include <nlohmann/json.hpp>
+
+#include "protocol/dvl/settings.hpp"
 #include "protocol/held_settings.hpp"
 
 namespace sonar::dvl {
+
+using Json = nlohmann::ordered_json;
+
+/// An outcome without an error is a success.
+struct Outcome {
+  Json result = nullptr;
+  std::string error = {};
+};
+/// Carries out a command except trigger_ping, which is part of the session; commands that set values change `settings`. nullopt:
+/// there is no such command.
+std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
+                                 Time now, Settings& settings);
+/// The answer to get_version_info. The version names sonard, so that a log shows that the device was emulated.
+Json version_info(const protocol::DeviceState& device);
+protocol::Bytes response_line(const std::string& to, const Outcome& outcome);
 
 /// Every client gets all reports. With acoustics enabled the device pings by itself and trigger_ping is refused; with acoustics
 /// disabled it pings only for triggers, which each client queues for itself.

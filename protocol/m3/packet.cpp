@@ -10,7 +10,6 @@
 #include "core/base/geometry.hpp"
 #include "core/sonar/sample_code.hpp"
 #include "protocol/m3/models.hpp"
-#include "protocol/m3/options.hpp"
 #include "protocol/m3/settings.hpp"
 
 namespace sonar::m3 {
@@ -144,6 +143,23 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin from, bo
   return head_size + body + foot_size;
 }
 
+using Place = std::pair<std::size_t, std::size_t>;  // offset, size
+
+/// Offset and size of a region in a packet of that many bytes.
+Place place_of(protocol::Region region, std::size_t size) {
+  switch (region) {
+    case protocol::Region::header:
+      return {0, head_size};
+    case protocol::Region::metadata:  // the data header up to the table of bearings
+      return {head_size, data_front_size};
+    case protocol::Region::bearings:
+      return {head_size + data_front_size, sizeof(float) * most_beams};
+    case protocol::Region::image:
+      return {samples_at, size - samples_at - foot_size};
+  }
+  return {};
+}
+
 }  // namespace
 
 const recording::Framing framing{{sync_word & 0xFF, sync_word >> 8}, stream_front_size, length_of};
@@ -185,6 +201,17 @@ std::optional<Packet> read_packet(BytesView whole) {
   fields(reader, foot);
   if (!reader.ok() || foot.body_size != front.head.body_size) return std::nullopt;
   return Packet{front.data, samples};
+}
+
+// Finds in a packet the fields and regions that faults change.
+std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packet) {
+  return wire::locate<PacketFront>(name, packet);
+}
+
+std::optional<Place> locate(protocol::Region region, BytesView packet) {
+  if (packet.empty()) return Place{};
+  if (packet.size() < samples_at + foot_size) return std::nullopt;
+  return place_of(region, packet.size());
 }
 
 }  // namespace sonar::m3

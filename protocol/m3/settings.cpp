@@ -1,6 +1,7 @@
 #include "protocol/m3/settings.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/sonar/water.hpp"
@@ -66,7 +67,7 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
 
 // Only range, rate and gain can be set: the maker's program sets them, its drivers cannot.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
-  const auto refused = [](std::string text) { return failure(ErrorKind::usage, std::move(text)); };
+  using protocol::refused;
   Settings s = settings_from(device.settings.get());
   if (wanted.range_m) {
     if (const std::string why = protocol::range_complaint(*wanted.range_m, "an M3", 1, farthest_m); !why.empty())
@@ -92,6 +93,16 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 double gain_percent(const Settings& settings) {
   return 100 * (static_cast<double>(settings.c_db) - least_c_db) / (most_c_db - least_c_db);
+}
+
+std::span<const protocol::Option> options() {
+  static const std::array<protocol::Option, 1> all{{
+      {option_name::positive_angles,
+       {"port", "starboard"},
+       "port",
+       "side of the beams with positive angles; packets begin with the beam of the least angle"},
+  }};
+  return all;
 }
 
 }  // namespace sonar::m3

@@ -1,7 +1,9 @@
 // Range, rate and gain, which only the M3's own program can set, not drivers, and the sampling window that follows from them.
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "core/sonar/phases.hpp"
 #include "core/sonar/ping_settings.hpp"
@@ -40,5 +42,11 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 double gain_percent(const Settings& settings);
+
+/// Options of a sonar in the configuration, by name, under `options:`.
+namespace option_name {
+inline constexpr std::string_view positive_angles = "positive_angles";
+}
+std::span<const protocol::Option> options();
 
 }  // namespace sonar::m3

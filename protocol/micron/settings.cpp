@@ -12,13 +12,13 @@
 namespace sonar::micron {
 namespace {
 
+using protocol::refused;
+
 constexpr double receiver_db = 80;  // ENS: span of an 8-bit bin, and of the gain
 constexpr double farthest_m = 200;  // our choice: end of the last bin, which bounds the work for a ping; the device's is unknown
 constexpr double pulse_m = 0.0075;  // length after compression of a chirp of 100 kHz: recalled from the data sheet
 constexpr auto turn_of_a_sixteenth = std::chrono::microseconds(500);  // unknown: time for 1/16 grad; a turn takes 3.2 s
 constexpr double fastest_hz = 1000;                                   // no limit: hosts request each scan line
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
 SonarModel make_model() {
   FrequencyMode mode;
@@ -217,6 +217,22 @@ Bytes encode(const Ping& ping, const protocol::DeviceState& device) {
   Bytes payload = wire::bytes_of(data);
   payload.insert(payload.end(), bins.begin(), bins.end());
   return from_head(Id::head_data, payload);
+}
+
+// Finds the fields and regions of an mtHeadData frame that faults change.
+std::optional<protocol::Field> locate(protocol::FieldName name, BytesView frame) {
+  const auto found = wire::locate<Header>(name, frame);
+  return found ? found : wire::locate<HeadData>(name, frame, header_size);
+}
+
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView frame) {
+  constexpr std::size_t data = header_size + wire::wire_size<HeadData>();
+  if (region == protocol::Region::bearings) return std::nullopt;
+  if (frame.empty()) return std::pair<std::size_t, std::size_t>{};
+  if (frame.size() <= data) return std::nullopt;
+  if (region == protocol::Region::header) return std::pair{std::size_t{0}, header_size};
+  return region == protocol::Region::metadata ? std::pair{header_size, data - header_size}
+                                              : std::pair{data, frame.size() - 1 - data};  // without the line feed
 }
 
 }  // namespace sonar::micron

@@ -80,7 +80,7 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
 }
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
-  const auto refused = [](std::string text) { return failure(ErrorKind::usage, std::move(text)); };
+  using protocol::refused;
   Settings s = settings_from(device.settings.get());
   if (wanted.range_m) {
     const std::string why =

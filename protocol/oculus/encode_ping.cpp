@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/geometry.hpp"
+#include "protocol/oculus/messages.hpp"
 #include "protocol/oculus/options.hpp"
 #include "protocol/oculus/settings.hpp"
 
@@ -97,6 +98,31 @@ double sound_speed_used(const FireSettings& asked, const PingSettings& settings)
   return as_asked ? asked.sound_speed_mps : static_cast<double>(settings.device_sound_speed_mps);
 }
 
+/// For an empty `ping` it returns the layout with the most fields, which is that of version 2.
+bool has_long_form(wire::BytesView ping) {
+  MessageHeader header{.version = 2};
+  wire::Reader reader(ping);
+  if (!ping.empty()) fields(reader, header);
+  return reader.ok() && header.version >= 2;
+}
+
+template <class Result>
+std::optional<std::pair<std::size_t, std::size_t>> region_of(protocol::Region region, wire::BytesView ping) {
+  Result head;
+  wire::Reader reader(ping);
+  fields(reader, head);
+  std::pair<std::size_t, std::size_t> found{0, header_size};
+  if (region != protocol::Region::header) {
+    if (!reader.ok()) return std::nullopt;
+    const std::size_t fixed_size = wire::wire_size<Result>();
+    if (region == protocol::Region::metadata) found = {header_size, fixed_size - header_size};
+    if (region == protocol::Region::bearings) found = {fixed_size, std::size_t{2} * head.beam_count};
+    if (region == protocol::Region::image) found = {head.sizes.image_offset, head.sizes.image_size};
+  }
+  if (found.first + found.second > ping.size()) return std::nullopt;
+  return found;
+}
+
 }  // namespace
 
 wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks) {
@@ -172,6 +198,17 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, c
   if (text_option(device.options, option_name::row_gain) == "tvg")
     return encode_ping(std::move(head), {bearings, ping.row_gain, ping.samples});
   return encode_ping(std::move(head), {bearings, digital_row_gains(settings), ping.samples});
+}
+
+std::optional<protocol::Field> locate(protocol::Part part, protocol::FieldName name, wire::BytesView message) {
+  if (part == protocol::Part::ping)
+    return has_long_form(message) ? wire::locate<PingResultV2>(name, message) : wire::locate<PingResultV1>(name, message);
+  return wire::locate<StatusMessage>(name, message);
+}
+
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping) {
+  if (ping.empty()) return std::pair<std::size_t, std::size_t>{};
+  return has_long_form(ping) ? region_of<PingResultV2>(region, ping) : region_of<PingResultV1>(region, ping);
 }
 
 }  // namespace sonar::oculus

@@ -2,8 +2,10 @@
 // positive to port). Vendor::frame calls it once per ping; tests encode captured pings again with the function for PingBlocks.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "protocol/oculus/fire.hpp"
@@ -34,5 +36,11 @@ FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, doub
 
 /// Returns the whole ping result of `ping`. `fire`: the request under which the ping was made.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const FireRequest& fire);
+
+/// Implements Vendor::field; the offsets are those of messages.hpp. The version in the header selects the layout of a ping; an
+/// empty message stands for version 2.
+std::optional<protocol::Field> locate(protocol::Part part, protocol::FieldName name, wire::BytesView message);
+/// Implements Vendor::region.
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
 
 }  // namespace sonar::oculus

@@ -4,7 +4,7 @@
 #include "core/text/format.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/oculus/oculus.hpp"
-#include "protocol/oculus/settings_override.hpp"
+#include "protocol/oculus/settings.hpp"
 
 namespace sonar::oculus {
 namespace {

@@ -1,13 +1,10 @@
 #include "protocol/oculus/oculus.hpp"
 
 #include "protocol/oculus/encode_ping.hpp"
-#include "protocol/oculus/locate.hpp"
 #include "protocol/oculus/models.hpp"
 #include "protocol/oculus/options.hpp"
 #include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"
-#include "protocol/oculus/settings_override.hpp"
-#include "protocol/oculus/tune_model.hpp"
 
 namespace sonar::oculus {
 namespace {

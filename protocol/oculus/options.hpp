@@ -2,11 +2,14 @@
 // public sources do not state, or on which they contradict each other. The first allowed value is the default.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 
-#include "protocol/options.hpp"
+#include "core/base/result.hpp"
+#include "core/sonar/sonar_model.hpp"
+#include "protocol/vendor.hpp"
 
 namespace sonar::oculus {
 
@@ -30,5 +33,9 @@ using protocol::text_option;
 
 /// The rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.
 std::string options_table();
+
+/// The model of a product, whose apertures and beam widths no public source states, with the values of the options; without such
+/// options, the model itself. Error: a value for a mode that the product lacks.
+Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model, const protocol::OptionValues& options);
 
 }  // namespace sonar::oculus

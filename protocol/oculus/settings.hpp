@@ -65,4 +65,12 @@ std::size_t ping_size(const PingSettings& settings);
 /// A line for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, sound speed of the device, 512 beams, 8 bits, ...".
 std::string describe(const FireRequest& fire);
 
+/// Converts an override to the fire message by which a driver would request the same settings; pings with them echo that message.
+/// Starts from the current fire message and changes only the fields that are set in `wanted`. Refuses values that the product
+/// does not support.
+Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+/// The nearest of the rates that a fire message can request, without standby.
+PingRate nearest_rate(double rate_hz);
+
 }  // namespace sonar::oculus

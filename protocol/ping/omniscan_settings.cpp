@@ -13,6 +13,8 @@
 namespace sonar::ping::omniscan {
 namespace {
 
+using protocol::refused;
+
 constexpr double db_per_gain = 6;  // unknown: assumed, as are full scale and the source level
 constexpr int most_gain = 7;
 constexpr double longest_m = 150;
@@ -23,8 +25,6 @@ constexpr double usual_speed_mps = 1500;
 
 /// From one ping to the next.
 double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
 SonarModel make_model() {
   FrequencyMode mode;

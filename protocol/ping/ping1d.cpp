@@ -1,5 +1,4 @@
 #include "protocol/ping/locate.hpp"
-#include "protocol/ping/ping1d_dialogue.hpp"
 #include "protocol/ping/ping1d_settings.hpp"
 #include "protocol/ping/products.hpp"
 #include "protocol/ping/streaming.hpp"

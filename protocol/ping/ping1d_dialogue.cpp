@@ -1,5 +1,3 @@
-#include "protocol/ping/ping1d_dialogue.hpp"
-
 #include "protocol/ping/ping1d_settings.hpp"
 #include "protocol/ping/sounding.hpp"
 

@@ -2,6 +2,7 @@
 // protocol/ping/README.md.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -70,5 +71,8 @@ std::vector<Bytes> frames_of(const Ping& ping);
 /// them, or if `wanted` is no_result. A frame with more values than the recorded one gets no samples, and 0 for the missing
 /// values. Empty: the message does not hold a result.
 std::vector<Bytes> answer(BytesView recorded, Results wanted);
+
+/// A host's conversation: single settings, and requested or streamed measurements.
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now);
 
 }  // namespace sonar::ping::ping1d

@@ -5,7 +5,6 @@
 
 #include "core/text/ipv4.hpp"
 #include "protocol/ping/locate.hpp"
-#include "protocol/ping/ping360_dialogue.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 #include "protocol/ping/products.hpp"
 

@@ -1,5 +1,3 @@
-#include "protocol/ping/ping360_dialogue.hpp"
-
 #include <algorithm>
 #include <cstdio>
 

@@ -14,13 +14,13 @@
 namespace sonar::ping::ping360 {
 namespace {
 
+using protocol::refused;
+
 constexpr double sample_unit_s = 25e-9;
 constexpr int shortest_period = 80, longest_period = 40000;    // DEF: sample periods, in sample_unit_s
 constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn takes 2.4 s
 constexpr double db_per_gain = 6;                              // unknown: assumed
 constexpr double fastest_hz = 1000;                            // no limit: hosts request each line, or the head limits the scan
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
 /// The reason for the first value outside its limits, else an empty text.
 std::string out_of_range(std::initializer_list<std::tuple<const char*, int, int, int>> values) {

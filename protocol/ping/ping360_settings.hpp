@@ -2,6 +2,7 @@
 // functions; sources: docs/protocols/ping.md.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -75,5 +76,8 @@ struct Head {
 /// The angle after `angle` in a scan. `back`: the scan is on its way back; the caller keeps it between calls. `oscillates`:
 /// option sector_scan.
 std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates);
+
+/// A host's conversation: each request turns the head, and the ping is fired when the head has arrived.
+std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now);
 
 }  // namespace sonar::ping::ping360

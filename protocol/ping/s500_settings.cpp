@@ -15,6 +15,8 @@
 namespace sonar::ping::s500 {
 namespace {
 
+using protocol::refused;
+
 constexpr int points = 1024;                // DEF: number of powers in a profile of one frequency
 constexpr std::uint32_t most_mm = 142000;   // CLI: limit of the hosts
 constexpr int fastest_ms = 100;             // MAN: at most 10 pings a second
@@ -32,8 +34,6 @@ const std::array<double, 14>& gains() {
   return all;
 }
 int most_gain() { return static_cast<int>(gains().size()) - 1; }
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
 SonarModel make_model() {
   FrequencyMode mode;

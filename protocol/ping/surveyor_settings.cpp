@@ -14,6 +14,8 @@
 namespace sonar::ping::surveyor {
 namespace {
 
+using protocol::refused;
+
 constexpr int beams = 64, directions = 16;         // a point is sought in as many directions as there are receive elements
 constexpr double swath_deg = 80;                   // recalled, as are the width along the track and the number of elements
 constexpr double beam_width_deg = 7;               // width for an array of 16 elements half a wavelength apart
@@ -26,8 +28,6 @@ constexpr double usual_speed_mps = 1500;
 
 /// From one ping to the next.
 double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
-
-tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
 SonarModel make_model() {
   FrequencyMode mode;

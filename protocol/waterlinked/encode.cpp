@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocol/waterlinked/options.hpp"
 #include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/settings.hpp"
 
 namespace sonar::waterlinked {
 namespace {

@@ -1,5 +1,3 @@
-#include "protocol/waterlinked/http.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/text/ipv4.hpp"
-#include "protocol/waterlinked/options.hpp"
 #include "protocol/waterlinked/settings.hpp"
+#include "protocol/waterlinked/waterlinked.hpp"
 
 namespace sonar::waterlinked {
 namespace {

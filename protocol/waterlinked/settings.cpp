@@ -1,9 +1,9 @@
 #include "protocol/waterlinked/settings.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "protocol/limits.hpp"
-#include "protocol/waterlinked/options.hpp"
 
 namespace sonar::waterlinked {
 namespace {
@@ -92,7 +92,7 @@ Time device_time(Time at, const Settings& settings, const protocol::DeviceState&
 }
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
-  const auto refused = [](std::string text) { return failure(ErrorKind::usage, std::move(text)); };
+  using protocol::refused;
   Settings s = settings_from(device.settings.get(), device);
   if (wanted.mode && *wanted.mode >= mode_rows().size())
     return refused("Sonar 3D-15 has 2 mode(s), counted from 0; no mode " + std::to_string(*wanted.mode));
@@ -113,6 +113,20 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   if (wanted.beams && *wanted.beams != columns) return refused("a Sonar 3D-15 has 256 columns");
   if (wanted.sample_bits || wanted.row_gains.value_or(false)) return refused("a Sonar 3D-15 has one format of its images");
   return change_to(s, device);
+}
+
+std::span<const protocol::Option> options() {
+  static const std::array<protocol::Option, 5> all{{
+      {option_name::release,
+       {"1.8.0", "1.7.1", "1.7.0", "1.6.0"},
+       "1.8.0",
+       "release of the device's software, which decides the paths of its HTTP API"},
+      {option_name::rip, {"2", "1"}, "2", "version of the range image protocol; 1 is without compression"},
+      {option_name::acoustics_at_start, {"disabled", "enabled"}, "disabled", "whether it images before a client enables it"},
+      {option_name::udp_at_start, {"disabled", "multicast"}, "disabled", "where images are sent before a client sets it"},
+      {option_name::clock, {"utc", "since_boot"}, "utc", "since_boot: time stamps begin at 1970, as before NTP"},
+  }};
+  return all;
 }
 
 }  // namespace sonar::waterlinked

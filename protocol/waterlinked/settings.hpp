@@ -1,7 +1,9 @@
 // The settings that clients have made over HTTP, and their conversion to PingSettings.
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "core/sonar/range_image.hpp"
 #include "protocol/vendor.hpp"
@@ -45,5 +47,13 @@ protocol::SetReceivers receivers_of(const Settings& settings);
 Time device_time(Time at, const Settings& settings, const protocol::DeviceState& device);
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
+
+/// Options of a sonar in the configuration, under `options:`: properties that the public sources do not state.
+namespace option_name {
+inline constexpr std::string_view release = "release", rip = "rip", acoustics_at_start = "acoustics_at_start",
+                                  udp_at_start = "udp_at_start", clock = "clock";
+}
+std::span<const protocol::Option> options();
+using protocol::text_option;
 
 }  // namespace sonar::waterlinked

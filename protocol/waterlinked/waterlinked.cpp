@@ -1,9 +1,7 @@
 #include "protocol/waterlinked/waterlinked.hpp"
 
 #include "protocol/waterlinked/encode.hpp"
-#include "protocol/waterlinked/http.hpp"
 #include "protocol/waterlinked/models.hpp"
-#include "protocol/waterlinked/options.hpp"
 #include "protocol/waterlinked/settings.hpp"
 
 namespace sonar::waterlinked {

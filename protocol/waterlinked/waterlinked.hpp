@@ -5,6 +5,7 @@
 #include <array>
 
 #include "protocol/host.hpp"
+#include "protocol/vendor.hpp"
 #include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/settings.hpp"
 
@@ -24,5 +25,7 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 
 recording::Codec codec();
+
+protocol::ResourceReply answer(const protocol::ResourceRequest& request, const protocol::DeviceState& device, Time now);
 
 }  // namespace sonar::waterlinked

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "protocol/dvl/dvl.hpp"
-#include "protocol/dvl/sentences.hpp"
+#include "protocol/dvl/reports.hpp"
 #include "tests/protocol/dvl/dvl_testing.hpp"
 
 namespace sonar::dvl {
