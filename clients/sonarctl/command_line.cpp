@@ -5,7 +5,6 @@
 
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
-#include "clients/sonarctl/scene_command.hpp"
 #include "core/base/standard_streams.hpp"
 #include "core/text/arguments.hpp"
 

@@ -29,6 +29,7 @@ Run add_load(CLI::App& app);
 Run add_object(CLI::App& app);
 Run add_recording(CLI::App& app);
 Run add_fault(CLI::App& app);
+Run add_scene(CLI::App& app);
 /// `words`: all words after "sonarctl", because they include the command line of another program, which the parser must not read.
 Run add_judge(CLI::App& app, const std::vector<std::string>& words);
 Run add_farm(CLI::App& app, const std::vector<std::string>& words);

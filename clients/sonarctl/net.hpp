@@ -86,4 +86,13 @@ extern volatile int interrupted;
 /// Waits are cut into steps of this length: a signal that comes between a check of `interrupted` and the wait is noticed soon.
 constexpr std::chrono::milliseconds longest_step{100};
 
+/// The answer to one request over HTTP.
+struct HttpReply {
+  unsigned status = 0;
+  std::string body;
+};
+/// A body is sent as JSON. Errors: unavailable if there is no connection; bad_data if the answer within `patience` is not HTTP.
+Result<HttpReply> http_ask(const Endpoint& at, const std::string& method, const std::string& path, const std::string& body,
+                           std::chrono::milliseconds patience);
+
 }  // namespace sonar::clients

@@ -1,5 +1,3 @@
-#include "clients/sonarctl/record.hpp"
-
 #include <arpa/inet.h>
 
 #include <algorithm>
@@ -8,7 +6,7 @@
 
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
-#include "clients/sonarctl/record_files.hpp"
+#include "clients/sonarctl/record.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/waiting.hpp"
 #include "core/text/counted.hpp"

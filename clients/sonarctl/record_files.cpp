@@ -1,4 +1,4 @@
-#include "clients/sonarctl/record_files.hpp"
+#include "clients/sonarctl/record.hpp"
 
 #include <algorithm>
 #include <cstdio>

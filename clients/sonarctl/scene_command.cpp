@@ -1,11 +1,11 @@
-#include "clients/sonarctl/scene_command.hpp"
-
+// Command line of `sonarctl scene check|info|import`; clients/scene_tools implements them.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 
 #include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/import_scene.hpp"
+#include "clients/sonarctl/command_line.hpp"
 #include "core/text/arguments.hpp"
 #include "core/text/counted.hpp"
 
@@ -101,7 +101,7 @@ void add_import(CLI::App& scene, SceneArguments& a) {
 
 }  // namespace
 
-std::function<Result<void>()> add_scene(CLI::App& app) {
+Run add_scene(CLI::App& app) {
   CLI::App& scene = *app.add_subcommand("scene", "check and describe scene files; import them from Gazebo and URDF");
   scene.require_subcommand(1);
   scene.footer(

@@ -77,7 +77,7 @@ DEPENDENCIES = {
         "daemon/server/operations/monitoring.cpp", "daemon/server/operations/time_operations.cpp", "daemon/server/recording/recordings.cpp",
         "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/recording_views.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control_client.cpp",
         "clients/sonarctl/control/control_commands.cpp", "clients/sonarctl/control/fault_commands.cpp",
-        "clients/sonarctl/control/fault_text.cpp", "clients/sonarctl/control/status_text.cpp", "clients/sonarctl/doctor/check_daemon.cpp",
+        "clients/sonarctl/control/status_text.cpp", "clients/sonarctl/doctor/check_daemon.cpp",
         "clients/sonarctl/doctor/check_sonar.cpp", "clients/sonarctl/doctor/gather.cpp", "clients/sonarctl/doctor/watch_pings.cpp",
         "clients/sonarctl/record.cpp", "clients/sonarctl/source.cpp"],
     r"nats": ["daemon/commands/farm/nats_queue.cpp"],

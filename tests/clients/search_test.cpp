@@ -9,7 +9,7 @@
 #include <atomic>
 #include <thread>
 
-#include "clients/sonarctl/doctor/watch_pings.hpp"
+#include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/messages.hpp"

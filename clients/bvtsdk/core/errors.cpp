@@ -1,5 +1,3 @@
-#include "clients/bvtsdk/core/errors.hpp"
-
 #include "clients/bvtsdk/core/codes.hpp"
 
 namespace sonar::bvt {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "clients/bvtsdk/core/codes.hpp"
-#include "clients/bvtsdk/core/image_filter.hpp"
 #include "clients/bvtsdk/core/polar_lookup.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 
@@ -26,6 +25,10 @@ enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 enum class XyBottom { sector, sonar };
 /// Reads the environment variable BVE_XY (sector or sonar); the default is sector.
 XyBottom xy_bottom_from_environment();
+
+/// Smoothing of a finished image. If several flags are set, the lowest applies (the values are verified; that the finished image
+/// is filtered is our choice).
+enum FilterFlags : int { no_filter = 0, mean_3x3 = 2, mean_9x2 = 16 };
 
 struct ImageSettings {
   ImageRes resolution = ImageRes::automatic;
@@ -79,5 +82,10 @@ class Imager {
   std::mutex mutex_;
   std::array<std::shared_ptr<const PolarLookup>, 4> recent_;  // latest first
 };
+
+/// `pixels`: row-major, rows x columns. Replaces each pixel by the mean of 3 x 3 pixels, or of 9 rows x 2 columns (this column
+/// and the next: our choice, because the vendor's is unknown). Pixels outside the image do not count. Other flags have no effect.
+/// May throw std::bad_alloc.
+void filter_image(int flags, int rows, int columns, std::vector<std::uint16_t>& pixels);
 
 }  // namespace sonar::bvt

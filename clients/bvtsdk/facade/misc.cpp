@@ -1,5 +1,5 @@
 // The functions for discovery, error texts, version and log. clients/bvtsdk/README.md describes each function.
-#include "clients/bvtsdk/core/errors.hpp"
+#include "clients/bvtsdk/core/codes.hpp"
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

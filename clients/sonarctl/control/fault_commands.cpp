@@ -7,7 +7,7 @@
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/control/control_commands.hpp"
-#include "clients/sonarctl/control/fault_text.hpp"
+#include "clients/sonarctl/control/status_text.hpp"
 #include "core/text/arguments.hpp"
 #include "protocol/control/answers.hpp"
 

@@ -6,7 +6,7 @@
 #include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/doctor/checks.hpp"
-#include "clients/sonarctl/doctor/gather.hpp"
+#include "clients/sonarctl/doctor/facts.hpp"
 #include "clients/sonarctl/terminal.hpp"
 #include "core/text/arguments.hpp"
 

@@ -1,10 +1,8 @@
-#include "clients/sonarctl/doctor/gather.hpp"
-
 #include <algorithm>
 
+#include "clients/sonarctl/doctor/facts.hpp"
 #include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/doctor/proc_net.hpp"
-#include "clients/sonarctl/doctor/watch_pings.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 #include "protocol/control/answers.hpp"
 

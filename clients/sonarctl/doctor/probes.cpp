@@ -14,7 +14,7 @@
 #include <fstream>
 
 #include "clients/sonarctl/doctor/proc_net.hpp"
-#include "clients/sonarctl/http.hpp"
+#include "clients/sonarctl/net.hpp"
 #include "core/text/ipv4.hpp"
 
 namespace sonar::clients::doctor {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/doctor/facts.hpp"
 #include "core/base/result.hpp"
 
@@ -58,5 +59,10 @@ class DiscoveryQuestion {
 HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds patience);
 
 KernelPorts kernel_ports();
+
+/// Measures delay, size, rate and latency of a sonar's pings as a driver would: connects, requests pings unless another client is
+/// connected, reads about 15 of them and disconnects. `control`: a client
+/// subscribed to pings, for transmission times; may be null. `clocks` is set to the difference of the clocks.
+void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks);
 
 }  // namespace sonar::clients::doctor

@@ -1,5 +1,3 @@
-#include "clients/sonarctl/doctor/watch_pings.hpp"
-
 #include <algorithm>
 #include <map>
 
