@@ -4,7 +4,7 @@
 #include <cassert>
 #include <chrono>
 
-#include "protocol/blueview/deflate.hpp"
+#include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
 

@@ -3,8 +3,8 @@
 
 #include "core/base/geometry.hpp"
 #include "protocol/blueview/blueview.hpp"
-#include "protocol/blueview/deflate.hpp"
 #include "protocol/blueview/encode_ping.hpp"
+#include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
 
 namespace sonar::blueview {

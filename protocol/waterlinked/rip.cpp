@@ -2,9 +2,12 @@
 
 #include <snappy.h>
 #include <zlib.h>
-
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <string>
+
+#include "protocol/waterlinked/settings.hpp"
 
 namespace sonar::waterlinked {
 namespace {
@@ -34,6 +37,43 @@ std::uint32_t u32_at(BytesView bytes, std::size_t at) {
   std::uint32_t value = 0;
   for (std::size_t b = 4; b-- > 0;) value = value << 8 | std::to_integer<std::uint32_t>(bytes[at + b]);
   return value;
+}
+
+constexpr double gravity_mps2 = 9.81;
+constexpr std::chrono::nanoseconds imu_period = std::chrono::milliseconds(10);
+constexpr std::chrono::nanoseconds longest_batch = std::chrono::seconds(1);  // bounds a batch after a pause of the acoustics
+
+/// A pixel of both images. Where one of them has no return, such as a strength below the first pixel value, both have 0, so that
+/// their masks agree.
+struct Pixel {
+  std::uint32_t range = 0;
+  std::uint8_t strength = 0;
+};
+Pixel pixel_at(const Ping& ping, std::size_t i) {
+  const RangePixel p = range_pixel(ping, i);
+  const std::uint8_t strength = strength_pixel(p.strength);
+  return p.range == 0 || strength == 0 ? Pixel{} : Pixel{p.range, strength};
+}
+
+Shot shot_of(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  const PingSettings& s = ping.request.settings;
+  const ModeRow& mode = mode_rows()[settings.mode];
+  Shot shot;
+  shot.at = device_time(ping.request.fired_at, settings, device);
+  shot.sequence = static_cast<std::uint32_t>(ping.request.number);
+  shot.speed_of_sound_mps = s.device_sound_speed_mps;
+  shot.range_m = static_cast<float>(s.range_m);
+  // unknown: the field is named frequency, but a real unit sends its rate in it
+  shot.frequency = static_cast<std::uint32_t>(mode.rate_hz);
+  shot.width = columns;
+  shot.height = rows;
+  shot.horizontal_deg = static_cast<float>(mode.horizontal_deg);
+  shot.vertical_deg = static_cast<float>(mode.vertical_deg);
+  return shot;
+}
+
+std::array<float, 3> frd(Vec3d flu) {
+  return {static_cast<float>(flu.x), static_cast<float>(-flu.y), static_cast<float>(-flu.z)};
 }
 
 }  // namespace
@@ -75,6 +115,51 @@ std::optional<Bytes> rip_content(BytesView packet) {
   if (!snappy::GetUncompressedLength(text.data(), text.size(), &size) || size > largest_content) return std::nullopt;
   if (!snappy::Uncompress(text.data(), text.size(), &plain)) return std::nullopt;
   return bytes_of(plain);
+}
+
+std::uint8_t strength_pixel(std::uint32_t linear) {
+  if (linear <= 30) return 0;
+  return static_cast<std::uint8_t>(std::clamp(std::lround(100 * std::log10(linear / 30.0)), 1L, 255L));
+}
+
+RangeMessage range_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  RangeMessage m{shot_of(ping, settings, device), static_cast<float>(pixel_scale_m), {}};
+  for (std::size_t i = 0; i < ping.samples.size() / 4; ++i) m.pixels.push_back(pixel_at(ping, i).range);
+  return m;
+}
+
+StrengthMessage strength_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  StrengthMessage m{shot_of(ping, settings, device), {}};
+  for (std::size_t i = 0; i < ping.samples.size() / 4; ++i) m.pixels.push_back(pixel_at(ping, i).strength);
+  return m;
+}
+
+/// Samples are taken at whole periods of the device's clock, independent of the time of the shot. A batch continues where the
+/// previous one ended; after a pause, or at first, it begins one period of the mode before the shot.
+ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  ImuMessage m;
+  m.sequence = static_cast<std::uint32_t>(ping.request.number);
+  const PingRequest& r = ping.request;
+  const auto since_last = r.fired_at - device.framed_at;
+  const bool goes_on = device.framed_at != Time{} && since_last.count() > 0 && since_last <= longest_batch;
+  const auto period = nanoseconds_from(1 / static_cast<double>(mode_rows()[settings.mode].rate_hz));
+  const Time shot = device_time(r.fired_at, settings, device);
+  const Time from = shot - (goes_on ? since_last : period);
+  for (Time at = from - from.time_since_epoch() % imu_period + imu_period; at <= shot; at += imu_period) {
+    // The orientation is turned back by the rate of turn. The acceleration is not known and is assumed to be 0.
+    const double before_s = -seconds(shot - at);
+    const Quatd then = normalized(r.sonar_in_world.orientation * turned_by(before_s * r.sonar_moves.angular_rate_radps));
+    m.samples.push_back({at, frd(rotate(conjugate(then), Vec3d{0, 0, gravity_mps2})), frd(r.sonar_moves.angular_rate_radps)});
+  }
+  return m;
+}
+
+std::vector<Bytes> encode_shot(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
+  const Rip rip = text_option(device.options, option_name::rip) == "1" ? Rip::one : Rip::two;
+  std::vector<Bytes> datagrams{rip_packet(packet_of(range_message(ping, settings, device)), rip),
+                               rip_packet(packet_of(strength_message(ping, settings, device)), rip)};
+  if (settings.imu) datagrams.push_back(rip_packet(packet_of(imu_message(ping, settings, device)), rip));
+  return datagrams;
 }
 
 }  // namespace sonar::waterlinked

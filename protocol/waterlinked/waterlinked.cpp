@@ -1,7 +1,7 @@
 #include "protocol/waterlinked/waterlinked.hpp"
 
-#include "protocol/waterlinked/encode.hpp"
 #include "protocol/waterlinked/models.hpp"
+#include "protocol/waterlinked/rip.hpp"
 #include "protocol/waterlinked/settings.hpp"
 
 namespace sonar::waterlinked {

@@ -65,7 +65,7 @@ DEPENDENCIES = {
     r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp", "core/image/gray_png.cpp"],
     r"tiffio\.h": ["core/scene/files/geo_tiff.cpp", "core/scene/files/tiff_file.cpp"],
-    r"zlib\.h": ["protocol/blueview/deflate.cpp", "protocol/waterlinked/rip.cpp", "protocol/recorded/zlib.cpp", "clients/bvtsdk/", "core/image/"],
+    r"zlib\.h": ["protocol/blueview/frames.cpp", "protocol/waterlinked/rip.cpp", "protocol/recorded/zlib.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/server/system/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],

@@ -1,7 +1,6 @@
 // The datagrams of a shot, read back.
 #include <cmath>
 
-#include "protocol/waterlinked/encode.hpp"
 #include "protocol/waterlinked/rip.hpp"
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
