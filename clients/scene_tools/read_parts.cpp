@@ -1,7 +1,6 @@
 #include "clients/scene_tools/read_parts.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace sonar::scene_tools {

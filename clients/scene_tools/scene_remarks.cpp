@@ -1,6 +1,5 @@
 // Probable mistakes in a valid scene, which a loader cannot detect and which show only as an empty image.
 #include <algorithm>
-#include <cmath>
 
 #include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/number_text.hpp"

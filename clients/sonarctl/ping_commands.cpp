@@ -1,6 +1,5 @@
 // Command lines of listen, view and stats, which examine pings.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <memory>
 
 #include "clients/sonarctl/argument_checks.hpp"

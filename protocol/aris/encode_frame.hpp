@@ -3,8 +3,6 @@
 
 #include <functional>
 #include <optional>
-#include <span>
-#include <string>
 #include <vector>
 
 #include "protocol/aris/frame_header.hpp"

@@ -2,7 +2,6 @@
 // vendor's published protocol (docs/protocols/aris.md); aris.proto has the same description, for readers and for tests.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>

@@ -1,7 +1,6 @@
 #include "protocol/blueview/blueview.hpp"
 
 #include "protocol/blueview/encode_ping.hpp"
-#include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
 

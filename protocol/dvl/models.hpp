@@ -1,7 +1,6 @@
 // The products: beams, limits, range modes. Sources: protocol/dvl/README.md.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>

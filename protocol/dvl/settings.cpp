@@ -1,7 +1,5 @@
 #include "protocol/dvl/settings.hpp"
 
-#include <algorithm>
-
 #include "protocol/limits.hpp"
 
 namespace sonar::dvl {

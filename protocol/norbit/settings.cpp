@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/base/geometry.hpp"
 #include "core/sonar/water.hpp"
 #include "core/text/format.hpp"
 #include "protocol/limits.hpp"

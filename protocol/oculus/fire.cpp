@@ -1,7 +1,6 @@
 #include "protocol/oculus/fire.hpp"
 
 #include <algorithm>
-#include <cstdio>
 
 #include "protocol/oculus/framer.hpp"
 

@@ -2,9 +2,7 @@
 // was made.
 #pragma once
 
-#include <memory>
 #include <optional>
-#include <string>
 
 #include "core/sonar/ping.hpp"
 #include "protocol/oculus/messages.hpp"

@@ -1,7 +1,6 @@
 #include "protocol/oculus/models.hpp"
 
 #include <algorithm>
-#include <array>
 #include <string_view>
 #include <vector>
 

@@ -2,8 +2,6 @@
 // docs/protocols/ping.md.
 #pragma once
 
-#include <vector>
-
 #include "protocol/held_settings.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/vendor.hpp"

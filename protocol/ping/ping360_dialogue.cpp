@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdio>
 
 #include "protocol/awaited_ping.hpp"
 #include "protocol/ping/conversation.hpp"

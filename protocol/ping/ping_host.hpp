@@ -2,10 +2,8 @@
 // beam.
 #pragma once
 
-#include <algorithm>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "protocol/host.hpp"
 #include "protocol/ping/messages.hpp"

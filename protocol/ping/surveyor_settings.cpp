@@ -8,7 +8,6 @@
 #include "core/base/geometry.hpp"
 #include "core/sonar/detections.hpp"
 #include "protocol/limits.hpp"
-#include "protocol/ping/conversation.hpp"
 #include "protocol/ping/period.hpp"
 
 namespace sonar::ping::surveyor {

@@ -1,6 +1,5 @@
 #include "protocol/waterlinked/settings.hpp"
 
-#include <algorithm>
 #include <array>
 
 #include "protocol/limits.hpp"

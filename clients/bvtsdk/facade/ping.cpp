@@ -1,5 +1,4 @@
 // The functions BVTPing_*: images, navigation data and, in 3.x, range data of a ping. See clients/bvtsdk/README.md.
-#include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"
 

@@ -1,7 +1,6 @@
 #include "clients/sonarctl/doctor/checks.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <set>
 
