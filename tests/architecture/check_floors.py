@@ -55,7 +55,7 @@ ONE_DIRECTION = r"daemon/|protocol/|core/|clients/|cuda/"
 # The list of makes includes them all, and nothing includes it.
 LISTS = {"protocol/makes.cpp"}
 # Headers that go to other people's include folders find each other by name alone.
-INSTALLED = r"clients/bvtsdk/abi\d/include/"
+INSTALLED = r"clients/bvtsdk/(abi\d|codes)/include/"
 # Header of a dependency -> the only files that may include it (tests may include anything).
 DEPENDENCIES = {
     r"embree[34]?/": ["core/scene/embree_scene.cpp", "core/scene/embree_trees.hpp"],

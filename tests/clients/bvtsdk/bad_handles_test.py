@@ -111,7 +111,7 @@ class BadHandles(unittest.TestCase):
         for abi in (3, 4):
             library = ctypes.CDLL(prefix(abi) / f"lib/libbvtsdk.so.{abi}")
             library.BVTError_GetName.restype = library.BVTError_GetString.restype = ctypes.c_char_p
-            header = (prefix(abi) / "include/bvt_sdk.h").read_text()
+            header = (prefix(abi) / "include/bvt_sdk_codes.h").read_text()
             codes = re.findall(r"(BVT_\w+) = (\d+)", re.search(r"typedef int RetVal;\s*enum \{(.*?)\}", header, re.S).group(1))
             self.assertGreater(len(codes), 40)
             for name, number in codes:

@@ -2,6 +2,8 @@
  * vendor's header. Hosts include only this, as C99 or C++11, and link libbvtsdk.so.4. */
 #pragma once
 
+#include "bvt_sdk_codes.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -19,55 +21,6 @@ typedef struct BVTOpaqueNavData* BVTNavData;
 typedef struct BVTOpaqueSonarDiscoveryAgent* BVTSonarDiscoveryAgent;
 typedef struct BVTOpaqueImageGenerator* BVTImageGenerator;
 typedef struct BVTOpaqueRangeProfile* BVTRangeProfile;
-
-/* 0 is success. BVTError_GetName and BVTError_GetString explain the others. */
-typedef int RetVal;
-enum {
-  BVT_SUCCESS = 0,
-  BVT_FAILED = 1,
-  BVT_MEMORY_ALLOC = 2,
-  BVT_FILE_OPEN = 3,
-  BVT_FILE_READ = 4,
-  BVT_FILE_WRITE = 5,
-  BVT_BAD_PARAMETER = 6,
-  BVT_INVALID_PTR = 7,
-  BVT_FILE_CREATE = 8,
-  BVT_FILE_NOTOPEN = 10,
-  BVT_NOT_IMPLEMENTED = 13,
-  BVT_TIMEOUT = 18,
-  BVT_BUFFER_TOO_SMALL = 19,
-  BVT_FILE_HEADER_BAD = 1003,
-  BVT_FILE_TOO_NEW = 1004,
-  BVT_LOOKUP_HOST = 1014,
-  BVT_CONNECTION_TIMEDOUT = 1015,
-  BVT_SOCKET_READ_TIMEOUT = 1017,
-  BVT_SOCKET_WRITE_TIMEOUT = 1018,
-  BVT_SOCKET_CLOSED = 1020,
-  BVT_SOCKET_WRITE = 1021,
-  BVT_SOCKET_READ = 1022,
-  BVT_INDEX_OUTOFBOUNDS = 1064,
-  BVT_SOCKET_NOT_CONNECTED = 1065,
-  BVT_NO_TEMP = 2008,
-  BVT_NO_HEAD = 2010,
-  BVT_PING_NUM_TOO_LARGE = 4002,
-  BVT_PING_NUM_TOO_SMALL = 4003,
-  BVT_BAD_RANGE = 4009,
-  BVT_NO_PING_SIGNAL = 4011,
-  BVT_READONLY_FILE = 4012,
-  BVT_NO_VIDEO_FRAME = 4014,
-  BVT_BAD_PING = 5001,
-  BVT_BAD_COLOR_MAP = 5002,
-  BVT_BAD_HEAD = 5003,
-  BVT_BAD_IMAGE_TYPE = 5004,
-  BVT_INVALID_IMG_SIZE = 5008,
-  BVT_INVALID_RESOLUTION = 5010,
-  BVT_PV_LOAD_COLORMAP = 9001,
-  BVT_NET_BAD_PACKET_TYPE = 14001,
-  BVT_NET_NOT_CONNECTED = 14003,
-  BVT_NET_BAD_PACKET_VER = 14004,
-  BVT_NAV_NO_DATA = 16000,
-  BVT_TRIGGER_NOT_PRESENT = 18000
-};
 
 /* Rows of an image: 256, 512, 1000, or as many as the ping has bins. */
 enum {
