@@ -155,6 +155,26 @@ class OneBeamAtATime(WithSonard):
         points = [struct.unpack_from("<3f", cloud.data, i * cloud.point_step) for i in range(cloud.width)]
         self.assertEqual([(y, z) for _, y, z in points], [(0.0, 0.0)] * len(points))  # in the axes of the head
 
+    def test_the_head_turns_about_the_axis_of_its_mount(self):
+        """Upside down: the head turns to port. Its clouds lie, by /tf, where the target to port is."""
+        daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "ping360").replace("rpy_deg: [0, -90, 0]", "rpy_deg: [180, 0, 0]")
+                            .replace("demo.yaml", "l-targets.yaml").replace("[-7, 0, -3]", "[0, 0, 0]"))
+        ros = self.bridge(daemon, clouds=True, cloud_threshold=0.05, tf_static=True)
+        self.listen(daemon, "ping360")
+        def points():
+            """Of the lines whose pose has come."""
+            sent = [t for message in list(ros.published.get("/tf", [])) for t in message.transforms]
+            poses = {(t.header.stamp.sec, t.header.stamp.nanosec): t.transform for t in sent}
+            for cloud in list(ros.published.get("~/down/cloud", [])):
+                at = poses.get((cloud.header.stamp.sec, cloud.header.stamp.nanosec))
+                for i in range(cloud.width if at else 0):
+                    point = struct.unpack_from("<3f", cloud.data, i * cloud.point_step)
+                    x, y, z = c.rotate(c.wxyz([getattr(at.rotation, axis) for axis in "xyzw"]), point)
+                    yield x + at.translation.x, y + at.translation.y, z + at.translation.z
+        a = A[0] * math.cos(math.radians(A[1])), A[0] * math.sin(math.radians(A[1])), -0.2  # the mount is 0.2 m below the centre
+        wait_for(lambda: any(math.dist(point, a) < 0.2 for point in points()))
+        self.assertFalse([point for point in points() if point[1] < -1])
+
     def test_the_cloud_of_a_dvl(self):
         daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "dvl-a50"))
         ros = self.bridge(daemon, clouds=True)
