@@ -382,6 +382,8 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(json.loads(ros_tap.line_of(ping)), plain)
         image = types.SimpleNamespace(header=types.SimpleNamespace(), image=types.SimpleNamespace(data=b"abcdefgh"))
         self.assertEqual(json.loads(ros_tap.line_of(image)), {**plain, "id": None})
+        echo = types.SimpleNamespace(intensities=array.array("B", b"abcdefgh"), number_of_samples=8)  # ping360_sonar_msgs/SonarEcho
+        self.assertEqual(json.loads(ros_tap.line_of(echo)), {**plain, "id": None})
 
     def test_name_of_a_driver(self):
         for words, name in ((["/usr/bin/mydriver", "{ip}"], "mydriver"), (["python3", "-u", "a/drv.py", "{ip}"], "drv.py"),

@@ -1,6 +1,7 @@
 """The judge's reader of the ping protocol, by TCP and by UDP: docs/protocols/ping.md."""
 import struct
 import unittest
+import zlib
 
 import judge_makes
 from sonard_client.judge.makes import make_of, ping
@@ -41,8 +42,12 @@ class Stream(judge_makes.StreamChecks, unittest.TestCase):
 class Sectors(judge_makes.StreamChecks, unittest.TestCase):
     make, numbers, size, step = ping.UNNUMBERED, None, (1, 214), 9
     messages = [[frame(2300, bytes(14) + bytes(range(200)))], [frame(2301, bytes(14) + bytes(range(1, 201)))]]
-    samples = [bytes(14) + bytes(range(200))]
+    samples = [bytes(14) + bytes(range(200)), bytes(range(200))]
     junk_pieces = (b"B",)
+
+    def test_the_data_of_a_sector_scan(self):
+        found, = ping.PingReader().pings(frame(2301, bytes([1]) * 20 + bytes(range(200))), 0)
+        self.assertIn(zlib.crc32(bytes(range(200))), found.crcs)
 
 
 class ProfilesOfAnS500(judge_makes.StreamChecks, unittest.TestCase):

@@ -2,7 +2,8 @@
 
     python3 -m sonard_client.judge.ros_tap ros1|ros2 TOPIC -- COMMAND...
 
-The type of the message must have a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data or data).
+The type of the message must have a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data, intensities or
+data).
 """
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ def line_of(message: Any) -> str:
     """Returns the line of the tap for a message. If the message has `step` and `n_ranges`, its last n_ranges * step bytes are the
     samples, because ping_data of one driver's Ping begins with the header from the wire. With `has_gains` the gain before each
     row is removed."""
-    samples = _field(message, "ping_data", "image.data", "data")
+    samples = _field(message, "ping_data", "image.data", "intensities", "data")
     data = bytes(samples if samples is not None else b"")
     step, rows = getattr(message, "step", 0), getattr(message, "n_ranges", 0)
     if step and rows:

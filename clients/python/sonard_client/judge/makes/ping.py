@@ -1,4 +1,5 @@
-"""The ping protocol: Ping1D, Ping360, S500, Omniscan, Surveyor. The samples are the payload of a whole message."""
+"""The ping protocol: Ping1D, Ping360, S500, Omniscan, Surveyor. The samples are the payload of a whole message; of a Ping360 also
+its data alone, which a ROS driver publishes."""
 from __future__ import annotations
 
 import struct
@@ -9,6 +10,7 @@ from ..truth import LOOKS_DOWN, Make, TruePing, WholeMessages
 
 # The messages whose content a driver publishes, and the offset of the ping number in their payload.
 _NUMBER_AT: Dict[int, Optional[int]] = {1300: 8, 1308: 0, 1223: None, 2198: None, 2300: None, 2301: None, 3012: 20}
+_DATA_AT = {2300: 14, 2301: 20}  # offset of the data of a Ping360 in the payload
 _FRAME = struct.Struct("<2sHHBB")  # "BR", length of the payload, message, source, destination; a 16-bit sum follows the payload
 
 
@@ -30,7 +32,8 @@ class PingReader(WholeMessages):
         payload, at = message[_FRAME.size:-2], _NUMBER_AT[kind]
         has_number = at is not None and len(payload) >= at + 4
         number = int.from_bytes(payload[at:at + 4], "little") if at is not None and has_number else self.unnumbered()
-        yield TruePing(number, frozenset({zlib.crc32(payload)}), 1, len(payload), begin, begin + len(message))
+        crcs = frozenset({zlib.crc32(payload)} | ({zlib.crc32(payload[_DATA_AT[kind]:])} if kind in _DATA_AT else set()))
+        yield TruePing(number, crcs, 1, len(payload), begin, begin + len(message))
 
 
 def _make(*profiles: str, numbered: bool, sonar: Mapping[str, object]) -> Make:
