@@ -1,9 +1,11 @@
 """The ROS 2 bridge as a process with a real rclpy, where that is installed: poses, mounts, the end, and the launch files."""
 import importlib.util
 import json
+import math
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -13,6 +15,7 @@ import unittest
 from common import SONARD, config
 from ros_stand_ins import BRIDGE
 
+from sonard_bridge.conversions import rotate, wxyz
 from sonard_client import Control, Daemon
 
 PATIENCE_S = 60
@@ -119,6 +122,39 @@ class WithRos(unittest.TestCase):
             mounts = self.spin_until(lambda: found.get("mounts"))
             self.assertEqual([(t.header.frame_id, t.child_frame_id) for t in mounts.transforms], [("rov", "front")])
             self.assertIsNone(process.poll(), said())
+
+    def test_clouds_of_a_head_that_turns_lie_where_tf_puts_them(self):
+        """The mount is upside down, so the head turns to port, where the target is."""
+        from sensor_msgs.msg import PointCloud2
+        from tf2_ros import Buffer, TransformException, TransformListener
+        head = config().replace("oculus-m1200d", "ping360").replace(", status_to: [ADDRESS]", "").replace(
+            "{frame: FLU, xyz_m: [0, 0, 0]}}]", "{frame: FRD, xyz_m: [0, 0, 0.2], rpy_deg: [180, 0, 0]}}]")
+        with Daemon(head, str(SONARD)) as daemon:
+            self.start("clouds:=true", "cloud_threshold:=0.05", "tf_static:=true", f"http:={daemon.address}:8088")
+            buffer = Buffer()
+            TransformListener(buffer, self.node)
+            clouds, points = [], []
+            self.node.create_subscription(PointCloud2, "/sonard_bridge/front/cloud", clouds.append, 10)
+            host = subprocess.Popen([SONARD.parents[1] / "clients/sonarctl", "listen", daemon.address, "--make", "ping360"],
+                                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+            self.addCleanup(host.wait)
+            self.addCleanup(host.terminate)
+
+            def at_the_target():
+                """Points of clouds whose transform has come, in the vehicle's frame; the target is 4 m away, 20 degrees to port."""
+                for cloud in list(clouds):
+                    try:
+                        at = buffer.lookup_transform("rov", cloud.header.frame_id, cloud.header.stamp).transform
+                    except TransformException:
+                        continue
+                    clouds.remove(cloud)
+                    turn, place = at.rotation, at.translation
+                    for i in range(cloud.width):
+                        x, y, z = rotate(wxyz((turn.x, turn.y, turn.z, turn.w)), struct.unpack_from("<3f", cloud.data, i * cloud.point_step))
+                        points.append((x + place.x, y + place.y, z + place.z))
+                return [point for point in points if math.dist(point, (3.76, 1.37, -0.2)) < 0.2]
+            self.spin_until(at_the_target)
+            self.assertFalse([point for point in points if point[1] < -1])
 
     def test_launch_files(self):
         for file in ("bridge.launch.py", "sonard.launch.py"):
