@@ -6,7 +6,6 @@
 #include <cstdlib>
 
 #include "protocol/dvl/dvl.hpp"
-#include "protocol/dvl/host.hpp"
 #include "protocol/dvl/reports.hpp"
 
 using namespace sonar;

@@ -1,7 +1,7 @@
 // Replay of a DVL at both of its ports: JSON as recorded, and the sentences of its serial line, made of it.
 #include <gtest/gtest.h>
 
-#include "protocol/dvl/host.hpp"
+#include "protocol/dvl/dvl.hpp"
 #include "tests/daemon/commands/requested_replay_testing.hpp"
 #include "tests/protocol/dvl/dvl_testing.hpp"
 
