@@ -27,6 +27,7 @@ using Kind = protocol::HostPort::Kind;
 constexpr auto probe_patience = 300ms;         // for each make, while the make is unknown
 constexpr auto answer_patience = 3000ms;       // minimum once a sonar has answered, because it may be computing
 constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
+constexpr auto probe_after = 500ms;            // without a datagram; sonard takes longer to start again
 constexpr auto longest_pause = 160ms;          // between attempts
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
@@ -235,18 +236,26 @@ bool PingStream::receive(milliseconds patience) {
     const auto until_tick = std::chrono::ceil<milliseconds>(*tick - now());
     patience = std::clamp(until_tick, 0ms, patience);
   }
+  if (make_->is_by_udp()) patience = std::min(patience, left_until(probe_at_));
   std::vector<pollfd> ready;
   for (const auto& socket : sockets_) ready.push_back({socket ? socket->fd() : -1, POLLIN, 0});
   const int polled = ::poll(ready.data(), ready.size(), static_cast<int>(patience.count()));
-  if (polled < 0 && errno == EINTR) return false;
   if (polled < 0) {
-    ended_ = Error{ErrorKind::io, std::strerror(errno)};
-    return true;
+    if (errno != EINTR) ended_ = Error{ErrorKind::io, std::strerror(errno)};
+    return ended_.has_value();
   }
+  if (make_->is_by_udp()) probe(polled == 0);
   for (std::size_t port = 0; port < ready.size() && !ended_; ++port)
     if (ready[port].revents != 0) read_port(port);
   if (!ended_) carry_out(host_->on_tick(now()));
   return true;
+}
+
+void PingStream::probe(bool is_silent) {
+  if (is_silent && Clock::now() < probe_at_) return;
+  if (is_silent && ::send(sockets_.front()->fd(), nullptr, 0, MSG_NOSIGNAL) < 0)
+    ended_ = Error{ErrorKind::unavailable, std::strerror(errno)};
+  probe_at_ = Clock::now() + probe_after;
 }
 
 void PingStream::read_port(std::size_t port) {

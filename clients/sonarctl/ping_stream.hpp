@@ -82,6 +82,9 @@ class PingStream {
   /// False: a signal ended the wait.
   bool receive(std::chrono::milliseconds patience);
   void read_port(std::size_t port);
+  /// UDP has no connection whose end would show that a silent sonar has gone, but a closed port refuses a datagram. An empty one
+  /// is not a request, so it does not take the sonar from another driver.
+  void probe(bool is_silent);
   std::string place() const;  // "tcp 127.0.0.2:14750"
 
   const Make* make_;
@@ -90,10 +93,11 @@ class PingStream {
   std::vector<std::optional<Socket>> sockets_;  // by port; none of kind http
   std::uint32_t device_ip_ = 0;                 // in network order
   std::chrono::milliseconds answer_patience_{};
-  std::deque<Item> items_;      // items that next() has not returned yet
-  std::optional<Error> ended_;  // set when the conversation has ended; empty text: the sonar closed it
-  bool has_answered_ = false;   // at the first port
-  bool is_started_ = false;     // the host must send what on_leave() returns
+  std::chrono::steady_clock::time_point probe_at_{};  // if no datagram arrives before
+  std::deque<Item> items_;                            // items that next() has not returned yet
+  std::optional<Error> ended_;                        // set when the conversation has ended; empty text: the sonar closed it
+  bool has_answered_ = false;                         // at the first port
+  bool is_started_ = false;                           // the host must send what on_leave() returns
   std::ofstream record_;
   bool keeps_ = false;
   std::vector<recording::RecordedMessage> kept_;  // messages since the last item

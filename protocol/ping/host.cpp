@@ -143,40 +143,17 @@ class SurveyorHost final : public PingHost {
   std::pair<std::optional<std::uint32_t>, Id> newest_{};  // number of the newest ping, and the message from which it is read
 };
 
-/// The scan that a host requests.
-std::optional<AutoTransmit> scan_in(const std::optional<Bytes>& request) {
-  if (!request) return std::nullopt;
-  Framer framer(65535);
-  framer.append(*request);
-  AutoTransmit scan;
-  const auto frame = framer.next();
-  return frame && read_front(*frame, scan) ? std::optional(scan) : std::nullopt;
-}
-
 /// First requests the protocol version, which changes nothing. UDP has no connection, so the answer shows that a sonar is there;
-/// then the host requests a scan. A datagram may be lost, so the first request is repeated until it is answered. Later, when
-/// nothing arrives for a second, the host requests the sonar's state, which changes nothing either: a closed port refuses the
-/// request, and a sonar that has restarted answers with settings other than those of the scan, which is then requested again.
+/// then the host requests a scan. A datagram may be lost, so the first request is repeated until it is answered.
 class Ping360Host final : public PingHost {
  public:
-  Ping360Host(std::string_view title, std::optional<Bytes> request)
-      : PingHost(title, std::move(request)), scan_(scan_in(this->request())) {}
+  using PingHost::PingHost;
   HostActions on_open(std::span<const std::uint16_t>, Time now) override {
     ask_again_at_ = now + answer_within;
     return {protocol::HostSend{0, request_for(Id::protocol_version)}};
   }
-  HostActions on_bytes(std::size_t port, BytesView received, Time now) override {
-    HostActions actions = PingHost::on_bytes(port, received, now);
-    if (is_open_) ask_again_at_ = now + answer_within;
-    return actions;
-  }
-  HostActions on_tick(Time now) override {
-    if (now < ask_again_at_) return {};
-    if (!is_open_) return on_open({}, now);
-    ask_again_at_ = now + answer_within;
-    return {protocol::HostSend{0, request_for(Id::device_data)}};
-  }
-  std::optional<Time> next_tick() const override { return ask_again_at_; }
+  HostActions on_tick(Time now) override { return !is_open_ && now >= ask_again_at_ ? on_open({}, now) : HostActions{}; }
+  std::optional<Time> next_tick() const override { return is_open_ ? std::nullopt : std::optional(ask_again_at_); }
   /// Stops the scan that this host has requested. It does not stop that of another driver.
   HostActions on_leave() override {
     if (!is_open_ || !asks()) return {};
@@ -185,15 +162,9 @@ class Ping360Host final : public PingHost {
   bool is_open() const override { return is_open_; }
 
  private:
-  /// Any frame shows that the sonar is there. Message 2300 without samples is its state.
-  void on_frame(const Frame& frame, HostActions& actions) override {
-    DeviceData state;
-    const bool is_state = frame.header.id == Id::device_data && read_front(frame, state) && state.count == 0;
-    if (!std::exchange(is_open_, true) || (is_state && !has_settings_of_scan(state))) ask(actions);
-  }
-  bool has_settings_of_scan(const DeviceData& state) const {
-    return scan_ && state.gain == scan_->gain && state.transmit_us == scan_->transmit_us && state.period == scan_->period &&
-           state.khz == scan_->khz && state.samples == scan_->samples;
+  /// Any frame shows that the sonar is there.
+  void on_frame(const Frame&, HostActions& actions) override {
+    if (!std::exchange(is_open_, true)) ask(actions);
   }
   std::optional<HostPing> ping_from(const Frame& frame) override {
     const auto line_of = [&](auto data) -> std::optional<HostPing> {
@@ -220,9 +191,8 @@ class Ping360Host final : public PingHost {
 
   static constexpr std::chrono::milliseconds answer_within{1000};  // our choice
 
-  const std::optional<AutoTransmit> scan_;  // nullopt: the host requests none
   bool is_open_ = false;
-  Time ask_again_at_{};  // if nothing arrives before
+  Time ask_again_at_{};
   protocol::Sweep sweep_{grads};
   std::uint32_t pings_ = 0;  // a Ping360 does not number its pings
 };

@@ -44,7 +44,6 @@ class PingHost : public protocol::Host {
 
  protected:
   bool asks() const { return request_.has_value(); }
-  const std::optional<Bytes>& request() const { return request_; }
   void ask(protocol::HostActions& actions) const {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }

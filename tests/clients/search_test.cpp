@@ -7,6 +7,7 @@
 
 #include <array>
 #include <atomic>
+#include <memory>
 #include <thread>
 
 #include "clients/sonarctl/doctor/probes.hpp"
@@ -83,7 +84,7 @@ class Ping360 {
       socklen_t length = sizeof from;
       const ssize_t size =
           ::recvfrom(socket_.fd(), datagram.data(), datagram.size(), 0, reinterpret_cast<sockaddr*>(&from), &length);
-      if (size <= 0) return;
+      if (size < 0) return;
       ping::Framer framer{65535};
       framer.append(std::span<const std::byte>(datagram).first(static_cast<std::size_t>(size)));
       const auto frame = framer.next();
@@ -153,6 +154,19 @@ TEST(Search, StopsOnlyScansThatItStarted) {
       EXPECT_THAT(sonar.received(),
                   testing::ElementsAre(ping::Id::general_request, ping::Id::auto_transmit, ping::Id::motor_off));
   }
+}
+
+TEST(Search, ASonarByUdpThatHasGoneIsNoticedWithoutARequest) {
+  auto sonar = std::make_unique<Ping360>(true);
+  auto stream = PingStream::open({address, 0}, find_make("ping360"), {}, 60s);
+  ASSERT_TRUE(stream) << stream.error().text;
+  EXPECT_EQ(stream->next(1200ms).what, Wait::timed_out);
+  EXPECT_THAT(sonar->received(), testing::ElementsAre(ping::Id::general_request, ping::Id::auto_transmit))
+      << "a request would take the sonar from another driver";
+  sonar.reset();
+  const PingStream::Item end = stream->next(60s);
+  EXPECT_EQ(end.what, Wait::closed);
+  EXPECT_THAT(end.error, HasSubstr("refused"));
 }
 
 TEST(Search, GoesOnBesideAWebServer) {

@@ -231,20 +231,6 @@ TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   }
 }
 
-/// Over UDP no connection ends when a sonar restarts.
-TEST(HostsByUdp, GetPingsAgainFromASonarThatHasRestarted) {
-  for (const Make& make : makes()) {
-    if (!make.is_by_udp()) continue;
-    Talk talk(make, all_that_is_known(make, range_m), 0, model_of(make));
-    talk.run(30);
-    const std::size_t before = talk.pings.size();
-    talk.restart();
-    talk.run(40);
-    EXPECT_GT(talk.pings.size(), before + 5) << make.name();
-    EXPECT_NEAR(talk.settings.range_m, range_m, 0.3) << make.name();
-  }
-}
-
 TEST(Makes, WithOnePortHaveHostsThatFindOutWhomTheyReached) {
   for (const Make& one : makes())
     for (const Make& other : makes()) {

@@ -83,15 +83,6 @@ class Talk {
     }
   }
 
-  /// The device forgets what its hosts have requested.
-  void restart() {
-    const ChangeSettings first = device.initial_settings(state);
-    state.settings = first.vendor_settings;
-    settings = first.settings;
-    with_ = nullptr;
-    for (Line& line : lines_) line.dialogue = device.converse(*line.port, state, now);
-  }
-
   void carry_out(HostActions actions) {
     for (HostAction& action : actions) {
       if (const auto* send = std::get_if<HostSend>(&action)) {

@@ -5,7 +5,6 @@
 
 #include "core/base/geometry.hpp"
 #include "protocol/ping/ping360_settings.hpp"
-#include "protocol/ping/ping_host.hpp"
 #include "protocol/ping/products.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
@@ -292,13 +291,12 @@ TEST(Ping360, SamplesAreTakenInTimeWithTheTrueSpeedOfSound) {
   }
 }
 
-Bytes sent(const protocol::HostActions& actions) {
-  return actions.size() == 1 ? std::get<protocol::HostSend>(actions.front()).bytes : Bytes{};
-}
-
 TEST(Ping360Host, RepeatsItsFirstRequestUntilItIsAnswered) {
   const auto host = ping360::make_host({});
   ASSERT_TRUE(host);
+  const auto sent = [](const protocol::HostActions& actions) {
+    return actions.size() == 1 ? std::get<protocol::HostSend>(actions.front()).bytes : Bytes{};
+  };
   const Bytes first = sent((*host)->on_open({}, at_s(0)));
   EXPECT_FALSE(first.empty());
   EXPECT_TRUE((*host)->on_tick(at_s(0.9)).empty());
@@ -309,25 +307,8 @@ TEST(Ping360Host, RepeatsItsFirstRequestUntilItIsAnswered) {
   EXPECT_FALSE((*host)->is_open());
   (*host)->on_bytes(0, framed_message(Id::protocol_version, 1, ProtocolVersion{}), at_s(2.5));
   EXPECT_TRUE((*host)->is_open());
-}
-
-TEST(Ping360Host, RequestsTheStateOfASilentSonarAndAScanOnlyIfItHasOtherSettings) {
-  const auto host = ping360::make_host({});
-  ASSERT_TRUE(host);
-  const Bytes request = sent((*host)->on_bytes(0, framed_message(Id::protocol_version, 1, ProtocolVersion{}), at_s(0)));
-  AutoTransmit asked;
-  wire::Reader reader(BytesView(request).subspan(header_size));
-  fields(reader, asked);
-  DeviceData state{asked.mode, asked.gain, 0, asked.transmit_us, asked.period, asked.khz, asked.samples, 0};
-  EXPECT_TRUE((*host)->on_tick(at_s(0.9)).empty());
-  const Bytes question = sent((*host)->on_tick(at_s(1)));
-  EXPECT_EQ(question, request_for(Id::device_data));
-  EXPECT_TRUE((*host)->on_bytes(0, framed_message(Id::device_data, 1, state), at_s(1.1)).empty()) << "it is slow";
-  EXPECT_EQ((*host)->next_tick(), at_s(2.1));
-  EXPECT_EQ(sent((*host)->on_tick(at_s(2.1))), question);
-  EXPECT_EQ(sent((*host)->on_tick(at_s(3.1))), question) << "a datagram may be lost";
-  ++state.samples;
-  EXPECT_EQ(sent((*host)->on_bytes(0, framed_message(Id::device_data, 1, state), at_s(3.2))), request) << "it has restarted";
+  EXPECT_FALSE((*host)->next_tick());
+  EXPECT_TRUE((*host)->on_tick(at_s(9)).empty());
 }
 
 }  // namespace
