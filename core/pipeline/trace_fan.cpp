@@ -306,9 +306,8 @@ void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScal
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
   // A packet is a tile of neighbouring columns and rays. Its rays visit more of the same boxes and triangles than those of one
   // column do.
-  constexpr int widest = 4;
-  for (int from = first; from < last; from += widest) {
-    const int columns = std::min(widest, last - from), at_once = RayPacket::size / columns;
+  for (int from = first; from < last; from += fixed_fan_columns) {
+    const int columns = std::min(fixed_fan_columns, last - from), at_once = RayPacket::size / columns;
     const std::size_t begin = hits.size();
     hits.resize(begin + static_cast<std::size_t>(columns) * static_cast<std::size_t>(rays));  // in the order of columns
     for (int ray = 0; ray < rays; ray += at_once) {

@@ -29,6 +29,9 @@ struct FanScratch {
 std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                       FanScratch& scratch, DepthMap& seen);
 
+/// Columns of a packet of trace_fixed_fan. A ray on the edge of two triangles may hit either, depending on the other rays of its
+/// packet, so callers split columns only between packets.
+inline constexpr int fixed_fan_columns = 4;
 /// Traces the plan's fixed fan for every column of [first, last), and appends to `hits`.
 void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                      std::vector<FanHit>& hits);

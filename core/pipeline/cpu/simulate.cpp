@@ -178,14 +178,18 @@ class PingSimulation {
 int PingSimulation::group_columns() const {
   const int traced = traced_columns();
   // Groups are small here, because a ping of another sonar is to run between them.
-  if (w_.between && w_.between->expected()) return traced;
+  const bool is_small = w_.between && w_.between->expected();
+  if (is_small && !ray_is_scatterer()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
   // Signals and depth maps of a group should fit a worker's share of the second-level cache.
   const auto column_bytes = sizeof(float) * (static_cast<std::size_t>(w_.columns.stride) + static_cast<std::size_t>(bins));
   const int in_cache = static_cast<int>(group_bytes / column_bytes);
   const int least_groups = pool_.threads() > 1 ? least_groups_a_worker * pool_.threads() : 1;
   const int for_all = (plan_.columns.count + least_groups - 1) / least_groups;
-  if (ray_is_scatterer()) return std::max(1, std::min({in_cache, for_all, traced}));
+  if (ray_is_scatterer()) {
+    const int most = is_small ? traced : std::min({in_cache, for_all, traced});
+    return std::max(1, most / fixed_fan_columns) * fixed_fan_columns;
+  }
   return std::max(1, std::min(in_cache / traced, (for_all + traced - 1) / traced)) * traced;
 }
 

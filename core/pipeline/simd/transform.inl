@@ -17,7 +17,7 @@ inline ComplexLanes times_conjugate(ComplexLanes v, const float* w) {
 inline ComplexLanes times_i(ComplexLanes v) { return {-v.im, v.re}; }
 
 /// Converts between the order of lanes in memory, (re, im, re, im ...), and ComplexLanes. Lane i of ComplexLanes is not value i
-/// but value_of_lane(i): only lanes of the same four are exchanged, which takes one instruction on every instruction set.
+/// but value_of_lane(i): only lanes of the same four are exchanged, for which every instruction set has one instruction.
 constexpr int value_of_lane(int i) { return (i % 4 < 2 ? 0 : lanes / 2) + i / 4 * 2 + i % 2; }
 struct Shuffles {
   LaneNumbers even, odd, low, high;
