@@ -11,7 +11,8 @@ constexpr double least_m = 1e-4, most_m = 1e5;  // limits for a length in a scen
 /// Reads one element of geometry. A value is a child element in SDF (<size>..</size>), and an attribute in URDF (size="..").
 class GeometryReader {
  public:
-  GeometryReader(const Element& element, Findings& findings) : element_(element), findings_(findings) {}
+  GeometryReader(const Element& element, Findings& findings, Defaults defaults)
+      : element_(element), findings_(findings), defaults_(defaults) {}
 
   bool has(const char* key) const { return !text_of(key).empty(); }
   std::string_view text_of(const char* key) const {
@@ -28,11 +29,11 @@ class GeometryReader {
     const auto v = numbers_or(key, 3, "1 1 1");
     return {checked(v[0], key), checked(v[1], key), checked(v[2], key)};
   }
-  /// Without the key, the default of the SDF specification is used, as in Gazebo.
+  /// Without the key, the default of the SDF specification is used, as in Gazebo; URDF has none.
   std::vector<double> numbers_or(const char* key, std::size_t count, const char* otherwise) {
-    if (element_.child(key) || has(key)) return numbers(key, count);
-    findings_.leave_out(element_.place(),
-                        std::string(element_.name()) + ": has no " + key + "; the default of SDF is used, " + otherwise + " m");
+    if (defaults_ == Defaults::none || element_.child(key) || has(key)) return numbers(key, count);
+    findings_.leave_out(element_.place(), std::string(key) + " of " + std::string(element_.name()) +
+                                              ": missing; SDF's default is used, " + otherwise + " m");
     return read_numbers(otherwise, count, element_.place(), key, findings_);
   }
   double checked(double v, const char* key) {
@@ -52,6 +53,7 @@ class GeometryReader {
  private:
   Element element_;
   Findings& findings_;
+  Defaults defaults_;
   std::string why_not_;
 };
 
@@ -117,9 +119,9 @@ std::string called(const Element& element) {
   return plain(element.name()) + (name.empty() ? std::string() : std::string(" \"") + plain(name) + "\"");
 }
 
-std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, Pose& offset) {
+std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, Pose& offset, Defaults defaults) {
   for (const Element& element : geometry.children()) {
-    GeometryReader in(element, findings);
+    GeometryReader in(element, findings, defaults);
     const std::string_view kind = element.name();
     const auto round = [&](Shape::Kind of, const char* otherwise) {
       return Shape{.kind = of, .radius_m = in.length("radius", otherwise)};

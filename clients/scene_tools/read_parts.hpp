@@ -7,10 +7,13 @@
 
 namespace sonar::scene_tools {
 
+/// Lengths that a file does not have. URDF knows no defaults.
+enum class Defaults { of_sdf, none };
+
 /// Reads the shape inside <geometry>, whose sizes are in child elements (SDF) or attributes (URDF). Returns nothing for other
 /// elements, and for shapes that a scene cannot hold, which are then listed. `offset` receives the pose of the shape in its
-/// frame.
-std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, Pose& offset);
+/// frame. Without `defaults`, a missing length is an error.
+std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, Pose& offset, Defaults defaults);
 
 /// Adds a shape; more than max_shapes are an error.
 void add_shape(ImportedWorld& world, PlacedShape shape, Findings& findings);

@@ -87,7 +87,7 @@ class SdfReader {
       const Pose base =
           given.relative_to.empty() ? link_in_model : frame_in_model(model, given.relative_to, part.place(), findings_);
       Pose offset;
-      const auto shape = read_geometry(part.child("geometry"), findings_, offset);
+      const auto shape = read_geometry(part.child("geometry"), findings_, offset, Defaults::of_sdf);
       if (!shape) continue;
       const Pose in_world = compose(compose(model_in_world, compose(base, given.pose)), offset);
       const Element material = part.child("material");

@@ -110,7 +110,7 @@ class UrdfReader {
     for (const Element& part : parts) {
       if (findings_.failed()) return;
       Pose offset;
-      const auto shape = read_geometry(part.child("geometry"), findings_, offset);
+      const auto shape = read_geometry(part.child("geometry"), findings_, offset, Defaults::none);
       if (!shape) continue;
       add_shape(world_,
                 {.shape = *shape,

@@ -173,9 +173,9 @@ TEST(ReadSdf, MissingLengthsAreTheDefaultsOfSdfAndAreTold) {
   EXPECT_EQ(world->shapes[1].shape.size_m.y, 1);
   EXPECT_EQ(world->shapes[2].shape.radius_m, 0.5);
   EXPECT_EQ(world->shapes[2].shape.length_m, 4);
-  EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: sphere: has no radius; the default of SDF is used, 1 m",
-                                                 "w.sdf:4: box: has no size; the default of SDF is used, 1 1 1 m",
-                                                 "w.sdf:5: capsule: has no radius; the default of SDF is used, 0.5 m"));
+  EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: radius of sphere: missing; SDF's default is used, 1 m",
+                                                 "w.sdf:4: size of box: missing; SDF's default is used, 1 1 1 m",
+                                                 "w.sdf:5: radius of capsule: missing; SDF's default is used, 0.5 m"));
 }
 
 TEST(ReadSdf, CollisionsInsteadOfVisuals) {

@@ -54,6 +54,7 @@ TEST(ReadUrdf, MistakesAreToldWithFileAndLine) {
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "a", "b"))),
               HasSubstr("hangs on two joints"));
   EXPECT_THAT(r.error(robot(part("a") + part("a"))), HasSubstr("used twice"));
+  EXPECT_THAT(r.error(robot(part("a", "", "<sphere/>"))), HasSubstr("sphere radius: 1 number is needed here, not 0"));
   EXPECT_THAT(r.error(robot(part("a", "<origin xyz='1 2'/>"))), HasSubstr("origin xyz: 3 numbers are needed here, not 2"));
   EXPECT_THAT(r.error("<robot name='x' xmlns:xacro='u'>\n<xacro:arm/></robot>"), HasSubstr("w.sdf:2: this is xacro"));
   EXPECT_THAT(r.error(robot(part("a", "<xacro:shape/>"))), HasSubstr("this is xacro"));
