@@ -209,7 +209,7 @@ void SonarClients::check() const { check_accounts(sonar_); }
 void SonarClients::finish(std::size_t place) {
   if (!clients_[place] || !clients_[place]->served) return;
   clients_[place]->finishing = true;
-  sonar_.finish(clients_[place]->id);
+  perform(sonar_.finish(clients_[place]->id, now_));
 }
 
 /// Disconnects in the middle of anything.
