@@ -116,10 +116,10 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
     if (is_last) {
       std::string silent;
       for (const auto& [one, at] : others)
-        silent += (silent.empty() ? "" : " and ") + std::string(one->ports.front().kind == Kind::http ? "http " : "udp ") +
-                  text_from(at);
+        silent +=
+            (silent.empty() ? "" : ", ") + std::string(one->ports.front().kind == Kind::http ? "http " : "udp ") + text_from(at);
       if (make == nullptr && !silent.empty())
-        failed.text += "; " + silent + " did not answer: on a busy computer name the make (--make)";
+        failed.text += ". No sonar answered at " + silent + " either; on a busy computer, name the make (--make)";
       return tl::unexpected(failed);
     }
     for (const Candidate& candidate : others) {

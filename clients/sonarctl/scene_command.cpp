@@ -26,7 +26,7 @@ Result<void> check(const std::string& file, bool strict) {
   const scene_tools::Remarks remarks = remarks_on(*scene);
   print_remarks(remarks);
   if (!strict || remarks.warnings.empty()) return {};
-  return failure(ErrorKind::bad_data, file + ": " + std::to_string(remarks.warnings.size()) + " warnings, and --strict");
+  return failure(ErrorKind::bad_data, file + ": " + text::counted(remarks.warnings.size(), "warning") + ", and --strict");
 }
 
 Result<void> info(const std::string& file, bool json) {

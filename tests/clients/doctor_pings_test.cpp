@@ -61,7 +61,7 @@ TEST(Doctor, NamesWhoElseHasThePort) {
   expect(line(facts, "ping"), Level::fail, "no ping came within 4.0 s: nginx (pid 99) has the port, not sonard", "stop it");
   sonar.stream.junk_bytes = 300;
   expect(line(facts, "ping"), Level::fail,
-         "sends 300 bytes that are not messages of an Oculus: nginx (pid 99) listens on 0.0.0.0:52100",
+         "sends 300 bytes in place of messages of an Oculus: nginx (pid 99) listens on 0.0.0.0:52100",
          "another program has the port");
 }
 
@@ -206,7 +206,7 @@ TEST(Doctor, SaysWhatIsWrongWithAHead) {
   s.outcome = Outcome::closed_without_a_byte;
   expect(line(facts, "ping"), Level::warn, "all its client slots are taken", "clients.max");
   s.outcome = Outcome::refused;
-  expect(line(facts, "ping"), Level::fail, "refuses the connection", "serves it at 127.0.0.2:14750: sonarctl fault list");
+  expect(line(facts, "ping"), Level::fail, "refuses the connection", "serves it at 127.0.0.2:14750: use one of these ports; if it is one, sonarctl fault list");
 }
 
 TEST(Doctor, FailsWhileADriverGetsNoPing) {

@@ -61,7 +61,7 @@ TEST(DoctorPlaces, ListsWhatEachAddressOfASonarCarries) {
   }
   facts.sonars[0].stream.outcome = Outcome::refused;
   EXPECT_THAT(text_from(run_checks(facts)),
-              AllOf(HasSubstr("the sonard at 127.0.0.1:14770 serves it at " + all + ": sonarctl fault list"),
+              AllOf(HasSubstr("the sonard at 127.0.0.1:14770 serves it at " + all + ": use one of these ports; if it is one, sonarctl fault list"),
                     Not(HasSubstr("start it"))));
   facts.sonars[0].stream.outcome = Outcome::pings;
   serve(facts, there);

@@ -168,7 +168,7 @@ class SonarChecks {
       return add(Level::fail, "ping",
                  first + (s.broken > 0 ? std::to_string(s.broken) + " of " + std::to_string(s.pings) +
                                              " pings broken: " + s.first_complaint
-                                       : std::to_string(s.junk_bytes) + " bytes between messages that belong to none"),
+                                       : text::counted(s.junk_bytes, "byte") + " between messages, part of none"),
                  "sonarctl listen shows every ping; if this is sonard, please report it");
     add(Level::ok, "ping", first + "size fields consistent", "");
   }
@@ -183,7 +183,7 @@ class SonarChecks {
       std::string who;
       for (const PortHolder& holder : sonar_.listeners) who = ": " + text_of(holder) + " listens on " + holder.at;
       return add(Level::fail, "ping",
-                 at_ + " sends " + std::to_string(s.junk_bytes) + " bytes that are not messages of " +
+                 at_ + " sends " + text::counted(s.junk_bytes, "byte") + " in place of messages of " +
                      std::string(sonar_.make->title) + who,
                  "another program has the port; stop it, or give the sonar's own address");
     }
@@ -226,7 +226,7 @@ class SonarChecks {
     if (here != nullptr)
       return "the sonard at " + text_from(facts_.control.at) + " serves it at " +
              (here->addresses().empty() ? here->listens() : addresses_of(*here)) +
-             ": sonarctl fault list shows whether a fault has closed its ports";
+             ": use one of these ports; if it is one, sonarctl fault list shows whether a fault has closed it";
     if (facts_.daemons.empty() && is_replay(facts_.http))
       return "sonard replay shows this recording only on its page, http://" + text_from(facts_.http.at);
     std::string others;
@@ -255,8 +255,8 @@ class SonarChecks {
   std::string stats_of_daemon() const {
     if (!sonar_.reported) return " (--take connects nevertheless)";
     const v1::SonarFigures& f = sonar_.reported->figures();
-    return "; it reports " + std::to_string(f.served()) + " pings served, " + std::to_string(f.dropped()) + " dropped, latency " +
-           format("%.0f", f.latency_ms_p50()) + " ms p50, " + format("%.0f", f.latency_ms_p99()) +
+    return "; it reports " + text::counted(f.served(), "ping") + " served, " + std::to_string(f.dropped()) +
+           " dropped, latency " + format("%.0f", f.latency_ms_p50()) + " ms p50, " + format("%.0f", f.latency_ms_p99()) +
            " ms p99 (--take connects nevertheless)";
   }
 
@@ -379,7 +379,7 @@ class SonarChecks {
     if (slow && !sonar_.reported && is_replay(facts_.http)) return add(Level::ok, "rate", text + ", as in the recording", "");
     if (slow) return add(Level::warn, "rate", text + ": the simulation is slower than the rate", less_to_compute);
     if (s.missing > 0)
-      return add(Level::warn, "rate", text + ", " + std::to_string(s.missing) + " pings missing",
+      return add(Level::warn, "rate", text + ", " + sonar::text::counted(s.missing, "ping") + " missing",
                  "the reader or the network is too slow: outbox of the sonar, sonarctl listen");
     add(Level::ok, "rate", text, "");
   }
