@@ -5,6 +5,7 @@ const log_lines = 500;
 const replayed_lines = 100;  // limit of the repeated lines of a new connection; the daemon's lines_kept
 const recent_pings = 64;
 const history_s = 60;
+const preview_stalls_s = 3;  // without a preview
 
 const now_s = () => performance.now() / 1000;
 const sameLine = (a, b) => a.ns === b.ns && a.message === b.message && a.name === b.name && a.level === b.level;
@@ -113,7 +114,7 @@ export class Facts {
   /// The measured rate of the pings that the page shows. The rate of previews is computed from their numbers until the next
   /// status. Older daemons send no rate.
   get madeRate() {
-    return this.preview ? this.numbered.rate : this.sonarStatus?.figures?.made_hz ?? this.rate;
+    return this.preview ? this.previewRate : this.sonarStatus?.figures?.made_hz ?? this.rate;
   }
   get rateUnit() {
     return this.linesByPing ? 'lines/s' : 'Hz';
@@ -248,10 +249,16 @@ export class Facts {
     const made = this.sonarStatus?.figures?.pings;
     if (made !== undefined) {
       const last = this.history.at(-1);
-      const rate = this.preview ? this.numbered.rate : last && made >= last.made && time_s > last.time_s ? (made - last.made) / (time_s - last.time_s) : undefined;
+      const rate = this.preview ? this.previewRate : last && made >= last.made && time_s > last.time_s ? (made - last.made) / (time_s - last.time_s) : undefined;
       if (!last || time_s - last.time_s > 0.5 || made < last.made) this.history.push({ time_s, made, rate });
       this.history = this.history.filter((h) => h.time_s > time_s - history_s && h.time_s <= time_s);
     }
+  }
+
+  /// Pings that the page receives in a second; 0 if none has come for preview_stalls_s.
+  get previewRate() {
+    const last = this.numbered.readings.at(-1);
+    return last && now_s() - last.time_s > preview_stalls_s ? 0 : this.numbered.rate;
   }
 
   /// Pings that the sonar makes in a second; 0 if it has made none for longer than its rate allows.
