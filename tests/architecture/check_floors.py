@@ -110,7 +110,7 @@ FORBIDDEN = [
     ("mutex", r"daemon/|protocol/", None, r"\bstd::(mutex|shared_mutex|recursive_mutex|condition_variable)\b",
      "work crosses threads by value and asio::post"),
     ("global random", r"core/", None, r"\bstd::(mt19937|random_device|default_random_engine)|\bs?rand\s*\(", "random numbers are counter-based, core/base/random.hpp"),
-    ("locale", r"core/|protocol/|daemon/|clients/", None, r"\b(set|use|new)locale\s*\(|\bstd::locale\s*(::global|[({])|\.imbue\s*\(",
+    ("locale", r"core/|protocol/|daemon/|clients/", None, r"\b(set|use|new)locale\s*\(|\bstd::locale\s*(::global|[({])|\.imbue\s*\((?!\s*std::locale::classic\(\))",
      "printf, strtod and streams would read and write numbers as the user's language does: 1,5 for 1.5"),
     ("test namespace", r"tests/", None, r"\bnamespace\s+(\w+::)*testing\b(?!_)", "it hides GoogleTest's from files compiled together: name it tests"),
     ("quiet grep", r"", None, r"\| *gr" + r"ep -\w*q", "it ends before its input does, and under pipefail the pipe then fails: test \"$(command)\" instead"),

@@ -206,7 +206,8 @@ TEST(Doctor, SaysWhatIsWrongWithAHead) {
   s.outcome = Outcome::closed_without_a_byte;
   expect(line(facts, "ping"), Level::warn, "all its client slots are taken", "clients.max");
   s.outcome = Outcome::refused;
-  expect(line(facts, "ping"), Level::fail, "refuses the connection", "serves it at 127.0.0.2:14750: use one of these ports; if it is one, sonarctl fault list");
+  expect(line(facts, "ping"), Level::fail, "refuses the connection",
+         "serves it at 127.0.0.2:14750: use one of these ports; if it is one, sonarctl fault list");
 }
 
 TEST(Doctor, FailsWhileADriverGetsNoPing) {

@@ -60,9 +60,9 @@ TEST(DoctorPlaces, ListsWhatEachAddressOfASonarCarries) {
     EXPECT_THAT(text_from(run_checks(facts)), AllOf(HasSubstr("fail  "), Not(HasSubstr("ok    front")))) << "not there";
   }
   facts.sonars[0].stream.outcome = Outcome::refused;
-  EXPECT_THAT(text_from(run_checks(facts)),
-              AllOf(HasSubstr("the sonard at 127.0.0.1:14770 serves it at " + all + ": use one of these ports; if it is one, sonarctl fault list"),
-                    Not(HasSubstr("start it"))));
+  EXPECT_THAT(text_from(run_checks(facts)), AllOf(HasSubstr("the sonard at 127.0.0.1:14770 serves it at " + all +
+                                                            ": use one of these ports; if it is one, sonarctl fault list"),
+                                                  Not(HasSubstr("start it"))));
   facts.sonars[0].stream.outcome = Outcome::pings;
   serve(facts, there);
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("ok    front: status 127.255.255.255:9, udp 127.0.0.2:7777\n"))
