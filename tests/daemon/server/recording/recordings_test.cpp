@@ -73,6 +73,15 @@ TEST(RecordingName, SaysTheKindAndNoFolder) {
     EXPECT_THAT(RecordingFile::kind_of(name, "oculus").error().text, HasSubstr("by its end")) << name;
 }
 
+/// A message of an Oculus of so many bytes, at most 271: the header, and a payload of ones.
+protocol::Bytes oculus_message(std::size_t bytes) {
+  protocol::Bytes message(bytes, std::byte{1});
+  std::fill_n(message.begin(), 16, std::byte{0});
+  message[0] = std::byte{'S'}, message[1] = std::byte{'O'};
+  message[10] = static_cast<std::byte>(bytes - 16);
+  return message;
+}
+
 RecordedPing ping_at(double at_s, std::size_t bytes = 64) {
   auto ping = std::make_shared<Ping>();
   ping->request.number = PingNumber{7};
@@ -80,7 +89,7 @@ RecordedPing ping_at(double at_s, std::size_t bytes = 64) {
   ping->truth = {{2.5f, 1}, {}};
   auto names = std::make_shared<SceneNames>();
   *names = {{"floor", "box"}, {"crate"}, {}};
-  return {Time{} + nanoseconds_from(at_s),   ping, std::make_shared<const protocol::Bytes>(bytes, std::byte{1}), {},
+  return {Time{} + nanoseconds_from(at_s),   ping, std::make_shared<const protocol::Bytes>(oculus_message(bytes)), {},
           protocol::Bytes(20, std::byte{2}), names};
 }
 
