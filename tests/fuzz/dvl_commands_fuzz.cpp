@@ -46,7 +46,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   dvl::read_line(bytes);
   const recording::Codec codec = dvl::codec();
-  if (codec.ping_part(bytes)) require(codec.answer(bytes, nullptr).size() == 2);
+  if (const auto part = codec.ping_part(bytes))  // a sentence of the serial line is only for that port
+    require(codec.answer(bytes, nullptr).size() == (part->port == dvl::tcp_port ? 2u : 1u));
 
   Ping ping;
   ping.request.model = device.model;
