@@ -13,7 +13,7 @@ bool is_json(BytesView message) { return recording::begins_with(message, {'{', '
 
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   if (!is_json(message.bytes) || !read_line(message.bytes).velocity) return std::nullopt;
-  return recording::Sender{recorded_model()};
+  return recording::Sender{.model = models().front(), .names_model = false};
 }
 
 /// Each report counts as a ping.
@@ -40,6 +40,12 @@ std::vector<Bytes> answer(BytesView message, const VendorSettings* request) {
 
 }  // namespace
 
-recording::Codec codec() { return {.framing = &framing, .sender = sender_of, .ping_part = ping_part, .answer = answer}; }
+recording::Codec codec() {
+  return {.framing = &framing,
+          .sender = sender_of,
+          .ping_part = ping_part,
+          .answer = answer,
+          .replayed = [](const SonarModel& recorded) { return replayed_model(recorded); }};
+}
 
 }  // namespace sonar::dvl

@@ -50,6 +50,11 @@ SonarModel model_of(const Product& product) {
   return model;
 }
 
+using Models = std::array<std::shared_ptr<const SonarModel>, products.size()>;
+Models all_models() {
+  return {std::make_shared<const SonarModel>(model_of(products[0])), std::make_shared<const SonarModel>(model_of(products[1]))};
+}
+
 }  // namespace
 
 const Product& product_of(const SonarModel& model) {
@@ -59,14 +64,13 @@ const Product& product_of(const SonarModel& model) {
 }
 
 std::span<const std::shared_ptr<const SonarModel>> models() {
-  static const std::array<std::shared_ptr<const SonarModel>, products.size()> all{
-      std::make_shared<const SonarModel>(model_of(products[0])), std::make_shared<const SonarModel>(model_of(products[1]))};
+  static const Models all = all_models();
   return all;
 }
 
-const std::shared_ptr<const SonarModel>& recorded_model() {
-  static const auto only = std::make_shared<const SonarModel>(model_of(products.front()));
-  return only;
+std::shared_ptr<const SonarModel> replayed_model(const SonarModel& recorded) {
+  static const Models all = all_models();
+  return all[static_cast<std::size_t>(&product_of(recorded) - products.data())];
 }
 
 RangeMode range_mode(int index, const Product& product) {

@@ -23,9 +23,9 @@ struct Product {
 };
 const Product& product_of(const SonarModel& model);
 std::span<const std::shared_ptr<const SonarModel>> models();
-/// The model of a replay: that of the first product, because reports do not name theirs. A device of this model sends no
-/// positions of its own; they are among the recorded reports.
-const std::shared_ptr<const SonarModel>& recorded_model();
+/// The model of a replay of this product. A device of this model sends no positions of its own; they are among the recorded
+/// reports.
+std::shared_ptr<const SonarModel> replayed_model(const SonarModel& recorded);
 
 struct RangeMode {
   double lowest_m, highest_m;  // altitudes

@@ -89,7 +89,7 @@ Reaction Session::on_tick(Time now, bool ping_pending) {
   Reaction reaction;
   if (now < due_) return reaction;
   due_ = next_report_after(now);
-  protocol::Bytes report = device_.model == recorded_model() ? protocol::Bytes{} : position_report(now);
+  protocol::Bytes report = device_.model == replayed_model(*device_.model) ? protocol::Bytes{} : position_report(now);
   if (!report.empty()) reaction.replies.push_back(std::move(report));
   if (waiting_ > 0 && now - requested_at_ > longest_wait && !ping_pending) {
     requested_at_ = now;

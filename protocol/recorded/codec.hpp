@@ -76,6 +76,8 @@ struct Codec {
   /// True if a message of ping_part() holds everything that another message of the same ping holds, and more. Null: no ping has
   /// two such messages.
   bool (*is_richer)(BytesView message, BytesView than) = nullptr;
+  /// The model of a replay's device, if that must differ from an emulated one. Null: the recorded model.
+  std::shared_ptr<const SonarModel> (*replayed)(const SonarModel& recorded) = nullptr;
 };
 
 }  // namespace sonar::recording

@@ -15,7 +15,8 @@ Config config_of(const ReplayDevice& device, const ReplayOptions& options) {
   config.vehicles.emplace_back().name = "recording";
   SonarConfig& sonar = config.sonars.emplace_back();
   sonar.name = device.vendor->name();
-  sonar.profile = {device.vendor, device.state->model};
+  const auto replayed = device.make->codec.replayed;
+  sonar.profile = {device.vendor, replayed == nullptr ? device.state->model : replayed(*device.state->model)};
   sonar.bind_ip = sonar.advertise_ip = options.at.ip;
   sonar.device_id = static_cast<std::uint16_t>(device.serial == 0 ? 1 : device.serial);
   sonar.max_clients = device.vendor->default_max_clients();

@@ -67,6 +67,7 @@ class SlowDisk final : public recording::RecordingReader {
   std::optional<Error> damage() const override { return of_->damage(); }
   void rewind() override { of_->rewind(); }
   bool knows_times() const override { return of_->knows_times(); }
+  std::string profile() const override { return of_->profile(); }
   std::atomic<bool> stands_still = false;
 
  private:
