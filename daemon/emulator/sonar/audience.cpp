@@ -143,9 +143,11 @@ void Audience::end_by_fault(Connection& connection, Faults::RequestVerdict verdi
 
 void Audience::end_clients(std::optional<ConnectionId> only, bool reset, Actions& actions) {
   using Verdict = Faults::RequestVerdict;
-  for (Connection& c : all())
-    if (c.role == Role::client && (!only || *only == c.id))
-      end_by_fault(c, reset || c.state == Connection::State::waiting ? Verdict::reset : Verdict::end, actions);
+  // Waiting clients end first, because the end of a served one may give its slot at once to a client that waits.
+  for (const bool waits : {true, false})
+    for (Connection& c : all())
+      if (c.role == Role::client && (!only || *only == c.id) && waits == (c.state == Connection::State::waiting))
+        end_by_fault(c, reset || waits ? Verdict::reset : Verdict::end, actions);
 }
 
 void Audience::read_clients(bool on, Actions& actions) {

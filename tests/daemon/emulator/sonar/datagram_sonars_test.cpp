@@ -246,6 +246,35 @@ TEST(HostByDatagrams, HasLeftAtOnceAndLeavesNothing) {
   }
 }
 
+/// As the daemon carries the fault out: a host by UDP has left while the actions after its end are still to come.
+TEST(HostByDatagrams, EndedByAFaultWithTheClientsThatWait) {
+  Talk talk("surveyor-240", "    clients: {max: 1, when_full: queue}\n");
+  Sonar& sonar = talk.sonar();
+  const auto connect = [&](ConnectionId id, protocol::Port::Kind by) {
+    sonar.on_connect(id, Role::client, {"host", {10, 0, 0, 5}, 5000}, talk.time.now, sonar.vendor().port(by));
+  };
+  connect(1, protocol::Port::Kind::udp_dialogue);
+  connect(2, protocol::Port::Kind::tcp_stream);
+  ASSERT_EQ(sonar.connections().find(2)->state, Connection::State::waiting);
+  FaultRecord record;
+  record.what = "L01";
+  const auto faults = check_fault(record, true);
+  ASSERT_TRUE(faults) << faults.error().text;
+  std::vector<ConnectionId> finished, reset;
+  for (const Action& action : sonar.add_faults(*faults, true, talk.time.now)) {
+    if (const auto* finish = std::get_if<Finish>(&action)) {
+      finished.push_back(finish->connection);
+      for (const Action& next : sonar.finish(finish->connection, talk.time.now))
+        EXPECT_FALSE(std::holds_alternative<Serve>(next)) << "a client that is then reset";
+    } else if (const auto* end = std::get_if<Reset>(&action)) {
+      reset.push_back(end->connection);
+      sonar.on_closed(end->connection, end->why, talk.time.now);
+    }
+  }
+  EXPECT_THAT(finished, ElementsAre(1));
+  EXPECT_THAT(reset, ElementsAre(2));
+}
+
 // ---- Ping1D
 
 struct Altimeter : Talk {
