@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <climits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -98,12 +99,20 @@ class GltfWalk final : public Json::json_sax_t {
     if (levels_.size() == 2 && levels_[0].key == "extensionsUsed") used.push_back(v);
     if (is_at(4, "nodes", "children")) children[levels_[1].name()].push_back(v);
     if (is_at(4, "scenes", "nodes")) scenes.back().push_back(v);
-    if (is_at(3, "buffers", "uri") && (v.starts_with("/") || v.starts_with("\\") || v.substr(1, 1) == ":"))
-      fault = "names the file " + v.substr(0, 200) + ", an absolute path; put the file beside it and name it without a folder";
-    if (is_at(3, "buffers", "uri") && is_itself_ && is_itself_(v))  // each such buffer would take the memory of the file again
-      fault = "names itself as the file of a buffer (" + v.substr(0, 200) + "); export it again";
+    if (is_at(3, "buffers", "uri") && !v.starts_with("data:")) check_file(v);
     step();
     return !fault;
+  }
+  /// The name of a buffer's file.
+  void check_file(const std::string& uri) {
+    constexpr std::size_t longest = 3 * PATH_MAX;  // a path whose bytes are all escaped with %
+    if (uri.size() > longest)
+      fault = "names the file of a buffer with " + std::to_string(uri.size()) +
+              " characters; put the file beside it and name it without a folder";
+    else if (uri.starts_with("/") || uri.starts_with("\\") || uri.find(':') == 1)
+      fault = "names the file " + uri.substr(0, 200) + ", an absolute path; put the file beside it and name it without a folder";
+    else if (is_itself_ && is_itself_(uri))  // each such buffer would take the memory of the file again
+      fault = "names itself as the file of a buffer (" + uri.substr(0, 200) + "); export it again";
   }
   bool open(bool array) {
     if (levels_.size() == 2 && levels_[0].key == "scenes") scenes.emplace_back();

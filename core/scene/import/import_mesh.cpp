@@ -116,13 +116,16 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
   return imported + (listed > faces ? listed - faces : 0);  // at least one triangle each
 }
 
-/// True if the URI of a buffer names the mesh itself.
+/// True if the URI of a buffer names the mesh itself. Links to the mesh are not recognised: ImportFiles counts their size, as
+/// that of other files.
 bool is_itself(const MeshFile& request, const std::string& uri) {
-  std::error_code error;
-  const std::filesystem::path parent = request.file.parent_path();
-  const std::filesystem::path folder = std::filesystem::canonical(parent.empty() ? "." : parent, error);
+  const std::string own = request.file.filename().string();
   const auto names_it = [&](const std::string& name) {
-    return (folder / name).lexically_normal() == folder / request.file.filename();
+    if (std::string_view(name).substr(name.rfind('/') + 1) != own) return false;  // without a slash, from 0
+    std::error_code error;
+    const std::filesystem::path parent = request.file.parent_path();
+    const std::filesystem::path folder = std::filesystem::canonical(parent.empty() ? "." : parent, error);
+    return (folder / name).lexically_normal() == folder / own;
   };
   return names_it(uri) || names_it(without_percents(uri));
 }

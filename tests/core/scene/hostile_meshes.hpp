@@ -101,6 +101,9 @@ inline std::vector<HostileMesh> hostile_meshes() {
        "etc/passwd, which is outside of its folder and the scene's"},
       {"own.gltf", gltf_with_buffer("own.gltf"), "names itself as the file of a buffer (own.gltf)"},
       {"own-dots.gltf", gltf_with_buffer("x/.././own%2ddots.gltf"), "names itself as the file of a buffer"},
+      {"empty.gltf", gltf_with_buffer(""), "referenced file"},
+      {"long.gltf", gltf_with_buffer(repeated("x/../", 600'000) + "long.gltf"),
+       "names the file of a buffer with 3000009 characters; put the file beside it"},
   };
 }
 
