@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
-#include <utility>
 
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
@@ -33,23 +32,49 @@ inline ImplausibleAngle angle_beyond_radians(const RollPitchYaw& a, bool counts_
 }
 
 /// Recognises a yaw in radians that is counted on over whole turns, as dead reckoning does: it changes no faster than a vehicle
-/// turns, over two turns and more. A yaw in degrees jumps after a turn, and changes 57 times as fast.
+/// turns, and covers two turns from a begin within the first turn, or many turns from any begin. A yaw in degrees begins
+/// anywhere, jumps after a turn, and changes 57 times as fast.
 class TurnCount {
  public:
   /// Poses in the order of time. False: the yaw does not continue that of the pose before.
   bool add(double yaw_rad, Time at) {
-    constexpr double fastest_radps = 2, least_step_rad = 0.05;  // least_step_rad: noise, and poses that come close together
-    const std::chrono::duration<double> passed_s = last_ ? at - last_->second : std::chrono::nanoseconds(0);
-    const bool goes_on = last_ && std::abs(yaw_rad - last_->first) <= std::max(fastest_radps * passed_s.count(), least_step_rad);
-    low_rad_ = goes_on ? std::min(low_rad_, yaw_rad) : yaw_rad;
-    high_rad_ = goes_on ? std::max(high_rad_, yaw_rad) : yaw_rad;
+    const bool goes_on = last_ && is_turn(yaw_rad, at);
+    if (!goes_on) {
+      constexpr double wrap = 360, about = 10;  // a jump of so much is the wrap of a heading in degrees
+      begins_count_ = std::abs(yaw_rad) <= 2 * pi && !(last_ && std::abs(std::abs(yaw_rad - last_->yaw_rad) - wrap) < about);
+      first_ = {yaw_rad, at};
+      low_rad_ = high_rad_ = yaw_rad;
+    }
+    low_rad_ = std::min(low_rad_, yaw_rad);
+    high_rad_ = std::max(high_rad_, yaw_rad);
     last_ = {yaw_rad, at};
     return goes_on;
   }
-  bool has_counted() const { return high_rad_ - low_rad_ > 2 * 2 * pi; }
+  bool has_counted() const {
+    constexpr double two_turns_rad = 2 * 2 * pi, many_turns_rad = 360;  // a heading in degrees covers no more than 360
+    const double covered_rad = high_rad_ - low_rad_;
+    return covered_rad > many_turns_rad || (covered_rad > two_turns_rad && begins_count_);
+  }
 
  private:
-  std::optional<std::pair<double, Time>> last_;
+  struct Heading {
+    double yaw_rad = 0;
+    Time at{};
+  };
+  /// True if a vehicle can have turned to this yaw, from the pose before and since the begin. Noise, and poses that come close
+  /// together, may exceed the speed by a step, but not again with each pose.
+  bool is_turn(double yaw_rad, Time at) const {
+    constexpr double fastest_radps = 2, least_step_rad = 0.05;
+    const auto reaches_from = [&](const Heading& from) {
+      const double passed_s = std::chrono::duration<double>(at - from.at).count();
+      return std::abs(yaw_rad - from.yaw_rad) <= fastest_radps * passed_s + least_step_rad;
+    };
+    return reaches_from(*last_) && reaches_from(first_);
+  }
+
+  std::optional<Heading> last_;
+  Heading first_;  // of the poses that continue each other
+  bool begins_count_ = false;
   double low_rad_ = 0, high_rad_ = 0;
 };
 

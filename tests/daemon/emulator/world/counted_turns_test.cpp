@@ -20,10 +20,10 @@ std::string line_of(double t_s, double yaw, double roll = 0) {
   return std::to_string(t_s) + ",0,0,-3," + std::to_string(roll) + ",0," + std::to_string(yaw) + "\n";
 }
 constexpr int spiral_steps = 2000;
-/// Turns by 0.5 rad a second, ten poses a second, to 100 rad from `begin_rad`.
-std::string spiral(double begin_rad, double roll = 0, double unit = 1) {
+/// Turns by 0.5 rad a second, ten poses a second, by default to 100 rad from `begin_rad`.
+std::string spiral(double begin_rad, double roll = 0, double unit = 1, int steps = spiral_steps) {
   std::string lines;
-  for (int i = 0; i < spiral_steps; ++i) lines += line_of(0.1 * i, unit * (begin_rad + 0.05 * i), roll);
+  for (int i = 0; i < steps; ++i) lines += line_of(0.1 * i, unit * (begin_rad + 0.05 * i), roll);
   return lines;
 }
 
@@ -42,14 +42,29 @@ std::vector<std::string> notes(const std::string& lines) {
 
 TEST(CountedTurns, OfATrajectoryAreNoDegrees) {
   EXPECT_THAT(notes(spiral(0)), IsEmpty());
-  EXPECT_THAT(notes(spiral(-150)), IsEmpty()) << "the file begins after many turns";
+  EXPECT_THAT(notes(spiral(4.7)), IsEmpty()) << "the sender counts from 0";
+  EXPECT_THAT(notes(spiral(-150, 0, 1, 8000)), IsEmpty()) << "the file begins after many turns";
   const auto are_degrees = HasSubstr("were degrees written?");
+  EXPECT_THAT(notes(spiral(-150)), ElementsAre(are_degrees)) << "fewer radians than a turn has degrees";
   EXPECT_THAT(notes(spiral(0, 0, deg_from_rad(1))), ElementsAre(are_degrees));
   EXPECT_THAT(notes(line_of(0, 270) + line_of(1, 270)), ElementsAre(are_degrees));
   EXPECT_THAT(notes(spiral(0) + line_of(200, 300)), ElementsAre(are_degrees)) << "a jump";
   std::string wrapped;
   for (int i = 0; i < spiral_steps; ++i) wrapped += line_of(0.1 * i, std::remainder(i, 360));
   EXPECT_THAT(notes(wrapped), ElementsAre(are_degrees)) << "10 degrees a second";
+}
+
+TEST(CountedTurns, AreNotFoundInASlowTurnInDegrees) {
+  const auto are_degrees = HasSubstr("were degrees written?");
+  std::string slow, through_north, often;
+  for (int i = 0; i < spiral_steps; ++i) {
+    slow += line_of(0.1 * i, 90 + 0.1 * i);
+    through_north += line_of(0.1 * i, std::fmod(350 + 0.1 * i, 360));
+    often += line_of(0.01 * i, 0.04 * i);
+  }
+  EXPECT_THAT(notes(slow), ElementsAre(are_degrees)) << "1 degree a second";
+  EXPECT_THAT(notes(through_north), ElementsAre(are_degrees));
+  EXPECT_THAT(notes(often), ElementsAre(are_degrees)) << "4 degrees a second, a hundred poses a second";
 }
 
 TEST(CountedTurns, HideNoOtherNoteOnTheAttitude) {
@@ -87,6 +102,8 @@ TEST(CountedTurns, OfASenderAreNoDegrees) {
     EXPECT_THAT(send(201, {3, 0, 300}), ElementsAre(HasSubstr("rov is upside down"), are_degrees));
     EXPECT_THAT(send(202, {170, 0, 300}), ElementsAre(are_degrees));
     EXPECT_THAT(send(203, {0, 0, 1}), IsEmpty());
+    for (int i = 0; i < spiral_steps; ++i) send(204 + 0.1 * i, {0, 0, std::fmod(350 + 0.1 * i, 360)});
+    EXPECT_THAT(send(404, {0, 0, 190}), ElementsAre(are_degrees)) << "a slow turn through north";
   }
 }
 
