@@ -11,11 +11,9 @@ constexpr std::size_t most_channels = 4096;
 constexpr std::size_t most_summary_records = 1 << 20;
 constexpr std::uint64_t most_described_bytes = 16 << 20;  // limit for all schemas and channels that are kept
 
-/// True for records without messages that files may have here.
-bool is_skipped(Opcode code, bool in_chunk) {
-  constexpr auto first_private = Opcode{0x80};
-  return code >= first_private || (!in_chunk && code <= Opcode::data_end);
-}
+/// True for records without messages that files may have here. Applications define records from 0x80 on, and later versions of
+/// the format may add the others, also to chunks (https://mcap.dev/spec, "Records").
+bool is_skipped(Opcode code, bool in_chunk) { return !in_chunk || code > Opcode::data_end; }
 
 std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
 
@@ -114,7 +112,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
     }
   } else if (!is_skipped(code, in_chunk)) {
     damages_.add("the record" + at_byte(at) + " has the opcode " + std::to_string(static_cast<unsigned>(code)) +
-                 ", which no record " + (in_chunk ? "of a chunk " : "") + "has");
+                 ", which no record of a chunk has");
   }
   scan_.seek(behind);
   return std::nullopt;

@@ -237,7 +237,23 @@ TEST(Mcap, RecordsThatNoFileHasAreReported) {
   };
   EXPECT_EQ(damage_with(record_of(0x0C), true), "") << "metadata";
   EXPECT_EQ(damage_with(record_of(0x80), true), "") << "a record of an application";
-  EXPECT_THAT(damage_with(record_of(0x42), true), HasSubstr("the record at byte 8 has the opcode 66, which no record has"));
+  for (const unsigned reserved : {0x10u, 0x42u, 0x7Fu}) EXPECT_EQ(damage_with(record_of(reserved), true), "") << reserved;
+  const auto chunk_of = [](const Bytes& records) {
+    Bytes chunk;
+    mcap::RecordWriter writer(chunk);
+    writer.begin(mcap::Opcode::chunk);
+    writer.time(start);
+    writer.time(start);
+    writer.number(std::uint64_t{records.size()});
+    writer.number(std::uint32_t{0});  // no checksum
+    writer.string("");
+    writer.number(std::uint64_t{records.size()});
+    writer.bytes(records);
+    writer.end();
+    return chunk;
+  };
+  for (const unsigned added : {0x10u, 0x7Fu, 0x80u}) EXPECT_EQ(damage_with(chunk_of(record_of(added)), true), "") << added;
+  EXPECT_THAT(damage_with(chunk_of(record_of(0x08)), true), HasSubstr("has the opcode 8, which no record of a chunk has"));
   EXPECT_THAT(damage_with(Bytes(20), false), HasSubstr("the record at byte 8 has the opcode 0, which no record has"));
 }
 
