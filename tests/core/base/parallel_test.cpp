@@ -3,6 +3,7 @@
 #include "core/base/parallel.hpp"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -80,12 +81,22 @@ TEST_P(ParallelPool, AnExceptionEndsTheLoopAndReachesTheCaller) {
 
 INSTANTIATE_TEST_SUITE_P(Threads, ParallelPool, testing::Values(1, 2, 4), testing::PrintToStringParamName());
 
+/// Bytes of the stack that a new thread gets.
+rlim_t stack_bytes_of_a_thread() {
+  pthread_attr_t attributes;
+  std::size_t bytes = 0;
+  if (::pthread_getattr_default_np(&attributes) != 0) return 0;
+  ::pthread_attr_getstacksize(&attributes, &bytes);
+  ::pthread_attr_destroy(&attributes);
+  return bytes;
+}
+
 // A child process whose limit of addresses leaves room for the stacks of a few workers, but not of all.
 TEST(ParallelPoolLimits, AWorkerThatCannotStartIsAnException) {
   if (test::is_sanitized) GTEST_SKIP() << "sanitizers need terabytes of addresses";
   const pid_t child = ::fork();
   if (child == 0) {
-    const rlim_t bytes = address_space_bytes().value() + (rlim_t{40} << 20);
+    const rlim_t bytes = address_space_bytes().value() + 5 * stack_bytes_of_a_thread();
     const rlimit limit{bytes, bytes};
     if (::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(2);
     try {
