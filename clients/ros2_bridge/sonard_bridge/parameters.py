@@ -41,7 +41,7 @@ PARAMETERS: Tuple[Parameter, ...] = (
     Parameter("tf_static", False, "publish where the sonars are mounted"),
     Parameter("base_frame", "", "frame that they are mounted on; empty: tf_child, else the vehicle's name"),
     Parameter("clouds", False, "publish ~/SONAR/cloud, sensor_msgs/PointCloud2"),
-    Parameter("cloud_threshold", 0.35, "of samples in clouds, part of the full scale; 0: all returns"),
+    Parameter("cloud_threshold", 0.35, "of samples in clouds, part of the full scale; of returns in space, of the strongest; 0: all"),
     Parameter("scans", False, "publish ~/SONAR/scan, sensor_msgs/LaserScan: the true range of the first hit of each beam"),
     Parameter("clock", False, "publish /clock, of a sonard whose clock is stepped or lockstep"),
 )

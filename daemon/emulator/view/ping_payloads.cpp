@@ -56,7 +56,8 @@ std::vector<foxglove::CloudPoint> points_of(const Ping& ping, const RangeImageSe
   const RangeImageGrid grid(ping.request);
   const std::size_t count = ping.samples.size() / 4, columns = static_cast<std::size_t>(grid.columns);
   std::uint32_t strongest = 1;
-  for (std::size_t i = 0; i < count; ++i) strongest = std::max(strongest, range_pixel(ping, i).strength);
+  for (std::size_t i = 0; i < count; ++i)
+    if (const RangePixel pixel = range_pixel(ping, i); pixel.range != 0) strongest = std::max(strongest, pixel.strength);
   std::vector<foxglove::CloudPoint> points;
   for (std::size_t i = 0; i < count; ++i) {
     const RangePixel pixel = range_pixel(ping, i);

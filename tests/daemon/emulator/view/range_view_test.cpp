@@ -11,8 +11,8 @@
 namespace sonar {
 namespace {
 
-void set_pixel(Ping& ping, std::size_t column, std::size_t row, std::uint32_t strength) {
-  const RangePixel pixel{strength, static_cast<std::uint32_t>(6 / (50.0 / 65536))};
+void set_pixel(Ping& ping, std::size_t column, std::size_t row, std::uint32_t strength, double range_m = 6) {
+  const RangePixel pixel{strength, static_cast<std::uint32_t>(range_m / (50.0 / 65536))};
   for (std::size_t b = 0; b < 4; ++b)
     ping.samples[4 * (256 * row + column) + b] = static_cast<std::byte>(pixel.code() >> (8 * b) & 0xFF);
 }
@@ -62,6 +62,7 @@ TEST(RangeView, ThePointsAreThoseThatAreNotMuchWeakerThanTheStrongest) {
   set_pixel(ping, 200, 60, 0);
   for (std::size_t column = 0; column < 3; ++column) set_pixel(ping, column, 60, 10);
   set_pixel(ping, 3, 60, 1);
+  set_pixel(ping, 4, 60, 400, 0);  // no return has range 0, whatever its strength
   const std::size_t all = size(0), strong = size(0.35);
   EXPECT_GT(all, strong);
   EXPECT_EQ(strong - one, 2 * (all - strong)) << "three of four";
