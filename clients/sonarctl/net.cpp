@@ -26,7 +26,7 @@ constexpr std::size_t longest_answer = 65536;
 
 }  // namespace
 
-volatile int interrupted = 0;
+std::atomic<int> interrupted = 0;
 
 namespace {
 

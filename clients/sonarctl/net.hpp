@@ -3,6 +3,7 @@
 
 #include <netinet/in.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -82,7 +83,8 @@ bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std:
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 
 /// Set by Ctrl-C and SIGTERM. Commands then end as at a time-out and make no connections.
-extern volatile int interrupted;
+extern std::atomic<int> interrupted;
+static_assert(std::atomic<int>::is_always_lock_free, "handlers of signals set it");
 /// Waits are cut into steps of this length: a signal that comes between a check of `interrupted` and the wait is noticed soon.
 constexpr std::chrono::milliseconds longest_step{100};
 

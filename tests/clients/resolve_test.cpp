@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <future>
+#include <memory>
 
 namespace sonar::clients::resolve_test {
 namespace {
@@ -32,22 +33,25 @@ TEST(Resolve, ANameIsLookedUpOrSaidToHaveNoAddress) {
 }
 
 TEST(Resolve, TheFirstSignalEndsALookupThatDoesNotEnd) {
-  std::promise<void> begun, answer, ended;
-  const auto answers = answer.get_future().share();
-  auto found = std::async(std::launch::async, [&] {
-    return resolve({"slow", 9}, [&, answers](const std::string&) -> Result<in_addr> {
-      begun.set_value();
+  struct Promises {
+    std::promise<void> begun, answer, ended;
+  };
+  const auto promises = std::make_shared<Promises>();  // the abandoned thread may outlive this test
+  const auto answers = promises->answer.get_future().share();
+  auto found = std::async(std::launch::async, [promises, answers] {
+    return resolve({"slow", 9}, [promises, answers](const std::string&) -> Result<in_addr> {
+      promises->begun.set_value();
       answers.wait();
-      ended.set_value();
+      promises->ended.set_value();
       return in_addr{};
     });
   });
-  begun.get_future().wait();
+  promises->begun.get_future().wait();
   interrupted = 1;
   EXPECT_EQ(found.wait_for(std::chrono::seconds(20)), std::future_status::ready);
   interrupted = 0;
-  answer.set_value();
-  ended.get_future().wait();
+  promises->answer.set_value();
+  promises->ended.get_future().wait();
   const auto got = found.get();
   ASSERT_FALSE(got);
   EXPECT_EQ(got.error().kind, ErrorKind::io);
