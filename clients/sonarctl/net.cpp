@@ -17,6 +17,7 @@
 #include <cstring>
 #include <future>
 #include <memory>
+#include <system_error>
 #include <thread>
 
 namespace sonar::clients {
@@ -33,13 +34,21 @@ namespace {
 /// The socket interface requires this cast.
 const sockaddr* generic(const sockaddr_in& address) { return reinterpret_cast<const sockaddr*>(&address); }
 
-/// Runs a task in a thread that gets no signals, so that they interrupt the waits of this thread.
+/// Runs a task in a thread that gets no signals, so that they interrupt the waits of this thread. If no thread can be started,
+/// it runs the task in this one.
 void run_without_signals(std::packaged_task<Result<in_addr>()> task) {
+  const auto shared = std::make_shared<decltype(task)>(std::move(task));  // a thread that fails to start destroys its argument
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, &before);
-  std::thread(std::move(task)).detach();
+  bool is_started = true;
+  try {
+    std::thread([shared] { (*shared)(); }).detach();
+  } catch (const std::system_error&) {  // the limit of threads (ulimit -u) or of memory (ulimit -v)
+    is_started = false;
+  }
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  if (!is_started) (*shared)();
 }
 
 Result<Socket> open_socket(int type) {

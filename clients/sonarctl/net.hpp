@@ -29,8 +29,8 @@ Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallbac
 using Lookup = std::function<Result<in_addr>(const std::string& host)>;
 /// Looks up a name in the hosts file and by DNS, which may take many seconds and ignores signals. Error usage: no address.
 Result<in_addr> look_up(const std::string& host);
-/// The first IPv4 address of a host. A name is looked up in a thread, which is abandoned when `interrupted` is set. Errors:
-/// usage (no address), io (interrupted).
+/// The first IPv4 address of a host. A name is looked up in a thread, which is abandoned when `interrupted` is set; if
+/// none can be started, in this one. Errors: usage (no address), io (interrupted).
 Result<sockaddr_in> resolve(const Endpoint& endpoint, const Lookup& lookup = look_up);
 
 /// Owns a file descriptor.

@@ -3,9 +3,13 @@
 
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
+#include <pthread.h>
 
+#include <csignal>
 #include <future>
 #include <memory>
+#include <system_error>
+#include <thread>
 
 namespace sonar::clients::resolve_test {
 namespace {
@@ -56,6 +60,44 @@ TEST(Resolve, TheFirstSignalEndsALookupThatDoesNotEnd) {
   ASSERT_FALSE(got);
   EXPECT_EQ(got.error().kind, ErrorKind::io);
   EXPECT_THAT(got.error().text, HasSubstr("interrupted before the address of slow was found"));
+}
+
+/// While it lives, no thread can start: new threads get stacks that no computer has addresses for.
+class NoThreads {
+ public:
+  NoThreads() {
+    ::pthread_getattr_default_np(&before_);
+    pthread_attr_t huge;
+    ::pthread_attr_init(&huge);
+    ::pthread_attr_setstacksize(&huge, std::size_t{1} << 58);
+    EXPECT_EQ(::pthread_setattr_default_np(&huge), 0);
+    ::pthread_attr_destroy(&huge);
+  }
+  ~NoThreads() {
+    ::pthread_setattr_default_np(&before_);
+    ::pthread_attr_destroy(&before_);
+  }
+  NoThreads(const NoThreads&) = delete;
+  NoThreads& operator=(const NoThreads&) = delete;
+
+ private:
+  pthread_attr_t before_;
+};
+
+TEST(Resolve, WithoutAThreadTheNameIsLookedUpAllTheSame) {
+  const NoThreads limit;
+  EXPECT_THROW(std::thread([] {}).join(), std::system_error);
+  std::thread::id looked_up_by;
+  const auto found = resolve({"near", 9}, [&](const std::string&) -> Result<in_addr> {
+    looked_up_by = std::this_thread::get_id();
+    return in_addr{htonl(0x7F000003)};
+  });
+  ASSERT_TRUE(found) << found.error().text;
+  EXPECT_EQ(ntohl(found->sin_addr.s_addr), 0x7F000003u);
+  EXPECT_EQ(looked_up_by, std::this_thread::get_id());
+  sigset_t blocked;
+  ::pthread_sigmask(SIG_BLOCK, nullptr, &blocked);
+  EXPECT_EQ(sigismember(&blocked, SIGINT), 0);
 }
 
 }  // namespace
