@@ -60,12 +60,8 @@ Result<Socket> open_socket(int type) {
 /// When no program listens on a port of the ephemeral range, the system may choose that port for our end: TCP then connects the
 /// socket to itself.
 bool is_connected_to_itself(const Socket& socket) {
-  sockaddr_in ours{}, theirs{};
-  socklen_t size = sizeof ours;
-  if (::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&ours), &size) != 0) return false;
-  size = sizeof theirs;
-  if (::getpeername(socket.fd(), reinterpret_cast<sockaddr*>(&theirs), &size) != 0) return false;
-  return ours.sin_port == theirs.sin_port && ours.sin_addr.s_addr == theirs.sin_addr.s_addr;
+  const sockaddr_in ours = own_address(socket), theirs = peer_address(socket);
+  return ours.sin_port != 0 && ours.sin_port == theirs.sin_port && ours.sin_addr.s_addr == theirs.sin_addr.s_addr;
 }
 
 /// Tries to connect once, for at most `patience`. Returns 0 or the errno.
@@ -90,6 +86,20 @@ int try_connect(const Socket& socket, const sockaddr_in& address, std::chrono::m
 
 Socket::~Socket() {
   if (fd_ >= 0) ::close(fd_);
+}
+
+sockaddr_in own_address(const Socket& socket) {
+  sockaddr_in at{};
+  socklen_t size = sizeof at;
+  ::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&at), &size);
+  return at;
+}
+
+sockaddr_in peer_address(const Socket& socket) {
+  sockaddr_in at{};
+  socklen_t size = sizeof at;
+  ::getpeername(socket.fd(), reinterpret_cast<sockaddr*>(&at), &size);
+  return at;
 }
 
 std::string text_from(const Endpoint& endpoint) { return endpoint.host + ":" + std::to_string(endpoint.port); }

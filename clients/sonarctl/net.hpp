@@ -49,6 +49,10 @@ class Socket {
   int fd_ = -1;
 };
 
+/// The address of one end of a socket; port 0 if it has none.
+sockaddr_in own_address(const Socket& socket);
+sockaddr_in peer_address(const Socket& socket);
+
 /// Retries until `patience` is over, because the daemon may still be starting.
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience);
 /// Tries several addresses in turn. Returns the socket of the first that accepts, and its index.

@@ -39,20 +39,6 @@ milliseconds left_until(Clock::time_point deadline) {
   return std::max(0ms, std::chrono::ceil<milliseconds>(deadline - Clock::now()));
 }
 
-/// Returns the address of one end of a socket; the socket API requires the casts.
-sockaddr_in own_address(const Socket& socket) {
-  sockaddr_in at{};
-  socklen_t size = sizeof at;
-  ::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&at), &size);
-  return at;
-}
-sockaddr_in peer_address(const Socket& socket) {
-  sockaddr_in at{};
-  socklen_t size = sizeof at;
-  ::getpeername(socket.fd(), reinterpret_cast<sockaddr*>(&at), &size);
-  return at;
-}
-
 Wanted nothing_wanted() {
   Wanted nothing;
   nothing.as_it_is = true;
@@ -70,7 +56,7 @@ const Make* make_at(std::uint16_t port) {
 }
 
 Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, const Wanted& wanted, milliseconds patience,
-                                    bool keeps_messages) {
+                                    bool keeps_messages, Rejection* rejection) {
   const auto deadline = Clock::now() + patience;
   using Candidate = std::pair<const Make*, Endpoint>;
   std::vector<Candidate> streams, others;
@@ -84,7 +70,9 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
                            milliseconds within) -> Result<PingStream> {
     if (!host) return tl::unexpected(host.error());
     PingStream stream(*at.first, at.second, *std::move(host), keeps_messages);
-    if (Result<void> opened = stream.start(std::move(connected), within); !opened) return tl::unexpected(opened.error());
+    const Result<void> opened = stream.start(std::move(connected), within);
+    if (rejection != nullptr && stream.is_turned_away_) *rejection = {at.first, at.second};
+    if (!opened) return tl::unexpected(opened.error());
     return stream;
   };
   // A make without the requested settings is tried without them; the error about the settings is reported only if it answers.
@@ -191,6 +179,7 @@ Result<void> PingStream::start(std::optional<Socket> connected, milliseconds pat
     return failure(ErrorKind::unavailable,
                    place() + " does not answer as " + std::string(make_->title) + " does" + is_sonard_there);
   if (why->kind != ErrorKind::io) return tl::unexpected(*why);
+  is_turned_away_ = !has_answered_ && make_->ports.front().kind == Kind::tcp;
   return failure(ErrorKind::io,
                  place() + (has_answered_ ? " closed the connection before it took the settings: the daemon stopped, "
                                             "or closed it; see its log"

@@ -29,13 +29,20 @@ using protocol::Wanted;
 /// The make that usually uses this port, or null.
 const Make* make_at(std::uint16_t port);
 
+/// A sonar that accepted a connection, and closed it before it answered.
+struct Rejection {
+  const Make* make = nullptr;
+  Endpoint at;
+};
+
 class PingStream {
  public:
   /// Connects and opens the conversation. `make`: null = the first make that answers at its usual port. `patience`: for the
   /// connection and for answers. Errors: usage (settings that the sonar does not have), io (closed), unavailable (no answer),
-  /// bad_data (another service). `keeps_messages`: for Item::messages.
+  /// bad_data (another service). `keeps_messages`: for Item::messages. `rejection`: set if
+  /// the sonar closed the connection before it answered.
   static Result<PingStream> open(const Endpoint& device, const Make* make, const Wanted& wanted,
-                                 std::chrono::milliseconds patience, bool keeps_messages = false);
+                                 std::chrono::milliseconds patience, bool keeps_messages = false, Rejection* rejection = nullptr);
   PingStream(PingStream&&) = default;
   ~PingStream();
 
@@ -97,6 +104,7 @@ class PingStream {
   std::deque<Item> items_;                            // items that next() has not returned yet
   std::optional<Error> ended_;                        // set when the conversation has ended; empty text: the sonar closed it
   bool has_answered_ = false;                         // at the first port
+  bool is_turned_away_ = false;                       // the sonar closed the connection before it answered
   bool is_started_ = false;                           // the host must send what on_leave() returns
   std::ofstream record_;
   bool keeps_ = false;

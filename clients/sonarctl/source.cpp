@@ -107,20 +107,18 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
     const Make& usual = make != nullptr ? *make : protocol::makes().front();
     return observe(source, {device.host, device.port != 0 ? device.port : usual.ports.front().number}, usual);
   }
-  auto stream =
-      PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s), source.keeps_messages);
+  Rejection rejection;
+  auto stream = PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s), source.keeps_messages,
+                                 &rejection);
   const auto now = std::chrono::steady_clock::now();
   if (stream && !stream->is_rejected(first_byte_within)) return OpenedStream{*std::move(stream), now};
   std::string why = "the device closed the connection before a ping arrived: another client may be connected (clients.max)";
   if (!stream) {
     // A host that waits for an answer before it requests pings notices itself that the sonar closes the connection.
-    const bool is_rejected = stream.error().kind == ErrorKind::io && interrupted == 0 && make != nullptr &&
-                             make->ports.front().kind == protocol::HostPort::Kind::tcp;
-    if (!is_rejected) return tl::unexpected(stream.error());
+    if (rejection.make == nullptr || interrupted != 0) return tl::unexpected(stream.error());
     why = stream.error().text;
   }
-  auto observed = stream ? observe(source, stream->device(), stream->make())
-                         : observe(source, {device.host, device.port != 0 ? device.port : make->ports.front().number}, *make);
+  auto observed = stream ? observe(source, stream->device(), stream->make()) : observe(source, rejection.at, *rejection.make);
   if (observed) return observed;
   return failure(ErrorKind::io, why + "; connecting as an observer failed too: " + observed.error().text);
 }

@@ -73,7 +73,7 @@ class TurnCount {
   }
 
   std::optional<Heading> last_;
-  Heading first_;  // of the poses that continue each other
+  Heading first_;  // the first of the poses that continue each other
   bool begins_count_ = false;
   double low_rad_ = 0, high_rad_ = 0;
 };

@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -385,6 +386,30 @@ class Tools(unittest.TestCase):
                 self.assertNotIn("refused", daemon.log(), "an Omniscan and an S500 have the same port")
                 of_many = profile != "surveyor-240"
                 self.assertEqual(bool(re.search(r"the picture has \d+ of \d\d\d scan lines", viewed.stderr)), of_many, viewed.stderr)
+
+
+    def test_sonarctl_looks_on_beside_a_driver(self):
+        with Sonard(profile="omniscan-450", mount=SIDE) as daemon, socket.create_connection((daemon.address, OMNISCAN)) as driver:
+            driver.sendall(side_scan(1))
+            reads = threading.Thread(target=self.read_until_closed, args=(driver,))
+            reads.start()
+            try:
+                for words in ((), ("--make", "omniscan450")):
+                    with self.subTest(words=words):
+                        listened = daemon.ctl("listen", "--pings", 2, *words, "--control", f"{daemon.address}:14770")
+                        self.assertEqual(listened.returncode, 0, listened.stderr)
+                        self.assertIn("as an observer", listened.stderr)
+            finally:
+                driver.shutdown(socket.SHUT_RDWR)
+                reads.join(20)
+
+    @staticmethod
+    def read_until_closed(connection):
+        try:
+            while connection.recv(65536):
+                pass
+        except OSError:
+            pass
 
 
 @unittest.skipIf(shark.why_not(), shark.why_not())

@@ -193,6 +193,30 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
   EXPECT_THAT(named.error().text, HasSubstr("is not a Sonar 3D-15"));
 }
 
+/// The client then may ask for the sonar's address for observers.
+TEST(Search, NamesTheSonarThatClosesTheConnectionBeforeItAnswers) {
+  for (const bool answers : {false, true}) {
+    SCOPED_TRACE(answers);
+    const Server full(find_make("omniscan450")->ports.front().number, [answers](const Socket& client) {
+      std::array<std::byte, 1024> request;
+      const std::array first{std::byte{'B'}};  // a message that never ends
+      if (!answers) return;
+      static_cast<void>(read_some(client, request, 60s));
+      static_cast<void>(write_all(client, first));
+    });
+    for (const Make* const make : {static_cast<const Make*>(nullptr), find_make("omniscan450")}) {
+      Rejection rejection;
+      const auto closed = PingStream::open({address, 0}, make, {}, 60s, false, &rejection);
+      ASSERT_FALSE(closed);
+      EXPECT_EQ(closed.error().kind, ErrorKind::io) << closed.error().text;
+      EXPECT_EQ(rejection.make != nullptr, !answers) << closed.error().text;
+      if (rejection.make == nullptr) continue;
+      EXPECT_EQ(rejection.make->name(), "omniscan450");
+      EXPECT_EQ(text_from(rejection.at), address + ":51200");
+    }
+  }
+}
+
 /// The time limit is longer than the test may run.
 TEST(PingStream, AByteAtAnotherPortShowsThatTheSonarDoesNotReject) {
   std::array<int, 2> first{}, other{};
