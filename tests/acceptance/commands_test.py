@@ -171,18 +171,14 @@ class Mistakes(unittest.TestCase):
             return run("bash", "-c", f"{limit}; exec {SONARD} run --demo")
 
         self.expect(short_of("ulimit -v 200000"), 69, "memory")
-        # Below, the dynamic loader ends the program. From 290 MB on, the ray tracer starts its threads, and needs some MB for each.
-        for kib in (*range(80_000, 290_000, 30_000), *range(290_000, 350_000, 2_000), 400_000):
-            for program, *words in ((SONARD, "check", ROOT / "scenes/sonard.yaml"), (SONARCTL, "scene", "check", ROOT / "scenes/demo.yaml")):
+        # Where memory does not suffice for the libraries, the dynamic loader ends the program. From 290 MB on, the ray tracer starts
+        # its threads, and needs some MB for each.
+        for program, *words in ((SONARD, "check", ROOT / "scenes/sonard.yaml"), (SONARCTL, "scene", "check", ROOT / "scenes/demo.yaml")):
+            for kib in (*range(80_000, 290_000, 30_000), *range(290_000, 350_000, 6_000), 400_000):
                 result = run("bash", "-c", f"ulimit -v {kib}; exec \"$@\"", "-", program, *words)
                 with self.subTest(kib=kib, program=program.name):
-                    if result.returncode != 0:
+                    if result.returncode not in (0, 127):
                         self.expect(result, 69, "memory", "ulimit -v")
-        with tempfile.TemporaryDirectory() as folder:
-            words = (SONARD, "dataset", ROOT / "scenes/datasets/mines.yaml", "--out", folder, "--quiet")
-            for kib in range(84_000, 100_000, 2_000):
-                with self.subTest(kib=kib, program="dataset"):
-                    self.expect(run("bash", "-c", f"ulimit -v {kib}; exec \"$@\"", "-", *words), 69, "memory", "ulimit -v")
         for kib in (64, 256, 1023):
             for program, *words in ((SONARD, "run", "--demo"), (SONARD, "check", "--demo"), (SONARCTL, "--version"),
                                     (SONARCTL, "scene", "check", "demo.yaml")):
