@@ -5,12 +5,8 @@
 #include <cstdlib>
 #include <exception>
 #include <new>
-#include <string_view>
-#include <system_error>
 
 #include <unistd.h>
-
-#include <boost/system/system_error.hpp>
 
 #include "core/base/stack_limit.hpp"
 #include "core/base/standard_streams.hpp"
@@ -22,6 +18,7 @@
 #include "daemon/commands/render/render_command.hpp"
 #include "daemon/commands/run/run_command.hpp"
 #include "daemon/server/system/log.hpp"
+#include "daemon/server/system/shortage.hpp"
 
 namespace sonar {
 namespace {
@@ -37,30 +34,14 @@ int report_error(const Error& error, bool json) {
   return exit_code(error.kind);
 }
 
-/// Returns whether an exception that std::thread or Boost threw means that no more threads can be started. This has the same
-/// code if the limit of threads is reached and if the memory of a stack is missing.
-bool is_short_of_threads(const std::exception& e) {
-  if (std::string_view(e.what()).find("pthread_create") != std::string_view::npos) return true;  // a text of Embree
-  if (const auto* error = dynamic_cast<const std::system_error*>(&e))
-    return error->code() == std::errc::resource_unavailable_try_again;
-  const auto* error = dynamic_cast<const boost::system::system_error*>(&e);
-  return error != nullptr && error->code() == boost::system::errc::resource_unavailable_try_again;
-}
-
-constexpr const char* no_memory =
-    "not enough memory; use a smaller scene, or raise the limits of memory (ulimit -v, LimitAS=, MemoryMax=)";
-constexpr const char* no_thread =
-    "cannot start a thread: allow this user or service more threads (ulimit -u, TasksMax=) or more memory (ulimit -v, LimitAS=), "
-    "whichever is limited";
-
 /// Called for an exception that no caller can catch, in a thread of a library, and for a running thread without owner. Embree
 /// leaves one behind if it cannot start all of its threads.
 [[noreturn]] void end_at_once() {
-  const char* why = no_thread;
+  const char* why = not_enough_threads;
   try {
     if (const std::exception_ptr e = std::current_exception()) std::rethrow_exception(e);
   } catch (const std::bad_alloc&) {
-    why = no_memory;
+    why = not_enough_memory;
   } catch (const std::exception& e) {
     if (!is_short_of_threads(e)) why = nullptr;
   } catch (...) {
@@ -112,9 +93,10 @@ int main(int argc, char** argv) {
     const bool is_lost = !printed && *code == 0 && !std::holds_alternative<sonar::RunCommand>(command);  // that writes a log
     return is_lost ? sonar::report_error(printed.error(), json) : *code;
   } catch (const std::bad_alloc&) {
-    return sonar::report_error({sonar::ErrorKind::unavailable, sonar::no_memory}, json);
+    return sonar::report_error({sonar::ErrorKind::unavailable, sonar::not_enough_memory}, json);
   } catch (const std::exception& e) {
-    if (sonar::is_short_of_threads(e)) return sonar::report_error({sonar::ErrorKind::unavailable, sonar::no_thread}, json);
+    if (sonar::is_short_of_threads(e))
+      return sonar::report_error({sonar::ErrorKind::unavailable, sonar::not_enough_threads}, json);
     return sonar::report_error({sonar::ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)"}, json);
   }
 }

@@ -14,6 +14,7 @@
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/config/scene_file.hpp"
 #include "daemon/server/engine/start_engine.hpp"
+#include "daemon/server/system/shortage.hpp"
 #include "tests/bench/findings.hpp"
 #include "tests/bench/parts.hpp"
 #include "tests/bench/ratios.hpp"
@@ -261,9 +262,9 @@ int main(int argc, char** argv) {
   try {
     return sonar::bench::parse_and_run(argc, argv);
   } catch (const std::runtime_error& e) {  // the device was lost, or the ray tracer cannot start
-    return sonar::bench::complain({ErrorKind::unavailable, e.what()});
+    return sonar::bench::complain({ErrorKind::unavailable, sonar::is_short_of_threads(e) ? sonar::not_enough_threads : e.what()});
   } catch (const std::bad_alloc&) {
-    return sonar::bench::complain({ErrorKind::unavailable, "not enough memory; use a smaller scene or free some"});
+    return sonar::bench::complain({ErrorKind::unavailable, sonar::not_enough_memory});
   } catch (const std::exception& e) {
     return sonar::bench::complain({ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)"});
   }

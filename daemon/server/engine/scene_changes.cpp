@@ -7,6 +7,8 @@
 #include <new>
 #include <utility>
 
+#include "daemon/server/system/shortage.hpp"
+
 namespace sonar {
 
 SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePointer scene, EngineFactory make_engine, int nice_by,
@@ -92,8 +94,10 @@ auto caught(const Work& work) -> decltype(work()) {
   try {
     return work();
   } catch (const std::bad_alloc&) {
-    return failure(ErrorKind::unavailable, "not enough memory for the changed scene; make it smaller or free memory");
+    return failure(ErrorKind::unavailable, std::string("cannot change the scene: ") + not_enough_memory);
   } catch (const std::exception& e) {
+    if (is_short_of_threads(e))
+      return failure(ErrorKind::unavailable, std::string("cannot change the scene: ") + not_enough_threads);
     return failure(ErrorKind::bug, std::string(e.what()) + " (this is a bug, please report it)");
   }
 }

@@ -6,6 +6,7 @@
 
 #include "core/base/memory_left.hpp"
 #include "core/scene/ray_scene.hpp"
+#include "daemon/server/system/shortage.hpp"
 
 namespace sonar {
 
@@ -32,9 +33,9 @@ Result<std::unique_ptr<PingEngine>> start_engine(const EngineFactory& make, std:
   try {
     return make(std::move(scene));
   } catch (const std::bad_alloc&) {
-    return failure(ErrorKind::unavailable, where + "not enough memory; use a smaller scene or free some");
+    return failure(ErrorKind::unavailable, where + not_enough_memory);
   } catch (const std::runtime_error& e) {
-    return failure(ErrorKind::unavailable, where + e.what());
+    return failure(ErrorKind::unavailable, where + (is_short_of_threads(e) ? not_enough_threads : e.what()));
   }
 }
 

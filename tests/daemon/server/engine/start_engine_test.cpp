@@ -7,6 +7,7 @@
 
 #include <new>
 #include <stdexcept>
+#include <system_error>
 
 namespace sonar {
 namespace {
@@ -43,7 +44,14 @@ TEST(StartEngine, WhatTheMachineCannotDoIs69AndSaysWhy) {
   const auto memory = start_engine(throwing(std::bad_alloc()), harbour());
   ASSERT_FALSE(memory);
   EXPECT_EQ(exit_code(memory.error().kind), 69);
-  EXPECT_THAT(memory.error().text, HasSubstr("not enough memory"));
+  EXPECT_THAT(memory.error().text, HasSubstr("not enough memory; use a smaller scene, or raise the limits of memory (ulimit -v"));
+  const auto again = std::make_error_code(std::errc::resource_unavailable_try_again);
+  for (const auto& make : {throwing(std::runtime_error("pthread_create failed")), throwing(std::system_error(again))}) {
+    const auto thread = start_engine(make, harbour());
+    ASSERT_FALSE(thread);
+    EXPECT_EQ(exit_code(thread.error().kind), 69);
+    EXPECT_THAT(thread.error().text, HasSubstr("scene harbour: cannot start a thread: allow this user or service more threads"));
+  }
 }
 
 TEST(StartEngine, OurOwnMistakesAreNotExplainedAway) {
