@@ -6,6 +6,7 @@
 #include <exception>
 #include <new>
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "core/base/stack_limit.hpp"
@@ -35,9 +36,14 @@ int report_error(const Error& error, bool json) {
 }
 
 /// Called for an exception that no caller can catch, in a thread of a library, and for a running thread without owner. Embree
-/// leaves one behind if it cannot start all of its threads.
+/// leaves one behind if a limit on memory or threads does not let it start all of its threads.
 [[noreturn]] void end_at_once() {
-  const char* why = not_enough_threads;
+  constexpr rlim_t few_threads = 1024;
+  rlimit memory{RLIM_INFINITY, RLIM_INFINITY}, threads{RLIM_INFINITY, RLIM_INFINITY};
+  ::getrlimit(RLIMIT_AS, &memory);
+  ::getrlimit(RLIMIT_NPROC, &threads);
+  const bool is_limited = memory.rlim_cur != RLIM_INFINITY || threads.rlim_cur < few_threads;
+  const char* why = is_limited ? not_enough_threads : nullptr;
   try {
     if (const std::exception_ptr e = std::current_exception()) std::rethrow_exception(e);
   } catch (const std::bad_alloc&) {

@@ -87,7 +87,7 @@ TEST_F(ReplayOfDvl, ADriverSelectsTheSentences) {
 }
 
 /// The same as an MCAP file that states a profile, five messages a second.
-Bytes mcap(const std::string& profile, std::initializer_list<std::string> lines) {
+Bytes mcap_file(const std::string& profile, std::initializer_list<std::string> lines) {
   Bytes file;
   recording::McapSession writer(recording::sink_into(file), "dvl", *protocol::find_make("dvl"), profile);
   Time at(std::chrono::seconds(1'700'000'000));
@@ -102,7 +102,7 @@ Bytes mcap(const std::string& profile, std::initializer_list<std::string> lines)
 /// The conversations of the device report a position five times a second; the recording lasts longer.
 TEST_F(ReplayOfDvl, ItSendsNoPositionsBesideTheRecordedOnes) {
   const auto lines = {velocity, velocity, velocity, position};
-  for (const Bytes& file : {dump(lines), mcap("dvl-a50", lines), mcap("dvl-a125", lines)}) {
+  for (const Bytes& file : {dump(lines), mcap_file("dvl-a50", lines), mcap_file("dvl-a125", lines)}) {
     Replay replay(file, 5.0);
     Tcp json(dvl::tcp_port);
     EXPECT_EQ(text_of(json.read_to_end()), velocity + velocity + velocity + position);
@@ -112,7 +112,7 @@ TEST_F(ReplayOfDvl, ItSendsNoPositionsBesideTheRecordedOnes) {
 TEST_F(ReplayOfDvl, ItIsTheProductThatTheRecordingStates) {
   for (const auto& [profile, name] : {std::pair{"dvl-a50", "DVL A50"}, std::pair{"dvl-a125", "DVL A125"}}) {
     std::promise<void> goes_on_now;
-    Replay replay(mcap(profile, {velocity}), 1000, goes_on_now.get_future().share());
+    Replay replay(mcap_file(profile, {velocity}), 1000, goes_on_now.get_future().share());
     Tcp json(dvl::tcp_port);
     EXPECT_NE(answer(json, R"({"command":"get_version_info"})", "}\r\n").find(name), std::string::npos) << profile;
     goes_on_now.set_value();
