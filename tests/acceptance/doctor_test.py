@@ -106,7 +106,7 @@ class Doctor(unittest.TestCase):
             output = command.communicate(timeout=60)[0]
             client.close()
         findings = {f["check"]: [f] for f in json.loads(output)["findings"]}
-        self.expect(findings, "ping", "fail", "not messages of an Oculus", f"pid {os.getpid()}")
+        self.expect(findings, "ping", "fail", "in place of messages of an Oculus", f"pid {os.getpid()}")
         self.expect(findings, "status", "warn", "cannot listen on udp 52102, held without address reuse by", f"pid {os.getpid()}")
         self.assertEqual(command.returncode, 69)
 

@@ -236,7 +236,7 @@ TEST(SceneChange, AFailureChangesNothing) {
   EXPECT_THAT(missing.text, HasSubstr("no scene file \"no/such.yaml\"; looked in"));
   const OperationResult no_memory = daemon.ask(added("buoy"));
   EXPECT_EQ(no_memory.code, Code::failed);
-  EXPECT_THAT(no_memory.text, HasSubstr("cannot change the scene: not enough memory; use a smaller scene, or raise"));
+  EXPECT_THAT(no_memory.text, HasSubstr("not enough memory; use a smaller scene, or raise"));
   EXPECT_EQ(objects_in(daemon.status()), 2);
   EXPECT_THAT(daemon.status().scene(), HasSubstr("scene.yaml"));
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
