@@ -271,7 +271,7 @@ class Pages(PageChecks, unittest.TestCase):
                 viewer.greeted().subscribe("/front/fan")
                 page = self.opened(self.browser.open(f"http://{HTTP}:8088/?test=720", 1100, 700, script=script))
                 shown(page)
-                page.wait("sonardTest.facts.pictures.has('front')")
+                page.wait("sonardTest.facts.pictures.has('front') && sonardTest.fan.per_mille === sonardTest.fan.shades.per_mille")
                 page.run("sonardTest.fan.useMap('gray')")
                 fans = {}
 
@@ -307,7 +307,7 @@ class Pages(PageChecks, unittest.TestCase):
             with self.subTest(demo=maker), demo(maker):
                 page = self.opened(self.browser.open(f"http://{HTTP}:8088/", 1600, 1000, script=NOTE_WORDS + ";" + WITHOUT_WEBGL))
                 shown(page)
-                self.assertEqual(page.wait(LABELS_INSIDE), "none")
+                page.wait(LABELS_INSIDE + " === 'none'")  # the first words may be of a smaller picture
                 page.close()
 
     def test_a_setting_by_keys_and_a_refusal_beside_it(self):

@@ -92,9 +92,10 @@ export class Fan {
     this.redraw();
   }
 
-  /// Shows a new ping; null if none was received yet.
+  /// Shows a new ping, or the present one again if its shades have become known; null if none was received yet.
   show(ping) {
-    if (this.frozen || ping === this.ping) return;
+    const again = ping === this.ping;
+    if (this.frozen || (again && (!this.samples || this.per_mille === this.shades.per_mille))) return;
     this.ping = ping;
     if (!ping) {
       this.polar = null;
@@ -110,11 +111,12 @@ export class Fan {
     const before = this.polar;
     this.polar = polarOf(ping.image, geometry);
     if (!this.samples || before?.range_m !== this.polar.range_m || before?.azimuth_rad.length !== this.polar.azimuth_rad.length) this.layout = null;
-    const { samples, full_scale } = samplesOf(ping.image, this.shades.per_mille);
+    this.per_mille = this.shades.per_mille;
+    const { samples, full_scale } = samplesOf(ping.image, this.per_mille);
     [this.samples, this.full_scale] = [samples, full_scale];
     this.painter.load(ping.image, samples, this.table, full_scale);
     this.paint();
-    this.facts.pingDrawn();
+    if (!again) this.facts.pingDrawn();
   }
 
   showDrawn({ image, about }) {
