@@ -241,7 +241,7 @@ TEST(HostByDatagrams, HasLeftAtOnceAndLeavesNothing) {
     connect(5);
     EXPECT_EQ(sonar.connections().clients(), 2u);
     EXPECT_EQ(sonar.connections().find(3)->state, Connection::State::leaving) << "the oldest that has not left";
-    for (const ConnectionId id : {1, 2, 3}) sonar.on_closed(id, "it has left", talk.time.now);
+    for (const ConnectionId id : {1ul, 2ul, 3ul}) sonar.on_closed(id, "it has left", talk.time.now);
     EXPECT_EQ(sonar.connections().clients(), 2u);
   }
 }
