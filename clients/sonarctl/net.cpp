@@ -21,15 +21,12 @@
 #include <thread>
 
 namespace sonar::clients {
-namespace {
-
-constexpr std::size_t longest_answer = 65536;
-
-}  // namespace
 
 std::atomic<int> interrupted = 0;
 
 namespace {
+
+constexpr std::size_t longest_answer = 65536;
 
 /// The socket interface requires this cast.
 const sockaddr* generic(const sockaddr_in& address) { return reinterpret_cast<const sockaddr*>(&address); }

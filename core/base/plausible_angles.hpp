@@ -40,7 +40,7 @@ class TurnCount {
   bool add(double yaw_rad, Time at) {
     const bool goes_on = last_ && is_turn(yaw_rad, at);
     if (!goes_on) {
-      constexpr double wrap = 360, about = 10;  // a jump of so much is the wrap of a heading in degrees
+      constexpr double wrap = 360, about = 10;  // a jump of this size is the wrap of a heading in degrees
       begins_count_ = std::abs(yaw_rad) <= 2 * pi && !(last_ && std::abs(std::abs(yaw_rad - last_->yaw_rad) - wrap) < about);
       first_ = {yaw_rad, at};
       low_rad_ = high_rad_ = yaw_rad;

@@ -16,8 +16,8 @@ struct Outcome {
   Json result = nullptr;
   std::string error = {};
 };
-/// Carries out a command except trigger_ping, which is part of the session; commands that set values change `settings`. nullopt:
-/// there is no such command.
+/// Carries out a command except trigger_ping, which is part of the session; commands that set values change `settings`. Returns
+/// nullopt if there is no such command.
 std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
                                  Time now, Settings& settings);
 /// The answer to get_version_info. The version names sonard, so that a log shows that the device was emulated.
