@@ -44,27 +44,6 @@ double absorption_db_per_m(const Water& water, double depth_m, double frequency_
   return (salts + a3 * p3 * f * f) * 1e-3;
 }
 
-// Ainslie & McColm 1998, JASA 103(3). f in kHz, z in km, dB/km.
-double absorption_ainslie_mccolm_db_per_m(const Water& water, double depth_m, double frequency_hz) {
-  const double t = water.temperature_c, s = std::max(water.salinity_psu, 0.0), z_km = std::max(depth_m, 0.0) * 1e-3;
-  const double f = frequency_hz * 1e-3;
-  double salts = 0;
-  if (s > 0) {
-    const double f1 = 0.78 * std::sqrt(s / 35) * std::exp(t / 26);
-    const double f2 = 42 * std::exp(t / 17);
-    salts = 0.106 * relaxation(f1, f) * std::exp((water.ph - 8) / 0.56) +
-            0.52 * (1 + t / 43) * (s / 35) * relaxation(f2, f) * std::exp(-z_km / 6);
-  }
-  return (salts + 0.00049 * f * f * std::exp(-(t / 27 + z_km / 17))) * 1e-3;
-}
-
-// Mackenzie 1981, JASA 70(3).
-double sound_speed_mackenzie_mps(double temperature_c, double salinity_psu, double depth_m) {
-  const double t = temperature_c, s = salinity_psu - 35, d = depth_m;
-  return polynomial(t, {1448.96, 4.591, -5.304e-2, 2.374e-4}) + 1.340 * s + 1.630e-2 * d + 1.675e-7 * d * d - 1.025e-2 * t * s -
-         7.139e-13 * t * d * d * d;
-}
-
 // Chen & Millero 1977 as printed in UNESCO technical papers in marine science 44 (1983); temperatures T68, pressure in bar.
 double sound_speed_unesco_mps(double temperature_c, double salinity_psu, double pressure_bar) {
   const double t = temperature_c, s = std::max(salinity_psu, 0.0), p = pressure_bar;
@@ -79,11 +58,6 @@ double sound_speed_unesco_mps(double temperature_c, double salinity_psu, double 
   const double b = -1.922e-2 - 4.42e-5 * t + (7.3637e-5 + 1.7945e-7 * t) * p;
   const double d = 1.727e-3 - 7.9836e-6 * p;
   return polynomial(p, {c0, c1, c2, c3}) + polynomial(p, {a0, a1, a2, a3}) * s + b * s * std::sqrt(s) + d * s * s;
-}
-
-// Bilaniuk & Wong 1993, JASA 93(3), corrected 1996, JASA 99(5): the 148-point equation.
-double sound_speed_fresh_mps(double temperature_c) {
-  return polynomial(temperature_c, {1.40238744e3, 5.03836171, -5.81172916e-2, 3.34638117e-4, -1.48259672e-6, 3.16585020e-9});
 }
 
 // Millero & Poisson 1981 (EOS-80), one atmosphere.

@@ -18,14 +18,8 @@ constexpr bool operator==(const Water& a, const Water& b) {
 
 /// Francois & Garrison 1982. Frequency [Hz], depth [m]; one-way, dB/m.
 double absorption_db_per_m(const Water& water, double depth_m, double frequency_hz);
-/// Ainslie & McColm 1998, dB/m. Only for comparison with Francois & Garrison.
-double absorption_ainslie_mccolm_db_per_m(const Water& water, double depth_m, double frequency_hz);
-/// Mackenzie 1981. T 2..30 C, S 25..40, depth 0..8000 m.
-double sound_speed_mackenzie_mps(double temperature_c, double salinity_psu, double depth_m);
 /// Chen & Millero / UNESCO 1983. T 0..40 C, S 0..40, gauge pressure 0..1000 bar.
 double sound_speed_unesco_mps(double temperature_c, double salinity_psu, double pressure_bar);
-/// Bilaniuk & Wong, fit to 148 points: fresh water at the surface, 0..100 C.
-double sound_speed_fresh_mps(double temperature_c);
 /// Density from temperature and salinity [kg/m^3] (UNESCO EOS-80 at the surface).
 double density_kg_per_m3(double temperature_c, double salinity_psu);
 /// Absolute pressure [bar] at a depth: 1.013 + 0.0981 depth rho / 1000; depth below 0 counts as 0.

@@ -107,19 +107,4 @@ std::span<const HeadPreset> head_presets(std::string_view profile) {
   return c.presets[static_cast<std::size_t>(it - c.models.begin())];
 }
 
-PingSettings p900_90_preset() {
-  constexpr int rows = 394;  // P25: 10 m
-  PingSettings settings;
-  settings.beam_count = 512;
-  settings.range_bin_count = rows;
-  settings.range_bin_m = inch;
-  settings.range_m = rows * inch;
-  settings.pulse_width_m = static_cast<float>(inch);  // DS: equal to the row
-  settings.rate_hz = 15;
-  settings.gain_db = 48;
-  settings.format.bits = 16;  // unknown: BlueView images carry 16-bit samples
-  settings.format.max_code = 65535;
-  return settings;
-}
-
 }  // namespace sonar::blueview

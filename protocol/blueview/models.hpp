@@ -6,7 +6,6 @@
 #include <span>
 #include <string_view>
 
-#include "core/sonar/ping_settings.hpp"
 #include "core/sonar/sonar_model.hpp"
 
 namespace sonar::blueview {
@@ -22,8 +21,5 @@ struct HeadPreset {
 std::span<const std::shared_ptr<const SonarModel>> models();
 /// One preset per frequency mode of the model.
 std::span<const HeadPreset> head_presets(std::string_view profile);
-
-/// The ping of benchmark P1 (docs/benchmarks.md): 10 m in 394 rows of 25.4 mm, 512 beams, pulse 25.4 mm.
-PingSettings p900_90_preset();
 
 }  // namespace sonar::blueview

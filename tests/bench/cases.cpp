@@ -26,8 +26,25 @@ BenchCase oculus(std::string name, std::string description, int mode, double ran
   return c;
 }
 
+/// The P900-90 at 10 m; the pulse is as long as a row.
+PingSettings p900_90_preset() {
+  constexpr double inch_m = 0.0254;
+  constexpr int rows = 394;
+  PingSettings settings;
+  settings.beam_count = 512;
+  settings.range_bin_count = rows;
+  settings.range_bin_m = inch_m;
+  settings.range_m = rows * inch_m;
+  settings.pulse_width_m = static_cast<float>(inch_m);
+  settings.rate_hz = 15;
+  settings.gain_db = 48;
+  settings.format.bits = 16;
+  settings.format.max_code = 65535;
+  return settings;
+}
+
 BenchCase p900() {
-  BenchCase c{"P1", "P900-90, 10 m, 394 rows", {}, blueview::p900_90_preset(), false};
+  BenchCase c{"P1", "P900-90, 10 m, 394 rows", {}, p900_90_preset(), false};
   c.profile.model = blueview::models().front();
   return c;
 }
