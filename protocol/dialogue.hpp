@@ -106,8 +106,7 @@ class Dialogue {
   /// Called when a ping is ready. `made_with`: the settings of the ping (null: the initial ones); `shared_bytes`: its framed
   /// size. In most protocols every client gets every ping; in protocols with requests for single pings, only the clients that
   /// requested it. It calls on_ping_queued() itself if it delivers something.
-  virtual Delivery on_ping(const VendorSettings* made_with, std::size_t shared_bytes, Time now) {
-    static_cast<void>(made_with), static_cast<void>(shared_bytes);
+  virtual Delivery on_ping(const VendorSettings* /*made_with*/, std::size_t /*shared_bytes*/, Time now) {
     on_ping_queued(now);
     return {{Bytes{}}, {}};
   }

@@ -87,21 +87,12 @@ class Host {
   /// Reads a piece of a stream, of any size, or a datagram, with any content. It never throws and never keeps bytes without
   /// bound.
   virtual HostActions on_bytes(std::size_t port, BytesView received, Time now) = 0;
-  virtual HostActions on_reply(const ResourceReply& reply, Time now) {
-    static_cast<void>(reply), static_cast<void>(now);
-    return {};
-  }
+  virtual HostActions on_reply(const ResourceReply& /*reply*/, Time /*now*/) { return {}; }
   /// Sends keep-alives and repeats requests. Called at or after next_tick().
-  virtual HostActions on_tick(Time now) {
-    static_cast<void>(now);
-    return {};
-  }
+  virtual HostActions on_tick(Time /*now*/) { return {}; }
   virtual std::optional<Time> next_tick() const { return std::nullopt; }
   /// Called whenever the caller waits for a ping. Hosts that must request each ping then do so.
-  virtual HostActions on_demand(Time now) {
-    static_cast<void>(now);
-    return {};
-  }
+  virtual HostActions on_demand(Time /*now*/) { return {}; }
   /// Called before the ports are closed.
   virtual HostActions on_leave() { return {}; }
 

@@ -76,8 +76,7 @@ class Vendor {
   virtual int default_max_clients() const = 0;
   /// The model that a device with these (complete) options emulates. Called once, when its configuration is read.
   virtual Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
-                                                          const OptionValues& options) const {
-    static_cast<void>(options);
+                                                          const OptionValues& /*options*/) const {
     return model;
   }
   /// The settings before any client has sent settings (the device's stored configuration).
@@ -87,94 +86,65 @@ class Vendor {
   virtual Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const = 0;
   /// The present gain, in the unit of SettingsOverride::gain_percent: per cent of the range that a client can set.
   virtual double gain_percent(const DeviceState& device) const = 0;
-  virtual bool pings_before_first_request(const DeviceState& device) const {
-    static_cast<void>(device);
-    return false;
-  }
+  virtual bool pings_before_first_request(const DeviceState& /*device*/) const { return false; }
   /// Changes that the device makes itself after a ping, such as an automatic range. nullopt: no change.
-  virtual std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const {
-    static_cast<void>(ping), static_cast<void>(device);
+  virtual std::optional<ChangeSettings> after_ping(const Ping& /*ping*/, const DeviceState& /*device*/) const {
     return std::nullopt;
   }
   /// True if its sonars are range finders, which measure one distance with each ping.
   virtual bool measures_distance() const { return false; }
   /// The distance in a ping, as the device reports it. nullopt: the sonar is not a range finder.
-  virtual std::optional<Distance> distance_in(const Ping& ping) const {
-    static_cast<void>(ping);
-    return std::nullopt;
-  }
+  virtual std::optional<Distance> distance_in(const Ping& /*ping*/) const { return std::nullopt; }
   /// The request of a usual host for ping `number` (counted from 1) of a mechanical scan. nullopt: the sonar does not scan.
   struct ScanStep {
     RequestPing aim;
     PingSettings settings;
   };
-  virtual std::optional<ScanStep> scan_step(std::uint32_t number, const DeviceState& device) const {
-    static_cast<void>(number), static_cast<void>(device);
+  virtual std::optional<ScanStep> scan_step(std::uint32_t /*number*/, const DeviceState& /*device*/) const {
     return std::nullopt;
   }
   /// The beacon's datagram. Empty: the vendor has no beacon.
-  virtual Bytes beacon(const DeviceState& device, Time now) const {
-    static_cast<void>(device), static_cast<void>(now);
-    return {};
-  }
+  virtual Bytes beacon(const DeviceState& /*device*/, Time /*now*/) const { return {}; }
   /// Answers a datagram with any content at a port of kind udp_answer; each reply is one datagram to the sender.
-  virtual Reaction on_datagram(const Port& port, BytesView datagram, const DeviceState& device, Time now) const {
-    static_cast<void>(port), static_cast<void>(datagram), static_cast<void>(device), static_cast<void>(now);
+  virtual Reaction on_datagram(const Port& /*port*/, BytesView /*datagram*/, const DeviceState& /*device*/, Time /*now*/) const {
     return {};
   }
   /// Answers a request with any path, method and body at a port of kind http.
-  virtual ResourceReply on_http(const Port& port, const ResourceRequest& request, const DeviceState& device, Time now) const {
-    static_cast<void>(port), static_cast<void>(request), static_cast<void>(device), static_cast<void>(now);
+  virtual ResourceReply on_http(const Port& /*port*/, const ResourceRequest& /*request*/, const DeviceState& /*device*/,
+                                Time /*now*/) const {
     return {404, "not found\n", "text/plain"};
   }
   /// True if a datagram at a port of kind udp_dialogue comes from a host that speaks the protocol. Others are dropped, so that
   /// they neither open a dialogue nor take it over.
-  virtual bool is_request(const Port& port, BytesView datagram) const {
-    static_cast<void>(port), static_cast<void>(datagram);
-    return false;
-  }
+  virtual bool is_request(const Port& /*port*/, BytesView /*datagram*/) const { return false; }
   /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   virtual PingsBy pings_by() const { return PingsBy::stream; }
   /// Time at which the device sends a ping's messages, if it needs time to make them. nullopt: as soon as they are made.
-  virtual std::optional<Time> leaves_at(const Ping& ping, const DeviceState& device) const {
-    static_cast<void>(ping), static_cast<void>(device);
-    return std::nullopt;
-  }
+  virtual std::optional<Time> leaves_at(const Ping& /*ping*/, const DeviceState& /*device*/) const { return std::nullopt; }
   /// Encodes a ping under its settings (PingRequest::vendor_settings), for all connections, or those of the first of several TCP
   /// ports. Called once per ping. Null: its pings are datagrams, or the parts of several TCP ports together.
-  virtual std::shared_ptr<const Bytes> frame(const Ping& ping, const DeviceState& device) const {
-    static_cast<void>(ping), static_cast<void>(device);
-    return nullptr;
-  }
+  virtual std::shared_ptr<const Bytes> frame(const Ping& /*ping*/, const DeviceState& /*device*/) const { return nullptr; }
   /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.
   /// For a port of kind tcp_stream: the parts of frame(), between which the device pauses; with several such ports, the bytes
   /// of this port.
-  virtual std::vector<Bytes> datagrams(const Port& port, const Ping& ping, const DeviceState& device) const {
-    static_cast<void>(port), static_cast<void>(ping), static_cast<void>(device);
+  virtual std::vector<Bytes> datagrams(const Port& /*port*/, const Ping& /*ping*/, const DeviceState& /*device*/) const {
     return {};
   }
   /// The place of a field in a message; if `message` is empty, in the vendor's layout with the most fields. nullopt: the message
   /// has no such field or is too short.
-  virtual std::optional<Field> field(Part part, FieldName name, BytesView message) const {
-    static_cast<void>(part), static_cast<void>(name), static_cast<void>(message);
-    return {};
-  }
+  virtual std::optional<Field> field(Part /*part*/, FieldName /*name*/, BytesView /*message*/) const { return {}; }
   /// Replaces an integer without a fixed place in the message, such as a varint, by `change(integer)`. False: the message has
   /// no such integer or, if `message` is empty, no message of this kind has it.
-  virtual bool change_integer(Part part, FieldName name, const std::function<std::int64_t(std::int64_t)>& change,
-                              Bytes& message) const {
-    static_cast<void>(part), static_cast<void>(name), static_cast<void>(change), static_cast<void>(message);
+  virtual bool change_integer(Part /*part*/, FieldName /*name*/, const std::function<std::int64_t(std::int64_t)>& /*change*/,
+                              Bytes& /*message*/) const {
     return false;
   }
   /// Corrects the checksums of a ping whose fields were changed. `before`: the unchanged ping, of the same size.
-  virtual void reseal(BytesView before, Bytes& message) const { static_cast<void>(before), static_cast<void>(message); }
+  virtual void reseal(BytesView /*before*/, Bytes& /*message*/) const {}
   /// {offset, size} of a region of a ping. nullopt: the vendor has no such region, or the ping is too short. For an empty `ping`
   /// it is {0, 0} if the vendor has such a region.
-  virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region region, BytesView ping) const {
-    static_cast<void>(region), static_cast<void>(ping);
-    return {};
-  }
+  virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region /*region*/, BytesView /*ping*/) const { return {}; }
 };
 
 /// A sonar that sends its pings without a request, from power-up on, to every client of one TCP port.

@@ -77,11 +77,9 @@ class PingEngine {
   }
   /// Largest number of requests like these two that one run() computes faster than several runs. 1: a common run is not faster,
   /// or delays one of the two too much.
-  virtual std::size_t most_together(const PingRequest& a, const PingRequest& b) const {
-    return static_cast<void>(a), static_cast<void>(b), 1;
-  }
+  virtual std::size_t most_together(const PingRequest& /*a*/, const PingRequest& /*b*/) const { return 1; }
   /// Sets the interruption; null = none. Engines that cannot be interrupted ignore it. Must not be called during a ping.
-  virtual void set_interruption(Interruption* interruption) { static_cast<void>(interruption); }
+  virtual void set_interruption(Interruption* /*interruption*/) {}
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Statistics of the last ping.
   virtual PingStatistics statistics() const { return {}; }

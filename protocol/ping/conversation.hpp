@@ -41,10 +41,7 @@ class Conversation : public protocol::Dialogue {
   /// True if the message is sent with every ping and pings are enabled, so that the next ping answers the request for it.
   virtual bool comes_with_pings(Id) const { return false; }
   /// True if the product answers the request for this message itself.
-  virtual bool on_wanted(Id wanted, Time now, protocol::Reaction& reaction) {
-    static_cast<void>(wanted), static_cast<void>(now), static_cast<void>(reaction);
-    return false;
-  }
+  virtual bool on_wanted(Id /*wanted*/, Time /*now*/, protocol::Reaction& /*reaction*/) { return false; }
   /// Called when a host has set id_.
   virtual void on_new_id(protocol::Reaction&) {}
 

@@ -49,10 +49,7 @@ class PingHost : public protocol::Host {
   }
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
   /// True if the host sends another request in place of the refused one.
-  virtual bool on_nack(Id refused, protocol::HostActions&) {
-    static_cast<void>(refused);
-    return false;
-  }
+  virtual bool on_nack(Id /*refused*/, protocol::HostActions&) { return false; }
   virtual std::optional<protocol::HostPing> ping_from(const Frame& frame) = 0;
 
  private:
