@@ -4,7 +4,7 @@
 #include <array>
 #include <limits>
 
-#include "core/scene/ray_origin.hpp"
+#include "core/scene/extent.hpp"
 
 namespace sonar::cuda {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "core/base/load_step.hpp"
 #include "core/scene/embree_trees.hpp"
-#include "core/scene/ray_origin.hpp"
+#include "core/scene/extent.hpp"
 #include "core/scene/ray_scene.hpp"
 
 namespace sonar {

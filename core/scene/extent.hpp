@@ -44,4 +44,26 @@ Extent extent_of(const Mesh& mesh);
 inline constexpr double huge_mesh_m = 200;
 inline constexpr std::string_view huge_mesh_cure = "if the file is in centimetres or millimetres, set scale: 0.01 or 0.001";
 
+// The world position to which float coordinates of rays are relative. It is separate from RayScene, so that unchanged objects
+// keep exactly the same floats after a change of the scene.
+
+/// Scene::ray_origin if it is given, else the middle of all visible static objects, or of the moving ones if there are none.
+inline Vec3d ray_origin_of(const Scene& scene) {
+  if (scene.ray_origin) return *scene.ray_origin;
+  Extent fixed, all;
+  for (const Object& object : scene.objects) {
+    if (!object.visible) continue;
+    const Extent local = extent_of(*object.mesh);
+    if (local.empty()) continue;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3d p{corner & 1 ? local.high_m.x : local.low_m.x, corner & 2 ? local.high_m.y : local.low_m.y,
+                    corner & 4 ? local.high_m.z : local.low_m.z};
+      all.add(transform(object.in_world, p));
+      if (object.body < 0) fixed.add(transform(object.in_world, p));
+    }
+  }
+  if (!fixed.empty()) return fixed.centre_m();
+  return all.empty() ? Vec3d{} : all.centre_m();
+}
+
 }  // namespace sonar

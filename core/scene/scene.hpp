@@ -129,7 +129,7 @@ struct Scene {
   SeaSurface sea_surface;               // its mesh, if present, is one of the objects
   WaterColumn water_column;
   std::vector<OtherSonar> other_sonars;
-  std::optional<Vec3d> ray_origin;  // the origin to keep when a running scene is changed (core/scene/ray_origin.hpp)
+  std::optional<Vec3d> ray_origin;  // the origin to keep when a running scene is changed (core/scene/extent.hpp)
   std::vector<std::string> notes;   // sentences for the user about decisions of the loader
 
   /// Returns the pose of an object in its body, or in the world if it is static.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "core/scene/ray_origin.hpp"
+#include "core/scene/extent.hpp"
 #include "core/text/nearest.hpp"
 
 namespace sonar {
