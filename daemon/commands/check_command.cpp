@@ -1,4 +1,4 @@
-#include "daemon/commands/check_command.hpp"
+#include "daemon/commands/options/commands.hpp"
 
 #include <cstdio>
 

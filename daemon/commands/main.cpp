@@ -11,13 +11,7 @@
 
 #include "core/base/stack_limit.hpp"
 #include "core/base/standard_streams.hpp"
-#include "daemon/commands/check_command.hpp"
-#include "daemon/commands/dataset/dataset_command.hpp"
-#include "daemon/commands/farm/farm_command.hpp"
-#include "daemon/commands/farm/worker.hpp"
-#include "daemon/commands/options/command_line.hpp"
-#include "daemon/commands/render/render_command.hpp"
-#include "daemon/commands/run/run_command.hpp"
+#include "daemon/commands/options/commands.hpp"
 #include "daemon/server/system/log.hpp"
 #include "daemon/server/system/shortage.hpp"
 

@@ -1,4 +1,4 @@
-#include "daemon/commands/dataset/dataset_command.hpp"
+#include "daemon/commands/options/commands.hpp"
 
 #include <algorithm>
 #include <atomic>

@@ -1,4 +1,4 @@
-#include "daemon/commands/farm/farm_command.hpp"
+#include "daemon/commands/options/commands.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -16,6 +16,7 @@
 #include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/farm/farm_job.hpp"
+#include "daemon/commands/farm/queue.hpp"
 
 namespace sonar::farm {
 namespace {

@@ -1,4 +1,4 @@
-#include "daemon/commands/render/render_command.hpp"
+#include "daemon/commands/options/commands.hpp"
 
 #include <unistd.h>
 

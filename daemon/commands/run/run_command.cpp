@@ -1,4 +1,4 @@
-#include "daemon/commands/run/run_command.hpp"
+#include "daemon/commands/options/commands.hpp"
 
 #include <csignal>
 #include <cstdio>

@@ -13,8 +13,8 @@
 #include "core/base/regular_file.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/text/printable.hpp"
-#include "daemon/commands/farm/farm_command.hpp"
-#include "daemon/commands/farm/worker.hpp"
+#include "daemon/commands/farm/queue.hpp"
+#include "daemon/commands/options/commands.hpp"
 
 namespace sonar::farm {
 namespace {
