@@ -8,14 +8,12 @@
 #include <set>
 #include <stdexcept>
 
-#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/cpu/simulate.hpp"
 #include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/sonar/range_image.hpp"
 #include "cuda/prepare_ping.hpp"
 #include "cuda/steps.hpp"
-#include "cuda/take_results.hpp"
 
 namespace sonar::cuda {
 namespace {

@@ -1,7 +1,5 @@
 #include "protocol/host.hpp"
 
-#include <algorithm>
-
 namespace sonar::protocol {
 
 // A setting that a make does not have is an error. If it were ignored, a user would assume that the ping was made with it.

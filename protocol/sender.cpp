@@ -1,6 +1,5 @@
 #include "protocol/sender.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace sonar::recording {

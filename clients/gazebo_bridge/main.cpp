@@ -9,8 +9,7 @@
 
 #include "clients/gazebo_bridge/model_poses.hpp"
 #include "clients/sonarctl/net.hpp"
-#include "core/base/stack_limit.hpp"
-#include "core/base/standard_streams.hpp"
+#include "core/base/program_start.hpp"
 
 namespace sonar::clients {
 namespace {

@@ -1,4 +1,4 @@
-#include "clients/scene_tools/fuel.hpp"
+#include "clients/scene_tools/resource_paths.hpp"
 
 #include <algorithm>
 #include <cstdlib>

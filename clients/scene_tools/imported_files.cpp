@@ -6,7 +6,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "clients/scene_tools/fuel.hpp"
+#include "clients/scene_tools/resource_paths.hpp"
 #include "core/scene/files/load_mesh.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/terrain.hpp"

@@ -3,8 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "clients/scene_tools/describe_scene.hpp"
-#include "clients/scene_tools/number_text.hpp"
+#include "clients/scene_tools/import_scene.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar::scene_tools {

@@ -8,8 +8,6 @@
 #include <fstream>
 #include <utility>
 
-#include "clients/scene_tools/fuel.hpp"
-
 namespace sonar::scene_tools {
 namespace {
 

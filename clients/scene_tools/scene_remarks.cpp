@@ -1,8 +1,7 @@
 // Probable mistakes in a valid scene, which a loader cannot detect and which show only as an empty image.
 #include <algorithm>
 
-#include "clients/scene_tools/describe_scene.hpp"
-#include "clients/scene_tools/number_text.hpp"
+#include "clients/scene_tools/import_scene.hpp"
 
 namespace sonar::scene_tools {
 namespace {

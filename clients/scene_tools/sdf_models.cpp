@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "clients/scene_tools/fuel.hpp"
 #include "clients/scene_tools/read_parts.hpp"
+#include "clients/scene_tools/resource_paths.hpp"
 #include "core/text/nearest.hpp"
 
 namespace sonar::scene_tools {

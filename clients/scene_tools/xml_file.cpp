@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/base/trimmed.hpp"
+#include "core/base/letters.hpp"
 
 namespace sonar::scene_tools {
 namespace {

@@ -1,11 +1,16 @@
 // The list of the commands, and errors as exit codes.
-#include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cstdio>
 
 #include "clients/sonarctl/command_line.hpp"
-#include "clients/sonarctl/commands.hpp"
-#include "core/base/standard_streams.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+
+#include <CLI/CLI.hpp>
+
+#include "clients/sonarctl/net.hpp"
+#include "core/base/program_start.hpp"
+#include "core/image/colour_map.hpp"
 #include "core/text/arguments.hpp"
 
 namespace sonar::clients {
@@ -57,6 +62,162 @@ int run(int argc, char** argv) {
     return done ? 0 : complain(done.error().text, done.error().kind);
   }
   return exit_code(ErrorKind::bug);
+}
+
+namespace {
+
+template <class T>
+std::string refusal(const Result<T>& parsed) {
+  return parsed ? std::string() : parsed.error().text;
+}
+
+}  // namespace
+
+CLI::Validator address() {
+  return CLI::Validator([](std::string& given) { return refusal(parse_endpoint(given, {"127.0.0.1", 1})); }, "", "address");
+}
+
+CLI::Validator colour_map() {
+  return CLI::Validator([](std::string& given) { return refusal(find_colour_map(given)); }, "", "colour map");
+}
+
+void add_frame_option(CLI::App& command, control::Frame& frame, const std::string& help) {
+  const auto set_frame = [&frame](const std::string& given) {
+    frame = given == "ned" ? control::Frame::ned_frd : control::Frame::enu_flu;
+  };
+  command.add_option_function<std::string>("--frame", set_frame, help)
+      ->check(text::one_of({"enu", "ned"}))
+      ->transform(text::in_small_letters());
+}
+
+void add_control_options(CLI::App& command, std::string& control, std::filesystem::path& token_file) {
+  command.add_option("--control", control, "HOST:PORT of sonard's control stream (default 127.0.0.1:14770)")->check(address());
+  command.add_option("--token-file", token_file, "the daemon's control.token_file, if it has one");
+}
+
+void DeviceArguments::add_to(CLI::App& command, const std::string& port_help) {
+  command.add_option("ADDRESS", address, "address of the sonar, HOST or HOST:PORT (default 127.0.0.2)")
+      ->check(clients::address());
+  command.add_option("--port", port, port_help)->check(text::whole_number(1, 65535));
+  command.add_flag("--discover", discover, "use the address in the status broadcast on udp 52102");
+  command
+      .add_option("--wait", patience_s,
+                  "time for which the connection is retried [s]; if above 10, also the time to wait for pings")
+      ->check(text::number(0))
+      ->capture_default_str();
+}
+
+namespace {
+
+using text::number;
+using text::one_of;
+using text::whole_number;
+
+std::string complaint_about_rate(std::string& given) {
+  double hz = 0;
+  const auto [end, error] = std::from_chars(given.data(), given.data() + given.size(), hz);
+  const bool is_number = error == std::errc{} && end == given.data() + given.size() && hz > 0 && hz <= 1000;
+  return is_number || given == "standby" ? "" : "\"" + given + "\" is not a number above 0 and up to 1000, or standby";
+}
+
+}  // namespace
+
+void SettingArguments::add_to(CLI::App& app) {
+  std::string usual;
+  for (const Make& make : protocol::makes())
+    if (!make.usual_settings.empty()) usual.append("; of ").append(make.title).append(" ").append(make.usual_settings);
+  const std::string heading = "Settings of the sonar (default: the make's own" + usual + ")";
+  const auto group = [&heading](CLI::Option* option) { return option->group(heading); };
+  const auto value = [&](const char* name, std::optional<double>& to, const char* help) {
+    return group(app.add_option_function<double>(
+        name, [&to](double given) { to = given; }, help));
+  };
+  const auto extra = [&](const std::string& name, const char* help) {
+    return group(app.add_option("--" + name, more[name], help));
+  };
+  group(app.add_option_function<std::uint32_t>(
+            "--mode", [this](std::uint32_t given) { settings.mode = given - 1; },
+            "number from 1 of a frequency or a head, in the order of the sonar's model"))
+      ->check(whole_number(1, 100));
+  CLI::Option* metres = value("--range", settings.range_m, "metres")->check(number(0.0, 1000.0));
+  extra("range-percent", "range in per cent of the mode's maximum, instead of metres")
+      ->check(number(0.0, 100.0))
+      ->excludes(metres);
+  value("--gain", settings.gain_percent, "gain in per cent of the possible range")->check(number(0.0, 100.0));
+  group(app.add_option_function<std::string>(
+            "--rate", [this](const std::string& given) { settings.rate_hz = given == "standby" ? 0 : std::stod(given); },
+            "maximum ping rate [Hz], any number, of some makes the nearest of these; or standby"))
+      ->check(CLI::Validator(complaint_about_rate, "2|5|10|15|40|standby", "rate"));
+  group(app.add_option_function<std::uint32_t>(
+            "--beams", [this](std::uint32_t given) { settings.beams = given; }, "default: 512"))
+      ->check(one_of({"256", "512"}));
+  group(app.add_option_function<std::uint32_t>(
+            "--bits", [this](std::uint32_t given) { settings.sample_bits = given; },
+            "bits per sample; 32 needs --version 2. Default: 8"))
+      ->check(one_of({"8", "16", "32"}));
+  extra("gamma", "wire value: gamma = value / 255. Default: 127")->check(whole_number(0, 255));
+  extra("speed-of-sound", "m/s; 0 (default) = the sonar computes it")->check(number(0.0, 2000.0));
+  extra("salinity", "ppt. Default: 0")->check(number(0.0, 50.0));
+  extra("version", "version of the messages. Default: 0")->check(whole_number(0, 2));
+  group(app.add_flag_function(
+      "--gains", [this](std::int64_t) { settings.row_gains = true; }, "request a gain in front of every row"));
+  group(app.add_flag_function(
+      "--gain-assist", [this](std::int64_t) { more["gain-assist"] = "on"; }, "flag bit 4"));
+  group(app.add_flag_function(
+      "--trigger", [this](std::int64_t) { more["trigger"] = "on"; }, "one ping for each request (network trigger)"));
+}
+
+protocol::Wanted SettingArguments::wanted() const {
+  protocol::Wanted wanted;
+  wanted.settings = settings;
+  for (const auto& [name, given] : more)
+    if (!given.empty()) wanted.more.emplace(name, given);
+  return wanted;
+}
+
+void SourceArguments::add_to(CLI::App& app, bool recordings, const std::string& control_help) {
+  std::string usual;
+  std::vector<std::string> names;
+  for (const Make& one : protocol::makes()) {
+    usual += (usual.empty() ? "" : ", ") + std::to_string(one.ports.front().number) + " of " + std::string(one.title);
+    names.emplace_back(one.name());
+  }
+  device.add_to(app, "port of the sonar (default: " + usual + ", the first make that answers)");
+  app.add_option("--make", make, "make of the sonar; needed on a port that is not the make's own")->check(one_of(names));
+  app.add_flag("--as-it-is", as_it_is, "send no settings (many sonars then send no pings)");
+  app.add_flag("--observe", observe,
+               "receive the pings that clients request, without occupying a client slot or sending settings");
+  CLI::Option* const stream = app.add_option("--control", control, "HOST:PORT of sonard's control stream, which " + control_help)
+                                  ->check(clients::address());
+  app.add_option("--token-file", token_file, "the daemon's control.token_file, if it has one");
+  settings.add_to(app);
+  if (!recordings) return;
+  CLI::Option* const from =
+      app.add_option("--from,--from-raw", recording, "read this recording, of any kind, instead of a sonar")->excludes(stream);
+  app.add_option("--sonar", sonar, "with --from: selects one of several: by address in captures, by name in MCAP")->needs(from);
+}
+
+Result<SourceOptions> SourceArguments::finish() const {
+  SourceOptions source;
+  Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
+  if (!at) return tl::unexpected(at.error());
+  source.make = make.empty() ? make_at(at->port) : protocol::find_make(make);
+  if (source.make == nullptr && at->port != 0) source.make = &protocol::makes().front();
+  if (device.discover && !make.empty() && source.make != &protocol::makes().front())
+    return failure(ErrorKind::usage, "--discover finds " + std::string(protocol::makes().front().title) +
+                                         " only: leave it out, and give the address of " + std::string(source.make->title));
+  source.device = *at;
+  source.discover = device.discover;
+  source.recording = recording;
+  source.sonar = sonar;
+  source.connect_patience_s = device.patience_s;
+  source.silence_limit_s = std::max(source.silence_limit_s, device.patience_s);
+  source.observe = observe;
+  source.control = control;
+  source.token_file = token_file;
+  source.wanted = settings.wanted();
+  source.wanted.as_it_is = as_it_is;
+  return source;
 }
 
 }  // namespace sonar::clients

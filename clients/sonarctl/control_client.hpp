@@ -8,7 +8,6 @@
 
 #include "clients/sonarctl/net.hpp"
 #include "protocol/control/control.hpp"
-#include "protocol/control/delimited.hpp"
 
 namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "core/image/polar_image.hpp"
+#include "core/image/sonar_picture.hpp"
 
 namespace sonar::clients {
 

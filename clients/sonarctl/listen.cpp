@@ -3,7 +3,6 @@
 #include <cstdio>
 
 #include "clients/sonarctl/commands.hpp"
-#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/waiting.hpp"

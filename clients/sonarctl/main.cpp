@@ -4,8 +4,7 @@
 
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
-#include "core/base/stack_limit.hpp"
-#include "core/base/standard_streams.hpp"
+#include "core/base/program_start.hpp"
 
 int main(int argc, char** argv) {
   struct sigaction on_interrupt {};

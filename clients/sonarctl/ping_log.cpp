@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+
 #include <nlohmann/json.hpp>
 
-#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar::clients {

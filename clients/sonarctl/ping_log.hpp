@@ -14,6 +14,12 @@
 
 namespace sonar::clients {
 
+// The time since a point of the steady clock.
+
+inline double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 /// A time in seconds on a monotonic clock. The origin is arbitrary.
 using Seconds = double;
 

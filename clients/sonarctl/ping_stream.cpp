@@ -12,7 +12,6 @@
 #include <cerrno>
 #include <cstring>
 
-#include "clients/sonarctl/net.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/text/ipv4.hpp"
 

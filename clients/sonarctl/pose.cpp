@@ -8,7 +8,7 @@
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/trajectory.hpp"
-#include "core/text/counted.hpp"
+#include "core/text/format.hpp"
 #include "protocol/control/control.hpp"
 
 namespace sonar::clients {

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <memory>
 
-#include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/commands.hpp"
 #include "core/text/arguments.hpp"

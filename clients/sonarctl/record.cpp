@@ -4,15 +4,14 @@
 #include <array>
 #include <cstdio>
 
-#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/record.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/waiting.hpp"
-#include "core/text/counted.hpp"
+#include "core/text/format.hpp"
 #include "core/text/ipv4.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/recording/recorded_pings.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar::clients {
 namespace {

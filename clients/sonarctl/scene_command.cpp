@@ -3,11 +3,10 @@
 #include <cstdio>
 #include <memory>
 
-#include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/import_scene.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "core/text/arguments.hpp"
-#include "core/text/counted.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 namespace {

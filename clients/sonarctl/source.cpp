@@ -1,6 +1,5 @@
 #include "clients/sonarctl/source.hpp"
 
-#include <algorithm>
 #include <cstdio>
 #include <thread>
 
@@ -8,7 +7,7 @@
 #include "clients/sonarctl/waiting.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/recording/recorded_pings.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar::clients {
 

@@ -1,11 +1,15 @@
 // Capabilities of the terminal, and a full-screen picture that is redrawn. Used by view.
 #pragma once
 
+#include <cstdint>
+#include <deque>
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "clients/sonarctl/ping_log.hpp"
 #include "core/image/terminal_fan.hpp"
 
 namespace sonar::clients {
@@ -40,6 +44,27 @@ class LiveScreen {
 
  private:
   bool is_terminal_;
+};
+
+// The line under a picture: ping number, geometry, rate and number of missed pings. No I/O.
+
+class ViewCaption {
+ public:
+  /// `rate_unit`: that of the sonar's make.
+  explicit ViewCaption(std::string_view rate_unit) : rate_unit_(rate_unit) {}
+  /// `of_wire`: counts of the host after the ping, if it has any.
+  void add(const HostPing& ping, const std::optional<protocol::Host::Counts>& of_wire, Seconds at);
+  std::uint64_t pings() const { return pings_; }
+  /// "ping 123 10.00 m 2.1 MHz 512 beams x 437 rows 10.0 Hz no gaps"; with the rate from the second ping on.
+  std::string text() const;
+
+ private:
+  static constexpr std::size_t remembered = 20;  // arrivals that determine the rate
+  std::string rate_unit_;
+  std::optional<std::uint64_t> missed_;
+  std::deque<Seconds> arrivals_;
+  std::uint64_t pings_ = 0;
+  std::string ping_text_;
 };
 
 }  // namespace sonar::clients

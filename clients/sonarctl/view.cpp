@@ -3,7 +3,6 @@
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/terminal.hpp"
-#include "clients/sonarctl/view_caption.hpp"
 #include "clients/sonarctl/waiting.hpp"
 #include "core/text/format.hpp"
 

@@ -39,7 +39,7 @@ def bytes_of(content):
 
 
 def cpp_of(files):
-    parts = ['// Made by clients/web/bundle.py.\n#include "daemon/server/http/page_files.hpp"\n\nnamespace sonar {\nnamespace {\n']
+    parts = ['// Made by clients/web/bundle.py.\n#include "daemon/server/http/page.hpp"\n\nnamespace sonar {\nnamespace {\n']
     rows = []
     for i, (name, content) in enumerate(files.items()):
         packed = gzip.compress(content, 9, mtime=0)

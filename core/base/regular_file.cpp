@@ -3,13 +3,11 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
 
-#include "core/base/confined_reads.hpp"
 #include "core/base/memory_left.hpp"
 
 namespace sonar {

@@ -32,4 +32,12 @@ Result<std::string> read_regular(const std::filesystem::path& file, std::size_t 
 int open_to_write(const std::filesystem::path& file, int flags);
 std::string why_not_written(const std::filesystem::path& file, int error);
 
+// Limits which files a program can read while it loads files of unknown origin, because such files can refer to any file of
+// this computer.
+
+/// After this call, open_regular() opens only files whose real path is below `folder`. Call it once, before threads start.
+void confine_reads(const std::filesystem::path& folder);
+/// The folder passed to confine_reads(); empty if every file may be read.
+const std::filesystem::path& readable_folder();
+
 }  // namespace sonar

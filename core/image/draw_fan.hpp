@@ -4,13 +4,14 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "core/base/result.hpp"
 #include "core/image/colour_map.hpp"
-#include "core/image/polar_image.hpp"
 #include "core/image/raster.hpp"
+#include "core/image/sonar_picture.hpp"
 
 namespace sonar {
 
@@ -66,5 +67,18 @@ class FanPainter {
 
 /// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
 double ring_spacing_m(double range_m);
+
+// Computes outlines of regions of a picture, along the edges of pixels. They become polygons of labels.
+
+/// A corner between pixels: pixel (x, y) lies between the corners (x, y) and (x + 1, y + 1).
+struct Corner {
+  int x = 0, y = 0;
+  bool operator==(const Corner&) const = default;
+};
+using Outline = std::vector<Corner>;  // clockwise on the screen (y downwards); only corners where the direction changes
+
+/// Outlines of the connected regions (by shared edges) of pixels in [x0, x1) by [y0, y1) for which `is_in` is true. Holes are
+/// ignored. The regions are ordered by their first pixels, row by row.
+std::vector<Outline> outlines(int x0, int y0, int x1, int y1, const std::function<bool(int x, int y)>& is_in);
 
 }  // namespace sonar

@@ -4,7 +4,6 @@
 #include <cassert>
 
 #include "core/base/units.hpp"
-#include "core/motion/turning.hpp"
 
 namespace sonar::motion {
 

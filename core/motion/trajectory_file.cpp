@@ -10,7 +10,6 @@
 #include "core/base/regular_file.hpp"
 #include "core/motion/columns.hpp"
 #include "core/motion/stamp.hpp"
-#include "core/motion/stamp_unit.hpp"
 #include "core/text/file_kind.hpp"
 #include "core/text/nearest.hpp"
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/paper/paper_ping.hpp"
-#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/water_line.hpp"
 
 namespace sonar {

@@ -1,7 +1,6 @@
 #include "core/paper/paper_fan.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace sonar::paper {
 namespace {

@@ -1,10 +1,10 @@
-#include "core/pipeline/check_request.hpp"
+#include "core/pipeline/ping_engine.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "core/pipeline/noise.hpp"
 #include "core/pipeline/ping_plan.hpp"
-#include "core/pipeline/shared_noise.hpp"
 #include "core/sonar/range_image.hpp"
 
 namespace sonar {

@@ -19,7 +19,7 @@ void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, B
                 std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out) {
   // A window of complex samples of all columns: two floats per sample.
   const int floats = static_cast<int>(out.stride), first_sample = out.first_sample;
-  // Eq. 9 for all beams at once, as a convolution over columns that are uniform in u = sin(azimuth) (beam_transform.hpp).
+  // Eq. 9 for all beams at once, as a convolution over columns that are uniform in u = sin(azimuth) (simd/kernels.hpp).
   if (beam_weights.transform) {
     scratch.transform.resize(beam_weights.transform->work_floats());
     kernels.transform_beams(beam_weights.transform->tables(), columns.first_sample(0) + 2 * first_sample, columns.stride, floats,

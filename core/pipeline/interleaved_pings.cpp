@@ -6,7 +6,6 @@
 
 #include "core/pipeline/interference.hpp"
 #include "core/pipeline/ping_scalars.hpp"
-#include "core/sonar/ping_labels.hpp"
 
 namespace sonar {
 namespace {

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <utility>
 
-#include "core/pipeline/check_request.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "core/sonar/range_image.hpp"
 
 namespace sonar {

@@ -12,7 +12,7 @@
 #include "core/pipeline/scatter.hpp"
 #include "core/pipeline/signals.hpp"
 #include "core/pipeline/trace_fan.hpp"
-#include "core/sonar/ping_labels.hpp"
+#include "core/sonar/ping.hpp"
 
 namespace sonar {
 

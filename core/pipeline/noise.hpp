@@ -8,9 +8,11 @@
 #include <memory>
 #include <set>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/base/units.hpp"
+#include "core/sonar/ping.hpp"
 
 namespace sonar {
 
@@ -43,5 +45,14 @@ struct PingNoise {
   const NoiseTable* table = nullptr;
   std::uint32_t sonar = 0, ping = 0;
 };
+
+// Signals that receive channels share, with opposite signs in neighbouring channels: noise, and in some receivers the
+// transmitter's leak. In pictures of an array that is focused at every range, these signals appear as wide grains and fringes
+// (docs/acoustics.md, section 5).
+
+/// The reason why the numbers of channels and of channels in a group are invalid; empty if they are valid.
+std::string why_impossible(const SharedNoise& law);
+/// The reason if SharedNoiseTable would need too much memory or time; else empty. The numbers of channels must be valid.
+std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& settings, const Switches& switches);
 
 }  // namespace sonar

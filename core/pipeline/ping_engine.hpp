@@ -64,7 +64,7 @@ class PingEngine {
  public:
   virtual ~PingEngine() = default;
   /// Computes the pings. Throws std::invalid_argument with the reason if a request cannot be simulated (why_invalid in
-  /// core/pipeline/check_request.hpp). Only one thread may call it at a time.
+  /// core/pipeline/ping_engine.hpp). Only one thread may call it at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
   /// submit() and collect() are the two halves of run(). An engine with a device works on the requests while the caller uses
   /// the pings of an earlier submit(). Requests are copied. collect() throws the exceptions that run() would throw.
@@ -93,5 +93,23 @@ class PingEngine {
 /// Builds the acceleration structures; the pool must outlive the engine.
 std::unique_ptr<PingEngine> make_cpu_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
                                             const EngineOptions& options = {});
+
+// The CPU engine for pings of many similar scenes, such as data sets.
+
+class ChangingEngine : public PingEngine {
+ public:
+  /// Replaces the scene. It keeps the tables of the settings, and the trees and cells of meshes that both scenes share (the
+  /// same object in memory, not only an equal one). The next pings equal those of a new engine.
+  virtual void change_scene(const std::shared_ptr<const Scene>& scene) = 0;
+};
+
+/// Like make_cpu_engine().
+std::unique_ptr<ChangingEngine> make_changing_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
+                                                     const EngineOptions& options = {});
+
+// Checks whether a request can be simulated. Every engine calls it before a ping.
+
+/// Returns the reason, one sentence, why a request cannot be simulated; empty if it can be simulated.
+std::string why_invalid(const PingRequest& request);
 
 }  // namespace sonar

@@ -1,14 +1,11 @@
 #include "core/pipeline/ping_plan.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "core/base/units.hpp"
-#include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/spectral_columns.hpp"
 #include "core/sonar/bearings.hpp"
 
 namespace sonar {
@@ -359,6 +356,29 @@ bool serves(const PingPlan& plan, const PingRequest& r) {
   asked.transmit = plan.settings.transmit;
   return asked == plan.settings && plan.switches == r.switches && plan.bearing_scale == bearing_scale_of(r) &&
          plan.mode.name == r.model->modes[static_cast<std::size_t>(asked.mode)].name;
+}
+
+std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {
+  const int coarsest = static_cast<int>(std::ceil(-std::log2(pulse_width_m) - 1e-9));
+  constexpr double level_fade = 1.15;  // levels cross-fade over 15 % of the range
+  constexpr double nearest_m = 0.2;    // no image begins at a shorter range; all nearer cells have the same level
+  std::vector<CellLevel> levels;
+  double coarser_begins = 2 * max_range_m;  // range at which the next coarser level begins
+  for (int level = coarsest;; ++level) {
+    // From this range on, a cell is at most a third of a beam wide: 2^-level <= r theta / 3.
+    const double begins = 3 * std::ldexp(1.0, -level) / beam_width_rad;
+    const bool finest = begins < nearest_m || level - coarsest > 10;
+    CellLevel l;
+    l.level = level;
+    l.fade_in_from_m = finest ? 0.0f : static_cast<float>(begins);
+    l.full_from_m = finest ? 0.0f : static_cast<float>(begins * level_fade);
+    l.full_to_m = static_cast<float>(coarser_begins);
+    l.fade_out_to_m = static_cast<float>(coarser_begins * level_fade);
+    if (begins < max_range_m || finest) levels.push_back(l);
+    if (finest) break;
+    if (begins < max_range_m) coarser_begins = begins;
+  }
+  return levels;
 }
 
 }  // namespace sonar

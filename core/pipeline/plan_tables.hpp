@@ -11,7 +11,7 @@
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/signals.hpp"
-#include "core/pipeline/simd/beam_transform.hpp"
+#include "core/pipeline/simd/kernels.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {

@@ -1,4 +1,5 @@
-#include "core/pipeline/shared_noise.hpp"
+#include "core/pipeline/arithmetic/kernel_math.hpp"
+#include "core/pipeline/noise.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +7,6 @@
 #include <limits>
 #include <string>
 
-#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/arithmetic/noise_place.hpp"
 #include "core/pipeline/focused_array.hpp"
 #include "core/pipeline/interference.hpp"

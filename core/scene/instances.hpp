@@ -1,4 +1,4 @@
-// Names and classes of the instances in labels (core/sonar/ping_labels.hpp).
+// Names and classes of the instances in labels (core/sonar/ping.hpp).
 #pragma once
 
 #include <cstddef>

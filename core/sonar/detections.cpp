@@ -7,8 +7,6 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/sonar/sample_code.hpp"
-
 namespace sonar {
 namespace {
 

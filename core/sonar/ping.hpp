@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -16,6 +17,24 @@
 #include "core/sonar/water.hpp"
 
 namespace sonar {
+
+// Labels of a ping: for each sample, the object whose echo it contains (docs/datasets.md). core/pipeline/labels.hpp computes
+// them.
+
+/// Arrays are [rows][beams], as Ping::samples. Instance i + 1 is Scene::objects[i]; the point targets follow them.
+struct PingLabels {
+  int rows = 0, beams = 0;
+  std::vector<std::uint16_t> instance;  // instance with the most energy, if above the receiver's noise; 0 = none
+  std::vector<std::uint8_t> share;      // share of that instance in the sample's energy, noise included; 255 = all
+  /// For samples without an instance: the nearest object that blocks the line of sight over the whole -3 dB width of the beam;
+  /// 0 = no shadow. Echoes through the side lobes of the beam are ignored.
+  std::vector<std::uint16_t> caster;
+  /// [instance - 1]: fraction of the instance's energy that arrives, 0 to 1 (1 = nothing hides it); -1 for an object without a
+  /// label.
+  std::vector<float> visible;
+
+  static constexpr std::size_t most_instances = 65535;
+};
 
 /// Models that convert the scene to scatterers (docs/acoustics.md, section 8).
 enum class Mode {
@@ -105,7 +124,7 @@ struct PingFindings {
 
 /// Base class of settings that a vendor's protocol needs besides PingSettings, such as the client's request. The message of a
 /// ping states the settings with which the ping was made. core reads only two derived types: RangeImageSettings
-/// (core/sonar/range_image.hpp) makes the ping a range image, PhasedSettings (core/sonar/phases.hpp) keeps signals of beams.
+/// (core/sonar/range_image.hpp) makes the ping a range image, PhasedSettings keeps signals of beams.
 struct VendorSettings {
   virtual ~VendorSettings() = default;
   /// True if clients see no difference between these settings and `other`, which must be of the same vendor.
@@ -147,7 +166,7 @@ struct BeamTruth {
   std::uint32_t object = nothing;  // index into Scene::objects
 };
 
-struct PingLabels;  // core/sonar/ping_labels.hpp
+struct PingLabels;  // core/sonar/ping.hpp
 
 /// The result of a ping, for all vendors. Row 0 is the nearest. Beam 0 is the one farthest to port: azimuths fall from + to -.
 struct Ping {
@@ -168,6 +187,25 @@ struct Ping {
 /// Sets the findings of a ping. Call it again after a change of its request or samples.
 inline void look_at(Ping& ping) {
   ping.findings = ping.request.vendor_settings != nullptr ? ping.request.vendor_settings->look_at(ping) : nullptr;
+}
+
+// Pings whose messages contain complex samples.
+
+/// A ping with vendor settings of this type keeps the signals of its beams (Ping::beam_signal_upa), because the vendor's
+/// message contains their phases.
+struct PhasedSettings : VendorSettings {};
+
+inline bool has_phases(const PingRequest& request) {
+  return dynamic_cast<const PhasedSettings*>(request.vendor_settings.get()) != nullptr;
+}
+
+// Reads samples of a ping as unsigned integers.
+
+/// The code of the sample `index` in samples of `width` bytes each, 1 to 4, the least significant byte first.
+inline std::uint32_t sample_code(std::span<const std::byte> samples, std::size_t index, std::size_t width) {
+  std::uint32_t code = 0;
+  for (std::size_t b = 0; b < width; ++b) code |= std::to_integer<std::uint32_t>(samples[index * width + b]) << (8 * b);
+  return code;
 }
 
 }  // namespace sonar

@@ -8,7 +8,6 @@
 
 #include "core/base/geometry.hpp"
 #include "core/sonar/ping.hpp"
-#include "core/sonar/sample_code.hpp"
 
 namespace sonar {
 

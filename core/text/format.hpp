@@ -1,7 +1,9 @@
 // Formats numbers for output to users: banner, status, doctor, tables.
 #pragma once
 
+#include <concepts>
 #include <string>
+#include <string_view>
 
 namespace sonar::text {
 
@@ -10,5 +12,18 @@ namespace sonar::text {
 
 /// Formats three significant digits: "750 kHz", "2.1 MHz".
 std::string frequency_text(double hz);
+
+// Formats a number with its noun.
+
+/// Returns "1 beam" or "2 beams".
+template <std::integral N>
+std::string counted(N count, std::string_view what) {
+  return std::to_string(count).append(" ").append(what).append(count == 1 ? "" : "s");
+}
+
+// Makes text from outside printable on a terminal. Bytes that are not UTF-8, move the cursor or change the terminal's state
+// become \xNN.
+
+std::string printable(std::string_view text);
 
 }  // namespace sonar::text

@@ -9,8 +9,8 @@
 #include <sstream>
 #include <unordered_set>
 
+#include "core/base/letters.hpp"
 #include "core/base/regular_file.hpp"
-#include "core/base/utf8.hpp"
 #include "core/text/yaml_tree.hpp"
 
 namespace sonar::text {

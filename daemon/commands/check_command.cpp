@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "core/text/counted.hpp"
+#include "core/text/format.hpp"
 #include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/emulator/world/plausibility.hpp"

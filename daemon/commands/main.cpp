@@ -9,8 +9,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "core/base/stack_limit.hpp"
-#include "core/base/standard_streams.hpp"
+#include "core/base/program_start.hpp"
 #include "daemon/commands/options/commands.hpp"
 #include "daemon/server/system/log.hpp"
 #include "daemon/server/system/shortage.hpp"

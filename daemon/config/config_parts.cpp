@@ -4,7 +4,7 @@
 
 #include "core/base/regular_file.hpp"
 #include "daemon/config/effective_switches.hpp"
-#include "daemon/config/nearest_scene.hpp"
+#include "daemon/config/scene_file.hpp"
 
 namespace sonar {
 namespace {

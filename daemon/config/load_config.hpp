@@ -20,4 +20,16 @@ Result<void> check_time_can_pass(const Config& config);
 /// files.
 Result<Config> demo_config();
 
+// Finds the configuration for `sonard run`: the given file, else the first one in the usual places, else the demo.
+
+struct FoundConfig {
+  Config config;
+  std::string how;             // for the banner
+  std::filesystem::path file;  // empty = none
+};
+
+/// If `file` is empty: ./sonard.yaml, ~/.config/sonard/sonard.yaml, /etc/sonard/sonard.yaml, in this order. `demo` ignores all
+/// files. Errors: those of load_config().
+Result<FoundConfig> find_config(const std::string& file, bool demo);
+
 }  // namespace sonar

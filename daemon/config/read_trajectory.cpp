@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "core/base/regular_file.hpp"
-#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 
 namespace sonar {

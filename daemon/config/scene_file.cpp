@@ -7,7 +7,6 @@
 
 #include "core/scene/files/built_in_scenes.hpp"
 #include "core/text/nearest.hpp"
-#include "daemon/config/nearest_scene.hpp"
 
 namespace sonar {
 namespace {

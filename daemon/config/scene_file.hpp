@@ -34,4 +34,9 @@ inline Result<std::shared_ptr<const Scene>> load_scene(const SceneFile& file, co
   return file.built_in ? load_built_in_scene(file.path.string()) : load_scene(file.path, world_origin);
 }
 
+// Suggests the closest scene name that find_scene() would find, for errors of configurations and render files.
+
+/// Returns a similar name that find_scene() finds in `directory`; empty if there is none.
+std::string nearest_scene(const std::filesystem::path& given, const std::filesystem::path& directory);
+
 }  // namespace sonar

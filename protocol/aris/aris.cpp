@@ -1,7 +1,6 @@
 #include "protocol/aris/aris.hpp"
 
 #include "protocol/aris/encode_frame.hpp"
-#include "protocol/aris/messages.hpp"
 #include "protocol/aris/models.hpp"
 #include "protocol/aris/settings.hpp"
 

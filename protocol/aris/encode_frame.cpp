@@ -5,7 +5,6 @@
 #include <cassert>
 
 #include "core/base/geometry.hpp"
-#include "protocol/aris/settings.hpp"
 
 namespace sonar::aris {
 namespace {

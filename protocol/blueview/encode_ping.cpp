@@ -4,8 +4,6 @@
 #include <cassert>
 #include <chrono>
 
-#include "protocol/blueview/frames.hpp"
-#include "protocol/blueview/head_settings.hpp"
 #include "protocol/blueview/models.hpp"
 
 namespace sonar::blueview {

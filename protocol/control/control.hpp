@@ -3,9 +3,11 @@
 // second to compile.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -54,5 +56,27 @@ Result<Request> request_from_json(std::string_view op, std::string_view json, st
 /// too. 64-bit numbers are strings, as protobuf's mapping requires.
 std::string json_of(const google::protobuf::Message& message);
 std::string json_of(StatusCode code, const std::string& text);  // {"code":"REFUSED","text":"..."}
+
+// Framing of the control stream: a varint length, then that many bytes. Incremental and without I/O: the stream may arrive in
+// any pieces. Source: protobuf encoding guide, "varint"; the limit of the length is ours (control.proto).
+
+class DelimitedParser {
+ public:
+  static constexpr std::size_t largest_message = 1u << 20;
+
+  /// `most`: bytes of a message, at most largest_message.
+  explicit DelimitedParser(std::size_t most = largest_message) : most_(std::min(most, largest_message)) {}
+  void feed(std::span<const std::byte> received) { buffer_.insert(buffer_.end(), received.begin(), received.end()); }
+  /// The next whole message; nullopt if more bytes are needed. After an error the rest of the stream cannot be read.
+  Result<std::optional<std::vector<std::byte>>> next();
+
+ private:
+  std::size_t most_;
+  std::vector<std::byte> buffer_;  // never longer than one message and one read
+  std::size_t start_ = 0;          // start of the next message
+};
+
+/// Length and message, ready to be sent.
+std::vector<std::byte> delimited(std::span<const std::byte> message);
 
 }  // namespace sonar::control

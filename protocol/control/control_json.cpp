@@ -7,7 +7,7 @@
 #include <set>
 
 #include "protocol/control/control.hpp"
-#include "protocol/control/json_mistake.hpp"
+#include "protocol/control/json_checks.hpp"
 #include "protocol/control/messages.hpp"
 #include "protocol/control/refused.hpp"
 

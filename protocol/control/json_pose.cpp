@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "protocol/control/json_depth.hpp"
+#include "protocol/control/json_checks.hpp"
 #include "protocol/control/refused.hpp"
 
 namespace sonar::control {

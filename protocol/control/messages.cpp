@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/base/utf8.hpp"
+#include "core/base/letters.hpp"
 
 namespace sonar::control {
 namespace {

@@ -4,13 +4,23 @@
 #include <string>
 #include <vector>
 
-#include "protocol/doctor/finding.hpp"
-
 namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;
 }  // namespace sonar::v1
-
 namespace sonar::doctor {
+
+// A finding of doctor: something that works, or a fault with its cause and a remedy. `sonarctl doctor` makes findings from
+// outside; the daemon makes them for the live view (judge.hpp).
+
+enum class Level { ok, warn, fail };
+struct Finding {
+  Level level = Level::ok;
+  std::string check;  // for programs: "status", "ping", "rate", "ports", ...
+  std::string text;
+  std::string cure;         // empty for Level::ok
+  std::string sonar = {};   // name of the sonar; empty = none
+  std::string client = {};  // address of the client; empty = none
+};
 
 inline constexpr const char* less_to_compute =
     "fewer beams, less range, more threads (engine.threads), or fewer other programs on this computer";

@@ -4,7 +4,6 @@
 #include <map>
 #include <set>
 
-#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/host.hpp"

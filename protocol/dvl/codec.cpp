@@ -1,7 +1,7 @@
 // The messages of a DVL, for recordings.
 #include "protocol/dvl/dvl.hpp"
-#include "protocol/dvl/models.hpp"
 #include "protocol/dvl/reports.hpp"
+#include "protocol/dvl/settings.hpp"
 
 namespace sonar::dvl {
 namespace {

@@ -4,7 +4,7 @@
 #include "core/text/format.hpp"
 #include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/reports.hpp"
-#include "protocol/waterfall.hpp"
+#include "protocol/line_pictures.hpp"
 
 namespace sonar::dvl {
 namespace {

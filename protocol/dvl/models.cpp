@@ -1,4 +1,4 @@
-#include "protocol/dvl/models.hpp"
+#include "protocol/dvl/settings.hpp"
 
 #include <cmath>
 

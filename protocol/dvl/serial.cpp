@@ -7,7 +7,6 @@
 
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
-#include "core/text/printable.hpp"
 #include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/reports.hpp"
 #include "protocol/dvl/session.hpp"

@@ -2,6 +2,7 @@
 // functions from plain structs to bytes. World ENU, bodies FLU, metres. Pure.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -15,7 +16,7 @@
 #include "core/base/units.hpp"
 #include "core/image/sonar_picture.hpp"
 #include "core/sonar/ping.hpp"
-#include "protocol/doctor/finding.hpp"
+#include "protocol/doctor/check_status.hpp"
 #include "protocol/foxglove/foxglove_words.hpp"
 #include "protocol/wire/wire.hpp"
 
@@ -89,4 +90,17 @@ Bytes truth(const Ping& ping);
 Bytes picture(const SonarPicture& picture);
 /// sonar.v1.Findings.
 Bytes findings(std::span<const doctor::Finding> all);
+
+// Figures of a sonar as a ROS 2 message in CDR, the only encoding that PlotJuggler reads over this socket. Pure.
+
+inline constexpr std::array<std::string_view, 15> figure_names = {
+    "stamp_s", "number", "range_m", "rate_hz", "simulation_ms", "latency_ms", "clients",    "served",
+    "dropped", "x",      "y",       "z",       "roll_deg",      "pitch_deg",  "heading_deg"};
+
+/// The schema of sonard_msgs/msg/SonarFigures: one float64 for each of figure_names.
+Schema figures_schema();
+wire::Bytes figures(const std::array<double, figure_names.size()>& values);
+/// The figures with another stamp_s.
+wire::Bytes with_stamp(wire::BytesView figures, const std::function<Time(Time)>& stamp);
+
 }  // namespace sonar::foxglove

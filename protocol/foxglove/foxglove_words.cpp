@@ -6,7 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "protocol/control/json_depth.hpp"
+#include "protocol/control/json_checks.hpp"
 
 namespace sonar::foxglove {
 namespace {

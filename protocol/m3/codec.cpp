@@ -3,8 +3,7 @@
 #include <array>
 
 #include "protocol/m3/m3.hpp"
-#include "protocol/m3/models.hpp"
-#include "protocol/m3/packet.hpp"
+#include "protocol/m3/settings.hpp"
 #include "protocol/recorded/raw_dump.hpp"
 
 namespace sonar::m3 {

@@ -4,7 +4,6 @@
 
 #include "core/base/geometry.hpp"
 #include "protocol/m3/m3.hpp"
-#include "protocol/m3/packet.hpp"
 
 namespace sonar::m3 {
 namespace {

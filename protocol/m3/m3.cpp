@@ -1,7 +1,5 @@
 #include "protocol/m3/m3.hpp"
 
-#include "protocol/m3/models.hpp"
-#include "protocol/m3/packet.hpp"
 #include "protocol/m3/settings.hpp"
 
 namespace sonar::m3 {

@@ -1,4 +1,4 @@
-#include "protocol/m3/models.hpp"
+#include "protocol/m3/settings.hpp"
 
 #include <array>
 

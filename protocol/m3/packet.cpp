@@ -1,4 +1,4 @@
-#include "protocol/m3/packet.hpp"
+#include "protocol/m3/m3.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -8,8 +8,7 @@
 #include <cstdio>
 
 #include "core/base/geometry.hpp"
-#include "core/sonar/sample_code.hpp"
-#include "protocol/m3/models.hpp"
+#include "core/sonar/ping.hpp"
 #include "protocol/m3/settings.hpp"
 
 namespace sonar::m3 {

@@ -7,7 +7,6 @@
 #include "core/sonar/water.hpp"
 #include "core/text/format.hpp"
 #include "protocol/limits.hpp"
-#include "protocol/m3/models.hpp"
 
 namespace sonar::m3 {
 namespace {

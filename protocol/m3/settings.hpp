@@ -1,17 +1,31 @@
 // Range, rate and gain, which only the M3's own program can set, not drivers, and the sampling window that follows from them.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string_view>
 
-#include "core/sonar/phases.hpp"
+#include "core/sonar/ping.hpp"
 #include "core/sonar/ping_settings.hpp"
+#include "core/sonar/sonar_model.hpp"
 #include "protocol/held_settings.hpp"
 #include "protocol/m3/messages.hpp"
-#include "protocol/m3/models.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::m3 {
+
+// The product and its mode. Sources: protocol/m3/README.md.
+
+inline constexpr int beam_count = 128;              // PKT
+inline constexpr double beam_spacing_deg = 0.9375;  // PKT
+inline constexpr double nearest_m = 0.2;            // PKT
+inline constexpr double farthest_m = 150;           // recalled from the data sheet
+inline constexpr float usual_rate_hz = 15;          // PKT
+inline constexpr float highest_rate_hz = 40;        // recalled from the data sheet
+inline constexpr double slowest_mps = 1400,
+                        fastest_mps = 1560;  // sound speeds that a window covers; fitted to PKT, LOG
+
+std::span<const std::shared_ptr<const SonarModel>> models();
 
 inline constexpr double transmit_s = 25e-6;  // PKT: start of the pulse, from the start of the ping
 /// unknown: limits of the gain law's c [dB]; the c of PKT is half way between them.

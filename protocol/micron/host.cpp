@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "core/text/format.hpp"
+#include "protocol/line_pictures.hpp"
 #include "protocol/micron/micron.hpp"
 #include "protocol/micron/settings.hpp"
-#include "protocol/sweep.hpp"
 
 namespace sonar::micron {
 namespace {

@@ -1,7 +1,6 @@
 #include "protocol/micron/micron.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "protocol/micron/settings.hpp"
 

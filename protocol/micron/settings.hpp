@@ -6,7 +6,6 @@
 
 #include "protocol/held_settings.hpp"
 #include "protocol/micron/messages.hpp"
-#include "protocol/options.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::micron {

@@ -1,7 +1,6 @@
 // The packets of a Norbit, for recordings.
-#include "protocol/norbit/models.hpp"
 #include "protocol/norbit/norbit.hpp"
-#include "protocol/norbit/packet.hpp"
+#include "protocol/norbit/settings.hpp"
 
 namespace sonar::norbit {
 namespace {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/text/format.hpp"
-#include "core/text/printable.hpp"
 #include "protocol/norbit/messages.hpp"
 #include "protocol/norbit/norbit.hpp"
 #include "protocol/norbit/settings.hpp"

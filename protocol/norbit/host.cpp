@@ -9,7 +9,6 @@
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/norbit/norbit.hpp"
-#include "protocol/norbit/packet.hpp"
 #include "protocol/norbit/settings.hpp"
 
 namespace sonar::norbit {

@@ -1,4 +1,4 @@
-#include "protocol/norbit/models.hpp"
+#include "protocol/norbit/settings.hpp"
 
 #include <array>
 

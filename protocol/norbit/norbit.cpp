@@ -1,6 +1,5 @@
 #include "protocol/norbit/norbit.hpp"
 
-#include "protocol/norbit/packet.hpp"
 #include "protocol/norbit/settings.hpp"
 
 namespace sonar::norbit {

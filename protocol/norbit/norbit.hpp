@@ -2,9 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "protocol/host.hpp"
 #include "protocol/norbit/messages.hpp"
+#include "protocol/recorded/message_splitter.hpp"
+#include "protocol/vendor.hpp"
 
 namespace sonar::norbit {
 
@@ -22,5 +26,34 @@ inline constexpr Shades shades{.gamma = 0.5f};
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
+
+// Converts a ping to packets, and splits packets into their parts.
+
+/// Boundaries of packets in a stream.
+extern const recording::Framing framing;
+
+Bytes encode_bathymetry(const Ping& ping, const protocol::DeviceState& device);
+Bytes encode_column(const Ping& ping, const protocol::DeviceState& device);
+
+struct Bathymetry {
+  BathymetryFront front;
+  std::vector<Beam> beams;
+  double range_m(const Beam& beam) const;
+};
+struct Column {
+  ColumnFront front;
+  BytesView pixels, directions;  // pixels: row by row, near first; each row in the order of the directions
+  double sample_m() const;
+};
+/// nullopt if `packet` is not a whole packet of this type, or its checksum is wrong.
+std::optional<Bathymetry> read_bathymetry(BytesView packet);
+/// Also nullopt if its pixels do not have 16 bits.
+std::optional<Column> read_column(BytesView packet);
+
+/// Corrects the checksums of packets whose bytes were changed.
+void reseal(BytesView before, Bytes& packets);
+
+std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packets);
+std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, BytesView packets);
 
 }  // namespace sonar::norbit

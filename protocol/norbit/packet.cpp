@@ -1,11 +1,11 @@
-#include "protocol/norbit/packet.hpp"
+#include "protocol/norbit/norbit.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/base/geometry.hpp"
 #include "core/sonar/detections.hpp"
-#include "core/sonar/sample_code.hpp"
+#include "core/sonar/ping.hpp"
 #include "protocol/norbit/settings.hpp"
 #include "protocol/recorded/zlib.hpp"
 

@@ -1,13 +1,29 @@
 // The settings that commands change, and the grids of samples that follow from them. Pure functions.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <string>
 
+#include "core/sonar/sonar_model.hpp"
 #include "protocol/held_settings.hpp"
-#include "protocol/norbit/models.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar::norbit {
+
+// The products. Sources: protocol/norbit/README.md.
+
+inline constexpr int bottom_beams = 256;                          // beams of bathymetry
+inline constexpr double swath_deg = 140, beam_width_deg = 0.9;    // DFD; recalled
+inline constexpr double sample_hz = 78125;                        // DFD
+inline constexpr double farthest_m = 600, fastest_hz = 60;        // DFD
+inline constexpr double frequency_khz = 400, bandwidth_khz = 80;  // DFD
+inline constexpr int amplitude = 15, pulse_us = 500;              // DFD
+
+/// Two products: one looks down, the other ahead.
+std::span<const std::shared_ptr<const SonarModel>> models();
+/// 0: forward, 1: bathymetry; as the sonar is mounted.
+int mode_of(const SonarModel& model);
 
 inline constexpr double most_gain_db = 40;          // DFD
 inline constexpr double gain_slope_db_per_m = 0.4;  // per metre of two-way range; unknown: assumed

@@ -4,7 +4,6 @@
 
 #include "protocol/oculus/framer.hpp"
 #include "protocol/oculus/oculus.hpp"
-#include "protocol/oculus/options.hpp"
 #include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"
 

@@ -6,7 +6,6 @@
 
 #include "core/base/geometry.hpp"
 #include "protocol/oculus/messages.hpp"
-#include "protocol/oculus/options.hpp"
 #include "protocol/oculus/settings.hpp"
 
 namespace sonar::oculus {

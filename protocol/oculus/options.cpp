@@ -1,4 +1,4 @@
-#include "protocol/oculus/options.hpp"
+#include "protocol/oculus/settings.hpp"
 
 #include <array>
 

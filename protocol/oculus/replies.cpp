@@ -4,7 +4,7 @@
 
 #include "core/sonar/water.hpp"
 #include "core/text/ipv4.hpp"
-#include "protocol/oculus/options.hpp"
+#include "protocol/oculus/settings.hpp"
 
 namespace sonar::oculus {
 namespace {

@@ -8,9 +8,7 @@
 
 #include "core/sonar/water.hpp"
 #include "protocol/limits.hpp"
-#include "protocol/oculus/fire.hpp"
 #include "protocol/oculus/models.hpp"
-#include "protocol/oculus/options.hpp"
 
 namespace sonar::oculus {
 namespace {

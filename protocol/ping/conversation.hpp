@@ -3,7 +3,6 @@
 
 #include <string_view>
 
-#include "protocol/options.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/vendor.hpp"
 

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
-
-#include "core/sonar/sample_code.hpp"
 
 namespace sonar::ping {
 namespace {

@@ -3,10 +3,10 @@
 
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
+#include "protocol/line_pictures.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_host.hpp"
 #include "protocol/ping/products.hpp"
-#include "protocol/sweep.hpp"
 
 namespace sonar::ping {
 namespace {

@@ -8,7 +8,7 @@
 #include "core/base/geometry.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/ping/one_beam.hpp"
-#include "protocol/ping/period.hpp"
+#include "protocol/ping/products.hpp"
 
 namespace sonar::ping::omniscan {
 namespace {

@@ -71,7 +71,4 @@ std::vector<Bytes> frames_of(const Ping& ping);
 /// values. Empty: the message does not hold a result.
 std::vector<Bytes> answer(BytesView recorded, Results wanted);
 
-/// A host's conversation: single settings, and requested or streamed measurements.
-std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now);
-
 }  // namespace sonar::ping::ping1d

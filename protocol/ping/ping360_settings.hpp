@@ -77,7 +77,4 @@ struct Head {
 /// option sector_scan.
 std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates);
 
-/// A host's conversation: each request turns the head, and the ping is fired when the head has arrived.
-std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now);
-
 }  // namespace sonar::ping::ping360

@@ -3,8 +3,8 @@
 #include <array>
 #include <utility>
 
-#include "core/sonar/sample_code.hpp"
-#include "protocol/ping/period.hpp"
+#include "core/sonar/ping.hpp"
+#include "protocol/ping/products.hpp"
 
 namespace sonar::ping {
 

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "protocol/host.hpp"
+#include "protocol/line_pictures.hpp"
 #include "protocol/ping/messages.hpp"
-#include "protocol/waterfall.hpp"
 
 namespace sonar::ping {
 

@@ -1,6 +1,7 @@
 // The products of the ping protocol (docs/protocols/ping.md): of each the device, its driver, and the codec of its recordings.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "protocol/host.hpp"
@@ -47,5 +48,10 @@ const protocol::Vendor& vendor();
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 recording::Codec codec();
 }  // namespace s500
+
+// Converts a ping rate to a period, which devices and hosts of the family use.
+
+/// The period for a rate above 0 [ms], limited to 1 to 30000.
+inline double period_ms(double rate_hz) { return std::clamp(1000 / rate_hz, 1.0, 30000.0); }
 
 }  // namespace sonar::ping

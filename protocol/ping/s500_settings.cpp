@@ -9,8 +9,8 @@
 #include "core/text/format.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/ping/one_beam.hpp"
-#include "protocol/ping/period.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
+#include "protocol/ping/products.hpp"
 
 namespace sonar::ping::s500 {
 namespace {

@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "protocol/recorded/junk_report.hpp"
-
 namespace sonar::recording {
 namespace {
 

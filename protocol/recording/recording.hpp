@@ -2,9 +2,12 @@
 // dumps. Used by `sonard replay`, the live view, and `sonarctl` for --from.
 #pragma once
 
+#include <deque>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "protocol/recorded/byte_source.hpp"
 #include "protocol/recorded/recorded_message.hpp"
@@ -27,5 +30,37 @@ Result<Recording> open_recording(std::unique_ptr<Source> source, const std::stri
 /// Finds the sonar of a recording by the first message that names its model, or else by its first message and the profile that
 /// the file states, within the first 64 MB. Rewinds the reader.
 std::optional<SentBy> find_sender(RecordingReader& reader);
+
+// Reads the pings of a recording, decoded by the host of their make. Used by `sonarctl` and by the live view.
+
+struct RecordedPing {
+  Time at{};  // 0 if the format stores no times
+  protocol::HostPing ping;
+};
+
+/// The pings that `host`, a host of `make`, decodes from the next message of a recording. Null: the recording has ended, so pings
+/// that wait for another part are complete. Actions of the host other than pings are left out.
+std::vector<RecordedPing> decode_next(protocol::Host& host, const protocol::Make& make, const RecordedMessage* message);
+
+class RecordedPings {
+ public:
+  /// Errors: bad_data if the recording contains no ping of a known sonar.
+  static Result<RecordedPings> open(std::unique_ptr<RecordingReader> reader);
+
+  /// nullopt at the end.
+  std::optional<RecordedPing> next();
+  void rewind();
+  const SentBy& by() const { return by_; }
+  const RecordingReader& reader() const { return *reader_; }
+
+ private:
+  RecordedPings(std::unique_ptr<RecordingReader> reader, SentBy by) : reader_(std::move(reader)), by_(std::move(by)) {}
+  Result<void> make_host();
+
+  std::unique_ptr<RecordingReader> reader_;
+  SentBy by_;
+  std::unique_ptr<protocol::Host> host_;
+  std::deque<RecordedPing> decoded_;  // pings of the last message that next() has not returned yet
+};
 
 }  // namespace sonar::recording

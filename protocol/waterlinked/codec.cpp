@@ -2,8 +2,8 @@
 #include <array>
 
 #include "protocol/recorded/raw_dump.hpp"
-#include "protocol/waterlinked/models.hpp"
 #include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/settings.hpp"
 #include "protocol/waterlinked/sonar_file.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
 

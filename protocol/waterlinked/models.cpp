@@ -1,4 +1,4 @@
-#include "protocol/waterlinked/models.hpp"
+#include "protocol/waterlinked/settings.hpp"
 
 #include <array>
 

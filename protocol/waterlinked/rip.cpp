@@ -7,8 +7,6 @@
 #include <cstring>
 #include <string>
 
-#include "protocol/waterlinked/settings.hpp"
-
 namespace sonar::waterlinked {
 namespace {
 

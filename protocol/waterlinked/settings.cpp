@@ -12,7 +12,7 @@ constexpr float first_gain_db = 33;           // gain of the first pictures, whe
 
 }  // namespace
 
-// The values of the model of the image (protocol/waterlinked/README.md); models.hpp has their evidence.
+// The values of the model of the image (protocol/waterlinked/README.md); settings.hpp has their evidence.
 HeldSettings::HeldSettings(const Settings& s) : settings(s) {
   beam_height_rad = rad_from_deg(mode_rows()[s.mode].beam_height_deg);
   range_unit_m = pixel_scale_m;

@@ -1,8 +1,6 @@
 #include "protocol/waterlinked/waterlinked.hpp"
 
-#include "protocol/waterlinked/models.hpp"
 #include "protocol/waterlinked/rip.hpp"
-#include "protocol/waterlinked/settings.hpp"
 
 namespace sonar::waterlinked {
 namespace {

@@ -11,10 +11,10 @@ import sys
 # Folders of protocol/ that are makes of sonar.
 MAKE_FOLDERS = ("aris", "blueview", "dvl", "m3", "micron", "norbit", "oculus", "ping", "waterlinked")
 # Files that a make of sonar may include beside its own folder.
-DEVICE = ["core/base/", "core/image/polar_image.hpp", "core/sonar/", "core/text/", "protocol/awaited_ping.hpp", "protocol/dialogue.hpp",
+DEVICE = ["core/base/", "core/image/sonar_picture.hpp", "core/sonar/", "core/text/", "protocol/awaited_ping.hpp", "protocol/dialogue.hpp",
           "protocol/held_settings.hpp", "protocol/host.hpp", "protocol/limits.hpp",
-          "protocol/message_fields.hpp", "protocol/options.hpp", "protocol/recorded/", "protocol/serial_line.hpp",
-          "protocol/sweep.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/waterfall.hpp", "protocol/wire/"]
+          "protocol/message_fields.hpp", "protocol/recorded/", "protocol/serial_line.hpp",
+          "protocol/line_pictures.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/wire/"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
@@ -27,14 +27,14 @@ FLOORS = {
     "core/pipeline/arithmetic": ["core/base/", "core/sonar/", "core/pipeline/arithmetic/"],
     "core/paper": ["core/base/", "core/sonar/", "core/scene/", "core/pipeline/", "core/paper/"],
     "cuda": ["core/base/", "core/sonar/", "core/scene/", "core/pipeline/", "cuda/"],
-    "protocol": ["core/base/", "core/image/polar_image.hpp", "core/image/sonar_picture.hpp", "core/sonar/", "core/text/", "protocol/"],
+    "protocol": ["core/base/", "core/image/sonar_picture.hpp", "core/sonar/", "core/text/", "protocol/"],
     "protocol/wire": ["core/base/", "protocol/wire/"],
     "protocol/control": ["core/base/", "protocol/control/"],
     "protocol/doctor": ["core/base/", "core/text/", "protocol/control/", "protocol/doctor/", "protocol/host.hpp"],
     "protocol/mavlink": ["core/base/", "protocol/control/pose_sample.hpp", "protocol/wire/", "protocol/mavlink/"],
     **{f"protocol/{make}": [*DEVICE, f"protocol/{make}/"] for make in MAKE_FOLDERS},
     "protocol/recorded": ["core/base/", "core/sonar/", "protocol/wire/", "protocol/recorded/"],
-    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp", "protocol/stream_framing.hpp",
+    "protocol/recording": ["core/base/", "core/sonar/", "core/text/", "protocol/foxglove/", "protocol/host.hpp", "protocol/sender.hpp",
                            "protocol/wire/", "protocol/recorded/", "protocol/recording/"],
     "daemon": ["core/", "cuda/", "protocol/", "daemon/"],
     # Within the daemon: files of configuration < what is emulated < sockets, threads and clocks < commands.
@@ -63,7 +63,7 @@ DEPENDENCIES = {
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/import/"],
     r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
-    r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp", "core/image/gray_png.cpp"],
+    r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp", "core/image/raster.cpp"],
     r"tiffio\.h": ["core/scene/files/geo_tiff.cpp", "core/scene/files/tiff_file.cpp"],
     r"zlib\.h": ["protocol/blueview/frames.cpp", "protocol/waterlinked/rip.cpp", "protocol/recorded/zlib.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
@@ -72,9 +72,9 @@ DEPENDENCIES = {
     r"google/protobuf|.*\.pb\.h": ["protocol/control/", "protocol/foxglove/", "protocol/waterlinked/messages.cpp"],
     # protoc's classes take long to compile: headers name them only, and requests are structs.
     r"protocol/control/answers\.hpp": [
-        "protocol/control/", "protocol/doctor/", "daemon/server/control/control_http.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/http/operation_answer.cpp", "daemon/server/api/events.cpp",
+        "protocol/control/", "protocol/doctor/", "daemon/server/control/control_server.cpp", "daemon/server/control/stream_connection.cpp", "daemon/server/http/operation_answer.cpp", "daemon/server/api/events.cpp",
         "daemon/server/faults/fault_log.cpp", "daemon/server/operations/fault_operations.cpp",
-        "daemon/server/operations/monitoring.cpp", "daemon/server/operations/time_operations.cpp", "daemon/server/recording/recordings.cpp",
+        "daemon/server/operations/monitoring.cpp", "daemon/server/operations/app_operations.cpp", "daemon/server/recording/recordings.cpp",
         "daemon/server/sonars/device_control.cpp", "daemon/server/sonars/fleet.cpp", "daemon/server/view/recording_views.cpp", "daemon/server/view/view_doctor.cpp", "daemon/server/view/view_messages.cpp", "clients/sonarctl/control_client.cpp",
         "clients/sonarctl/control/control_commands.cpp", "clients/sonarctl/control/fault_commands.cpp",
         "clients/sonarctl/control/status_text.cpp", "clients/sonarctl/doctor/check_daemon.cpp",
@@ -102,8 +102,8 @@ FORBIDDEN = [
      "only daemon/ and clients/ print or log"),
     ("thread", r"core/|protocol/|cuda/|clients/", r"core/base/parallel\.|clients/bvtsdk/core/link\.|clients/sonarctl/net\.", r"\bstd::(j?thread|async)\b|\bpthread_create\b",
      "compute threads live in core/base/parallel.* only, the keep-alive thread of a link and the look-up of names in files of their own"),
-    ("socket", r"core/|protocol/", r"core/base/standard_streams\.cpp", r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
-    ("file", r"core/|protocol/", r"core/base/(regular_file|memory_left|child_process|standard_streams)\.cpp|core/image/raster\.cpp|protocol/recorded/byte_source\.cpp",
+    ("socket", r"core/|protocol/", r"core/base/program_start\.cpp", r"#\s*include\s*<(sys/socket|netinet/|arpa/|poll|netdb)", "only daemon/ and clients/ touch sockets"),
+    ("file", r"core/|protocol/", r"core/base/(regular_file|memory_left|child_process|program_start)\.cpp|core/image/raster\.cpp|protocol/recorded/byte_source\.cpp",
      r"\bstd::[io]?fstream\b|(?<![\w:>.])(std::|::)?fopen\s*\(|(?<![\w>])::open(at)?\s*\(|#\s*include\s*<fcntl\.h>",
      "bytes come in as arguments; only the loaders named in this rule, and recordings through protocol/recorded/byte_source.cpp, open files "
      "(docs/decisions/0015-recording-files-behind-two-interfaces.md)"),
@@ -285,7 +285,7 @@ def program_violations(name, code):
     """Checks that every program makes room for its stacks: one with a small limit otherwise ends by a signal, without a message."""
     found = re.search(r"\bint main\(", code)
     if found and re.match(ONE_DIRECTION, name) and not re.match(BUILD_TOOLS, name) and "make_room_for_stacks()" not in code:
-        yield line_of(code, found.start()), "program: main() does not call make_room_for_stacks() (core/base/stack_limit.hpp)"
+        yield line_of(code, found.start()), "program: main() does not call make_room_for_stacks() (core/base/program_start.hpp)"
 
 
 def line_of(text, position):

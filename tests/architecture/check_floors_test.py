@@ -165,7 +165,7 @@ class Planted(unittest.TestCase):
     def test_makes_are_named_in_their_folders_only(self):
         for name, line in [("daemon/server/a.cpp", "oculus::Framer framer;"), ("clients/sonarctl/a.cpp", '#include "protocol/ping/messages.hpp"'),
                            ("clients/python/a.py", "# of an ARIS"), ("protocol/recording/a.cpp", 'if (name == "blueview") return;'),
-                           ("daemon/config/a.cpp", 'name = "m3";'), ("daemon/config/a.cpp", '#include "protocol/m3/models.hpp"'),
+                           ("daemon/config/a.cpp", 'name = "m3";'), ("daemon/config/a.cpp", '#include "protocol/m3/settings.hpp"'),
                            *((f"daemon/emulator/{make}.cpp", f"{make}::vendor();") for make in check_floors.MAKE_FOLDERS)]:
             with self.subTest(name=name):
                 self.expect(name, line + "\n", 1, "only the make's folder")

@@ -8,7 +8,7 @@
 #include "clients/sonarctl/ping_stream.hpp"
 #include "control.pb.h"
 #include "daemon/commands/options/command_line.hpp"
-#include "daemon/config/find_config.hpp"
+#include "daemon/config/load_config.hpp"
 #include "daemon/config/scene_file.hpp"
 #include "tests/bench/findings.hpp"
 #include "tests/bench/service.hpp"

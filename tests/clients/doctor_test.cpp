@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "clients/sonarctl/doctor/proc_net.hpp"
+#include "clients/sonarctl/doctor/probes.hpp"
 #include "tests/clients/doctor_testing.hpp"
 
 namespace sonar::clients::doctor {

@@ -7,7 +7,6 @@
 #include "clients/sonarctl/control/control_commands.hpp"
 #include "clients/sonarctl/control/status_text.hpp"
 #include "clients/sonarctl/terminal.hpp"
-#include "clients/sonarctl/view_caption.hpp"
 #include "tests/protocol/control/message_from.hpp"
 
 namespace sonar::clients {

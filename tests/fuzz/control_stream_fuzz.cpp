@@ -6,7 +6,6 @@
 
 #include "protocol/control/answers.hpp"
 #include "protocol/control/control.hpp"
-#include "protocol/control/delimited.hpp"
 #include "tests/fuzz/byte_script.hpp"
 
 namespace {

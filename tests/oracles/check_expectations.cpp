@@ -5,7 +5,6 @@
 #include "core/text/format.hpp"
 #include "daemon/commands/render/coverage.hpp"
 #include "daemon/commands/render/render_job.hpp"
-#include "daemon/commands/render/resolution_cell.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 #include "tests/oracles/expectation.hpp"
 

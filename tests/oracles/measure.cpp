@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "daemon/commands/render/coverage.hpp"
-#include "daemon/commands/render/resolution_cell.hpp"
 #include "tests/oracles/expectation.hpp"
 
 namespace sonar::render {

@@ -8,7 +8,6 @@
 #include <new>
 
 #include "clients/bvtsdk/core/degrees.hpp"
-#include "clients/bvtsdk/core/polar_ping.hpp"
 
 namespace sonar::bvt {
 namespace {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "clients/bvtsdk/core/codes.hpp"
-#include "clients/bvtsdk/core/polar_lookup.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 
 namespace sonar::bvt {

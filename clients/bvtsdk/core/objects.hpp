@@ -4,7 +4,6 @@
 
 #include "clients/bvtsdk/core/colour_maps.hpp"
 #include "clients/bvtsdk/core/description.hpp"
-#include "clients/bvtsdk/core/discovery.hpp"
 #include "clients/bvtsdk/core/handles.hpp"
 #include "clients/bvtsdk/core/imaging.hpp"
 #include "clients/bvtsdk/core/range_list.hpp"

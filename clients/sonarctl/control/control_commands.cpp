@@ -6,7 +6,7 @@
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/control/status_text.hpp"
 #include "clients/sonarctl/terminal.hpp"
-#include "core/text/counted.hpp"
+#include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 
 namespace sonar::clients {

@@ -6,7 +6,6 @@
 #include <set>
 #include <string_view>
 
-#include "core/text/counted.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
 #include "core/text/nearest.hpp"

@@ -6,7 +6,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
-#include "protocol/control/fault_record.hpp"
+#include "protocol/control/operations.hpp"
 
 namespace sonar::v1 {  // from control.pb.h
 class DaemonStatus;

@@ -3,7 +3,6 @@
 #include <memory>
 #include <utility>
 
-#include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/control/control_commands.hpp"
 #include "core/text/arguments.hpp"

@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "clients/sonarctl/doctor/checks.hpp"
-#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/doctor/judge.hpp"

@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "core/text/counted.hpp"
 #include "core/text/format.hpp"
 #include "core/text/ipv4.hpp"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "clients/sonarctl/doctor/facts.hpp"
-#include "protocol/doctor/finding.hpp"
+#include "protocol/doctor/check_status.hpp"
 
 namespace sonar::clients::doctor {
 

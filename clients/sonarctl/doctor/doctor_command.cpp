@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <memory>
 
-#include "clients/sonarctl/argument_checks.hpp"
 #include "clients/sonarctl/command_line.hpp"
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "clients/sonarctl/doctor/facts.hpp"

@@ -2,7 +2,6 @@
 
 #include "clients/sonarctl/doctor/facts.hpp"
 #include "clients/sonarctl/doctor/probes.hpp"
-#include "clients/sonarctl/doctor/proc_net.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 #include "protocol/control/answers.hpp"
 

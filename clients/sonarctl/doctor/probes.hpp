@@ -1,6 +1,8 @@
 // Single queries to the network, each with a time limit.
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,6 +10,7 @@
 #include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/doctor/facts.hpp"
 #include "core/base/result.hpp"
+#include "protocol/doctor/socket_table.hpp"
 
 namespace sonar::clients::doctor {
 
@@ -64,5 +67,25 @@ KernelPorts kernel_ports();
 /// connected, reads about 15 of them and disconnects. `control`: a client
 /// subscribed to pings, for transmission times; may be null. `clocks` is set to the difference of the clocks.
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks);
+
+// Lists the sockets of this computer from /proc/net, and their programs as far as /proc is readable.
+
+using sonar::doctor::established;
+using sonar::doctor::listening;
+using sonar::doctor::parse_proc_net;
+using sonar::doctor::SocketLine;
+
+/// Returns all sockets of the computer, IPv4 and IPv6; none if there is no /proc.
+std::vector<SocketLine> tcp_sockets();
+std::vector<SocketLine> udp_sockets();
+
+struct Program {
+  int pid = 0;
+  std::string name;
+};
+/// Returns the program of each socket inode. Programs of other users are missing if /proc is not readable for them.
+std::map<std::uint64_t, Program> programs_by_socket();
+
+PortHolder holder_of(const SocketLine& socket, const std::map<std::uint64_t, Program>& programs);
 
 }  // namespace sonar::clients::doctor

@@ -3,7 +3,6 @@
 
 #include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/doctor/probes.hpp"
-#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/ping_stream.hpp"
 #include "protocol/control/answers.hpp"

@@ -3,8 +3,6 @@
 #include <array>
 #include <stdexcept>
 
-#include "core/pipeline/changing_engine.hpp"
-#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/cpu/simulate.hpp"
 #include "core/pipeline/interleaved_pings.hpp"
 #include "core/pipeline/labels.hpp"

@@ -5,7 +5,6 @@
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
-#include "core/pipeline/scatter.hpp"
 #include "core/scene/cells/cell_lattice.hpp"
 
 namespace sonar {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/pipeline/pulses/spectral.hpp"
-#include "core/sonar/waveform.hpp"
+#include "core/sonar/sonar_model.hpp"
 
 namespace sonar {
 

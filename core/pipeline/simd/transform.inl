@@ -1,4 +1,4 @@
-// Makes beams from columns by a Fourier transform across the columns (tables: beam_transform.hpp). kernels.inl includes the
+// Makes beams from columns by a Fourier transform across the columns (tables: kernels.hpp). kernels.inl includes the
 // file once per instruction set. Every value is a vector of `lanes` samples. The transform is in place, without reordering:
 // forward passes leave the frequencies in digit-reversed order, the response is stored in this order, and inverse passes
 // restore the original order.

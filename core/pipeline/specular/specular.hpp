@@ -2,6 +2,9 @@
 // section 3, eq. 7). Such echoes are points, which are added to the beams at their exact direction.
 #pragma once
 
+#include <array>
+#include <bitset>
+#include <complex>
 #include <memory>
 #include <span>
 #include <vector>
@@ -11,9 +14,32 @@
 #include "core/pipeline/scatter.hpp"
 #include "core/scene/ray_scene.hpp"
 #include "core/scene/specular/specular_mesh.hpp"
-#include "core/scene/specular/specular_primitives.hpp"
+#include "core/scene/specular/specular_point.hpp"
 
 namespace sonar {
+
+// Computes how much of a mirror's echo reaches the sonar if the surface is finite and partly hidden: Fresnel integrals over the
+// visible part (docs/acoustics.md, section 3). Used by specular.
+
+/// Divides the extent into cells around the point that contributes most, to find hidden parts. The outermost cells reach to the
+/// edge.
+struct SpecularWindow {
+  static constexpr std::size_t cells = 16;
+  std::array<std::array<double, cells + 1>, 2> edge{};  // along the principal directions [m]
+  std::bitset<cells * cells> hidden;                    // y * cells + x
+};
+SpecularWindow make_window(const SpecularPoint& point, double wavelength_m);
+
+/// K_1 K_2 of eq. 7 with its phase: 1 for an infinite mirror, a factor i for each focus on the path (time convention e^{+i 2 pi
+/// f t}).
+std::complex<double> specular_factor(const SpecularPoint& point, double wavelength_m);
+/// The same factor without the cells that are hidden.
+std::complex<double> specular_factor(const SpecularPoint& point, double wavelength_m, const SpecularWindow& window);
+
+/// True if a point in the tangent plane belongs to the surface.
+bool on_surface(const SpecularPoint& point, double x, double y);
+/// The point of the surface that is nearest to the foot of the perpendicular from the sonar.
+std::array<double, 2> nearest_on_surface(const SpecularPoint& point);
 
 /// Pressure that a surface reflects coherently at normal incidence: reflection times exp(-2 k^2 h^2). It is 0 for rough
 /// surfaces (smooth_below_kh) and for results below a hundredth.

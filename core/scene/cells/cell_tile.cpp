@@ -4,8 +4,6 @@
 #include <array>
 #include <cstring>
 #include <limits>
-#include <memory>
-#include <vector>
 
 #include "core/scene/cells/cell_lanes.hpp"
 #include "core/scene/cells/cell_lattice.hpp"

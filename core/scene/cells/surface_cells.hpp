@@ -18,7 +18,6 @@
 #include "core/base/parallel.hpp"
 #include "core/base/units.hpp"
 #include "core/scene/cells/cell_tile.hpp"
-#include "core/scene/cells/cell_view.hpp"
 #include "core/scene/closed_mesh.hpp"
 #include "core/scene/scene.hpp"
 

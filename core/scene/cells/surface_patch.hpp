@@ -9,7 +9,6 @@
 
 #include "core/scene/cells/cell_lattice.hpp"
 #include "core/scene/cells/cell_tile.hpp"
-#include "core/scene/cells/cell_view.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -41,5 +42,15 @@ Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::
 
 /// Codes of units of length.
 enum : std::uint16_t { unit_metre = 9001, unit_foot = 9002, unit_us_survey_foot = 9003, unit_kilometre = 9036 };
+
+// Reads TIFF tag 42112, in which GDAL stores the unit, scale and offset of a band.
+
+/// The metadata of the first band. A height is scale * value + offset.
+struct GdalMetadata {
+  std::optional<std::uint16_t> height_unit = {};  // code of the unit of length; other units, as of a sensor, are ignored
+  double scale = 1, offset = 0;                   // NaN if they are not finite numbers
+};
+
+GdalMetadata gdal_metadata_of(std::string_view text);
 
 }  // namespace sonar

@@ -11,7 +11,6 @@
 
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
-#include "core/scene/files/gdal_metadata.hpp"
 #include "core/scene/files/geo_keys.hpp"
 #include "core/scene/files/height_values.hpp"
 #include "core/scene/files/tiff_file.hpp"

@@ -8,7 +8,6 @@
 #include "core/base/letters.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
-#include "core/text/printable.hpp"
 
 namespace sonar {
 namespace {

@@ -2,8 +2,13 @@
 // scenes and the importer of worlds (clients/scene_tools) use it.
 #pragma once
 
+#include <cstdint>
+#include <cstdio>
+#include <optional>
+
 #include "core/base/result.hpp"
-#include "core/scene/files/mesh_file.hpp"
+#include "core/scene/files/clean_mesh.hpp"
+#include "core/scene/files/mesh_exchange.hpp"
 
 namespace sonar {
 
@@ -11,5 +16,21 @@ namespace sonar {
 /// triangles, no triangle with an area, files elsewhere, too much memory or time. y up becomes z up by (x, y, z) -> (x, -z, y).
 /// A separate program reads all formats but binary STL (docs/decisions/0023-meshes-in-a-child.md).
 Result<LoadedMesh> load_mesh(const MeshFile& request);
+
+// Reads binary STL files, a few triangles at a time. The importer of other formats would need three times the file's size in
+// memory.
+
+inline constexpr std::size_t bytes_of_stl_triangle = 50;
+
+struct BinaryStl {
+  std::uint64_t triangles = 0;     // number in its header
+  std::uint64_t bytes_behind = 0;  // bytes after the last triangle
+};
+
+/// Returns nullopt if the file is not a binary STL file: it is too short for the number of triangles in its header. This is
+/// true of every text.
+std::optional<BinaryStl> binary_stl(std::FILE* file);
+/// Passes `count` triangles of the file to `take`, with material 0. Returns false if a triangle could not be read.
+bool each_triangle_of_binary_stl(std::FILE* file, std::uint64_t count, const TriangleSink& take);
 
 }  // namespace sonar

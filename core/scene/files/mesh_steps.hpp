@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "core/scene/files/clean_mesh.hpp"
-#include "core/scene/files/mesh_file.hpp"
+#include "core/scene/files/mesh_exchange.hpp"
 
 namespace sonar {
 

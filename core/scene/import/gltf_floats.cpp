@@ -1,7 +1,6 @@
 #include "core/scene/import/gltf_floats.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <vector>

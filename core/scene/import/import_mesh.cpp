@@ -14,7 +14,6 @@
 #include "core/scene/import/gltf_floats.hpp"
 #include "core/scene/import/import_files.hpp"
 #include "core/scene/import/node_graph.hpp"
-#include "core/scene/import/skins.hpp"
 #include "core/scene/shapes/polygon.hpp"
 
 namespace sonar {

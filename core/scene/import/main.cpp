@@ -6,9 +6,9 @@
 
 #include <cstring>
 
-#include "core/base/confined_reads.hpp"
 #include "core/base/memory_left.hpp"
-#include "core/base/stack_limit.hpp"
+#include "core/base/program_start.hpp"
+#include "core/base/regular_file.hpp"
 #include "core/scene/import/import_limits.hpp"
 #include "core/scene/import/import_mesh.hpp"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "core/scene/shapes/relief_noise.hpp"
+#include "core/scene/shapes/terrain.hpp"
 
 namespace sonar {
 namespace {

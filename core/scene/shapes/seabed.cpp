@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/scene/shapes/relief_noise.hpp"
 #include "core/scene/shapes/terrain.hpp"
 #include "core/text/format.hpp"
 

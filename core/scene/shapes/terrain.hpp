@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -10,8 +11,9 @@
 #include <vector>
 
 #include "core/base/geodesy.hpp"
+#include "core/base/geometry.hpp"
+#include "core/base/random.hpp"
 #include "core/base/result.hpp"
-#include "core/base/utm.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
@@ -85,5 +87,28 @@ struct SeabedShape {
 /// Number of triangles of the shape, for a check before making the mesh.
 std::size_t seabed_triangles(const SeabedShape& shape);
 HeightGrid make_seabed(const SeabedShape& shape);
+
+// Smooth random fields for generated terrain and boulders. They use Philox, so the same seed gives the same terrain on every
+// machine. Only the loading of scenes uses them.
+
+/// Smooth value noise on the unit lattice in space, in -1..1. Two fields with the same seed differ if their `stream` differs.
+double value_noise(Vec3d p, std::uint32_t seed, std::uint32_t stream);
+
+/// Gradient noise over a rectangle of the plane, about -1..1, with features of one wavelength. The constructor draws the
+/// gradients of the lattice.
+class GradientField {
+ public:
+  /// The field covers |x| <= half_x and |y| <= half_y [m].
+  GradientField(double half_x_m, double half_y_m, double wavelength_m, std::uint32_t seed, std::uint32_t stream);
+  double operator()(double x_m, double y_m) const;
+
+ private:
+  struct Slope {
+    float x, y;
+  };
+  double wavelength_m_;
+  int first_x_, first_y_, columns_, rows_;
+  std::vector<Slope> slopes_;
+};
 
 }  // namespace sonar

@@ -73,4 +73,11 @@ class SpecularMesh {
   std::vector<Node> nodes_;
 };
 
+// Computes mirror points of spheres, cylinders, boxes and planes in closed form, from outside and, for tanks, from inside. So
+// core/pipeline/specular gets exact radii and extents instead of those of facets.
+
+/// Appends the mirror points of the primitive whose echoes may be strong enough. The caller tests whether they are hidden.
+/// Kind::none has no mirror points.
+void find_specular_points(const Primitive& primitive, const SpecularQuery& query, std::vector<SpecularPoint>& out);
+
 }  // namespace sonar

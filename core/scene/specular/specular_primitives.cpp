@@ -1,4 +1,4 @@
-#include "core/scene/specular/specular_primitives.hpp"
+#include "core/scene/specular/specular_mesh.hpp"
 
 #include <algorithm>
 #include <cmath>

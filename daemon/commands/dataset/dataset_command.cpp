@@ -8,7 +8,6 @@
 #include <thread>
 
 #include "core/text/decimal.hpp"
-#include "daemon/commands/dataset/export_dataset.hpp"
 #include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "daemon/commands/dataset/constraints.hpp"
 #include "daemon/commands/dataset/vary.hpp"
 #include "daemon/commands/render/render_job.hpp"
 

@@ -1,4 +1,4 @@
-#include "daemon/commands/dataset/export_dataset.hpp"
+#include "daemon/commands/dataset/make_dataset.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -10,9 +10,7 @@
 #include "core/image/raster.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/nearest.hpp"
-#include "daemon/commands/dataset/coco.hpp"
 #include "daemon/commands/dataset/dataset_card.hpp"
-#include "daemon/commands/dataset/parts.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/server/system/sha256.hpp"
 

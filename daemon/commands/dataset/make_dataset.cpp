@@ -1,21 +1,16 @@
 #include "daemon/commands/dataset/make_dataset.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <fstream>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/base/parallel.hpp"
 #include "core/pipeline/simd/kernels.hpp"
-#include "daemon/commands/dataset/coco.hpp"
-#include "daemon/commands/dataset/contact_sheet.hpp"
 #include "daemon/commands/dataset/dataset_card.hpp"
 #include "daemon/commands/dataset/labelled_ping.hpp"
-#include "daemon/commands/dataset/parts.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/options/sonar_version.hpp"
 #include "daemon/commands/render/sidecar.hpp"

@@ -4,15 +4,14 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "core/base/regular_file.hpp"
@@ -265,6 +264,30 @@ Result<std::string> digest_of_file(const path& file) {
   while (const std::size_t n = std::fread(piece.data(), 1, piece.size(), in->get())) hash.add(std::span(piece).first(n));
   if (std::ferror(in->get()) != 0) return failure(ErrorKind::io, "cannot read " + file.string());
   return hash.hex();
+}
+
+using nlohmann::json;
+using std::filesystem::path;
+
+std::string ping_key(std::uint64_t number) { return text::format("%010llu", static_cast<unsigned long long>(number)); }
+
+path part_file(const path& set, std::uint64_t shard) { return set / path(shard_name(shard)).replace_extension(".json"); }
+
+json read_json(const path& file) {
+  std::ifstream in(file);
+  return json::parse(in, nullptr, false);
+}
+
+Result<json> read_part(const path& set, std::uint64_t shard) {
+  json part = read_json(part_file(set, shard));
+  const auto is_complete = [](const json& image) {
+    return image.is_object() && image.contains("annotations") && image.contains("scene");
+  };
+  if (part.is_object() && part.contains("pixels") && part.contains("images") && part["images"].is_array() &&
+      std::ranges::all_of(part["images"], is_complete))
+    return part;
+  return failure(ErrorKind::bad_data,
+                 part_file(set, shard).string() + " cannot be read; remove it, and run the same command again");
 }
 
 }  // namespace sonar::dataset

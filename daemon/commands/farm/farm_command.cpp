@@ -12,7 +12,6 @@
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
-#include "core/text/printable.hpp"
 #include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/farm/farm_job.hpp"

@@ -5,7 +5,7 @@
 
 #include "core/base/regular_file.hpp"
 #include "core/text/decimal.hpp"
-#include "core/text/printable.hpp"
+#include "core/text/format.hpp"
 #include "daemon/commands/farm/queue.hpp"
 
 namespace sonar::farm {

@@ -1,20 +1,20 @@
 #include "daemon/commands/options/commands.hpp"
 
 #include <unistd.h>
+#include <cstdlib>
 
 #include <array>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <future>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "core/base/confined_reads.hpp"
 #include "core/base/enum_names.hpp"
-#include "core/text/printable.hpp"
+#include "core/base/regular_file.hpp"
+#include "core/text/format.hpp"
 #include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/farm/farm_job.hpp"

@@ -10,6 +10,16 @@
 
 namespace sonar::render {
 
+// The area that contributes to one sample of a beam, from the beam's pattern and the pulse. A predicted level is the scattering
+// strength times this area (docs/acoustics.md, sections 3 and 4).
+
+struct ResolutionCell {
+  double beam_u = 0;         // theta_eff, the integral of W^2 over the direction's sine; 0 for the taper `unit`, which has none
+  double energy_s = 0;       // tau_eff, the integral of |p|^2 over time
+  double pulse_width_m = 0;  // -3 dB width in the device's metres: the settings', or a measured pulse's own
+};
+ResolutionCell cell_of(const RenderJob& job);
+
 struct Coverage {
   std::size_t bins = 0, good = 0;  // bins; bins within 1 dB
   std::size_t empty = 0;           // 10 dB or more below the closed form

@@ -1,4 +1,4 @@
-#include "daemon/commands/render/label_json.hpp"
+#include "daemon/commands/render/sidecar.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/image/draw_fan.hpp"
-#include "core/image/outline.hpp"
 #include "core/scene/instances.hpp"
 
 namespace sonar::render {

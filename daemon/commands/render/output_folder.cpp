@@ -13,7 +13,7 @@
 
 #include "core/image/raster.hpp"
 #include "daemon/commands/options/sonar_version.hpp"
-#include "daemon/commands/render/npy.hpp"
+#include "daemon/commands/render/sidecar.hpp"
 
 namespace sonar::render {
 namespace {

@@ -14,8 +14,8 @@
 #include "core/paper/paper_engine.hpp"
 #include "daemon/commands/options/load_progress.hpp"
 #include "daemon/commands/render/coverage.hpp"
+#include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/render_pings.hpp"
-#include "daemon/commands/render/snapshots.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 

@@ -11,8 +11,6 @@
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/text/format.hpp"
-#include "daemon/commands/render/label_json.hpp"
-#include "daemon/commands/render/npy.hpp"
 #include "daemon/commands/render/sidecar.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/emulator/world/plausibility.hpp"

@@ -2,10 +2,17 @@
 // files that need not be rendered again.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <cstddef>
+#include <initializer_list>
+#include <span>
 #include <string>
+#include <string_view>
 
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/pipeline/labels.hpp"
 #include "core/pipeline/ping_engine.hpp"
+#include "core/sonar/ping.hpp"
 #include "daemon/commands/render/render_job.hpp"
 
 namespace sonar::render {
@@ -17,5 +24,27 @@ nlohmann::json sidecar(const RenderJob& job, const Ping& ping, const std::string
 /// SHA-256 of everything that determines the pings: the files' text, the loaded scene, the sonar, switches, seed, poses and
 /// times; not threads and the number of pings. `plain_pictures`: without rings.
 std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictures = false);
+
+// Writes NumPy arrays (.npy, format version 1.0): a short header, then the bytes, little-endian, last index fastest.
+
+/// `type`: "<f4", "<c8", "|u1", "<u2", "<u4". The header's size is a multiple of 64.
+std::string npy_header(std::string_view type, std::initializer_list<std::size_t> shape);
+
+inline std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text.data(), text.size())); }
+
+// Labels as JSON: the instances of a scene, and the pixels of each in a ping, in COCO's format (docs/datasets.md).
+
+inline constexpr int cartesian_width_px = 1000;  // width of the fan to which `cartesian` refers, as in render's pictures
+
+/// For each instance, from 1 on: its name, its class, and true if it is a thing. A thing is an object with a label of its own; it
+/// has boxes and polygons.
+nlohmann::json instances_of(const Scene& scene);
+
+/// Annotations of every visible thing: `bbox`, `area` and `segmentation` in pixels of the samples (x = beam, y = row), and
+/// under `cartesian` in pixels of the fan; `visible`, the unblocked fraction of its energy.
+nlohmann::json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& scene);
+
+/// Returns the scale and origin of the Cartesian picture, which is the fan of --image-rings off.
+nlohmann::json layout_of(const Ping& ping);
 
 }  // namespace sonar::render

@@ -6,7 +6,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/shared_noise.hpp"
+#include "core/pipeline/noise.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
 

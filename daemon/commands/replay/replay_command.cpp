@@ -5,9 +5,8 @@
 #include <optional>
 
 #include "core/text/arguments.hpp"
-#include "core/text/counted.hpp"
 #include "core/text/decimal.hpp"
-#include "daemon/commands/replay/replay_page.hpp"
+#include "core/text/format.hpp"
 #include "daemon/commands/replay/replay_server.hpp"
 #include "daemon/commands/replay/requested_replay.hpp"
 

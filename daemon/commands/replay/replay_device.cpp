@@ -1,7 +1,6 @@
 #include "daemon/commands/replay/replay_device.hpp"
 
 #include "daemon/server/time/clock.hpp"
-#include "protocol/host.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/oculus/oculus.hpp"
 

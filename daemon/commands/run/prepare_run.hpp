@@ -9,7 +9,8 @@
 #include "core/base/parallel.hpp"
 #include "daemon/commands/options/command_line.hpp"
 #include "daemon/commands/options/load_progress.hpp"
-#include "daemon/config/find_config.hpp"
+#include "daemon/config/load_config.hpp"
+#include "daemon/server/app.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 
 namespace sonar {
@@ -27,5 +28,18 @@ struct PreparedRun {
 /// format of errors from then on. `say_with` returns the function for sentences about a long load.
 Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
                                 const std::function<LoadProgress::Say(const Config&)>& say_with);
+
+// Lines that sonard prints on stderr when it is ready and when it ends.
+
+struct BannerFacts {
+  std::string config_line;  // where the configuration came from
+  double scene_ms = 0;      // time to load the scene and build the engine
+};
+std::string banner(const App& app, const BannerFacts& facts);
+std::string ready_line(const App& app, double seconds);
+/// One line per sonar, and the memory: "sonar front  20 pings  0 dropped  0 late ticks ...".
+std::string summary(const App& app);
+/// One line per client stream.
+std::string digest_lines(const App& app);
 
 }  // namespace sonar

@@ -1,16 +1,15 @@
 #include "daemon/commands/options/commands.hpp"
+#include "daemon/server/system/real_time.hpp"
 
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 
-#include "daemon/commands/run/banner.hpp"
 #include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/config/load_config.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/server/app.hpp"
-#include "daemon/server/system/real_time.hpp"
 
 namespace sonar {
 namespace {

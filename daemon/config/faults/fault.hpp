@@ -13,7 +13,7 @@
 #include "core/base/result.hpp"
 #include "core/text/ipv4.hpp"
 #include "daemon/config/faults/kinds.hpp"
-#include "protocol/control/fault_record.hpp"
+#include "protocol/control/operations.hpp"
 
 namespace sonar {
 

@@ -2,15 +2,38 @@
 // stage status change status messages. Pure functions.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "core/base/random.hpp"
+#include "core/base/units.hpp"
+#include "core/sonar/ping.hpp"
 #include "daemon/config/faults/fault.hpp"
 #include "daemon/emulator/connections/outbox.hpp"
-#include "daemon/emulator/faults/draws.hpp"
 #include "protocol/vendor.hpp"
 
 namespace sonar {
+
+// Random numbers for faults: functions of the seed, the fault, the sonar, the ping and the client.
+
+struct FaultDraws {
+  Seed seed{};
+  std::uint32_t fault = 0;  // key made from the fault's name
+  std::uint32_t sonar = 0, ping = 0, client = 0;
+
+  /// Returns the draw with that index, 32 random bits.
+  std::uint32_t bits(std::uint32_t index) const {
+    const auto key = static_cast<std::uint64_t>(seed);
+    return philox(index, ping, client, sonar ^ fault, static_cast<std::uint32_t>(key) ^ fault,
+                  static_cast<std::uint32_t>(key >> 32))
+        .v[0];
+  }
+  /// Returns a number below `end`; `end` > 0.
+  std::size_t below(std::size_t end, std::uint32_t index) const { return static_cast<std::size_t>(bits(index)) % end; }
+  /// Returns a value in (0, 1).
+  double uniform(std::uint32_t index) const { return static_cast<double>(uniform_open(bits(index))); }
+};
 
 /// A message and its shape, which several faults change one after the other.
 struct MessageEdit {
@@ -38,5 +61,10 @@ Touch alter_message(const Fault& fault, const MessageContext& context, MessageEd
 /// Changes the list of datagrams of one status broadcast.
 void alter_beacons(const Fault& fault, const protocol::Vendor& vendor, const FaultDraws& draws,
                    std::vector<protocol::Bytes>& datagrams);
+
+// Effects of faults of the stage payload on the samples of a ping. Pure functions.
+
+/// `kept`: the ping that the effect `stuck` repeats, or null. `begun`: number of pings since the fault began, 0 for the first.
+void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, std::uint64_t begun, Ping& ping);
 
 }  // namespace sonar

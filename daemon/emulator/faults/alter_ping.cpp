@@ -1,12 +1,12 @@
-#include "daemon/emulator/faults/alter_ping.hpp"
+#include "daemon/emulator/faults/alter_message.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <utility>
 
+#include "core/sonar/ping.hpp"
 #include "core/sonar/range_image.hpp"
-#include "core/sonar/sample_code.hpp"
 
 namespace sonar {
 namespace {

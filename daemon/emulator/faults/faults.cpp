@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daemon/emulator/faults/draws.hpp"
+#include "daemon/emulator/faults/alter_message.hpp"
 
 namespace sonar {
 namespace {

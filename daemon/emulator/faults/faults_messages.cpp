@@ -4,8 +4,6 @@
 #include <span>
 
 #include "daemon/emulator/faults/alter_message.hpp"
-#include "daemon/emulator/faults/alter_ping.hpp"
-#include "daemon/emulator/faults/draws.hpp"
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {

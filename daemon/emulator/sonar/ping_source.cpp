@@ -1,9 +1,8 @@
 #include "daemon/emulator/sonar/ping_source.hpp"
 
 #include <algorithm>
-#include <utility>
 
-#include "core/sonar/phases.hpp"
+#include "core/sonar/ping.hpp"
 #include "daemon/emulator/sonar/ping_request.hpp"
 
 namespace sonar {

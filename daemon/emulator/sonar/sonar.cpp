@@ -1,7 +1,6 @@
 #include "daemon/emulator/sonar/sonar.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "core/base/overloaded.hpp"
 #include "core/text/ipv4.hpp"

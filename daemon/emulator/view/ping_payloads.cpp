@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/sonar/range_image.hpp"
-#include "core/sonar/sample_code.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"
 
 namespace sonar {

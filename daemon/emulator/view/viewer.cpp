@@ -1,7 +1,6 @@
 #include "daemon/emulator/view/viewer.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace sonar {
 namespace {

@@ -1,6 +1,8 @@
 // Guesses the axes of the poses in a file, assuming that vehicles stay roughly upright.
 #pragma once
 
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/base/geometry.hpp"
@@ -23,5 +25,12 @@ struct OtherAxes {
 const OtherAxes* axes_of(const std::vector<Pose>& poses);
 /// True if the mounts make the sonars upright in these axes.
 bool are_upright(const std::vector<Pose>& mounts, const OtherAxes& axes);
+
+// Finds files of poses whose angles were written in radians although their columns are degrees.
+
+/// Returns why the headings of these poses, in the order of time, are probably radians that were read as degrees: "follow the
+/// course ..."; nullopt if they are plausible. nullopt also if the vehicle neither moves on a curved path nor turns by a whole
+/// turn.
+std::optional<std::string> radians_read_as_degrees(const std::vector<Pose>& poses);
 
 }  // namespace sonar

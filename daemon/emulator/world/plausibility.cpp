@@ -9,7 +9,6 @@
 #include "core/motion/trajectory_file.hpp"
 #include "core/pipeline/water_line.hpp"
 #include "core/text/format.hpp"
-#include "daemon/emulator/world/angle_unit.hpp"
 #include "daemon/emulator/world/body_axes.hpp"
 
 namespace sonar {

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/motion/jump.hpp"
-
 namespace sonar {
 namespace {
 // Two samples closer in time than this give no speed, because the difference of their stamps is mostly jitter.

@@ -8,7 +8,6 @@
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
 #include "core/motion/trajectory.hpp"
-#include "core/motion/turning.hpp"
 
 namespace sonar {
 

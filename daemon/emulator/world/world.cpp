@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/motion/jump.hpp"
+#include "core/motion/trajectory.hpp"
 
 namespace sonar {
 namespace {

@@ -21,7 +21,7 @@ struct PoseRules {
   std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
   double max_jump_m = 50;
   bool stepped = false;      // simulated time: WALL stamps then belong to the sender's own clock, and the rate is not limited
-  bool follows = false;      // simulated time that follows the stamps of the vehicles (world_follows.cpp)
+  bool follows = false;      // simulated time that follows the stamps of the vehicles (world_sources.cpp)
   double most_per_s = 1000;  // stored poses of one body per second; faster ones replace the newest
   double burst = 64;         // poses that may arrive at once, because networks deliver delayed ones together
 };

@@ -1,7 +1,5 @@
 #include "daemon/server/connections/http_connection.hpp"
 
-#include <utility>
-
 #include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/http/chunk_encode.hpp>
 #include <boost/beast/http/empty_body.hpp>

@@ -1,7 +1,6 @@
 #include "daemon/server/connections/http_reader.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>

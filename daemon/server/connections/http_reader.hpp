@@ -7,10 +7,23 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/base/result.hpp"
 
 namespace sonar {
+
+// An answer of an HTTP server, as plain data.
+
+struct HttpAnswer {
+  unsigned status = 200;
+  std::string body;
+  std::string type = "application/json";
+  std::string allow = {};  // Allow header of status 405
+  std::string why = {};    // the reason of a refusal, for the log; empty = no line
+  std::vector<std::pair<std::string, std::string>> headers = {};
+};
 
 struct HttpRequest {
   std::string method, target, host, origin, authorization, content_type, body;

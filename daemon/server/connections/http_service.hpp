@@ -8,7 +8,6 @@
 #include <string>
 #include <variant>
 
-#include "daemon/server/connections/http_answer.hpp"
 #include "daemon/server/connections/http_reader.hpp"
 #include "daemon/server/system/asio.hpp"
 

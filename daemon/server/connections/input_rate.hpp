@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <limits>
+#include <memory>
 
 namespace sonar {
 
@@ -45,6 +46,52 @@ class InputRate {
   double rate_, tokens_;
   bool begun_ = false;
   Steady::time_point last_{};
+};
+
+// Limits the rate at which the bytes of several clients are read: one token bucket for all. A client within its fair share of
+// the rate never waits; when the bucket is empty, only the others wait. Pure arithmetic, like InputRate.
+
+class SharedRate {
+ public:
+  using Steady = InputRate::Steady;
+  /// The share of one client, which counts while this object exists. It may outlive the SharedRate.
+  class Part {
+    friend class SharedRate;
+    explicit Part(std::shared_ptr<const char> counted) : counted_(std::move(counted)) {}
+    std::shared_ptr<const char> counted_;
+    InputRate share_{at_once};
+  };
+
+  explicit SharedRate(std::size_t bytes_per_s) : bytes_per_s_(bytes_per_s), together_(bytes_per_s) {}
+  /// Adds a client, and sets the rate.
+  Part join(std::size_t bytes_per_s) {
+    bytes_per_s_ = bytes_per_s;
+    together_.use(bytes_per_s);
+    return Part(counted_);
+  }
+
+  /// The share of one client, bytes a second.
+  std::size_t share() const {
+    const auto parts = static_cast<std::size_t>(std::max(counted_.use_count() - 1, 1L));
+    return std::max<std::size_t>(bytes_per_s_ / parts, 1);
+  }
+  /// Bytes of the client that may be read now without a pause after them.
+  std::size_t left(const Part& part, Steady::time_point now) const {
+    return std::max(std::min(part.share_.left(now), share()), together_.left(now));
+  }
+
+  /// Counts bytes that were read from the client. Returns the pause before the next read; 0 = none.
+  Steady::duration pause_after(Part& part, std::size_t bytes, Steady::time_point now) {
+    part.share_.use(share());
+    const auto of_all = together_.pause_after(bytes, now);
+    return part.share_.pause_after(bytes, now).count() > 0 ? of_all : Steady::duration{};
+  }
+
+ private:
+  static constexpr std::size_t at_once = 4096;  // limit for a new sender; a larger one would reward repeated connecting
+  std::size_t bytes_per_s_;
+  InputRate together_;
+  std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // shared with each Part, which it counts
 };
 
 }  // namespace sonar

@@ -3,7 +3,7 @@
 
 #include "daemon/server/api/events.hpp"
 #include "daemon/server/api/operations.hpp"
-#include "daemon/server/connections/shared_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 
 namespace sonar {

@@ -13,7 +13,6 @@
 #include "daemon/server/control/control_targets.hpp"
 #include "daemon/server/http/http_rules.hpp"
 #include "protocol/control/control.hpp"
-#include "protocol/control/delimited.hpp"
 
 namespace sonar {
 

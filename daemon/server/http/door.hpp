@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "daemon/config/config.hpp"
-#include "daemon/server/connections/http_answer.hpp"
 #include "daemon/server/connections/http_reader.hpp"
 #include "daemon/server/connections/token.hpp"
 

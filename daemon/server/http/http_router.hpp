@@ -6,7 +6,6 @@
 #include <variant>
 #include <vector>
 
-#include "daemon/server/connections/http_answer.hpp"
 #include "daemon/server/connections/http_reader.hpp"
 #include "daemon/server/connections/token.hpp"
 #include "daemon/server/http/http_rules.hpp"

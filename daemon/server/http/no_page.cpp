@@ -1,4 +1,4 @@
-#include "daemon/server/http/page_files.hpp"
+#include "daemon/server/http/page.hpp"
 
 namespace sonar {
 

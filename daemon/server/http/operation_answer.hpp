@@ -2,7 +2,7 @@
 #pragma once
 
 #include "daemon/server/api/operations.hpp"
-#include "daemon/server/connections/http_answer.hpp"
+#include "daemon/server/connections/http_reader.hpp"
 
 namespace sonar {
 

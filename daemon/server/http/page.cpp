@@ -4,7 +4,6 @@
 #include <string>
 
 #include "core/base/letters.hpp"
-#include "core/base/trimmed.hpp"
 
 namespace sonar {
 namespace {

@@ -5,10 +5,17 @@
 #include <span>
 #include <string_view>
 
-#include "daemon/server/connections/http_answer.hpp"
-#include "daemon/server/http/page_files.hpp"
+#include "daemon/server/connections/http_reader.hpp"
 
 namespace sonar {
+
+// The compressed files of the page, which the build embeds (clients/web/bundle.py); none if sonard was built without the page.
+
+struct PageFile {
+  std::string_view path, type, hash;     // "/"; "text/html; ..."; hash of the content
+  std::span<const unsigned char> bytes;  // gzip
+};
+std::span<const PageFile> page_files();
 
 struct PageRequest {
   std::string_view path;  // without its query

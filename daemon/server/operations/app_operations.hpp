@@ -2,14 +2,63 @@
 // like these classes.
 #pragma once
 
+#include <functional>
+
 #include "daemon/server/api/operations.hpp"
 #include "daemon/server/operations/fault_operations.hpp"
 #include "daemon/server/operations/monitoring.hpp"
 #include "daemon/server/operations/scene_operations.hpp"
-#include "daemon/server/operations/sonar_operations.hpp"
-#include "daemon/server/operations/time_operations.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
+#include "daemon/server/recording/recordings.hpp"
+#include "daemon/server/sonars/fleet.hpp"
+#include "daemon/server/time/stepped_time.hpp"
 
 namespace sonar {
+
+// Carries out requests for sonars: settings, water, and recordings.
+
+class SonarOperations {
+ public:
+  /// Changed water is written to `config`.
+  SonarOperations(Config& config, Fleet& fleet, Recordings& recordings, Log& log)
+      : config_(config), fleet_(fleet), recordings_(recordings), log_(log) {}
+
+  OperationResult set(const control::SetSonar& asked, const Sender& sender);
+  OperationResult set(const control::SetEnvironment& asked, const Sender& sender);
+  void start(const control::StartRecording& asked, const Sender& sender, Operations::Done done);
+  void stop(const control::StopRecording& asked, Operations::Done done);
+
+ private:
+  /// Finds a sonar; an empty name means the only one.
+  Result<Device*> find(const std::string& name);
+
+  Config& config_;
+  Fleet& fleet_;
+  Recordings& recordings_;
+  Log& log_;
+};
+
+// Carries out requests that move bodies or advance time: poses, steps of lockstep time, playback of trajectories.
+
+class TimeOperations {
+ public:
+  /// `on_change` is called when time may advance.
+  TimeOperations(SteppedTime& time, PoseIntake& poses, const Fleet& fleet, std::function<void()> on_change)
+      : time_(time), poses_(poses), fleet_(fleet), on_change_(std::move(on_change)) {}
+
+  void take(const control::PoseSample& sample, const Sender& sender, Operations::Done done);
+  void step(const control::Step& asked, Operations::Done done, HasLeft has_left);
+  OperationResult steer(const control::SetTrajectory& asked, const Sender& sender);
+
+ private:
+  std::uint64_t pings_made() const;
+
+  SteppedTime& time_;
+  PoseIntake& poses_;
+  const Fleet& fleet_;
+  std::function<void()> on_change_;
+  std::uint64_t pings_reported_ = 0;  // pings counted in answers to steps so far
+};
 
 class AppOperations final : public Operations {
  public:

@@ -15,7 +15,6 @@
 #include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/connections/listener.hpp"
 #include "daemon/server/connections/port_guard.hpp"
-#include "daemon/server/connections/shared_rate.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"

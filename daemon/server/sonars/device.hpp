@@ -15,7 +15,7 @@
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/connections/recent_rate.hpp"
 #include "daemon/emulator/sonar/sonar.hpp"
-#include "daemon/emulator/view/preview.hpp"
+#include "daemon/emulator/view/driver_picture.hpp"
 #include "daemon/server/connections/listener.hpp"
 #include "daemon/server/engine/simulator.hpp"
 #include "daemon/server/recording/recording_file.hpp"

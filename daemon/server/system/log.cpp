@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "core/base/standard_streams.hpp"
+#include "core/base/program_start.hpp"
 
 namespace sonar {
 namespace {

@@ -3,9 +3,9 @@
 #include <dirent.h>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <sstream>
 
 #include <fstream>
-#include <sstream>
 
 namespace sonar {
 namespace {

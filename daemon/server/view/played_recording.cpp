@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "daemon/server/recording/recording_file.hpp"
-#include "protocol/recording/recording.hpp"
 
 namespace sonar {
 namespace {

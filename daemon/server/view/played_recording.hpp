@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/base/result.hpp"
-#include "protocol/recording/recorded_pings.hpp"
+#include "protocol/recording/recording.hpp"
 
 namespace sonar {
 

@@ -9,7 +9,6 @@
 
 #include "core/motion/playback.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
-#include "daemon/emulator/view/playback_watch.hpp"
 #include "daemon/emulator/view/recording_player.hpp"
 #include "daemon/server/view/view_messages.hpp"
 #include "daemon/server/view/view_parameters.hpp"

@@ -9,7 +9,6 @@
 #include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/server/view/view_messages.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"
-#include "protocol/foxglove/ros_cdr.hpp"
 
 namespace sonar {
 namespace {

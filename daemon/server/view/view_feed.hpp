@@ -13,7 +13,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/view/driver_picture.hpp"
-#include "daemon/emulator/view/playback_watch.hpp"
+#include "daemon/emulator/view/recording_player.hpp"
 #include "daemon/emulator/view/viewer.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/api/operations.hpp"

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "protocol/control/answers.hpp"
-#include "protocol/foxglove/ros_cdr.hpp"
+#include "protocol/foxglove/foxglove_messages.hpp"
 
 namespace sonar {
 namespace {

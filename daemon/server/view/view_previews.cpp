@@ -1,4 +1,4 @@
-// Previews: pings only for viewers, while no driver is connected (daemon/emulator/view/preview.hpp).
+// Previews: pings only for viewers, while no driver is connected (daemon/emulator/view/driver_picture.hpp).
 #include "daemon/server/view/view_feed.hpp"
 
 namespace sonar {

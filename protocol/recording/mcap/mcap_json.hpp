@@ -9,7 +9,6 @@
 #include "core/base/geometry.hpp"
 #include "core/base/units.hpp"
 #include "core/sonar/ping.hpp"
-#include "core/sonar/ping_labels.hpp"
 
 namespace sonar::recording::mcap {
 

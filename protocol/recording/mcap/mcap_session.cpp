@@ -4,8 +4,8 @@
 #include <set>
 
 #include "protocol/foxglove/foxglove_messages.hpp"
-#include "protocol/recorded/junk_report.hpp"
-#include "protocol/stream_framing.hpp"
+#include "protocol/recorded/message_splitter.hpp"
+#include "protocol/sender.hpp"
 
 namespace sonar::recording {
 namespace {

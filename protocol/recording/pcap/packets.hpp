@@ -1,12 +1,17 @@
-// Reads the packets of a capture file (classic pcap or pcapng). First step of reading a capture; ip_packet.hpp decodes them.
+// Reads the packets of a capture file (classic pcap or pcapng). First step of reading a capture; parse_packet() decodes them.
 #pragma once
 
+#include <algorithm>
+#include <compare>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "protocol/recorded/byte_source.hpp"
 #include "protocol/recorded/recorded_message.hpp"
+#include "protocol/wire/wire.hpp"
 
 namespace sonar::recording {
 
@@ -50,5 +55,54 @@ class PacketReader {
   std::vector<Interface> interfaces_;
   Damages damages_;
 };
+
+// Reads integers at any offset of a block of bytes; 0 if the block is too short. Used for the headers of packets and of capture
+// files.
+
+template <class T>
+T number_at(wire::BytesView bytes, std::size_t offset, wire::Endian endian) {
+  T value = 0;
+  wire::Reader reader(bytes.subspan(std::min(offset, bytes.size())), endian);
+  reader("number", value);
+  return value;
+}
+inline std::uint16_t u16_at(wire::BytesView bytes, std::size_t offset, wire::Endian endian = wire::Endian::big) {
+  return number_at<std::uint16_t>(bytes, offset, endian);
+}
+inline std::uint32_t u32_at(wire::BytesView bytes, std::size_t offset, wire::Endian endian = wire::Endian::big) {
+  return number_at<std::uint32_t>(bytes, offset, endian);
+}
+
+// Extracts the TCP segment or UDP datagram of a captured packet. Second step of reading a capture; tcp_stream.hpp orders
+// segments.
+
+struct IpEnd {
+  std::uint32_t address = 0;  // 127.0.0.2 = 0x7F000002
+  std::uint16_t port = 0;
+  auto operator<=>(const IpEnd&) const = default;
+};
+std::string text_of(const IpEnd& end);  // "127.0.0.2:52100"
+
+namespace tcp_flag {
+inline constexpr std::uint8_t fin = 0x01, syn = 0x02, rst = 0x04, psh = 0x08, ack = 0x10;
+}
+
+struct Segment {
+  bool tcp = true;  // if false: UDP
+  IpEnd source, target;
+  std::uint32_t sequence = 0;
+  std::uint8_t flags = 0;
+  wire::BytesView payload;  // as far as it was captured
+};
+
+/// Link types Ethernet (with VLAN tags), raw IP, Linux cooked 1 and 2, BSD loopback. nullopt for other packets: other protocols,
+/// IPv6, fragments, cut headers.
+std::optional<Segment> parse_packet(std::uint32_t link_type, wire::BytesView packet);
+
+/// True if the packet is the first fragment of an IPv4 datagram.
+bool begins_fragments(std::uint32_t link_type, wire::BytesView packet);
+
+/// True for link types that parse_packet supports.
+bool is_known_link_type(std::uint32_t link_type);
 
 }  // namespace sonar::recording

@@ -8,7 +8,7 @@
 #include "protocol/host.hpp"
 #include "protocol/recorded/byte_source.hpp"
 #include "protocol/recorded/recorded_message.hpp"
-#include "protocol/recording/pcap/ip_packet.hpp"
+#include "protocol/recording/pcap/packets.hpp"
 
 namespace sonar::recording {
 

@@ -3,13 +3,11 @@
 #include <map>
 #include <set>
 
-#include "protocol/recorded/junk_report.hpp"
 #include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/pcap/packets.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/pcap/tcp_stream.hpp"
 #include "protocol/sender.hpp"
-#include "protocol/stream_framing.hpp"
 
 namespace sonar::recording {
 namespace {

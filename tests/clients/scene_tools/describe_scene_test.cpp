@@ -1,4 +1,4 @@
-#include "clients/scene_tools/describe_scene.hpp"
+#include "clients/scene_tools/import_scene.hpp"
 
 #include <gmock/gmock.h>
 

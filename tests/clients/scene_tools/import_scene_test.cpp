@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <optional>
 
-#include "clients/scene_tools/describe_scene.hpp"
 #include "clients/scene_tools/resource_paths.hpp"
 #include "core/scene/files/load_scene.hpp"
 #include "tests/clients/scene_tools/reading.hpp"

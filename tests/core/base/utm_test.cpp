@@ -1,6 +1,6 @@
 // Compares Universal Transverse Mercator with its definition: angles are preserved everywhere, and the meridian in the middle
 // of a zone has 0.9996 times its length.
-#include "core/base/utm.hpp"
+#include "core/base/geodesy.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "core/image/outline.hpp"
+#include "core/image/draw_fan.hpp"
 
 #include <gtest/gtest.h>
 
 #include <string>
 
-#include "core/image/gray_png.hpp"
+#include "core/image/raster.hpp"
 
 namespace sonar {
 namespace {

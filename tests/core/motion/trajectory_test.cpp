@@ -6,7 +6,6 @@
 #include <random>
 
 #include "core/base/units.hpp"
-#include "core/motion/turning.hpp"
 
 namespace sonar::motion {
 namespace {

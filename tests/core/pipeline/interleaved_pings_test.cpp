@@ -4,9 +4,9 @@
 #include <cmath>
 #include <complex>
 
-#include "core/pipeline/check_request.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_scalars.hpp"
-#include "core/sonar/ping_labels.hpp"
+#include "core/sonar/ping.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 

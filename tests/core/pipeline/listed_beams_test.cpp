@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/pipeline/check_request.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "tests/core/pipeline/basin.hpp"
 #include "tests/core/pipeline/scenes.hpp"

@@ -8,7 +8,7 @@
 
 #include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/receiver.hpp"
-#include "core/pipeline/check_request.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/pulses/pulse.hpp"
 #include "tests/core/pipeline/pulses.hpp"

@@ -8,7 +8,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/sonar/waveform.hpp"
+#include "core/sonar/sonar_model.hpp"
 
 namespace sonar::test {
 

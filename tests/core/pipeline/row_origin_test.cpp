@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/pipeline/check_request.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"

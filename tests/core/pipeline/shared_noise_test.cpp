@@ -1,7 +1,7 @@
 // Noise and leak that channels share: power in every beam compared with the sum over the channels, correlation of beams, the
 // range at which the noise ends, and no effect if it is off (docs/acoustics.md, section 5). Also codes that are truncated
 // instead of rounded (section 7).
-#include "core/pipeline/shared_noise.hpp"
+#include "core/pipeline/noise.hpp"
 
 #include <gmock/gmock.h>
 
@@ -15,8 +15,8 @@
 
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
-#include "core/pipeline/check_request.hpp"
 #include "core/pipeline/focused_array.hpp"
+#include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_plan.hpp"
 #include "tests/core/pipeline/kernel_sets.hpp"
 #include "tests/core/pipeline/scenes.hpp"

@@ -11,7 +11,6 @@
 #include "core/base/base64.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
-#include "core/scene/files/binary_stl.hpp"
 #include "core/scene/files/clean_mesh.hpp"
 #include "core/text/format.hpp"
 #include "tests/core/scene/mesh_checks.hpp"

@@ -8,7 +8,6 @@
 #include <random>
 
 #include "core/scene/shapes/primitives.hpp"
-#include "core/scene/specular/specular_primitives.hpp"
 
 namespace sonar {
 namespace {

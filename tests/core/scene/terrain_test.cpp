@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/scene/shapes/relief_noise.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 
 namespace sonar::terrain_test {

@@ -1,5 +1,4 @@
 // The configuration file: every key, every default, every refusal with file, line, column and key.
-#include "daemon/config/find_config.hpp"
 #include "daemon/config/load_config.hpp"
 
 #include <gmock/gmock.h>

@@ -8,8 +8,6 @@
 #include <cstring>
 #include <limits>
 
-#include "protocol/control/delimited.hpp"
-
 namespace sonar::control {
 namespace {
 

@@ -13,7 +13,6 @@
 
 #include "core/base/base64.hpp"
 #include "protocol/foxglove/glb.hpp"
-#include "protocol/foxglove/ros_cdr.hpp"
 
 namespace sonar::foxglove {
 namespace {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "protocol/norbit/norbit.hpp"
-#include "protocol/norbit/packet.hpp"
 #include "protocol/norbit/settings.hpp"
 
 namespace sonar::norbit::tests {

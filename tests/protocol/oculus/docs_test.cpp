@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "protocol/oculus/options.hpp"
+#include "protocol/oculus/settings.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::tests {

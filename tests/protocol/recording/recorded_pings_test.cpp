@@ -1,5 +1,5 @@
 // A host gets the messages of a recording.
-#include "protocol/recording/recorded_pings.hpp"
+#include "protocol/recording/recording.hpp"
 
 #include <gmock/gmock.h>
 

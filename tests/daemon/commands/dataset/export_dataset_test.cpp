@@ -1,5 +1,5 @@
 // Exports of a small data set, its split by scene, a stopped run, and damaged archives.
-#include "daemon/commands/dataset/export_dataset.hpp"
+#include "daemon/commands/dataset/make_dataset.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,6 @@
 
 #include "core/text/strict_yaml.hpp"
 #include "daemon/commands/dataset/labelled_ping.hpp"
-#include "daemon/commands/dataset/make_dataset.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 
 namespace sonar::dataset {

@@ -9,10 +9,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "core/base/confined_reads.hpp"
 #include "core/base/regular_file.hpp"
 #include "core/pipeline/simd/kernels.hpp"
-#include "core/text/printable.hpp"
+#include "core/text/format.hpp"
 #include "daemon/commands/farm/queue.hpp"
 #include "daemon/commands/options/commands.hpp"
 

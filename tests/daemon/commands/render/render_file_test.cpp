@@ -11,9 +11,7 @@
 
 #include "core/paper/paper_engine.hpp"
 #include "daemon/commands/render/coverage.hpp"
-#include "daemon/commands/render/npy.hpp"
 #include "daemon/commands/render/render_job.hpp"
-#include "daemon/commands/render/resolution_cell.hpp"
 #include "daemon/commands/render/sidecar.hpp"
 
 namespace sonar::render {

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "daemon/commands/render/render_job.hpp"
-#include "daemon/commands/render/snapshots.hpp"
 
 namespace sonar::render {
 namespace {

@@ -1,5 +1,5 @@
 // Faults of the samples on range images: strengths and ranges are altered separately, and no pixel without a return gets one.
-#include "daemon/emulator/faults/alter_ping.hpp"
+#include "daemon/emulator/faults/alter_message.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

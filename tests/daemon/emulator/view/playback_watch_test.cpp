@@ -1,5 +1,5 @@
 // Messages to viewers of a trajectory: its time, and changes by steps.
-#include "daemon/emulator/view/playback_watch.hpp"
+#include "daemon/emulator/view/recording_player.hpp"
 
 #include <gtest/gtest.h>
 

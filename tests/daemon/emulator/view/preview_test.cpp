@@ -1,5 +1,5 @@
 // A preview in virtual time: its rate and its end, and that the first driver gets the same bytes with and without one before.
-#include "daemon/emulator/view/preview.hpp"
+#include "daemon/emulator/view/driver_picture.hpp"
 
 #include <gmock/gmock.h>
 

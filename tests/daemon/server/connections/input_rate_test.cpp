@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "daemon/server/connections/shared_rate.hpp"
-
 namespace sonar {
 namespace {
 

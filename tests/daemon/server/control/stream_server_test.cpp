@@ -3,7 +3,7 @@
 
 #include <list>
 
-#include "protocol/control/delimited.hpp"
+#include "protocol/control/control.hpp"
 #include "tests/daemon/server/control/control_bench.hpp"
 
 namespace sonar::testing_daemon {

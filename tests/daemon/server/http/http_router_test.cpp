@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/server/http/page_files.hpp"
+#include "daemon/server/http/page.hpp"
 
 namespace sonar {
 namespace {

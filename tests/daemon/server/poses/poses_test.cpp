@@ -7,7 +7,7 @@
 
 #include "daemon/server/system/listen.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/control/delimited.hpp"
+#include "protocol/control/control.hpp"
 #include "tests/daemon/server/loopback.hpp"
 
 namespace sonar::testing_daemon {

@@ -1,0 +1,84 @@
+#include "protocol/line_pictures.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/geometry.hpp"
+
+namespace sonar::protocol {
+namespace {
+
+constexpr double shown_db = 60;  // levels down to this far below the strongest echo are shown
+
+/// The scale follows the strongest echo of all lines shown, so that it is the same for all of them.
+SonarPicture picture_of(const std::deque<std::shared_ptr<const Line>>& waterfall, double start_m, double row_m) {
+  SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};
+  seen.image.rows = waterfall.size();
+  seen.image.beams = waterfall.front()->size();
+  seen.image.row_spacing_m = row_m;
+  seen.image.start_m = start_m;
+  float most_db = -1000;
+  for (const auto& profile : waterfall) most_db = std::max(most_db, *std::max_element(profile->begin(), profile->end()));
+  for (const auto& profile : waterfall)
+    for (const float db : *profile)
+      seen.image.samples.push_back(std::clamp(255 * (1 + (db - most_db) / static_cast<float>(shown_db)), 0.0f, 255.0f));
+  return seen;
+}
+
+}  // namespace
+
+void Waterfall::add(Line line, double start_m, double row_m, HostPing& ping) {
+  if (start_m != start_m_ || row_m != row_m_ || (!lines_.empty() && lines_.front()->size() != line.size())) lines_.clear();
+  start_m_ = start_m;
+  row_m_ = row_m;
+  lines_.push_front(std::make_shared<const Line>(std::move(line)));
+  if (lines_.size() > waterfall_rows) lines_.pop_back();
+  ping.lines = lines_.size();
+  ping.whole_lines = waterfall_fewest_rows;
+  ping.drawing = [lines = lines_, start_m, row_m] { return picture_of(lines, start_m, row_m); };
+}
+
+double Sweep::bearing_rad(std::size_t direction) const {
+  const auto all = static_cast<double>(lines_.size());
+  return (all / 2 - static_cast<double>(direction)) * 2 * pi / all;
+}
+
+// A scan of the half circle ahead would fill only half of a round picture, so the picture shows only that half. The first line
+// outside of it makes the picture a whole turn.
+PolarImage Sweep::shown() const {
+  bool only_ahead = lines_.size() % 4 == 0;
+  for (std::size_t i = 0; i < lines_.size(); ++i)
+    only_ahead = only_ahead && (lines_[i] == nullptr || (i >= ahead_begin() && i < ahead_end()));
+  const std::size_t begin = only_ahead ? ahead_begin() : 0;
+  PolarImage image;
+  image.rows = rows_;
+  image.beams = only_ahead ? ahead_end() - begin : lines_.size();
+  image.row_spacing_m = row_m_;
+  image.samples.resize(rows_ * image.beams);
+  for (std::size_t beam = 0; beam < image.beams; ++beam) {
+    image.azimuth_rad.push_back(bearing_rad(begin + beam));
+    if (const auto& line = lines_[begin + beam])
+      for (std::size_t row = 0; row < rows_; ++row) image.samples[row * image.beams + beam] = (*line)[row];
+  }
+  return image;
+}
+
+void Sweep::add(std::size_t direction, Line line, double row_m, HostPing& ping) {
+  // Lines of another range cannot be in one picture with the earlier ones.
+  if (rows_ != line.size() || row_m_ != row_m) lines_.assign(lines_.size(), nullptr);
+  rows_ = line.size();
+  row_m_ = row_m;
+  lines_[direction] = std::make_shared<const Line>(std::move(line));
+  // The picture is drawn later, perhaps by another thread, so it gets a copy. Lines are shared, which makes the copy cheap.
+  const auto now = std::make_shared<const Sweep>(*this);
+  ping.picture = [now]() -> Result<PolarImage> { return now->shown(); };
+  ping.drawing = [now, head_rad = bearing_rad(direction)] {
+    return SonarPicture{.kind = PictureKind::sweep, .image = now->shown(), .head_rad = head_rad};
+  };
+  const auto at = [this](std::size_t i) { return lines_.begin() + static_cast<std::ptrdiff_t>(i); };
+  ping.lines = static_cast<std::size_t>(
+      std::count_if(at(ahead_begin()), at(ahead_end()), [](const auto& scanned) { return scanned != nullptr; }));
+  ping.whole_lines = ahead_end() - ahead_begin();
+}
+
+}  // namespace sonar::protocol

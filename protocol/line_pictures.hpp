@@ -1,0 +1,49 @@
+// Pictures of sonars that send single lines: a waterfall, and the sweep of a head that turns.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <vector>
+
+#include "protocol/host.hpp"
+
+namespace sonar::protocol {
+
+using Line = std::vector<float>;  // by range, [dB]
+
+/// The lines of the last pings, one below the other, the newest on top.
+class Waterfall {
+ public:
+  /// Adds a line and puts the drawing into `ping`. If the rows differ from those of earlier lines, the earlier lines are
+  /// dropped.
+  void add(Line line, double start_m, double row_m, HostPing& ping);
+
+ private:
+  std::deque<std::shared_ptr<const Line>> lines_;
+  double start_m_ = 0, row_m_ = 0;
+};
+
+/// The newest line of each direction of a head that turns. Cheap to copy.
+class Sweep {
+ public:
+  /// `directions`: number of directions in a turn, at least 4. Direction 0 looks astern; the others follow over port, ahead and
+  /// starboard.
+  explicit Sweep(std::size_t directions) : lines_(directions) {}
+  std::size_t directions() const { return lines_.size(); }
+  /// Adds a line and puts the picture into `ping`; it is complete once the half circle ahead has been scanned. If the rows
+  /// differ from those of earlier lines, the earlier lines are dropped.
+  void add(std::size_t direction, Line line, double row_m, HostPing& ping);
+
+ private:
+  double bearing_rad(std::size_t direction) const;
+  std::size_t ahead_begin() const { return lines_.size() / 4; }
+  std::size_t ahead_end() const { return lines_.size() - lines_.size() / 4 + 1; }
+  /// The picture to show: the half circle ahead while only that half was scanned, else the full circle.
+  PolarImage shown() const;
+
+  std::size_t rows_ = 0;
+  double row_m_ = 0;
+  std::vector<std::shared_ptr<const Line>> lines_;
+};
+
+}  // namespace sonar::protocol
