@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <new>
 #include <optional>
 #include <set>
 #include <stdexcept>

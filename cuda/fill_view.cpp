@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/pipeline/form_beams.hpp"
 #include "core/pipeline/receive.hpp"
 #include "core/pipeline/truth.hpp"
 #include "core/pipeline/volume.hpp"

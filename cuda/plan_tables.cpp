@@ -5,9 +5,7 @@
 
 #include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/spectral_columns.hpp"
-#include "core/pipeline/volume.hpp"
 #include "core/sonar/bearings.hpp"
-#include "cuda/fan_steps.hpp"
 
 namespace sonar::cuda {
 

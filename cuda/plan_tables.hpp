@@ -2,7 +2,6 @@
 // once, and every ping with the same values uses them.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 
 #include "core/pipeline/noise.hpp"

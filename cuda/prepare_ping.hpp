@@ -12,7 +12,6 @@
 #include "core/pipeline/multipath/multipath.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/pipeline/ping_scalars.hpp"
-#include "core/pipeline/scatter.hpp"
 #include "core/pipeline/specular/specular.hpp"
 #include "cuda/arena.hpp"
 #include "cuda/cell_store.hpp"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "clients/sonarctl/ping_stream.hpp"
-#include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
 #include "core/image/draw_fan.hpp"
 #include "core/image/terminal_fan.hpp"

@@ -3,7 +3,6 @@
 #include <cstdio>
 
 #include "clients/sonarctl/command_line.hpp"
-#include "clients/sonarctl/commands.hpp"
 #include "core/base/program_start.hpp"
 
 int main(int argc, char** argv) {

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/base/units.hpp"
-#include "core/pipeline/arithmetic/beam_pattern.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/pipeline/receive.hpp"
 #include "core/sonar/bearings.hpp"

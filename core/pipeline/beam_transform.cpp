@@ -3,7 +3,6 @@
 #include <cmath>
 #include <initializer_list>
 
-#include "core/pipeline/ping_plan.hpp"
 #include "core/pipeline/plan_tables.hpp"
 
 namespace sonar {

@@ -5,8 +5,6 @@
 #include <complex>
 #include <utility>
 
-#include "core/pipeline/arithmetic/beam_pattern.hpp"
-
 namespace sonar {
 
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,

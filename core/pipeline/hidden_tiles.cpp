@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/pipeline/arithmetic/kernel_math.hpp"
-
 namespace sonar {
 namespace {
 

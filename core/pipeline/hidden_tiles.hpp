@@ -9,7 +9,6 @@
 #include "core/pipeline/ping_context.hpp"
 #include "core/pipeline/signals.hpp"
 #include "core/pipeline/simd/kernels.hpp"
-#include "core/scene/cells/surface_cells.hpp"
 
 namespace sonar {
 

@@ -3,14 +3,12 @@
 // 6).
 #pragma once
 
-#include <complex>
 #include <span>
 #include <vector>
 
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/ping_context.hpp"
 #include "core/pipeline/ping_plan.hpp"
-#include "core/pipeline/ping_scalars.hpp"
 #include "core/pipeline/signals.hpp"
 
 namespace sonar {

@@ -15,7 +15,6 @@
 #include "core/pipeline/signals.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/pipeline/spectral_columns.hpp"
-#include "core/scene/cells/surface_cells.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {

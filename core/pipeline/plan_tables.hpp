@@ -12,7 +12,6 @@
 #include "core/pipeline/noise.hpp"
 #include "core/pipeline/signals.hpp"
 #include "core/pipeline/simd/kernels.hpp"
-#include "core/sonar/ping.hpp"
 
 namespace sonar {
 

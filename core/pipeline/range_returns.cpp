@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/pipeline/arithmetic/receiver.hpp"
 #include "core/pipeline/arithmetic/scattering.hpp"
 #include "core/sonar/bearings.hpp"
 

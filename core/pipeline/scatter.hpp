@@ -16,7 +16,6 @@
 #include "core/pipeline/signals.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/scene/cells/surface_cells.hpp"
-#include "core/scene/ray_scene.hpp"
 
 namespace sonar {
 

@@ -1,4 +1,3 @@
-#include "core/pipeline/arithmetic/kernel_math.hpp"
 #include "core/pipeline/noise.hpp"
 
 #include <algorithm>

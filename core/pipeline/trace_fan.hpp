@@ -2,7 +2,6 @@
 // Scatterers belong to the surfaces (scatter.hpp), so rays only determine shadows.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "core/pipeline/fan_refinement.hpp"

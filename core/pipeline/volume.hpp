@@ -2,7 +2,6 @@
 // signals between synthesis and beamforming (docs/acoustics.md, section 3).
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "core/pipeline/noise.hpp"

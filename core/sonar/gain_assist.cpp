@@ -1,7 +1,6 @@
 #include "core/sonar/gain_assist.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace sonar {

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/base/geometry.hpp"
 #include "core/sonar/ping.hpp"
 
 namespace sonar {

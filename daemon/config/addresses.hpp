@@ -1,7 +1,6 @@
 // Reads and prints IPv4 addresses, endpoints and ranges in configurations, command lines and log lines.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <string_view>
 

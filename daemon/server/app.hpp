@@ -4,10 +4,7 @@
 
 #include <functional>
 #include <list>
-#include <memory>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"

@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "core/sonar/ping_settings.hpp"
-#include "core/sonar/sonar_model.hpp"
-#include "core/sonar/water.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/vendor.hpp"
 

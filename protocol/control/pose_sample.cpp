@@ -1,6 +1,5 @@
 #include "protocol/control/pose_sample.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "protocol/control/refused.hpp"

@@ -4,7 +4,6 @@
 
 #include <deque>
 #include <optional>
-#include <vector>
 
 #include "core/base/geodesy.hpp"
 #include "core/base/result.hpp"

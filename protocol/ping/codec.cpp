@@ -9,7 +9,6 @@
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/ping/products.hpp"
 #include "protocol/ping/s500_settings.hpp"
-#include "protocol/recorded/raw_dump.hpp"
 
 namespace sonar::ping {
 namespace {

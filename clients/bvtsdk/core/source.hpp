@@ -2,10 +2,7 @@
 // Used by Sonar and Head; any thread may call.
 #pragma once
 
-#include <atomic>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "clients/bvtsdk/core/codes.hpp"

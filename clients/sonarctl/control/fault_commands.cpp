@@ -4,7 +4,6 @@
 #include <memory>
 
 #include "clients/sonarctl/command_line.hpp"
-#include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/control/control_commands.hpp"
 #include "clients/sonarctl/control/status_text.hpp"
 #include "core/text/arguments.hpp"

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <map>
 
-#include "clients/sonarctl/commands.hpp"
 #include "clients/sonarctl/doctor/probes.hpp"
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/ping_stream.hpp"

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "core/base/geometry.hpp"
 #include "core/base/host_device.hpp"
 
 namespace sonar {

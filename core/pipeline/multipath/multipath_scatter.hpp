@@ -2,7 +2,6 @@
 // only in direction have the same delay and phase, so they add coherently (docs/acoustics.md, section 3).
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include "core/pipeline/multipath/multipath_trace.hpp"

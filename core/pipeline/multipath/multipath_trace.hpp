@@ -7,7 +7,6 @@
 #include <limits>
 #include <vector>
 
-#include "core/base/parallel.hpp"
 #include "core/pipeline/multipath/multipath_paths.hpp"
 #include "core/scene/ray_scene.hpp"
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/base/geometry.hpp"
 #include "core/pipeline/arithmetic/waveform.hpp"
 
 namespace sonar {

@@ -6,13 +6,9 @@
 #include <bitset>
 #include <complex>
 #include <memory>
-#include <span>
 #include <vector>
 
-#include "core/pipeline/ping_plan.hpp"
-#include "core/pipeline/ping_scalars.hpp"
 #include "core/pipeline/scatter.hpp"
-#include "core/scene/ray_scene.hpp"
 #include "core/scene/specular/specular_mesh.hpp"
 #include "core/scene/specular/specular_point.hpp"
 

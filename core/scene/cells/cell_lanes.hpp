@@ -4,8 +4,6 @@
 
 #include <cstdint>
 
-#include "core/base/units.hpp"
-
 namespace sonar::cell_lanes {
 
 constexpr int side = 16, points = side * side;  // points along a side of a tile; points of a tile

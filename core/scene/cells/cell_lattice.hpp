@@ -2,7 +2,6 @@
 // every lattice point has exactly one owner, and the cubes of tiles.
 #pragma once
 
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>

@@ -4,18 +4,15 @@
 
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <optional>
 #include <set>
 #include <span>
 #include <string>
 
 #include "core/scene/files/built_in_scenes.hpp"
-#include "core/scene/files/load_mesh.hpp"
 #include "core/scene/files/materials.hpp"
 #include "core/scene/files/shape_cache.hpp"
 #include "core/scene/scene.hpp"
-#include "core/scene/shapes/terrain.hpp"
 #include "core/text/strict_yaml.hpp"
 
 namespace sonar {

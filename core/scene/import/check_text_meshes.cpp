@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <charconv>
-#include <vector>
 
 #include "core/base/letters.hpp"
 #include "core/scene/import/check_mesh.hpp"

@@ -7,7 +7,6 @@
 
 #include "core/base/regular_file.hpp"
 #include "core/text/format.hpp"
-#include "core/text/nearest.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 
 namespace sonar::dataset {

@@ -9,7 +9,6 @@
 #include <string_view>
 #include <vector>
 
-#include "core/base/result.hpp"
 #include "core/base/units.hpp"
 #include "core/scene/scene.hpp"
 #include "core/sonar/ping.hpp"

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "core/pipeline/ping_engine.hpp"
 #include "daemon/commands/dataset/dataset_job.hpp"
 #include "daemon/commands/farm/queue.hpp"
 

@@ -1,7 +1,6 @@
 #include "daemon/commands/options/commands.hpp"
 
 #include <unistd.h>
-#include <cstdlib>
 
 #include <array>
 #include <atomic>

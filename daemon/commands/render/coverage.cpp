@@ -10,7 +10,6 @@
 #include "core/pipeline/scattering_law.hpp"
 #include "core/scene/shapes/primitives.hpp"
 #include "core/sonar/range_image.hpp"
-#include "daemon/commands/render/sonar_keys.hpp"
 
 namespace sonar::render {
 

@@ -2,8 +2,6 @@
 // Keys that are not given keep their values.
 #pragma once
 
-#include <optional>
-
 #include "core/sonar/ping_settings.hpp"
 #include "core/sonar/sonar_model.hpp"
 #include "core/text/strict_yaml.hpp"

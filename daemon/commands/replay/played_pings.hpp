@@ -1,7 +1,6 @@
 // The pings of a recording for a sonar whose hosts request them: in order or, for a mechanical scan, by direction.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 
 #include "daemon/commands/replay/played_pings.hpp"
 #include "daemon/commands/replay/replay_device.hpp"

@@ -1,7 +1,6 @@
 #include "daemon/commands/run/prepare_run.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <thread>

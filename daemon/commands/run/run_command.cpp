@@ -1,9 +1,7 @@
 #include "daemon/commands/options/commands.hpp"
-#include "daemon/server/system/real_time.hpp"
 
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 
 #include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/effective_switches.hpp"

@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/base/enum_names.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
 #include "core/text/nearest.hpp"

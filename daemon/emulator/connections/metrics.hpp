@@ -3,8 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "daemon/emulator/connections/outbox.hpp"
 #include "daemon/emulator/connections/pacer.hpp"

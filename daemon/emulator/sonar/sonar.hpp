@@ -6,7 +6,6 @@
 // are the daemon's; conversations run on unskipped time, which does not include the jumps of stepped time.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>

@@ -2,7 +2,6 @@
 // go to the same PoseIntake as those of PoseServer. Owned by App.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <list>
 #include <optional>

@@ -1,7 +1,6 @@
 #include "daemon/server/sonars/device.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/system/listen.hpp"

@@ -8,7 +8,6 @@
 
 #include "daemon/server/connections/connection_listener.hpp"
 #include "daemon/server/connections/http_connection.hpp"
-#include "protocol/vendor.hpp"
 
 namespace sonar {
 

@@ -3,7 +3,6 @@
 #include <dirent.h>
 #include <sys/resource.h>
 #include <unistd.h>
-#include <sstream>
 
 #include <fstream>
 

@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "core/base/units.hpp"
 #include "protocol/recorded/byte_source.hpp"
