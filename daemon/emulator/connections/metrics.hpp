@@ -32,8 +32,8 @@ class Histogram {
   double sum_s_ = 0;
 };
 
-/// The counters of one sonar. ticks = pings + skipped (+ one ping being computed, + a waiting trigger); pings = refused +
-/// unwanted + those offered to clients; offered = sent + dropped (+ those in the outboxes now).
+/// The counters of one sonar. ticks = pings + skipped (+ one ping being computed, + a waiting tick or trigger);
+/// pings = refused + unwanted + those offered to clients; offered = sent + dropped (+ those in the outboxes now).
 struct DeviceFigures {
   std::uint64_t ticks = 0;
   std::uint64_t skipped_ticks = 0;  // number of ticks without a ping

@@ -29,6 +29,7 @@ void Pacer::configure(const PingSettings& settings, Time now) {
   // A new grid begins when the last echo has returned and the shorter of both periods has passed.
   const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
   running_ = period.count() > 0;
+  forget_tick();
   // A trigger that waits stays valid only if pings were triggered before and still are.
   if (!(running_ && triggered_ && settings.triggered)) forget_trigger();
   triggered_ = settings.triggered;
@@ -49,13 +50,19 @@ void Pacer::skip(std::chrono::nanoseconds by) {
 
 void Pacer::hurry(Time now) {
   if (!running_ || triggered_) return;
+  forget_tick();
   start_ = now;
   index_ = 0;
 }
 
 void Pacer::stop() {
   running_ = false;
+  forget_tick();
   forget_trigger();
+}
+
+void Pacer::forget_tick() {
+  if (std::exchange(tick_waits_, false)) ++skipped_.busy;
 }
 
 void Pacer::forget_trigger() {
@@ -105,18 +112,23 @@ bool Pacer::fire(Time now, bool busy) {
     note_ping(now);
     return true;
   }
-  // Free running: missed ticks, and ticks while the simulation is busy, are counted and never repeated.
+  // Free running: missed ticks are counted and never repeated. The newest one waits while the simulation is busy: without that,
+  // a ping that takes a little more than a period would cost every second ping.
   const std::int64_t reached = (now - start_) / period_;  // index of the newest tick that has passed
   const auto missed = static_cast<std::uint64_t>(reached - index_);
   ticks_ += missed + 1;
   skipped_.late += missed;
   index_ = reached + 1;
-  if (busy) {
-    ++skipped_.busy;
-    return false;
-  }
+  forget_tick();
+  tick_waits_ = busy;
   // The ping's stamp is its time on the grid, however late the call is.
-  note_ping(start_ + reached * period_);
+  if (!busy) note_ping(start_ + reached * period_);
+  return !busy;
+}
+
+bool Pacer::fire_waiting() {
+  if (!std::exchange(tick_waits_, false)) return false;
+  note_ping(start_ + (index_ - 1) * period_);
   return true;
 }
 

@@ -17,7 +17,7 @@ std::chrono::nanoseconds ping_period(const PingSettings& settings);
 /// Counts of ticks and triggers without a ping.
 struct SkippedTicks {
   std::uint64_t late = 0;     // the next tick was already due
-  std::uint64_t busy = 0;     // the previous ping was still being computed
+  std::uint64_t busy = 0;     // the previous ping was being computed until the next tick
   std::uint64_t trigger = 0;  // another trigger was waiting, or pings stopped before this trigger was used
   std::uint64_t total() const { return late + busy + trigger; }
 };
@@ -40,25 +40,29 @@ class Pacer {
   /// The time at which fire() must be called next; none in standby, when stopped, or without a trigger.
   std::optional<Time> next_tick() const;
   /// Call it at or after next_tick(). True: make a ping now, with the stamp last_tick(). `busy`: the previous ping is being
-  /// computed; ticks are then skipped and counted, and a trigger waits. A late call does not shift the grid.
+  /// computed; then the tick waits for its end or for the next tick, which replaces it (it is skipped and counted). A trigger
+  /// waits too. A late call does not shift the grid.
   bool fire(Time now, bool busy);
+  /// Call it when a ping has been computed. True: a tick has waited for that; make its ping now, with the stamp last_tick().
+  bool fire_waiting();
 
   Time last_tick() const { return last_tick_; }
   bool trigger_waits() const { return trigger_waits_; }
   std::chrono::nanoseconds period() const { return period_; }
-  /// Number of ticks that were due: skipped, fired, and a waiting trigger.
+  /// Number of ticks that were due: skipped, fired, and a waiting tick or trigger.
   std::uint64_t ticks() const { return ticks_; }
   const SkippedTicks& skipped() const { return skipped_; }
   std::uint64_t skipped_ticks() const { return skipped_.total(); }
 
  private:
+  void forget_tick();
   void forget_trigger();
   void note_ping(Time at);
 
-  bool running_ = false, triggered_ = false, trigger_waits_ = false, has_fired_ = false;
+  bool running_ = false, triggered_ = false, tick_waits_ = false, trigger_waits_ = false, has_fired_ = false;
   std::chrono::nanoseconds period_{0}, travel_{0};  // travel_: travel time of sound to the range and back
   Time start_{};                                    // start of the grid
-  std::int64_t index_ = 0;                          // index of the next tick on the grid
+  std::int64_t index_ = 0;                          // index of the next tick on the grid, behind one that waits
   Time trigger_at_{};
   Time last_tick_{}, home_at_{};  // time of the last ping; time when its sound has returned
   std::uint64_t ticks_ = 0;

@@ -135,6 +135,10 @@ Actions PingSource::tick(Time now) {
   return actions;
 }
 
+void PingSource::catch_up(Actions& actions) {
+  if (pacer_.fire_waiting()) request_ping(pacer_.last_tick(), actions);
+}
+
 // ---- pings
 
 /// The number of the next ping. With an option, pings that were skipped because of overload are numbered too.

@@ -70,6 +70,8 @@ class PingSource {
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const;
   /// Handles the engine's result. Returns whether clients get the ping.
   bool on_ping(const PingOutcome& outcome, Time now, Actions& actions);
+  /// Requests the ping of a tick that has waited for the last ping. Call it after the delivery of the last ping.
+  void catch_up(Actions& actions);
   /// Keeps a ping that a slow device sends later; false: it leaves now.
   bool keep_unsent(PingOutcome& outcome, Time now);
   std::optional<Time> next_unsent() const;

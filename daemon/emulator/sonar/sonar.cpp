@@ -109,8 +109,8 @@ void Sonar::skip(std::chrono::nanoseconds by) {
 
 Actions Sonar::on_ping(PingOutcome outcome, Time now) {
   Actions actions;
-  if (!source_.on_ping(outcome, now, actions)) return actions;
-  if (!source_.keep_unsent(outcome, now)) deliver(outcome, now, actions);
+  if (source_.on_ping(outcome, now, actions) && !source_.keep_unsent(outcome, now)) deliver(outcome, now, actions);
+  source_.catch_up(actions);
   return actions;
 }
 

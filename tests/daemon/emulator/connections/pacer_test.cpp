@@ -63,13 +63,60 @@ TEST(Pacer, AHurriedGridRestartsAtOnce) {
   EXPECT_FALSE(pacer.next_tick()) << "a triggered sonar waits for its trigger";
 }
 
-TEST(Pacer, ABusySimulationLosesTheTick) {
+TEST(Pacer, ATickWaitsForABusySimulationUntilTheNextOneReplacesIt) {
   Pacer pacer;
   pacer.configure(settings(10), t0);
   EXPECT_TRUE(pacer.fire(t0, false));
+  EXPECT_FALSE(pacer.fire_waiting()) << "none waits";
   EXPECT_FALSE(pacer.fire(t0 + milliseconds(100), true));
+  EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(200));
+  EXPECT_EQ(pacer.skipped_ticks(), 0u);
+  EXPECT_FALSE(pacer.fire(t0 + milliseconds(200), true));
+  EXPECT_EQ(pacer.skipped().busy, 1u);
+  ASSERT_TRUE(pacer.fire_waiting());
+  EXPECT_EQ(pacer.last_tick(), t0 + milliseconds(200)) << "its time on the grid";
+  EXPECT_FALSE(pacer.fire_waiting()) << "only once";
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(300), false));
+  EXPECT_EQ(pacer.ticks(), 4u);
   EXPECT_EQ(pacer.skipped_ticks(), 1u);
-  EXPECT_TRUE(pacer.fire(t0 + milliseconds(200), false));
+}
+
+TEST(Pacer, ATickWaitsNoLongerThanItsRhythm) {
+  const auto waiting = [] {
+    Pacer pacer;
+    pacer.configure(settings(10), t0);
+    EXPECT_TRUE(pacer.fire(t0, false));
+    EXPECT_FALSE(pacer.fire(t0 + milliseconds(100), true));
+    return pacer;
+  };
+  Pacer same = waiting(), other = waiting(), hurried = waiting(), stopped = waiting();
+  same.configure(settings(10), t0 + milliseconds(120));
+  EXPECT_TRUE(same.fire_waiting());
+  other.configure(settings(20), t0 + milliseconds(120));
+  hurried.hurry(t0 + milliseconds(120));
+  stopped.stop();
+  for (Pacer* p : {&other, &hurried, &stopped}) {
+    EXPECT_FALSE(p->fire_waiting());
+    EXPECT_EQ(p->skipped().busy, 1u);
+    EXPECT_EQ(p->ticks(), 2u);
+  }
+}
+
+TEST(Pacer, PingsThatTakeMoreThanAPeriodFollowEachOther) {
+  Pacer pacer;
+  pacer.configure(settings(40, 1), t0);
+  Time free_at = t0;
+  int pings = 0;
+  for (int ms = 0; ms < 3000; ++ms) {
+    const Time now = t0 + milliseconds(ms);
+    const bool due = now >= *pacer.next_tick() && pacer.fire(now, now < free_at);
+    if (due || (now >= free_at && pacer.fire_waiting())) {
+      ++pings;
+      free_at = now + milliseconds(30);
+      EXPECT_LT(now - pacer.last_tick(), milliseconds(25)) << "older than the newest tick";
+    }
+  }
+  EXPECT_EQ(pings, 100) << "30 ms each; one for every second tick would be 60";
 }
 
 TEST(Pacer, TimeThatIsSkippedHasNoTicks) {
@@ -184,8 +231,8 @@ TEST(Pacer, EveryTickIsFiredOrSkippedForAReason) {
   pacer.configure(settings(10), t0);
   EXPECT_TRUE(pacer.fire(t0, false));
   EXPECT_TRUE(pacer.fire(t0 + milliseconds(450), false));  // 100, 200, 300 are late
-  EXPECT_FALSE(pacer.fire(t0 + milliseconds(620), true));  // 500 late, 600 busy
-  EXPECT_TRUE(pacer.fire(t0 + milliseconds(700), false));
+  EXPECT_FALSE(pacer.fire(t0 + milliseconds(620), true));  // 500 late, 600 waits
+  EXPECT_TRUE(pacer.fire(t0 + milliseconds(700), false));  // it replaces 600
   EXPECT_EQ(pacer.ticks(), 8u);
   EXPECT_EQ(pacer.skipped().late, 4u);
   EXPECT_EQ(pacer.skipped().busy, 1u);

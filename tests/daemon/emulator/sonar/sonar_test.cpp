@@ -112,6 +112,30 @@ TEST(SonarInVirtualTime, APingWhoseClientLeftIsUnwanted) {
   EXPECT_GT(sonar.figures().offered, 1u);
 }
 
+TEST(SonarInVirtualTime, ATickThatWaitedForThePingBeforeItFollowsAtOnce) {
+  VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
+  Sonar& sonar = time.sonar("front");
+  const ConnectionId client = time.connect("front");
+  time.clients[client].reads = false;
+  sonar.on_bytes(client, fire(), time.now);
+  const auto asked = [](const Actions& actions) {
+    const ComputePing* ping = actions.empty() ? nullptr : std::get_if<ComputePing>(&actions.back());
+    return ping == nullptr ? std::nullopt : std::optional(ping->request);
+  };
+  const auto first = asked(sonar.on_tick(*sonar.next_ping()));
+  ASSERT_TRUE(first);
+  const Time tick = *sonar.next_ping();
+  EXPECT_FALSE(asked(sonar.on_tick(tick))) << "the engine is busy";
+  auto ping = std::make_shared<Ping>();
+  ping->request = *first;
+  const auto second = asked(sonar.on_ping({.ping = ping}, tick + milliseconds(20)));
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->fired_at, tick);
+  EXPECT_EQ(static_cast<std::uint32_t>(second->number), 2u);
+  EXPECT_EQ(sonar.figures().skipped_ticks, 0u);
+  EXPECT_GT(*sonar.next_ping(), tick + milliseconds(20));
+}
+
 TEST(SonarInVirtualTime, ReceiversAreTheDevicesOwnAndThoseOfItsClients) {
   using testing_daemon::made_up_vendor;
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 2}\n")));

@@ -154,7 +154,7 @@ TEST(Serving, LateSimulationSkipsTicksAndNeverQueues) {
   const auto requests = daemon.requests();
   ASSERT_GE(requests.size(), 4u);
   for (std::size_t i = 1; i < requests.size(); ++i)
-    EXPECT_GE(requests[i].fired_at - requests[i - 1].fired_at, 6 * milliseconds(25)) << "a tick waited for the engine";
+    EXPECT_GE(requests[i].fired_at - requests[i - 1].fired_at, 6 * milliseconds(25)) << "an older tick waited";
 }
 
 TEST(Serving, VersionTwoAsksAreAnsweredInVersionTwoWithAttitude) {
