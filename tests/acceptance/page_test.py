@@ -308,8 +308,12 @@ class Page(PageChecks, unittest.TestCase):
         page = self.open(1100, 760, script=WITHOUT_WEBGL)
         shown(page)
         self.assertTrue(page.run("document.querySelector('#fan').offsetWidth"))
-        page.wait("document.querySelector('#no-scene').offsetWidth > 0")
+        page.wait("document.querySelector('#badges').innerText.includes('no scene')")
+        self.assertGreater(page.run("document.querySelector('#fan-pane').offsetWidth"), 700, "the picture has the room of the scene")
         self.picture(page, "no-webgl")
+        page.press("0")
+        page.wait("document.querySelector('#no-scene').offsetWidth > 0")
+        self.assertTrue(page.run("[...document.querySelectorAll('.camera')].every((button) => button.disabled)"))
         page.run("1")
         self.assertEqual(page.errors, [])
 

@@ -172,9 +172,17 @@ async function beginScene() {
   const software = /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? '');
   if (renderer !== null && !software) fan.useGraphics();
   scene = new Scene(facts, fan, software);
-  setHidden($('no-scene'), !scene.missing);
-  setHidden($('scene'), scene.missing);
+  if (scene.missing) missScene();
   choose();
+}
+
+/// The picture takes the place of the scene; on a phone each has the whole screen.
+function missScene() {
+  setHidden($('no-scene'), false);
+  setHidden($('scene'), true);
+  facts.noScene = $('no-scene').textContent;
+  for (const button of document.querySelectorAll('.camera')) button.disabled = true;
+  if (document.body.dataset.max === '0' && innerWidth >= 820) maximise('1');
 }
 
 function frame() {

@@ -73,6 +73,7 @@ export function badgesOf(facts) {
   const sonar = facts.sonarStatus;
   if (facts.connection !== 'open' || !sonar) return out;
   if (facts.recording) return [{ text: 'RECORDING', level: 'note', title: facts.recording }];
+  if (facts.noScene) out.push({ text: 'no scene', level: 'note', title: facts.noScene });
   if (facts.preview) out.push({ text: 'PREVIEW', level: 'note', title: 'for viewers only; it ends when a driver connects' });
   if (!sonar.transmits) out.push({ text: 'transmit is off: noise only', level: 'warning', title: 'see the settings' });
   const vehicle = facts.vehicle;
