@@ -331,6 +331,14 @@ class Pages(PageChecks, unittest.TestCase):
                 gap = page.run(f"((a, b) => Math.max(a.top - b.bottom, b.top - a.bottom))(document.querySelector('#refusal').getBoundingClientRect(), {field}.getBoundingClientRect())")
                 self.assertLess(abs(gap), 20)
                 self.assertLessEqual(page.run("document.querySelector('#refusal').getBoundingClientRect().right"), width)
+                page.run(field + ".focus(), document.activeElement.select()")
+                for key in ("6", "Enter"):
+                    page.press(key)
+                self.assertFalse(page.run("document.querySelector('#refusal').offsetWidth"), "the next request removes it")
+                page.run(field + ".focus(), document.activeElement.select()")
+                for key in ("9", "9", "9", "Enter"):
+                    page.press(key)
+                page.wait("document.querySelector('#refusal').offsetWidth")
                 page.press("Escape")
                 page.wait("!document.querySelector('#refusal').offsetWidth")
 

@@ -24,6 +24,7 @@ export class Refusals {
 
   /// Remembers the place of the control that was touched last, which caused request `id`.
   note(id) {
+    this.hide();  // that of an earlier request
     const control = this.touched?.closest?.('button, input, select') ?? document.activeElement;
     this.asked.set(id, { row: control.closest(rows), place: control.getBoundingClientRect() });
   }
