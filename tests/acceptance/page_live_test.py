@@ -224,6 +224,7 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.querySelector('.fault-card progress').value < 0.97")
             page.click("#findings button.link")
             page.wait("!document.querySelector('.fault-card')")
+            self.assertNotIn("A fault acts", page.text("#findings"), "although the daemon looks only every 2 s")
             ask(daemon, "sonar", {"rate_hz": 0})
             page.wait("document.body.dataset.situation === 'standby'")
             page.click("#notice-button")

@@ -24,7 +24,7 @@ export function drawDoctor(facts, steering) {
   const noted = (findings ?? []).filter((f) => f.level !== 0).sort((a, b) => b.level - a.level);
   const faults = facts.connection !== 'open' ? [] : activeTroubles(facts).filter((f) => !f.waiting).map((f) => (
     { level: 2, check: 'fault', text: `A fault acts on ${f.sonar || 'every sonar'}: ${titleOf(f.trouble)}.`, cure: f.ends_ns ? 'It ends by itself, or' : '' }));
-  const bad = faults.length > 0 ? [...faults, ...noted.filter((f) => f.check !== 'fault')] : noted;  // faults first, named as on their buttons
+  const bad = [...faults, ...noted.filter((f) => f.check !== 'fault')];  // faults first, named as on their buttons
   const well = (findings ?? []).filter((f) => f.level === 0);
   const active = facts.faults;
   const ofFault = (finding) => (finding.check === 'fault' ? active.find((f) => finding.text.includes(troubleOf(f)) || finding.text.includes(titleOf(troubleOf(f))) || finding.text.includes(f.name) || active.length === 1) : null);
