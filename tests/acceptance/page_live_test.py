@@ -199,6 +199,10 @@ class Live(PageChecks, unittest.TestCase):
         with Sonard(mount=MOUNT, trajectory="orbit") as daemon, Driver(daemon.address):
             page = self.open(daemon, query="?test=300")
             page.wait("sonardTest.scene.objects.has('wreck')")
+            triangles = page.run("sonardTest.scene.objects.get('bed').children[0].geometry.index.count / 3")
+            self.assertTrue(10_000 < triangles < 30_000, f"{triangles} of 109552, because there is no graphics processor")
+            page.press_mouse("[data-camera=top]")
+            self.assertEqual(page.run("sonardTest.scene.restUntil"), 0, "drawn at once")
             ask(daemon, "set_object", {"object": "tyre", "visible": False})
             page.wait("!sonardTest.scene.objects.has('tyre')")
             ask(daemon, "load", {"path": str(ROOT / "scenes/tank-rod.yaml")})

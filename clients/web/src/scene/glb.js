@@ -32,3 +32,32 @@ export function readGlb(bytes) {
   const colour = about.materials?.[primitive.material]?.pbrMetallicRoughness?.baseColorFactor ?? [0.6, 0.6, 0.6];
   return { geometry, colour: colour.slice(0, 3) };
 }
+
+const most_triangles = 20000;
+
+/// A geometry with fewer triangles, for software renderers, whose time for a frame grows with their number: of the vertices in a cell
+/// only the first remains.
+export function coarsened(geometry) {
+  const { index, attributes } = geometry;
+  if (!index || index.count < 3 * most_triangles) return geometry;
+  geometry.computeBoundingBox();
+  const { min, max } = geometry.boundingBox;
+  const places = attributes.position.array;
+  const cells_aside = Math.sqrt(most_triangles / 2);
+  const cell = Math.max(max.x - min.x, max.y - min.y, max.z - min.z) / cells_aside;
+  const firstOf = new Map();
+  const first = new Uint32Array(attributes.position.count);
+  for (let i = 0; i < first.length; i++) {
+    const [x, y, z] = [0, 1, 2].map((axis) => Math.floor((places[3 * i + axis] - min.getComponent(axis)) / cell));
+    const key = (x * 1024 + y) * 1024 + z;
+    if (!firstOf.has(key)) firstOf.set(key, i);
+    first[i] = firstOf.get(key);
+  }
+  const kept = [];
+  for (let i = 0; i < index.count; i += 3) {
+    const [a, b, c] = [first[index.array[i]], first[index.array[i + 1]], first[index.array[i + 2]]];
+    if (a !== b && b !== c && c !== a) kept.push(a, b, c);
+  }
+  geometry.setIndex(kept);
+  return geometry;
+}

@@ -1,10 +1,10 @@
 // The scene's pane: objects as the daemon sends them, the vehicle, and the last ping at its place.
 import { $, setHidden, setText } from '../dom.js';
 import { Camera, drawCompass } from './camera.js';
-import { Color, DirectionalLight, DoubleSide, FogExp2, Group, HemisphereLight, Mesh, MeshPhongMaterial, Raycaster, Scene as Graph, Vector2, Vector3, WebGLRenderer } from 'three.module.js';
+import { Color, DirectionalLight, DoubleSide, FogExp2, Group, HemisphereLight, Mesh, MeshLambertMaterial, MeshPhongMaterial, Raycaster, Scene as Graph, Vector2, Vector3, WebGLRenderer } from 'three.module.js';
 import { fixed } from '../numbers.js';
 import { makeFanPlane, makeGrid, makeLines, makePoints, makeTrail, makeVehicle } from './bodies.js';
-import { readGlb } from './glb.js';
+import { coarsened, readGlb } from './glb.js';
 
 const water = 0x0b2233;
 const least_interval_ms = 1000 / 15;
@@ -39,6 +39,7 @@ export class Scene {
     this.drawnAt = 0;
     this.interval_ms = least_interval_ms;
     this.coarse = software ? 0.5 : 1;
+    this.software = software;
     this.restUntil = 0;
     for (const kind of ['pointerdown', 'pointerup', 'keydown']) document.addEventListener(kind, () => (this.restUntil = performance.now() + rest_ms), true);
     for (const button of document.querySelectorAll('.camera')) button.onclick = () => this.use(button.dataset.camera);
@@ -46,7 +47,9 @@ export class Scene {
     this.canvas.addEventListener('click', (event) => this.pick(event));
   }
 
+  /// The new view is drawn at once, because nothing else shows the press.
   use(mode) {
+    this.restUntil = 0;
     this.camera.use(mode);
     for (const button of document.querySelectorAll('.camera')) button.setAttribute('aria-pressed', String(button.dataset.camera === mode));
   }
@@ -92,7 +95,8 @@ export class Scene {
     const group = new Group();
     for (const model of entity.models) {
       const { geometry, colour } = readGlb(model.data);
-      const mesh = new Mesh(geometry, new MeshPhongMaterial({ color: new Color(...colour), shininess: 6, side: DoubleSide }));
+      const paint = { color: new Color(...colour), side: DoubleSide };
+      const mesh = this.software ? new Mesh(coarsened(geometry), new MeshLambertMaterial(paint)) : new Mesh(geometry, new MeshPhongMaterial({ ...paint, shininess: 6 }));
       const { position = null, orientation = null } = model.pose ?? {};
       if (position) mesh.position.set(position.x, position.y, position.z);
       if (orientation) mesh.quaternion.set(orientation.x, orientation.y, orientation.z, orientation.w);
