@@ -108,6 +108,12 @@ class Link {
     if (make_.ports[port].kind != protocol::HostPort::Kind::http) carry_out(host_->on_bytes(port, bytes, now_));
   }
   std::size_t host_ports() const { return make_.ports.size(); }
+  /// Connects an observer, whose host requests nothing.
+  void observe() {
+    observing_ = *make_.host({.as_it_is = true, .settings = {}});
+    perform(sonar.on_connect(observer_ = ++last_id_, Role::observer, {"observer", {127, 0, 0, 1}}, now_));
+    static_cast<void>(observing_->on_open(std::vector<std::uint16_t>(make_.ports.size(), 40000), now_));
+  }
   void reconnect() { connect(); }
   void end_faults() {
     Actions actions;
@@ -123,7 +129,7 @@ class Link {
 
  public:
   Sonar sonar;
-  std::size_t pings = 0;
+  std::size_t pings = 0, observed = 0;
 
  private:
   bool changes(const protocol::SettingsOverride& settings) {
@@ -241,6 +247,12 @@ class Link {
         deliver(id, message);
       }
     for (const ConnectionId id : std::exchange(finished_, {})) lose(id);
+    while (const Outbox::Message message = observer_ == 0 ? Outbox::Message{} : sonar.next_message(observer_, now_)) {
+      sonar.on_sent(observer_, message.size());
+      sonar.on_written(observer_, message, now_);
+      for (const auto& action : observing_->on_bytes(0, *message.bytes, now_))
+        if (std::holds_alternative<protocol::HostPing>(action)) ++observed;
+    }
   }
   void deliver(ConnectionId id, const Outbox::Message& message) {
     std::vector<Bytes> pieces;
@@ -260,10 +272,10 @@ class Link {
   }
 
   protocol::Wanted wanted_;
-  std::unique_ptr<protocol::Host> host_;
+  std::unique_ptr<protocol::Host> host_, observing_;
   std::vector<ConnectionId> streams_, finished_;
   std::vector<Line> lines_;
-  ConnectionId last_id_ = 0;
+  ConnectionId last_id_ = 0, observer_ = 0;
   bool lost_ = false, listens_ = true;
   Time last_sign_ = start;
 };

@@ -109,6 +109,8 @@ std::vector<protocol::Event> Delivery::offer(Connection& to, FramedPing& framed,
   protocol::Delivery wanted{{protocol::Bytes{}}, {}};
   if (to.dialogue != nullptr)
     wanted = to.dialogue->on_ping(request.vendor_settings.get(), bytes == nullptr ? 0 : bytes->size(), sonar_.unskipped(now));
+  // An observer has requested nothing, but gets what clients have requested.
+  if (to.role == Role::observer && wanted.prefixes.empty() && bytes != nullptr && !bytes->empty()) wanted.prefixes.emplace_back();
   if (!wanted.prefixes.empty()) {
     Outbox::Message message{
         .bytes = nullptr, .ping = static_cast<std::uint32_t>(request.number), .prefixes = {}, .fired_at = request.fired_at};
