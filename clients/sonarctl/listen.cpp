@@ -169,6 +169,7 @@ Result<void> listen(const ListenOptions& given) {
   ListenOptions options = given;
   auto opened = connect(options.source, !options.json);
   if (!opened) return tl::unexpected(opened.error());
+  options.source = for_run(std::move(options.source), *opened);
   if (!options.record.empty())
     if (Result<void> recording = opened->stream.record_to(options.record); !recording) return recording;
   if (!options.json) std::printf("connected to %s\n", opened->stream.about().c_str());

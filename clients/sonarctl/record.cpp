@@ -172,8 +172,8 @@ std::optional<Socket> listen_to_status(const RecordOptions& options, const Make&
   return std::nullopt;
 }
 
-Result<void> record_device(const RecordOptions& options) {
-  SourceOptions source = options.source;
+Result<void> record_device(RecordOptions options) {
+  SourceOptions& source = options.source;
   source.keeps_messages = true;
   const Result<Endpoint> device = find_device(source, true);
   if (!device) return tl::unexpected(device.error());
@@ -185,6 +185,7 @@ Result<void> record_device(const RecordOptions& options) {
   }
   auto opened = open_stream(source, *device);
   if (!opened) return tl::unexpected(opened.error());
+  source = for_run(std::move(source), *opened);
   PingStream& stream = opened->stream;
   const std::string at = text_from(stream.device());
   const FirstPingWait waits(source, stream, opened->observes);

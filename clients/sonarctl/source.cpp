@@ -1,6 +1,7 @@
 #include "clients/sonarctl/source.hpp"
 
 #include <cstdio>
+#include <limits>
 #include <thread>
 
 #include "clients/sonarctl/control_client.hpp"
@@ -17,42 +18,74 @@ namespace {
 constexpr int stale_pings = 4;
 constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
 
-/// The address for observers, as reported by the sonard that serves the device.
-Result<Endpoint> observers_of(const SourceOptions& source, const Endpoint& device) {
+/// True if the sonar is at the device's address; port 0 means any port.
+bool is_at(const v1::SonarStatus& s, const Endpoint& device) {
+  const auto fits = [&](const std::string& address) {
+    const auto at = parse_endpoint(address, {});
+    const bool same_host = at && (at->host == device.host || at->host == "0.0.0.0" || s.advertised() == device.host);
+    return same_host && (device.port == 0 || at->port == device.port);
+  };
+  return fits(s.listens()) || fits(s.observers()) ||
+         std::ranges::any_of(s.addresses(), [&](const auto& of) { return fits(of.address()); });
+}
+
+Error no_observers(const v1::SonarStatus& s, const Make& make) {
+  const bool by_datagrams = make.device->pings_by() == protocol::PingsBy::datagrams;
+  const std::string why = by_datagrams                             ? "because it sends pings by datagrams to its host"
+                          : make.device->default_max_clients() > 1 ? "because it serves several clients"
+                                                                   : "because observers.max is 0 in its configuration";
+  return {ErrorKind::unavailable, s.name() + ", " + std::string(make.title) + ", accepts no observers, " + why +
+                                      ": leave out --observe to connect as a client; beside a driver, the live view shows its "
+                                      "pings and sonarctl recording records them"};
+}
+
+struct Observed {
+  Endpoint at;  // for observers
+  const Make* make = nullptr;
+  bool has_client = false;
+};
+/// The only sonar at the device's address, as reported by the sonard that serves it.
+Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device) {
+  const std::string place = device.port != 0 ? text_from(device) : device.host;
   auto control = ControlClient::open({source.control, source.token_file});
   if (!control) return tl::unexpected(control.error());
   const auto status = control->status();
   if (!status) return tl::unexpected(status.error());
-  const std::string port = std::string(":").append(std::to_string(device.port));
-  for (const v1::SonarStatus& s : (*status)->sonars()) {
-    if (s.listens() != text_from(device) && s.advertised() + port != text_from(device) &&
-        s.listens() != std::string("0.0.0.0").append(port))
-      continue;
-    if (s.observers().empty())
-      return failure(ErrorKind::unavailable,
-                     "this sonar accepts no observers: its make has none, or observers.max is 0; leave out --observe");
-    auto at = parse_endpoint(s.observers(), device);
-    if (at) at->host = device.host;
-    return at;
+  std::vector<const v1::SonarStatus*> found;
+  for (const v1::SonarStatus& s : (*status)->sonars())
+    if (is_at(s, device)) found.push_back(&s);
+  if (found.empty())
+    return failure(ErrorKind::unavailable,
+                   "the sonard at " + text_from(control->at()) + " serves no sonar at " + place + "; --control names another");
+  if (found.size() > 1) {
+    std::string all;
+    for (const v1::SonarStatus* s : found) all += (all.empty() ? "" : ", ") + s->listens() + " (" + s->name() + ")";
+    return failure(ErrorKind::usage, "several sonars are at " + place + ": name one with its port: " + all);
   }
-  return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar at " +
-                                             text_from(device) + "; --control names another");
+  const v1::SonarStatus& s = *found.front();
+  const Make& make = protocol::make_of_profile(s.profile());
+  if (s.observers().empty()) return tl::unexpected(no_observers(s, make));
+  const auto at = parse_endpoint(s.observers(), device);
+  if (!at) return tl::unexpected(at.error());
+  return Observed{{device.host, at->port}, &make, s.clients_size() > 0};
 }
 
-Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device, const Make& make) {
-  const auto at = observers_of(source, device);
-  if (!at) return tl::unexpected(at.error());
+Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device) {
+  const auto found = observed_at(source, device);
+  if (!found) return tl::unexpected(found.error());
   Wanted nothing;
   nothing.as_it_is = true;
-  auto stream = PingStream::open(*at, &make, nothing, milliseconds_from(source.connect_patience_s), source.keeps_messages);
+  auto stream =
+      PingStream::open(found->at, found->make, nothing, milliseconds_from(source.connect_patience_s), source.keeps_messages);
   if (!stream) return tl::unexpected(stream.error());
   const auto now = std::chrono::steady_clock::now();
   if (stream->is_rejected(first_byte_within))
     return failure(ErrorKind::io,
-                   "tcp " + text_from(*at) + " closed the connection: all observer slots are taken (observers.max)");
-  std::fprintf(stderr,
-               "sonarctl: connected to %s as an observer: no settings are sent, pings have the settings of the sonar's clients\n",
-               text_from(*at).c_str());
+                   "tcp " + text_from(found->at) + " closed the connection: all observer slots are taken (observers.max)");
+  std::fprintf(
+      stderr,
+      "sonarctl: connected to %s as an observer: no settings are sent, pings have the settings of the sonar's clients%s\n",
+      text_from(found->at).c_str(), found->has_client ? "" : "; it has none now: pings come when a driver requests them");
   return OpenedStream{*std::move(stream), now, true};
 }
 
@@ -102,10 +135,7 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
 
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device) {
   const Make* const make = source.make != nullptr ? source.make : make_at(device.port);
-  if (source.observe) {
-    const Make& usual = make != nullptr ? *make : protocol::makes().front();
-    return observe(source, {device.host, device.port != 0 ? device.port : usual.ports.front().number}, usual);
-  }
+  if (source.observe) return observe(source, device);
   Rejection rejection;
   auto stream = PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s), source.keeps_messages,
                                  &rejection);
@@ -117,9 +147,14 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
     if (rejection.make == nullptr || interrupted != 0) return tl::unexpected(stream.error());
     why = stream.error().text;
   }
-  auto observed = stream ? observe(source, stream->device(), stream->make()) : observe(source, rejection.at, *rejection.make);
+  auto observed = observe(source, stream ? stream->device() : rejection.at);
   if (observed) return observed;
   return failure(ErrorKind::io, why + "; connecting as an observer failed too: " + observed.error().text);
+}
+
+SourceOptions for_run(SourceOptions source, const OpenedStream& opened) {
+  if (opened.observes) source.silence_limit_s = std::numeric_limits<double>::infinity();
+  return source;
 }
 
 void Outage::begins() {

@@ -31,6 +31,9 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
 /// find_device() and open_stream().
 Result<OpenedStream> connect(const SourceOptions& source, bool say);
 
+/// Options for a run of many pings: an observer waits for any time, because the sonar may have no client.
+SourceOptions for_run(SourceOptions source, const OpenedStream& opened);
+
 /// A time without pings. A new connection alone does not end it, because over UDP a connection can always be opened.
 class Outage {
  public:

@@ -172,9 +172,10 @@ class LiveView {
   Outage outage_;
 };
 
-Result<void> view_live(const ViewOptions& options) {
+Result<void> view_live(ViewOptions options) {
   auto opened = connect(options.source, false);
   if (!opened) return tl::unexpected(opened.error());
+  options.source = for_run(std::move(options.source), *opened);
   const Result<void> ran = LiveView(options, *std::move(opened)).run();
   if (!options.terminal && terminal_facts().is_terminal) std::puts("");
   return ran;
@@ -185,7 +186,7 @@ Result<void> view_live(const ViewOptions& options) {
 Result<void> view(ViewOptions options) {
   options.terminal = options.terminal || (options.png.empty() && terminal_facts().is_terminal);
   if (Result<void> sound = check(options); !sound) return sound;
-  return options.live ? view_live(options) : view_one(options);
+  return options.live ? view_live(std::move(options)) : view_one(options);
 }
 
 }  // namespace sonar::clients

@@ -389,19 +389,41 @@ class Tools(unittest.TestCase):
 
 
     def test_sonarctl_looks_on_beside_a_driver(self):
-        with Sonard(profile="omniscan-450", mount=SIDE) as daemon, socket.create_connection((daemon.address, OMNISCAN)) as driver:
-            driver.sendall(side_scan(1))
-            reads = threading.Thread(target=self.read_until_closed, args=(driver,))
-            reads.start()
-            try:
-                for words in ((), ("--make", "omniscan450")):
-                    with self.subTest(words=words):
-                        listened = daemon.ctl("listen", "--pings", 2, *words, "--control", f"{daemon.address}:14770")
-                        self.assertEqual(listened.returncode, 0, listened.stderr)
-                        self.assertIn("as an observer", listened.stderr)
-            finally:
-                driver.shutdown(socket.SHUT_RDWR)
-                reads.join(20)
+        drivers = {"omniscan-450": (OMNISCAN, side_scan(1)), "s500": (S500, sound(100, 1308)), "surveyor-240": (SURVEYOR, settings(1)),
+                   "ping1d": (PING1D, frame(1400, struct.pack("<H", 1300)))}
+        for profile, (port, request) in drivers.items():
+            with Sonard(profile=profile, mount=DOWN) as daemon, socket.create_connection((daemon.address, port)) as driver:
+                driver.sendall(request)
+                reads = threading.Thread(target=self.read_until_closed, args=(driver,))
+                reads.start()
+                control, mcap = ("--control", f"{daemon.address}:14770"), pathlib.Path(daemon.folder.name) / "run.mcap"
+                try:
+                    for words in (("listen",), ("listen", "--make", {"omniscan-450": "omniscan450", "surveyor-240": "surveyor240"}.get(profile, profile)),
+                                  ("listen", "--observe"), ("record", "--observe", "--mcap", mcap)):
+                        with self.subTest(profile=profile, words=words):
+                            heard = daemon.ctl(*words, "--pings", 2, *control)
+                            self.assertEqual(heard.returncode, 0, heard.stderr)
+                            self.assertRegex(heard.stderr, "as an observer: .* settings of the sonar's clients\n")
+                            self.assertRegex(heard.stdout, "\npings 2\n|recorded 2 pings")
+                finally:
+                    driver.shutdown(socket.SHUT_RDWR)
+                    reads.join(20)
+
+    def test_an_observer_waits_for_a_driver_or_says_why_it_cannot(self):
+        with Sonard(profile="s500", mount=DOWN) as daemon:
+            control = ("--control", f"{daemon.address}:14770")
+            with subprocess.Popen([SONARCTL, "listen", daemon.address, "--observe", "--pings", "2", *control], text=True,
+                                  stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as waits:
+                self.assertRegex(waits.stderr.readline(), "it has none now: pings come when a driver requests them\n")
+                self.assertRegex(waits.stderr.readline(), "nothing asked; waiting for the first one\n")
+                time.sleep(11)  # longer than a client waits
+                self.assertEqual(daemon.ctl("listen", "--pings", 4).returncode, 0)
+                self.assertEqual(waits.wait(60), 0, waits.stderr.read())
+        for profile, why in (("ping360", "it sends pings by datagrams to its host"), ("norbit-wbms", "serves several clients")):
+            with Sonard(profile=profile) as daemon:
+                refused = daemon.ctl("listen", "--observe", "--control", f"{daemon.address}:14770")
+                self.assertEqual(refused.returncode, 69, refused.stderr)
+                self.assertRegex(refused.stderr, f"accepts no observers, because .*{why}.*leave out --observe")
 
     @staticmethod
     def read_until_closed(connection):
