@@ -2,6 +2,7 @@
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -61,6 +62,33 @@ class Help(unittest.TestCase):
     def test_version(self):
         self.assertRegex(run(SONARD, "--version").stdout, r"^sonard \d+\.\d+\.\d+\nhot loops: (portable|avx2|avx512|neon)\n$")
         self.assertEqual(run(SONARCTL, "--version").stdout.split()[1], run(SONARD, "--version").stdout.split()[1])
+
+
+@unittest.skipIf(shutil.which("localedef") is None, "there is no localedef")
+class Languages(unittest.TestCase):
+    def test_a_decimal_comma_changes_nothing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            if not run("localedef", "-i", "de_DE", "-f", "UTF-8", folder / "de_DE.UTF-8").returncode == 0:
+                self.skipTest("the definition of de_DE is not installed")
+            (folder / "box.obj").write_text("v 0.25 0.5 0.75\nv 1.5 0.5 0.75\nv 0.25 1.625 0.75\nv 0.25 0.5 2.125\n"
+                                            "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n", encoding="utf-8")
+            (folder / "scene.yaml").write_text("objects: [{name: box, type: mesh, file: box.obj, scale: 1.25, material: steel,"
+                                               " pose: {xyz_m: [2.5, 0, -5.5]}}]\n", encoding="utf-8")
+            (folder / "sonard.yaml").write_text("world: {scene: scene.yaml}\nvehicles: [{name: rov, initial_pose:"
+                                                " {frame: ENU_FLU, xyz_m: [0, 0, -4.5]}}]\nsonars:"
+                                                " [{name: front, profile: ping360, bind_ip: 127.0.0.2}]\n", encoding="utf-8")
+            found = {}
+            for language, point in (("C", "."), ("de_DE.UTF-8", ",")):
+                speaking = ("env", f"LOCPATH={folder}", f"LC_ALL={language}")
+                self.assertEqual(run(*speaking, "locale", "decimal_point").stdout.strip(), point)
+                checked = run(*speaking, SONARCTL, "scene", "check", folder / "scene.yaml")
+                self.assertIn("x 2.81..4.38", checked.stdout)
+                out = folder / language[:1]
+                made = run(*speaking, SONARD, "render", folder / "sonard.yaml", "--out", out, "--pings", "1")
+                self.assertEqual(made.returncode, 0, made.stderr)
+                found[language] = checked.stdout, {file.name: file.read_bytes() for file in out.iterdir()}
+            self.assertEqual(*found.values())
 
 
 class Mistakes(unittest.TestCase):
