@@ -2,7 +2,6 @@
 // prints its lines and derives the exit code from it.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -10,15 +9,10 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/sonarctl/elapsed.hpp"
 #include "protocol/host.hpp"
 
 namespace sonar::clients {
-
-// The time since a point of the steady clock.
-
-inline double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 /// A time in seconds on a monotonic clock. The origin is arbitrary.
 using Seconds = double;

@@ -290,11 +290,9 @@ void PingStream::take(std::size_t port, std::span<const std::byte> bytes) {
 
 void PingStream::keep(std::size_t port, recording::Origin from, std::span<const std::byte> bytes) {
   if (!keeps_) return;
-  const auto unix_now = std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now());
-  last_kept_ = std::max(last_kept_, Time(unix_now));
   const bool by_tcp = make_->ports[port].kind == Kind::tcp;
   kept_.push_back(
-      {last_kept_, from, by_tcp ? recording::Carrier::stream : recording::Carrier::datagram, {bytes.begin(), bytes.end()}});
+      {unix_time_.now(), from, by_tcp ? recording::Carrier::stream : recording::Carrier::datagram, {bytes.begin(), bytes.end()}});
 }
 
 recording::PcapConversation PingStream::conversation() const {

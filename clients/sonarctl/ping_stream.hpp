@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/net.hpp"
 #include "core/base/result.hpp"
 #include "protocol/host.hpp"
@@ -62,6 +63,8 @@ class PingStream {
   /// Also writes every byte received by TCP to this file. Error usage: the sonar does not send its pings over TCP.
   Result<void> record_to(const std::filesystem::path& file);
 
+  /// The clock of the times of Item::messages.
+  Time unix_now() const { return unix_time_.now(); }
   const protocol::Host& host() const { return *host_; }
   const Make& make() const { return *make_; }
   const Endpoint& device() const { return device_; }
@@ -111,7 +114,7 @@ class PingStream {
   std::vector<recording::RecordedMessage> kept_;  // messages since the last item
   // While messages are kept: a splitter per port, so that messages of different ports are not mixed.
   std::map<std::size_t, recording::MessageSplitter> splitters_;
-  Time last_kept_{};  // UNIX time, which never decreases
+  UnixTime unix_time_;
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 

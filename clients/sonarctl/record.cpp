@@ -23,8 +23,6 @@ using recording::RecordedMessage;
 
 constexpr int most_status_at_once = 32;
 
-Time unix_now() { return Time(std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now())); }
-
 /// The sonard that serves the device, with the name and profile of the sonar and a subscription to its pings.
 struct Steering {
   ControlClient client;
@@ -109,7 +107,7 @@ class Recorder {
       const Datagram datagram = receive_from(*status_, bytes, 0ms);
       if (datagram.what != Wait::data) return {};
       if (!is_of_device(datagram, std::span(bytes).first(datagram.size))) continue;
-      last_ = std::max(last_, unix_now());
+      last_ = std::max(last_, stream_.unix_now());
       if (Result<void> written =
               files_.write({last_, Origin::device, Carrier::datagram, {bytes.begin(), bytes.begin() + datagram.size}});
           !written)
@@ -152,7 +150,7 @@ class Recorder {
   NoticeLog notices_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double last_heard_s_ = 0;
-  Time last_ = unix_now();  // time of the latest recorded message
+  Time last_ = stream_.unix_now();  // time of the latest recorded message
 };
 
 void report(const RecordFiles& files, double seconds) {
