@@ -1,5 +1,7 @@
 // Compares the fast ray caster with the simple one: triangle soups, moving bodies, distant positions, and empty scenes.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -7,9 +9,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/base/memory_left.hpp"
 #include "core/scene/ray_scene.hpp"
 #include "tests/core/held_variable.hpp"
 #include "tests/core/scene/scene_testing.hpp"
+#include "tests/is_sanitized.hpp"
 
 namespace sonar {
 namespace {
@@ -272,6 +276,24 @@ TEST(RayScene, RefusesAnUnknownInstructionSet) {
   } catch (const std::runtime_error& e) {
     EXPECT_STREQ(e.what(), "SONARD_EMBREE_ISA: unknown instruction set \"avx3\"; use sse2, sse4.2, avx, avx2 or avx512");
   }
+}
+
+// Embree's cache of tessellated surfaces, which no scene has, would take 128 MB.
+TEST(RayScene, ASmallSceneFitsIntoFewAddresses) {
+  if (test::is_sanitized) GTEST_SKIP() << "sanitizers need terabytes of addresses";
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto build = [] {
+    ::alarm(60);
+    Draw draw(1);
+    const auto scene = std::make_shared<Scene>();
+    scene->objects.push_back(Object{.name = "soup", .mesh = soup(draw, 150, 5, 1), .in_world = {}});
+    const rlim_t bytes = address_space_bytes().value() + (std::uint64_t{64} << 20);
+    const rlimit limit{bytes, bytes};
+    if (::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(2);
+    const RayScene rays(scene, 1);
+    ::_exit(0);
+  };
+  EXPECT_EXIT(build(), testing::ExitedWithCode(0), "");
 }
 
 TEST(RayScene, NamesItsLibrary) { EXPECT_EQ(RayScene::version().rfind("Embree ", 0), 0u); }
