@@ -6,6 +6,7 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
+#include <new>
 #include <sstream>
 #include <unordered_set>
 
@@ -190,6 +191,8 @@ Result<Document> parse_yaml(std::string_view text, std::string name, const YamlL
     return refused(r);
   } catch (const YAML::Exception& e) {
     return refused({std::max(e.mark.line, 0) + 1, std::max(e.mark.column, 0) + 1, {}, "not valid YAML: " + first_line(e.msg)});
+  } catch (const std::bad_alloc&) {
+    return failure(ErrorKind::unavailable, tree->name + ": not enough memory to read it (ulimit -v, LimitAS=, MemoryMax=)");
   } catch (const std::exception& e) {
     return refused({1, 1, {}, std::string("not valid YAML: ") + e.what()});
   }

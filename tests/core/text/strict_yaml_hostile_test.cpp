@@ -1,9 +1,14 @@
 // Hostile text: bombs, wrong encodings, broken syntax, and every mutation of a good file.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include "core/base/memory_left.hpp"
 #include "core/base/random.hpp"
 #include "core/text/strict_yaml.hpp"
+#include "tests/is_sanitized.hpp"
 
 namespace sonar::text {
 namespace {
@@ -121,6 +126,28 @@ TEST(StrictYamlHostile, EveryTruncationAndManyMutationsEndInAValueOrASentence) {
     if (r.v[3] & 1) bad.insert(r.v[2] % bad.size(), 1, alphabet[(r.v[3] >> 8) % alphabet.size()]);
     check(bad);
   }
+}
+
+// A child process whose limit of addresses leaves room for a part of the tree.
+TEST(StrictYamlHostile, ALackOfMemoryIsNoMistakeOfTheFile) {
+  if (test::is_sanitized) GTEST_SKIP() << "sanitizers need terabytes of addresses";
+  std::string text = "a: [0";
+  for (int i = 0; i < 300000; ++i) text += ",0";
+  text += "]";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const rlim_t bytes = address_space_bytes().value() + (std::uint64_t{8} << 20);
+    const rlimit limit{bytes, bytes};
+    if (::setrlimit(RLIMIT_AS, &limit) != 0) ::_exit(2);
+    const auto read = parse_yaml(text, "f.yaml");
+    ::_exit(!read && read.error().kind == ErrorKind::unavailable && read.error().text.starts_with("f.yaml: not enough memory")
+                ? 0
+                : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status)) << "ended by signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace
