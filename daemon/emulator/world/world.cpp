@@ -17,6 +17,7 @@ constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, near e
 constexpr double smallest_orbit_m = 4;
 constexpr double orbit_speed_mps = 0.5;
 constexpr std::chrono::nanoseconds future_allowed = std::chrono::seconds(1);
+constexpr std::chrono::nanoseconds most_out_of_order = std::chrono::seconds(1);  // an older stamp is of a clock that was set back
 
 std::string joined_names(const std::vector<std::string>& names) {
   std::string all;
@@ -75,8 +76,11 @@ bool World::continues(const Track& track, const PoseSample& sample, const Sender
   const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
   if (!known) return false;
   // With `clock: follow`, time stops while no stamps arrive, so silence cannot be detected. A stamp far behind the newest one
-  // means that the simulator has restarted.
-  return rules_.follows ? at >= track.history.newest().at - rules_.stale_after : now - track.last_arrival <= rules_.stale_after;
+  // means that the sender's clock was set back, or that the simulator has restarted.
+  const Time newest = track.history.newest().at;
+  if (rules_.follows) return at >= newest - rules_.stale_after;
+  const bool is_set_back = has_own_clock(sample) && at < newest - most_out_of_order;
+  return !is_set_back && now - track.last_arrival <= rules_.stale_after;
 }
 
 /// Notes who sends, and returns true once while two senders alternate.
@@ -167,9 +171,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
     return out;
   }
 
-  // SIM stamps come from the sender's own clock; in stepped time, WALL stamps do too.
-  const bool own_clock = !has_shared_clock(sample) && sample.stamp.domain != ClockDomain::arrival;
-  const Ns offset = own_clock ? offset_for(track, at, now, goes_on) : Ns(0);
+  const Ns offset = has_own_clock(sample) ? offset_for(track, at, now, goes_on) : Ns(0);
   const bool vehicle = sample.of == PoseSample::Of::vehicle;  // poses of objects may be rare
   if (rules_.follows && vehicle && offset != track.offset && track.sender_id == sender.id)
     out.notice = "stamps of " + track.body.name +

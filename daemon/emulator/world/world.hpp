@@ -142,6 +142,10 @@ class World {
   bool has_shared_clock(const control::PoseSample& sample) const {
     return sample.stamp.domain == control::ClockDomain::wall && !rules_.stepped;
   }
+  /// True for SIM stamps, and in stepped time for WALL stamps: they come from the sender's own clock.
+  bool has_own_clock(const control::PoseSample& sample) const {
+    return sample.stamp.domain != control::ClockDomain::arrival && !has_shared_clock(sample);
+  }
   /// One sentence if the time stamp cannot be accepted, else empty.
   std::string why_bad_time(const control::PoseSample& sample, Time at, Time now) const;
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;

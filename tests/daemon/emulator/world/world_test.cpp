@@ -141,6 +141,22 @@ TEST(World, EqualStampsReplaceAndOlderOnesAreLate) {
   EXPECT_EQ(w.accept(stamped(3, ClockDomain::sim, milliseconds(999)), json, t0 + milliseconds(20)).verdict, PoseVerdict::late);
 }
 
+TEST(World, ASendersClockThatIsSetBackStartsANewHistory) {
+  for (const bool stepped : {false, true}) {
+    PoseRules rules;
+    rules.stepped = stepped;
+    World w = one_rov(rules);
+    w.accept(stamped(1, ClockDomain::sim, seconds(7200)), json, t0);
+    EXPECT_EQ(w.accept(stamped(2, ClockDomain::sim, seconds(7199)), json, t0 + milliseconds(10)).verdict, PoseVerdict::late);
+    EXPECT_EQ(w.accept(stamped(3, ClockDomain::sim, milliseconds(7198999)), json, t0 + milliseconds(20)).verdict,
+              PoseVerdict::accepted);
+    EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(20)).position_m.x, 3);
+    EXPECT_EQ(w.accept(stamped(4, ClockDomain::sim, seconds(10)), json, t0 + milliseconds(30)).verdict, PoseVerdict::accepted);
+    EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(30)).position_m.x, 4);
+    EXPECT_EQ(w.counters().late, 1u);
+  }
+}
+
 TEST(World, WallStampsMustAgreeWithOurClock) {
   World w = one_rov();
   const auto now = t0.time_since_epoch();
