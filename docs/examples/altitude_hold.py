@@ -43,9 +43,9 @@ def main():
     options = options.parse_args()
     north, east, down = options.start
     poses = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    before = time.time()
+    before = time.monotonic()
     for ping, (distance, confidence) in zip(range(options.pings), distances(options.sonar)):
-        now = time.time()
+        now = time.monotonic()
         step_s, before = min(now - before, 0.2), now
         speed = GAIN_PER_S * (distance - options.altitude) if confidence >= SURE else 0
         down += max(-FASTEST_MPS, min(FASTEST_MPS, speed)) * step_s
