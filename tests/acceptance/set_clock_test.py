@@ -1,14 +1,21 @@
 """The computer's clock is set by hours while sonard or sonarctl runs, as NTP does after the start of a computer without a battery
 for its clock. set_clock.cpp sets it for these programs only."""
+import json
 import os
 import pathlib
+import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import unittest
 from unittest import mock
 
-from running_sonard import BUILD, SONARCTL, Sonard
+from oculus_reader import Client, fire_message
+from running_sonard import BUILD, ROOT, SONARCTL, Sonard, eventually
+
+sys.path.insert(0, str(ROOT / "clients/python"))
+from sonard_client import Control  # noqa: E402  pylint: disable=wrong-import-position
 
 HOURS = (2, -3)
 
@@ -28,6 +35,26 @@ class SetClock(unittest.TestCase):
     def set_clock(self, hours):
         with open(self.file, "r+b" if self.file.exists() else "wb") as file:
             file.write(struct.pack("<q", 3600 * hours))
+
+    def test_visits_and_poses_keep_their_time(self):
+        with Sonard() as daemon:
+            control = Control(daemon.address)
+            with Client(daemon.address) as client:
+                client.send(fire_message(rate_hz=10))
+                client.ping()
+            eventually(lambda: control.status()["sonars"][0].get("gone"))
+            for hours in HOURS:
+                self.set_clock(hours)
+                self.assertLess(abs(control.status()["sonars"][0]["gone"]["ago_s"]), 600)
+                before = int(control.status()["poses"]["accepted"])
+                done = daemon.ctl_to(f"{daemon.address}:14770", "pose", "once", "--xyz", "1,2,-3")  # stamped with WALL time
+                self.assertEqual(done.returncode, 0, done.stderr)
+                eventually(lambda: int(control.status()["poses"]["accepted"]) > before, 30)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as poses:
+                for hours in HOURS:  # now the sender's clock is set
+                    pose = {"timestamp": 1e9 + 3600 * hours, "position": [0, hours, 3], "attitude": [0, 0, 0]}
+                    poses.sendto(json.dumps(pose).encode(), (daemon.address, 14771))
+                    eventually(lambda: abs(control.status()["vehicles"][0]["position"].get("x", 0) - hours) < 0.01, 30)
 
     def test_a_recording_has_neither_gaps_nor_equal_times(self):
         with Sonard() as daemon:

@@ -72,6 +72,7 @@ struct StreamDigest {
 struct Visit {
   std::string address, why;
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
+  std::chrono::steady_clock::time_point noted = std::chrono::steady_clock::now();  // the same time, by a clock that is never set
   bool by_itself = false, without_ping = false;
   std::optional<std::chrono::steady_clock::time_point> connected_at = {};  // start of a connection that ended
 };

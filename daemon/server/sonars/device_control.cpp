@@ -30,7 +30,7 @@ v1::Visit message_of(const Visit& visit) {
   out.set_address(visit.address);
   out.set_why(visit.why);
   out.set_utc_ns(std::chrono::nanoseconds(visit.at.time_since_epoch()).count());
-  out.set_ago_s(seconds(std::chrono::system_clock::now() - visit.at));
+  out.set_ago_s(seconds(std::chrono::steady_clock::now() - visit.noted));
   out.set_by_itself(visit.by_itself);
   out.set_without_ping(visit.without_ping);
   if (visit.connected_at) out.set_connected_s(seconds(std::chrono::steady_clock::now() - *visit.connected_at));
