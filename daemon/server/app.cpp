@@ -251,6 +251,9 @@ asio::awaitable<void> App::housekeeping() {
     const std::string slow_load = monitoring_.slow_load();
     if (!slow_load.empty() && !slow_load_logged_) log_.warning(slow_load);
     slow_load_logged_ = !slow_load.empty();
+    const std::vector<Note> on_clock = monitoring_.notes_on_clock();
+    if (!on_clock.empty() && !clock_note_logged_) log_.warning(text_of(on_clock.front()));
+    clock_note_logged_ = !on_clock.empty();
     fleet_.sweep();
     for (Device& d : fleet_.devices()) d.forget_who_left();
     error_code ec;

@@ -125,7 +125,7 @@ class App {
   Notify notify_;
   Reload reload_;
   bool look_posted_ = false, stopping_ = false;
-  bool slow_load_logged_ = false;
+  bool slow_load_logged_ = false, clock_note_logged_ = false;
   bool notes_due_ = true;  // the configuration or the scene has changed since notes were last logged
   int exit_code_ = 0;
 };

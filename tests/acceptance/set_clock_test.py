@@ -12,7 +12,7 @@ import unittest
 from unittest import mock
 
 from oculus_reader import Client, fire_message
-from running_sonard import BUILD, ROOT, SONARCTL, Sonard, eventually
+from running_sonard import BUILD, ROOT, SONARCTL, Sonard, eventually, run
 
 sys.path.insert(0, str(ROOT / "clients/python"))
 from sonard_client import Control  # noqa: E402  pylint: disable=wrong-import-position
@@ -36,6 +36,24 @@ class SetClock(unittest.TestCase):
         with open(self.file, "r+b" if self.file.exists() else "wb") as file:
             file.write(struct.pack("<q", 3600 * hours))
 
+    def test_pings_go_on_and_the_daemon_tells(self):
+        with Sonard() as daemon, Client(daemon.address) as client:
+            client.send(fire_message(rate_hz=10))
+            client.ping()
+            control = Control(daemon.address)
+            self.assertEqual(control.status()["notes"], [])
+            for hours in HOURS:
+                self.set_clock(hours)
+                for _ in range(5):
+                    client.ping()
+                notes = control.status()["notes"]
+                self.assertEqual(len(notes), 1, notes)
+                self.assertIn(f"it is {abs(3600 * hours)} s {'ahead of' if hours > 0 else 'behind'} sonard's", notes[0]["text"])
+                eventually(lambda: "the computer's clock was set" in daemon.log())
+            self.assertEqual(daemon.log().count("the computer's clock was set"), 1, daemon.log())
+            self.set_clock(0)
+            eventually(lambda: control.status()["notes"] == [])
+
     def test_visits_and_poses_keep_their_time(self):
         with Sonard() as daemon:
             control = Control(daemon.address)
@@ -55,6 +73,15 @@ class SetClock(unittest.TestCase):
                     pose = {"timestamp": 1e9 + 3600 * hours, "position": [0, hours, 3], "attitude": [0, 0, 0]}
                     poses.sendto(json.dumps(pose).encode(), (daemon.address, 14771))
                     eventually(lambda: abs(control.status()["vehicles"][0]["position"].get("x", 0) - hours) < 0.01, 30)
+
+    def test_doctor_knows_the_latency(self):
+        with Sonard() as daemon:
+            for hours in HOURS:
+                self.set_clock(hours)
+                done = run(SONARCTL, "doctor", daemon.address, "--status-on", daemon.address, "--control", f"{daemon.address}:14770",
+                           "--within", "40")
+                self.assertRegex(done.stdout, r"image latency \d+ ms p50")
+                self.assertIn("the computer's clock was set", done.stdout)
 
     def test_a_recording_has_neither_gaps_nor_equal_times(self):
         with Sonard() as daemon:

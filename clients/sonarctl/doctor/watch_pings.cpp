@@ -111,8 +111,11 @@ Outcome outcome_of(const Error& error, const SonarFacts& sonar) {
   return is_refused ? Outcome::refused : Outcome::unreachable;
 }
 
-void set_latency(SonarFacts& sonar, const std::vector<double>& delays_s, ControlFacts& clocks) {
+void set_latency(SonarFacts& sonar, std::vector<double> delays_s, ControlFacts& clocks) {
   if (delays_s.empty()) return;
+  // The daemon's time, by which pings are stamped, may differ from the clock of its computer.
+  if (clocks.status)
+    for (double& delay_s : delays_s) delay_s -= clocks.status->wall_ahead_s();
   const double p50 = percentile(delays_s, 0.5), p99 = percentile(delays_s, 0.99);
   if (!sonar.on_this_host) clocks.clock_ahead_s = -*std::min_element(delays_s.begin(), delays_s.end());
   if (p50 < 0 || p50 > 2) return;  // clocks differ: latency unknown

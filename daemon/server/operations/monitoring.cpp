@@ -1,5 +1,7 @@
 #include "daemon/server/operations/monitoring.hpp"
 
+#include <cmath>
+
 #include "daemon/server/control/prometheus.hpp"
 #include "daemon/server/operations/fault_operations.hpp"
 #include "protocol/control/answers.hpp"
@@ -8,6 +10,7 @@ namespace sonar {
 namespace {
 
 constexpr auto longest_ping = std::chrono::seconds(30);  // if it takes longer, the simulation is stuck
+constexpr double largest_wall_difference_s = 2;          // more than a leap second
 
 std::string whole_seconds(std::chrono::nanoseconds t) {
   return std::to_string(std::chrono::duration_cast<std::chrono::seconds>(t).count()) + " s";
@@ -125,6 +128,8 @@ std::shared_ptr<const v1::DaemonStatus> Monitoring::status() const {
   add_notes(s, of_.plausibility.all());
   add_notes(s, of_.mavlink.notes());
   add_notes(s, of_.faults.notes());
+  add_notes(s, notes_on_clock());
+  s.set_wall_ahead_s(wall_ahead_s());
   s.set_faults_armed(of_.config.faults.armed);
   for (v1::FaultStatus& fault : fault_statuses(of_.fleet, now, false)) *s.add_faults() = std::move(fault);
   add_viewers(s, of_.view.viewers());
@@ -163,6 +168,16 @@ std::string Monitoring::slow_load() const {
   if (loading <= of_.config.limits.load) return {};
   return "a change of the scene has been loading for " + whole_seconds(loading) +
          ", longer than limits.load_s; reloads and changes of the scene wait for it";
+}
+
+std::vector<Note> Monitoring::notes_on_clock() const {
+  const double ahead_s = wall_ahead_s();
+  if (std::abs(ahead_s) < largest_wall_difference_s) return {};
+  return {{"",
+           "the computer's clock was set, or the computer slept: it is " + std::to_string(std::llround(std::abs(ahead_s))) +
+               " s " + (ahead_s > 0 ? "ahead of" : "behind") +
+               " sonard's, which stamps pings, recordings and events and never jumps",
+           "restart sonard, and start it after the clock is set (systemd: time-sync.target)"}};
 }
 
 }  // namespace sonar

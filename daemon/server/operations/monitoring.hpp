@@ -48,8 +48,11 @@ class Monitoring {
   std::string problem() const;
   /// Returns a sentence if a change of the scene takes longer than limits.load_s; else empty.
   std::string slow_load() const;
+  /// A note if the computer's clock was set since sonard started.
+  std::vector<Note> notes_on_clock() const;
 
  private:
+  double wall_ahead_s() const { return of_.clock.stepped() ? 0 : -seconds(of_.clock.ahead_of_wall()); }
   double uptime_s() const { return seconds(std::chrono::steady_clock::now() - started_); }
 
   Monitored of_;
