@@ -1,4 +1,5 @@
 """The judge's reader of a Sonar 3D-15: docs/protocols/waterlinked.md."""
+import math
 import struct
 import unittest
 import zlib
@@ -29,10 +30,10 @@ def packet(name, image):
     return block(1, block(1, b"type.googleapis.com/waterlinked.sonar.protocol." + name) + block(2, image))
 
 
-def range_image(sequence, ranges, width=WIDTH):
+def range_image(sequence, ranges, width=WIDTH, scale_m=0.0):
     pixels = b"".join(map(varint, ranges))
     return packet(b"RangeImage", block(1, block(1, number(1, 99)) + number(2, sequence)) + b"\x15" + bytes(4) + number(4, 5) +
-                  number(5, width) + number(6, HEIGHT) + b"\x4d" + bytes(4) + block(10, pixels))
+                  number(5, width) + number(6, HEIGHT) + b"\x4d" + struct.pack("<f", scale_m) + block(10, pixels))
 
 
 def strengths(sequence, kind=0):
@@ -48,6 +49,12 @@ class Reader(judge_makes.DatagramChecks, unittest.TestCase):
     def test_strengths_may_be_published_too(self):
         (ping,) = self.found(datagram(literals(strengths(7))))
         self.assertEqual((ping.number, ping.needed, ping.crcs), (7, False, {zlib.crc32(bytes(range(WIDTH * HEIGHT)))}))
+
+    def test_ranges_may_be_in_metres(self):
+        (ping,) = self.found(datagram(literals(range_image(7, RANGES[0], scale_m=0.1))))
+        near = struct.unpack("<f", struct.pack("<f", 0.1))[0]
+        for none in (0, math.nan):
+            self.assertIn(zlib.crc32(struct.pack(f"<{WIDTH * HEIGHT}f", *(n * near if n else none for n in RANGES[0]))), ping.crcs)
 
     def test_what_is_no_ping(self):
         good = literals(range_image(7, RANGES[0]))

@@ -3,7 +3,7 @@
     python3 -m sonard_client.judge.ros_tap ros1|ros2 TOPIC -- COMMAND...
 
 The type of the message must have a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data, intensities or
-data).
+data), or a velocity and an altitude.
 """
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import json
 import os
 import resource
 import signal
+import struct
 import subprocess
 import sys
 import threading
@@ -37,6 +38,9 @@ def line_of(message: Any) -> str:
     samples, because ping_data of one driver's Ping begins with the header from the wire. With `has_gains` the gain before each
     row is removed."""
     samples = _field(message, "ping_data", "image.data", "intensities", "data")
+    if samples is None and hasattr(message, "altitude"):
+        moved = message.velocity
+        samples = struct.pack("<4d", moved.x, moved.y, moved.z, message.altitude)
     data = bytes(samples if samples is not None else b"")
     step, rows = getattr(message, "step", 0), getattr(message, "n_ranges", 0)
     if step and rows:

@@ -1,8 +1,10 @@
-"""Sonar 3D-15: images as datagrams. The samples are the ranges of a RangeImage as 32-bit numbers, little-endian; a driver may also
-publish the bytes of the strengths."""
+"""Sonar 3D-15: images as datagrams. The samples are the ranges of a RangeImage, little-endian: its 32-bit numbers, or metres as
+32-bit floats, with 0 or NaN where there is none; a driver may also publish the bytes of the strengths."""
 from __future__ import annotations
 
 import array
+import math
+import struct
 import sys
 import zlib
 from typing import List, Optional
@@ -49,6 +51,12 @@ def content_of(datagram: bytes) -> Optional[bytes]:
         return None
 
 
+def _in_memory_order(numbers: "array.array[int] | array.array[float]") -> bytes:
+    if sys.byteorder == "big":
+        numbers.byteswap()
+    return numbers.tobytes()
+
+
 class WaterlinkedReader:
     def __init__(self) -> None:
         self._at = 0
@@ -64,20 +72,20 @@ class WaterlinkedReader:
             if name == b"RangeImage":
                 width, height = protobuf.number(image, 5), protobuf.number(image, 6)
                 ranges = array.array("I", protobuf.varints(protobuf.block(image, 10)))
-                if sys.byteorder == "big":
-                    ranges.byteswap()
-                samples, count = ranges.tobytes(), len(ranges)
+                scale_m, = struct.unpack("<f", protobuf.block(image, 9) or bytes(4))
+                forms = [array.array("f", (n * scale_m if n else none for n in ranges)) for none in (0, math.nan)] if scale_m else []
+                samples, count = [_in_memory_order(form) for form in (ranges, *forms)], len(ranges)
             elif name == b"BitmapImageGreyscale8" and protobuf.number(image, 5) == 0:
                 width, height = protobuf.number(image, 6), protobuf.number(image, 7)
-                samples = protobuf.block(image, 10)
-                count = len(samples)
+                samples = [protobuf.block(image, 10)]
+                count = len(samples[0])
             else:
                 return []
-        except (ValueError, OverflowError):
+        except (ValueError, OverflowError, struct.error):
             return []
         if not count or count != width * height:
             return []
-        return [TruePing(number, frozenset({zlib.crc32(samples)}), height, width, begin, self._at, name == b"RangeImage")]
+        return [TruePing(number, frozenset(map(zlib.crc32, samples)), height, width, begin, self._at, name == b"RangeImage")]
 
 
 WATERLINKED = Make(("waterlinked",), datagrams=WaterlinkedReader, is_request=lambda sent: sent.startswith(b"POST "),
