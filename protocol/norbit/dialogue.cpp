@@ -55,15 +55,18 @@ std::string fixed_values(std::string_view name, const DeviceState& device) {
   if (name == "set_mode" || name == "set_flip") return std::to_string(mode);
   if (name == "set_opening_angle") return format("%g", swath_deg);
   if (name == "set_tx") return format("%g %g %d %d", frequency_khz, bandwidth_khz, amplitude, pulse_us);
-  if (name == "set_vga") return format("%g", 1e3 * gain_slope_db_per_m);
+  if (name == "set_vga") return format("%g", 100 * gain_slope_db_per_m);
   if (name == "set_trigger_mode") return "2";
-  if (name == "set_time_source") return "1";
+  for (const std::string_view one : {"set_time_source", "set_mf_decimation", "set_tx_beam_number"})
+    if (name == one) return "1";
+  if (name == "set_tp_rate") return "-1";
   if (name == "temperature") return format("%.1f", device.water.temperature_c);
   if (name == "serial") return std::to_string(device.id);
   if (name == "partno") return "12003";
   if (name == "revision") return "0";
-  for (const std::string_view zero : {"set_gate_mode", "set_gate_tilt", "set_direction", "set_autogate_preset", "autogain",
-                                      "set_sidescan_mode", "set_ntp_server"})
+  for (const std::string_view zero :
+       {"set_gate_mode", "set_gate_tilt", "set_direction", "set_autogate_preset", "autogain", "set_sidescan_mode",
+        "set_ntp_server", "set_snippet_rate", "set_tx_direction", "set_tx_opening_angle", "bit_log", "ntp_log"})
     if (name == zero) return "0";
   return {};
 }

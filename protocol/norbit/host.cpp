@@ -67,7 +67,7 @@ PolarImage with_samples(PolarImage fan, const Column& column) {
   for (float& sample : fan.samples) {
     std::uint16_t pixel = 0;
     pixels("pixel", pixel);
-    sample = pixel;
+    sample = column.front.pixels == PixelType::int16 ? std::max<float>(0, static_cast<std::int16_t>(pixel)) : pixel;
   }
   fan.shade(shades);
   return fan;

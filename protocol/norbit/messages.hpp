@@ -18,7 +18,7 @@ using wire::BytesView;
 inline constexpr std::uint16_t command_port = 2209, bathymetry_port = 2210, column_port = 2211;
 
 enum class Type : std::uint32_t { bathymetry = 1, column = 2 };
-enum class PixelType : std::uint32_t { uint16 = 2 };  // other values exist
+enum class PixelType : std::uint32_t { uint16 = 2, int16 = 3 };  // other values exist
 
 inline constexpr std::uint32_t preamble = 0xDEADBEEF, version = 4;
 struct Header {
@@ -106,7 +106,7 @@ struct ColumnFront {
   float sound_mps = 0, sample_hz = 0;
   std::uint32_t beams = 0, samples = 0;  // samples of a beam
   double time_s = 0;
-  PixelType pixels = PixelType::uint16;
+  PixelType pixels = PixelType::int16;
   std::int32_t first_sample = 0;
   float gain = 1;
   std::uint32_t reserved_1 = 0;

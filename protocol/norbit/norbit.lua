@@ -73,7 +73,8 @@ local function packet(tvb, pinfo, root)
     return
   end
   local samples = tvb(36, 4):le_uint()
-  if tvb(48, 4):le_uint() ~= 2 or beams == 0 or size ~= COLUMN + 2 * beams * samples + 4 * beams then
+  local kind_of_pixels = tvb(48, 4):le_uint()  -- 2: uint16, 3: int16
+  if kind_of_pixels < 2 or kind_of_pixels > 3 or beams == 0 or size ~= COLUMN + 2 * beams * samples + 4 * beams then
     tree:add_proto_expert_info(broken)
     return
   end

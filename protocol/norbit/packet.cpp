@@ -15,7 +15,7 @@ namespace {
 constexpr double above_db = 15;           // unknown: assumed
 constexpr std::uint8_t good_quality = 8;  // DFD: quality of a signal 12 dB above the noise
 constexpr std::size_t longest_packet = 24 + 168 + (1u << 20) + 4 * 512;
-constexpr double most_pixel = 65535;
+constexpr double most_pixel = 32767;
 
 /// A whole packet: the header, `front`, and the bytes after it.
 template <class Front>
@@ -110,7 +110,7 @@ Bytes column_pixels(const Ping& ping) {
       for (int row = begin; row < end; ++row)
         for (int beam = n * beam_step; beam < (n + 1) * beam_step; ++beam) sum += power_at(ping, row, beam);
       const double level = scale * std::sqrt(sum / ((end - begin) * beam_step));
-      const auto pixel = static_cast<std::uint16_t>(std::lround(std::min(level, most_pixel)));
+      const auto pixel = static_cast<std::int16_t>(std::lround(std::min(level, most_pixel)));
       write("pixel", pixel);
     }
   }
@@ -244,8 +244,8 @@ std::optional<Column> read_column(BytesView packet) {
   wire::Reader reader(*body);
   fields(reader, read.front);
   const std::size_t pixels = pixel_size * std::size_t{read.front.beams} * read.front.samples;
-  if (!reader.ok() || read.front.pixels != PixelType::uint16 || read.front.beams > 1024 ||
-      reader.remaining() != pixels + sizeof(float) * read.front.beams)
+  if (!reader.ok() || (read.front.pixels != PixelType::uint16 && read.front.pixels != PixelType::int16) ||
+      read.front.beams > 1024 || reader.remaining() != pixels + sizeof(float) * read.front.beams)
     return std::nullopt;
   read.pixels = reader.block("pixels", pixels);
   read.directions = reader.block("directions", reader.remaining());

@@ -26,7 +26,7 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 int mode_of(const SonarModel& model);
 
 inline constexpr double most_gain_db = 40;          // DFD
-inline constexpr double gain_slope_db_per_m = 0.4;  // per metre of two-way range; unknown: assumed
+inline constexpr double gain_slope_db_per_m = 0.5;  // per metre of two-way range; DFD 2D
 
 /// Format of the samples from which both packets are made; they include gain_db.
 inline constexpr SampleFormat sample_format{

@@ -56,8 +56,8 @@ class Driver:
         packet = self.packet(COLUMN)
         speed, rate, beams, rows = struct.unpack_from("<ffII", packet, 24)
         kind, first = struct.unpack_from("<Ii", packet, 48)
-        assert kind == 2 and len(packet) == 192 + beams * (2 * rows + 4)
-        pixels = struct.unpack_from(f"<{rows * beams}H", packet, 192)
+        assert kind == 3 and len(packet) == 192 + beams * (2 * rows + 4)
+        pixels = struct.unpack_from(f"<{rows * beams}h", packet, 192)
         angles = struct.unpack_from(f"<{beams}f", packet, 192 + 2 * rows * beams)
         return struct.unpack_from("<I", packet, 108)[0], speed / (2 * rate), first, pixels, [-math.degrees(a) for a in angles]
 

@@ -59,6 +59,9 @@ class Column(judge_makes.StreamChecks, unittest.TestCase):
         needed = [ping.needed for ping in self.found(bathymetry(7, DETECTIONS[0]), column(7, PIXELS[0]))]
         self.assertEqual(needed, [True, False])
 
+    def test_signed_pixels(self):
+        self.assertEqual([ping.number for ping in self.found(column(7, PIXELS[0], 3))], [7])
+
     def test_other_pixels_are_not_judged(self):
         self.assertEqual(self.found(column(7, PIXELS[0], 1)), [])
 

@@ -76,9 +76,10 @@ TEST_F(Packets, TheWaterColumnHasItAtTheSamePlace) {
   EXPECT_EQ(beams, 128u);
   EXPECT_NEAR(rows, 256, 64);
   ASSERT_EQ(column.size(), 192 + beams * (2 * rows + 4));
+  EXPECT_EQ(at<std::uint32_t>(column, 48), 3u) << "int16";
   std::size_t brightest = 0;
   for (std::size_t i = 0; i < beams * rows; ++i)
-    if (at<std::uint16_t>(column, 192 + 2 * i) > at<std::uint16_t>(column, 192 + 2 * brightest)) brightest = i;
+    if (at<std::int16_t>(column, 192 + 2 * i) > at<std::int16_t>(column, 192 + 2 * brightest)) brightest = i;
   const std::size_t directions = 192 + 2 * beams * rows;
   const double coarse_m = 1500 / (2 * static_cast<double>(at<float>(column, 28)));
   EXPECT_NEAR((at<std::int32_t>(column, 52) + static_cast<double>(brightest / beams)) * coarse_m,
@@ -123,6 +124,25 @@ TEST_F(Packets, FaultsFindTheirFields) {
   reseal(both, changed);
   EXPECT_TRUE(read_bathymetry(BytesView(changed).first(bathymetry.size())));
   EXPECT_TRUE(read_column(BytesView(changed).subspan(bathymetry.size())));
+}
+
+TEST_F(Packets, TheAnalogGainRisesByTheSlopeOfSetVga) {
+  const double row_m = 1500 / (2 * static_cast<double>(at<float>(column, 28)));
+  const auto rise_db = static_cast<double>(at<float>(column, 136) - at<float>(column, 128));
+  EXPECT_NEAR(rise_db / (2 * at<std::int32_t>(column, 132) * row_m), 50.0 / 100, 0.005) << "50 dB in 100 m of two-way range";
+}
+
+TEST_F(Packets, PixelsBelowZeroAreDark) {
+  const std::size_t pixels = 2 * at<std::uint32_t>(column, 32) * at<std::uint32_t>(column, 36);
+  Bytes dark = column;
+  for (std::size_t i = 192; i < 192 + pixels; ++i) dark[i] = std::byte{0xFF};  // -1
+  reseal(column, dark);
+  const auto host = *make_host({.as_it_is = true, .settings = {}});
+  host->on_bytes(0, bathymetry, at_s(0));
+  const protocol::HostActions shown = host->on_bytes(1, dark, at_s(0));
+  ASSERT_EQ(shown.size(), 1u);
+  const auto picture = std::get<protocol::HostPing>(shown[0]).picture();
+  EXPECT_EQ(std::ranges::max(picture->samples), 0);
 }
 
 /// The driver's side, which gets packets by port: 0 is the bathymetry, 1 is the water column.
@@ -261,6 +281,9 @@ TEST(NorbitCommands, AreAnsweredWithTheValuesInUse) {
   talk.take();
   talk.say("serial\nset_time_source 1\nset_mode 5\n");
   EXPECT_EQ(talk.take(), "serial 7001\r\nset_time_source 1 # fixed\r\nset_mode 1 # fixed\r\n");
+  talk.say("set_vga 50\nset_tp_rate 2\nset_mf_decimation 1\nset_snippet_rate 1\n");
+  EXPECT_EQ(talk.take(),
+            "set_vga 50 # fixed\r\nset_tp_rate -1 # fixed\r\nset_mf_decimation 1 # fixed\r\nset_snippet_rate 0 # fixed\r\n");
   talk.say("set_default\nexit\n");
   EXPECT_EQ(talk.held(), Settings{});
   EXPECT_TRUE(talk.closed);

@@ -8,9 +8,10 @@ from typing import Iterator
 from ..truth import Make, TruePing, WholeMessages
 
 _HEADER, _TYPE_AT, _SIZE_AT, _CRC_AT, _BEAMS_AT = 24, 4, 8, 20, 32
+_16_BITS = (2, 3)  # types of pixels: uint16, int16
 _BATHYMETRY, _COLUMN = 1, 2
 _BATHYMETRY_FRONT, _BATHYMETRY_NUMBER_AT, _BEAM = 88, 36, 20
-_COLUMN_FRONT, _ROWS_AT, _PIXELS_AT, _COLUMN_NUMBER_AT, _UINT16, _PIXEL, _DIRECTION = 168, 36, 48, 108, 2, 2, 4
+_COLUMN_FRONT, _ROWS_AT, _PIXELS_AT, _COLUMN_NUMBER_AT, _PIXEL, _DIRECTION = 168, 36, 48, 108, 2, 4
 _LONGEST = 1 << 22
 
 
@@ -43,7 +44,7 @@ class NorbitReader(WholeMessages):
         if _u32(message, _TYPE_AT) == _BATHYMETRY:
             crc = zlib.crc32(memoryview(message)[_HEADER + _BATHYMETRY_FRONT:])
             yield TruePing(_u32(message, _BATHYMETRY_NUMBER_AT), frozenset({crc}), 1, beams, begin, end)
-        elif _u32(message, _PIXELS_AT) == _UINT16:
+        elif _u32(message, _PIXELS_AT) in _16_BITS:
             crc = zlib.crc32(memoryview(message)[_HEADER + _COLUMN_FRONT:-_DIRECTION * beams])
             yield TruePing(_u32(message, _COLUMN_NUMBER_AT), frozenset({crc}), _u32(message, _ROWS_AT), beams, begin, end, False)
 
