@@ -14,8 +14,7 @@ constexpr double speckle_cell_m = 0.02;  // a surface keeps its speckle while a 
 constexpr std::uint32_t draws = 4096;    // number of draws; the range cells of all returns share them
 constexpr double least_blur = 0.5;       // least half length of an echo in range cells
 
-// Number of rays around the middle of a cell. An object that the middle ray misses is weighted by the part of the cell that it
-// covers.
+// Number of rays around the middle of a cell. They show which part of a cell is covered by an object that the middle ray misses.
 constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up;
 constexpr int cells_a_packet = RayPacket::size / rays_around;
 // If a smaller fraction of the rays in a cell and its eight neighbours hits an object, the object is thin. Thin objects are
@@ -23,8 +22,8 @@ constexpr int cells_a_packet = RayPacket::size / rays_around;
 // the covered part of a cell is known. `most_close_rays` limits the sum for all of these cells.
 constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
-constexpr std::size_t most_thin_cells = 512,
-                      most_probed_cells = 2048;  // if a net covers the view, only the usual few rays are traced
+// If a net covers the view, only the usual rays are traced. most_aimed_at: objects in view that these rays miss.
+constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048, most_aimed_at = 256;
 
 /// The position of a ray in a cell, -0.5 to 0.5, along an axis in one of `of` strata. Multiples of the golden ratio shift it
 /// from line to line of the grid, so that rays meet horizontal and vertical edges at all positions in a cell. The start of each
@@ -160,7 +159,6 @@ void RangeReturns::aim_around(int column, int row, Lattice lattice, int first_ra
 void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const {
   const std::size_t first = to.size();
   const double about_m = 1.25 * middle.spread_m + 2 * cell_m_;  // a patch is not exactly flat
-  const double of_one = middle.power / rays_around;
   double power = 0;
   for (int lane = first_lane; lane < first_lane + rays_around; ++lane) {
     if (p.object[lane] == RayPacket::miss) continue;
@@ -168,7 +166,7 @@ void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int f
     const bool is_there = middle.power > 0 && p.object[lane] == middle.object && std::abs(range_m - middle.range_m) <= about_m;
     middle.rays += is_there;
     if (is_there && is_inclined_alike(p, lane, middle.cosine)) {
-      power += of_one;
+      power += middle.power / rays_around;
       continue;
     }
     const RangeReturn r = met(p, lane, {rays_across, rays_up});
@@ -190,8 +188,7 @@ RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) con
   const double size = length(normal), range_m = static_cast<double>(p.far[i]);
   if (!(size > 0)) return {};
   const double cosine = std::abs(dot(normal, along)) / size;
-  const Mesh& mesh = *scene_.scene().objects[p.object[i]].mesh;
-  const LawTable& law = laws_[mesh.material[p.triangle[i]]];
+  const LawTable& law = laws_[scene_.scene().objects[p.object[i]].mesh->material[p.triangle[i]]];
   const double root = static_cast<double>(law.root_strength(static_cast<float>(cosine)));
   const double level = std::hypot(along.x, along.y);  // cosine of the elevation
   const double width = column_step_rad_ * level / lattice.across, height = row_step_rad_ / lattice.up;
@@ -253,7 +250,34 @@ void RangeReturns::for_each_neighbour(Cell cell, F f) const {
       f(Cell{column, row});
 }
 
-/// Cells in which rays hit a thin object. An object is thin if it is thin in most of its cells.
+/// Aims rays at points on an object and adds the cells in which they hit it. Returns false if no point is in view.
+bool RangeReturns::aim_at(std::uint32_t object, std::vector<Cell>& cells) const {
+  const Object& o = scene_.scene().objects[object];
+  const Pose in_world = scene_.scene().in_world(o, request_.bodies_in_world);
+  const auto reported = [&](double rad) { return true_angle_rad(rad, 1 / bearing_scale_of(request_)); };
+  RayPacket p{};
+  Cell in[RayPacket::size];
+  std::uint32_t active = 0;
+  for (int i = 0; i < RayPacket::size && o.visible && !o.mesh->triangles.empty(); ++i) {
+    const auto& corners = o.mesh->triangles[static_cast<std::size_t>(i) * o.mesh->triangles.size() / RayPacket::size];
+    const auto corner = [&](std::size_t n) { return to_double(o.mesh->vertices[corners[n]]); };
+    const double b = std::fmod(0.7549 * (i + 1), 1), c = (1 - b) * std::fmod(0.5698 * (i + 1), 1);
+    const Vec3d place = transform(in_world, (1 - b - c) * corner(0) + b * corner(1) + c * corner(2));
+    const Vec3d to = transposed(world_from_sonar_) * (place - request_.sonar_in_world.position_m);
+    const double column = (grid_.azimuth_rad(0) - reported(std::atan2(to.y, to.x))) / grid_.column_step_rad();
+    const double row = (reported(std::atan2(to.z, std::hypot(to.x, to.y))) - grid_.elevation_rad(0)) / grid_.row_step_rad();
+    if (!(column >= 0 && column <= grid_.columns - 1 && row >= 0 && row <= grid_.rows - 1)) continue;
+    in[i] = {static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))};
+    aim(p, i, to_float(world_from_sonar_ * (1 / length(to) * to)));
+    active |= 1u << i;
+  }
+  scene_.trace(p, active, false);
+  for (int i = 0; i < RayPacket::size; ++i)
+    if (p.object[i] == object && std::find(cells.begin(), cells.end(), in[i]) == cells.end()) cells.push_back(in[i]);
+  return active != 0;
+}
+
+/// Cells in which rays hit a thin object. An object is thin if it is thin in most of its cells, or if the usual rays miss it.
 std::vector<RangeReturns::Cell> RangeReturns::thin_cells(std::vector<std::uint8_t>& is_thin) const {
   struct Found {
     Cell cell;
@@ -279,13 +303,14 @@ std::vector<RangeReturns::Cell> RangeReturns::thin_cells(std::vector<std::uint8_
   std::vector<Cell> all;
   for (const Found& f : found)
     if (is_thin[f.object] && (all.empty() || all.back() != f.cell)) all.push_back(f.cell);
+  for (std::size_t o = 0, aimed_at = 0; o < is_thin.size() && aimed_at < most_aimed_at; ++o)
+    if (cells[o] == 0) is_thin[o] = 1, aimed_at += aim_at(static_cast<std::uint32_t>(o), all);
   return all;
 }
 
 template <class F>
 void RangeReturns::for_each_hit(Cell cell, Lattice lattice, F f) const {
-  const int rays = lattice.across * lattice.up;  // fills whole packets
-  for (int ray = 0; ray < rays; ray += RayPacket::size) {
+  for (int ray = 0; ray < lattice.across * lattice.up; ray += RayPacket::size) {  // the rays fill whole packets
     RayPacket p{};
     aim_around(cell.column, cell.row, lattice, ray, RayPacket::size, p, 0);
     scene_.trace(p, 0xFFFFu, true);

@@ -93,6 +93,7 @@ class RangeReturns {
   void draw_speckle(const RayPacket& p, int lane, RangeReturn& r) const;
   void add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to, std::size_t first) const;
   void look_closer(Parallel& pool);
+  bool aim_at(std::uint32_t object, std::vector<Cell>& cells) const;
   std::vector<Cell> thin_cells(std::vector<std::uint8_t>& is_thin) const;  // by object
   std::vector<Cell> crossed_cells(Parallel& pool) const;
   Vec3d direction(int column, int row) const;  // direction of a beam in sonar axes

@@ -148,7 +148,7 @@ double power_of(const Pole& pole, const PingRequest& request) {
   return std::pow(10, (200 + pole_lambert_db) / 10) * area_m2 * sum;
 }
 
-/// Compares the power that all beams receive from the pole with Lambert's law summed over its surface, for 16 positions of the
+/// Compares the power that all beams receive from the pole with Lambert's law summed over its surface, for 64 positions of the
 /// sonar within one cell of the beam grid.
 TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
   // The sum of the weights of the beams around a point. Each beam is at -3 dB at 0.75 degrees off its axis.
@@ -175,7 +175,7 @@ TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
         const double expected =
             power_of(pole, s.request()) * weights(s.grid().column_step_rad()) * weights(s.grid().row_step_rad());
         double least_db = 1e9, most_db = -1e9, sum = 0;
-        constexpr int places = 16;
+        constexpr int places = 64;
         for (int n = 0; n < places; ++n) {
           const double part = (n + 0.5) / places;
           s.request().sonar_in_world.position_m = {0, range_m * part * s.grid().column_step_rad(),
