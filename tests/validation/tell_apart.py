@@ -21,6 +21,7 @@ TREES = 200
 RESAMPLES = 1000
 SEEDS = 101, 202  # seeds of the speckle; the second is for the control
 BANDS = (0, 32), (32, 160), (160, 288), (288, 448), (448, 672)  # rows: leak, near floor, before the bed, bed, beyond it
+NEAR_FLOOR = BANDS[1]
 FITTED = "type: point", "pulse_width_m:", "noise_width:"  # what drifts, and settings that replace the product's
 
 
@@ -157,6 +158,11 @@ def only(patch_set, first, last):
     return patch_set[0][:, first:last], patch_set[1]
 
 
+def of_rows(patch_set, first, last):
+    inside = (PATCH * patch_set[1][:, 1] >= first) & (PATCH * patch_set[1][:, 1] < last)
+    return patch_set[0][inside], patch_set[1][inside]
+
+
 def best_features(ours, theirs, names, count=5):
     """The features that tell most when alone: accuracy of the best threshold on each, over all patches."""
     import numpy as np
@@ -188,7 +194,8 @@ def render(program, seed, scene):
 
 
 def results(captured, ours, others, another):
-    """Rows of the table: name, accuracy, its interval; the features that tell most; and shares by rows: name -> of each band."""
+    """Rows of the table: name, accuracy, its interval; the features that tell most, in the picture and near the floor; and shares by
+    rows: name -> of each band."""
     import numpy as np
 
     sets = [patches(p) for p in (captured, ours, others, another)]
@@ -206,7 +213,9 @@ def results(captured, ours, others, another):
         if unseen == 2 and features == texture and second == 0:
             bands[name] = by_rows(right, places)
         rows.append((name, *interval(right, places)))
-    best = best_features(only(sets[1], 0, texture), only(sets[0], 0, texture), names[:texture])
+    like = [only(sets[i], 0, texture) for i in (1, 0)]
+    best = {"picture": best_features(*like, names[:texture]),
+            "near floor": best_features(*(of_rows(one, *NEAR_FLOOR) for one in like), names[:texture])}
     return rows, best, bands
 
 
@@ -231,9 +240,11 @@ def chapter(program, captures):
     text += "\nBy rows, of which 32 to 159 are the near floor:\n\n"
     for name, shares in bands.items():
         text += f"- {name}: " + "; ".join(f"{first} to {last} {100 * share:.1f} %" for first, last, share in shares) + "\n"
-    text += "\nWhat gives the picture away most, each feature alone with its best threshold:\n\n"
-    text += "| feature | right, % | captured, median | sonard, median |\n|---|---|---|---|\n"
-    return text + "".join(f"| {name} | {100 * share:.1f} | {real:.3g} | {ours:.3g} |\n" for share, name, real, ours in best)
+    for part, features in best.items():
+        text += f"\nWhat gives the {part} away most, each feature alone with its best threshold:\n\n"
+        text += "| feature | right, % | captured, median | sonard, median |\n|---|---|---|---|\n"
+        text += "".join(f"| {name} | {100 * share:.1f} | {real:.3g} | {ours:.3g} |\n" for share, name, real, ours in features)
+    return text
 
 
 def main():
