@@ -1,4 +1,4 @@
-// A message is described once, by a function fields(visit, message). The visitors here write, read, count and name its fields, so
+// A message is described once, by a function fields(visit, message). The visitors here write, read, count and find its fields, so
 // no protocol has packed structs or casts of buffers, and no byte beyond the span is ever read.
 #pragma once
 
@@ -178,63 +178,6 @@ class Counter : public Visitor<Counter> {
   }
 };
 
-/// Lists offset, type and the vendor's name of every field: the tables of the protocol documents.
-class Namer : public Visitor<Namer> {
- public:
-  struct Row {
-    std::size_t offset = 0, size = 0;
-    std::string type, name;
-  };
-  std::vector<Row> rows;
-
-  std::string markdown() const {
-    std::string text = "| off | type | field |\n|---|---|---|\n";
-    for (const Row& row : rows) {
-      text.append("| ").append(std::to_string(row.offset)).append(" | ").append(row.type);
-      text.append(" | ").append(row.name).append(" |\n");
-    }
-    return text;
-  }
-
- private:
-  friend class Visitor<Namer>;
-  template <class T>
-  static std::string type_name() {
-    if constexpr (std::is_enum_v<T>) {
-      return type_name<std::underlying_type_t<T>>();
-    } else {
-      return std::string(std::is_floating_point_v<T> ? "f" : (std::is_signed_v<T> ? "i" : "u"))
-          .append(std::to_string(8 * sizeof(T)));
-    }
-  }
-  void add(std::string type, std::string_view name, std::size_t size) {
-    rows.push_back({offset_, size, std::move(type), prefix_ + std::string(name)});
-    offset_ += size;
-  }
-  template <Scalar T>
-  void scalar(std::string_view name, const T&) {
-    add(type_name<T>(), name, sizeof(T));
-  }
-  template <class A>
-  void array(std::string_view name, A& values) {
-    using Element = typename std::remove_const_t<A>::value_type;
-    if constexpr (Scalar<Element>) {
-      add(type_name<Element>() + " x " + std::to_string(values.size()), name, values.size() * sizeof(Element));
-    } else {
-      Visitor::array(name, values);
-    }
-  }
-  template <class M>
-  void nested(std::string_view name, M& message) {
-    const std::string outer = prefix_;
-    prefix_ += std::string(name) + ".";
-    fields(*this, message);
-    prefix_ = outer;
-  }
-  std::size_t offset_ = 0;
-  std::string prefix_;
-};
-
 /// The position of a field in a message, and its type; little-endian. `bytes`: any other type than an integer or a
 /// floating-point number.
 struct Field {
@@ -309,13 +252,6 @@ Bytes bytes_of(const M& message, Endian endian = Endian::little) {
   out.reserve(wire_size<M>());
   append(out, message, endian);
   return out;
-}
-template <class M>
-std::string offset_table() {
-  Namer namer;
-  const M message{};
-  fields(namer, message);
-  return namer.markdown();
 }
 
 }  // namespace sonar::wire

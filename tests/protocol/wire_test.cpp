@@ -5,6 +5,8 @@
 
 #include <memory>
 
+#include "tests/docs/layout_table.hpp"
+
 namespace sonar::wire_test {
 namespace {
 
@@ -138,12 +140,12 @@ TEST(Wire, HandsOutBlocks) {
 }
 
 TEST(Wire, PrintsTheOffsetTable) {
-  EXPECT_EQ(sonar::wire::offset_table<Outer>(),
-            "| off | type | field |\n|---|---|---|\n"
-            "| 0 | u16 | colour |\n"
-            "| 2 | i16 | pair.left |\n| 4 | u8 x 3 | pair.octets |\n"
-            "| 7 | i16 | pair.left |\n| 9 | u8 x 3 | pair.octets |\n"
-            "| 12 | f64 | level |\n| 20 | f32 | share |\n");
+  EXPECT_EQ(docs::layout_table<Outer>({{"octets", "three"}}),
+            "| offset | type | field | meaning |\n|---|---|---|---|\n"
+            "| 0 | u16 | colour |  |\n"
+            "| 2 | i16 | pair.left |  |\n| 4 | u8 x 3 | pair.octets | three |\n"
+            "| 7 | i16 | pair.left |  |\n| 9 | u8 x 3 | pair.octets | three |\n"
+            "| 12 | f64 | level |  |\n| 20 | f32 | share |  |\n\n");
 }
 
 }  // namespace
