@@ -48,8 +48,11 @@ void draw_axis(Raster& raster, double left, double right, double step, const cha
     for (int y = 0; y < raster.height; ++y) blend(raster, x, y, ring_colour, 0.12f);
     char label[32];
     std::snprintf(label, sizeof label, "%g%s", at == 0 ? 0 : at, unit);
-    draw_text(raster, std::clamp(x + 2 * scale, 0, std::max(0, raster.width - text_width(label, scale) - 1)), 2 * scale, label,
-              label_colour, scale);
+    const int width = text_width(label, scale);
+    const int from = std::clamp(x + 2 * scale, 0, std::max(0, raster.width - width - 1));
+    for (int y = 0; y < 9 * scale; ++y)  // echoes may be as bright as the label
+      for (int i = -2 * scale; i < width + 2 * scale; ++i) blend(raster, from + i, y, outside_colour, 0.7f);
+    draw_text(raster, from, 2 * scale, label, label_colour, scale);
   }
 }
 

@@ -75,6 +75,18 @@ TEST(SonarPicture, AWaterfallBeginsOnTopAndIsEmptyBelow) {
   EXPECT_FALSE(PicturePainter(style()).draw(picture));
 }
 
+TEST(SonarPicture, LabelsCanBeReadOverTheBrightestEchoes) {
+  SonarPicture picture{.kind = PictureKind::waterfall, .image = cells(20, 100)};
+  picture.image.samples.assign(20 * 100, 255);
+  const Raster raster = *PicturePainter(style(true)).draw(picture);
+  int dark = 0, bright = 0;
+  for (int y = 0; y < 9; ++y)
+    for (int x = 0; x < 12; ++x) ++(raster.at(x, y).r < 100 ? dark : bright);
+  EXPECT_GT(dark, 3 * bright) << "around the first label";
+  EXPECT_GT(bright, 5) << "its dots";
+  EXPECT_GT(raster.at(60, 20).r, 200) << "the echoes";
+}
+
 TEST(SonarPicture, PointsLieOverAFanThatOpensDownwards) {
   SonarPicture picture{.kind = PictureKind::points, .image = cells(100, 2), .points = {{0.3, 5}, {0, 99}}};
   picture.image.azimuth_rad = {0.7, -0.7};
