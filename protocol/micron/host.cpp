@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/text/format.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/line_pictures.hpp"
 #include "protocol/micron/micron.hpp"
 #include "protocol/micron/settings.hpp"
@@ -119,6 +120,10 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (auto accepted = protocol::accept_settings(wanted, "a Micron", {"range", "gain", "mode"}); !accepted)
     return tl::unexpected(accepted.error());
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a Micron has one mode only");
+  // The sonar would not refuse the range, only send nothing.
+  const double farthest_m = static_cast<double>(models().front()->modes.front().max_range_m);
+  const std::string why = protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Micron", 0, farthest_m);
+  if (!why.empty()) return failure(ErrorKind::usage, why);
   return std::make_unique<MicronHost>(wanted.as_it_is ? std::nullopt : std::optional(command_of(wanted.settings)));
 }
 

@@ -19,7 +19,7 @@ constexpr auto processing = std::chrono::milliseconds(5);
 
 std::string complaint(const Settings& s) {
   if (!(s.start_m >= 0 && s.stop_m <= farthest_m && s.stop_m >= s.start_m + shortest_m))
-    return text::format("start and stop must be from 0 to %g m and at least %g m apart", farthest_m, shortest_m);
+    return protocol::range_rule(shortest_m, farthest_m, "start, stop");
   if (s.rate_hz != -1 && !(s.rate_hz > 0 && s.rate_hz <= fastest_hz))
     return text::format("the rate must be above 0 and at most %g Hz, or -1", fastest_hz);
   if (!(s.gain_db >= 0 && s.gain_db <= most_gain_db)) return text::format("the gain must be 0 to %g dB", most_gain_db);

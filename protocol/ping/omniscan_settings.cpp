@@ -89,7 +89,7 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
 
 std::string complaint(const OsPingParams& p) {
   if (p.length_mm < least_length_mm || 1e-3 * p.start_mm + 1e-3 * p.length_mm > longest_m)
-    return "length_mm must be at least 100, and the range must end by 150000";
+    return protocol::range_rule(1e-3 * least_length_mm, longest_m, "start_mm, length_mm");
   if (p.gain < -1 || p.gain > most_gain) return "gain_index is not in -1..7";
   if (p.results < 200 || p.results > 1200) return "num_results is not in 200..1200";
   if (!(p.pulse_part >= 0 && p.pulse_part <= 1)) return "pulse_len_percent is not in 0..1";

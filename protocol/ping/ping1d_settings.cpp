@@ -56,7 +56,7 @@ bool same_settings(const Settings& a, const Settings& b) { return a.id == b.id &
 std::string complaint(const Parameters& p) {
   if (p.range.length_mm < shortest_range_mm || p.range.length_mm > most_mm || p.range.start_mm > most_mm ||
       end_mm(p.range) > most_mm)
-    return "scan_length is below 1000, or ends beyond 100000";
+    return protocol::range_rule(1e-3 * shortest_range_mm, 1e-3 * most_mm, "scan_start, scan_length");
   if (p.speed_mm_per_s < 1000000 || p.speed_mm_per_s > 2000000) return "speed_of_sound is not in 1000000..2000000";
   if (p.gain > most_gain) return "gain_setting is not in 0..6";
   if (p.mode_auto > 1) return "mode_auto must be 0 or 1";

@@ -59,11 +59,11 @@ HostActions PingHost::on_bytes(std::size_t, BytesView received, Time) {
   while (const auto frame = framer_.next()) {
     if (!frame->sum_is_right) continue;
     on_frame(*frame, actions);
-    if (frame->header.id == Id::nack && !on_nack(refused_in(*frame), actions)) {
-      std::string why;
-      // The text of the reason follows the number of the request.
-      for (std::size_t i = 2; i < frame->payload.size(); ++i) why += static_cast<char>(frame->payload[i]);
-      actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + why});
+    if (frame->header.id == Id::nack) {
+      std::string text;  // after the number of the request
+      for (std::size_t i = 2; i < frame->payload.size(); ++i) text += static_cast<char>(frame->payload[i]);
+      if (const auto why = on_nack(refused_in(*frame), std::move(text), actions))
+        actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + *why});
     }
     if (auto ping = ping_from(*frame)) {
       ping->facts.message_size = header_size + frame->payload.size() + sum_size;

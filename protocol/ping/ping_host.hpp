@@ -48,8 +48,9 @@ class PingHost : public protocol::Host {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
-  /// True if the host sends another request in place of the refused one.
-  virtual bool on_nack(Id /*refused*/, protocol::HostActions&) { return false; }
+  /// The reason of the error; nullopt: none, because the host sends another request in place of the refused one. `why`: what the
+  /// sonar says.
+  virtual std::optional<std::string> on_nack(Id /*refused*/, std::string why, protocol::HostActions&) { return why; }
   virtual std::optional<protocol::HostPing> ping_from(const Frame& frame) = 0;
 
  private:

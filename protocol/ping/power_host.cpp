@@ -98,14 +98,15 @@ class PowerHost final : public PingHost {
   }
   /// The request was refused: the sonar is perhaps the other product. Its request is sent once; a second refusal is an error. A
   /// recording holds refusals of another host's request, which are ignored.
-  bool on_nack(Id refused, HostActions& actions) override {
-    if (refused == only_s500_has) return ask_once(actions), true;
+  std::optional<std::string> on_nack(Id refused, std::string why, HostActions& actions) override {
+    if (refused == only_s500_has) return ask_once(actions), std::nullopt;
     const bool has_switched = title_ == other_.title;
-    if (refused != refusable_ && refused != other_.request_id) return false;
-    if (!asks() || refused != (has_switched ? other_.request_id : refusable_)) return true;
-    if (has_switched) return false;
+    if (refused != refusable_ && refused != other_.request_id) return why;
+    if (!asks() || refused != (has_switched ? other_.request_id : refusable_)) return std::nullopt;
+    if (has_switched) return refusal_.empty() ? why : refusal_ + "; as " + std::string(title_) + ": " + why;
+    refusal_ = std::move(why);
     switch_to_other(actions);
-    return true;
+    return std::nullopt;
   }
   std::optional<HostPing> ping_from(const Frame& frame) override {
     if (frame.header.id == Id::os_mono_profile) return read(frame, OsMonoProfile{});
@@ -139,6 +140,7 @@ class PowerHost final : public PingHost {
   }
 
   std::string_view title_;  // the product whose request was sent last
+  std::string refusal_;     // why the request of the first product was refused
   std::string_view shown_;  // the product that refused the other's request, or whose ping came; empty: not known
   Id refusable_;
   const Product& other_;

@@ -97,7 +97,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 std::string complaint(const SetPingParams& p) {
   if ((p.length_mm != 0 && p.length_mm < shortest_range_mm) || p.length_mm > most_mm || p.start_mm > most_mm ||
       p.start_mm + p.length_mm > most_mm)
-    return "length_mm must be 0 or at least 1000, and the range must end by 142000";
+    return protocol::range_rule(1e-3 * shortest_range_mm, 1e-3 * most_mm, "length_mm; 0: automatic");
   if (p.gain < -1 || p.gain > most_gain()) return "gain_index is not in -1..13";
   if (p.period_ms < -1) return "msec_per_ping is not in -1..32767";
   if (p.report != Id{} && p.report != Id::s500_distance2 && p.report != Id::s500_profile6)

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/text/ipv4.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/waterlinked/settings.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
 
@@ -104,7 +105,7 @@ Outcome set_range(Call& call, const Json& posted) {
     return malformed("not {\"min\": number, \"max\": number}");
   const double least = posted["min"].get<double>(), most = posted["max"].get<double>();
   if (!(least >= 0 && least + least_window_m <= most && most <= longest_range_m))
-    return malformed("min and max lie within 0 to 15, at least 0.1 apart");
+    return malformed(protocol::range_rule(least_window_m, longest_range_m, "min, max"));
   call.settings.range_min_m = least;
   call.settings.range_max_m = most;
   return {};

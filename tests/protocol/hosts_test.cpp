@@ -74,6 +74,24 @@ TEST_P(Hosts, TellTheRangeWhichTheSonarHasInsteadOfThatWhichItEchoes) {
   EXPECT_THAT(ping.limited, testing::Contains(HasSubstr("not 900 m")));
 }
 
+/// Users type metres, and do not know the fields of messages.
+TEST_P(Hosts, TellInMetresWhyARangeIsRefused) {
+  for (const double wanted_m : {900.0, 0.001}) {
+    Wanted wanted;
+    wanted.settings.range_m = wanted_m;
+    const auto host = GetParam().host(wanted);
+    std::string why = host ? "" : host.error().text;
+    if (host) {
+      Talk talk(GetParam(), wanted, 0, model_of(GetParam()));
+      talk.run(30);
+      if (!talk.error && !talk.pings.empty()) continue;  // limited
+      why = talk.error ? talk.error->text : "";
+    }
+    if (why.find("--range") != std::string::npos) continue;  // this make has no such setting
+    EXPECT_THAT(why, testing::MatchesRegex(".*range[^_]* m([^a-z].*)?")) << wanted_m;
+  }
+}
+
 TEST_P(Hosts, FindASonarWithSettingsThatItsModelHas) {
   Wanted nothing;
   nothing.as_it_is = true;
