@@ -43,7 +43,7 @@ export function drawnLayout(image, polar, width, height, margins) {
   box.top = margins.top + (height - margins.top - margins.bottom - box.height) / 2;
   if (!polar) return { width, height, box };
   const { apex_x, apex_y, up, metres_per_pixel } = exactLayout(polar, image.width, 4);
-  return { width, height, box, apex_x: box.left + apex_x * scale, apex_y: box.top + apex_y * scale, up, metres_per_pixel: metres_per_pixel / scale };
+  return { width, height, box, scale, apex_x: box.left + apex_x * scale, apex_y: box.top + apex_y * scale, up, metres_per_pixel: metres_per_pixel / scale };
 }
 
 /// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
