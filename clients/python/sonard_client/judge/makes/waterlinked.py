@@ -1,9 +1,8 @@
 """Sonar 3D-15: images as datagrams. The samples are the ranges of a RangeImage, little-endian: its 32-bit numbers, or metres as
-32-bit floats, with 0 or NaN where there is none; a driver may also publish the bytes of the strengths."""
+32-bit floats; a driver may also publish the bytes of the strengths."""
 from __future__ import annotations
 
 import array
-import math
 import struct
 import sys
 import zlib
@@ -51,7 +50,7 @@ def content_of(datagram: bytes) -> Optional[bytes]:
         return None
 
 
-def _in_memory_order(numbers: "array.array[int] | array.array[float]") -> bytes:
+def _little_endian(numbers: "array.array[int] | array.array[float]") -> bytes:
     if sys.byteorder == "big":
         numbers.byteswap()
     return numbers.tobytes()
@@ -73,8 +72,8 @@ class WaterlinkedReader:
                 width, height = protobuf.number(image, 5), protobuf.number(image, 6)
                 ranges = array.array("I", protobuf.varints(protobuf.block(image, 10)))
                 scale_m, = struct.unpack("<f", protobuf.block(image, 9) or bytes(4))
-                forms = [array.array("f", (n * scale_m if n else none for n in ranges)) for none in (0, math.nan)] if scale_m else []
-                samples, count = [_in_memory_order(form) for form in (ranges, *forms)], len(ranges)
+                metres = array.array("f", (n * scale_m for n in ranges))
+                samples, count = [_little_endian(form) for form in (ranges, metres)][:2 if scale_m else 1], len(ranges)
             elif name == b"BitmapImageGreyscale8" and protobuf.number(image, 5) == 0:
                 width, height = protobuf.number(image, 6), protobuf.number(image, 7)
                 samples = [protobuf.block(image, 10)]
