@@ -79,6 +79,9 @@ class RangeReturns {
     int column = 0, row = 0;
     bool operator==(const Cell&) const = default;
   };
+  // Number of rays around the middle of a cell. They show which part of it an object covers that the middle ray misses.
+  static constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up,
+                       cells_a_packet = RayPacket::size / rays_around;
   /// Number of rays across a cell in azimuth and in elevation. The rays are uniform over the cell.
   struct Lattice {
     int across = 1, up = 1;
@@ -93,7 +96,7 @@ class RangeReturns {
   void draw_speckle(const RayPacket& p, int lane, RangeReturn& r) const;
   void add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to, std::size_t first) const;
   void look_closer(Parallel& pool);
-  bool aim_at(std::uint32_t object, std::vector<Cell>& cells) const;
+  bool aim_at(std::uint32_t object, std::vector<std::uint8_t>& is_listed, std::vector<Cell>& cells) const;
   std::vector<Cell> thin_cells(std::vector<std::uint8_t>& is_thin) const;  // by object
   std::vector<Cell> crossed_cells(Parallel& pool) const;
   Vec3d direction(int column, int row) const;  // direction of a beam in sonar axes

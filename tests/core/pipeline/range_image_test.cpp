@@ -1,6 +1,6 @@
 // Compares range images with closed forms: positions of a plane, a sphere and a point, orientation, levels, sound speed,
 // threads.
-#include "core/sonar/range_image.hpp"
+#include "tests/core/pipeline/range_image_sounding.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,81 +13,9 @@
 #include "core/base/units.hpp"
 #include "core/scene/shapes/primitives.hpp"
 #include "core/sonar/water.hpp"
-#include "tests/core/pipeline/scenes.hpp"
-#include "tests/core/pipeline/sounding.hpp"
 
 namespace sonar::test {
 namespace {
-
-constexpr std::uint32_t full_scale = 400;
-
-struct Wanted final : RangeImageSettings {
-  bool equals(const VendorSettings&) const override { return true; }
-};
-
-/// 256 x 64 beams of 1.5 degrees over 90 x 40 degrees, up to 15 m.
-class RangeImageSounding {
- public:
-  explicit RangeImageSounding(std::shared_ptr<const Scene> scene, int threads = 2)
-      : sounding_(std::move(scene), mode(), settings(), {.threads = threads, .engine = {}}), wanted(std::make_shared<Wanted>()) {
-    wanted->beam_height_rad = rad_from_deg(1.5);
-    wanted->range_unit_m = 50.0 / 65536;
-    wanted->least_strength = 31;
-    request().vendor_settings = wanted;
-    request().switches.keep_pressure = false;
-  }
-  PingRequest& request() { return sounding_.request; }
-  const Ping& ping() { return sounding_.ping(); }
-  const Ping& last() const { return sounding_.last(); }
-  RangeImageGrid grid() { return RangeImageGrid(request()); }
-  RangePixel at(int column, int row) const { return range_pixel(last(), static_cast<std::size_t>(row * 256 + column)); }
-  double range_m(int column, int row) const { return at(column, row).range * wanted->range_unit_m; }
-  /// Forward, left, up [m].
-  Vec3d place(int column, int row) {
-    const double a = grid().azimuth_rad(column), e = grid().elevation_rad(row), r = range_m(column, row);
-    return {r * std::cos(e) * std::cos(a), r * std::cos(e) * std::sin(a), r * std::sin(e)};
-  }
-  /// Mean column and row of the pixels with a return.
-  std::pair<double, double> middle() {
-    double columns = 0, rows = 0, n = 0;
-    for (int row = 0; row < 64; ++row)
-      for (int column = 0; column < 256; ++column)
-        if (at(column, row).range != 0) columns += column, rows += row, ++n;
-    return n > 0 ? std::pair(columns / n, rows / n) : std::pair(-1.0, -1.0);
-  }
-
- private:
-  static FrequencyMode mode() {
-    FrequencyMode m;
-    m.name = "range image";
-    m.centre_hz = 1.2e6f;
-    m.horizontal_aperture_rad = static_cast<float>(rad_from_deg(90));
-    m.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(40));
-    m.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(1.5));
-    m.beam_spacing = BeamSpacing::uniform_in_angle;
-    m.max_range_m = 15;
-    m.source_level_db = 200;
-    m.receiver.tvg_slope_db = 20;
-    m.receiver.full_scale_upa = 1e9f;
-    return m;
-  }
-  static PingSettings settings() {
-    PingSettings s;
-    s.beam_count = 256;
-    s.range_bin_count = 64;
-    s.range_m = 15;
-    s.range_bin_m = 15.0 / 64;
-    s.pulse_width_m = 0.02f;
-    s.gain_db = 30;
-    s.device_sound_speed_mps = 1500;
-    s.format = {.bits = 32, .max_code = range_image_max_code(full_scale)};
-    return s;
-  }
-  Sounding sounding_;
-
- public:
-  std::shared_ptr<Wanted> wanted;
-};
 
 std::shared_ptr<const Scene> plane_ahead(double x_m) { return SceneMaker().add(wall(40, 40), -20, {x_m, 0, 0}).make(); }
 
@@ -122,74 +50,6 @@ TEST(RangeImage, SphereIsWhereItIs) {
   EXPECT_NEAR(s.grid().azimuth_rad(column), std::atan2(centre.y, centre.x), rad_from_deg(0.3));
   EXPECT_NEAR(s.grid().elevation_rad(row), std::atan2(centre.z, std::hypot(centre.x, centre.y)), rad_from_deg(0.4));
   EXPECT_NEAR(s.range_m(static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))), length(centre) - 0.5, 0.02);
-}
-
-/// A pole straight ahead. `turn_rad` makes it upright, level or oblique.
-struct Pole {
-  double radius_m = 0, length_m = 0, turn_rad = 0, range_m = 0;
-};
-constexpr double pole_lambert_db = -8;
-
-/// The power [uPa^2], by Lambert's law, that a beam receives from the pole when its axis points at the pole.
-double power_of(const Pole& pole, const PingRequest& request) {
-  constexpr int along = 200, around = 200;
-  const double alpha_db = absorption_db_per_m(request.water, 0, 1.2e6);
-  double sum = 0;
-  for (int i = 0; i < along; ++i)
-    for (int j = 0; j < around; ++j) {
-      const double t = ((i + 0.5) / along - 0.5) * pole.length_m, angle = ((j + 0.5) / around - 0.5) * std::numbers::pi;
-      // `angle` is the angle of the surface normal, 0 where the surface faces the sonar. `t` is the position along the pole,
-      // which is perpendicular to the direction of the sonar.
-      const Vec3d place{pole.range_m - pole.radius_m * std::cos(angle), pole.radius_m * std::sin(angle), t};
-      const double r = length(place), cosine = dot(Vec3d{std::cos(angle), -std::sin(angle), 0}, place) / r;
-      if (cosine > 0) sum += cosine * cosine * std::pow(r, -4) * std::pow(10, -2 * alpha_db * r / 10);
-    }
-  const double area_m2 = std::numbers::pi * pole.radius_m * pole.length_m / (along * around);
-  return std::pow(10, (200 + pole_lambert_db) / 10) * area_m2 * sum;
-}
-
-/// Compares the power that all beams receive from the pole with Lambert's law summed over its surface, for 64 positions of the
-/// sonar within one cell of the beam grid.
-TEST(RangeImage, HearsThinPolesWhereverTheyAre) {
-  // The sum of the weights of the beams around a point. Each beam is at -3 dB at 0.75 degrees off its axis.
-  const auto weights = [](double step_rad) {
-    double sum = 0;
-    for (int n = -20; n <= 20; ++n) {
-      const double x = n * step_rad / rad_from_deg(1.5);
-      if (std::abs(x) < 1.1) sum += std::exp2(-4 * x * x);
-    }
-    return sum;
-  };
-  for (const double range_m : {2.5, 4.5, 8.5, 12.5})  // centres of range cells
-    for (const double diameter_m : {0.005, 0.02, 0.1})
-      for (const double turn_rad : {0.0, std::numbers::pi / 2, 0.6}) {
-        const Pole pole{diameter_m / 2, std::min(2.0, 0.4 * range_m), turn_rad, range_m};
-        const Quatd turn{std::cos(turn_rad / 2), std::sin(turn_rad / 2), 0, 0};
-        RangeImageSounding s(
-            SceneMaker()
-                .add(make_cylinder(pole.radius_m, pole.length_m, 48, Caps::none), pole_lambert_db, {range_m, 0, 0}, turn)
-                .make());
-        s.request().switches.expected_power = s.request().switches.keep_pressure = true;
-        s.request().settings.pulse_width_m = 1;  // the whole pole in one cell
-        s.wanted->least_strength = 0;
-        const double expected =
-            power_of(pole, s.request()) * weights(s.grid().column_step_rad()) * weights(s.grid().row_step_rad());
-        double least_db = 1e9, most_db = -1e9, sum = 0;
-        constexpr int places = 64;
-        for (int n = 0; n < places; ++n) {
-          const double part = (n + 0.5) / places;
-          s.request().sonar_in_world.position_m = {0, range_m * part * s.grid().column_step_rad(),
-                                                   range_m * part * s.grid().row_step_rad()};
-          double heard = 0;
-          for (const float p : s.ping().pressure_upa) heard += std::pow(static_cast<double>(p), 2);
-          const double off_db = 10 * std::log10(heard / expected);
-          least_db = std::min(least_db, off_db), most_db = std::max(most_db, off_db), sum += heard / expected;
-        }
-        SCOPED_TRACE(std::to_string(diameter_m) + " m thick at " + std::to_string(range_m) + " m, turned by " +
-                     std::to_string(turn_rad));
-        EXPECT_LT(most_db - least_db, 1);
-        EXPECT_NEAR(10 * std::log10(sum / places), 0, 0.5);
-      }
 }
 
 TEST(RangeImage, LeftIsTheFirstColumnAndUpTheLastRow) {
