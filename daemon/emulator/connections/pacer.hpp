@@ -45,6 +45,8 @@ class Pacer {
   bool fire(Time now, bool busy);
   /// Call it when a ping has been computed. True: a tick has waited for that; make its ping now, with the stamp last_tick().
   bool fire_waiting();
+  /// Skips a tick that waits.
+  void forget_tick();
 
   Time last_tick() const { return last_tick_; }
   bool trigger_waits() const { return trigger_waits_; }
@@ -55,7 +57,6 @@ class Pacer {
   std::uint64_t skipped_ticks() const { return skipped_.total(); }
 
  private:
-  void forget_tick();
   void forget_trigger();
   void note_ping(Time at);
 

@@ -27,8 +27,10 @@ void PingSource::use_initial_settings() {
   settings_ = initial.settings;
   sonar_.state.settings = std::move(initial.vendor_settings);
   if (initial.receivers) audience_.restore_receivers(*std::move(initial.receivers));
-  // The ping that is being computed has the settings of clients that have left: on_ping() drops it.
+  // The ping that is being computed has the settings of clients that have left: on_ping() drops it. A tick that waits for it was
+  // due for those clients too.
   busy_unwanted_ = busy_;
+  pacer_.forget_tick();
   drop_unsent();
 }
 
@@ -73,6 +75,7 @@ void PingSource::forget_settings(Time now) {
 
 void PingSource::restart(bool clock_only, Time now) {
   sonar_.state.powered_up_at = now;
+  pacer_.forget_tick();  // it is older
   if (clock_only) return;
   sonar_.state.last_ping = ping_number_ = 0;
   forget_settings(now);

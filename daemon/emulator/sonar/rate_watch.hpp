@@ -10,9 +10,8 @@ namespace sonar {
 
 class RateWatch {
  public:
-  /// Call it after each ping. `ticks`: ticks since the start; `busy`: those at which the previous ping was still being
-  /// computed; `ping_s`: computing time of this ping; `rate_hz`: rate of the ticks; `has_others`: other sonars use the same
-  /// engine. Returns a sentence at most once.
+  /// Call it after each ping. `ticks`: ticks since the start; `busy`: SkippedTicks::busy; `ping_s`: computing time of
+  /// this ping; `rate_hz`: rate of the ticks; `has_others`: other sonars use the same engine. Returns a sentence at most once.
   std::optional<std::string> look(std::uint64_t ticks, std::uint64_t busy, double ping_s, double rate_hz, bool has_others);
 
  private:

@@ -89,13 +89,14 @@ TEST(Pacer, ATickWaitsNoLongerThanItsRhythm) {
     EXPECT_FALSE(pacer.fire(t0 + milliseconds(100), true));
     return pacer;
   };
-  Pacer same = waiting(), other = waiting(), hurried = waiting(), stopped = waiting();
+  Pacer same = waiting(), other = waiting(), hurried = waiting(), stopped = waiting(), restarted = waiting();
   same.configure(settings(10), t0 + milliseconds(120));
   EXPECT_TRUE(same.fire_waiting());
   other.configure(settings(20), t0 + milliseconds(120));
   hurried.hurry(t0 + milliseconds(120));
   stopped.stop();
-  for (Pacer* p : {&other, &hurried, &stopped}) {
+  restarted.forget_tick();
+  for (Pacer* p : {&other, &hurried, &stopped, &restarted}) {
     EXPECT_FALSE(p->fire_waiting());
     EXPECT_EQ(p->skipped().busy, 1u);
     EXPECT_EQ(p->ticks(), 2u);
