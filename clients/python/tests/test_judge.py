@@ -18,7 +18,6 @@ from common import ROOT
 from sonard_client.judge import __main__ as judge_main
 from sonard_client.judge import cases, driver, ros_tap, run_case
 from sonard_client.judge.cases import CASES
-from sonard_client.judge.makes import dvl as makes_dvl
 from sonard_client.judge.scene import Scene
 from sonard_client.judge.truth import TruePing
 from sonard_client.judge.verdicts import Observation, back_at, colour, judge, sort_published
@@ -385,9 +384,6 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(json.loads(ros_tap.line_of(image)), {**plain, "id": None})
         echo = types.SimpleNamespace(intensities=array.array("B", b"abcdefgh"), number_of_samples=8)  # ping360_sonar_msgs/SonarEcho
         self.assertEqual(json.loads(ros_tap.line_of(echo)), {**plain, "id": None})
-        dvl = types.SimpleNamespace(velocity=types.SimpleNamespace(x=0.5, y=-0.25, z=0.125), altitude=3.0)  # dvl_msgs/DVL
-        (crcs, _) = makes_dvl._velocity('{"type":"velocity","vx":0.5,"vy":-0.25,"vz":0.125,"altitude":3,"velocity_valid":true}')
-        self.assertIn(int(json.loads(ros_tap.line_of(dvl))["crc32"], 16), crcs)
 
     def test_name_of_a_driver(self):
         for words, name in ((["/usr/bin/mydriver", "{ip}"], "mydriver"), (["python3", "-u", "a/drv.py", "{ip}"], "drv.py"),

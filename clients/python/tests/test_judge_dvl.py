@@ -1,9 +1,11 @@
 """The judge's reader of a DVL: docs/protocols/dvl.md."""
 import json
 import struct
+import types
 import unittest
 
 import judge_makes
+from sonard_client.judge import ros_tap
 from sonard_client.judge.makes import dvl, make_of
 
 
@@ -29,6 +31,13 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
         self.assertEqual(self.found(line(1e300)), [], "no 32-bit float")
         self.assertEqual(self.found(b"x" * 200_000, line(0.1)[:-1]), [])
         self.assertEqual(len(self.found(b"x" * 200_000, line(0.1))), 1, "a line without end is dropped")
+
+    def test_lines_of_ros_messages(self):
+        message = types.SimpleNamespace(velocity=types.SimpleNamespace(x=0.5, y=-0.2, z=0), altitude=3.25)  # dvl_msgs/DVL
+        (crcs, _) = dvl._velocity(line(0.5))
+        self.assertIn(int(json.loads(ros_tap.line_of(message))["crc32"], 16), crcs)
+        del message.velocity  # sensor_msgs/NavSatFix
+        self.assertEqual(json.loads(ros_tap.line_of(message)), {"id": None, "crc32": "00000000"})
 
     def test_make(self):
         self.assertIs(make_of("dvl-a125"), dvl.DVL)

@@ -38,9 +38,9 @@ def line_of(message: Any) -> str:
     samples, because ping_data of one driver's Ping begins with the header from the wire. With `has_gains` the gain before each
     row is removed."""
     samples = _field(message, "ping_data", "image.data", "intensities", "data")
-    if samples is None and hasattr(message, "altitude"):
-        moved = message.velocity
-        samples = struct.pack("<4d", moved.x, moved.y, moved.z, message.altitude)
+    moved, altitude = _field(message, "velocity"), _field(message, "altitude")
+    if samples is None and moved is not None and altitude is not None:
+        samples = struct.pack("<4d", moved.x, moved.y, moved.z, altitude)
     data = bytes(samples if samples is not None else b"")
     step, rows = getattr(message, "step", 0), getattr(message, "n_ranges", 0)
     if step and rows:
