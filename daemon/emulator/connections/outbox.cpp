@@ -22,14 +22,11 @@ std::size_t Outbox::Message::size() const {
 
 // A slow client gets the newest pings: the oldest waiting one is dropped (only a fault uses drop_newest). The message that is
 // being written is never dropped, because that would cut the stream.
-void Outbox::push(Message ping, bool limited) {
+void Outbox::push(Message ping, std::size_t most, std::size_t most_bytes) {
   const std::size_t size = ping.size();
   ++pings_offered_;
-  // An empty queue accepts any ping, so that a ping larger than most_ping_bytes can be sent.
-  const auto full = [&] {
-    return limited && !pings_.empty() &&
-           (pings_.size() >= static_cast<std::size_t>(rules_.depth) || ping_bytes_ + size > most_ping_bytes);
-  };
+  // An empty queue accepts any ping, so that a ping larger than most_bytes can be sent.
+  const auto full = [&] { return !pings_.empty() && (pings_.size() >= most || ping_bytes_ + size > most_bytes); };
   if (full() && rules_.when_full == WhenFull::drop_newest) {
     count_drop(DropReason::slow);
     return;

@@ -48,7 +48,8 @@ class Outbox {
     explicit operator bool() const { return bytes != nullptr || datagrams != nullptr; }
     std::size_t size() const;  // in bytes, without prefixes
   };
-  static constexpr std::size_t most_ping_bytes = 8u << 20;    // limit for the waiting pings of one client
+  static constexpr std::size_t most_ping_bytes = 8u << 20;                    // limit for the waiting pings of one client
+  static constexpr std::size_t most_held = 128, most_held_bytes = 64u << 20;  // the same for pings that a fault holds back
   static constexpr std::size_t most_reply_bytes = 64u << 10;  // limit for clients that send requests but do not read
   static constexpr std::size_t most_replies = 256;
 
@@ -59,9 +60,9 @@ class Outbox {
   void push_ping(std::shared_ptr<const Bytes> bytes, std::uint32_t number, std::vector<Bytes> prefixes = {}, Time fired_at = {}) {
     push_ping({std::move(bytes), number, std::move(prefixes), fired_at});
   }
-  void push_ping(Message ping) { push(std::move(ping), true); }
-  /// Adds a ping that a fault held back, even beyond the depth.
-  void push_held(Message ping) { push(std::move(ping), false); }
+  void push_ping(Message ping) { push(std::move(ping), static_cast<std::size_t>(rules_.depth), most_ping_bytes); }
+  /// Adds a ping that a fault held back, even beyond the depth: as many as a fault may hold.
+  void push_held(Message ping) { push(std::move(ping), most_held, most_held_bytes); }
   /// Returns the next message to write, replies before pings; empty while a message is being written or if none waits.
   Message take();
   /// Call it when the message that take() returned was written completely.
@@ -85,7 +86,7 @@ class Outbox {
   std::size_t pings_waiting() const { return pings_.size(); }
 
  private:
-  void push(Message ping, bool limited);
+  void push(Message ping, std::size_t most, std::size_t most_bytes);
   void count_drop(DropReason why, std::uint64_t pings = 1) { dropped_[static_cast<std::size_t>(why)] += pings; }
 
   OutboxRules rules_;

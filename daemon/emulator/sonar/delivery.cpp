@@ -7,9 +7,6 @@
 namespace sonar {
 namespace {
 
-// Limits of the pings that a fault holds back for one client.
-constexpr std::size_t most_held = 128, most_held_bytes = 64u << 20;
-
 std::size_t held_bytes(const Connection& c) {
   return std::accumulate(c.held.begin(), c.held.end(), std::size_t{0},
                          [](std::size_t sum, const Connection::Held& held) { return sum + held.ping.size(); });
@@ -154,7 +151,7 @@ void Delivery::deliver(Connection& to, Outbox::Message ping, Time now, Actions& 
     if (!held.empty()) release_held(to, now, true, actions);
     return;
   }
-  if (held.size() >= most_held || held_bytes(to) + ping.size() > most_held_bytes)
+  if (held.size() >= Outbox::most_held || held_bytes(to) + ping.size() > Outbox::most_held_bytes)
     return to.outbox.drop_offered(DropReason::fault);
   // A ping that waits for an event (collect, after_next) has no release time: Time::max(). Pings keep their order: no ping
   // leaves before the previous one.

@@ -28,6 +28,20 @@ TEST(Outbox, ReplacesTheOldestWaitingPingAndNeverTheOneBeingWritten) {
   EXPECT_EQ(box.pings_written(), 2u);
 }
 
+// Under the fault latency every ping is held back first; a client that reads too slowly must not collect them without limit.
+TEST(Outbox, HeldPingsMayPassTheDepthButNotTheirOwnLimit) {
+  Outbox box({1, WhenFull::replace_oldest});
+  const auto hold = [&](std::uint32_t number, std::size_t bytes) {
+    box.push_held({.bytes = std::make_shared<const Outbox::Bytes>(bytes), .ping = number, .prefixes = {}, .fired_at = {}});
+  };
+  for (std::uint32_t i = 1; i <= 3 * Outbox::most_held; ++i) hold(i, 100);
+  EXPECT_EQ(box.pings_waiting(), Outbox::most_held);
+  EXPECT_EQ(box.pings_dropped(), 2 * Outbox::most_held);
+  EXPECT_EQ(box.take().ping, 2 * Outbox::most_held + 1) << "the newest are kept";
+  for (std::uint32_t i = 0; i < 20; ++i) hold(1000 + i, Outbox::most_held_bytes / 10);
+  EXPECT_EQ(box.pings_waiting(), 10u);
+}
+
 TEST(Outbox, DropsTheNewestWhenToldTo) {
   Outbox box({2, WhenFull::drop_newest});
   for (int i = 1; i <= 5; ++i) push(box, i);
