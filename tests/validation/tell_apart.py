@@ -73,11 +73,11 @@ def texture_features(ratio):
         out[f"percentile {percent}"] = np.percentile(ratio, percent)
     out["share above 1.5 local means"] = (ratio > 1.5).mean()
     for lag in (1, 2, 3, 4):
-        out[f"{lag} beams apart"] = correlation(*shifted(ratio, 0, lag))
+        out[f"samples {lag} beams apart" if lag > 1 else "samples of neighbouring beams"] = correlation(*shifted(ratio, 0, lag))
     for lag in (1, 2, 3, 4):
-        out[f"{lag} rows apart"] = correlation(*shifted(ratio, lag, 0))
+        out[f"samples {lag} rows apart" if lag > 1 else "samples of neighbouring rows"] = correlation(*shifted(ratio, lag, 0))
     for right in (-1, 1):
-        out[f"1 row and {right:+d} beam apart"] = correlation(*shifted(ratio, 1, right))
+        out[f"samples 1 row and {right:+d} beam apart"] = correlation(*shifted(ratio, 1, right))
     along, across = np.abs(np.diff(ratio, axis=0)).mean(), np.abs(np.diff(ratio, axis=1)).mean()
     out["range over azimuth gradient"] = along / across if across > 0 else 0.0
     blocks = ratio.reshape(8, 4, 8, 4).mean((1, 3))

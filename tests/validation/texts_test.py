@@ -129,7 +129,7 @@ class Summary(unittest.TestCase):
                                                            ["another bed, unseen sector, texture", "62.6", "58 to 67"],
                                                            ["control", "46.8", ""]])
                           + "\n- unseen sector, texture: 0 to 31 70.1 %; 32 to 159 72.4 %\n\n"
-                          + table(["feature"], [["kurtosis"]]) + "\n" + table(["feature"], [["1 beams apart"]]),
+                          + table(["feature"], [["kurtosis"]]) + "\n" + table(["feature"], [["samples of neighbouring beams"]]),
             "oracles": table(oracle_table.HEAD, [["3", "level: far", "0 dB", "0.1", "±0.3", "yes"]]),
             "cost": "Ours, no GPU: test. By `x`\n\n" + table(["", "", "", "", "", "rate"], [
                 [name, "", "", "", "", "1 Hz"] for name in ("default: surface cells", "paper mode, 300 rays", "P25, ray, 300 rays")]),
@@ -163,7 +163,7 @@ class Summary(unittest.TestCase):
             self.assertEqual((page.with_suffix("") / summary.PICTURE_FILE).read_bytes(), b"picture")
 
     def test_the_near_floor_has_its_aim(self):
-        self.assertIn("| its near floor | guessing | 72.4 % (most by: 1 beams apart) | 65 % at most is the aim |",
+        self.assertIn("| its near floor | guessing | 72.4 % (most by: samples of neighbouring beams) | 65 % at most is the aim |",
                       summary.page_of(self.chapters()))
 
     def test_without_a_chapter_the_summary_stays(self):
