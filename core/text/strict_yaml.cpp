@@ -158,6 +158,11 @@ std::optional<Refused> check_characters(std::string_view text) {
   return std::nullopt;
 }
 
+tl::unexpected<Error> no_memory_for(const std::string& name) {
+  return failure(ErrorKind::unavailable,
+                 name + ": not enough memory to read it; raise the limits of memory (ulimit -v, LimitAS=, MemoryMax=)");
+}
+
 std::string first_line(std::string_view s) { return std::string(s.substr(0, std::min<std::size_t>(s.find('\n'), 200))); }
 
 }  // namespace
@@ -192,7 +197,7 @@ Result<Document> parse_yaml(std::string_view text, std::string name, const YamlL
   } catch (const YAML::Exception& e) {
     return refused({std::max(e.mark.line, 0) + 1, std::max(e.mark.column, 0) + 1, {}, "not valid YAML: " + first_line(e.msg)});
   } catch (const std::bad_alloc&) {
-    return failure(ErrorKind::unavailable, tree->name + ": not enough memory to read it (ulimit -v, LimitAS=, MemoryMax=)");
+    return no_memory_for(tree->name);
   } catch (const std::exception& e) {
     return refused({1, 1, {}, std::string("not valid YAML: ") + e.what()});
   }
@@ -200,9 +205,13 @@ Result<Document> parse_yaml(std::string_view text, std::string name, const YamlL
 }
 
 Result<Document> parse_yaml_file(const std::filesystem::path& file, const YamlLimits& limits) {
-  const auto text = read_regular(file, limits.max_bytes);
-  if (!text) return tl::make_unexpected(text.error());
-  return parse_yaml(*text, file.string(), limits);
+  try {
+    const auto text = read_regular(file, limits.max_bytes);
+    if (!text) return tl::make_unexpected(text.error());
+    return parse_yaml(*text, file.string(), limits);
+  } catch (const std::bad_alloc&) {
+    return no_memory_for(file.string());
+  }
 }
 
 }  // namespace sonar::text
