@@ -142,6 +142,7 @@ TEST_F(Packets, PixelsBelowZeroAreDark) {
   const protocol::HostActions shown = host->on_bytes(1, dark, at_s(0));
   ASSERT_EQ(shown.size(), 1u);
   const auto picture = std::get<protocol::HostPing>(shown[0]).picture();
+  ASSERT_TRUE(picture);
   EXPECT_EQ(std::ranges::max(picture->samples), 0);
 }
 
