@@ -177,7 +177,7 @@ std::vector<Note> Monitoring::notes_on_clock() const {
            "the computer's clock was set, or the computer slept: it is " + std::to_string(std::llround(std::abs(ahead_s))) +
                " s " + (ahead_s > 0 ? "ahead of" : "behind") +
                " sonard's, which stamps pings, recordings and events and never jumps",
-           "restart sonard, and start it after the clock is set (systemd: time-sync.target)"}};
+           "restart sonard; to start it only once the clock is set: systemctl enable systemd-time-wait-sync"}};
 }
 
 }  // namespace sonar

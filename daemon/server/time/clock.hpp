@@ -20,7 +20,7 @@ class Clock {
   bool stepped() const { return stepped_; }
   /// Stepped time begins at the epoch, so that two runs send the same packets.
   Time now() const { return stepped_ ? origin_ : origin_ + (std::chrono::steady_clock::now() - started_); }
-  /// The lead of now() over the wall clock; 0 until that clock is set. Real time only.
+  /// The lead of now() over the wall clock; about 0 until that clock is set. Real time only.
   std::chrono::nanoseconds ahead_of_wall() const { return now() - wall_(); }
   /// The time at which a timer must expire for `t`. Real time only.
   std::chrono::steady_clock::time_point timer_at(Time t) const { return started_ + (t - origin_); }
