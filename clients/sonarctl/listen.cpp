@@ -23,7 +23,7 @@ class Listener {
  public:
   Listener(const ListenOptions& options, OpenedStream opened)
       : options_(options), start_(opened.connected_at), waits_(options.source, opened.stream, opened.observes) {
-    use(std::move(opened.stream));
+    use(std::move(opened));
   }
 
   /// Runs until the requested time or number of pings. It is an error if the device stops earlier or, in a run without a limit,
@@ -48,29 +48,29 @@ class Listener {
       if (ran || interrupted != 0 || log_.counts().pings == 0 || options_.seconds > 0 || options_.pings > 0 ||
           !options_.record.empty())
         return ran;
-      const Endpoint device = stream_->device();
+      const Endpoint device = opened_->again;
       before_ = counts();
       outage_.begins();
-      stream_.reset();  // frees its ports for the next connection
+      opened_.reset();  // frees its ports for the next connection
       auto again =
           open_again(options_.source, device, outage_, ran.error(), [](const std::string& line) { print_notices({line}); });
       if (!again) return interrupted != 0 ? Result<void>{} : tl::unexpected(again.error());
-      use(std::move(again->stream));
+      use(*std::move(again));
     }
   }
 
-  void use(PingStream stream) {
-    stream_.emplace(std::move(stream));
-    received_ = !stream_->host().counts();
-    asked_ = stream_->host().expects_echo();
-    rate_unit_ = stream_->make().rate_unit();
+  void use(OpenedStream opened) {
+    opened_.emplace(std::move(opened));
+    received_ = !opened_->stream.host().counts();
+    asked_ = opened_->stream.host().expects_echo();
+    rate_unit_ = opened_->stream.make().rate_unit();
     last_message_ = Clock::now();
   }
 
   Result<void> run_once() {
     while (!finished()) {
       const PingStream::Item item =
-          stream_->next(waits_.patience(patience(options_, seconds_since(start_), seconds_since(last_message_))));
+          opened_->stream.next(waits_.patience(patience(options_, seconds_since(start_), seconds_since(last_message_))));
       waits_.look(item.ping.has_value());
       if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
       if (item.what == Wait::data) {
@@ -79,7 +79,7 @@ class Listener {
         print_notices(notices_.kept(item.notices));
         if (item.ping) handle_ping(*item.ping);
       } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
-        return tl::unexpected(silence(options_.source, *stream_, received_, "nothing more",
+        return tl::unexpected(silence(options_.source, opened_->stream, received_, "nothing more",
                                       "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
     }
@@ -88,8 +88,8 @@ class Listener {
 
   /// Counts of all connections so far, reconnections included.
   std::optional<protocol::Host::Counts> counts() const {
-    if (!stream_) return before_;
-    auto all = stream_->host().counts();
+    if (!opened_) return before_;
+    auto all = opened_->stream.host().counts();
     if (!all || !before_) return all;
     all->messages += before_->messages;
     all->dummies += before_->dummies;
@@ -128,7 +128,7 @@ class Listener {
   }
 
   const ListenOptions& options_;
-  std::optional<PingStream> stream_;
+  std::optional<OpenedStream> opened_;
   std::optional<protocol::Host::Counts> before_;  // counts of connections that are lost
   bool received_ = false, asked_ = false, output_closed_ = false;
   std::string_view rate_unit_;

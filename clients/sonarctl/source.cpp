@@ -86,7 +86,7 @@ Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device
       stderr,
       "sonarctl: connected to %s as an observer: no settings are sent, pings have the settings of the sonar's clients%s\n",
       text_from(found->at).c_str(), found->has_client ? "" : "; it has none now: pings come when a driver requests them");
-  return OpenedStream{*std::move(stream), now, true};
+  return OpenedStream{*std::move(stream), now, true, device};
 }
 
 Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
@@ -140,7 +140,10 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
   auto stream = PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s), source.keeps_messages,
                                  &rejection);
   const auto now = std::chrono::steady_clock::now();
-  if (stream && !stream->is_rejected(first_byte_within)) return OpenedStream{*std::move(stream), now};
+  if (stream && !stream->is_rejected(first_byte_within)) {
+    const Endpoint at = stream->device();
+    return OpenedStream{*std::move(stream), now, false, at};
+  }
   std::string why = "the device closed the connection before a ping arrived: another client may be connected (clients.max)";
   if (!stream) {
     // A host that waits for an answer before it requests pings notices itself that the sonar closes the connection.

@@ -22,7 +22,8 @@ Result<Endpoint> find_device(const SourceOptions& source, bool say);
 struct OpenedStream {
   PingStream stream;
   std::chrono::steady_clock::time_point connected_at;
-  bool observes = false;  // no settings sent: pings as requested by the sonar's clients
+  bool observes;   // no settings sent: pings as requested by the sonar's clients
+  Endpoint again;  // for open_again(): the sonar's own address, because its port for observers may change
 };
 /// Connects as an observer if source.observe is set. It also does so, with a note on standard error, if the sonar has no free
 /// client slot and its sonard reports an address for observers.

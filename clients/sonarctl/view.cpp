@@ -78,9 +78,9 @@ class LiveView {
   LiveView(const ViewOptions& options, OpenedStream opened)
       : options_(options),
         waits_(options.source, opened.stream, opened.observes),
-        stream_(std::move(opened.stream)),
+        opened_(std::move(opened)),
         painter_(options.style),
-        figures_(stream_->make().rate_unit()) {}
+        figures_(opened_->stream.make().rate_unit()) {}
 
   /// Succeeds when interrupted, after the requested pings, or when the output is closed. A run without limits connects again if
   /// the device has disconnected.
@@ -92,8 +92,8 @@ class LiveView {
       for (;;) {
         ran = draw(screen, has_screen);
         if (!lost_ || interrupted != 0 || options_.pings > 0 || figures_.pings() == 0) break;
-        const Endpoint device = stream_->device();
-        stream_.reset();  // frees its ports for the next connection
+        const Endpoint device = opened_->again;
+        opened_.reset();  // frees its ports for the next connection
         outage_.begins();
         auto again = open_again(options_.source, device, outage_, ran.error(), [&](const std::string& line) {
           if (has_screen)
@@ -105,7 +105,7 @@ class LiveView {
           ran = tl::unexpected(again.error());
           break;
         }
-        stream_.emplace(std::move(again->stream));
+        opened_.emplace(*std::move(again));
         lost_ = false;
       }
     }
@@ -118,9 +118,9 @@ class LiveView {
  private:
   Result<void> draw(const LiveScreen& screen, bool has_screen) {
     double heard_s = now_s();
-    bool received = !stream_->host().counts();  // without counts, other messages look like junk
+    bool received = !opened_->stream.host().counts();  // without counts, other messages look like junk
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
-      PingStream::Item item = stream_->next(waits_.patience(std::chrono::milliseconds(500)));
+      PingStream::Item item = opened_->stream.next(waits_.patience(std::chrono::milliseconds(500)));
       waits_.look(item.ping.has_value());
       lost_ = item.what == Wait::closed || (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s);
       if (item.what == Wait::closed)
@@ -133,7 +133,8 @@ class LiveView {
       for (std::string& notice : item.notices)
         if (has_screen && notices_.size() < most_notices) notices_.push_back(std::move(notice));
       if (lost_)
-        return tl::unexpected(silence(options_.source, *stream_, received, "nothing more", "is the daemon stopped or stuck?"));
+        return tl::unexpected(
+            silence(options_.source, opened_->stream, received, "nothing more", "is the daemon stopped or stuck?"));
       if (!item.ping) continue;
       const Result<bool> read = show(*item.ping, screen);
       if (!read) return tl::unexpected(read.error());
@@ -144,7 +145,7 @@ class LiveView {
 
   /// Returns false if the output was closed.
   Result<bool> show(const HostPing& ping, const LiveScreen& screen) {
-    figures_.add(ping, stream_->host().counts(), now_s());
+    figures_.add(ping, opened_->stream.host().counts(), now_s());
     outage_.ends();
     const Result<SonarPicture> picture = protocol::drawing_of(ping);
     if (!picture) return tl::unexpected(picture.error());
@@ -163,7 +164,7 @@ class LiveView {
 
   const ViewOptions& options_;
   FirstPingWait waits_;
-  std::optional<PingStream> stream_;
+  std::optional<OpenedStream> opened_;
   PicturePainter painter_;
   ViewCaption figures_;
   NoticeLog notice_log_;

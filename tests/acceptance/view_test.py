@@ -12,7 +12,7 @@ import time
 import unittest
 
 from oculus_reader import Client, fire_message
-from running_sonard import SONARCTL, Sonard, run
+from running_sonard import SONARCTL, Sonard, eventually, run
 
 
 def in_a_terminal(command, until, end, **environment):
@@ -117,6 +117,33 @@ class View(unittest.TestCase):
             finally:
                 driver.socket.shutdown(socket.SHUT_RDWR)
                 reads.join(20)
+
+    def test_an_observer_connects_again_after_a_restart_of_sonard(self):
+        for words in (("--observe",), ("--make", "oculus")):  # the second gets no slot at first, and one after the restart
+            with self.subTest(words), Sonard() as daemon:
+                control = ("--control", f"{daemon.address}:14770")
+                said, pings = (pathlib.Path(daemon.folder.name) / name for name in ("said", "pings"))
+                with said.open("w") as errors, pings.open("w") as output, Client(daemon.address) as driver:
+                    driver.send(fire_message())
+                    reads = threading.Thread(target=self.read_until_closed, args=(driver,))
+                    reads.start()
+                    with subprocess.Popen([SONARCTL, "listen", daemon.address, *words, *control], stdout=output, stderr=errors) as watches:
+                        try:
+                            eventually(lambda: len(pings.read_text().splitlines()) > 2)
+                            self.assertIn(" as an observer: ", said.read_text())
+                            daemon.stop()
+                            daemon.restart()
+                            eventually(lambda: "connected again" in said.read_text() or watches.poll() is not None)
+                            before = len(pings.read_text().splitlines())
+                            if "--observe" in words:
+                                self.assertEqual(daemon.ctl("listen", "--pings", 4).returncode, 0)
+                            eventually(lambda: len(pings.read_text().splitlines()) > before or watches.poll() is not None)
+                            self.assertIsNone(watches.poll(), said.read_text())
+                        finally:
+                            watches.send_signal(signal.SIGINT)
+                            driver.socket.shutdown(socket.SHUT_RDWR)
+                            reads.join(20)
+                    self.assertEqual(watches.returncode, 0, said.read_text())
 
     @staticmethod
     def read_until_closed(client):
