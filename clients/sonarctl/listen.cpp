@@ -13,8 +13,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 /// Time until the end of the run or of the permitted silence; short enough to react to Ctrl-C.
-std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_s, double silent_s) {
-  double left_s = options.source.silence_limit_s - silent_s;
+std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_s, double left_s) {
   if (options.seconds > 0) left_s = std::min(left_s, options.seconds - elapsed_s);
   return milliseconds_from(std::clamp(left_s, 0.0, 0.5));
 }
@@ -61,24 +60,24 @@ class Listener {
 
   void use(OpenedStream opened) {
     opened_.emplace(std::move(opened));
+    silence_.emplace(options_.source, *opened_);
     received_ = !opened_->stream.host().counts();
     asked_ = opened_->stream.host().expects_echo();
     rate_unit_ = opened_->stream.make().rate_unit();
-    last_message_ = Clock::now();
   }
 
   Result<void> run_once() {
     while (!finished()) {
       const PingStream::Item item =
-          opened_->stream.next(waits_.patience(patience(options_, seconds_since(start_), seconds_since(last_message_))));
+          opened_->stream.next(waits_.patience(patience(options_, seconds_since(start_), silence_->left_s())));
       waits_.look(item.ping.has_value());
       if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
       if (item.what == Wait::data) {
-        last_message_ = Clock::now();
+        silence_->ends();
         received_ = true;
         print_notices(notices_.kept(item.notices));
         if (item.ping) handle_ping(*item.ping);
-      } else if (seconds_since(last_message_) >= options_.source.silence_limit_s) {
+      } else if (silence_->is_over()) {
         return tl::unexpected(silence(options_.source, opened_->stream, received_, "nothing more",
                                       "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
@@ -129,13 +128,14 @@ class Listener {
 
   const ListenOptions& options_;
   std::optional<OpenedStream> opened_;
+  std::optional<Silence> silence_;
   std::optional<protocol::Host::Counts> before_;  // counts of connections that are lost
   bool received_ = false, asked_ = false, output_closed_ = false;
   std::string_view rate_unit_;
   Outage outage_;
   PingLog log_;
   NoticeLog notices_;
-  Clock::time_point start_, last_message_ = Clock::now();
+  Clock::time_point start_;
   FirstPingWait waits_;
   std::optional<HostPing> last_ping_;
   std::optional<double> first_ping_after_s_;
@@ -165,11 +165,9 @@ Result<void> report(const ListenOptions& options, const Listener& listener) {
 
 }  // namespace
 
-Result<void> listen(const ListenOptions& given) {
-  ListenOptions options = given;
+Result<void> listen(const ListenOptions& options) {
   auto opened = connect(options.source, !options.json);
   if (!opened) return tl::unexpected(opened.error());
-  options.source = for_run(std::move(options.source), *opened);
   if (!options.record.empty())
     if (Result<void> recording = opened->stream.record_to(options.record); !recording) return recording;
   if (!options.json) std::printf("connected to %s\n", opened->stream.about().c_str());

@@ -46,15 +46,16 @@ Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& devic
 /// Records one device up to its limits.
 class Recorder {
  public:
-  Recorder(const RecordOptions& options, PingStream stream, std::optional<Socket> status, std::optional<Steering> steering,
-           RecordFiles& files, const FirstPingWait& waits)
+  Recorder(const RecordOptions& options, OpenedStream opened, std::optional<Socket> status, std::optional<Steering> steering,
+           RecordFiles& files)
       : options_(options),
-        stream_(std::move(stream)),
+        waits_(options.source, opened.stream, opened.observes),
+        silence_(options.source, opened),
+        stream_(std::move(opened.stream)),
         device_ip_(stream_.conversation().device.address),
         status_(std::move(status)),
         steering_(std::move(steering)),
-        files_(files),
-        waits_(waits) {}
+        files_(files) {}
 
   Result<void> run() {
     while (!enough()) {
@@ -68,8 +69,8 @@ class Recorder {
                                             " pings: it stopped, or another client holds it (clients.max)"
                                       : "the connection broke: " + item.error);
       if (item.what == Wait::data)
-        last_heard_s_ = seconds();
-      else if (seconds() - last_heard_s_ >= options_.source.silence_limit_s)
+        silence_.ends();
+      else if (silence_.is_over())
         return failure(ErrorKind::io, "not a byte from the device for " +
                                           std::to_string(std::lround(options_.source.silence_limit_s)) +
                                           " s: is it stopped or stuck?");
@@ -141,15 +142,15 @@ class Recorder {
   }
 
   const RecordOptions& options_;
+  FirstPingWait waits_;
+  Silence silence_;
   PingStream stream_;
   std::uint32_t device_ip_;
   std::optional<Socket> status_;
   std::optional<Steering> steering_;
   RecordFiles& files_;
-  FirstPingWait waits_;
   NoticeLog notices_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  double last_heard_s_ = 0;
   Time last_ = stream_.unix_now();  // time of the latest recorded message
 };
 
@@ -183,17 +184,15 @@ Result<void> record_device(RecordOptions options) {
   }
   auto opened = open_stream(source, *device);
   if (!opened) return tl::unexpected(opened.error());
-  source = for_run(std::move(source), *opened);
-  PingStream& stream = opened->stream;
+  const PingStream& stream = opened->stream;
   const std::string at = text_from(stream.device());
-  const FirstPingWait waits(source, stream, opened->observes);
   auto status = listen_to_status(options, stream.make());
   auto files = RecordFiles::create(options, stream.make(), stream.conversation(), steering ? steering->sonar : "sonar",
                                    steering ? steering->profile : "");
   if (!files) return tl::unexpected(files.error());
   std::printf("connected to %s\n", at.c_str());
   std::fflush(stdout);
-  Recorder recorder(options, std::move(stream), std::move(status), std::move(steering), *files, waits);
+  Recorder recorder(options, *std::move(opened), std::move(status), std::move(steering), *files);
   const Result<void> ran = recorder.run();
   const double took_s = recorder.seconds();
   print_notices(recorder.rest_of_notices());

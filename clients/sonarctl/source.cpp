@@ -1,10 +1,10 @@
 #include "clients/sonarctl/source.hpp"
 
 #include <cstdio>
-#include <limits>
 #include <thread>
 
 #include "clients/sonarctl/control_client.hpp"
+#include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/waiting.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
@@ -42,7 +42,7 @@ Error no_observers(const v1::SonarStatus& s, const Make& make) {
 struct Observed {
   Endpoint at;  // for observers
   const Make* make = nullptr;
-  bool has_client = false;
+  bool has_client = false, has_observer = false;
 };
 /// The only sonar at the device's address, as reported by the sonard that serves it.
 Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device) {
@@ -67,7 +67,7 @@ Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device
   if (s.observers().empty()) return tl::unexpected(no_observers(s, make));
   const auto at = parse_endpoint(s.observers(), device);
   if (!at) return tl::unexpected(at.error());
-  return Observed{{device.host, at->port}, &make, s.clients_size() > 0};
+  return Observed{{device.host, at->port}, &make, s.clients_size() > 0, s.observing() > 0};
 }
 
 Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device) {
@@ -155,9 +155,18 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
   return failure(ErrorKind::io, why + "; connecting as an observer failed too: " + observed.error().text);
 }
 
-SourceOptions for_run(SourceOptions source, const OpenedStream& opened) {
-  if (opened.observes) source.silence_limit_s = std::numeric_limits<double>::infinity();
-  return source;
+Silence::Silence(const SourceOptions& source, const OpenedStream& opened)
+    : source_(source), observes_(opened.observes), device_(opened.again), port_(opened.stream.device().port) {}
+
+double Silence::left_s() const { return source_.silence_limit_s - seconds_since(since_); }
+
+bool Silence::is_over() {
+  if (left_s() > 0) return false;
+  if (!observes_) return true;
+  const auto found = observed_at(source_, device_);
+  const bool is_served = found && found->at.port == port_ && found->has_observer;
+  if (is_served) ends();
+  return !is_served && interrupted == 0;
 }
 
 void Outage::begins() {

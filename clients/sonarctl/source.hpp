@@ -32,8 +32,24 @@ Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& de
 /// find_device() and open_stream().
 Result<OpenedStream> connect(const SourceOptions& source, bool say);
 
-/// Options for a run of many pings: an observer waits for any time, because the sonar may have no client.
-SourceOptions for_run(SourceOptions source, const OpenedStream& opened);
+/// The time without a message, in a run of many pings.
+class Silence {
+ public:
+  /// Keeps a reference to `source`.
+  Silence(const SourceOptions& source, const OpenedStream& opened);
+  void ends() { since_ = std::chrono::steady_clock::now(); }
+  double left_s() const;  // until the limit; not above 0: is_over() decides
+  /// True after source.silence_limit_s. The time of an observer then begins again if sonard answers that it serves the
+  /// connection, because the sonar may have no client.
+  bool is_over();
+
+ private:
+  const SourceOptions& source_;
+  bool observes_;
+  Endpoint device_;     // as OpenedStream::again
+  std::uint16_t port_;  // that the stream is connected to
+  std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
+};
 
 /// A time without pings. A new connection alone does not end it, because over UDP a connection can always be opened.
 class Outage {

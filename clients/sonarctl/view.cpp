@@ -117,16 +117,16 @@ class LiveView {
 
  private:
   Result<void> draw(const LiveScreen& screen, bool has_screen) {
-    double heard_s = now_s();
+    Silence quiet(options_.source, *opened_);
     bool received = !opened_->stream.host().counts();  // without counts, other messages look like junk
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = opened_->stream.next(waits_.patience(std::chrono::milliseconds(500)));
       waits_.look(item.ping.has_value());
-      lost_ = item.what == Wait::closed || (item.what != Wait::data && now_s() - heard_s >= options_.source.silence_limit_s);
+      lost_ = item.what == Wait::closed || (item.what != Wait::data && quiet.is_over());
       if (item.what == Wait::closed)
         return failure(ErrorKind::io, "the device ended the connection" + (item.error.empty() ? "" : ": " + item.error) +
                                           "; it stopped, or another client holds it (clients.max)");
-      if (item.what == Wait::data) heard_s = now_s();
+      if (item.what == Wait::data) quiet.ends();
       received = received || item.what == Wait::data;
       item.notices = notice_log_.kept(item.notices);
       if (!has_screen) print_notices(item.notices);
@@ -173,10 +173,9 @@ class LiveView {
   Outage outage_;
 };
 
-Result<void> view_live(ViewOptions options) {
+Result<void> view_live(const ViewOptions& options) {
   auto opened = connect(options.source, false);
   if (!opened) return tl::unexpected(opened.error());
-  options.source = for_run(std::move(options.source), *opened);
   const Result<void> ran = LiveView(options, *std::move(opened)).run();
   if (!options.terminal && terminal_facts().is_terminal) std::puts("");
   return ran;
@@ -187,7 +186,7 @@ Result<void> view_live(ViewOptions options) {
 Result<void> view(ViewOptions options) {
   options.terminal = options.terminal || (options.png.empty() && terminal_facts().is_terminal);
   if (Result<void> sound = check(options); !sound) return sound;
-  return options.live ? view_live(std::move(options)) : view_one(options);
+  return options.live ? view_live(options) : view_one(options);
 }
 
 }  // namespace sonar::clients

@@ -1,7 +1,6 @@
 #include "clients/sonarctl/waiting.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 
 #include "core/text/format.hpp"
@@ -21,7 +20,7 @@ FirstPingWait::FirstPingWait(const SourceOptions& source, const PingStream& stre
     : due_(now + moment) {
   const bool asks = !observes && (!source.wanted.as_it_is || stream.make().each_ping_requested);
   line_ = "connected to " + stream.about() + (asks ? "; asked for pings" : "; nothing asked") + "; waiting for the first one" +
-          (std::isinf(source.silence_limit_s) ? "" : text::format(", at most %g s", source.silence_limit_s));
+          (observes ? "" : text::format(", at most %g s", source.silence_limit_s));
 }
 
 std::chrono::milliseconds FirstPingWait::patience(std::chrono::milliseconds most, Clock::time_point now) const {

@@ -17,8 +17,8 @@
 #include "clients/sonarctl/source.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/json_pose.hpp"
-#include "protocol/oculus/encode_ping.hpp"
 #include "protocol/oculus/replies.hpp"
+#include "tests/clients/made_up_ping.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -37,23 +37,6 @@ Socket bound(int type, std::uint16_t& port) {
   ::getsockname(socket.fd(), reinterpret_cast<sockaddr*>(&address), &size);
   port = ntohs(address.sin_port);
   return socket;
-}
-
-wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
-  oculus::PingHead head;
-  head.fixed.header.source = 7001;
-  head.fixed.header.type = oculus::MessageType::ping_result;
-  head.fixed.fire = echo;
-  head.fixed.ping_id = id;
-  head.fixed.frequency_hz = 2.1e6;
-  head.fixed.sound_speed_mps = 1500;
-  head.fixed.range_resolution_m = 0.1;
-  head.fixed.row_count = 20;
-  head.fixed.beam_count = 16;
-  std::array<std::int16_t, 16> bearings{};
-  for (std::size_t i = 0; i < bearings.size(); ++i) bearings[i] = static_cast<std::int16_t>(200 * static_cast<int>(i) - 1500);
-  const std::array<std::byte, 320> samples{};
-  return oculus::encode_ping(head, {bearings, {}, samples});
 }
 
 /// Accepts one client, waits for its fire message and sends the result of `answer`, then waits until the client leaves. Later
