@@ -18,6 +18,9 @@ namespace {
 constexpr int stale_pings = 4;
 constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
 
+/// False for a destination of the sonar's datagrams.
+bool is_own(const v1::SonarAddress& of) { return of.protocol() != "status" && of.protocol() != "multicast"; }
+
 /// True if the sonar is at the device's address; port 0 means any port.
 bool is_at(const v1::SonarStatus& s, const Endpoint& device) {
   const auto fits = [&](const std::string& address) {
@@ -26,7 +29,7 @@ bool is_at(const v1::SonarStatus& s, const Endpoint& device) {
     return same_host && (device.port == 0 || at->port == device.port);
   };
   return fits(s.listens()) || fits(s.observers()) ||
-         std::ranges::any_of(s.addresses(), [&](const auto& of) { return fits(of.address()); });
+         std::ranges::any_of(s.addresses(), [&](const auto& of) { return is_own(of) && fits(of.address()); });
 }
 
 Error no_observers(const v1::SonarStatus& s, const Make& make) {
@@ -59,7 +62,11 @@ Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device
                    "the sonard at " + text_from(control->at()) + " serves no sonar at " + place + "; --control names another");
   if (found.size() > 1) {
     std::string all;
-    for (const v1::SonarStatus* s : found) all += (all.empty() ? "" : ", ") + s->listens() + " (" + s->name() + ")";
+    for (const v1::SonarStatus* s : found) {
+      const auto first = std::ranges::find_if(s->addresses(), is_own);
+      all +=
+          (all.empty() ? "" : ", ") + (first != s->addresses().end() ? first->address() : s->listens()) + " (" + s->name() + ")";
+    }
     return failure(ErrorKind::usage, "several sonars are at " + place + ": name one with its port: " + all);
   }
   const v1::SonarStatus& s = *found.front();

@@ -209,5 +209,28 @@ TEST(Observe, AnObserverThatReturnsAsAClientDoesNotWait) {
   EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 0.2 s")) << said;
 }
 
+/// The error of observing a sonar at this address, of three.
+Error error_at(const Endpoint& device, const char* make = nullptr) {
+  const Control control(
+      R"(sonars { name: "front" profile: "oculus-m1200d" listens: "127.0.0.2:52100"
+           addresses { protocol: "tcp" address: "127.0.0.2:52100" } addresses { protocol: "status" address: "127.0.0.3:52102" }
+           addresses { protocol: "multicast" address: "127.0.0.4:4747" } }
+         sonars { name: "scan" profile: "ping360" addresses { protocol: "udp" address: "127.0.0.3:12345" } }
+         sonars { name: "side" profile: "omniscan-450" listens: "127.0.0.3:51200"
+           addresses { protocol: "tcp" address: "127.0.0.3:51200" } })",
+      1);
+  SourceOptions source = observing(control);
+  if (make != nullptr) source.make = find_make(make);
+  const auto opened = open_stream(source, device);
+  return opened ? Error{} : opened.error();
+}
+
+TEST(Observe, TheSonarAtAnAddressIsNotOneThatSendsToIt) {
+  const Error several = error_at({"127.0.0.3", 0});
+  EXPECT_EQ(several.kind, ErrorKind::usage);
+  EXPECT_THAT(several.text, testing::EndsWith("with its port: 127.0.0.3:12345 (scan), 127.0.0.3:51200 (side)"));
+  EXPECT_THAT(error_at({"127.0.0.4", 0}).text, HasSubstr(" serves no sonar at 127.0.0.4;"));
+}
+
 }  // namespace
 }  // namespace sonar::clients::observe_test
