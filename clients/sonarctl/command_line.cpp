@@ -201,8 +201,7 @@ Result<SourceOptions> SourceArguments::finish() const {
   SourceOptions source;
   Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
   if (!at) return tl::unexpected(at.error());
-  source.make = make.empty() ? make_at(at->port) : protocol::find_make(make);
-  if (source.make == nullptr && at->port != 0) source.make = &protocol::makes().front();
+  source.make = make.empty() ? nullptr : protocol::find_make(make);
   if (device.discover && !make.empty() && source.make != &protocol::makes().front())
     return failure(ErrorKind::usage, "--discover finds " + std::string(protocol::makes().front().title) +
                                          " only: leave it out, and give the address of " + std::string(source.make->title));

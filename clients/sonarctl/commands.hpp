@@ -19,7 +19,7 @@ namespace sonar::clients {
 /// The source of pings: a device or a recording.
 struct SourceOptions {
   Endpoint device{"127.0.0.2", 0};  // port 0: the make's port
-  const Make* make = nullptr;       // null: the first make that answers at the host of `device`
+  const Make* make = nullptr;       // null: that of the port, or the first make that answers at the host of `device`
   bool discover = false;            // take the device from its status broadcast
   std::filesystem::path recording;  // instead of a device
   std::string sonar;                // selects one of several in a recording

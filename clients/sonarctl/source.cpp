@@ -56,10 +56,12 @@ Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device
   if (!status) return tl::unexpected(status.error());
   std::vector<const v1::SonarStatus*> found;
   for (const v1::SonarStatus& s : (*status)->sonars())
-    if (is_at(s, device)) found.push_back(&s);
+    if (is_at(s, device) && (source.make == nullptr || source.make == &protocol::make_of_profile(s.profile())))
+      found.push_back(&s);
+  const std::string of_make = source.make != nullptr ? " of the make " + std::string(source.make->name()) : "";
   if (found.empty())
-    return failure(ErrorKind::unavailable,
-                   "the sonard at " + text_from(control->at()) + " serves no sonar at " + place + "; --control names another");
+    return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar" + of_make + " at " +
+                                               place + "; --control names another");
   if (found.size() > 1) {
     std::string all;
     for (const v1::SonarStatus* s : found) {
@@ -141,8 +143,9 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
 }  // namespace
 
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device) {
-  const Make* const make = source.make != nullptr ? source.make : make_at(device.port);
   if (source.observe) return observe(source, device);
+  const Make* make = source.make != nullptr ? source.make : make_at(device.port);
+  if (make == nullptr && device.port != 0) make = &protocol::makes().front();
   Rejection rejection;
   auto stream = PingStream::open(device, make, source.wanted, milliseconds_from(source.connect_patience_s), source.keeps_messages,
                                  &rejection);

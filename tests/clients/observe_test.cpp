@@ -232,5 +232,12 @@ TEST(Observe, TheSonarAtAnAddressIsNotOneThatSendsToIt) {
   EXPECT_THAT(error_at({"127.0.0.4", 0}).text, HasSubstr(" serves no sonar at 127.0.0.4;"));
 }
 
+TEST(Observe, AMakeSelectsOneOfSeveralSonarsAtAnAddress) {
+  EXPECT_THAT(error_at({"127.0.0.3", 0}, "omniscan450").text, HasSubstr("side, an Omniscan, accepts no observers"));
+  EXPECT_THAT(error_at({"127.0.0.3", 0}, "ping360").text, HasSubstr("scan, a Ping360, accepts no observers"));
+  EXPECT_THAT(error_at({"127.0.0.3", 51200}, "ping360").text,
+              HasSubstr(" serves no sonar of the make ping360 at 127.0.0.3:51200;"));
+}
+
 }  // namespace
 }  // namespace sonar::clients::observe_test
