@@ -412,13 +412,16 @@ class Tools(unittest.TestCase):
     def test_an_observer_waits_for_a_driver_or_says_why_it_cannot(self):
         with Sonard(profile="s500", mount=DOWN) as daemon:
             control = ("--control", f"{daemon.address}:14770")
-            with subprocess.Popen([SONARCTL, "listen", daemon.address, "--observe", "--pings", "2", *control], text=True,
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as waits:
-                self.assertRegex(waits.stderr.readline(), "it has none now: pings come when a driver requests them\n")
-                self.assertRegex(waits.stderr.readline(), "nothing asked; waiting for the first one\n")
-                time.sleep(11)  # longer than a client waits
-                self.assertEqual(daemon.ctl("listen", "--pings", 4).returncode, 0)
-                self.assertEqual(waits.wait(60), 0, waits.stderr.read())
+            said = pathlib.Path(daemon.folder.name) / "said"
+            with said.open("w") as errors, subprocess.Popen([SONARCTL, "listen", daemon.address, "--observe", "--pings", "2", *control],
+                                                            stdout=subprocess.DEVNULL, stderr=errors) as waits:
+                try:
+                    eventually(lambda: "nothing asked; waiting for the first one\n" in said.read_text())
+                    self.assertIn("it has none now: pings come when a driver requests them\n", said.read_text())
+                    self.assertEqual(daemon.ctl("listen", "--pings", 4).returncode, 0)
+                    self.assertEqual(waits.wait(60), 0, said.read_text())
+                finally:
+                    waits.kill()
         for profile, why in (("ping360", "it sends pings by datagrams to its host"), ("norbit-wbms", "serves several clients")):
             with Sonard(profile=profile) as daemon:
                 refused = daemon.ctl("listen", "--observe", "--control", f"{daemon.address}:14770")
