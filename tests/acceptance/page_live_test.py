@@ -201,12 +201,35 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("sonardTest.scene.objects.has('wreck')")
             triangles = page.run("sonardTest.scene.objects.get('bed').children[0].geometry.index.count / 3")
             self.assertTrue(10_000 < triangles < 30_000, f"{triangles} of 109552, because there is no graphics processor")
+            ask(daemon, "load", {"path": self.tube(daemon.folder.name)})
+            page.wait("sonardTest.scene.objects.has('tube')")
+            triangles = page.run("sonardTest.scene.objects.get('tube').children[0].geometry.index.count / 3")
+            self.assertTrue(2_000 < triangles < 30_000, f"{triangles} of 32000 of a long thin mesh")
+            ask(daemon, "load", {"path": str(ROOT / "scenes/demo.yaml")})
+            page.wait("sonardTest.scene.objects.has('tyre')")
             page.press_mouse("[data-camera=top]")
             self.assertEqual(page.run("sonardTest.scene.restUntil"), 0, "drawn at once")
             ask(daemon, "set_object", {"object": "tyre", "visible": False})
             page.wait("!sonardTest.scene.objects.has('tyre')")
             ask(daemon, "load", {"path": str(ROOT / "scenes/tank-rod.yaml")})
             page.wait("[...sonardTest.scene.objects.keys()].sort().join() === 'rod,tank'")
+
+    @staticmethod
+    def tube(folder):
+        """A scene with a tube of 20 m, 2 cm wide, of 32000 triangles."""
+        around, rings = 16, 1001
+        places = [(0.02 * i, 0.01 * math.cos(math.tau * k / around), 0.01 * math.sin(math.tau * k / around))
+                  for i in range(rings) for k in range(around)]
+        text = "".join(f"v {x:.4f} {y:.6f} {z:.6f}\n" for x, y, z in places)
+        for i in range(rings - 1):
+            for k in range(around):
+                a, b = around * i + k + 1, around * i + (k + 1) % around + 1
+                text += f"f {a} {b} {b + around}\nf {a} {b + around} {a + around}\n"
+        scene = pathlib.Path(folder, "tube.yaml")
+        scene.with_suffix(".obj").write_text(text, encoding="utf-8")
+        scene.write_text("name: tube\nmaterials: {steel: {like: steel}}\nobjects:\n"
+                         "  - {name: tube, type: mesh, file: tube.obj, material: steel, pose: {xyz_m: [0, 0, -5]}}\n", encoding="utf-8")
+        return str(scene)
 
     def test_the_page_steers(self):
         """Tests a setting, a fault and its end, the trajectory, standby and its button."""

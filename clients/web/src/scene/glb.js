@@ -33,23 +33,31 @@ export function readGlb(bytes) {
   return { geometry, colour: colour.slice(0, 3) };
 }
 
-const most_triangles = 20000;
+const most_triangles = 20000, fewest_triangles = 2000, most_cells_aside = 1600;
 
-/// A geometry with fewer triangles, for software renderers, whose time for a frame grows with their number: of the vertices in a cell
-/// only the first remains.
+/// A geometry with fewer triangles, for software renderers, whose time for a frame grows with their number. A long thin mesh has
+/// smaller cells, because in large ones few of its triangles remain, or none.
 export function coarsened(geometry) {
-  const { index, attributes } = geometry;
-  if (!index || index.count < 3 * most_triangles) return geometry;
+  if (!geometry.index || geometry.index.count < 3 * most_triangles) return geometry;
   geometry.computeBoundingBox();
-  const { min, max } = geometry.boundingBox;
+  for (let cells_aside = Math.sqrt(most_triangles / 2); cells_aside <= most_cells_aside; cells_aside *= 2) {
+    const kept = keptIn(cells_aside, geometry);
+    if (kept.length < 3 * fewest_triangles) continue;
+    geometry.setIndex(kept);
+    break;
+  }
+  return geometry;
+}
+
+/// The indices of the triangles that remain if only the first vertex in a cell does.
+function keptIn(cells_aside, { index, attributes, boundingBox: { min, max } }) {
   const places = attributes.position.array;
-  const cells_aside = Math.sqrt(most_triangles / 2);
   const cell = Math.max(max.x - min.x, max.y - min.y, max.z - min.z) / cells_aside;
   const firstOf = new Map();
   const first = new Uint32Array(attributes.position.count);
   for (let i = 0; i < first.length; i++) {
     const [x, y, z] = [0, 1, 2].map((axis) => Math.floor((places[3 * i + axis] - min.getComponent(axis)) / cell));
-    const key = (x * 1024 + y) * 1024 + z;
+    const key = (x * 2048 + y) * 2048 + z;
     if (!firstOf.has(key)) firstOf.set(key, i);
     first[i] = firstOf.get(key);
   }
@@ -58,6 +66,5 @@ export function coarsened(geometry) {
     const [a, b, c] = [first[index.array[i]], first[index.array[i + 1]], first[index.array[i + 2]]];
     if (a !== b && b !== c && c !== a) kept.push(a, b, c);
   }
-  geometry.setIndex(kept);
-  return geometry;
+  return kept;
 }
