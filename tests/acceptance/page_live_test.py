@@ -234,7 +234,7 @@ class Live(PageChecks, unittest.TestCase):
     def test_the_page_steers(self):
         """Tests a setting, a fault and its end, the trajectory, standby and its button."""
         with Sonard(mount=MOUNT, trajectory=str(self.circle()), arguments=["--faults"]) as daemon, Driver(daemon.address):
-            page = self.open(daemon)
+            page = self.open(daemon, query="?test=300")
             shown(page)
             field = "document.querySelector('[name=\"/front/range_m\"]')"
             page.wait(f"!!{field}")
@@ -249,6 +249,11 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:') && document.querySelector('#fan-pane').matches('.faulty')")
             self.assertEqual(page.text("#fault-count"), "1")
             page.wait("document.querySelector('.fault-card progress').value < 0.97")
+            page.wait("sonardTest.facts.findings?.some((f) => f.check === 'fault' && f.level > 0)")
+            time.sleep(2.5)  # screen readers hear of changes at most every 2 s
+            announced = page.run("document.querySelector('#announce').textContent")
+            self.assertIn("fault: Deaf head", announced)
+            self.assertNotIn("A fault acts", announced, "named twice, and after its end")
             page.click("#findings button.link")
             page.wait("!document.querySelector('.fault-card')")
             self.assertNotIn("A fault acts", page.text("#findings"), "although the daemon looks only every 2 s")

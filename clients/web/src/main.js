@@ -140,7 +140,7 @@ let announced = '';
 let announcedAt = 0;
 function announce() {
   const faults = activeTroubles(facts).map((f) => `fault: ${titleOf(f.trouble)}`);
-  const findings = (facts.findings ?? []).filter((f) => f.level > 0).map((f) => f.text);
+  const findings = (facts.findings ?? []).filter((f) => f.level > 0 && f.check !== 'fault').map((f) => f.text);
   const text = [...faults, ...findings].join('. ');
   if (text === announced || performance.now() - announcedAt < 2000) return;
   [announced, announcedAt] = [text, performance.now()];
