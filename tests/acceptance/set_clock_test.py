@@ -46,7 +46,9 @@ class SetClock(unittest.TestCase):
                 self.set_clock(hours)
                 for _ in range(5):
                     client.ping()
-                notes = control.status()["notes"]
+                status = control.status()
+                self.assertAlmostEqual(status["wall_ahead_s"], 3600 * hours, delta=2)
+                notes = status["notes"]
                 self.assertEqual(len(notes), 1, notes)
                 self.assertIn(f"it is {abs(3600 * hours)} s {'ahead of' if hours > 0 else 'behind'} sonard's", notes[0]["text"])
                 eventually(lambda: "the computer's clock was set" in daemon.log())
@@ -74,13 +76,12 @@ class SetClock(unittest.TestCase):
                     poses.sendto(json.dumps(pose).encode(), (daemon.address, 14771))
                     eventually(lambda: abs(control.status()["vehicles"][0]["position"].get("x", 0) - hours) < 0.01, 30)
 
-    def test_doctor_knows_the_latency(self):
+    def test_doctor_tells(self):
         with Sonard() as daemon:
             for hours in HOURS:
                 self.set_clock(hours)
                 done = run(SONARCTL, "doctor", daemon.address, "--status-on", daemon.address, "--control", f"{daemon.address}:14770",
                            "--within", "40")
-                self.assertRegex(done.stdout, r"image latency \d+ ms p50")
                 self.assertIn("the computer's clock was set", done.stdout)
 
     def test_a_recording_has_neither_gaps_nor_equal_times(self):

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "clients/sonarctl/doctor/probes.hpp"
 #include "tests/clients/doctor_testing.hpp"
 
 namespace sonar::clients::doctor {
@@ -305,6 +306,23 @@ TEST(Doctor, WaitsForTheFirstPingAsLongAsItTakes) {
   front.mutable_clients(0)->set_connected_s(3.5);
   report(facts);
   expect(line(facts, "driver"), Level::fail, "127.0.0.1:40122 is connected and gets no ping", "sonarctl status");
+}
+
+TEST(Doctor, KnowsTheLatencyAlsoAfterTheClockWasSet) {
+  for (const double wall_ahead_s : {0.0, 7200.0, -10800.0}) {
+    ControlFacts clocks;
+    const auto status = std::make_shared<v1::DaemonStatus>();
+    status->set_wall_ahead_s(wall_ahead_s);
+    clocks.status = status;
+    SonarFacts sonar;
+    set_latency(sonar, {wall_ahead_s + 0.02, wall_ahead_s + 0.03, wall_ahead_s + 0.04}, clocks);
+    EXPECT_NEAR(sonar.stream.latency_p50_ms.value_or(0), 30, 0.001);
+    EXPECT_NEAR(clocks.clock_ahead_s.value_or(0), -0.02, 1e-6) << "the sonar is on another computer";
+    status->set_wall_ahead_s(wall_ahead_s + 5);
+    sonar.stream = {};
+    set_latency(sonar, {wall_ahead_s + 0.02}, clocks);
+    EXPECT_FALSE(sonar.stream.latency_p50_ms) << "the clocks differ";
+  }
 }
 
 TEST(Doctor, PrintsWhatTheSonarAnswered) {

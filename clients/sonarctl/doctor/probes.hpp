@@ -64,9 +64,12 @@ HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds p
 KernelPorts kernel_ports();
 
 /// Measures delay, size, rate and latency of a sonar's pings as a driver would: connects, requests pings unless another client is
-/// connected, reads about 15 of them and disconnects. `control`: a client
-/// subscribed to pings, for transmission times; may be null. `clocks` is set to the difference of the clocks.
+/// connected, reads about 15 of them and disconnects. `control`: a client subscribed to pings, for transmission times; may be
+/// null. `clocks` is set to the difference of the clocks.
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks);
+/// Sets the latency if it is 0 to 2 s, and the difference of the clocks. `delays_s`: times of receipt by this computer's clock
+/// minus the stamps. The daemon's time, by which pings are stamped, may differ from the clock of its computer.
+void set_latency(SonarFacts& sonar, std::vector<double> delays_s, ControlFacts& clocks);
 
 // Lists the sockets of this computer from /proc/net, and their programs as far as /proc is readable.
 

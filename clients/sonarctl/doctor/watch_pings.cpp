@@ -111,9 +111,10 @@ Outcome outcome_of(const Error& error, const SonarFacts& sonar) {
   return is_refused ? Outcome::refused : Outcome::unreachable;
 }
 
+}  // namespace
+
 void set_latency(SonarFacts& sonar, std::vector<double> delays_s, ControlFacts& clocks) {
   if (delays_s.empty()) return;
-  // The daemon's time, by which pings are stamped, may differ from the clock of its computer.
   if (clocks.status)
     for (double& delay_s : delays_s) delay_s -= clocks.status->wall_ahead_s();
   const double p50 = percentile(delays_s, 0.5), p99 = percentile(delays_s, 0.99);
@@ -122,8 +123,6 @@ void set_latency(SonarFacts& sonar, std::vector<double> delays_s, ControlFacts& 
   sonar.stream.latency_p50_ms = 1000 * p50;
   sonar.stream.latency_p99_ms = 1000 * p99;
 }
-
-}  // namespace
 
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks) {
   StreamFacts& facts = sonar.stream;
