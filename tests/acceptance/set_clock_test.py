@@ -51,6 +51,7 @@ class SetClock(unittest.TestCase):
                 notes = status["notes"]
                 self.assertEqual(len(notes), 1, notes)
                 self.assertIn(f"it is {abs(3600 * hours)} s {'ahead of' if hours > 0 else 'behind'} sonard's", notes[0]["text"])
+                self.assertIn("systemd-time-wait-sync", notes[0]["cure"])
                 eventually(lambda: "the computer's clock was set" in daemon.log())
             self.assertEqual(daemon.log().count("the computer's clock was set"), 1, daemon.log())
             self.set_clock(0)
