@@ -198,7 +198,7 @@ class Mistakes(unittest.TestCase):
         def short_of(limit):
             return run("bash", "-c", f"{limit}; exec {SONARD} run --demo")
 
-        self.expect(short_of("ulimit -v 200000"), 69, "memory")
+        self.expect(short_of("ulimit -v 120000"), 69, "memory")  # from about 160 MB on it may run
         # Where memory does not suffice for the libraries, the dynamic loader ends the program. From 290 MB on, the ray tracer starts
         # its threads, and needs some MB for each.
         for program, *words in ((SONARD, "check", ROOT / "scenes/sonard.yaml"), (SONARCTL, "scene", "check", ROOT / "scenes/demo.yaml")):
