@@ -44,7 +44,7 @@ function drawRings(g, polar, layout, port, starboard) {
     const [x, y] = place(layout, n * spacing, starboard);
     const flat = starboard < -1.2;
     const away = 9 * Math.max(1, layout.scale ?? 1);  // the picture ends half a beam farther, and so do its points
-    const outside = layout.up > 0 ? 13 : -8;  // of a fan that opens downwards, above its edge
+    const outside = layout.up > 0 ? 4 + away : -3 - away;  // of a fan that opens downwards, above its edge, which rises to the left
     g.textAlign = flat ? 'center' : 'left';
     g.fillText(`${short(n * spacing)} m`, x + (flat ? 0 : away * Math.cos(starboard)), y + (flat ? outside : 4 - away * layout.up * Math.sin(starboard)));
   }
