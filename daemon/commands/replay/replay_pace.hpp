@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <deque>
 #include <optional>
 
 #include "core/base/units.hpp"
-#include "daemon/server/system/asio.hpp"
-#include "protocol/recorded/recorded_message.hpp"
 
 namespace sonar {
 
@@ -48,30 +45,6 @@ class ReplayPace {
   std::optional<std::chrono::nanoseconds> interval_;
   std::optional<Time> last_recorded_;
   std::optional<Steady::time_point> last_due_;
-};
-
-// Reads a recording ahead on a separate thread, so that a slow disk does not delay the event loop.
-
-/// For one coroutine. The reader must outlive it, and only this object may use it after the first next().
-class ReadAhead {
- public:
-  explicit ReadAhead(recording::RecordingReader& reader) : reader_(reader) {}
-
-  /// nullopt at the end.
-  asio::awaitable<std::optional<recording::RecordedMessage>> next();
-  /// Starts again at the first message.
-  void rewind();
-  /// The reader's damage(); valid after next() has returned nullopt.
-  std::optional<Error> damage() const { return reader_.damage(); }
-  bool knows_times() const { return reader_.knows_times(); }
-
- private:
-  asio::awaitable<void> read();
-
-  recording::RecordingReader& reader_;
-  std::deque<recording::RecordedMessage> ahead_;
-  bool ended_ = false, from_the_front_ = false;
-  asio::thread_pool thread_{1};
 };
 
 }  // namespace sonar

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 
+#include "daemon/commands/replay/read_ahead.hpp"
 #include "daemon/commands/replay/replay_device.hpp"
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "daemon/server/connections/input_rate.hpp"

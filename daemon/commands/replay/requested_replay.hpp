@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "daemon/commands/replay/played_pings.hpp"
+#include "daemon/commands/replay/read_ahead.hpp"
 #include "daemon/commands/replay/replay_device.hpp"
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "daemon/commands/replay/replay_server.hpp"

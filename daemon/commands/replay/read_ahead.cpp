@@ -1,5 +1,6 @@
-#include "daemon/commands/replay/replay_pace.hpp"
+#include "daemon/commands/replay/read_ahead.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace sonar {
