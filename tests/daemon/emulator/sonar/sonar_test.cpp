@@ -126,9 +126,7 @@ TEST(SonarInVirtualTime, ATickThatWaitedForThePingBeforeItFollowsAtOnce) {
   ASSERT_TRUE(first);
   const Time tick = *sonar.next_ping();
   EXPECT_FALSE(asked(sonar.on_tick(tick))) << "the engine is busy";
-  auto ping = std::make_shared<Ping>();
-  ping->request = *first;
-  const auto second = asked(sonar.on_ping({.ping = ping}, tick + milliseconds(20)));
+  const auto second = asked(sonar.on_ping({.ping = VirtualTime::computed(*first)}, tick + milliseconds(20)));
   ASSERT_TRUE(second);
   EXPECT_EQ(second->fired_at, tick);
   EXPECT_EQ(static_cast<std::uint32_t>(second->number), 2u);

@@ -104,6 +104,21 @@ class VirtualTime {
         sonars.emplace_back(around(), s, ++last_index, now);
   }
 
+  /// A ping of a few rows, as the engine might make it.
+  static std::shared_ptr<const Ping> computed(PingRequest request) {
+    auto ping = std::make_shared<Ping>();
+    PingSettings& s = request.settings;
+    if (request.model->profile.starts_with("oculus")) s.range_bin_count = std::min(s.range_bin_count, 4);
+    const auto beams = static_cast<std::size_t>(s.beam_count), rows = static_cast<std::size_t>(s.range_bin_count);
+    ping->samples.resize(beams * rows * static_cast<std::size_t>(s.format.bits) / 8);
+    for (std::size_t b = 0; b < beams; ++b)
+      ping->beam_azimuth_rad.push_back(0.5f - static_cast<float>(b) / static_cast<float>(beams));
+    if (s.format.row_gains) ping->row_gain.assign(rows, 1);
+    ping->request = std::move(request);
+    look_at(*ping);
+    return ping;
+  }
+
   Config config;
   World world;
   Time now = start;
@@ -174,19 +189,6 @@ class VirtualTime {
       return close(id, "a fault");
     }
     if (client.finished) close(id, client.why);
-  }
-  static std::shared_ptr<const Ping> computed(PingRequest request) {
-    auto ping = std::make_shared<Ping>();
-    PingSettings& s = request.settings;
-    if (request.model->profile.starts_with("oculus")) s.range_bin_count = std::min(s.range_bin_count, 4);
-    const auto beams = static_cast<std::size_t>(s.beam_count), rows = static_cast<std::size_t>(s.range_bin_count);
-    ping->samples.resize(beams * rows * static_cast<std::size_t>(s.format.bits) / 8);
-    for (std::size_t b = 0; b < beams; ++b)
-      ping->beam_azimuth_rad.push_back(0.5f - static_cast<float>(b) / static_cast<float>(beams));
-    if (s.format.row_gains) ping->row_gain.assign(rows, 1);
-    ping->request = std::move(request);
-    look_at(*ping);
-    return ping;
   }
 
   ConnectionId last_id = 0;
