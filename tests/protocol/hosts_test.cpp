@@ -76,7 +76,8 @@ TEST_P(Hosts, TellTheRangeWhichTheSonarHasInsteadOfThatWhichItEchoes) {
 
 /// Users type metres, and do not know the fields of messages.
 TEST_P(Hosts, TellInMetresWhyARangeIsRefused) {
-  for (const double wanted_m : {900.0, 0.001}) {
+  const auto& model = *GetParam().device->models()[model_of(GetParam())];
+  for (const double wanted_m : {900.0, 0.001, static_cast<double>(model.modes.front().max_range_m)}) {
     Wanted wanted;
     wanted.settings.range_m = wanted_m;
     const auto host = GetParam().host(wanted);
