@@ -23,10 +23,11 @@ inline std::string range_complaint(double range_m, std::string_view of, double l
          (field.empty() ? std::string() : " (" + std::string(field) + ")");
 }
 
-/// The refusal of the range in a message, such as "the range must be at least 1 m long and end by 142 m (length_mm)". `fields`:
-/// those of the message.
+/// The refusal of the range in a message, such as "the range must start at 0 m or later, be at least 1 m long
+/// and end by 142 m (length_mm)". `fields`: those of the message.
 inline std::string range_rule(double least_m, double farthest_m, std::string_view fields) {
-  return text::format("the range must be at least %g m long and end by %g m (", least_m, farthest_m) + std::string(fields) + ")";
+  return text::format("the range must start at 0 m or later, be at least %g m long and end by %g m (", least_m, farthest_m) +
+         std::string(fields) + ")";
 }
 
 /// The refusal of gain_percent. Empty if it is valid or not set.

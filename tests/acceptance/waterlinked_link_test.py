@@ -209,7 +209,7 @@ class Images(unittest.TestCase):
             self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
             refused = daemon.ctl("listen", "--range", 16)
             self.assertEqual(refused.returncode, 64)
-            self.assertIn("the range must be at least 0.1 m long and end by 15 m (min, max)", refused.stderr)
+            self.assertIn("the range must start at 0 m or later, be at least 0.1 m long and end by 15 m (min, max)", refused.stderr)
             self.assertIn("--gain does not apply to a Sonar 3D-15", daemon.ctl("listen", "--gain", 50).stderr)
             where = {"mode": "unicast", "unicast_destination_ip": "127.0.0.1", "unicast_destination_port": 40999}
             self.assertEqual(self.ask(daemon, "/udp", where)[0], 204)
