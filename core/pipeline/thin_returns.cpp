@@ -84,7 +84,7 @@ std::vector<RangeReturns::Cell> RangeReturns::thin_cells(std::vector<std::uint8_
     if (is_thin[f.object] && (all.empty() || all.back() != f.cell)) all.push_back(f.cell);
   std::vector<std::uint8_t> is_listed(rows_.size() * static_cast<std::size_t>(grid_.columns));
   for (const Cell& cell : all) is_listed[index(cell)] = 1;
-  const std::size_t most = all.size() + most_aimed_cells;
+  const std::size_t most = std::min(all.size() + most_aimed_cells, most_thin_cells / 2);
   for (std::size_t o = 0, aimed_at = 0; o < is_thin.size() && aimed_at < most_aimed_at && all.size() < most; ++o)
     if (cells[o] == 0) is_thin[o] = 1, aimed_at += aim_at(static_cast<std::uint32_t>(o), is_listed, all);
   return all;
