@@ -17,8 +17,6 @@ using protocol::HostPing;
 constexpr double usual_range_m = 10, sound_mps = 1500;     // bins are intervals of time; drivers assume 1500 m/s
 constexpr auto patience = std::chrono::milliseconds(500);  // time after which a request without a scan line is repeated
 
-double limit_m() { return static_cast<double>(models().front()->modes.front().max_range_m); }
-
 /// Parameters for a scan of the half circle ahead in steps of a grad.
 HeadCommand command_of(const protocol::SettingsOverride& wanted) {
   HeadCommand c;
@@ -27,8 +25,8 @@ HeadCommand command_of(const protocol::SettingsOverride& wanted) {
   c.right = ahead + turn / 4;
   const double range_m = wanted.range_m.value_or(usual_range_m);
   // The sonar would refuse bins that reach beyond its farthest range by a rounding.
-  const auto longest = static_cast<long>(limit_m() / (c.bins * bin_unit_s * sound_mps / 2));
-  c.interval = static_cast<std::uint16_t>(std::clamp(std::lround(2 * range_m / sound_mps / c.bins / bin_unit_s), 1L, longest));
+  c.interval = static_cast<std::uint16_t>(
+      std::clamp<long>(std::lround(2 * range_m / sound_mps / c.bins / bin_unit_s), 1, longest_interval(c.bins)));
   c.range_dm = static_cast<std::uint16_t>(std::clamp(std::lround(10 * range_m), 1L, 16383L));
   if (wanted.gain_percent)
     c.gain = static_cast<std::uint8_t>(std::clamp(std::lround(most_gain * *wanted.gain_percent / 100), 0L, 255L));
@@ -125,7 +123,8 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
     return tl::unexpected(accepted.error());
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a Micron has one mode only");
   // The sonar would not refuse the range, only send nothing.
-  const std::string why = protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Micron", 0, limit_m());
+  const double farthest = static_cast<double>(models().front()->modes.front().max_range_m);
+  const std::string why = protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Micron", 0, farthest);
   if (!why.empty()) return failure(ErrorKind::usage, why);
   return std::make_unique<MicronHost>(wanted.as_it_is ? std::nullopt : std::optional(command_of(wanted.settings)));
 }

@@ -71,11 +71,13 @@ bool same_settings(const Settings& a, const Settings& b) {
   return a.command == b.command && a.has_parameters == b.has_parameters;
 }
 
+// 750 m/s is half of the nominal sound speed, because the sound travels there and back.
+int longest_interval(int bins) { return static_cast<int>(farthest_m / (bins * bin_unit_s * 750)); }
+
 std::string complaint(const HeadCommand& c) {
   if (c.bins < 1 || c.bins > 1500) return text::format("%d bins are not in 1..1500", c.bins);
   if (c.interval < 1) return "the interval of the bins is 0";
-  // 750 m/s is half of the nominal sound speed, because the sound travels there and back.
-  if (c.bins * c.interval * bin_unit_s * 750 > farthest_m) return text::format("the bins reach beyond %g m", farthest_m);
+  if (c.interval > longest_interval(c.bins)) return text::format("the bins reach beyond %g m", farthest_m);
   if (c.step < 1) return "the step of the motor is 0";
   if (c.left >= turn || c.right >= turn) return text::format("a limit is not in 0..%d", turn - 1);
   if (c.gain > most_gain) return text::format("gain %d is not in 0..%d", c.gain, most_gain);
@@ -124,8 +126,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   if (wanted.range_m) {
     const double speed = true_sound_speed_mps(device.water, device.depth_m);
     const double unit_m = speed * bin_unit_s * c.bins / 2;  // range of the shortest interval
-    const double longest = std::floor(farthest_m / (c.bins * bin_unit_s * 750));
-    const std::string why = protocol::range_complaint(*wanted.range_m, "a Micron", unit_m, longest * unit_m, "ad_interval");
+    const std::string why =
+        protocol::range_complaint(*wanted.range_m, "a Micron", unit_m, longest_interval(c.bins) * unit_m, "ad_interval");
     if (!why.empty()) return refused(why);
     c.interval = static_cast<std::uint16_t>(std::lround(*wanted.range_m / unit_m));
     c.range_dm = static_cast<std::uint16_t>(std::lround(10 * *wanted.range_m));

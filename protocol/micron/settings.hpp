@@ -32,6 +32,8 @@ using HeldSettings = protocol::Held<Settings>;
 /// The settings in `held`; if it is null, those of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
+/// The longest interval of this many bins that complaint() accepts.
+int longest_interval(int bins);
 /// The reason if the device ignores the command, else an empty text.
 std::string complaint(const HeadCommand& command);
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
