@@ -1,4 +1,4 @@
-// A socket of a made-up sonar, at the address and port of a make.
+// Sockets of a made-up sonar, at the address and port of a make.
 #pragma once
 
 #include <arpa/inet.h>
@@ -7,7 +7,10 @@
 #include <sys/socket.h>
 
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "clients/sonarctl/net.hpp"
 
@@ -26,5 +29,32 @@ inline Socket bound_socket(const std::string& address, int type, std::uint16_t p
   EXPECT_EQ(::bind(socket.fd(), reinterpret_cast<sockaddr*>(&at), sizeof at), 0);
   return socket;
 }
+
+/// Calls `serve` for each connection in turn, in a thread, until it is destroyed. Port 0: a free one.
+class SocketServer {
+ public:
+  using Serve = std::function<void(const Socket&)>;
+  SocketServer(std::string address, std::uint16_t port, Serve serve)
+      : address_(std::move(address)), listener_(bound_socket(address_, SOCK_STREAM, port)) {
+    ::listen(listener_.fd(), 16);
+    thread_ = std::thread([this, serve = std::move(serve)] {
+      for (;;) {
+        const Socket client(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
+        if (client.fd() < 0) return;
+        serve(client);
+      }
+    });
+  }
+  ~SocketServer() {
+    ::shutdown(listener_.fd(), SHUT_RDWR);
+    thread_.join();
+  }
+  std::string at() const { return text_from({address_, ntohs(own_address(listener_).sin_port)}); }
+
+ private:
+  std::string address_;
+  Socket listener_;
+  std::thread thread_;
+};
 
 }  // namespace sonar::clients

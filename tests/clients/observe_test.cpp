@@ -26,29 +26,10 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-/// Serves each connection to a free port of 127.0.0.2 in turn, in a thread.
-class Server {
+/// Serves each connection to a free port of 127.0.0.2 in turn.
+class Server : public SocketServer {
  public:
-  using Serve = std::function<void(const Socket&)>;
-  explicit Server(Serve serve) : listener_(bound_socket("127.0.0.2", SOCK_STREAM, 0)) {
-    ::listen(listener_.fd(), 16);
-    thread_ = std::thread([this, serve = std::move(serve)] {
-      for (;;) {
-        const Socket client(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
-        if (client.fd() < 0) return;
-        serve(client);
-      }
-    });
-  }
-  ~Server() {
-    ::shutdown(listener_.fd(), SHUT_RDWR);
-    thread_.join();
-  }
-  std::string at() const { return text_from({"127.0.0.2", ntohs(own_address(listener_).sin_port)}); }
-
- private:
-  Socket listener_;
-  std::thread thread_;
+  explicit Server(Serve serve) : SocketServer("127.0.0.2", 0, std::move(serve)) {}
 };
 
 /// Reads until the client leaves.

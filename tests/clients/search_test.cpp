@@ -28,29 +28,6 @@ const std::string address = "127.0.0.9";
 
 Socket bound(int type, std::uint16_t port) { return bound_socket(address, type, port); }
 
-/// Runs `serve` for each connection until the end of the test.
-class Server {
- public:
-  Server(std::uint16_t port, std::function<void(const Socket&)> serve) : listener_(bound(SOCK_STREAM, port)) {
-    ::listen(listener_.fd(), 4);
-    thread_ = std::thread([this, serve = std::move(serve)] {
-      for (;;) {
-        const Socket client(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
-        if (client.fd() < 0) return;
-        serve(client);
-      }
-    });
-  }
-  ~Server() {
-    ::shutdown(listener_.fd(), SHUT_RDWR);
-    thread_.join();
-  }
-
- private:
-  Socket listener_;
-  std::thread thread_;
-};
-
 /// Answers like a web server that refuses. Returns false if the client disconnected without a request.
 bool refuse_as_a_web_server(const Socket& client) {
   std::array<std::byte, 1024> request;
@@ -173,7 +150,7 @@ TEST(Search, ASonarByUdpThatHasGoneIsNoticedWithoutARequest) {
 TEST(Search, GoesOnBesideAWebServer) {
   std::atomic<int> requests = 0;
   Socket sonar = bound(SOCK_STREAM, oculus::tcp_port);
-  const Server web(80, [&](const Socket& client) {
+  const SocketServer web(address, 80, [&](const Socket& client) {
     if (refuse_as_a_web_server(client) && ++requests == 1) ::listen(sonar.fd(), 4);
   });
   const auto found = PingStream::open({address, 0}, nullptr, {}, 60s);
@@ -183,7 +160,7 @@ TEST(Search, GoesOnBesideAWebServer) {
 }
 
 TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
-  const Server web(80, refuse_as_a_web_server);
+  const SocketServer web(address, 80, refuse_as_a_web_server);
   const auto nothing = PingStream::open({address, 0}, nullptr, {}, 100ms);
   ASSERT_FALSE(nothing);
   EXPECT_EQ(nothing.error().kind, ErrorKind::unavailable);
@@ -197,7 +174,7 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
 TEST(Search, NamesTheSonarThatClosesTheConnectionBeforeItAnswers) {
   for (const bool answers : {false, true}) {
     SCOPED_TRACE(answers);
-    const Server full(find_make("omniscan450")->ports.front().number, [answers](const Socket& client) {
+    const SocketServer full(address, find_make("omniscan450")->ports.front().number, [answers](const Socket& client) {
       std::array<std::byte, 1024> request;
       const std::array first{std::byte{'B'}};  // a message that never ends
       if (!answers) return;
@@ -236,7 +213,7 @@ TEST(PingStream, AByteAtAnotherPortShowsThatTheSonarDoesNotReject) {
 }
 
 TEST(WatchPings, KeepsWhatTheSonarRefuses) {
-  const Server surveyor(62312, [](const Socket& client) {
+  const SocketServer surveyor(address, 62312, [](const Socket& client) {
     std::array<std::byte, 1024> request;
     if (read_some(client, request, 60s).what != Wait::data) return;
     wire::Bytes why{std::byte{0}, std::byte{0}};
