@@ -185,8 +185,7 @@ void Outage::begins() {
 
 double Outage::left_s(const SourceOptions& source) const {
   if (!since_) return source.return_limit_s;
-  const std::chrono::duration<double> lasts = Clock::now() - *since_;
-  return std::max(0.0, source.return_limit_s - lasts.count());
+  return std::max(0.0, source.return_limit_s - seconds_since(*since_));
 }
 
 Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
