@@ -18,7 +18,7 @@ from ros_stand_ins import BRIDGE
 from sonard_bridge.conversions import rotate, wxyz
 from sonard_client import Control, Daemon
 
-PATIENCE_S = 60
+PATIENCE_S = 120
 HAS_ROS = importlib.util.find_spec("rclpy") is not None
 if not HAS_ROS:
     print("rclpy is not installed: the ROS 2 bridge is tested with stand-ins for ROS alone", file=sys.stderr)
@@ -135,8 +135,8 @@ class WithRos(unittest.TestCase):
             TransformListener(buffer, self.node)
             clouds, points = [], []
             self.node.create_subscription(PointCloud2, "/sonard_bridge/front/cloud", clouds.append, 10)
-            host = subprocess.Popen([SONARD.parents[1] / "clients/sonarctl", "listen", daemon.address, "--make", "ping360"],
-                                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+            host = subprocess.Popen([SONARD.parents[1] / "clients/sonarctl", "listen", daemon.address, "--make", "ping360", "--wait",
+                                     str(PATIENCE_S)], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
             self.addCleanup(host.wait)
             self.addCleanup(host.terminate)
 

@@ -15,6 +15,7 @@ from sonard_bridge import conversions as c
 from sonard_client import Control, Daemon, OculusClient
 
 SONARCTL = SONARD.parents[1] / "clients/sonarctl"
+WAIT = ("--wait", str(PATIENCE_S))  # for the first ping
 A, B, C = (4.0, 20.0), (4.0, -10.0), (7.0, 8.0)  # m and degrees, positive to port: spheres of 0.1 m in scenes/l-targets.yaml
 RANGE_IMAGES = """
 world: {scene: SCENE, seed: 1}
@@ -118,7 +119,7 @@ class ASurveyor(WithSonard):
     def test_its_cloud_lies_where_the_truth_is(self):
         daemon = self.start(LOOKING_DOWN)
         ros = self.bridge(daemon, clouds=True, scans=True, tf_static=True)
-        host = subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "surveyor240"], stdin=subprocess.DEVNULL,
+        host = subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "surveyor240", *WAIT], stdin=subprocess.DEVNULL,
                                 stdout=subprocess.DEVNULL)
         self.addCleanup(host.wait)
         self.addCleanup(host.terminate)
@@ -137,7 +138,7 @@ class OneBeamAtATime(WithSonard):
     """A scanning sonar and a DVL. Their echoes are weak parts of the full scale."""
 
     def listen(self, daemon, make):
-        host = subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", make], stdin=subprocess.DEVNULL,
+        host = subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", make, *WAIT], stdin=subprocess.DEVNULL,
                                 stdout=subprocess.DEVNULL)
         self.addCleanup(host.wait)
         self.addCleanup(host.terminate)
@@ -156,23 +157,30 @@ class OneBeamAtATime(WithSonard):
         self.assertEqual([(y, z) for _, y, z in points], [(0.0, 0.0)] * len(points))  # in the axes of the head
 
     def test_the_head_turns_about_the_axis_of_its_mount(self):
-        """Upside down: the head turns to port. Its clouds lie, by /tf, where the target to port is."""
+        """Upside down: the head turns to port. Its clouds lie, by /tf, on the wall to port. One line in several gives a cloud, so
+        the wall takes up a large part of a turn."""
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        scene = pathlib.Path(folder.name) / "wall.yaml"
+        scene.write_text("objects: [{name: wall, type: box, material: concrete, size_m: [20, 1, 10], pose: {xyz_m: [0, 3.5, 0]}}]")
         daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "ping360").replace("rpy_deg: [0, -90, 0]", "rpy_deg: [180, 0, 0]")
-                            .replace("demo.yaml", "l-targets.yaml").replace("[-7, 0, -3]", "[0, 0, 0]"))
+                            .replace(str(ROOT / "scenes/demo.yaml"), str(scene)).replace("[-7, 0, -3]", "[0, 0, 0]"))
         ros = self.bridge(daemon, clouds=True, cloud_threshold=0.05, tf_static=True)
         self.listen(daemon, "ping360")
-        def points():
-            """Of the lines whose pose has come."""
+        def sides():
+            """Metres to port, of the points in the lines whose pose has come."""
             sent = [t for message in list(ros.published.get("/tf", [])) for t in message.transforms]
             poses = {(t.header.stamp.sec, t.header.stamp.nanosec): t.transform for t in sent}
+            found = []
             for cloud in list(ros.published.get("~/down/cloud", [])):
                 at = poses.get((cloud.header.stamp.sec, cloud.header.stamp.nanosec))
                 for i in range(cloud.width if at else 0):
                     point = struct.unpack_from("<3f", cloud.data, i * cloud.point_step)
-                    x, y, z = c.rotate(c.wxyz([getattr(at.rotation, axis) for axis in "xyzw"]), point)
-                    yield x + at.translation.x, y + at.translation.y, z + at.translation.z
-        a = A[0] * math.cos(math.radians(A[1])), A[0] * math.sin(math.radians(A[1])), -0.2  # the mount is 0.2 m below the centre
-        wait_for(lambda: any(math.dist(point, a) < 0.2 for point in points()))
+                    y = c.rotate(c.wxyz([getattr(at.rotation, axis) for axis in "xyzw"]), point)[1] + at.translation.y
+                    found.append(y)
+            return found
+        seen = wait_for(lambda: sides()[20:] and sides())
+        self.assertAlmostEqual(sorted(seen)[len(seen) // 2], 3, delta=0.3)
 
     def test_the_cloud_of_a_dvl(self):
         daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "dvl-a50"))
