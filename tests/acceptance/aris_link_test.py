@@ -218,7 +218,7 @@ class Tools(unittest.TestCase):
         replay = subprocess.Popen([SONARD, "replay", file, "--ip", address, "--loop"], stderr=subprocess.PIPE, text=True)
         try:
             self.assertIn("(.aris file) as sonar 7001", replay.stderr.readline())
-            heard = run(SONARCTL, "listen", address, "--make", "aris", "--pings", 5)
+            heard = run(SONARCTL, "listen", address, "--make", "aris", "--wait", 100, "--pings", 5)
             self.assertEqual(heard.returncode, 0, heard.stderr)
             self.assertRegex(heard.stdout, r"x 96  8 bit  6\.\d+ m  1\.8000 MHz")
             return heard

@@ -52,7 +52,7 @@ class Beside(unittest.TestCase):
                 status = demo.status()
                 self.assertEqual(status["sonars"][0]["listens"], f"{demo.address}:52100")
                 self.assertEqual(status["http"], f"127.0.0.1:{8088 + 10 * demo.offset}")
-                heard = run(SONARCTL, "listen", demo.address, "--pings", "2", "--quiet")
+                heard = run(SONARCTL, "listen", demo.address, "--wait", "100", "--pings", "2", "--quiet")
                 self.assertEqual(heard.returncode, 0, heard.stdout + heard.stderr)
                 found = json.loads(run(SONARCTL, "doctor", "--control", demo.control, "--json", "--within", "40").stdout)
                 self.assertEqual(found["errors"], 0, found)
@@ -77,7 +77,7 @@ class Beside(unittest.TestCase):
     def test_more_clients_are_served_at_a_time(self):
         with Demo(2, "--clients", "3") as demo:
             with socket.create_connection((demo.address, 52100)), socket.create_connection((demo.address, 52100)):
-                heard = run(SONARCTL, "listen", demo.address, "--pings", "2", "--quiet")
+                heard = run(SONARCTL, "listen", demo.address, "--wait", "100", "--pings", "2", "--quiet")
                 self.assertEqual(heard.returncode, 0, heard.stdout + heard.stderr)
                 self.assertEqual(len(demo.status()["sonars"][0]["clients"]), 2)
 

@@ -128,7 +128,7 @@ class Preview(unittest.TestCase):
             viewer.greeted().subscribe("/front/ping", "/status")
             viewer.subscribe("/front/image")
             viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping" and viewer.decode(*value[::2]).get("preview"))
-            with subprocess.Popen([SONARCTL, "listen", SONAR, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+            with subprocess.Popen([SONARCTL, "listen", SONAR, "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                 numbers = []
                 while len(numbers) < 5:
                     event = viewer.decode(*viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping")[::2])
@@ -172,7 +172,7 @@ class Preview(unittest.TestCase):
 
     def test_a_port_that_two_products_share_names_the_one_that_answers(self):
         with demo("s500"):
-            self.assertIn("connected to 127.0.0.2:51200, an S500\n", run(SONARCTL, "listen", "--pings", 2, "--quiet").stdout)
+            self.assertIn("connected to 127.0.0.2:51200, an S500\n", run(SONARCTL, "listen", "--wait", 100, "--pings", 2, "--quiet").stdout)
 
     def test_faults_are_armed(self):
         with demo("oculus"):
@@ -258,7 +258,7 @@ class Pages(PageChecks, unittest.TestCase):
                 self.assertEqual(page.run("[...document.querySelectorAll('#setting-rows select')].map((s) => s.name.split('/').pop())"), choices)
                 self.assertEqual(set(page.run("[...document.querySelectorAll('#setting-rows [name$=mode] option')].map((o) => o.text)")), modes)
                 if maker == "ping360":  # its host requests each ping, so the engine limits the rate
-                    with subprocess.Popen([SONARCTL, "listen", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+                    with subprocess.Popen([SONARCTL, "listen", "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                         page.wait("document.querySelector('#rate-word').textContent === 'pinging'")
                         page.wait("parseFloat(document.querySelector('#rate').textContent) > 0")
                         self.assertNotIn("of 1000 Hz", page.text("#badges"))
@@ -292,7 +292,7 @@ class Pages(PageChecks, unittest.TestCase):
     def test_a_preview_has_a_rate_and_not_the_latency_of_the_last_driver(self):
         with demo("oculus"):
             page = self.opened(self.browser.open(f"http://{HTTP}:8088/?test=300", 1600, 1000))
-            with subprocess.Popen([SONARCTL, "listen", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+            with subprocess.Popen([SONARCTL, "listen", "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                 page.wait("/^\\d+ ms$/.test(document.querySelector('#latency').textContent)")
                 driver.terminate()
             page.wait("document.querySelector('#rate-word').textContent === 'preview'")

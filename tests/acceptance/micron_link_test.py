@@ -130,7 +130,7 @@ class MicronLink(unittest.TestCase):
             at = f"{daemon.address}:{PORT}"
             examined = daemon.ctl("doctor", "--within", 60, "--control", f"{daemon.address}:14770")
             self.assertRegex(examined.stdout, rf"ok +tcp {at} accepts, first ping decoded", examined.stdout + examined.stderr)
-            listened = run(SONARCTL, "listen", at, "--pings", 5, "--range", 8)
+            listened = run(SONARCTL, "listen", at, "--wait", "100", "--pings", 5, "--range", 8)
             self.assertEqual(len(re.findall(r"x 1  8 bit .* bearing -?\d+\.\d deg", listened.stdout)), 5, listened.stdout + listened.stderr)
             picture = pathlib.Path(folder) / "sweep.png"
             viewed = run(SONARCTL, "view", at, "--png", picture, "--range", 8)

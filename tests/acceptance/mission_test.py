@@ -58,7 +58,7 @@ class WholeMission(unittest.TestCase):
         """True if our client receives the same bytes from the replay as the client of the mission did."""
         with tempfile.TemporaryDirectory() as folder, Replay(log, "--stepped") as replay:
             again = pathlib.Path(folder) / "again.raw"
-            done = run(SONARCTL, "listen", replay.address, "--as-it-is", "--pings", PINGS, "--quiet", "--record", again, patience_s=600)
+            done = run(SONARCTL, "listen", replay.address, "--as-it-is", "--wait", 100, "--pings", PINGS, "--quiet", "--record", again, patience_s=600)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr + replay.text())
             with open(again, "rb") as received:
                 digest = hashlib.sha256()

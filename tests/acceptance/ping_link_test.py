@@ -373,7 +373,7 @@ class Tools(unittest.TestCase):
                 at = f"{daemon.address}:{port}"
                 examined = daemon.ctl("doctor", "--within", 60, "--control", f"{daemon.address}:14770")
                 self.assertRegex(examined.stdout, rf"ok +(udp|tcp) {at} accepts, first ping decoded", examined.stdout + examined.stderr)
-                listened = run(SONARCTL, "listen", at, "--pings", 5, "--range", 8)
+                listened = run(SONARCTL, "listen", at, "--wait", "100", "--pings", 5, "--range", 8)
                 self.assertEqual(listened.returncode, 0, listened.stderr)
                 self.assertEqual(len(re.findall(line, listened.stdout)), 5, listened.stdout)
                 self.assertRegex(listened.stdout, r"  (8\.00|7\.99) m  0\.\d{4} MHz")

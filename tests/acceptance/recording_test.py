@@ -122,7 +122,7 @@ class Recorded(Files):
                 self.assertEqual(replay.process.wait(60), 0, replay.text())
         with Replay(self.path("oculus"), "--speed", "3") as replay:
             again = self.folder / "again.raw"
-            done = run(SONARCTL, "listen", replay.address, "--as-it-is", "--pings", 6, "--quiet", "--record", again)
+            done = run(SONARCTL, "listen", replay.address, "--as-it-is", "--wait", "100", "--pings", 6, "--quiet", "--record", again)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr + replay.text())
             self.assertTrue(self.read("raw").startswith(again.read_bytes()))
             self.assertEqual(len([m for m in split(again.read_bytes()) if m[6] == 0x23]), 6)

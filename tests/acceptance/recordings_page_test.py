@@ -29,7 +29,7 @@ def is_message(topic):
 
 def record(maker, pings):
     """A recording of the running demo, started and stopped as by the page, while a driver is connected."""
-    with subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--quiet"], stdout=subprocess.DEVNULL,
+    with subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL,
                           stderr=subprocess.DEVNULL) as driver:
         name = f"{maker}.mcap"
         assert run(SONARCTL, "recording", "start", name).returncode == 0
@@ -107,7 +107,7 @@ class Recordings(PageChecks, unittest.TestCase):
                         self.assertNotIn("simulation", said, "a recording has its own rate")
                         self.assertNotIn("control stream", said, "and no control stream")
                     if maker not in ("blueview", "ping360", "micron", "norbit"):
-                        done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--quiet", "--pings", 2)
+                        done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--wait", "100", "--quiet", "--pings", 2)
                         self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
 
     def test_a_recorded_refusal_of_another_request_stops_no_host(self):
@@ -116,7 +116,7 @@ class Recordings(PageChecks, unittest.TestCase):
         with demo("s500"):
             self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--seconds", 3).returncode, 0)
         with Replay(pathlib.Path("run.mcap"), "--loop") as replay:
-            done = run(SONARCTL, "listen", f"{replay.address}:51200", "--quiet", "--pings", 2)
+            done = run(SONARCTL, "listen", f"{replay.address}:51200", "--wait", "100", "--quiet", "--pings", 2)
             self.assertIn("pings 2", done.stdout, done.stderr)
 
     def test_only_files_of_the_folder(self):
@@ -198,7 +198,7 @@ class Recordings(PageChecks, unittest.TestCase):
             shown(page)
             page.press_mouse("#record")
             page.wait("document.querySelector('#recordings')?.innerText.includes('waits for a driver, such as sonarctl listen')")
-            with subprocess.Popen([SONARCTL, "listen", SONAR, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
+            with subprocess.Popen([SONARCTL, "listen", SONAR, "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                 page.wait("/ [1-9]\\d* pings .* running/.test(document.querySelector('#recordings').innerText)")
                 driver.terminate()
             # The page changes when the driver disconnects; a click at that moment may miss the button.

@@ -91,7 +91,8 @@ class Sonard(Daemon):
 
     def ctl(self, command, *arguments, **options):
         """sonarctl COMMAND ADDRESS ..."""
-        return run(SONARCTL, command, self.address, *arguments, **options)
+        wait = () if "--wait" in arguments or "--pings" not in arguments else ("--wait", 100)  # for the first ping
+        return run(SONARCTL, command, self.address, *arguments, *wait, **options)
 
     def status(self):
         """Returns the output of sonarctl status, over the control stream of this address."""
