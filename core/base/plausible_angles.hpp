@@ -31,12 +31,12 @@ inline ImplausibleAngle angle_beyond_radians(const RollPitchYaw& a, bool counts_
   return {!counts_turns && yaw_rad > most_yaw_rad ? std::max(tilt_rad, yaw_rad) : 0, false};
 }
 
-/// Recognises a yaw in radians that is counted on over whole turns, as dead reckoning does: it changes no faster than a vehicle
-/// turns, and covers two turns from a begin within the first turn, or many turns from any begin. A yaw in degrees begins
+/// Recognises a yaw in radians that counts whole turns, as dead reckoning does. Such a yaw changes no faster than a vehicle
+/// turns. It covers two turns if it starts within the first turn, or many turns from any start. A yaw in degrees starts
 /// anywhere, jumps after a turn, and changes 57 times as fast.
 class TurnCount {
  public:
-  /// Poses in the order of time. False: the yaw does not continue that of the pose before.
+  /// Adds the yaw of a pose; poses must be in the order of time. False: this yaw cannot follow from that of the previous pose.
   bool add(double yaw_rad, Time at) {
     const bool goes_on = last_ && is_turn(yaw_rad, at);
     if (!goes_on) {
@@ -61,8 +61,8 @@ class TurnCount {
     double yaw_rad = 0;
     Time at{};
   };
-  /// True if a vehicle can have turned to this yaw, from the pose before and since the begin. Noise, and poses that come close
-  /// together, may exceed the speed by a step, but not again with each pose.
+  /// True if a vehicle can have turned to this yaw both from the previous pose and from the first one. The tolerance
+  /// least_step_rad allows for noise and for poses at nearly the same time; it does not accumulate from pose to pose.
   bool is_turn(double yaw_rad, Time at) const {
     constexpr double fastest_radps = 2, least_step_rad = 0.05;
     const auto reaches_from = [&](const Heading& from) {

@@ -18,7 +18,7 @@ bool standard_error_is_blocked();
 /// reading end (`| head`) is not an error.
 Result<void> flush_standard_output();
 
-// Makes room for the stacks of a program, because a stack that reaches its limit ends the program by a signal without a word.
+// Makes room for the stacks of a program, because a program whose stack reaches its limit ends without a message.
 
 constexpr std::size_t usual_stack_bytes = std::size_t{8} << 20;  // the limit that systems set
 

@@ -49,7 +49,7 @@ enum class Domain : std::uint32_t {
   leak = 0x6c65616bu,           // used with noise_place; combined with the sonar's number
   fixed_fan = 0x66616eu,        // speckle of a hit of the fixed fan
   paper_speckle = 0x50323521u,  // speckle of a hit in the modes paper and raster
-  // Phase and carrier offset of another sonar. With the words of the key swapped: those of each of its pulses.
+  // Phase and carrier offset of another sonar; with the words of the key swapped, phase and carrier offset of one pulse.
   other_sonar = 0x6f746872u,
   range_speckle = 0x72736b6cu,    // speckle of a ray in range images, by the hit point of the ray
   range_noise = 0x726e6f69u,      // noise of a pixel in range images

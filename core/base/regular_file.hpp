@@ -28,7 +28,7 @@ Result<OpenFile> open_regular(const std::filesystem::path& file);
 /// reading fails, unavailable if there is too little memory.
 Result<std::string> read_regular(const std::filesystem::path& file, std::size_t most_bytes);
 
-/// open() for writing, without the wait for the reader of a FIFO. -1: errno has the reason, and why_not_written() its words.
+/// open() for writing, without the wait for the reader of a FIFO. -1: errno has the reason, and why_not_written() explains it.
 int open_to_write(const std::filesystem::path& file, int flags);
 std::string why_not_written(const std::filesystem::path& file, int error);
 

@@ -28,9 +28,9 @@ struct FirstLines {
   std::vector<Vec3d> positions;
 };
 
-/// Returns N, 9, 6, 3 or 0, for a unit of 10^N ns. `usual` is the N of the file's format: 9 (seconds) or 0 (nanoseconds). The
-/// result is `usual`, unless lines would then be implausibly far apart in time, or the unit is seconds and the body would move
-/// slower than 5 mm/s. If the body rests, a file of ten or more lines is assumed to be a log, whose steps are short.
+/// Returns the power N of the unit 10^N ns: 9, 6, 3 or 0. `usual` is the N of the file's format: 9 (seconds) or 0 (nanoseconds).
+/// The result is `usual`, unless lines would then be implausibly far apart in time, or the unit is seconds and the body would
+/// move slower than 5 mm/s. If the body rests, a file of ten or more lines is assumed to be a log, whose steps are short.
 int unit_by_steps(const FirstLines& lines, int usual);
 
 }  // namespace sonar::motion

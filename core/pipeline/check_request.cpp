@@ -31,7 +31,7 @@ std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings&
     return "an exact pulse must be at least a quarter of a sample of the picture long: choose shorter rows or a longer pulse";
   const double band = mode.waveform.shape == Waveform::Shape::cw ? tone_band_in_pulses : other_band_in_pulses;
   if (!measured && mode.waveform.exact && samples * std::max(1.0, band / pulse) > most_frequencies)
-    return "an exact pulse so short on so many samples needs too much memory: choose fewer rows or a longer pulse";
+    return "an exact pulse this short needs too much memory for this many samples: choose fewer rows or a longer pulse";
   if (samples * make_columns(mode, s.beam_count).count > most_column_samples)
     return "so many beams, rows and samples per row need too much memory: choose fewer of them";
   return {};
@@ -42,8 +42,8 @@ std::string why_beams_unlisted(const FrequencyMode& mode, int beam_count) {
   const std::vector<double>& azimuth = mode.beam_azimuths_rad;
   const std::vector<float>& width = mode.beam_widths_rad;
   if (static_cast<int>(azimuth.size()) != beam_count)
-    return "beam_count " + std::to_string(beam_count) + " is not the " + std::to_string(azimuth.size()) +
-           " beams that are listed";
+    return "beam_count is " + std::to_string(beam_count) + ", but the number of listed beams is " +
+           std::to_string(azimuth.size());
   if (!width.empty() && width.size() != azimuth.size()) return "there must be as many beam widths as beams, or none";
   const double edge_rad = static_cast<double>(mode.horizontal_aperture_rad) / 2 + sector_slack_rad;
   for (std::size_t j = 0; j < azimuth.size(); ++j) {

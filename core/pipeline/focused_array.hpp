@@ -9,9 +9,10 @@
 
 namespace sonar {
 
-/// Sums over the channels of w_m (-1)^m e^{i 2 pi d / lambda}. Here d is the delay of a channel at x relative to the array's
-/// middle, from a point at a range and sine u. The parts are groups of channels. Neighbouring groups overlap by half, and their
-/// w^2 add to 1 in every channel. The last part is all channels with equal weights.
+/// Computes the sums over channels of w_m (-1)^m e^{i 2 pi d / lambda}. Here d is the path from a point to channel m, minus the
+/// path from the point to the array's middle; focus() sets the range of the point, the beam its sine. Each sum is over one
+/// part: a group of channels. Neighbouring groups overlap by half, and their w^2 add to 1 in every channel. The last part
+/// contains all channels with equal weights.
 ///
 /// Half a group is short, so its sum hardly changes with the sine, except for the delay of its middle. Therefore the sum is
 /// computed at a few Chebyshev points of a segment of beams and interpolated. The error is 1e-5 of the largest value, like that
@@ -48,7 +49,7 @@ class FocusedArray {
   double widest_ = 0;
 };
 
-/// Chebyshev points of [from, to], and the weights that interpolate values at these points: [points][places].
+/// Chebyshev points of [from, to], and the weights that interpolate from these points to other places: [points][places].
 std::vector<double> chebyshev_points(double from, double to, int count);
 std::vector<double> chebyshev_weights(const std::vector<double>& points, const std::vector<double>& places);
 /// Number of points for an error below about 5e-6 if the phase changes by `radians` on either side of the middle.

@@ -20,7 +20,8 @@ struct BeamScratch {
 /// Computes the samples of the window for which `out` has been shaped.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out);
-/// Forms only some beams; the others are undefined. `heard`: columns_of() these beams; no other columns are read.
+/// Forms only some beams; the others are undefined. `heard`: the columns that these beams use (columns_of()); others are not
+/// read.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, BeamChoice wanted,
                 std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out);
 

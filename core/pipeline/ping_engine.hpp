@@ -61,8 +61,8 @@ class EngineUnavailable : public std::runtime_error {
 class PingEngine {
  public:
   virtual ~PingEngine() = default;
-  /// Computes the pings. Throws std::invalid_argument with the reason if a request cannot be simulated (why_invalid in
-  /// core/pipeline/ping_engine.hpp). Only one thread may call it at a time.
+  /// Computes the pings. Throws std::invalid_argument with the reason if a request cannot be simulated (why_invalid()). Only
+  /// one thread may call it at a time.
   virtual std::vector<Ping> run(std::span<const PingRequest> requests) = 0;
   /// submit() and collect() are the two halves of run(). An engine with a device works on the requests while the caller uses
   /// the pings of an earlier submit(). Requests are copied. collect() throws the exceptions that run() would throw.

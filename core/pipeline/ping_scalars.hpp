@@ -19,7 +19,7 @@ struct PingScalars {
   double sound_speed_mps = 1500;
   double absorption_np_per_m = 0;  // one way, true
   double source_upa = 1;           // amplitude at 1 m
-  double max_range_m = 0;          // true range from which echoes still reach the last sample
+  double max_range_m = 0;          // largest true range whose echoes reach the last sample
   double min_range_m = 0;          // true range from `seen_from`; echoes from nearer points end before the first sample
   double samples_per_m = 0;        // fractional sample of a true range r: r * samples_per_m - sample_offset
   double sample_offset = 0.5;      // PingPlan::sample_offset

@@ -26,7 +26,7 @@ class BeamTransformTables {
   /// Makes the tables. The relative error of the interpolation is at most 2e-6 for columns up to 0.35 of a beam apart (single
   /// precision: 1e-6).
   BeamTransformTables(const ReceivePattern& pattern, const Columns& columns, const std::vector<double>& beam_sines);
-  /// Makes the tables for one beam on each column. The weight of columns d away is of_distance[d].
+  /// Makes the tables for as many beams as columns, beam k at column k. The weight of columns d away is of_distance[d].
   explicit BeamTransformTables(const std::vector<double>& of_distance);
   BeamTransformTables(const BeamTransformTables&) = delete;
   BeamTransformTables& operator=(const BeamTransformTables&) = delete;
@@ -94,7 +94,7 @@ class SharedNoiseTable {
   SharedNoiseTable(const PingPlan& plan, Parallel& pool);
   bool is_audible() const { return samples_ > 0; }
   bool has_leak() const { return !leak_upa_.empty(); }
-  int samples() const { return samples_; }  // number of samples with shared noise; later, it lies outside the sector
+  int samples() const { return samples_; }  // number of samples with shared noise; in later ones it lies outside the sector
   std::size_t parts() const { return parts_; }
   /// Real and imaginary part, [parts][beams][2][samples], of the response to a signal of amplitude 1. The signal is in the
   /// channels of one group; in the last part, in all channels.

@@ -118,7 +118,7 @@ void RangeReturns::trace_middles(int row, std::vector<RangeReturn>& middles) con
     for (int i = 0; i < lanes; ++i)
       if (p.object[i] != RayPacket::miss) {
         RangeReturn& middle = middles[static_cast<std::size_t>(from + i)];
-        middle = met(p, i, {1, 1});
+        middle = return_of(p, i, {1, 1});
         draw_speckle(p, i, middle);
         middle.rays = 0;  // the rays around it are counted later
       }
@@ -158,7 +158,7 @@ void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int f
       power += middle.power / rays_around;
       continue;
     }
-    const RangeReturn r = met(p, lane, {rays_across, rays_up});
+    const RangeReturn r = return_of(p, lane, {rays_across, rays_up});
     if (is_there)
       power += r.power;
     else
@@ -169,7 +169,7 @@ void RangeReturns::compare_around(RangeReturn& middle, const RayPacket& p, int f
 }
 
 /// Computes the echo of one ray of a cell's lattice.
-RangeReturn RangeReturns::met(const RayPacket& p, int lane, Lattice lattice) const {
+RangeReturn RangeReturns::return_of(const RayPacket& p, int lane, Lattice lattice) const {
   const auto i = static_cast<std::size_t>(lane);
   const Rotation sonar_from_world = transposed(world_from_sonar_);
   const Vec3d normal = sonar_from_world * to_double({p.normal_x[i], p.normal_y[i], p.normal_z[i]});

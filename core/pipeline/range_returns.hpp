@@ -92,7 +92,7 @@ class RangeReturns {
   void aim_around(int column, int row, Lattice lattice, int first_ray, int rays, RayPacket& p, int first_lane) const;
   void compare_around(RangeReturn& middle, const RayPacket& p, int first_lane, std::vector<RangeReturn>& to) const;
   void aim(RayPacket& p, int lane, Vec3 direction) const;
-  RangeReturn met(const RayPacket& p, int lane, Lattice lattice) const;  // without speckle
+  RangeReturn return_of(const RayPacket& p, int lane, Lattice lattice) const;  // without speckle
   void draw_speckle(const RayPacket& p, int lane, RangeReturn& r) const;
   void add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to, std::size_t first) const;
   void look_closer(Parallel& pool);

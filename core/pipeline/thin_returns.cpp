@@ -14,8 +14,9 @@ namespace {
 // the covered part of a cell is known. `most_close_rays` limits the sum for all of these cells.
 constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
-// If a net covers the view, only the usual rays are traced. Of the objects that these rays miss, the first most_aimed_at in view
-// are aimed at, until most_aimed_cells are found: many specks must not use up what thin objects need.
+// If a net covers the view, only the usual rays are traced. Further rays are aimed at objects that these rays miss: at no more
+// than most_aimed_at objects in view, and only until most_aimed_cells are found. Otherwise many specks would use up the cells
+// that thin objects need.
 constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048, most_aimed_at = 1024, most_aimed_cells = 128;
 
 }  // namespace
@@ -140,7 +141,7 @@ void RangeReturns::look_closer(Parallel& pool) {
   std::vector<std::vector<RangeReturn>> seen(cells.size());
   pool.for_each(cells.size(), [&](std::size_t n, int) {
     for_each_hit(cells[n], {across, across}, [&](const RayPacket& p, int lane) {
-      add(met(p, lane, {across, across}), p, lane, seen[n], 0);
+      add(return_of(p, lane, {across, across}), p, lane, seen[n], 0);
     });
   });
   std::vector<std::size_t> which(rows_.size() * static_cast<std::size_t>(grid_.columns), cells.size());

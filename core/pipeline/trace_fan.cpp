@@ -49,7 +49,7 @@ class PacketFiller {
     packet.origin_x[i] = origin_.x;
     packet.origin_y[i] = origin_.y;
     packet.origin_z[i] = origin_.z;
-    // True range from which echoes still reach the last sample [m].
+    // Largest true range whose echoes reach the last sample [m].
     packet.far[i] = far_m_;
   }
   void trace(const RayScene& scene, bool coherent = true) {
@@ -220,7 +220,7 @@ class FanTracer {
   }
 
   /// Slope of the map from this column to the next, along the plane n . p = o of the facet that was hit: of 1 / x = (n_x +
-  /// n_y u / (s cos psi) + n_z tan psi) / o with s^2 = 1 - u^2; of flat beams 1 / h = (n_x s + n_y u + n_z tan psi) / o.
+  /// n_y u / (s cos psi) + n_z tan psi) / o with s^2 = 1 - u^2; for flat beams of 1 / h = (n_x s + n_y u + n_z tan psi) / o.
   float per_column(const Sample& a, ColumnSine column) const {
     const SurfaceHit& hit = a.surface;
     if (hit.object == RayPacket::miss || hit.offset == 0) return 0;

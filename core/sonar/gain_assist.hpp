@@ -12,8 +12,8 @@ namespace sonar {
 /// constant is our choice.
 inline constexpr double assisted_share = 0.99, assisted_level = 0.97, assist_time_s = 0.3;
 /// Assumed level of a saturated picture above full scale [dB]. The samples do not show the true level. The value is low for the
-/// first saturated picture, so that the gain does not jump when a scene becomes louder. It doubles with each further one in a
-/// row.
+/// first saturated picture, so that the gain does not jump when a scene becomes louder. It doubles with each further
+/// saturated picture in succession.
 inline constexpr double least_overload_db = 1, most_overload_db = 12;
 /// The whole range of the gain setting, 0 to 100 % (docs/protocols/oculus.md) [dB].
 inline constexpr double least_assisted_gain_db = 0, most_assisted_gain_db = 96;
@@ -21,9 +21,9 @@ inline constexpr double least_assisted_gain_db = 0, most_assisted_gain_db = 96;
 /// The code that the fraction `share` of a ping's samples does not exceed, divided by max_code: 0 to 1.
 double percentile_of_full_scale(const Ping& ping, double share = assisted_share);
 
-/// The gain `passed_s` after a picture that was made with `gain_db`. In that picture the loud part had the fraction `level` of
-/// full scale, after the power law `gamma`. The gain approaches, as a first-order system, the value with which that part would
-/// have had assisted_level. `overload_db` is the assumed level of a saturated picture above full scale.
+/// The gain [dB] at the time `passed_s` after a picture that was made with `gain_db`. The loud part of that picture reached the
+/// fraction `level` of full scale, after the power law `gamma`. The gain approaches, as a first-order system, the value at
+/// which that part would have reached assisted_level. `overload_db` is the assumed level of a saturated picture above full scale.
 double next_gain_db(double gain_db, double level, double gamma, double passed_s, double overload_db = most_overload_db);
 
 /// State of a device's gain. It begins at the client's gain. After a change of mode, or after the assist was off, it begins

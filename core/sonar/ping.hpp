@@ -166,8 +166,6 @@ struct BeamTruth {
   std::uint32_t object = nothing;  // index into Scene::objects
 };
 
-struct PingLabels;  // core/sonar/ping.hpp
-
 /// The result of a ping, for all vendors. Row 0 is the nearest. Beam 0 is the one farthest to port: azimuths fall from + to -.
 struct Ping {
   PingRequest request;

@@ -36,8 +36,8 @@ inline const RangeImageSettings* range_image_of(const PingRequest& request) {
   return dynamic_cast<const RangeImageSettings*>(request.vendor_settings.get());
 }
 
-/// A pixel in Ping::samples, little-endian. The upper 16 bits are the strength; therefore the whole sample can serve as a
-/// level. The lower 16 bits are the range. 0 = no return. Row 0 is the lowest. Column 0 is the one farthest to port.
+/// A pixel in Ping::samples, little-endian. The upper 16 bits are the strength; therefore samples can be compared as
+/// levels. The lower 16 bits are the range. 0 = no return. Row 0 is the lowest. Column 0 is the one farthest to port.
 struct RangePixel {
   static constexpr std::uint32_t most_range = 0xFFFF, most_strength = 0x7FFF;
   std::uint32_t strength = 0, range = 0;  // strength: amplitude, linear; range: in range_unit_m

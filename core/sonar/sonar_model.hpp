@@ -60,7 +60,7 @@ struct BeamProfile {
   std::vector<float> noise_db;       // receiver noise re (30), far from the sonar
   std::vector<float> near_noise_db;  // the same at range 0; same length as noise_db
   float near_m = 0.2f;               // weight of noise_db at range r: 1 - e^{-r / near_m}
-  std::vector<float> blend;          // amplitude, re the beam's own, of the neighbours half a beam width away that are added
+  std::vector<float> blend;          // amplitude, re the beam's own, of the added neighbours half a beam width away
 };
 
 /// Noise that receive channels share, with opposite signs in neighbours (docs/acoustics.md, section 5).

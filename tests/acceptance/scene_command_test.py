@@ -45,7 +45,7 @@ class SceneCommand(unittest.TestCase):
             place = f"quay.yaml, origin: {{lat: {latitude}, lon: 15}}}}"
             config.write_text(CONFIG.replace("quay.yaml}", place), encoding="utf-8")
             checked.append(run(SONARD, "check", config).stdout)
-        self.assertIn("note: bed.asc: its place is relative to world.origin, latitude 60.000000, longitude 15.000000", checked[0])
+        self.assertIn("note: bed.asc: its position is relative to world.origin, latitude 60.000000, longitude 15.000000", checked[0])
         self.assertNotIn("from everything", checked[0])
         self.assertIn("note: the scene is 111.4 km from world.origin; vehicles", checked[1])
         self.assertIn("m from everything in the scene", checked[1])

@@ -70,7 +70,7 @@ struct GroupView {
   int columns_beside;          // if the sonar moves: number of columns on either side in which a cell is also looked up
   const float* inverse_depth;  // DepthMap::inverse_x
   const float* depth_slope;    // DepthMap::per_column
-  bool has_upper_marks;        // in depth_slope
+  bool has_upper_marks;        // depth_slope holds the upper bits of object numbers (surface_mark)
   float depth_tolerance_m;
   float turns_per_m;                                              // 2 f / c
   float decay_per_m;                                              // 2 alpha [Np/m]

@@ -40,7 +40,7 @@ void accumulate_taps(const EchoArrays& e, int count, const PulseRows& pulse, flo
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
-  alignas(64) std::int32_t turned[8][lanes];  // taps, repeated, from a sample within the vector on and wrapped around
+  alignas(64) std::int32_t turned[8][lanes];  // [begin]: number of the tap for each lane if the pulse begins at sample `begin`
   for (int begin = 0; begin < 8; ++begin)
     for (int l = 0; l < lanes; ++l) turned[begin][l] = (l / 2 - begin) & 7;
   const float steps = static_cast<float>(pulse.steps);

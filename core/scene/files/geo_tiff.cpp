@@ -66,8 +66,8 @@ double half_number(std::uint16_t bits) {
   return (bits & 0x8000) != 0 ? -size : size;
 }
 
-/// A whole number of some bits that may begin within a byte. Its first bit is the most significant one, in files of both byte
-/// orders: GDAL writes them so (NBITS), also those of 24 bits.
+/// A whole number of `bits` bits that may begin within a byte. The first bit is the most significant one in files of both byte
+/// orders. GDAL writes numbers of NBITS bits, and numbers of 24 bits, in this order.
 double packed_number(std::span<const std::byte> bytes, std::size_t first_bit, std::size_t bits) {
   std::uint32_t value = 0;
   for (std::size_t bit = first_bit; bit < first_bit + bits; ++bit)
@@ -302,7 +302,7 @@ Result<HeightGrid> read_geo_tiff_heights(const std::filesystem::path& file, cons
   if (std::filesystem::file_size(file, error) > most_file_bytes || error)
     return bad("larger than 2 GiB; cut a part out (gdal_translate)");
   const Tiff tiff = open_tiff(file);
-  if (!tiff) return bad("no TIFF, or damaged: " + last_tiff_error());
+  if (!tiff) return bad("not a TIFF, or damaged: " + last_tiff_error());
   auto grid = GeoTiffReader(tiff.get(), file, options).read();
   if (!grid) return failure(grid.error().kind, file.string() + ": " + grid.error().text);
   return grid;

@@ -138,13 +138,12 @@ void remove_zone_number(RawHeights& raw, UtmZone zone, std::vector<std::string>&
 std::string note_of_system(const CoordinateSystem& system) {
   const bool is_named = !same_letters(system.name, "unknown") && !same_letters(system.name, "unnamed");
   const std::string name = is_named ? text::printable(system.name) : "a system without a name";
-  return system.other_datum
-             ? "its degrees, of " + name +
-                   ", are taken as those of WGS 84, from which they may be some 100 m away; convert them: gdalwarp "
-                   "-t_srs EPSG:4326 IN OUT.tif"
-             : "its coordinates, of " + name +
-                   ", are read as plain metres, with the scale of that projection; to place it by latitude and "
-                   "longitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif";
+  return system.other_datum ? "its degrees, of " + name +
+                                  ", are read as degrees of WGS 84, which may differ by about 100 m; convert them: gdalwarp "
+                                  "-t_srs EPSG:4326 IN OUT.tif"
+                            : "its coordinates, of " + name +
+                                  ", are read as plain metres, with the scale of that projection; to place it by latitude and "
+                                  "longitude: gdalwarp -t_srs EPSG:4326 IN OUT.tif";
 }
 
 /// Converts stored values to heights. Fill values must have been replaced by NaN before.
@@ -173,7 +172,8 @@ std::string place_text(const Geodetic& place) {
 /// Sets the origin from the scene or the configuration; without both, the middle of the grid.
 void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodetic& middle) {
   grid.origin = options.origin ? options.origin : options.world_origin;
-  if (grid.origin && !options.origin) grid.notes.push_back("its place is relative to world.origin, " + place_text(*grid.origin));
+  if (grid.origin && !options.origin)
+    grid.notes.push_back("its position is relative to world.origin, " + place_text(*grid.origin));
   if (grid.origin && std::abs(grid.origin->altitude_m) >= 1)
     grid.notes.push_back(
         text::format("its heights are relative to z = 0, which is %.6g m above mean sea level by world.origin; if "
@@ -244,7 +244,7 @@ Result<void> set_origin_of_zone(HeightGrid& grid, const HeightOptions& options, 
   if (!are_utm(grid.x.front(), grid.y.front()) || !are_utm(grid.x.back(), grid.y.back()))
     return failure(
         ErrorKind::bad_data,
-        text::format("its coordinates (%.7g, %.7g) are not eastings and northings of UTM, zone %s; %s to take them as plain "
+        text::format("its coordinates (%.7g, %.7g) are not eastings and northings of UTM, zone %s; %s to read them as plain "
                      "metres",
                      grid.x.front(), grid.y.front(), text_of(zone).c_str(),
                      options.utm ? "remove utm" : "write geographic: false"));
@@ -279,7 +279,7 @@ void hint_at_zone(HeightGrid& grid, const Geodetic& world_origin) {
 }  // namespace
 
 bool is_nan_word(std::string_view word) {
-  // no-data words of printf, Microsoft's C, R, databases, Python, and numpy's masked arrays
+  // The words that printf, Microsoft's C, R, databases, Python and numpy's masked arrays write for missing values.
   static constexpr std::array<std::string_view, 16> words{"nan", "NaN",  "NAN",  "nan(ind)", "1.#QNAN", "1.#IND",
                                                           "NA",  "null", "NULL", "None",     "none",    "--",
                                                           "inf", "Inf",  "INF",  "Infinity"};
@@ -313,7 +313,7 @@ HeightValues::HeightValues(std::optional<std::string_view> declared) {
     return;
   }
   // Accepts the same value in single precision. A value beyond every height may also have been rounded to few digits. The
-  // tolerance never reaches a height: with the one digit of 1e20, it would reach 0.
+  // tolerance is limited, so that no height counts as missing: without the limit, the tolerance of 1e20 would include 0.
   const double size = std::abs(*declared_);
   tolerance_ = size > highest_m ? std::min(last_digit(*declared, *declared_), 0.5 * (size - highest_m)) : 1e-6 * size;
 }

@@ -44,7 +44,7 @@ struct CoordinateSystem {
   bool web_mercator = false;  // its metres are longer than true metres
   /// The zone, if the datum agrees with WGS 84 within 2 m.
   std::optional<UtmZone> utm = {};
-  /// The name that the file gives it; empty for systems without a name, and for local coordinates.
+  /// The name of the system in the file; empty for systems without a name, and for local coordinates.
   std::string name = {};
   std::string depths = {};   // the name of a vertical system that counts downwards; empty for all others
   bool other_datum = false;  // degrees that may differ from those of WGS 84 by about 100 m

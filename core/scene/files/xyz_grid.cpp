@@ -208,7 +208,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
   if (raw.x.size() < 2 || raw.y.size() < 2)
     return bad(std::string("its ") + std::to_string(points->size()) + " points are not a uniform grid" + way);
   if (raw.x.size() * raw.y.size() > max_mesh_triangles / 2)
-    return bad(text::format("its points span %zu x %zu cells, more than 10 million: no grid, or too fine a one", raw.x.size(),
+    return bad(text::format("its points span %zu x %zu cells, more than 10 million: not a grid, or too fine", raw.x.size(),
                             raw.y.size()) +
                way);
   raw.z.assign(raw.x.size() * raw.y.size(), std::numeric_limits<float>::quiet_NaN());

@@ -18,15 +18,15 @@ constexpr std::size_t ply_head_bytes = 64 << 10;  // limit of a header
 
 struct PlyProperty {
   bool is_list = false;
-  std::uint64_t bytes = 0;  // size in a binary file; of a list: of its count
+  std::uint64_t bytes = 0;  // size in a binary file; for a list: the size of its count
 };
 struct PlyElement {
   std::string name;
-  std::uint64_t count = 0;  // the largest number if it is larger than that
+  std::uint64_t count = 0;  // counts that do not fit become the largest number
   std::vector<PlyProperty> properties;
 };
 struct PlyHead {
-  std::size_t bytes = 0;  // size with its last line end; 0 if it is not whole, and then nothing else is known
+  std::size_t bytes = 0;  // size with its last line end; 0: the header is incomplete, and the other members are empty
   bool is_text = false;
   std::vector<PlyElement> elements;
 
@@ -53,15 +53,15 @@ MeshFault check_ply(const PlyHead& head, std::uint64_t file_bytes);
 MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr,
                      const std::function<bool(const std::string& uri)>& is_itself = {});
 MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
-/// The JSON of a glTF file, text or GLB; empty or cut short if the file is.
+/// The JSON of a glTF file, text or GLB. It is empty or cut short if the file is.
 std::string_view json_of_gltf(std::string_view file);
 /// The binary chunk of a GLB file of version 2, up to the end of the file; empty if there is none.
 std::string_view binary_part_of_glb(std::string_view file);
 /// The fault in the container of a GLB file, version 2. The importer calls every such fault an unknown format.
 MeshFault glb_fault(std::string_view file);
 
-/// Complete texts. These find records that are not complete, which the importer leaves out or misreads. Binary files, which make
-/// it fail if they are cut short, pass.
+/// Find incomplete records in the complete text of a file. The importer would omit or misread such records. Binary files are
+/// not checked, because the importer rejects them if they are cut short.
 MeshFault check_ply_text(std::string_view file);
 MeshFault check_stl_text(std::string_view file);
 MeshFault check_obj(std::string_view file);

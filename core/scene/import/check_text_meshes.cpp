@@ -90,7 +90,7 @@ MeshFault check_ply_text(std::string_view file) {
     for (std::uint64_t k = 0; k < element.count && !element.properties.empty(); ++k) {
       const std::string which = element.name + " " + std::to_string(k + 1) + " of " + std::to_string(element.count);
       bool there = lines.next();
-      // The importer skips one blank line, and takes further ones for records.
+      // The importer skips one blank line, and reads further ones as records.
       if (there && lines.line().empty() && !lines.ends_with_return()) there = lines.next();
       if (!there) return "ends before " + which + ", which its header counts" + std::string(cut_short);
       if (const std::string fault = fault_of_record(lines.line(), element); !fault.empty())

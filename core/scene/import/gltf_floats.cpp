@@ -21,7 +21,7 @@ tl::unexpected<Error> bad_gltf(const std::string& what) { return failure(ErrorKi
 /// How an accessor stores a number.
 struct Component {
   std::size_t bytes = 0;
-  double full = 1;  // what normalised numbers are divided by
+  double full = 1;  // divisor of normalised numbers
   double (*number)(const char* at) = nullptr;
 };
 template <class T>
@@ -116,7 +116,7 @@ class Rewriter {
         const std::size_t comma = name.find(',');
         const bool is_base64 = comma != name.npos && name.substr(0, comma).ends_with(";base64");
         const auto bytes = is_base64 ? from_base64(std::string_view(name).substr(comma + 1)) : std::nullopt;
-        if (!bytes) return bad_gltf("has a buffer (" + number + ") that is no base64; export it again");
+        if (!bytes) return bad_gltf("has a buffer (" + number + ") that is not base64; export it again");
         data_ += *bytes;
       } else {
         auto bytes = beside_(name);

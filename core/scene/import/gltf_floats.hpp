@@ -17,9 +17,8 @@ namespace sonar {
 using ReadBeside = std::function<std::optional<std::string>(const std::string& name)>;
 
 /// A GLB file, version 2, with the nodes, meshes and skins of `file`, and with floating-point positions and weights of bones.
-/// It has no normals, colours, textures or animations; of materials it has the names. `file`: text or GLB, version 2. Errors do
-/// not contain the file's name.
-/// `most_bytes`: limit of its size; GLB files have sizes of 32 bits.
+/// It has no normals, colours, textures or animations, and only the names of materials. `file`: text or GLB, version 2.
+/// `most_bytes`: limit of the result's size; GLB files have sizes of 32 bits. Errors do not contain the file's name.
 Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside,
                                      std::uint64_t most_bytes = std::numeric_limits<std::uint32_t>::max());
 

@@ -177,7 +177,8 @@ class ObjStream final : public Assimp::IOStream {
     }
     return size == 0 ? 0 : n / size;
   }
-  /// Continues reading at a place, after reading the text before it. The importer also seeks its current place before each block.
+  /// Continues reading at a position, after reading the text before it. The importer also seeks its current position before each
+  /// block.
   aiReturn Seek(std::size_t offset, aiOrigin origin) override {
     if (origin == aiOrigin_CUR) offset += Tell();
     if (origin == aiOrigin_END) offset = size_ - std::min(offset, size_);

@@ -10,7 +10,7 @@ namespace sonar {
 namespace {
 
 constexpr double widening = 1.08, widest_m = 1.0;
-constexpr double noted_share = 0.25;  // ripples with less of their height are noted
+constexpr double noted_share = 0.25;  // ripples that keep less than this fraction of their height are noted
 
 struct Axis {
   std::vector<double> at_m, spacing_m;
@@ -56,11 +56,11 @@ double ripple_profile(double cycles) {
   return 0.5 * (c + 0.25 * (c * c - 0.5)) / 1.125;
 }
 
-/// Ripples of which the finest part of the grid shows less than a quarter.
+/// A note if even the finest part of the grid shows less than noted_share of the ripples' height.
 std::vector<std::string> notes_on(const Ripples& r, double spacing_m) {
   const double share = carried(r.wavelength_m, spacing_m);
   if (share >= noted_share) return {};
-  const std::string has = share < 0.005 ? "do not appear" : text::format("have %.0f %% of their height at most", 100 * share);
+  const std::string has = share < 0.005 ? "do not appear" : text::format("keep at most %.0f %% of their height", 100 * share);
   return {text::format("its ripples of wavelength %g m ", r.wavelength_m) + has +
           text::format(": the finest spacing of its grid is %.3g m; set spacing_m: %.3g, and fine_size_m if the bed is large",
                        spacing_m, r.wavelength_m / 6)};

@@ -193,7 +193,7 @@ void SpecularMesh::solve(std::uint32_t index, const SpecularQuery& q, std::vecto
 // far to matter. Parts that deviate from the osculating arc by more than a quarter wavelength contribute nothing.
 double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, const SpecularPoint& point, std::size_t axis,
                           double unit_m) const {
-  constexpr double for_ever = std::numeric_limits<double>::infinity();
+  constexpr double unlimited = std::numeric_limits<double>::infinity();
   const Vec3d cut = cross(point.normal, direction);  // the walk stays in the plane of normal and direction
   const double quarter_of_wave = unit_m * unit_m * std::abs(bending(point.range_m, point.curvature[axis])) / point.range_m;
   double walked = 0, risen = 0;
@@ -208,7 +208,7 @@ double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, cons
     const Vec3d facing = cross(p[1] - p[0], p[2] - p[0]);
     Vec3d along = unit_vector(cross(cut, facing));
     if (dot(along, direction) < 0) along = -1.0 * along;
-    if (dot(along, direction) < 0.3) return for_ever;  // the surface turns away and is not visible
+    if (dot(along, direction) < 0.3) return unlimited;  // the surface turns away and is not visible
     const double area2 = dot(facing, facing);
     double leave = HUGE_VAL;
     std::size_t through = 3;
@@ -222,21 +222,21 @@ double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, cons
       const double s = std::max(share[k], 0.0) / -rate[k];
       if (s < leave) leave = s, through = k;
     }
-    if (through == 3) return for_ever;  // numerically caught at a corner
+    if (through == 3) return unlimited;  // numerically caught at a corner
     from = from + leave * along;
     walked += leave;
     Vec3d normal;
     for (std::size_t k = 0; k < 3; ++k) normal = normal + (share[k] + leave * rate[k]) * n[k];
     const double up = dot(normal, point.normal), over = dot(normal, direction) / (std::abs(up) > 1e-6 ? up : 1e-6);
-    if (std::abs(over) > 1.5) return for_ever;
+    if (std::abs(over) > 1.5) return unlimited;
     risen += std::abs(over - std::tan(std::clamp(point.curvature[axis] * walked, -1.0, 1.0))) * leave;
-    if (walked > walk_units * unit_m) return for_ever;
+    if (walked > walk_units * unit_m) return unlimited;
     if (triangle.across[through] < 0) return walked;
-    if (risen > quarter_of_wave && walked > unit_m) return walked > trusted_units * unit_m ? for_ever : walked;
+    if (risen > quarter_of_wave && walked > unit_m) return walked > trusted_units * unit_m ? unlimited : walked;
     came_from = static_cast<std::int32_t>(index);
     index = static_cast<std::uint32_t>(triangle.across[through]);
   }
-  return for_ever;
+  return unlimited;
 }
 
 }  // namespace sonar

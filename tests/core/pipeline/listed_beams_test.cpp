@@ -115,7 +115,7 @@ TEST(ListedBeams, AreChecked) {
   };
   EXPECT_EQ(why({0.2, 0, -0.1}), "");
   EXPECT_EQ(why({0.2, 0, -0.1}, {0.01f, 0.02f, 0.03f}), "");
-  EXPECT_EQ(why({0.2, 0}), "beam_count 3 is not the 2 beams that are listed");
+  EXPECT_EQ(why({0.2, 0}), "beam_count is 3, but the number of listed beams is 2");
   EXPECT_EQ(why({0.2, -0.1, 0}), "listed beam 2 is not to starboard of the one before");
   EXPECT_EQ(why({0.9, 0, -0.1}), "listed beam 0 does not point into the sector");
   EXPECT_EQ(why({0.2, std::nan(""), -0.1}), "listed beam 1 does not point into the sector");

@@ -198,7 +198,7 @@ TEST_F(GltfFloats, DamagedFilesAreRefused) {
   const Triangle triangle(5122, false, shorts, 8);
   EXPECT_THAT(refusal(triangle.beside("no.bin")), HasSubstr("names the file no.bin, which cannot be read"));
   EXPECT_THAT(refusal(triangle.beside("../no.bin")), HasSubstr("outside of its folder"));
-  EXPECT_THAT(refusal(triangle.beside("data:;base64,*")), HasSubstr("has a buffer (0) that is no base64"));
+  EXPECT_THAT(refusal(triangle.beside("data:;base64,*")), HasSubstr("has a buffer (0) that is not base64"));
 }
 
 TEST_F(GltfFloats, DracoIsReadOrNamedWithTheCommandThatUnpacksIt) {

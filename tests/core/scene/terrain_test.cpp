@@ -81,7 +81,7 @@ TEST(Seabed, NotesRipplesThatAreTooFineForItsGrid) {
   EXPECT_THAT(notes(0.5, 0, 0.1),
               testing::ElementsAre("its ripples of wavelength 0.5 m do not appear: the finest spacing of its "
                                    "grid is 0.2 m; set spacing_m: 0.0833, and fine_size_m if the bed is large"));
-  EXPECT_THAT(notes(0.72, 0, 0.1), testing::ElementsAre(HasSubstr("have 20 % of their height at most")));
+  EXPECT_THAT(notes(0.72, 0, 0.1), testing::ElementsAre(HasSubstr("keep at most 20 % of their height")));
   EXPECT_THAT(notes(0.6, 0, 0.1), testing::ElementsAre(HasSubstr("do not appear")))
       << "three grid points a wave, but for rounding";
   EXPECT_THAT(notes(1.3, 0, 0.1), testing::IsEmpty());

@@ -123,7 +123,7 @@ TEST_F(UtmGrid, TheWorldsOriginPlacesItUnlessItHasItsOwn) {
   const auto grid = read({.utm = UtmZone{33, false}, .world_origin = origin});
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_EQ(grid->origin, origin);
-  EXPECT_THAT(grid->notes, ElementsAre("its place is relative to world.origin, latitude 60.000000, longitude 15.000000"));
+  EXPECT_THAT(grid->notes, ElementsAre("its position is relative to world.origin, latitude 60.000000, longitude 15.000000"));
   const Geodetic near{rad_from_deg(60.09), rad_from_deg(15), 0};
   const HeightOptions both{.utm = UtmZone{33, false}, .origin = near, .world_origin = origin};
   EXPECT_EQ(read(both)->origin, near);
@@ -155,9 +155,9 @@ TEST_F(UtmGrid, WrongZonesAndOriginsAreRefused) {
   EXPECT_THAT(notes_of({.geographic = true, .utm = UtmZone{33, false}}), HasSubstr("not longitudes and latitudes"));
   text = grid_about(50'000'000, 0);
   EXPECT_THAT(notes_of({.utm = UtmZone{33, false}, .origin = origin}),
-              HasSubstr("are not eastings and northings of UTM, zone 33N; remove utm to take them as plain metres"));
+              HasSubstr("are not eastings and northings of UTM, zone 33N; remove utm to read them as plain metres"));
   files.write("g.prj", "PROJCS[\"WGS 84 / UTM zone 33N\"]");
-  EXPECT_THAT(notes_of({.origin = origin}), HasSubstr("write geographic: false to take them as plain metres"));
+  EXPECT_THAT(notes_of({.origin = origin}), HasSubstr("write geographic: false to read them as plain metres"));
   text = "ncols 2\nnrows 2\nxllcenter 15\nyllcenter 60\ncellsize 0.001\n-9 -9 -9 -9\n";
   EXPECT_THAT(notes_of({.geographic = true, .utm = UtmZone{33, false}}), HasSubstr("utm is for coordinates in metres"));
 }
@@ -173,7 +173,7 @@ TEST_F(UtmGrid, InAScene) {
   ASSERT_TRUE(placed) << placed.error().text;
   EXPECT_NEAR((*placed)->objects[0].in_world.position_m.x, 0, 0.01);
   EXPECT_NEAR((*placed)->objects[0].in_world.position_m.y, 0, 0.02);
-  EXPECT_THAT((*placed)->notes, ElementsAre(HasSubstr("g.asc: its place is relative to world.origin")));
+  EXPECT_THAT((*placed)->notes, ElementsAre(HasSubstr("g.asc: its position is relative to world.origin")));
   const auto own = scene_of(", utm: 33N, origin: {lat: 60, lon: 15}", std::nullopt);
   ASSERT_TRUE(own) << own.error().text;
   EXPECT_EQ((*own)->objects[0].in_world.position_m, (*placed)->objects[0].in_world.position_m);
