@@ -10,9 +10,9 @@ constexpr std::size_t slice_alignment = 256;
 
 }  // namespace
 
-Arena::~Arena() { give_back(); }
+Arena::~Arena() { release(); }
 
-void Arena::give_back() {
+void Arena::release() {
   for (const Chunk& c : chunks_) {
     if (c.device) machine_.release(c.device);
     if (c.host) machine_.release_host(c.host);
@@ -56,7 +56,7 @@ void Arena::download(int lane) {
 }
 
 void Arena::clear() {
-  if (machine_.pieces_apart()) return give_back();
+  if (machine_.pieces_apart()) return release();
   // The memory is kept, because the next batch needs about as much.
   for (Chunk& c : chunks_) c.used = 0;
 }

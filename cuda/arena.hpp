@@ -56,7 +56,7 @@ class Arena {
   void upload(int lane);    // all pieces; only with Where::both
   void download(int lane);  // all pieces; only with Where::both
   void clear();
-  void give_back();  // releases the memory; no queued work may use it any more
+  void release();  // frees the memory; no queued work may use it any more
   std::size_t taken_bytes() const;
 
  private:

@@ -15,27 +15,27 @@ std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride
 
 }  // namespace
 
-std::size_t CellStore::Table::first_place(const std::int16_t* data) const {
+std::size_t CellStore::Table::first_slot(const std::int16_t* data) const {
   // The upper bits of a product with 2^64 divided by the golden ratio are spread evenly.
   const std::uint64_t spread = reinterpret_cast<std::uintptr_t>(data) * 0x9E3779B97F4A7C15u;
-  return static_cast<std::size_t>(spread >> 32) & (places_.size() - 1);
+  return static_cast<std::size_t>(spread >> 32) & (slots_.size() - 1);
 }
 
-std::size_t CellStore::Table::place_of(const std::int16_t* data) const {
-  std::size_t i = first_place(data);
-  while (places_[i].data && places_[i].data != data) i = (i + 1) & (places_.size() - 1);
+std::size_t CellStore::Table::slot_of(const std::int16_t* data) const {
+  std::size_t i = first_slot(data);
+  while (slots_[i].data && slots_[i].data != data) i = (i + 1) & (slots_.size() - 1);
   return i;
 }
 
 void CellStore::Table::put(const Held& held) {
-  if (2 * taken_ >= places_.size()) {
-    const std::vector<Held> before = std::exchange(places_, std::vector<Held>(2 * places_.size()));
+  if (2 * used_ >= slots_.size()) {
+    const std::vector<Held> before = std::exchange(slots_, std::vector<Held>(2 * slots_.size()));
     for (const Held& h : before)
-      if (h.data) places_[place_of(h.data)] = h;
+      if (h.data) slots_[slot_of(h.data)] = h;
   }
-  Held& place = places_[place_of(held.data)];
-  taken_ += place.data ? 0 : 1;
-  place = held;
+  Held& slot = slots_[slot_of(held.data)];
+  used_ += slot.data ? 0 : 1;
+  slot = held;
 }
 
 void CellStore::Table::clear() { *this = Table(); }
@@ -59,9 +59,9 @@ void CellStore::clear() {
   memory_.clear();
 }
 
-void CellStore::give_back() {
+void CellStore::release() {
   clear();
-  memory_.give_back();
+  memory_.release();
 }
 
 bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells,

@@ -25,7 +25,7 @@ class CellStore {
   /// time, each with its own `staging` or with one that has a lock.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
-  void give_back();  // releases the memory, too
+  void release();  // also frees the memory
 
   std::size_t bytes() const { return memory_.taken_bytes(); }
 
@@ -41,17 +41,17 @@ class CellStore {
   /// look-ups.
   class Table {
    public:
-    const Held& at(const std::int16_t* data) const { return places_[place_of(data)]; }  // a free entry if the tile is missing
+    const Held& at(const std::int16_t* data) const { return slots_[slot_of(data)]; }  // a free entry if the tile is missing
     void put(const Held& held);
     void clear();
-    bool empty() const { return taken_ == 0; }
-    void prefetch(const std::int16_t* data) const { __builtin_prefetch(&places_[first_place(data)]); }
+    bool empty() const { return used_ == 0; }
+    void prefetch(const std::int16_t* data) const { __builtin_prefetch(&slots_[first_slot(data)]); }
 
    private:
-    std::size_t first_place(const std::int16_t* data) const;
-    std::size_t place_of(const std::int16_t* data) const;
-    std::vector<Held> places_ = std::vector<Held>(1024);  // a power of two; at most half of the entries are in use
-    std::size_t taken_ = 0;
+    std::size_t first_slot(const std::int16_t* data) const;
+    std::size_t slot_of(const std::int16_t* data) const;
+    std::vector<Held> slots_ = std::vector<Held>(1024);  // a power of two; at most half of the entries are in use
+    std::size_t used_ = 0;
   };
   const Held* held(const CellTile& tile) const;
   std::size_t send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,

@@ -167,19 +167,19 @@ class DeviceEngine final : public PingEngine {
   bool has_room_for(const Work& work) {
     try {
       work();
-      all_given_back_ = false;
+      all_released_ = false;
       return true;
     } catch (const DeviceMemoryFull&) {
       for (int lane = 0; lane < Machine::lanes; ++lane) machine_->wait(lane);
-      if (one_room_ && all_given_back_) throw;
-      all_given_back_ = true;
+      if (one_room_ && all_released_) throw;
+      all_released_ = true;
       one_room_ = batch_ == 1;
       batch_ = std::max<std::size_t>(1, batch_ / 2);
       for (BatchRoom& room : rooms_) {
         empty(room);
-        for (Arena* arena : room.arenas()) arena->give_back();
+        for (Arena* arena : room.arenas()) arena->release();
       }
-      preparer_.give_back();
+      preparer_.release();
       plans_.clear();
       say("CUDA: the device's memory is full; from here on " +
           (one_room_ ? "one ping at a time" : "batches of at most " + std::to_string(batch_)));
@@ -370,7 +370,7 @@ class DeviceEngine final : public PingEngine {
   PingStatistics statistics_;
   std::vector<PingStatistics> each_;   // statistics of the last call that was collected
   bool one_room_ = false;              // true after lack of memory: no batch is prepared while the device is busy
-  bool all_given_back_ = false;        // true if all memory has been released since the last run that had enough
+  bool all_released_ = false;          // true if all memory has been released since the last run that had enough
   std::optional<std::string> failed_;  // reason of the device's failure
 };
 

@@ -42,7 +42,7 @@ void PingPreparer::place_fan(Making& m) {
   std::copy(g.elevation, g.elevation + elevation_terms, sea.elevation);
   sea.origin[0] = s.position_in_scene.x, sea.origin[1] = s.position_in_scene.y, sea.origin[2] = s.position_in_scene.z;
   for (int i = 0; i < 9; ++i) sea.world_from_sonar[i] = static_cast<float>(s.world_from_sonar.m[i / 3][i % 3]);
-  // True range [m] from which echoes still reach the last sample.
+  // Largest true range [m] whose echoes reach the last sample.
   sea.far_m = static_cast<float>(s.max_range_m);
   // Tolerance of the refinement (section 2) [m].
   sea.pulse_width_m = static_cast<float>(plan.pulse_width_m);
@@ -52,7 +52,7 @@ void PingPreparer::place_fan(Making& m) {
   m.view.has_scene = m.request().blank ? 0 : 1;
   if (m.request().blank) return;
   m.view.tracer = tracer_;
-  // Places are relative to the origin of rays; see FlatScene.
+  // Positions are relative to the origin of rays; see FlatScene.
   const BodyPlaces places = flat_.place(m.bodies);
   m.view.tracer.top = m.room.tables.put(places.top);
   m.view.tracer.bodies = m.room.tables.put(places.bodies);

@@ -22,8 +22,7 @@ class DeviceMemoryFull : public std::runtime_error {
 
 /// Lanes are queues of work. A lane keeps the order of its work; different lanes run at the same time. Failures throw
 /// std::runtime_error. After it the device must not be used again, except after DeviceMemoryFull. Only one thread may call a
-/// machine at a time. Exceptions are allocate, allocate_host and upload, which threads that prepare pings call at the same
-/// time.
+/// machine at a time, except for allocate, allocate_host and upload, which several threads that prepare pings may call at once.
 class Machine {
  public:
   static constexpr int lanes = 3;

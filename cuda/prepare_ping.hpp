@@ -82,7 +82,7 @@ class PingPreparer {
   static bool may_go_together(const AskedPing& a, const AskedPing& b);
   void forget_cells() { store_.clear(); }
   /// Like forget_cells(), but also releases the memory.
-  void give_back() { store_.give_back(); }
+  void release() { store_.release(); }
 
  private:
   /// A ping while its view is being filled.
