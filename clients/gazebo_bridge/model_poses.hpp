@@ -15,8 +15,8 @@
 namespace sonar::clients {
 
 struct FollowedModel {
-  std::string model;    // its name in the world
-  std::string vehicle;  // sonard's name; empty = the only one
+  std::string model;    // name of the model in Gazebo's world
+  std::string vehicle;  // name of the vehicle in sonard; empty = the only one
   std::optional<std::int64_t> last_ns;
 };
 
@@ -29,7 +29,7 @@ inline Result<FollowedModel> parse_followed(const std::string& text) {
   return followed;
 }
 
-/// One pose; ENU_FLU, stamped with the simulation's time. No line for a non-finite pose or an invalid rotation.
+/// The line of a pose, in ENU and FLU axes, with the simulation's time; nullopt if the pose is not finite or not a rotation.
 inline std::optional<std::string> json_line(const Pose& body_in_world, std::int64_t stamp_ns, const std::string& vehicle) {
   const Vec3d& p = body_in_world.position_m;
   const Quatd& q = body_in_world.orientation;

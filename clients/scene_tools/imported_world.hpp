@@ -44,7 +44,7 @@ struct ImportedWorld {
   std::string format;  // "Gazebo SDF 1.9", "URDF"
   std::vector<ImportedModel> models;
   std::vector<PlacedShape> shapes;
-  std::vector<std::shared_ptr<const XmlFile>> files;  // that the places above are in
+  std::vector<std::shared_ptr<const XmlFile>> files;  // the files to which the elements and lines above belong
 };
 
 /// Access of a reader to referenced files. `find` returns an empty path for a missing file.

@@ -33,8 +33,8 @@ std::string table(const std::vector<Row>& rows, const std::vector<std::size_t>& 
     std::string line;
     for (std::size_t c = 0; c < row.size(); ++c) {
       const std::string blanks(width[c] - row[c].size(), ' ');
-      const bool stands_right = std::find(right.begin(), right.end(), c) != right.end();
-      line += (c ? "  " : "") + (stands_right ? blanks + row[c] : row[c] + blanks);
+      const bool is_right_aligned = std::find(right.begin(), right.end(), c) != right.end();
+      line += (c ? "  " : "") + (is_right_aligned ? blanks + row[c] : row[c] + blanks);
     }
     line.erase(line.find_last_not_of(' ') + 1);
     out += line + "\n";

@@ -7,7 +7,7 @@
 
 namespace sonar::scene_tools {
 
-/// Lengths that a file does not have. URDF knows no defaults.
+/// Where the values of missing lengths come from. URDF has no defaults.
 enum class Defaults { of_sdf, none };
 
 /// Reads the shape inside <geometry>, whose sizes are in child elements (SDF) or attributes (URDF). Returns nothing for other
@@ -18,7 +18,7 @@ std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, 
 /// Adds a shape; more than max_shapes are an error.
 void add_shape(ImportedWorld& world, PlacedShape shape, Findings& findings);
 
-/// "sensor "camera"": name of an element in the list of omissions.
+/// The name of an element in the list of omissions, such as: sensor "camera".
 std::string called(const Element& element);
 
 Result<ImportedWorld> read_sdf(std::shared_ptr<const XmlFile> file, const Library& library, const ReadOptions& options,

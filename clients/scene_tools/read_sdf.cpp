@@ -77,7 +77,7 @@ class SdfReader {
         findings_.leave_out(element.place(), called(element));
     const std::vector<Element> parts = link.children(wanted);
     if (parts.empty() && link.child(other))
-      findings_.leave_out(link.place(), called(link) + ": has " + other + " shapes only; --" + other + " takes those");
+      findings_.leave_out(link.place(), called(link) + ": has " + other + " shapes only; --" + other + " imports them");
     if (parts.empty()) return;
     const std::string name(link.attribute("name"));
     const Pose link_in_model = frame_in_model(model, name, link.place(), findings_);

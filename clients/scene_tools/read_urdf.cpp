@@ -72,7 +72,7 @@ class UrdfReader {
     const std::string_view type = element.attribute("type");
     if (type != "fixed") findings_.leave_out(element.place(), called(element) + " (" + plain(type) + "): stays at zero");
     if (!joint_of_.try_emplace(joint.child, joints_.size()).second)
-      return findings_.fail(element.place(), std::string("link \"") + plain(joint.child) + "\" hangs on two joints");
+      return findings_.fail(element.place(), std::string("link \"") + plain(joint.child) + "\" is the child of two joints");
     children_[joint.parent].push_back(joints_.size());
     joints_.push_back(joint);
   }
@@ -105,7 +105,7 @@ class UrdfReader {
     const char* other = options_.collisions ? "visual" : "collision";
     const std::vector<Element> parts = link.children(wanted);
     if (parts.empty() && link.child(other))
-      findings_.leave_out(link.place(), called(link) + ": has " + other + " shapes only; --" + other + " takes those");
+      findings_.leave_out(link.place(), called(link) + ": has " + other + " shapes only; --" + other + " imports them");
     const std::string name(link.attribute("name"));
     for (const Element& part : parts) {
       if (findings_.failed()) return;

@@ -162,7 +162,7 @@ fs::path find_in_packages(const fs::path& wanted, const std::vector<fs::path>& f
   return {};
 }
 
-/// The folders in an environment variable, between colons.
+/// The folders in an environment variable, separated by colons.
 std::vector<fs::path> folders_of(const char* variable) {
   std::vector<fs::path> folders;
   const char* value = std::getenv(variable);

@@ -22,7 +22,7 @@ struct FuelAddress {
 /// Parses an address without scheme and escapes, also in the form of web pages (app.gazebosim.org/OWNER/fuel/models/NAME).
 std::optional<FuelAddress> fuel_address(std::string_view address);
 
-/// Returns the number that the whole text is, or -1.
+/// Returns the number if the whole text is one, else -1.
 int version_number(std::string_view text);
 
 /// Returns the name of a model in small letters: "coast water" for ".../models/Coast%20Water/2".

@@ -227,7 +227,7 @@ class SceneWriter {
   const WriteOptions& options_;
   std::string out_;
   std::set<std::string> names_;
-  std::map<std::string, int> last_number_;  // highest number appended so far to a name that was taken
+  std::map<std::string, int> last_number_;  // highest number appended so far to a name in use
   std::map<std::size_t, std::size_t> shapes_of_model_;
   std::map<Key, std::size_t> shapes_of_link_;
   std::vector<std::size_t> links_of_model_;

@@ -90,7 +90,7 @@ class Findings {
   std::unordered_set<std::string> seen_;
 };
 
-/// Parses numbers between blanks. Fails unless there are exactly `count` numbers, all within -1e9 to 1e9.
+/// Parses numbers separated by blanks. Fails unless there are exactly `count` numbers, all within -1e9 to 1e9.
 std::vector<double> read_numbers(std::string_view text, std::size_t count, const Place& at, std::string_view what,
                                  Findings& findings);
 

@@ -52,7 +52,7 @@ void put(Bytes& out, T value) {
   for (std::size_t i = 0; i < sizeof bits; ++i) out.push_back(static_cast<std::uint8_t>(bits >> (8 * i)));
 }
 
-/// A 16-bit length and that number of bytes of UTF-8; longer texts are truncated.
+/// Appends a 16-bit length and that number of bytes of UTF-8; longer texts are truncated.
 inline void put_text(Bytes& out, const std::string& text) {
   const std::size_t length = text.size() < 65535 ? text.size() : 65535;
   put(out, static_cast<std::uint16_t>(length));

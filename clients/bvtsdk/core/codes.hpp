@@ -56,7 +56,7 @@ enum Code : int {
 /// The name of a return code (BVTError_GetName), also for numbers that are not return codes. Returns a name of the SDK's
 /// constants such as "BVT_SUCCESS", and "BVT_UNKNOWN_ERROR" for an unknown number. Never null; always valid.
 const char* error_name(int code);
-/// Its text (BVTError_GetString), which is sonard's: one sentence with the cause and the remedy.
+/// The text of a return code (BVTError_GetString). The texts are ours: one sentence with the cause and the remedy.
 const char* error_text(int code);
 
 }  // namespace sonar::bvt

@@ -34,16 +34,16 @@ class Handles {
   std::size_t live();
 
  private:
-  struct Place {
+  struct Slot {
     std::shared_ptr<Object> object;
     std::uint32_t generation = 1;
   };
-  Place* place_of(const void* handle);
+  Slot* slot_of(const void* handle);
   std::shared_ptr<Object> find_any(const void* handle);
   std::shared_ptr<Object> remove_any(const void* handle);
 
   std::mutex mutex_;
-  std::vector<Place> places_;
+  std::vector<Slot> slots_;
   std::deque<std::uint32_t>
       free_;  // indices are reused in the order in which they were freed, so that stale handles are detected for a long time
   std::size_t live_ = 0;

@@ -12,8 +12,8 @@
 namespace sonar::bvt {
 namespace {
 
-constexpr double most_pixels = 32e6;   // limit for any image
-constexpr double polite_pixels = 1e6;  // default size limit: clients keep 4 bytes per pixel on an 8 MB stack (verified)
+constexpr double most_pixels = 32e6;  // limit for any image
+constexpr double usual_pixels = 1e6;  // default size limit: clients keep 4 bytes per pixel on an 8 MB stack (verified)
 
 int to_int(double x) {
   constexpr double limit = std::numeric_limits<int>::max();
@@ -51,8 +51,8 @@ int rows_by_resolution(const Extent& extent, const ImageSettings& settings, doub
     }
     rows = std::clamp(std::round((extent.stop_m - extent.start_m) / extent.bin_m), 200.0, 1000.0);
   }
-  const double polite = fixed_columns > 0 ? polite_pixels / fixed_columns : std::sqrt(polite_pixels / columns_per_row);
-  return std::max(1, to_int(std::min(std::round(rows), std::floor(polite))));
+  const double usual = fixed_columns > 0 ? usual_pixels / fixed_columns : std::sqrt(usual_pixels / columns_per_row);
+  return std::max(1, to_int(std::min(std::round(rows), std::floor(usual))));
 }
 
 /// Verified, by a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m

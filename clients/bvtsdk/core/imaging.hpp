@@ -16,8 +16,9 @@ namespace sonar::bvt {
 
 enum class ImageType { xy = 0, r_theta = 1 };
 
-/// Rows of an image (our choice): low 256, medium 512, high 1000; automatic as many as the ping has bins, 200 to 1000, and with
-/// XY no more than make a million pixels, because a client keeps whole images on its stack. Off: as automatic.
+/// Rows of an image (our choice). low: 256; medium: 512; high: 1000. automatic: as many as the ping has bins, but from 200 to
+/// 1000, and for XY images fewer if they would have over a million pixels, because clients keep whole images on their stack.
+/// off: the same as automatic.
 enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 
 /// The place where an XY image begins: the nearest corners of the sector, or the sonar.
@@ -53,9 +54,9 @@ struct ImageGeometry {
   float fov_min_deg = 0, fov_max_deg = 0;
   double start_m = 0, stop_m = 0;  // ends of the shown area, with the sound speed override
 
-  /// Any row and column, also outside the image: clients ask one past the end (verified). R-Theta labels a column by its
-  /// left edge (verified). XY counts whole pixels from the origin (verified): x = (col - origin_col) * range_resolution_m to
-  /// starboard, y = (origin_row - row) * range_resolution_m ahead.
+  /// Row and column may lie outside the image, because clients pass the index after the last (verified). R-Theta labels a column
+  /// by its left edge (verified). XY counts whole pixels from the origin (verified): x = (col - origin_col) * range_resolution_m
+  /// to starboard, y = (origin_row - row) * range_resolution_m ahead.
   double pixel_range_m(int row, int col) const;
   double pixel_bearing_deg(int row, int col) const;
   std::size_t pixel_count() const { return static_cast<std::size_t>(height) * static_cast<std::size_t>(width); }

@@ -73,7 +73,7 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   put_text(hello, "libbvtsdk");
   const int greeted = fresh->ask(FrameType::hello, hello, answer, patience.connect);
   if (greeted == bad_packet_type)
-    return refuse(greeted, "what answers at " + there + " is not sonard's BlueView link; check the port");
+    return refuse(greeted, "the program at " + there + " does not use sonard's BlueView link; check the port");
   if (greeted == bad_packet_version)
     return refuse(greeted,
                   "sonard at " + there + " uses another version of the link; use the library and sonard of the same release");
@@ -88,7 +88,7 @@ Code Link::open(const std::string& endpoint, int abi, std::unique_ptr<Link>& lin
   std::optional<SonarDescription> description = decode_description(answer);
   if (!description)
     return refuse(bad_packet_type,
-                  "what answers at " + there + " does not describe a sonar; use the library and sonard of the same release");
+                  "the program at " + there + " does not describe a sonar; use the library and sonard of the same release");
   fresh->may_be_silent_ = description->may_be_silent();
   sonar = std::move(*description);
   link = std::move(fresh);

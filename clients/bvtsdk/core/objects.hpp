@@ -34,8 +34,7 @@ struct DiscoveryObject : Object {
   DiscoveryAgent agent;
 };
 
-/// Image settings of a head. Each ping keeps a copy of them from when it was made, for BVTPing_GetImage and related
-/// functions.
+/// Image settings of a head. Each ping keeps a copy of the settings at its time, for BVTPing_GetImage and related functions.
 struct HeadImaging {
   ImageType type = ImageType::xy;
   ImageSettings image;

@@ -10,7 +10,7 @@
 namespace sonar::bvt {
 namespace {
 
-constexpr std::uint32_t one = 32768;  // a weight of 1: products with 16 bits still fit 32
+constexpr std::uint32_t one = 32768;  // the weight 1; its products with 16-bit samples fit in 32 bits
 
 struct Place {
   int low;

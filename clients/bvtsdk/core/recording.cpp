@@ -19,7 +19,7 @@ constexpr std::size_t index_tail_size = 8 + crc_size;  // the index frame's own 
 
 std::uint32_t checksum(BytesView header, BytesView payload) {
   auto crc = crc32(0, header.data, static_cast<uInt>(header.size));
-  if (payload.size > 0) crc = crc32(crc, payload.data, static_cast<uInt>(payload.size));  // crc32(..., nullptr, 0) starts anew
+  if (payload.size > 0) crc = crc32(crc, payload.data, static_cast<uInt>(payload.size));  // crc32(..., nullptr, 0) would return 0
   return static_cast<std::uint32_t>(crc);
 }
 
@@ -123,7 +123,7 @@ Code RecordingWriter::close() {
   }
   put(index, size_);
   Code code = put_frame(FrameType::index, index, 0, 0);
-  if (code == bad_parameter) code = success;  // over about three million frames: readers scan the file
+  if (code == bad_parameter) code = success;  // no index of over about three million frames: readers scan the file
   if (file_ && std::fclose(file_.release()) != 0) code = file_write;
   return code;
 }

@@ -2,10 +2,10 @@
 // the data of NET mode. The vendor's .son files are proprietary and are refused.
 //
 // File: "BVER", u16 version = 2 (1: samples are not packed), u16 0; then frames (frame.hpp), each followed by the CRC-32 of its
-// header and payload: HELLO_OK first, and again before a ping that was made with other settings, then PING_DATA, NAV_DATA (u16
-// bitmap, values, f64 time) and EVENT_MARK (f64 time, text key, text) in order of arrival. A closed file ends with an index
-// frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at last the u64 offset of the index
-// frame itself. Without it the file is scanned up to the last whole frame.
+// header and payload. The first frame is HELLO_OK. PING_DATA, NAV_DATA (u16 bitmap, values, f64 time) and EVENT_MARK (f64 time,
+// text key, text) follow in order of arrival. Another HELLO_OK precedes each ping with other settings than the ping before. A
+// closed file ends with an index frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at
+// last the u64 offset of the index frame itself. Without the index, readers scan the file up to the last whole frame.
 #pragma once
 
 #include <cstdint>
