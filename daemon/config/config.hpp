@@ -27,7 +27,7 @@
 
 namespace sonar {
 
-// Enums, each with the names of its values in a configuration (config/enum_names.hpp).
+// Enums, each with the names of its values in a configuration (core/base/enum_names.hpp).
 enum class WhenClientsFull { close_new, take_over, queue };
 inline constexpr std::array<std::string_view, 3> when_clients_full_names = {"close_new", "take_over", "queue"};
 enum class OnStale { hold, blank, stop };

@@ -14,7 +14,7 @@ using text::Node;
 using text::Range;
 
 constexpr Range finite_place{.min = -1e7, .max = 1e7};
-/// An option's value; errors name its place in the file.
+/// An option's value; errors state its position in the file.
 std::string read_option(const Node& value, const protocol::Option& option) {
   if (option.allowed.empty()) {
     const std::string text = value.text(64);

@@ -73,7 +73,7 @@ std::string read_name_text(const Node& node, std::size_t longest) {
   return name;
 }
 
-/// Reads the name of one of several entries; `taken` has the names of those before it.
+/// Reads the name of one of several entries; `taken` contains the names of earlier entries.
 Node read_name(Map& map, std::size_t longest, std::set<std::string>& taken, std::string& name) {
   const Node node = map.required("name");
   name = read_name_text(node, longest);

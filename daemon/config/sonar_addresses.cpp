@@ -66,7 +66,7 @@ struct Listening {
   bool is_shared = false;  // may be shared with other listeners for which this is true
 };
 /// True if two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
-bool meet(const Listening& a, const Listening& b) {
+bool conflict(const Listening& a, const Listening& b) {
   const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
   const bool same_kind = (a.udp && b.udp && !(a.is_shared && b.is_shared)) || (a.tcp && b.tcp);
   return same_ip && a.at.port == b.at.port && same_kind;
@@ -111,7 +111,7 @@ Result<void> check_apart(const Config& moved, const Config& unmoved) {
     }
   for (const Listening& a : listening_of(moved))
     for (const Listening& b : listening_of(unmoved))
-      if (meet(a, b)) return cannot_move(a.key + " would be at " + text_of(a.at) + ", where " + b.key + " is" + instead);
+      if (conflict(a, b)) return cannot_move(a.key + " would be at " + text_of(a.at) + ", where " + b.key + " is" + instead);
   return {};
 }
 
@@ -123,7 +123,7 @@ Result<void> check_ports_apart(const Config& config) {
   for (Listening& listening : listening_of(config)) all.push_back(std::move(listening));
   for (auto b = all.begin(); b != all.end(); ++b)
     for (auto a = all.begin(); a != b; ++a)
-      if (meet(*a, *b) && !a->gives_way && !b->gives_way)
+      if (conflict(*a, *b) && !a->gives_way && !b->gives_way)
         return failure(ErrorKind::config, config.source + ": " + a->key + " and " + b->key + " would both listen at " +
                                               text_of(b->at) + "; give each its own address or port");
   return {};

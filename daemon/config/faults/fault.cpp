@@ -160,8 +160,8 @@ class Check {
     if (at.every && (*at.every == 0 || *at.every > most_pings)) wrong("at: every must be from 1 to 1000000000");
     if (at.phase != 0 && !at.every) wrong("at: phase belongs to every");
     if (at.every && at.phase >= std::max<std::uint64_t>(*at.every, 1))
-      wrong("at: phase must be below every, " + std::to_string(*at.every) + ": no ping's number leaves " +
-            std::to_string(at.phase));
+      wrong("at: phase must be below every, " + std::to_string(*at.every) + ": no ping number modulo " +
+            std::to_string(*at.every) + " is " + std::to_string(at.phase));
     if (at.time_s && !(*at.time_s >= 0 && *at.time_s <= 1e9)) wrong("at: time_s must be from 0 to 1e9 s since the start");
     if (at.probability && !(*at.probability >= least_probability && *at.probability <= 1))
       wrong("at: probability must be from 1e-9 to 1");

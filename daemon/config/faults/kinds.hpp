@@ -97,7 +97,7 @@ enum class FaultEffect {
   older_part,
   late_part,
   leave_group,
-  // not from inside the daemon
+  // effects that the daemon cannot produce by itself
   harness,
 };
 

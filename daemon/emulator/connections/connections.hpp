@@ -37,7 +37,7 @@ struct Connection {
   const protocol::Port* port = nullptr;  // one of the vendor's ports
   std::unique_ptr<protocol::Dialogue> dialogue;
   Outbox outbox;
-  /// Receivers. Of a client: the lists that it requested, one per stream. Of a stream: the device's own list.
+  /// Lists of receivers: for a client, those that it requested, one per stream; for a stream, the device's own list.
   std::vector<protocol::SetReceivers> receivers;
   struct Held {  // held back by a fault
     Outbox::Message ping;

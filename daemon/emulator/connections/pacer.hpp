@@ -63,7 +63,7 @@ class Pacer {
   bool running_ = false, triggered_ = false, tick_waits_ = false, trigger_waits_ = false, has_fired_ = false;
   std::chrono::nanoseconds period_{0}, travel_{0};  // travel_: travel time of sound to the range and back
   Time start_{};                                    // start of the grid
-  std::int64_t index_ = 0;                          // index of the next tick on the grid, behind one that waits
+  std::int64_t index_ = 0;                          // index of the next tick on the grid; a waiting tick comes before it
   Time trigger_at_{};
   Time last_tick_{}, home_at_{};  // time of the last ping; time when its sound has returned
   std::uint64_t ticks_ = 0;

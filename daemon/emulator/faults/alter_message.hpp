@@ -51,10 +51,10 @@ struct MessageContext {
   const protocol::Bytes* before = nullptr;  // for splice: the previous message; may be null
 };
 
-/// True if a fault acted on a message, and at which byte, if that is not the first changed byte (for a pause or an end).
+/// The result of a fault for a message.
 struct Touch {
-  bool acted = true;
-  std::optional<std::size_t> place = {};
+  bool acted = true;                      // false: the message stays as it was
+  std::optional<std::size_t> place = {};  // the byte at which the message pauses or ends; nullopt: at the first changed byte
 };
 Touch alter_message(const Fault& fault, const MessageContext& context, MessageEdit& message);
 

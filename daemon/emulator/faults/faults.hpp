@@ -85,7 +85,7 @@ class Faults {
     const Fault* fault;
     bool active, over;
     std::uint64_t injections;
-    Time expires;  // Time::max() = not by time
+    Time expires;  // Time::max() = no time limit
   };
   std::vector<Listed> list() const;
   std::size_t active_count() const;
@@ -108,7 +108,7 @@ class Faults {
   bool leaves_group() const;
   /// Changes a message before it is sent to a client. Returns false if it must not be sent.
   bool shape(const Connection& to, Outbox::Message& message, Time now);
-  /// True if and until when a ping is held back before it enters a client's outbox.
+  /// Whether a ping is held back before it enters a client's outbox, and the time or number of pings for which it is held.
   struct Hold {
     enum class Kind { pass, until, after_next, collect } kind = Kind::pass;
     Time until{};

@@ -75,7 +75,7 @@ void PingSource::forget_settings(Time now) {
 
 void PingSource::restart(bool clock_only, Time now) {
   sonar_.state.powered_up_at = now;
-  pacer_.forget_tick();  // it is older
+  pacer_.forget_tick();  // a waiting tick is older than the restart
   if (clock_only) return;
   sonar_.state.last_ping = ping_number_ = 0;
   forget_settings(now);

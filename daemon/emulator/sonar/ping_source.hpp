@@ -82,7 +82,7 @@ class PingSource {
   PingRequest request_at(Time at, const protocol::RequestPing& aim) const;
   void request_ping(Time at, Actions& actions);
   PingNumber next_number();
-  /// Like the ping that is being computed, those that are not sent yet are lost with the clients that requested them.
+  /// Drops pings that wait to be sent, because the clients that requested them have left.
   void drop_unsent();
   void follow_water();
   void note_water(const PingRequest& computed, Time now, Actions& actions);
@@ -93,7 +93,7 @@ class PingSource {
 
   Pacer pacer_;
   PingSettings settings_;
-  protocol::RequestPing aim_;  // the last
+  protocol::RequestPing aim_;  // the last request
   GainAssist gain_assist_;
   bool asked_ = false;  // settings were requested since the first client or receiver connected
   std::string asked_by_;

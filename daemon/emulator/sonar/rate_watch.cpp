@@ -48,7 +48,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
                           : has_others ? ", and other sonars are computed in between"
                                        : text::format(", single pings up to %.0f ms", 1e3 * longest_s);
   return text::format(
-      "computing takes %.0f ms a ping%s: %.*f Hz at most here, %.3g Hz are asked for; ticks are skipped: ask for "
+      "computing takes %.0f ms a ping%s: %.*f Hz at most here, %.3g Hz are requested; ticks are skipped: request "
       "fewer beams, less range or a lower rate, or give more engine.threads",
       1e3 * mean_s, why.c_str(), possible_hz < 10 ? 1 : 0, possible_hz, rate_hz);
 }

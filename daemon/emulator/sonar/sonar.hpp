@@ -29,8 +29,8 @@ class Sonar {
 
   // ---- connections
 
-  /// A client or an observer at a port of kind tcp_stream, by default the vendor's first, or a host at one of kind udp_dialogue.
-  /// Serve, KeepWaiting or Refuse is among the actions.
+  /// Reports a client or observer at a port of kind tcp_stream (null: the vendor's first), or a host at one of kind
+  /// udp_dialogue. Serve, KeepWaiting or Refuse is among the actions.
   Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
   /// Call it when a port of kind udp_stream is open: next_message() then has messages for its receivers under this id.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
@@ -48,8 +48,8 @@ class Sonar {
   void on_written(ConnectionId id, const Outbox::Message& message, Time now) { delivery_.on_written(id, message, now); }
   /// Reports that a stream's last message had no receiver, or that none of its datagrams could be sent.
   void on_not_sent(ConnectionId id) { delivery_.on_not_sent(id); }
-  /// Ends the connection after the message that is being written. A host by datagrams, which has no connection, has left then:
-  /// it counts as a client no more, because the request of the next host may arrive before on_closed().
+  /// Ends the connection after the message that is being written. A host that sends datagrams stops being a client at once,
+  /// because the request of the next host may arrive before on_closed().
   Actions finish(ConnectionId id, Time now);
   /// Reports that a connection, served or waiting, is closed. `why` is for the log.
   Actions on_closed(ConnectionId id, const std::string& why, Time now, bool by_client = false);

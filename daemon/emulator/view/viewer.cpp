@@ -66,7 +66,7 @@ bool Viewer::has_room_for_message(Moment now) {
 
 /// Reports an unreadable message; a viewer with too many of them is disconnected.
 void Viewer::complain(const std::string& why) {
-  say_status(foxglove::StatusLevel::error, why);
+  send_status(foxglove::StatusLevel::error, why);
   if (++complaints_ >= most_complaints) close_ = CloseCode::policy;
 }
 
@@ -76,12 +76,12 @@ void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
   for (const auto& [id, channel] : word.subscriptions) {
     const ViewChannel* const offered = host_.channel(channel);
     if (offered == nullptr) {
-      say_status(foxglove::StatusLevel::error, "there is no channel " + std::to_string(channel));
+      send_status(foxglove::StatusLevel::error, "there is no channel " + std::to_string(channel));
     } else if (slots_.contains(id) || subscribes(channel)) {
-      say_status(foxglove::StatusLevel::warning,
-                 "subscription " + std::to_string(id) + " to channel " + std::to_string(channel) + " is there already; ignored");
+      send_status(foxglove::StatusLevel::warning,
+                  "subscription " + std::to_string(id) + " to channel " + std::to_string(channel) + " exists already; ignored");
     } else if (slots_.size() >= most_subscriptions) {
-      say_status(foxglove::StatusLevel::error, "more than 256 subscriptions");
+      send_status(foxglove::StatusLevel::error, "more than 256 subscriptions");
     } else {
       const Moment own = offered->kind == ViewChannel::Kind::picture ? interval_of(rights_.most_hz) : Moment{0};
       slots_[id] = {channel, offered->kind, std::max(interval_of(offered->most_hz), own), offered->deepest, {}, {}};
@@ -93,7 +93,7 @@ void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
 
 void Viewer::on_word(const foxglove::Unsubscribe& word, Moment) {
   for (const std::uint32_t id : word.subscriptions)
-    if (slots_.erase(id) == 0) say_status(foxglove::StatusLevel::warning, "there is no subscription " + std::to_string(id));
+    if (slots_.erase(id) == 0) send_status(foxglove::StatusLevel::warning, "there is no subscription " + std::to_string(id));
 }
 
 void Viewer::on_word(const foxglove::GetParameters& word, Moment) {
@@ -127,7 +127,8 @@ void Viewer::on_word(const foxglove::WatchParameters& word, Moment) {
 }
 
 void Viewer::on_word(const foxglove::Incapable& word, Moment) {
-  say_status(foxglove::StatusLevel::error, word.op + " needs the capability " + word.capability + ", which sonard does not have");
+  send_status(foxglove::StatusLevel::error,
+              word.op + " needs the capability " + word.capability + ", which sonard does not have");
 }
 
 void Viewer::on_word(const foxglove::UnknownWord& word, Moment) {
@@ -136,7 +137,7 @@ void Viewer::on_word(const foxglove::UnknownWord& word, Moment) {
 
 /// Warns once for each connection.
 void Viewer::warn_ignored(const std::string& what) {
-  if (!std::exchange(warned_unknown_, true)) say_status(foxglove::StatusLevel::warning, what);
+  if (!std::exchange(warned_unknown_, true)) send_status(foxglove::StatusLevel::warning, what);
 }
 
 // ---- from the host
@@ -153,8 +154,8 @@ void Viewer::add_word(ViewMessage word) {
 
 /// Shows a status that next() removes after `lasts`. If 64 such statuses exist, the new one is not removed.
 void Viewer::show_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts) {
-  if (passing_.size() >= most_passing && !passing_.contains(id)) return say_status(foxglove::StatusLevel::error, text);
-  say_status(foxglove::StatusLevel::error, text, id);
+  if (passing_.size() >= most_passing && !passing_.contains(id)) return send_status(foxglove::StatusLevel::error, text);
+  send_status(foxglove::StatusLevel::error, text, id);
   passing_[id] = now + lasts;
 }
 
@@ -199,7 +200,7 @@ void Viewer::merge(Slot& slot, const ViewPayloadPointer& payload, Moment now) {
   if (!slot.is_due(now)) return;
   ++dropped_[slot.channel];
   if (slot.kind != ViewChannel::Kind::picture) return;
-  if (!slow_since_) say_status(foxglove::StatusLevel::warning, too_slow, slow_id);
+  if (!slow_since_) send_status(foxglove::StatusLevel::warning, too_slow, slow_id);
   slow_since_ = now;
 }
 
@@ -211,7 +212,7 @@ void Viewer::answer(const foxglove::ServiceCall& answer) {
 void Viewer::fail(const foxglove::ServiceCall& call, const std::string& why) {
   open_calls_ -= std::min<std::size_t>(open_calls_, 1);
   say(foxglove::service_failure(call.service, call.call, why));
-  say_status(foxglove::StatusLevel::error, why);  // Lichtblick shows this status but ignores the failure
+  send_status(foxglove::StatusLevel::error, why);  // Lichtblick shows this status but ignores the failure
 }
 
 void Viewer::on_parameters(std::span<const foxglove::Parameter> changed) {

@@ -110,7 +110,7 @@ class Viewer {
   void greet(std::string word) { words_.push_back({true, bytes_of(word), {}}); }
   void say(std::string word);
   void say_frame(wire::Bytes frame);
-  void say_status(foxglove::StatusLevel level, const std::string& text, const std::string& id = {}) {
+  void send_status(foxglove::StatusLevel level, const std::string& text, const std::string& id = {}) {
     say(foxglove::status(level, text, id));
   }
   /// Shows a status, which is removed after `lasts`.

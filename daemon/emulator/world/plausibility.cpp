@@ -43,8 +43,8 @@ constexpr const char* mount_cure =
     "rpy_deg is [roll, pitch, yaw]: a roll near 180, or a pitch beyond 90, turns it over and swaps port and starboard; to look "
     "aft, set yaw 180";
 constexpr const char* origin_cure =
-    "vehicles with latitudes and longitudes are placed about world.origin: does it belong to this scene? A height map in degrees "
-    "or UTM without `origin` and `centred` is too";
+    "vehicles with latitudes and longitudes are placed relative to world.origin, and so is a height map in degrees or UTM "
+    "without `origin` and `centred`: does world.origin belong to this scene?";
 constexpr const char* lift_cure = "lower the scene (sonarctl scene import --offset 0,0,-10) or the poses of its objects";
 
 struct Doubt {
@@ -52,7 +52,7 @@ struct Doubt {
   const char* cure;
 };
 
-/// The lowest point of all ground above or below a place; nullopt without ground.
+/// The lowest point of all ground above or below a position; nullopt without ground.
 std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around) {
   std::optional<double> lowest;
   for (const Extent& ground : around.ground)
@@ -70,7 +70,7 @@ Location judge_location(Vec3d sonar_m, const Surroundings& around) {
   return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Location::far_away : Location::fine;
 }
 
-/// The first implausible place of a carrier's sonar.
+/// The first implausible position of a carrier's sonar.
 std::optional<Vec3d> doubtful_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
   for (const Pose& mount : carrier.mounts)
     if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_location(at_m, around) != Location::fine)
@@ -148,7 +148,7 @@ std::optional<Doubt> doubt_of_all(const std::vector<Pose>& poses, const motion::
   if (first == poses.end()) return std::nullopt;
   std::optional<Doubt> doubt = doubt_of(*first);
   const auto count = static_cast<std::size_t>(std::count_if(first, poses.end(), is_doubtful));
-  const char* which = poses.size() < plan.trajectory->size() ? "poses looked at" : "poses";
+  const char* which = poses.size() < plan.trajectory->size() ? "checked poses" : "poses";
   if (doubt) doubt->text += format(", in %zu of %zu %s of ", count, poses.size(), which) + plan.file;
   return doubt;
 }

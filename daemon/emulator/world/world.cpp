@@ -17,7 +17,7 @@ constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, near e
 constexpr double smallest_orbit_m = 4;
 constexpr double orbit_speed_mps = 0.5;
 constexpr std::chrono::nanoseconds future_allowed = std::chrono::seconds(1);
-constexpr std::chrono::nanoseconds most_out_of_order = std::chrono::seconds(1);  // an older stamp is of a clock that was set back
+constexpr std::chrono::nanoseconds most_out_of_order = std::chrono::seconds(1);  // older: the clock was set back
 
 std::string joined_names(const std::vector<std::string>& names) {
   std::string all;
@@ -83,7 +83,7 @@ bool World::continues(const Track& track, const PoseSample& sample, const Sender
   return !is_set_back && now - track.last_arrival <= rules_.stale_after;
 }
 
-/// Notes who sends, and returns true once while two senders alternate.
+/// Stores the sender of a pose, and returns true once while two senders alternate.
 bool World::has_rival(Track& track, const Sender& sender, Time now) const {
   const bool silent = now - track.last_arrival > rules_.stale_after;
   if (silent) {

@@ -110,7 +110,7 @@ class World {
   /// The time to which time may advance: the minimum of the vehicles' newest stamps, ignoring vehicles that lag by more than
   /// stale_after. nullopt before the first pose.
   std::optional<Time> followed_until() const;
-  /// By how much stamps have jumped ahead since the last call, for example at the first pose. Orbits and trajectories do not
+  /// The time that stamps have skipped since the last call, for example at the first pose. Orbits and trajectories do not
   /// advance by it.
   std::chrono::nanoseconds take_skipped();
 

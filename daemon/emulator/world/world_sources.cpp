@@ -53,8 +53,8 @@ bool World::is_followed(const Track& track, Time newest) const {
 
 /// Offset from the stamps of a sender to sonard's time. The candidates are the vehicle's present offset, 0, and the offsets of
 /// other vehicles; the first one that places the stamp near the newest stamp is used. If none does, this is the first pose, or
-/// the sender's clock has jumped. Then a stamp ahead skips the time between if no other vehicle is followed; any other stamp
-/// becomes the present time.
+/// the sender's clock has jumped. In this case, if the stamp is ahead and no other vehicle is followed, sonard's time jumps to
+/// the stamp; otherwise the stamp counts as the present time.
 World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
   const Time newest = newest_followed_.value_or(now);
   const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });

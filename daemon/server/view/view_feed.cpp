@@ -70,7 +70,7 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   for (const auto& [id, channel] : channels_) channels.push_back(channel.advertised);
   advertise(viewer, channels);
   viewer.greet(services_word());
-  if (!no_playback.empty()) viewer.say_status(foxglove::StatusLevel::warning, no_playback);
+  if (!no_playback.empty()) viewer.send_status(foxglove::StatusLevel::warning, no_playback);
   if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())
     viewer.say_frame(foxglove::playback_frame(watch->second.state(of_.clock.now())));
   of_.fleet.tap_pings([this](const Device& of, const PingQueued& queued) { on_ping(of, queued); },

@@ -61,7 +61,7 @@ bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& a
     if (asked.seeks) op.position_s = seconds(std::clamp(asked.to, Time{}, watch->second.end()).time_since_epoch());
     why = perform_at_once(op, viewer);
   }
-  if (!why.empty()) viewer.say_status(foxglove::StatusLevel::error, why);
+  if (!why.empty()) viewer.send_status(foxglove::StatusLevel::error, why);
   watch_playback(&viewer);
   watch = watches_.find(viewer.playback());  // watches without viewers have been removed
   if (watch == watches_.end()) return false;

@@ -160,7 +160,7 @@ TEST(FaultRecords, ThatNeverActAreRefused) {
   FaultRecord r = record("L05");
   r.at.every = 1;
   r.at.phase = 5;
-  EXPECT_THAT(text(r), HasSubstr("phase must be below every, 1: no ping's number leaves 5"));
+  EXPECT_THAT(text(r), HasSubstr("phase must be below every, 1: no ping number modulo 1 is 5"));
   r.at.every = 5;
   EXPECT_THAT(text(r), HasSubstr("phase must be below every"));
   r.at.every = 6;

@@ -29,7 +29,7 @@ struct Sonar {
 TEST(RateWatch, SaysOnceWhatComputingAllows) {
   Sonar slow{40, 0.052, 0};
   slow.ping(200);
-  EXPECT_THAT(slow.said, StartsWith("computing takes 52 ms a ping: 19 Hz at most here, 40 Hz are asked for"));
+  EXPECT_THAT(slow.said, StartsWith("computing takes 52 ms a ping: 19 Hz at most here, 40 Hz are requested"));
   EXPECT_EQ(std::count(slow.said.begin(), slow.said.end(), '\n'), 1);
 }
 
@@ -61,7 +61,7 @@ TEST(RateWatch, DoesNotBlameOthersWhereThereAreNone) {
     uneven.ping_s = 0.09;
     uneven.ping(1);
   }
-  EXPECT_THAT(uneven.said, HasSubstr(" ms a ping, single pings up to 90 ms: 15 Hz at most here, 20 Hz are asked for"));
+  EXPECT_THAT(uneven.said, HasSubstr(" ms a ping, single pings up to 90 ms: 15 Hz at most here, 20 Hz are requested"));
 }
 
 TEST(RateWatch, AnotherRateIsLookedAtAnew) {

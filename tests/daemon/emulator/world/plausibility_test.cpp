@@ -130,7 +130,7 @@ TEST(Plausibility, ASceneFarFromTheOriginOfLatitudesIsToldBeforeTheFirstPose) {
   config.origin = Geodetic{rad_from_deg(60), rad_from_deg(15), 0};
   EXPECT_THAT(notes(config, far),
               ElementsAre(AllOf(HasSubstr("the scene is 6670.2 km from world.origin; vehicles with latitudes"),
-                                HasSubstr("A height map in degrees or UTM without `origin` and `centred` is too"))));
+                                HasSubstr("a height map in degrees or UTM without `origin` and `centred`"))));
   EXPECT_THAT(notes(config, bed_scene()), IsEmpty());
   far.objects[0].in_world.position_m = {900, 0, -5};
   EXPECT_THAT(notes(config, far), IsEmpty()) << "a drive away";
@@ -332,7 +332,7 @@ TEST(Plausibility, AVehicleThatHoldsItsHeadingHasDegrees) {
 TEST(Plausibility, OfALongTrajectorySomePosesAreLookedAt) {
   std::string lines = "# frame: ENU_FLU\n";
   for (int i = 0; i < 25000; ++i) lines += std::to_string(i) + " 0 0 2 0 0 0 1\n";
-  EXPECT_THAT(notes(playing(lines)), ElementsAre(HasSubstr("in 8334 of 8334 poses looked at of dive.tum")));
+  EXPECT_THAT(notes(playing(lines)), ElementsAre(HasSubstr("in 8334 of 8334 checked poses of dive.tum")));
 }
 
 // ---- a running daemon
