@@ -6,8 +6,9 @@ examples:
 The same as python3 -m sonard_client.lab. Lines on standard input apply faults while the command runs: `L06 seconds=5`,
 `end L06`, `list`.
 
-A process cannot fake a pulled cable: its kernel keeps acknowledging. Here the packets themselves are dropped. Needs root or
-user namespaces, and the programs unshare, nsenter, ip; most faults also nft, one tc. An error names the missing programs.
+A process cannot imitate a pulled cable, because its kernel continues to acknowledge. Here the packets themselves are dropped.
+Needs root or user namespaces, and the programs unshare, nsenter and ip; most faults need nft, one needs tc. An error names
+missing programs.
 """
 from __future__ import annotations
 
@@ -136,7 +137,7 @@ def fault_missing(code: str) -> str:
 
 
 def read_request(text: str) -> Tuple[str, Dict[str, str]]:
-    """"L06:seconds=5" or "vanished-peer seconds=5" as a code and its parameters. Raises ValueError."""
+    """Parses "L06:seconds=5" or "vanished-peer seconds=5" into a code and its parameters. Raises ValueError."""
     name, _, rest = text.strip().replace(":", " ").partition(" ")
     code = next((code for code, fault in FAULTS.items() if name.lower() in (code.lower(), fault.name)), "")
     if not code:
@@ -259,7 +260,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--config", metavar="TEXT", help="configuration of sonard, whose sonar has bind_ip " + DEVICE)
     parser.add_argument("--profile", metavar="TEXT", default=DEFAULT_PROFILE, help="product, without --config")
     parser.add_argument("--sonard", metavar="TEXT", default=os.environ.get("SONARD", "sonard"), help="the program")
-    parser.add_argument("--check", action="store_true", help="only say what this machine lacks")
+    parser.add_argument("--check", action="store_true", help="only list what works here and what is missing")
     parser.add_argument("command", nargs=argparse.REMAINDER, metavar="-- COMMAND", help="runs in the host's namespace")
     return parser
 
@@ -308,7 +309,7 @@ class _Timed:
             _say(str(why))
 
 
-def _obey(timed: _Timed, lines: Sequence[str]) -> None:
+def _apply_requests(timed: _Timed, lines: Sequence[str]) -> None:
     for line in lines:
         words = line.split()
         try:
@@ -338,7 +339,7 @@ def _run_inside(options: argparse.Namespace, command: List[str]) -> int:
         driver = subprocess.Popen([*lab.host, *command], stdin=subprocess.DEVNULL, env={**environment, "SONARD_IP": DEVICE})
         for code, given in requests:
             timed.start(code, given, float(given["after"]))
-        threading.Thread(target=lambda: [_obey(timed, [line]) for line in sys.stdin], daemon=True).start()
+        threading.Thread(target=lambda: [_apply_requests(timed, [line]) for line in sys.stdin], daemon=True).start()
         try:
             result = driver.wait()
             _say(f"the command ended with {result}")

@@ -193,7 +193,7 @@ class Tap(unittest.TestCase):
             scene.capture.connections = [mock.Mock(fires=[])]
             self.assertIn("sent neither settings nor a request", run_case.explanation(scene))
             scene.make.needs_request = False
-            self.assertIn("took no complete ping", run_case.explanation(scene))
+            self.assertIn("received no complete ping", run_case.explanation(scene))
 
     def test_why_a_fault_has_no_effect_on_a_make(self):
         judge = mock.Mock(options=mock.Mock(profile="omniscan-450"), lacking="", fault_engine=True, ping_bytes=1)

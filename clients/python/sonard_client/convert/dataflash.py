@@ -25,7 +25,7 @@ _KINDS: Dict[str, Tuple[str, float]] = {
 # In order of preference: the simulator's ground truth, then estimates.
 FULL = ("SIM", "XKF1", "NKF1", "EKF1", "AHR2")
 LOCAL = ("XKF1", "NKF1", "EKF1")  # metres from the filter's origin
-# Heights above the home, by message and field, of vehicles without a position; BARO:1 is ArduSub's pressure sensor outside.
+# Heights above the home, by message and field, of vehicles without a position; BARO:1 is ArduSub's external pressure sensor.
 HEIGHTS = (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO:1", "Alt"), ("BARO", "Alt"))
 STATES = {"XKF4": "XKF1", "NKF4": "NKF1"}  # messages with the number of the core in use, PI
 WANTED = FULL + ("ATT", "POS", "GPS", "ORGN", "CTUN", "BARO") + tuple(STATES)

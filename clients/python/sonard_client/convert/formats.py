@@ -103,7 +103,7 @@ def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source
     """Reads the track of one vehicle. kind: one of FORMATS; default: detected. source: messages of an autopilot's log.
     topic: topic of a recording. system, component: MAVLink system and component of a telemetry log. at: north and east [m]
     of a vehicle whose log has a depth but no horizontal position. frame: axes of a recording, "ENU_FLU" or "NED_FRD"; default:
-    as the recording says. without_checksum: accept NMEA sentences without one. Raises ConvertError and OSError."""
+    as the recording states. without_checksum: accept NMEA sentences without one. Raises ConvertError and OSError."""
     file = recording_at(pathlib.Path(path))
     chosen = kind or format_of(file)
     readers: "dict[str, Callable[[], Track]]" = {

@@ -116,7 +116,7 @@ class _Vehicle:
         self.pressures: Dict[str, Stream[float]] = {}  # [hPa]
         self.is_submarine = False
         self.autopilot: Optional[int] = None  # its component, from its first heartbeat on
-        self._homes_m: Dict[int, float] = {}  # by component: altitude of the home, of submarines the surface
+        self._homes_m: Dict[int, float] = {}  # by component: altitude of the home; for submarines, of the surface
         self._origins: Dict[int, Geodetic] = {}  # by component
         self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id
         self._local_headings: Dict[int, bool] = {}  # by component
@@ -220,7 +220,7 @@ class _Vehicle:
         return [len(streams.get(name, ())) for streams in self._streams]
 
     def _forget_others(self, name: str) -> None:
-        """Drops what other components than the autopilot sent in this message."""
+        """Drops this message from components other than the autopilot."""
         runs = self._runs.get(name, [])
         if all(component == self.autopilot for component, _ in runs):
             return

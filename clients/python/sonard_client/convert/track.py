@@ -14,7 +14,7 @@ Value = TypeVar("Value")
 Stream = List[Tuple[float, Value]]  # times in s
 Place2 = Tuple[float, float]  # north, east [m]
 LONG_GAP_S = 1.0
-LONG_LACK_S = 3.0  # without positions or attitudes while the others arrive
+LONG_LACK_S = 3.0  # a longer time with positions only, or with attitudes only, is reported
 
 
 class ConvertError(Exception):

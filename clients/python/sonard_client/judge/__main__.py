@@ -44,7 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--driver", metavar="TEXT", help="starts the driver; {ip}, {port} and {id} are filled in")
     parser.add_argument("--tap", metavar="TEXT", default="none", type=lambda text: "none" if text == "wire" else text,
                         help="json: the driver prints a JSON line per ping; ros1:TOPIC or ros2:TOPIC; wire or none (the default): only "
-                             "the packets are looked at")
+                             "the packets are examined")
     parser.add_argument("--profile", metavar="TEXT", default=DEFAULT_PROFILE, help="product")
     parser.add_argument("--case", metavar="TEXT", action="append", default=[],
                         help="number (L05.2), code (L05), family (L) or name; repeatable")
@@ -222,7 +222,7 @@ class Judge:
                 raise NotJudged(result.get("text") or result["why"])
             if not result["works"]:
                 shutil.copyfile(log, self.out / "driver.log")
-                raise NotJudged("The driver does not take 20 consecutive pings from a sonar without any fault, "
+                raise NotJudged("The driver does not receive 20 consecutive pings from a sonar without any fault, "
                                 f"so it is not judged.\n{result['why']}\nIts whole output: {self.out / 'driver.log'}")
         self.ping_bytes = int(result["ping_bytes"])
         self.kinds = {kind["code"]: kind for kind in result["kinds"].get("kinds", ())}

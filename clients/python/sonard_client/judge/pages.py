@@ -248,7 +248,7 @@ def _run_part(row: Json, number: int, folder: pathlib.Path) -> str:
     w = run["wall_clock"]
     journal = [" ".join(f"{k}={_value(v)}" for k, v in record.items() if k not in _JOURNAL_LEFT_OUT) + more
                for record, more in in_brief(w["journal"])]
-    connections = [f"{c['from']}  opened {c['opened_s']:.2f} s  {c['bytes']} bytes taken  settings sent {c['settings']}x  "
+    connections = [f"{c['from']}  opened {c['opened_s']:.2f} s  {c['bytes']} bytes acknowledged  settings sent {c['settings']}x  "
                    f"zero windows {c['zero_windows']}  {c['ended_by'] or 'open to the end'}" for c in w["connections"]]
     process = w["process"]
     state = (f"{process['ending']}; peak {process['peak_mib']} MiB resident, {process['cpu_s']} s of processor time, descriptors "

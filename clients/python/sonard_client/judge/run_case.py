@@ -176,15 +176,15 @@ def explanation(scene: Scene) -> str:
     elif scene.make and scene.make.needs_request and not any(c.fires for c in connections):
         lines.append("It connected but sent neither settings nor a request: the sonar pings only after one.")
     elif not taken:
-        lines.append("It connected, but took no complete ping.")
+        lines.append("It connected, but received no complete ping.")
     elif scene.tapped and not scene.driver.published:
-        lines.append(f"It took {taken} pings, but its standard output has no tap line. A line looks like "
+        lines.append(f"It received {taken} pings, but its standard output has no tap line. A line looks like "
                      '{"id": 812, "crc32": "0a1b2c3d"}; without a tap give --tap none.')
     elif scene.tapped and len(scene.good()) < len(scene.driver.published):
-        lines.append(f"It took {taken} pings, but of {len(scene.driver.published)} published ones {len(scene.good())} have the "
-                     "CRC-32 of a ping's samples: docs/judge.md, \"The tap\", says which bytes these are for each make.")
+        lines.append(f"It received {taken} pings, but of {len(scene.driver.published)} published ones {len(scene.good())} have the "
+                     "CRC-32 of a ping's samples: docs/judge.md, \"The tap\", states which bytes these are for each make.")
     else:
-        lines.append(f"It took {taken} pings, but not {NOMINAL_PINGS} consecutive ones.")
+        lines.append(f"It received {taken} pings, but not {NOMINAL_PINGS} consecutive ones.")
     log = (scene.folder / "driver.log").read_text(encoding="utf-8", errors="replace").splitlines()[-12:]
     if log:
         lines += ["The last lines of its output:", *(f"  {line[:160]}" for line in log)]
@@ -204,7 +204,7 @@ def _case(scene: Scene, case: Case) -> Dict[str, Any]:
         driver.poll()
         if driver.exited is None and scene.ping_times():
             return {"ran": False, "why": f"the fault did not begin: {_last_line(scene.sonard.log())}"}
-        return {"ran": False, "why": "the driver took no pings before the fault", "text": explanation(scene)}
+        return {"ran": False, "why": "the driver received no pings before the fault", "text": explanation(scene)}
     scene.wait(lambda: _is_back(scene, ended), case.limit + max(0.0, ended - time.monotonic()))
     watched_until = time.monotonic()
     seen = _observe(scene, case, began, ended, watched_until)
