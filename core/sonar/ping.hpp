@@ -166,7 +166,9 @@ struct BeamTruth {
   std::uint32_t object = nothing;  // index into Scene::objects
 };
 
-/// The result of a ping, for all vendors. Row 0 is the nearest. Beam 0 is the one farthest to port: azimuths fall from + to -.
+/// The result of a ping, for all vendors.
+/// Row 0 is the nearest. Beam 0 is the one farthest to port: azimuths fall from + to -.
+/// An array is empty, or a pointer null, if the ping does not have the value.
 struct Ping {
   PingRequest request;
   std::vector<float> beam_azimuth_rad;  // [beams], positive to port
