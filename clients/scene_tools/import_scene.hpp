@@ -54,7 +54,7 @@ struct DescribedObject {
   std::string name = {}, kind = {}, file = {};  // kind: as in the scene (box, mesh, seabed, point, ...)
   std::vector<std::string> materials = {};
   std::size_t triangles = 0;
-  Extent own = {}, in_world = {};  // along its own axes, and along the world's axes at its place in the scene
+  Extent own = {}, in_world = {};  // along its own axes, and along the world's axes at its pose in the scene
   std::string moves_with = {};     // the moving object that it is or is attached to
   bool visible = true;
 };

@@ -24,7 +24,7 @@ bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   return std::find(std::begin(of_streams), std::end(of_streams), kind.effect) == std::end(of_streams);
 }
 
-/// True if an effect can change an integer without a fixed place.
+/// True if an effect can change an integer without a fixed offset.
 bool takes_integer(E effect) {
   constexpr E all[] = {E::renumber, E::add_to_field, E::heat, E::beacon_address, E::second_beacon};
   return std::find(std::begin(all), std::end(all), effect) != std::end(all);

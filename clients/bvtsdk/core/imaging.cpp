@@ -126,7 +126,7 @@ void fill_r_theta(const PolarGrid& grid, const Extent& extent, MagImage& image) 
     }
 }
 
-/// The pixels over which the mean for (row, col) is taken: rows row - above to row + below, columns col - left to col + right.
+/// The pixels over which the mean for (row, col) is computed: rows row - above to row + below, columns col - left to col + right.
 struct Window {
   int above, below, left, right;
 };

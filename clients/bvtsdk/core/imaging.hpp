@@ -21,7 +21,7 @@ enum class ImageType { xy = 0, r_theta = 1 };
 /// off: the same as automatic.
 enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 
-/// The place where an XY image begins: the nearest corners of the sector, or the sonar.
+/// The position where an XY image begins: the nearest corners of the sector, or the sonar.
 enum class XyBottom { sector, sonar };
 /// Reads the environment variable BVE_XY (sector or sonar); the default is sector.
 XyBottom xy_bottom_from_environment();

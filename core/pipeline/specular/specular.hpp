@@ -67,7 +67,7 @@ class SpecularEchoes {
   void candidates(const Object& object, PreparedMesh& mesh, const SpecularQuery& query);
 
   std::vector<PreparedMesh> meshes_;  // in the order of their first use
-  std::vector<std::size_t> mesh_of_;  // object to place in meshes_
+  std::vector<std::size_t> mesh_of_;  // by object: index into meshes_
   std::vector<double> reflection_;    // per material, this ping
   std::vector<bool> mirrors_;         // materials of a mesh that reflect
   std::vector<SpecularPoint> points_;

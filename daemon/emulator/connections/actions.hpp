@@ -29,7 +29,7 @@ struct ComputePing {
 struct Serve {
   ConnectionId connection = 0;
 };
-/// All slots are taken: keep the connection open, but neither read nor write until Serve.
+/// No slot is free: keep the connection open, but neither read nor write until Serve.
 struct KeepWaiting {
   ConnectionId connection = 0;
 };

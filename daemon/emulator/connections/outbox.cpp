@@ -41,7 +41,7 @@ void Outbox::push(Message ping, std::size_t most, std::size_t most_bytes) {
   pings_.push_back(std::move(ping));
 }
 
-// Replies come before pings, because a client may wait for a reply before it reads more. Only one message is taken at a time:
+// Replies come before pings, because a client may wait for a reply before it reads more. Only one message is returned at a time:
 // the caller reports its end by written() or not_written().
 Outbox::Message Outbox::take() {
   if (writing_ || (replies_.empty() && pings_.empty())) return {};

@@ -20,7 +20,7 @@ using protocol::Vendor;
 
 constexpr std::size_t most_message_bytes = 16u << 20;
 
-// Fields with a fixed place are little-endian in every make that has them.
+// Fields with a fixed offset are little-endian in every make that has them.
 std::uint64_t read_integer(const Bytes& bytes, const Field& field) {
   std::uint64_t value = 0;
   for (std::size_t i = 0; i < std::min<std::size_t>(field.size, 8); ++i)

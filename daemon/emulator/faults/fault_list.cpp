@@ -60,7 +60,7 @@ bool Faults::end(const std::string& name, Time now, Actions& actions) {
   bool found = name.empty();
   for (Entry& e : entries_) {
     // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own is ended by the code and
-    // by the word of its kind.
+    // by the name of its kind.
     const bool by_word = e.fault.name == e.fault.what && (e.fault.kind->code == name || e.fault.kind->name == name);
     const bool named = name.empty() || e.fault.name == name || by_word || e.fault.name.starts_with(name + ".");
     if (!named || (e.over && !name.empty())) continue;

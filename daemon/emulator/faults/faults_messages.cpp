@@ -134,7 +134,7 @@ void Faults::note_message(Entry& e, const Connection& to, std::uint32_t ping, co
 }
 
 /// Changes bytes of a ping that is sent as datagrams: in the first datagram with the field or region; a field without a fixed
-/// place is changed in every datagram.
+/// offset is changed in every datagram.
 void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
   using protocol::Part;
   for (Entry& e : entries_) {

@@ -181,7 +181,7 @@ std::optional<Time> Delivery::next_release() const {
   return first;
 }
 
-// ---- messages are taken
+// ---- messages for the caller
 
 std::vector<protocol::Endpoint> Delivery::receivers(ConnectionId stream) const {
   const Connection* const connection = std::as_const(audience_).connections().find(stream);

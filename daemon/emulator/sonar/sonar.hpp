@@ -2,7 +2,7 @@
 // the Audience (the connections), the PingSource (settings and pings) and the Delivery (messages to clients).
 //
 // Flow: the caller reports each event (a connection, bytes, a finished ping, a tick) with its time; the sonar changes its state
-// and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller takes whole messages. Times
+// and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller fetches whole messages. Times
 // are the daemon's; conversations run on unskipped time, which does not include the jumps of stepped time.
 #pragma once
 
