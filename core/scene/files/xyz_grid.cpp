@@ -24,9 +24,9 @@ struct Point {
 constexpr std::size_t most_columns = 16;
 using Line = std::array<std::string_view, most_columns>;
 
-/// Splits a line into words between blanks, commas or semicolons, without quotes. Returns their number, up to the size of
+/// Splits a line into words between blanks, commas, semicolons or bars, without quotes. Returns their number, up to the size of
 /// `words`.
-std::size_t split(std::string_view line, Line& words, std::string_view between = " \t,;\r\"") {
+std::size_t split(std::string_view line, Line& words, std::string_view between = " \t,;|\r\"") {
   std::size_t count = 0;
   for (std::size_t at = line.find_first_not_of(between); at != std::string_view::npos && count < words.size();) {
     const std::size_t end = std::min(line.find_first_of(between, at), line.size());
@@ -34,6 +34,36 @@ std::size_t split(std::string_view line, Line& words, std::string_view between =
     at = line.find_first_not_of(between, end);
   }
   return count;
+}
+
+std::string_view without_edges(std::string_view text, std::string_view edges = " \t\r\"") {
+  const std::size_t begin = text.find_first_not_of(edges);
+  return begin == text.npos ? std::string_view() : text.substr(begin, text.find_last_not_of(edges) + 1 - begin);
+}
+
+/// Splits a line into the fields between its `mark`, without blanks and quotes around them. A field may be empty.
+std::size_t split_at(char mark, std::string_view line, Line& fields) {
+  std::size_t count = 0;
+  for (std::size_t at = 0; at <= line.size() && count < fields.size();) {
+    const std::size_t end = std::min(line.find(mark, at), line.size());
+    fields[count++] = without_edges(line.substr(at, end - at));
+    at = end + 1;
+  }
+  return count;
+}
+
+/// Splits a line of values. Of a table with commas, semicolons or bars the empty fields count too: a missing value must not
+/// shift those after it into its column.
+std::size_t split_values(std::string_view line, Line& words) {
+  for (const char mark : {';', '|', ','}) {
+    if (line.find(mark) == line.npos) continue;
+    const std::size_t count = split_at(mark, line, words);
+    const bool is_table = std::none_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count),
+                                       [](std::string_view word) { return word.find_first_of(" \t") != word.npos; });
+    if (is_table) return without_edges(line).empty() ? 0 : count;
+    break;
+  }
+  return split(line, words);
 }
 
 /// The uniform coordinates that contain all given ones. Some may be missing among the given ones. Empty if there are none.
@@ -69,15 +99,10 @@ std::size_t index_on(const std::vector<double>& axis, double v) {
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));
 }
 
-/// Splits a line of column names. The names may contain blanks if commas, semicolons or tabs separate them.
+/// Splits a line of column names. The names may contain blanks if commas, semicolons, bars or tabs separate them.
 std::size_t split_names(std::string_view line, Line& words) {
-  for (const char between : {';', ',', '\t'}) {
-    if (line.find(between) == line.npos) continue;
-    const std::size_t count = split(line, words, std::string_view(&between, 1));
-    for (std::size_t k = 0; k < count; ++k)
-      words[k].remove_prefix(std::min(words[k].find_first_not_of(" \t\""), words[k].size()));
-    return count;
-  }
+  for (const char mark : {';', '|', ',', '\t'})
+    if (line.find(mark) != line.npos) return split_at(mark, line, words);
   return split(line, words);
 }
 
@@ -90,23 +115,25 @@ struct Order {
   bool operator==(const Order&) const = default;
 };
 
-/// The order according to column names, such as "lat lon depth" or "id,x,y,z". For other names: the first three columns.
+/// The order according to column names, such as "lat lon depth", "id,x,y,z" or "OBJECTID,POINT_X,POINT_Y,grid_code". For other
+/// names: the first three columns.
 Order order_by(const Line& names, std::size_t count) {
   using Begins = std::initializer_list<std::string_view>;
-  const auto column = [&](Begins begins, std::size_t otherwise, std::string_view whole = "z") {
+  const auto column = [&](Begins begins, std::size_t otherwise, std::string_view whole, std::string_view last) {
     const auto is_it = [&](std::string_view name) {
-      return same_letters(name, whole) || std::any_of(begins.begin(), begins.end(), [&](std::string_view begin) {
-               return same_letters(name.substr(0, begin.size()), begin);
-             });
+      const std::string_view end = name.substr(name.size() - std::min(name.size(), last.size()));
+      return same_letters(name, whole) || same_letters(end, last) ||
+             std::any_of(begins.begin(), begins.end(),
+                         [&](std::string_view begin) { return same_letters(name.substr(0, begin.size()), begin); });
     };
     const auto found = std::find_if(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(count), is_it);
     return found == names.begin() + static_cast<std::ptrdiff_t>(count) ? otherwise
                                                                        : static_cast<std::size_t>(found - names.begin());
   };
-  Order order{column({"lon", "lng", "x", "east"}, count, "e"), column({"lat", "y", "north"}, count, "n"),
-              column({"z", "dep", "elev", "height", "alt", "bathy", "topo"}, count)};
+  Order order{column({"lon", "lng", "x", "east"}, count, "e", "_x"), column({"lat", "y", "north"}, count, "n", "_y"),
+              column({"z", "dep", "elev", "height", "alt", "bathy", "topo"}, count, "z", "_z")};
   if (order.x == count || order.y == count) return {};
-  if (order.z == count) order.z = count == 3 ? 3 - order.x - order.y : 2;
+  if (order.z == count) order.z = count == 3 ? 3 - order.x - order.y : std::max(order.x, order.y) + 1;
   const bool distinct = order.x != order.y && order.x != order.z && order.y != order.z && order.last() < count;
   if (!distinct) return {};
   order.depth = same_letters(names[order.z].substr(0, 1), "d");
@@ -120,7 +147,8 @@ bool has_decimal_commas(std::string_view line) {
   const std::size_t count = split(line, words, " \t;\r\"");
   const auto is_decimal = [](std::string_view word) {
     const std::size_t comma = word.find(',');
-    return comma != word.npos && comma > 0 && comma + 1 < word.size();
+    const auto digit_at = [&](std::size_t at) { return at < word.size() && word[at] >= '0' && word[at] <= '9'; };
+    return comma != word.npos && comma > 0 && digit_at(comma - 1) && digit_at(comma + 1);
   };
   return count >= 3 && std::any_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count), is_decimal);
 }
@@ -147,12 +175,12 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find(line_end, at), text.size());
     const std::string_view this_line = text.substr(at, end - at);
-    const std::size_t count = split(this_line, words);
+    const std::size_t count = split_values(this_line, words);
     at = end + 1, ++line;
     if (count == 0) continue;
-    if (words[0].front() == '#' || words[0].starts_with("//")) {
+    if (!words[0].empty() && (words[0].find_first_of("#%!>") == 0 || words[0].starts_with("//"))) {
       if (!points.empty()) continue;
-      const std::size_t begin = this_line.find_first_not_of("#/ \t\"");
+      const std::size_t begin = this_line.find_first_not_of("#%!>/ \t\"");
       Line names;
       const std::size_t number = begin == this_line.npos ? 0 : split_names(this_line.substr(begin), names);
       if (const Order found = order_by(names, number); found != Order())
@@ -162,19 +190,24 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
     const auto bad = [&](const std::string& what) {
       return failure(ErrorKind::bad_data, "line " + std::to_string(line) + ": " + what);
     };
+    const auto bad_line = [&] {
+      return bad(has_decimal_commas(this_line) ? "numbers have a decimal comma; write points"
+                                               : "three numbers are needed, x y z" + way_out(points));
+    };
+    if (points.empty() && has_decimal_commas(this_line)) return bad_line();
     if (points.empty() && count >= 3 && !height_number(words[0]) && !height_number(words[1])) {
       const std::size_t names = split_names(this_line, words);
       order = order_by(words, names);
       has_names = true;
       continue;
     }
+    if (points.empty() && count == 1 && height_number(words[0])) continue;  // the number of points
     if (points.empty() && !has_names && comment.first == count) order = comment.second;
     if (points.empty()) first_count = count;  // decimal commas can change the number of words
-    if ((points.empty() || count != first_count) && has_decimal_commas(this_line))
-      return bad("numbers have a decimal comma; write points");
-    if (count <= order.last()) return bad("three numbers are needed, x y z" + way_out(points));
-    const auto x = height_number(words[order.x]), y = height_number(words[order.y]), z = height_number(words[order.z]);
-    if (!x || !y || !z) return bad("three numbers are needed, x y z" + way_out(points));
+    if (count <= order.last() || (count != first_count && has_decimal_commas(this_line))) return bad_line();
+    const auto x = height_number(words[order.x]), y = height_number(words[order.y]);
+    const auto z = words[order.z].empty() ? std::numeric_limits<double>::quiet_NaN() : height_number(words[order.z]);
+    if (!x || !y || !z) return bad_line();
     if (!(std::abs(*x) <= 1e8 && std::abs(*y) <= 1e8)) return bad("the point is farther than 1e8 m away");
     const auto height = values.height_of(*z);
     if (!height) return bad("the height " + std::string(words[order.z].substr(0, 40)) + " is beyond 1e7 m");

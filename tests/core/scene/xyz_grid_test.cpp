@@ -117,7 +117,10 @@ TEST(XyzGrid, ColumnsAreFoundByTheirNames) {
        {"id,x,y,z\n1,0,0,-1\n2,10,0,-2\n3,0,20,-3\n4,10,20,-4\n", "// by hand\nz;x;y\n-1;0;0\n-2;10;0\n-3;0;20\n-4;10;20\n",
         "Easting (m), Northing (m), Depth below water (m)\r0,0,-1\r10,0,-2\r0,20,-3\r10,20,-4\r",
         "\"Northing\",\"Easting\",\"Elevation\"\n0,0,-1\n0,10,-2\n20,0,-3\n20,10,-4\n",
-        "0 0 -1 9 9\n10 0 -2 9 9\n0 20 -3 9 9\n10 20 -4 9 9\n"}) {
+        "0 0 -1 9 9\n10 0 -2 9 9\n0 20 -3 9 9\n10 20 -4 9 9\n", "x|y|z\n0|0|-1\n10|0|-2\n0|20|-3\n10|20|-4\n",
+        ",x,y,z\n0,0,0,-1\n1,10,0,-2\n2,0,20,-3\n3,10,20,-4\n",
+        "OBJECTID,POINT_X,POINT_Y,grid_code\n1,0,0,-1\n2,10,0,-2\n3,0,20,-3\n4,10,20,-4\n",
+        "4\n0 0 -1\n10 0 -2\n0 20 -3\n10 20 -4\n", "% x y z\n> a\n! b\n0 0 -1\n10 0 -2\n0 20 -3\n10 20 -4\n"}) {
     const auto grid = read(text);
     ASSERT_TRUE(grid) << text << grid.error().text;
     EXPECT_EQ(grid->x, (std::vector<double>{0, 10})) << text;
@@ -129,8 +132,21 @@ TEST(XyzGrid, ColumnsAreFoundByTheirNames) {
   EXPECT_THAT(depths->notes, ::testing::ElementsAre(HasSubstr("set z_scale: -1")));
   for (const char* text : {"0,5 0,5 -1,5\n", "0,5;0,5;-1,5\n", "500000,5\t0\t-1\n"})
     EXPECT_THAT(read(text).error().text, HasSubstr("line 1: numbers have a decimal comma")) << text;
-  EXPECT_THAT(read("0 0 -1\n10 0 -2\n0 20 -3,5\n").error().text, HasSubstr("line 3: numbers have a decimal comma"));
+  for (const char* text : {"0 0 -1\n10 0 -2\n0 20 -3,5\n", "0;0;-1\n10;0;-2\n0;20;-3,5\n"})
+    EXPECT_THAT(read(text).error().text, HasSubstr("line 3: numbers have a decimal comma")) << text;
   EXPECT_TRUE(read("0, 0, -1\n10, 0, -2\n0, 20, -3\n10, 20, -4\n")) << "commas between numbers";
+}
+
+TEST(XyzGrid, AnEmptyFieldIsAHoleAndShiftsNoOthers) {
+  TemporaryFiles files;
+  for (const char* text :
+       {"x,y,z,id\n0,0,-1,5\n10,0,,5\n0,20,-3,5\n10,20,-4,5\n", "0;0;-1\n10;0;\n0;20;-3\n10;20;-4\n",
+        "0, 0, -1\r\n10, 0, \r\n0, 20, -3\r\n10, 20, -4\r\n", "id,x,y,z\n1,0,0,-1\n2,10,0,\n3,0,20,\"-3\"\n4,10,20,-4\n"}) {
+    const auto grid = read_xyz_heights(files.write("p.csv", text), {});
+    ASSERT_TRUE(grid) << text << grid.error().text;
+    EXPECT_THAT(grid->z_m, ::testing::ElementsAre(-1, ::testing::IsNan(), -3, -4)) << text;
+  }
+  EXPECT_THAT(read_xyz_heights(files.write("p.csv", "0,0,-1\n,0,-2\n"), {}).error().text, HasSubstr("line 2: three numbers"));
 }
 
 TEST(XyzGrid, FineStepsFarAwayStayInTheirCells) {
