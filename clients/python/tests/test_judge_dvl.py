@@ -36,6 +36,8 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
         message = types.SimpleNamespace(velocity=types.SimpleNamespace(x=0.5, y=-0.2, z=0), altitude=3.25)  # dvl_msgs/DVL
         (crcs, _) = dvl._velocity(line(0.5))
         self.assertIn(int(json.loads(ros_tap.line_of(message))["crc32"], 16), crcs)
+        report = types.SimpleNamespace(vx=0.5, vy=-0.2, vz=0.0, altitude=3.25)  # waterlinked_a50/TransducerReportStamped
+        self.assertEqual(ros_tap.line_of(types.SimpleNamespace(report=report)), ros_tap.line_of(message))
         del message.velocity  # sensor_msgs/NavSatFix
         self.assertEqual(json.loads(ros_tap.line_of(message)), {"id": None, "crc32": "00000000"})
 

@@ -3,7 +3,7 @@
     python3 -m sonard_client.judge.ros_tap ros1|ros2 TOPIC -- COMMAND...
 
 The type of the message must have a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data, intensities or
-data), or a velocity and an altitude.
+data), or a velocity and an altitude, also as vx, vy, vz and altitude of its report.
 """
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def line_of(message: Any) -> str:
     samples, because ping_data of one driver's Ping begins with the header from the wire. With `has_gains` the gain before each
     row is removed."""
     samples = _field(message, "ping_data", "image.data", "intensities", "data")
-    moved, altitude = _field(message, "velocity"), _field(message, "altitude")
-    if samples is None and moved is not None and altitude is not None:
-        samples = struct.pack("<4d", moved.x, moved.y, moved.z, altitude)
+    moved = [_field(message, f"velocity.{axis}", f"report.v{axis}") for axis in "xyz"] + [_field(message, "altitude", "report.altitude")]
+    if samples is None and None not in moved:
+        samples = struct.pack("<4d", *moved)
     data = bytes(samples if samples is not None else b"")
     step, rows = getattr(message, "step", 0), getattr(message, "n_ranges", 0)
     if step and rows:
