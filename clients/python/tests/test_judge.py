@@ -344,6 +344,14 @@ class Waiting(unittest.TestCase):
         self.assertLess(seconds, 2.1)
 
 
+class Options(unittest.TestCase):
+    def test_of_the_sonar(self):
+        words = ["--driver", "x {ip}", "--profile", "waterlinked-3d15", "--option", "rip=1", "--option", "a=b=c", "--sonard", "true"]
+        spec = judge_main.Judge(judge_main._parser().parse_args(words), pathlib.Path("out")).spec(None, 1)
+        config = json.loads(run_case.config_of(spec, None, "127.0.0.2", pathlib.Path("journal")))
+        self.assertEqual(config["sonars"][0]["options"], {"rip": "1", "a": "b=c"})
+
+
 class CommandLine(unittest.TestCase):
     def said(self, *arguments):
         with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
@@ -363,7 +371,7 @@ class CommandLine(unittest.TestCase):
                                     (["--driver", "x", "--no-namespaces", "--out", folder + "/new"], "{ip}"), (right + ["--case", "Q77"], "Q77"),
                                     (right + ["--tap", "yaml"], "--tap"), (right + ["--repeat", "0"], "--repeat"),
                                     (right + ["--shallow", "5"], "--torture"), (right + ["--tap", "ros1"], "topic"),
-                                    (right + ["--tap", "ros2:"], "ros2:/sonar/ping"),
+                                    (right + ["--tap", "ros2:"], "ros2:/sonar/ping"), (right + ["--option", "rip"], "KEY=TEXT"),
                                     (["merge", folder, "--out", folder + "/new"], "no report")):
                 code, text = self.said(*arguments)
                 self.assertEqual((code, word in text), (64, True), text)

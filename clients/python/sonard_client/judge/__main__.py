@@ -46,6 +46,8 @@ def _parser() -> argparse.ArgumentParser:
                         help="json: the driver prints a JSON line per ping; ros1:TOPIC or ros2:TOPIC; wire or none (the default): only "
                              "the packets are examined")
     parser.add_argument("--profile", metavar="TEXT", default=DEFAULT_PROFILE, help="product")
+    parser.add_argument("--option", metavar="KEY=TEXT", action="append", default=[],
+                        help="option of the sonar, as in its configuration; repeatable")
     parser.add_argument("--case", metavar="TEXT", action="append", default=[],
                         help="number (L05.2), code (L05), family (L) or name; repeatable")
     parser.add_argument("--strict", action="store_true", help="count failed SHOULDs too")
@@ -98,6 +100,9 @@ def _check(options: argparse.Namespace) -> None:
     for name, low in (("repeat", 1), ("jobs", 1), ("seed", 0)):
         if getattr(options, name) < low:
             raise ValueError(f"--{name} is {getattr(options, name)}: it must be at least {low}")
+    for option in options.option:
+        if not option.partition("=")[2]:
+            raise ValueError(f"--option {option}: it must be KEY=TEXT, as rip=1")
     if options.shallow is not None and not options.torture:
         raise ValueError("--shallow belongs to --torture")
     kind, _, topic = options.tap.partition(":")
@@ -173,8 +178,8 @@ class Judge:
         if case is not None:
             described = {**vars(case), "given": dict(case.given), "must": dict(case.must), "should": dict(case.should)}
         return {"case": described, "driver": self.command, "tap": "json" if o.tap != "none" else "none", "profile": o.profile,
-                "sonard": self.sonard, "seed": o.seed, "space": "loopback" if self.lacking else "lab",
-                "offset": self._first_offset + slot,
+                "options": dict(option.split("=", 1) for option in o.option), "sonard": self.sonard, "seed": o.seed,
+                "space": "loopback" if self.lacking else "lab", "offset": self._first_offset + slot,
                 "fault_engine": self.fault_engine, "ping_bytes": self.ping_bytes}
 
     def run_one(self, case: Optional[Case], folder: pathlib.Path) -> Dict[str, Any]:
@@ -261,6 +266,7 @@ class Judge:
                 runs.append(self.run_one(case, folder / f"run-{number + 1}" if number else folder))
         o = self.options
         repeat = f"sonarctl judge --driver {shlex.quote(o.driver)} --tap {o.tap} --profile {o.profile} --seed {o.seed}" + (
+            "".join(f" --option {shlex.quote(option)}" for option in o.option)) + (
             " --torture" if ".T" in case.number else "") + f" --case {case.number} --out report-{case.number}"
         described = {"number": case.number, "kind": case.kind, "name": case.name, "sentence": case.sentence,
                      "with": dict(case.given), "at": case.at, "duration": case.duration, "limit": case.limit,

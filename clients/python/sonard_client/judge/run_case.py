@@ -52,7 +52,8 @@ def config_of(spec: Dict[str, Any], case: Optional[Case], address: str, journal:
         plan = [fault_record(case, int(spec["ping_bytes"]))] if case is not None and by_sonard else []
         more["faults"] = {"armed": True, "journal": str(journal), "plan": plan}
     make = make_of(spec["profile"])
-    return lab.lab_config(spec["profile"], address, more, make.sonar if make else None)
+    options = {"options": spec["options"]} if spec.get("options") else {}
+    return lab.lab_config(spec["profile"], address, more, {**(make.sonar if make else {}), **options})
 
 
 def run(folder: pathlib.Path) -> Dict[str, Any]:
