@@ -102,6 +102,8 @@ def _address_lost(lab: "Lab", given: Mapping[str, str]) -> None:
     space, link, address = (lab.device, LINK, DEVICE) if at_device else (lab.host, _HOST_LINK, HOST)
     where = [f"{address}/24", "broadcast", "10.77.0.255", "dev", link]
     _run(*space, "ip", "addr", "del", *where)
+    if not at_device:
+        lab.undo.append(lab.add_route)  # the kernel removes it with the address
     lab.undo.append(lambda: _run(*space, "ip", "addr", "add", *where))
 
 
@@ -191,7 +193,12 @@ class Lab:
             _run(*prefix, "ip", "addr", "add", f"{address}/24", "broadcast", "10.77.0.255", "dev", link)
             _run(*prefix, "ip", "link", "set", link, "up")
             _run(*prefix, "ip", "link", "set", "lo", "up")
+        self.add_route()
         return self
+
+    def add_route(self) -> None:
+        """For drivers that join a multicast group without naming an interface. On a computer the default route serves for that."""
+        _run(*self.host, "ip", "route", "replace", "224.0.0.0/4", "dev", _HOST_LINK)
 
     def __exit__(self, *_: object) -> None:
         if self._holder is not None:

@@ -40,6 +40,28 @@ class Namespaces(unittest.TestCase):
         done = self.run_lab("--", sys.executable, "-c", program)
         self.assertEqual(done.returncode, 7, done.stderr)
 
+    def test_a_group_is_joined_without_an_interface(self):
+        """Before and after the driver's computer has lost its address."""
+        program = ("import socket, sys\n"
+                   "with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:\n"
+                   "    s.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton('224.0.0.96') + bytes(4))")
+        with subprocess.Popen([*lab.unshare_prefix(), sys.executable, "-c", self.LOST, program], stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                              env={**os.environ, "PYTHONPATH": str(PACKAGE)}) as done:
+            self.assertEqual((done.communicate(timeout=60)[0], done.returncode), ("", 0))
+
+    LOST = """if True:
+        import subprocess, sys
+        from sonard_client.lab import Lab
+        with Lab() as lab:
+            def join():
+                subprocess.run([*lab.host, sys.executable, "-c", sys.argv[1]], check=True)
+            join()
+            lab.begin("L17", {"side": "host", "seconds": "1", "after": "0"})
+            lab.end("L17")
+            join()
+    """
+
     @unittest.skipIf(lab.fault_missing("L16"), "needs nft")
     def test_a_vanished_peer_is_silent_and_returns(self):
         driver = str(ROOT / "docs/driver-test/tiny_driver.py")  # notices 3 s of silence and connects again
