@@ -172,7 +172,11 @@ class GeoTiffReader {
               : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 16 || picture_.bits == 32 || picture_.bits == 64);
     const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
     if (grey && picture_.samples == 1 && !known)
-      return bad(std::string("has ") + (whole ? "whole" : "floating-point") + " numbers of " + std::to_string(picture_.bits) +
+      return bad(std::string("has ") +
+                 (whole                                    ? "whole"
+                  : picture_.format == SAMPLEFORMAT_IEEEFP ? "floating-point"
+                                                           : "complex") +
+                 " numbers of " + std::to_string(picture_.bits) +
                  " bits, which are not read; write them otherwise: gdal_translate -ot Float32");
     if (!grey || !known || picture_.samples > most_bands ||
         (picture_.samples != 1 && picture_.bits <= 8 && planes == PLANARCONFIG_CONTIG))

@@ -367,6 +367,8 @@ TEST_F(GeoTiff, NumbersThatAreNotWholeBytes) {
   const auto refused = read(with_sign);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text, HasSubstr("whole numbers of 12 bits, which are not read; write them otherwise: gdal_tr"));
+  TiffFile complex = TiffFile::of<double>(2, 2, {1, 2, 3, 4}).at(0, 0, 1, 1).without(339);
+  EXPECT_THAT(read(complex.shorts(339, {6})).error().text, HasSubstr("complex numbers of 64 bits"));
 }
 
 TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
