@@ -59,6 +59,8 @@ std::string_view json_of_gltf(std::string_view file);
 std::string_view binary_part_of_glb(std::string_view file);
 /// The fault in the container of a GLB file, version 2. The importer calls every such fault an unknown format.
 MeshFault glb_fault(std::string_view file);
+/// The fault of a glTF or GLB file for which the importer finds no reader.
+std::string unknown_gltf(std::string_view file);
 
 /// Find incomplete records in the complete text of a file. The importer would omit or misread such records. Binary files are
 /// not checked, because the importer rejects them if they are cut short.

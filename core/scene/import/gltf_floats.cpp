@@ -119,8 +119,7 @@ class Rewriter {
         if (!bytes) return bad_gltf("has a buffer (" + number + ") that is not base64; export it again");
         data_ += *bytes;
       } else {
-        auto bytes = beside_(name);
-        if (!bytes) bytes = beside_(without_percents(name));
+        const auto bytes = beside_(name);
         if (!bytes) return bad_gltf("names the file " + name.substr(0, 200) + ", which cannot be read; put it beside the mesh");
         data_ += *bytes;
       }
@@ -247,7 +246,8 @@ std::string without_percents(const std::string& uri) {
   std::string plain;
   const auto digit = [](char c) { return std::string_view("0123456789abcdef").find(static_cast<char>(c | 32)); };
   for (std::size_t at = 0; at < uri.size(); ++at) {
-    const bool escaped = uri[at] == '%' && at + 2 < uri.size() && digit(uri[at + 1]) < 16 && digit(uri[at + 2]) < 16;
+    const bool escaped = uri[at] == '%' && at + 2 < uri.size() && digit(uri[at + 1]) < 16 && digit(uri[at + 2]) < 16 &&
+                         uri.compare(at, 3, "%00") != 0;  // a name ends at a zero byte
     plain += escaped ? static_cast<char>(16 * digit(uri[at + 1]) + digit(uri[at + 2])) : uri[at];
     if (escaped) at += 2;
   }

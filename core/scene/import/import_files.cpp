@@ -13,6 +13,7 @@
 #include "core/base/regular_file.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/import/check_mesh.hpp"
+#include "core/scene/import/gltf_floats.hpp"
 
 namespace sonar {
 namespace {
@@ -281,6 +282,12 @@ std::optional<std::string> ImportFiles::bytes_of(const std::string& file) {
   return bytes;
 }
 
+/// URIs of glTF have %20 for a blank. The name of the folder is as it is.
+std::string ImportFiles::plain_name(const std::string& file) const {
+  const std::string folder = folders_.empty() ? std::string() : folders_[0].string();
+  return file.starts_with(folder) ? folder + without_percents(file.substr(folder.size())) : file;
+}
+
 Assimp::IOStream* ImportFiles::Open(const char* file, const char* mode) {
   const std::filesystem::path place = std::filesystem::path(file).lexically_normal();
   if (!is_ours(place)) {
@@ -290,6 +297,7 @@ Assimp::IOStream* ImportFiles::Open(const char* file, const char* mode) {
     return nullptr;
   }
   auto opened = open_regular(place);
+  if (const std::string plain = plain_name(file); !opened && plain != file) return Open(plain.c_str(), mode);
   std::error_code error;
   const std::uintmax_t bytes = opened ? std::filesystem::file_size(place, error) : 0;
   if (!opened || error || *mode != 'r') return nullptr;

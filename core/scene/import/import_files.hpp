@@ -37,6 +37,7 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
 
  private:
   bool is_ours(const std::filesystem::path& file) const;
+  std::string plain_name(const std::string& file) const;
 
   const MeshFile& request_;
   std::vector<std::filesystem::path> folders_;

@@ -92,12 +92,12 @@ std::string better_reason(const MeshFile& request, const std::string& extension,
   if (reason.find("Draco") != reason.npos)  // Assimp can be built without it
     return reason + " (KHR_draco_mesh_compression); unpack it: gltf-transform copy IN OUT.glb";
   const auto text = text_of(request, max_mesh_bytes);
-  if (extension == ".gltf")
-    return text && text->starts_with("glTF") ? "is a GLB file; name it .glb"
-           : reason == "GLTF: No scene"      ? "has no scene; export it with one"
-                                             : reason;
-  const MeshFault fault = text ? glb_fault(*text) : MeshFault();
-  return fault ? *fault : reason;
+  if (!text) return reason;
+  if (extension == ".gltf" && text->starts_with("glTF")) return "is a GLB file; name it .glb";
+  if (extension == ".glb")
+    if (const MeshFault fault = glb_fault(*text)) return *fault;
+  if (reason == "GLTF: No scene") return "has no scene; export it with one";
+  return reason.starts_with("No suitable reader") ? unknown_gltf(*text) : reason;
 }
 
 /// Number of triangles that an STL, PLY or OBJ file lists; for other files the number that was imported.

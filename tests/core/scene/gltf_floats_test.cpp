@@ -138,6 +138,12 @@ TEST_F(GltfFloats, EveryContainer) {
   files.write("a b.bin", triangle.data);
   expect_vertices(vertices("b.gltf", triangle.beside("a b.bin")), of_shorts);
   expect_vertices(vertices("c.gltf", triangle.beside("a%20b.bin")), of_shorts);
+  Triangle of_floats(5126, false, corners<float>({0, 0, 0, 100, 0, 0, 0, 50, 25}, 12), 12);
+  of_floats.description["materials"] = {{{"name", "rust"}}};
+  of_floats.description["meshes"][0]["primitives"][0]["attributes"].erase("NORMAL");
+  files.write("f b.bin", of_floats.data);
+  expect_vertices(vertices("d.gltf", of_floats.beside("f%20b.bin")), of_shorts);  // read by the importer itself
+  EXPECT_EQ(without_percents("a%20b%00c%2"), "a b%00c%2");
   const std::string bytes = triangle.glb();
   const auto held = load_mesh({.file = "held.glb", .in_memory = bytes});
   ASSERT_TRUE(held) << held.error().text;

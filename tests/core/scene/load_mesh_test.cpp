@@ -525,6 +525,14 @@ TEST_F(LoadMesh, FaultsOfAGlbAreNamed) {
   EXPECT_THAT(refusal("c.glb", whole.substr(0, whole.size() - 30)), HasSubstr("c.glb: cannot be read: is cut short"));
   EXPECT_THAT(refusal("v.glb", with(4, 3)), HasSubstr("v.glb: cannot be read: is GLB of version 3"));
   EXPECT_THAT(refusal("h.glb", whole.substr(0, 15)), HasSubstr("ends within its head"));
+  EXPECT_THAT(refusal("a.glb", with(9, 0)), HasSubstr("its head announces "));
+  EXPECT_THAT(refusal("j.glb", with(20, '[')), HasSubstr("j.glb: cannot be read: its JSON is damaged"));
+  EXPECT_THAT(refusal("j.gltf", "{\"asset\":"), HasSubstr("j.gltf: cannot be read: its JSON is damaged"));
+  for (const std::string asset : {R"({"version":"4.0"})", "{}"})
+    EXPECT_THAT(refusal("v.gltf", R"({"asset":)" + asset + "}"), HasSubstr("is no valid glTF of version 1 or 2")) << asset;
+  std::string alone = whole.substr(0, 20 + json);
+  alone[8] = static_cast<char>((20 + json) & 0xFF), alone[9] = static_cast<char>((20 + json) >> 8);
+  EXPECT_THAT(refusal("b.glb", alone), HasSubstr("b.glb: cannot be read: has no binary chunk"));
 }
 
 TEST_F(LoadMesh, WrongFilesAreRefusedWithOneSentence) {
