@@ -7,13 +7,14 @@ import math
 import pathlib
 import re
 import struct
+import subprocess
 import threading
 import time
 import unittest
 
 from foxglove_viewer import NAMES, Closed, Refused, Viewer
 from oculus_reader import Client, fire_message
-from running_sonard import BUILD, Sonard, eventually
+from running_sonard import BUILD, SONARCTL, Sonard, eventually
 
 ORIGINS = ', view_origins: ["https://look.example", {origin: "https://steer.example", steer: true}], hosts: [sonar-lab]'
 
@@ -180,6 +181,20 @@ class Channels(unittest.TestCase):
             self.assertAlmostEqual(at(20), 3.9, delta=0.03)  # A, to port
             self.assertEqual(at(-20), 0)
             self.assertGreater(truth["range_end_m"], 0)
+
+    def test_every_line_of_a_scanning_sonar_is_a_cloud(self):
+        with Sonard(profile="ping360") as daemon, Viewer(daemon.address) as viewer:
+            viewer.greeted().subscribed("/front/ping", "/front/cloud")
+            with subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "ping360"], stdin=subprocess.DEVNULL,
+                                  stdout=subprocess.DEVNULL) as host:
+                stamps = collections.defaultdict(list)
+                try:
+                    while len(stamps["/front/ping"]) < 20 or stamps["/front/cloud"][-1:] < stamps["/front/ping"][19:20]:
+                        topic, ns, _ = viewer.wait_for(lambda kind, value: kind == "message")
+                        stamps[topic].append(ns)
+                finally:
+                    host.terminate()
+            self.assertLessEqual(set(stamps["/front/ping"][:20]), set(stamps["/front/cloud"]))
 
     def test_who_comes_after_all_have_left_gets_geometry_too(self):
         with Sonard() as daemon, Client(daemon.address) as client:

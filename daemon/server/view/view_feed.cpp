@@ -232,7 +232,9 @@ void ViewFeed::sync_sonars() {
     sonar.ping = add_channel("/" + name + "/ping", "sonar.v1.PingEvent", ChannelKind::event, ping_hz);
     sonar.fan = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
     sonar.about = add_channel("/" + name + "/picture", "sonar.v1.Picture", ChannelKind::last_value, fan_hz);
-    sonar.cloud = add_channel("/" + name + "/cloud", "foxglove.PointCloud", ChannelKind::picture, cloud_hz);
+    const bool by_lines = device.sonar().settings().beam_count == 1;
+    sonar.cloud = add_channel("/" + name + "/cloud", "foxglove.PointCloud", by_lines ? ChannelKind::event : ChannelKind::picture,
+                              by_lines ? ping_hz : cloud_hz);
     sonar.drawn.channels = {sonar.fan, sonar.about};
     sonar.points.channels = {sonar.cloud};
     sonar.points.threshold = "/" + name + "/view/cloud_threshold";

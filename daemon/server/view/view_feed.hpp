@@ -112,6 +112,8 @@ class ViewFeed final : public ViewerHost {
   void on_preview(const std::string& sonar, const PingOutcome& outcome);
   void make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make);
   void begin_slow_ones(SonarView& sonar);
+  bool clouds_are_lines(const SonarView& sonar) const;
+  void offer_line(const SonarView& sonar);
   void on_log(LogLevel level, const std::string& line, const std::vector<LogField>& fields);
   void arm();
   void tick();

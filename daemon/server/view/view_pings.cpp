@@ -39,8 +39,27 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
     const std::string volume = std::to_string(s.mode) + " " + std::to_string(s.range_m) + " " + std::to_string(s.range_start_m);
     if (std::exchange(sonar->volume, volume) != volume) offer(swath_, swath_payload(sonar->name, ping));
   }
+  if (clouds_are_lines(*sonar)) offer_line(*sonar);
   begin_slow_ones(*sonar);
   if (of_.clock.stepped()) arm();
+}
+
+/// After a reload the profile may have another number of beams than the channel was made for.
+bool ViewFeed::clouds_are_lines(const SonarView& sonar) const {
+  return channel(sonar.cloud)->kind == ViewChannel::Kind::event && sonar.last->request.settings.beam_count == 1;
+}
+
+/// The cloud of a sonar with one beam. Each ping gives one: a line that is left out would be a gap in the sweep.
+void ViewFeed::offer_line(const SonarView& sonar) {
+  std::map<double, ViewPayloadPointer> made;  // by threshold
+  each([&](ViewConnection& c) {
+    if (!c.viewer().subscribes(sonar.cloud)) return;
+    const double threshold = threshold_of(c.viewer(), sonar.points);
+    ViewPayloadPointer& line = made[threshold];
+    if (line == nullptr) line = cloud_payload(sonar.name, *sonar.last, threshold);
+    give(c.viewer(), sonar.cloud, line);
+    c.wake();
+  });
 }
 
 /// Called for each ping and at each tick, because a payload may become due, or get a subscriber, between pings.
@@ -55,6 +74,7 @@ void ViewFeed::begin_slow_ones(SonarView& sonar) {
                   if (!picture) picture = draw();
                   return channel == about ? picture_payload(at, *picture) : fan_payload(name, at, *picture, *painter);
                 });
+  if (clouds_are_lines(sonar)) return;
   make_slowly(sonar, &SonarView::points, [name = sonar.name, ping = sonar.last](std::uint32_t, double threshold) {
     return cloud_payload(name, *ping, threshold);
   });
