@@ -21,6 +21,12 @@ constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without 
 /// False for a destination of the sonar's datagrams.
 bool is_own(const v1::SonarAddress& of) { return of.protocol() != "status" && of.protocol() != "multicast"; }
 
+/// The first address at which the sonar accepts clients.
+const std::string& own_address(const v1::SonarStatus& s) {
+  const auto first = std::ranges::find_if(s.addresses(), is_own);
+  return first != s.addresses().end() ? first->address() : s.listens();
+}
+
 /// True if the sonar is at the device's address; port 0 means any port.
 bool is_at(const v1::SonarStatus& s, const Endpoint& device) {
   const auto fits = [&](const std::string& address) {
@@ -43,7 +49,8 @@ Error no_observers(const v1::SonarStatus& s, const Make& make) {
 }
 
 struct Observed {
-  Endpoint at;  // for observers
+  Endpoint at;     // for observers
+  Endpoint sonar;  // for its clients, if the user named the port for observers; else as the user named it
   const Make* make = nullptr;
   bool has_client = false, has_observer = false;
 };
@@ -64,11 +71,7 @@ Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device
                                                place + "; --control names another");
   if (found.size() > 1) {
     std::string all;
-    for (const v1::SonarStatus* s : found) {
-      const auto first = std::ranges::find_if(s->addresses(), is_own);
-      all +=
-          (all.empty() ? "" : ", ") + (first != s->addresses().end() ? first->address() : s->listens()) + " (" + s->name() + ")";
-    }
+    for (const v1::SonarStatus* s : found) all += (all.empty() ? "" : ", ") + own_address(*s) + " (" + s->name() + ")";
     return failure(ErrorKind::usage, "several sonars are at " + place + ": name one with its port: " + all);
   }
   const v1::SonarStatus& s = *found.front();
@@ -76,7 +79,9 @@ Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device
   if (s.observers().empty()) return tl::unexpected(no_observers(s, make));
   const auto at = parse_endpoint(s.observers(), device);
   if (!at) return tl::unexpected(at.error());
-  return Observed{{device.host, at->port}, &make, s.clients_size() > 0, s.observing() > 0};
+  Endpoint sonar = device;
+  if (const auto own = parse_endpoint(own_address(s), device); own && at->port == device.port) sonar.port = own->port;
+  return Observed{{device.host, at->port}, sonar, &make, s.clients_size() > 0, s.observing() > 0};
 }
 
 Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device) {
@@ -95,7 +100,7 @@ Result<OpenedStream> observe(const SourceOptions& source, const Endpoint& device
       stderr,
       "sonarctl: connected to %s as an observer: no settings are sent, pings have the settings of the sonar's clients%s\n",
       text_from(found->at).c_str(), found->has_client ? "" : "; it has none now: pings come when a driver requests them");
-  return OpenedStream{*std::move(stream), now, true, device};
+  return OpenedStream{*std::move(stream), now, true, found->sonar};
 }
 
 Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
@@ -105,7 +110,7 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
   auto give_up = std::chrono::steady_clock::now() + milliseconds_from(source.silence_limit_s);
   PictureProgress progress(source.picture_limit_s);
   std::optional<HostPing> last;
-  FirstPingWait waits(source, *stream, opened->observes);
+  FirstPingWait waits(source, *stream, opened->observes, true);
   bool received = !stream->host().counts();  // without counts, other messages look like junk
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());

@@ -16,11 +16,12 @@ double seconds_between(PictureProgress::Clock::time_point from, PictureProgress:
 
 }  // namespace
 
-FirstPingWait::FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, Clock::time_point now)
+FirstPingWait::FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, bool is_limited,
+                             Clock::time_point now)
     : due_(now + moment) {
   const bool asks = !observes && (!source.wanted.as_it_is || stream.make().each_ping_requested);
   line_ = "connected to " + stream.about() + (asks ? "; asked for pings" : "; nothing asked") + "; waiting for the first one" +
-          (observes ? "" : text::format(", at most %g s", source.silence_limit_s));
+          (observes && !is_limited ? "" : text::format(", at most %g s", source.silence_limit_s));
 }
 
 std::chrono::milliseconds FirstPingWait::patience(std::chrono::milliseconds most, Clock::time_point now) const {

@@ -15,8 +15,9 @@ class FirstPingWait {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds moment{300};
 
-  /// `observes` is true if the command only observes and has requested nothing.
-  FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, Clock::time_point now = Clock::now());
+  /// `observes` is true if the command only observes and has requested nothing; it is then patient, unless it `is_limited`.
+  FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, bool is_limited = false,
+                Clock::time_point now = Clock::now());
   /// Returns how long to wait: `most`, or less if the line is due before.
   std::chrono::milliseconds patience(std::chrono::milliseconds most, Clock::time_point now = Clock::now()) const;
   /// Call it after each wait. `has_ping`: a ping has arrived.

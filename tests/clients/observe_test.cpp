@@ -134,6 +134,31 @@ TEST(Observe, WaitsWithoutPingsAsLongAsSonardAnswers) {
   }
 }
 
+TEST(Observe, ASinglePictureTellsHowLongItWaits) {
+  const Server observers(send_a_dummy);
+  const Control control(observers.at(), 1, "127.0.0.2:52100");
+  ViewOptions options;
+  options.source = observing(control);
+  options.source.silence_limit_s = 1;
+  options.png = testing::TempDir() + "/observe_test.png";
+  testing::internal::CaptureStderr();
+  EXPECT_FALSE(view(options));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("; nothing asked; waiting for the first one, at most 1 s\n"));
+}
+
+TEST(Observe, WhoNamesThePortForObserversFindsTheNextOne) {
+  const Server observers(send_a_dummy);
+  for (const std::string& named : {std::string("127.0.0.2:52100"), observers.at()}) {
+    const Control control(observers.at(), 1, "127.0.0.2:52100");
+    SourceOptions source = observing(control);
+    source.device = *parse_endpoint(named, {});
+    const auto opened = open_stream(source, source.device);
+    ASSERT_TRUE(opened) << opened.error().text;
+    EXPECT_EQ(text_from(opened->again), "127.0.0.2:52100");
+    EXPECT_EQ(text_from(opened->stream.device()), observers.at());
+  }
+}
+
 /// Ends the connection after it.
 void send_a_ping(const Socket& client) {
   static_cast<void>(write_all(client, ping_bytes(1, {})));
