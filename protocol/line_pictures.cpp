@@ -10,32 +10,34 @@ namespace {
 
 constexpr double shown_db = 60;  // levels down to this far below the strongest echo are shown
 
+}  // namespace
+
 /// The scale follows the strongest echo of all lines shown, so that it is the same for all of them.
-SonarPicture picture_of(const std::deque<std::shared_ptr<const Line>>& waterfall, double start_m, double row_m) {
+SonarPicture Waterfall::picture_of(const std::deque<Row>& rows, double start_m, double row_m) {
   SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};
-  seen.image.rows = waterfall.size();
-  seen.image.beams = waterfall.front()->size();
+  seen.image.rows = rows.size();
+  seen.image.beams = rows.front().line->size();
   seen.image.row_spacing_m = row_m;
   seen.image.start_m = start_m;
   float most_db = -1000;
-  for (const auto& profile : waterfall) most_db = std::max(most_db, *std::max_element(profile->begin(), profile->end()));
-  for (const auto& profile : waterfall)
-    for (const float db : *profile)
+  for (const auto& [line, _] : rows) most_db = std::max(most_db, *std::max_element(line->begin(), line->end()));
+  for (const auto& [line, received_at] : rows) {
+    seen.row_age_s.push_back(std::max(0.0, seconds(rows.front().received_at - received_at)));
+    for (const float db : *line)
       seen.image.samples.push_back(std::clamp(255 * (1 + (db - most_db) / static_cast<float>(shown_db)), 0.0f, 255.0f));
+  }
   return seen;
 }
 
-}  // namespace
-
-void Waterfall::add(Line line, double start_m, double row_m, HostPing& ping) {
-  if (start_m != start_m_ || row_m != row_m_ || (!lines_.empty() && lines_.front()->size() != line.size())) lines_.clear();
+void Waterfall::add(Line line, double start_m, double row_m, Time received_at, HostPing& ping) {
+  if (start_m != start_m_ || row_m != row_m_ || (!rows_.empty() && rows_.front().line->size() != line.size())) rows_.clear();
   start_m_ = start_m;
   row_m_ = row_m;
-  lines_.push_front(std::make_shared<const Line>(std::move(line)));
-  if (lines_.size() > waterfall_rows) lines_.pop_back();
-  ping.lines = lines_.size();
+  rows_.push_front({std::make_shared<const Line>(std::move(line)), received_at});
+  if (rows_.size() > waterfall_rows) rows_.pop_back();
+  ping.lines = rows_.size();
   ping.whole_lines = waterfall_fewest_rows;
-  ping.drawing = [lines = lines_, start_m, row_m] { return picture_of(lines, start_m, row_m); };
+  ping.drawing = [rows = rows_, start_m, row_m] { return picture_of(rows, start_m, row_m); };
 }
 
 double Sweep::bearing_rad(std::size_t direction) const {

@@ -15,11 +15,17 @@ using Line = std::vector<float>;  // by range, [dB]
 class Waterfall {
  public:
   /// Adds a line and puts the drawing into `ping`. If the rows differ from those of earlier lines, the earlier lines are
-  /// dropped.
-  void add(Line line, double start_m, double row_m, HostPing& ping);
+  /// dropped. `received_at`: for the times beside the picture.
+  void add(Line line, double start_m, double row_m, Time received_at, HostPing& ping);
 
  private:
-  std::deque<std::shared_ptr<const Line>> lines_;
+  struct Row {
+    std::shared_ptr<const Line> line;
+    Time received_at;
+  };
+  static SonarPicture picture_of(const std::deque<Row>& rows, double start_m, double row_m);
+
+  std::deque<Row> rows_;
   double start_m_ = 0, row_m_ = 0;
 };
 

@@ -11,6 +11,10 @@ namespace {
 
 constexpr Rgb head_colour{79, 184, 255};
 constexpr double waterfall_shape = 0.75;  // height divided by width
+constexpr double closest_marks = 0.06;    // of the height
+
+/// The number of rows that fill the height of a waterfall.
+std::size_t rows_shown(const PolarImage& waterfall) { return std::clamp(waterfall.rows, waterfall_fewest_rows, waterfall_rows); }
 
 /// The cells [first, last) that pixel `at` covers when `cells` cells fill `pixels` pixels; at least one cell.
 std::pair<std::size_t, std::size_t> cells_under(int at, int pixels, std::size_t cells) {
@@ -39,6 +43,17 @@ Raster draw_cells(const PolarImage& image, std::size_t rows, const FanStyle& sty
   return raster;
 }
 
+/// Writes a value whose upper left corner is (x, y).
+void draw_label(Raster& raster, int x, int y, double value, const char* unit, int scale) {
+  char label[32];
+  std::snprintf(label, sizeof label, "%g%s", value == 0 ? 0 : value, unit);
+  const int width = text_width(label, scale);
+  const int from = std::clamp(x, 0, std::max(0, raster.width - width - 1));
+  for (int dy = -2 * scale; dy < 7 * scale; ++dy)  // echoes may be as bright as the label
+    for (int i = -2 * scale; i < width + 2 * scale; ++i) blend(raster, from + i, y + dy, outside_colour, 0.7f);
+  draw_text(raster, from, y, label, label_colour, scale);
+}
+
 /// Draws vertical lines at multiples of `step`; `left` and `right` are the values at the edges of the picture.
 void draw_axis(Raster& raster, double left, double right, double step, const char* unit) {
   const int scale = std::max(1, raster.width / 400);
@@ -46,13 +61,16 @@ void draw_axis(Raster& raster, double left, double right, double step, const cha
   for (double at = std::ceil(low / step) * step; at <= high + 1e-9; at += step) {
     const int x = static_cast<int>((at - left) / (right - left) * (raster.width - 1));
     for (int y = 0; y < raster.height; ++y) blend(raster, x, y, ring_colour, 0.12f);
-    char label[32];
-    std::snprintf(label, sizeof label, "%g%s", at == 0 ? 0 : at, unit);
-    const int width = text_width(label, scale);
-    const int from = std::clamp(x + 2 * scale, 0, std::max(0, raster.width - width - 1));
-    for (int y = 0; y < 9 * scale; ++y)  // echoes may be as bright as the label
-      for (int i = -2 * scale; i < width + 2 * scale; ++i) blend(raster, from + i, y, outside_colour, 0.7f);
-    draw_text(raster, from, 2 * scale, label, label_colour, scale);
+    draw_label(raster, x + 2 * scale, 2 * scale, at, unit, scale);
+  }
+}
+
+void draw_times(Raster& raster, const SonarPicture& waterfall) {
+  const int scale = std::max(1, raster.width / 400);
+  for (const TimeMark& mark : time_marks(waterfall)) {
+    const int y = static_cast<int>(mark.part * (raster.height - 1));
+    for (int x = 0; x < raster.width; ++x) blend(raster, x, y, ring_colour, 0.12f);
+    draw_label(raster, 2 * scale, y + 2 * scale, mark.age_s, " s", scale);
   }
 }
 
@@ -109,14 +127,34 @@ Result<Raster> PicturePainter::draw(const SonarPicture& picture) {
   }
   if (Result<void> sound = check_cells(picture, style_); !sound) return tl::unexpected(sound.error());
   const bool falls = picture.kind == PictureKind::waterfall;
-  const std::size_t rows = falls ? std::clamp(image.rows, waterfall_fewest_rows, waterfall_rows) : image.rows;
+  const std::size_t rows = falls ? rows_shown(image) : image.rows;
   Raster raster = draw_cells(image, rows, style_, picture_height(picture, style_));
   if (!style_.rings) return raster;
-  if (falls)
+  if (falls) {
     draw_axis(raster, image.start_m, picture.range_m(), ring_spacing_m(picture.range_m()), " m");
-  else
+    draw_times(raster, picture);
+  } else {
     draw_axis(raster, -deg_from_rad(image.azimuth_rad.front()), -deg_from_rad(image.azimuth_rad.back()), 15, "");
+  }
   return raster;
+}
+
+std::vector<TimeMark> time_marks(const SonarPicture& waterfall) {
+  const std::vector<double>& ages = waterfall.row_age_s;
+  std::vector<TimeMark> marks;
+  if (ages.size() < 2 || ages.size() != waterfall.image.rows || !(ages.back() > 0)) return marks;
+  const auto rows = static_cast<double>(rows_shown(waterfall.image));
+  const double step_s = ring_spacing_m(ages.back() * rows / static_cast<double>(ages.size()));
+  double passed = 0;  // steps
+  for (std::size_t row = 1; row < ages.size(); ++row) {
+    const double steps = std::floor(ages[row] / step_s);
+    if (!(steps > passed)) continue;
+    passed = steps;
+    const double beyond = (steps * step_s - ages[row - 1]) / (ages[row] - ages[row - 1]);  // the middle of the row before
+    const double part = (static_cast<double>(row) - 0.5 + beyond) / rows;
+    if (part - (marks.empty() ? 0 : marks.back().part) >= closest_marks) marks.push_back({part, steps * step_s});
+  }
+  return marks;
 }
 
 }  // namespace sonar

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <utility>
+#include <vector>
 
 #include "core/image/draw_fan.hpp"
 #include "core/image/sonar_picture.hpp"
@@ -15,6 +16,10 @@ inline Opens opens_of(const SonarPicture& picture) {
 
 /// Height of the picture in pixels, for the width in `style`. The picture must be one that PicturePainter accepts.
 int picture_height(const SonarPicture& picture, const FanStyle& style);
+
+/// Marks at equal steps of time before the newest ping; none if the ages of the rows are not known. Marks that would lie too
+/// close to others, after a pause between pings, are left out.
+std::vector<TimeMark> time_marks(const SonarPicture& waterfall);
 
 /// Draws a series of pictures. If rings are on, it also draws the head direction of a sweep, and axes in pictures that are not
 /// fans.

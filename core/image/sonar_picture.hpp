@@ -66,8 +66,9 @@ struct SonarPicture {
   /// A range image has a row for each elevation, the highest first. A waterfall has no bearings; it has a row for each ping and
   /// a column for each range, `row_spacing_m` apart, beginning at `start_m`.
   PolarImage image;
-  double head_rad = 0;       // sweep: direction of the head, positive to port
-  double elevation_rad = 0;  // range image: elevation of the highest row; the lowest row has the negative value
+  double head_rad = 0;                 // sweep: direction of the head, positive to port
+  double elevation_rad = 0;            // range image: elevation of the highest row; the lowest row has the negative value
+  std::vector<double> row_age_s = {};  // waterfall: time from the ping of each row to the newest; empty: not known
   std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
   enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: `image` is empty
 
@@ -77,6 +78,12 @@ struct SonarPicture {
     return kind == PictureKind::waterfall ? image.start_m + static_cast<double>(image.beams) * image.row_spacing_m
                                           : image.range_m();
   }
+};
+
+/// A time beside a waterfall (time_marks() in draw_picture.hpp).
+struct TimeMark {
+  double part = 0;   // distance from the upper edge, in heights of the picture
+  double age_s = 0;  // before the newest ping
 };
 
 /// Largest number of rows of a waterfall, and smallest number of rows in its picture. Rows without a ping are empty.

@@ -47,12 +47,12 @@ class DvlHost final : public protocol::Host {
     return {protocol::HostSend{0, *request_}};
   }
   /// Reports end with CR LF. A line that is too long is dropped, and reading continues after the next line end.
-  HostActions on_bytes(std::size_t, BytesView received, Time) override {
+  HostActions on_bytes(std::size_t, BytesView received, Time now) override {
     HostActions actions;
     for (const std::byte b : received) {
       line_.push_back(b);
       if (b == std::byte{'\n'}) {
-        on_line(actions);
+        on_line(actions, now);
         line_.clear();
       } else if (line_.size() > longest_line) {
         line_.clear();
@@ -63,14 +63,14 @@ class DvlHost final : public protocol::Host {
   std::string about() const override { return std::string(title); }
 
  private:
-  void on_line(HostActions& actions) {
+  void on_line(HostActions& actions, Time now) {
     const Line line = read_line(line_);
-    if (line.velocity) actions.emplace_back(ping_from(line.velocity->measured));
+    if (line.velocity) actions.emplace_back(ping_from(line.velocity->measured, now));
     if (line.response && !line.response->success)
       actions.emplace_back(Error{ErrorKind::usage, "refuses " + line.response->to + ": " + line.response->error});
   }
 
-  HostPing ping_from(const Measurement& report) {
+  HostPing ping_from(const Measurement& report, Time now) {
     double farthest_m = 0;
     for (const Beam& beam : report.beams)
       if (beam.is_valid) farthest_m = std::max(farthest_m, beam.distance_m);
@@ -90,7 +90,7 @@ class DvlHost final : public protocol::Host {
       float& point = echoes[static_cast<std::size_t>(beam.distance_m / row_m)];
       point = std::max(point, static_cast<float>(std::clamp(beam.rssi_dbm, -200.0, 200.0)));
     }
-    waterfall_.add(std::move(echoes), 0, row_m, ping);
+    waterfall_.add(std::move(echoes), 0, row_m, now, ping);
     return ping;
   }
 

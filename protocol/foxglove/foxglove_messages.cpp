@@ -288,7 +288,7 @@ Bytes truth(const Ping& ping) {
   return bytes_of(message);
 }
 
-Bytes picture(const SonarPicture& picture) {
+Bytes picture(const SonarPicture& picture, std::span<const TimeMark> times) {
   v1::Picture message;
   message.set_kind(std::string(name_of(picture.kind)));
   message.set_range_start_m(picture.image.start_m);
@@ -303,6 +303,11 @@ Bytes picture(const SonarPicture& picture) {
   if (picture.kind == PictureKind::points) message.set_column(columns[static_cast<std::size_t>(picture.column)]);
   message.set_gamma(static_cast<double>(picture.image.shades.gamma));
   message.set_per_mille(static_cast<std::uint32_t>(picture.image.shades.per_mille));
+  for (const auto& [part, age_s] : times) {
+    v1::TimeMark& mark = *message.add_time_marks();
+    mark.set_part(part);
+    mark.set_age_s(age_s);
+  }
   return bytes_of(message);
 }
 

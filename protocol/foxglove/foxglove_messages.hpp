@@ -87,7 +87,8 @@ Bytes geometry(const Ping& ping, std::uint32_t number);
 /// sonar.v1.PingTruth of a ping that was made with SimulationSwitches::keep_truth.
 Bytes truth(const Ping& ping);
 /// sonar.v1.Picture.
-Bytes picture(const SonarPicture& picture);
+/// `times`: the marks beside a waterfall.
+Bytes picture(const SonarPicture& picture, std::span<const TimeMark> times);
 /// sonar.v1.Findings.
 Bytes findings(std::span<const doctor::Finding> all);
 

@@ -125,7 +125,7 @@ class SurveyorHost final : public PingHost {
   using PingHost::PingHost;
 
  private:
-  std::optional<HostPing> ping_from(const Frame& frame) override {
+  std::optional<HostPing> ping_from(const Frame& frame, Time) override {
     if (frame.header.id == Id::atof_point_data) return read(frame, AtofPointData{});
     return frame.header.id == Id::yz_point_data ? read(frame, YzPointData{}) : std::nullopt;
   }
@@ -166,7 +166,7 @@ class Ping360Host final : public PingHost {
   void on_frame(const Frame&, HostActions& actions) override {
     if (!std::exchange(is_open_, true)) ask(actions);
   }
-  std::optional<HostPing> ping_from(const Frame& frame) override {
+  std::optional<HostPing> ping_from(const Frame& frame, Time) override {
     const auto line_of = [&](auto data) -> std::optional<HostPing> {
       const auto rest = read_front(frame, data);
       if (!rest || data.count == 0) return std::nullopt;

@@ -45,7 +45,7 @@ class Ping1DHost final : public PingHost {
   using PingHost::PingHost;
 
  private:
-  std::optional<HostPing> ping_from(const Frame& frame) override {
+  std::optional<HostPing> ping_from(const Frame& frame, Time now) override {
     Profile data;
     const auto rest = frame.header.id == Id::ping1d_profile ? read_front(frame, data) : std::nullopt;
     if (!rest) return std::nullopt;
@@ -69,7 +69,7 @@ class Ping1DHost final : public PingHost {
     Line line;
     for (const std::byte code : codes)
       line.push_back(20 * std::log10(std::max(static_cast<float>(std::to_integer<int>(code)), 0.1f) / 255));
-    waterfall_.add(std::move(line), start_m, row_m, found);
+    waterfall_.add(std::move(line), start_m, row_m, now, found);
     return found;
   }
 

@@ -53,7 +53,7 @@ HostActions PingHost::on_open(std::span<const std::uint16_t>, Time) {
   return actions;
 }
 
-HostActions PingHost::on_bytes(std::size_t, BytesView received, Time) {
+HostActions PingHost::on_bytes(std::size_t, BytesView received, Time now) {
   HostActions actions;
   framer_.append(received);
   while (const auto frame = framer_.next()) {
@@ -65,7 +65,7 @@ HostActions PingHost::on_bytes(std::size_t, BytesView received, Time) {
       if (const auto why = on_nack(refused_in(*frame), std::move(text), actions))
         actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + *why});
     }
-    if (auto ping = ping_from(*frame)) {
+    if (auto ping = ping_from(*frame, now)) {
       ping->facts.message_size = header_size + frame->payload.size() + sum_size;
       actions.emplace_back(*std::move(ping));
     }

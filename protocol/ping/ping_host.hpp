@@ -51,7 +51,7 @@ class PingHost : public protocol::Host {
   /// The reason of the error; nullopt: none, because the host sends another request in place of the refused one. `why`: what the
   /// sonar says.
   virtual std::optional<std::string> on_nack(Id /*refused*/, std::string why, protocol::HostActions&) { return why; }
-  virtual std::optional<protocol::HostPing> ping_from(const Frame& frame) = 0;
+  virtual std::optional<protocol::HostPing> ping_from(const Frame& frame, Time now) = 0;
 
  private:
   std::string_view title_;

@@ -108,12 +108,12 @@ class PowerHost final : public PingHost {
     switch_to_other(actions);
     return std::nullopt;
   }
-  std::optional<HostPing> ping_from(const Frame& frame) override {
-    if (frame.header.id == Id::os_mono_profile) return read(frame, OsMonoProfile{});
-    return frame.header.id == Id::s500_profile6 ? read(frame, Profile6{}) : std::nullopt;
+  std::optional<HostPing> ping_from(const Frame& frame, Time now) override {
+    if (frame.header.id == Id::os_mono_profile) return read(frame, OsMonoProfile{}, now);
+    return frame.header.id == Id::s500_profile6 ? read(frame, Profile6{}, now) : std::nullopt;
   }
   template <class Data>
-  std::optional<HostPing> read(const Frame& frame, Data data) {
+  std::optional<HostPing> read(const Frame& frame, Data data, Time now) {
     const auto rest = read_front(frame, data);
     if (!rest) return std::nullopt;
     Line powers = powers_in(*rest, data.results, data.lowest_db, data.highest_db);
@@ -122,7 +122,7 @@ class PowerHost final : public PingHost {
     HostPing found = ping_of(data.ping, data.start_mm, row_m, powers.size(), hz_of(data), title_of(data));
     if (powers.empty()) return found;
     found.facts.note = note_of(data, powers, row_m);
-    waterfall_.add(std::move(powers), 1e-3 * data.start_mm, row_m, found);
+    waterfall_.add(std::move(powers), 1e-3 * data.start_mm, row_m, now, found);
     return found;
   }
 

@@ -302,6 +302,14 @@ class Pages(PageChecks, unittest.TestCase):
             page.wait("sonardTest.facts.history.some((h) => h.time_s > window.begun + 2 && h.rate > 0)")
             page.close()
 
+    def test_a_waterfall_has_ranges_and_times(self):
+        with demo("omniscan"):
+            page = self.opened(self.browser.open(f"http://{HTTP}:8088/", 1600, 1000, script=NOTE_WORDS))
+            shown(page)
+            for unit in ("m", "s"):
+                page.wait(f"[...window.words.keys()].some((text) => /^[\\d.]+ {unit}$/.test(text))")
+            page.close()
+
     def test_range_labels_lie_beside_a_picture_that_opens_downwards(self):
         for maker in ("norbit", "surveyor"):
             with self.subTest(demo=maker), demo(maker):

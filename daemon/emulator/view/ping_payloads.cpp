@@ -147,7 +147,9 @@ ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPic
                  {static_cast<std::uint32_t>(fan->width), static_cast<std::uint32_t>(fan->height), "mono8", 1, samples});
 }
 
-ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture) { return view_payload(at, foxglove::picture(picture)); }
+ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture) {
+  return view_payload(at, foxglove::picture(picture, time_marks(picture)));
+}
 
 /// Only the brightest samples are kept, in no particular order: a viewer draws them as points.
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold) {

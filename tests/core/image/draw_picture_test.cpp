@@ -75,6 +75,48 @@ TEST(SonarPicture, AWaterfallBeginsOnTopAndIsEmptyBelow) {
   EXPECT_FALSE(PicturePainter(style()).draw(picture));
 }
 
+/// A waterfall whose rows are this far apart [s].
+SonarPicture aged(std::size_t rows, const std::vector<double>& between_s) {
+  SonarPicture picture{.kind = PictureKind::waterfall, .image = cells(rows, 20)};
+  for (double age_s = 0; picture.row_age_s.size() < rows;) {
+    picture.row_age_s.push_back(age_s);
+    age_s += between_s[picture.row_age_s.size() % between_s.size()];
+  }
+  return picture;
+}
+
+TEST(SonarPicture, TimesBesideAWaterfallAreThoseOfItsRows) {
+  const auto at_each_two_seconds = time_marks(aged(200, {0.1}));
+  ASSERT_EQ(at_each_two_seconds.size(), 9u);
+  for (std::size_t i = 0; i < 9; ++i) {
+    EXPECT_EQ(at_each_two_seconds[i].age_s, 2.0 * static_cast<double>(i + 1));
+    EXPECT_NEAR(at_each_two_seconds[i].part, (20.5 + 20 * static_cast<double>(i)) / 200, 1e-9) << "the middle of its row";
+  }
+  const auto few = time_marks(aged(30, {0.1}));
+  ASSERT_EQ(few.size(), 2u) << "the rows fill the upper part of a picture of 100";
+  EXPECT_NEAR(few[1].part, 0.205, 1e-9);
+}
+
+TEST(SonarPicture, APauseBetweenPingsLeavesOutTimesOfAWaterfall) {
+  std::vector<double> between_s(100, 0.1);
+  between_s[50] = 60;
+  const auto marks = time_marks(aged(100, between_s));
+  ASSERT_EQ(marks.size(), 1u);
+  EXPECT_EQ(marks[0].age_s, 60);
+  EXPECT_NEAR(marks[0].part, 0.5, 0.01);
+}
+
+TEST(SonarPicture, AWaterfallWithoutTimesHasNone) {
+  EXPECT_TRUE(time_marks(SonarPicture{.kind = PictureKind::waterfall, .image = cells(50, 20)}).empty());
+  EXPECT_TRUE(time_marks(aged(50, {0})).empty());
+}
+
+TEST(SonarPicture, TimesOfAWaterfallAreDrawnAcrossIt) {
+  const Raster raster = *PicturePainter(style(true)).draw(aged(100, {0.1}));
+  const auto y = static_cast<int>(0.205 * (raster.height - 1));  // 2 s
+  EXPECT_GT(raster.at(340, y).r, raster.at(340, y + 6).r);
+}
+
 TEST(SonarPicture, LabelsCanBeReadOverTheBrightestEchoes) {
   SonarPicture picture{.kind = PictureKind::waterfall, .image = cells(20, 100)};
   picture.image.samples.assign(20 * 100, 255);

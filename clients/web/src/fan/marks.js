@@ -117,25 +117,29 @@ export function drawMarks(canvas, polar, layout, { rings, cursor, ratio, head_ra
   if (cursor) drawCursor(g, polar, layout, cursor, port, starboard);
 }
 
-/// Axes of a rectangle: bearings below and elevations beside a range image, ranges above a waterfall.
+/// Axes of a rectangle: bearings above and elevations beside a range image, ranges above and times beside a waterfall.
 export function drawAxes(canvas, about, { box, width, height }, { rings, ratio }) {
   const g = cleared(canvas, { width, height }, ratio);
   if (!rings) return;
-  const line = (low, high, step, text, upright) => {
-    for (let v = Math.ceil(Math.min(low, high) / step - 1e-9) * step; v <= Math.max(low, high) + 1e-9; v += step) {
-      const part = (v - low) / (high - low);
-      const [x, y] = [box.left + part * box.width, box.top + part * box.height];
-      g.beginPath();
-      g.moveTo(upright ? x : box.left, upright ? box.top : y);
-      g.lineTo(upright ? x : box.left + box.width, upright ? box.top + box.height : y);
-      g.stroke();
-      g.textAlign = upright ? 'center' : 'left';
-      g.fillText(text(v), upright ? x : box.left + box.width + 4, upright ? box.top - 5 : y + 4);
-    }
+  const line = (part, text, upright) => {
+    const [x, y] = [box.left + part * box.width, box.top + part * box.height];
+    g.beginPath();
+    g.moveTo(upright ? x : box.left, upright ? box.top : y);
+    g.lineTo(upright ? x : box.left + box.width, upright ? box.top + box.height : y);
+    g.stroke();
+    g.textAlign = upright ? 'center' : 'left';
+    g.fillText(text, upright ? x : box.left + box.width + 4, upright ? box.top - 5 : y + 4);
+  };
+  const lines = (low, high, step, text, upright) => {
+    for (let v = Math.ceil(Math.min(low, high) / step - 1e-9) * step; v <= Math.max(low, high) + 1e-9; v += step)
+      line((v - low) / (high - low), text(v), upright);
   };
   g.strokeStyle = ring;
-  if (about.kind === 'waterfall') return line(about.range_start_m, about.range_m, ringSpacing_m(about.range_m), (v) => `${short(v)} m`, true);
+  if (about.kind === 'waterfall') {
+    for (const { part, age_s } of about.time_marks ?? []) line(part, `${short(age_s)} s`, false);
+    return lines(about.range_start_m, about.range_m, ringSpacing_m(about.range_m), (v) => `${short(v)} m`, true);
+  }
   const [port, elevation] = [degrees(about.port_rad), degrees(about.elevation_rad)];
-  line(-port, -degrees(about.starboard_rad), bearingStep(2 * port), (v) => `${short(v)}°`, true);
-  line(elevation, -elevation, bearingStep(2 * elevation), (v) => `${short(v)}°`, false);
+  lines(-port, -degrees(about.starboard_rad), bearingStep(2 * port), (v) => `${short(v)}°`, true);
+  lines(elevation, -elevation, bearingStep(2 * elevation), (v) => `${short(v)}°`, false);
 }

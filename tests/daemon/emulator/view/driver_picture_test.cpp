@@ -20,6 +20,7 @@ std::shared_ptr<Ping> ping_of(const protocol::Vendor& vendor, const protocol::De
   const protocol::ChangeSettings first = vendor.initial_settings(state);
   ping->request.model = state.model;
   ping->request.number = PingNumber(number);
+  ping->request.fired_at = Time{} + number * std::chrono::milliseconds(100);
   ping->request.settings = first.settings;
   ping->request.vendor_settings = first.vendor_settings;
   if (const auto step = vendor.scan_step(number, state)) {
@@ -83,6 +84,8 @@ TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
   }
   if (make.picture == PictureKind::waterfall) {
     EXPECT_EQ(picture.image.rows, 250u);
+    ASSERT_EQ(picture.row_age_s.size(), 250u);
+    for (std::size_t row = 0; row < 250; ++row) EXPECT_NEAR(picture.row_age_s[row], 0.1 * static_cast<double>(row), 1e-9);
   }
 }
 
