@@ -185,7 +185,7 @@ class Channels(unittest.TestCase):
     def test_every_line_of_a_scanning_sonar_is_a_cloud(self):
         with Sonard(profile="ping360") as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribed("/front/ping", "/front/cloud")
-            with subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "ping360"], stdin=subprocess.DEVNULL,
+            with subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "ping360", "--wait", "100"], stdin=subprocess.DEVNULL,
                                   stdout=subprocess.DEVNULL) as host:
                 stamps = collections.defaultdict(list)
                 try:
