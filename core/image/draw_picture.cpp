@@ -70,7 +70,7 @@ void draw_times(Raster& raster, const SonarPicture& waterfall) {
   for (const TimeMark& mark : time_marks(waterfall)) {
     const int y = static_cast<int>(mark.part * (raster.height - 1));
     for (int x = 0; x < raster.width; ++x) blend(raster, x, y, ring_colour, 0.12f);
-    draw_label(raster, 2 * scale, y + 2 * scale, mark.age_s, " s", scale);
+    if (y + 9 * scale <= raster.height) draw_label(raster, 2 * scale, y + 2 * scale, mark.age_s, " s", scale);
   }
 }
 

@@ -30,6 +30,7 @@ std::uint16_t glyph(char c) {
   if (c == '.') return 0b000'000'000'000'010;
   if (c == '-') return 0b000'000'111'000'000;
   if (c == 'm') return 0b000'000'111'111'101;
+  if (c == 's') return 0b000'000'011'010'110;
   return 0;
 }
 

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/base/geometry.hpp"
 
 namespace sonar::draw_picture_test {
@@ -115,6 +117,14 @@ TEST(SonarPicture, TimesOfAWaterfallAreDrawnAcrossIt) {
   const Raster raster = *PicturePainter(style(true)).draw(aged(100, {0.1}));
   const auto y = static_cast<int>(0.205 * (raster.height - 1));  // 2 s
   EXPECT_GT(raster.at(340, y).r, raster.at(340, y + 6).r);
+}
+
+TEST(Labels, HaveTheLettersOfTheirUnits) {
+  for (const char* const unit : {"m", "s"}) {
+    Raster raster(8, 8);
+    draw_text(raster, 0, 0, unit, {255, 255, 255}, 1);
+    EXPECT_GT(std::ranges::count(raster.pixels, Rgb{255, 255, 255}), 4) << unit;
+  }
 }
 
 TEST(SonarPicture, LabelsCanBeReadOverTheBrightestEchoes) {
