@@ -1,6 +1,7 @@
 #include "protocol/line_pictures.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "core/base/geometry.hpp"
@@ -9,35 +10,40 @@ namespace sonar::protocol {
 namespace {
 
 constexpr double shown_db = 60;  // levels down to this far below the strongest echo are shown
+constexpr float silent_db = -std::numeric_limits<float>::infinity();
 
 }  // namespace
 
+float Waterfall::level_at(const Row& row, double range_m) {
+  const double place = (range_m - row.start_m) / row.row_m;
+  return place >= 0 && place < static_cast<double>(row.line->size()) ? (*row.line)[static_cast<std::size_t>(place)] : silent_db;
+}
+
 /// The scale follows the strongest echo of all lines shown, so that it is the same for all of them.
-SonarPicture Waterfall::picture_of(const std::deque<Row>& rows, double start_m, double row_m) {
+SonarPicture Waterfall::picture_of(const std::deque<Row>& rows) {
+  const Row& newest = rows.front();
   SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};
   seen.image.rows = rows.size();
-  seen.image.beams = rows.front().line->size();
-  seen.image.row_spacing_m = row_m;
-  seen.image.start_m = start_m;
-  float most_db = -1000;
-  for (const auto& [line, _] : rows) most_db = std::max(most_db, *std::max_element(line->begin(), line->end()));
-  for (const auto& [line, received_at] : rows) {
-    seen.row_age_s.push_back(std::max(0.0, seconds(rows.front().received_at - received_at)));
-    for (const float db : *line)
-      seen.image.samples.push_back(std::clamp(255 * (1 + (db - most_db) / static_cast<float>(shown_db)), 0.0f, 255.0f));
+  seen.image.beams = newest.line->size();
+  seen.image.row_spacing_m = newest.row_m;
+  seen.image.start_m = newest.start_m;
+  for (const Row& row : rows) {
+    seen.row_age_s.push_back(std::max(0.0, seconds(newest.received_at - row.received_at)));
+    for (std::size_t i = 0; i < newest.line->size(); ++i)
+      seen.image.samples.push_back(level_at(row, newest.start_m + (static_cast<double>(i) + 0.5) * newest.row_m));
   }
+  const float most_db = std::max(-1000.0f, *std::ranges::max_element(seen.image.samples));
+  for (float& sample : seen.image.samples)
+    sample = std::clamp(255 * (1 + (sample - most_db) / static_cast<float>(shown_db)), 0.0f, 255.0f);
   return seen;
 }
 
 void Waterfall::add(Line line, double start_m, double row_m, Time received_at, HostPing& ping) {
-  if (start_m != start_m_ || row_m != row_m_ || (!rows_.empty() && rows_.front().line->size() != line.size())) rows_.clear();
-  start_m_ = start_m;
-  row_m_ = row_m;
-  rows_.push_front({std::make_shared<const Line>(std::move(line)), received_at});
+  rows_.push_front({std::make_shared<const Line>(std::move(line)), start_m, row_m, received_at});
   if (rows_.size() > waterfall_rows) rows_.pop_back();
   ping.lines = rows_.size();
   ping.whole_lines = waterfall_fewest_rows;
-  ping.drawing = [rows = rows_, start_m, row_m] { return picture_of(rows, start_m, row_m); };
+  ping.drawing = [rows = rows_] { return picture_of(rows); };
 }
 
 double Sweep::bearing_rad(std::size_t direction) const {

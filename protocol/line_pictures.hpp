@@ -14,19 +14,20 @@ using Line = std::vector<float>;  // by range, [dB]
 /// The lines of the last pings, one below the other, the newest on top.
 class Waterfall {
  public:
-  /// Adds a line and puts the drawing into `ping`. If the rows differ from those of earlier lines, the earlier lines are
-  /// dropped. `received_at`: for the times beside the picture.
+  /// Adds a line and puts the drawing into `ping`; it has the ranges of this line, also for earlier lines, which may have had
+  /// others. `received_at`: for the times beside the picture.
   void add(Line line, double start_m, double row_m, Time received_at, HostPing& ping);
 
  private:
   struct Row {
     std::shared_ptr<const Line> line;
+    double start_m, row_m;
     Time received_at;
   };
-  static SonarPicture picture_of(const std::deque<Row>& rows, double start_m, double row_m);
+  static float level_at(const Row& row, double range_m);
+  static SonarPicture picture_of(const std::deque<Row>& rows);
 
   std::deque<Row> rows_;
-  double start_m_ = 0, row_m_ = 0;
 };
 
 /// The newest line of each direction of a head that turns. Cheap to copy.

@@ -1,0 +1,41 @@
+// Pictures of sonars that send single lines.
+#include "protocol/line_pictures.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace sonar::protocol::line_pictures_test {
+namespace {
+
+TEST(Waterfall, EarlierLinesHaveTheRangesOfTheNewest) {
+  Waterfall waterfall;
+  HostPing ping;
+  waterfall.add({-60, 0, -30, -6}, 0, 1, Time{}, ping);  // 0 to 4 m
+  waterfall.add({0, -30}, 0.5, 0.5, Time{}, ping);       // 0.5 to 1.5 m
+  waterfall.add({-30, 0, -60}, 0, 1, Time{}, ping);      // 0 to 3 m
+  const SonarPicture seen = ping.drawing();
+  EXPECT_EQ(ping.lines, 3u);
+  EXPECT_EQ(seen.image.rows, 3u);
+  EXPECT_EQ(seen.image.beams, 3u);
+  EXPECT_EQ(seen.range_m(), 3);
+  EXPECT_THAT(seen.image.samples, testing::ElementsAre(127.5, 255, 0, 255, 0, 0, 0, 255, 127.5));
+}
+
+TEST(Waterfall, RowsHaveTheirAgesAndNoneIsInTheFuture) {
+  Waterfall waterfall;
+  HostPing ping;
+  for (const int s : {10, 12, 9}) waterfall.add({0, 0}, 0, 1, Time{std::chrono::seconds(s)}, ping);
+  EXPECT_THAT(ping.drawing().row_age_s, testing::ElementsAre(0, 0, 0));
+  waterfall.add({0, 0}, 0, 1, Time{std::chrono::seconds(15)}, ping);
+  EXPECT_THAT(ping.drawing().row_age_s, testing::ElementsAre(0, 6, 3, 5));
+}
+
+TEST(Waterfall, ALineWithoutALengthIsBlack) {
+  Waterfall waterfall;
+  HostPing ping;
+  waterfall.add({0, 0}, 0, 0, Time{}, ping);
+  EXPECT_THAT(ping.drawing().image.samples, testing::Each(0));
+}
+
+}  // namespace
+}  // namespace sonar::protocol::line_pictures_test
