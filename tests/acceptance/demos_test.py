@@ -248,6 +248,7 @@ class Pages(PageChecks, unittest.TestCase):
 
     def test_only_the_settings_that_a_sonar_has(self):
         all_of = {"oculus": (["mode", "beams", "transmit"], {"low frequency", "high frequency"}), "ping360": (["transmit"], set()),
+                  "dvl": (["transmit"], set()),
                   "aris": (["mode", "transmit"], {"64 LF", "64 HF", "128 LF", "128 HF"}),
                   "3d15": (["mode", "transmit"], {"low-frequency", "high-frequency"})}
         for maker, (choices, modes) in all_of.items():
@@ -257,6 +258,7 @@ class Pages(PageChecks, unittest.TestCase):
                 page.wait("!!document.querySelector('#setting-rows select')")
                 self.assertEqual(page.run("[...document.querySelectorAll('#setting-rows select')].map((s) => s.name.split('/').pop())"), choices)
                 self.assertEqual(set(page.run("[...document.querySelectorAll('#setting-rows [name$=mode] option')].map((o) => o.text)")), modes)
+                self.assertEqual(page.run("!!document.querySelector('[name$=rate_hz]')"), maker not in ("ping360", "dvl"))
                 if maker == "ping360":  # its host requests each ping, so the engine limits the rate
                     with subprocess.Popen([SONARCTL, "listen", "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as driver:
                         page.wait("document.querySelector('#rate-word').textContent === 'pinging'")

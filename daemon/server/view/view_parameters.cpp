@@ -52,8 +52,7 @@ void add_sonar(std::vector<Parameter>& all, const Device& device, bool has_previ
   all.push_back({at + "range_m", step ? step->settings.range_m : s.range_m});
   const auto rate_hz = static_cast<double>(s.rate_hz);
   using Setting = protocol::SettingsOverride;
-  if (takes(device, &Setting::rate_hz, rate_hz > 0 ? rate_hz : 1.0) || takes(device, &Setting::rate_hz, 0.0))
-    all.push_back({at + "rate_hz", rate_hz});
+  if (takes(device, &Setting::rate_hz, rate_hz > 0 ? rate_hz : 1.0)) all.push_back({at + "rate_hz", rate_hz});
   const double gain_percent = vendor.gain_percent(device.sonar().state());
   if (takes(device, &Setting::gain_percent, gain_percent)) all.push_back({at + "gain_percent", gain_percent});
   if (device.config().profile.model->modes.size() > 1) all.push_back({at + "mode", std::int64_t{s.mode}});
