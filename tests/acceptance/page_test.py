@@ -280,6 +280,7 @@ class Page(PageChecks, unittest.TestCase):
         page.wait("document.querySelector('#clients tr .dot').className === 'dot ok'")  # the rate of the driver is known
         rows = page.run("[...document.querySelectorAll('#clients tr')].map((r) => [r.querySelector('.dot').className, r.children[1].innerText, r.children[3].innerText])")
         self.assertEqual(rows[1], ["dot ok", "–", "–"])
+        self.assertIn("2 driver connections", page.text("#connection-count"))
         self.assertIn("for commands: it gets no pings", page.run("document.querySelector('#clients tr:nth-child(2) .who').title"))
         self.assertEqual(page.run("[...document.querySelectorAll('#addresses li')].map((e) => e.innerText)"),
                          ["tcp 127.0.0.2:2210 · points", "tcp 127.0.0.2:2209 · commands", "status 127.255.255.255:9 · sends without a request"])

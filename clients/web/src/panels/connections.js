@@ -51,7 +51,7 @@ export function drawConnections(facts) {
   const rows = rowsOf(facts);
   const drivers = (facts.status?.sonars ?? []).reduce((sum, sonar) => sum + sonar.clients.length, 0);
   const viewers = facts.status?.viewers?.length ?? 0;  // older daemons do not list viewers
-  setText($('connection-count'), facts.status ? many(drivers, 'driver') + (viewers ? `, ${many(viewers, 'viewer')}` : '') : dash);
+  setText($('connection-count'), facts.status ? many(drivers, 'driver connection') + (viewers ? `, ${many(viewers, 'viewer')}` : '') : dash);
   const body = $('clients');
   showList(body, rows.map((r) => r.key), () =>
     rows.map(() => make('tr', {}, make('td', { class: 'who' }, make('span', { class: 'dot' }), make('span')), make('td'), make('td'), make('td'))));
