@@ -141,8 +141,8 @@ ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPic
   if (!fan) return nullptr;
   auto samples = std::make_shared<wire::Bytes>();
   samples->reserve(fan->pixels.size());
-  for (const Rgb& p : fan->pixels)  // pixels outside the fan have a colour that is not in the map
-    samples->push_back(static_cast<std::byte>(p.r == p.g && p.g == p.b ? p.r : 0));
+  for (const Rgb& p : fan->pixels)  // pixels outside the picture have a colour that is not in the map
+    samples->push_back(static_cast<std::byte>(p.r == p.g && p.g == p.b ? std::max<std::uint8_t>(1, p.r) : 0));
   return picture(at, sonar,
                  {static_cast<std::uint32_t>(fan->width), static_cast<std::uint32_t>(fan->height), "mono8", 1, samples});
 }

@@ -23,7 +23,7 @@ ViewPayloadPointer truth_payload(const Ping& ping);
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);
 /// The style of fan_payload(): gray, without rings.
 FanStyle view_fan_style();
-/// The picture that `painter` draws in view_fan_style(), 0 outside. Slow. Null: it cannot be drawn.
+/// The picture that `painter` draws in view_fan_style(): 0 outside, 1 to 255 inside. Slow. Null: it cannot be drawn.
 ViewPayloadPointer fan_payload(const std::string& sonar, Time at, const SonarPicture& picture, PicturePainter& painter);
 /// The axes of fan_payload(), as sonar.v1.Picture.
 ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture);

@@ -89,5 +89,21 @@ TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
   }
 }
 
+TEST(FanPayload, SilentSamplesAreNotOutsideOfThePicture) {
+  SonarPicture silent;
+  silent.image.rows = 100;
+  silent.image.beams = 101;
+  silent.image.row_spacing_m = 0.1;
+  for (int beam = 0; beam < 101; ++beam) silent.image.azimuth_rad.push_back(0.5 - 0.01 * beam);
+  silent.image.samples.resize(100 * 101);
+  PicturePainter painter(view_fan_style());
+  const auto payload = fan_payload("front", Time{}, silent, painter);
+  ASSERT_NE(payload, nullptr);
+  const wire::Bytes& pixels = *payload->pieces.back().bytes;
+  const auto inside = std::ranges::count(pixels, std::byte{1}), outside = std::ranges::count(pixels, std::byte{0});
+  EXPECT_EQ(static_cast<std::size_t>(inside + outside), pixels.size());
+  EXPECT_NEAR(static_cast<double>(inside) / static_cast<double>(pixels.size()), 0.52, 0.03) << "a sector of 1 rad in its box";
+}
+
 }  // namespace
 }  // namespace sonar::driver_picture_test
