@@ -55,12 +55,17 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
   }
 }
 
+/// True if a vehicle at the origin, at any depth of the sea, cannot see the object.
+bool is_far(const DescribedObject& o) {
+  constexpr double deepest_sea_m = 11'000;
+  const double depth_m = std::clamp(-o.in_world.high_m.z, 0.0, deepest_sea_m);
+  return !o.in_world.empty() && o.in_world.distance_m({0, 0, -depth_m}) > far_m;
+}
+
 void remark_on_places(const SceneDescription& scene, Remarks& out) {
-  const auto far =
-      names_where(scene, [](const DescribedObject& o) { return !o.in_world.empty() && o.in_world.distance_m({}) > far_m; });
-  const auto far_grid = std::find_if(scene.objects.begin(), scene.objects.end(), [](const DescribedObject& o) {
-    return o.kind == "heightmap" && !o.in_world.empty() && o.in_world.distance_m({}) > far_m;
-  });
+  const auto far = names_where(scene, is_far);
+  const auto far_grid = std::find_if(scene.objects.begin(), scene.objects.end(),
+                                     [](const DescribedObject& o) { return o.kind == "heightmap" && is_far(o); });
   if (!far.empty())
     out.warnings.push_back(std::string("more than 1 km from the origin, beyond the range of every product: ") + list_of(far) +
                            (far_grid == scene.objects.end()

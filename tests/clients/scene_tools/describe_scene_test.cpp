@@ -121,6 +121,15 @@ TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
   EXPECT_THAT(remarks("objects: [{name: bed, type: heightmap, file: utm.asc, material: sand}]\n").warnings,
               ElementsAre(HasSubstr(
                   "every product: bed; centred: true brings the middle of utm.asc to its pose, and origin: {lat, lon}")));
+  for (const char* height_m : {"-3000", "-10900", "-15000"}) {
+    const std::string deep = height_m;
+    files.write("deep.asc", "ncols 2\nnrows 2\ncellsize 100\n" + deep + " " + deep + " " + deep + " " + deep + "\n");
+    const auto warnings = remarks("objects: [{name: bed, type: heightmap, file: deep.asc, material: sand}]\n").warnings;
+    if (deep == "-15000")
+      EXPECT_THAT(warnings, ElementsAre(HasSubstr("more than 1 km from the origin"))) << "deeper than any sea";
+    else
+      EXPECT_THAT(warnings, IsEmpty()) << deep;
+  }
 }
 
 TEST_F(DescribeScene, WarnsOfGroundAndOfObjectsAtTheSurface) {
