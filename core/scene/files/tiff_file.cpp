@@ -21,7 +21,7 @@ void on_error(const char*, const char* pattern, va_list arguments) {
 }
 
 tl::unexpected<Error> bad(const std::string& what) { return failure(ErrorKind::bad_data, what); }
-tl::unexpected<Error> unreadable() { return bad("cannot be read: " + last_tiff_error()); }
+tl::unexpected<Error> unreadable() { return bad("cannot be read; is it cut short? Fetch it again: " + last_tiff_error()); }
 
 /// The name of a compression that is not read; its code if the name is unknown.
 std::string name_of_compression(std::uint16_t code) {
