@@ -108,6 +108,14 @@ TEST(SonarPicture, APauseBetweenPingsLeavesOutTimesOfAWaterfall) {
   EXPECT_NEAR(marks[0].part, 0.5, 0.01);
 }
 
+TEST(SonarPicture, TimesOfAWaterfallKeepADistance) {
+  std::vector<double> between_s(40, 0.1);
+  std::fill(between_s.begin() + 30, between_s.end(), 10);
+  const auto marks = time_marks(aged(40, between_s));
+  ASSERT_EQ(marks.size(), 1u) << "100 s would be five rows below 50 s";
+  EXPECT_EQ(marks[0].age_s, 50);
+}
+
 TEST(SonarPicture, AWaterfallWithoutTimesHasNone) {
   EXPECT_TRUE(time_marks(SonarPicture{.kind = PictureKind::waterfall, .image = cells(50, 20)}).empty());
   EXPECT_TRUE(time_marks(aged(50, {0})).empty());
