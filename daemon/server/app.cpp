@@ -152,6 +152,7 @@ void App::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
   log_.info("stopping: " + why);
   notify_.stopping();
+  hurry_all_threads();
   pose_server_.stop();
   mavlink_server_.stop();
   control_.stop();

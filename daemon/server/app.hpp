@@ -64,8 +64,8 @@ class App {
   const Config& config() const { return config_; }
   const Scene& scene() const { return *changes_.scene(); }
   const std::string& engine_description() const { return simulator_.engine_description(); }
-  /// Call it after run(). True if the destructor would wait: for a scene or a ping that is no longer needed, or for files.
-  bool is_at_work() const { return changes_.is_building() || simulator_.under_way_for().count() > 0 || !files_are_written(); }
+  /// True if all files are written as far as it was requested.
+  bool files_are_written() const { return recordings_.idle() && writer_.idle(); }
   const PoseServer& poses() const { return pose_server_; }
   const MavlinkServer& mavlink() const { return mavlink_server_; }
   const ControlServer& control() const { return control_; }
@@ -83,7 +83,6 @@ class App {
   void on_change();
   void look();  // called after a change: ends the daemon, or takes the next step of stepped time
   bool enough_served() const;
-  bool files_are_written() const { return recordings_.idle() && writer_.idle(); }
   void log_new_notes();
   void run_range_finders();
   void wait_for_signal();

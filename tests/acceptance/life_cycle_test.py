@@ -18,6 +18,7 @@ import unittest
 from foxglove_viewer import Viewer
 from oculus_reader import Client, fire_message
 from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, run
+from stopped_threads import stopped_threads
 
 sys.path.insert(0, str(ROOT / "tests/reliability"))
 from record import record  # noqa: E402  the folder above
@@ -183,6 +184,12 @@ class Stop(unittest.TestCase):
             viewer.socket.close()
             self.assertEqual(code, 0, daemon.log())
             self.assertLess(seconds, ROOM)
+
+    def test_terminate_does_not_wait_for_threads_of_low_priority(self):
+        with Sonard() as daemon, stopped_threads(daemon.process.pid, nicer_than=1) as stopped:
+            self.assertGreaterEqual(stopped, 1)
+            daemon.process.terminate()
+            eventually(lambda: pathlib.Path(f"/proc/{daemon.process.pid}/stat").read_text(encoding="ascii").split()[2] == "Z")
 
     def test_a_second_terminate_ends_at_once(self):
         with Sonard(mount=FOUR_CLIENTS) as daemon:

@@ -2,12 +2,15 @@
 
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 
 #include "daemon/commands/run/prepare_run.hpp"
 #include "daemon/config/effective_switches.hpp"
 #include "daemon/config/load_config.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/server/app.hpp"
+
+extern "C" void __lsan_do_leak_check() __attribute__((weak));  // in builds with the address sanitizer
 
 namespace sonar {
 namespace {
@@ -82,11 +85,11 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
   let_hangups_through(false);
   log.announce(summary(app));
   std::fputs(digest_lines(app).c_str(), stdout);
-  if (app.is_at_work()) {  // a scene is loading or a ping is being computed that is no longer needed
-    std::fflush(nullptr);
-    std::_Exit(code);
-  }
-  return code;
+  // All files are written and all clients are gone. The destructors would wait for threads of lower priority, which take seconds
+  // to end beside busy programs, and for a scene or a ping that is no longer needed.
+  if (__lsan_do_leak_check != nullptr) __lsan_do_leak_check();
+  std::fflush(nullptr);
+  std::_Exit(code);
 }
 
 }  // namespace sonar

@@ -55,8 +55,6 @@ class SceneChanges {
   void submit(Change change);
   bool busy() const { return under_way_ || !waiting_.empty(); }
   bool is_full() const { return waiting_.size() >= most_waiting; }
-  /// True while the thread works, even for a change that is no longer needed; the destructor would wait for it.
-  bool is_building() const { return building_; }
   /// Duration of the present change so far; 0 = none.
   std::chrono::steady_clock::duration building_for() const;
   void stop();

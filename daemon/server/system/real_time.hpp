@@ -16,6 +16,10 @@ inline constexpr int background_niceness = 10;
 /// Returns an empty text, or a sentence with the reason of a failure and the remedy.
 std::string schedule_in_real_time(int priority);
 
+/// Gives all threads of the process the niceness of the first one. At its end each of them needs processor time: beside busy
+/// programs, one at +10 took seconds to free the memory. It needs the limit LimitNICE= of the unit, or CAP_SYS_NICE.
+void hurry_all_threads();
+
 /// Runs `work` on a separate background thread, and waits for it. Threads that `work` starts inherit its niceness, for example
 /// those of Embree, which stay. Exceptions are passed on to the caller.
 void compute_apart(const std::function<void()>& work);

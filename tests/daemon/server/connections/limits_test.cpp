@@ -233,6 +233,18 @@ TEST(Threads, ThatComputeAreNiceAndSoAreThoseTheyStart) {
   EXPECT_THROW(compute_apart([] { throw std::runtime_error("no"); }), std::runtime_error);
 }
 
+TEST(Threads, GetTheNicenessOfTheFirstAtTheEnd) {
+  const int first = getpriority(PRIO_PROCESS, static_cast<id_t>(getpid()));
+  const auto own = [] { return static_cast<id_t>(gettid()); };
+  bool permitted = false;
+  compute_apart([&] { permitted = setpriority(PRIO_PROCESS, own(), first) == 0; });
+  compute_apart([&] {
+    const int before = getpriority(PRIO_PROCESS, own());
+    hurry_all_threads();
+    EXPECT_EQ(getpriority(PRIO_PROCESS, own()), permitted ? first : before);
+  });
+}
+
 TEST(Threads, RealTimeIsTakenOrTheRefusalSaysWhatToDo) {
   std::thread([] {  // a separate thread, so that the test's own is not changed
     const std::string why = schedule_in_real_time(1);

@@ -465,7 +465,7 @@ TEST(RecordedDaemon, AStopOfTheDaemonFinishesTheFile) {
   ASSERT_TRUE(client.next_ping());
   ASSERT_TRUE(client.next_ping());
   EXPECT_EQ(daemon.stop(), 0);
-  EXPECT_FALSE(daemon.app().is_at_work());
+  EXPECT_TRUE(daemon.app().files_are_written());
   EXPECT_GE(messages_in(folder.path + "/run.mcap"), 2u);
 }
 
