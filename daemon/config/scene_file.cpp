@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <sstream>
 #include <system_error>
 #include <vector>
 
@@ -41,12 +42,16 @@ bool is_below(const std::filesystem::path& file, const std::filesystem::path& fo
 
 constexpr int most_looked_at = 256;  // limit, because the folder can be a home directory
 
-/// Recognises a scene by its keys at the start of lines, because configurations and material libraries lie beside scenes.
+/// Recognises a scene by its keys at the start of lines, because configurations and material libraries lie beside scenes. Only
+/// the beginning is read: a line may be longer than the memory.
 bool is_like_a_scene(const std::filesystem::path& file) {
-  std::ifstream in(file);
+  std::string beginning(std::size_t{1} << 18, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(beginning.data(), static_cast<std::streamsize>(beginning.size()));
+  beginning.resize(static_cast<std::size_t>(in.gcount()));
+  std::istringstream lines(beginning);
   bool has_objects = false;
-  std::string line;
-  for (int i = 0; i < 4096 && std::getline(in, line); ++i) {
+  for (std::string line; std::getline(lines, line);) {
     if (line.starts_with("sonars:") || line.starts_with("world:")) return false;
     has_objects = has_objects || line.starts_with("objects:");
   }

@@ -1,7 +1,9 @@
 """Tests sonarctl scene: a Gazebo world is converted to a scene, and its box has an echo at the position of its poses."""
 import json
 import math
+import os
 import pathlib
+import subprocess
 import tempfile
 import unittest
 
@@ -49,6 +51,23 @@ class SceneCommand(unittest.TestCase):
         self.assertNotIn("from everything", checked[0])
         self.assertIn("note: the scene is 111.4 km from world.origin; vehicles", checked[1])
         self.assertIn("m from everything in the scene", checked[1])
+
+    def test_small_files_take_little_memory(self):
+        """Two points far apart; beside a scene that is not there, a file of 64 GiB without a line."""
+        (self.path / "far.xyz").write_text("0 0 1\n1 1 1\n2 2 1\n3 3 1\n19000000 19000000 1\n", encoding="utf-8")
+        self.scene.write_text("objects: [{name: bed, type: heightmap, file: far.xyz, material: sand}]\n", encoding="utf-8")
+        with open(self.path / "quax.yaml", "wb") as holes:
+            holes.truncate(1 << 36)
+        config = self.path / "sonard.yaml"
+        config.write_text(CONFIG.replace("quay", "quai"), encoding="utf-8")
+        for command, words in (([SONARCTL, "scene", "check", self.scene], "19000001 x 19000001 cells"),
+                               ([SONARD, "check", config], "quai.yaml")):
+            with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+                error = process.stderr.read()
+                used = os.wait4(process.pid, 0)[2]
+                process.returncode = 65
+            self.assertIn(words, error)
+            self.assertLess(used.ru_maxrss, 300_000, "kB")
 
     def test_an_imported_box_is_heard_where_its_poses_put_it(self):
         said = self.import_quay("--material", "left_rig=concrete")

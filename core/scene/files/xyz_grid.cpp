@@ -66,8 +66,14 @@ std::size_t split_values(std::string_view line, Line& words) {
   return split(line, words);
 }
 
-/// The uniform coordinates that contain all given ones. Some may be missing among the given ones. Empty if there are none.
-std::vector<double> even_axis(std::vector<double> given) {
+/// Uniform coordinates. Two points far apart can have millions, so they are made once their number is checked.
+struct EvenAxis {
+  double first = 0, step = 0;
+  std::size_t size = 0;
+};
+
+/// The uniform coordinates that contain all given ones. Some may be missing among the given ones. Size 0: there are none.
+EvenAxis even_axis(std::vector<double> given) {
   std::sort(given.begin(), given.end());
   given.erase(std::unique(given.begin(), given.end()), given.end());
   if (given.size() < 2) return {};
@@ -84,13 +90,17 @@ std::vector<double> even_axis(std::vector<double> given) {
   if (!(cells >= 1 && cells < static_cast<double>(max_mesh_triangles))) return {};
   const double step = (given.back() - given.front()) / cells;
   if (!(step > 1e-7 && step < 1e5)) return {};
-  std::vector<double> axis;
-  for (double i = 0; i <= cells; ++i) axis.push_back(given.front() + i * step);
   const bool even = std::all_of(given.begin(), given.end(), [&](double v) {
     const double at = (v - given.front()) / step;
     return std::abs(at - std::round(at)) < 0.2;
   });
-  return even ? axis : std::vector<double>();
+  return even ? EvenAxis{given.front(), step, static_cast<std::size_t>(cells) + 1} : EvenAxis{};
+}
+
+std::vector<double> coordinates(const EvenAxis& axis) {
+  std::vector<double> all(axis.size);
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = axis.first + static_cast<double>(i) * axis.step;
+  return all;
 }
 
 /// The spacing follows from the whole length, because a single step is rounded if coordinates are large.
@@ -235,15 +245,15 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
     for (const Point& p : *points) all.push_back(p.*coordinate);
     return even_axis(std::move(all));
   };
-  raw.x = axis_of(&Point::x), raw.y = axis_of(&Point::y);
+  const EvenAxis x = axis_of(&Point::x), y = axis_of(&Point::y);
   const char* const way = "; make one of them: gdal_grid, or gmt surface, then gdal_translate -of AAIGrid";
   if (points->empty()) return bad("has no line of three numbers, x y z; coordinates must be metres or decimal degrees");
-  if (raw.x.size() < 2 || raw.y.size() < 2)
+  if (x.size == 0 || y.size == 0)
     return bad(std::string("its ") + std::to_string(points->size()) + " points are not a uniform grid" + way);
-  if (raw.x.size() * raw.y.size() > max_mesh_triangles / 2)
-    return bad(text::format("its points span %zu x %zu cells, more than 10 million: not a grid, or too fine", raw.x.size(),
-                            raw.y.size()) +
+  if (x.size * y.size > max_mesh_triangles / 2)
+    return bad(text::format("its points span %zu x %zu cells, more than 10 million: not a grid, or too fine", x.size, y.size) +
                way);
+  raw.x = coordinates(x), raw.y = coordinates(y);
   raw.z.assign(raw.x.size() * raw.y.size(), std::numeric_limits<float>::quiet_NaN());
   std::size_t again = 0;
   std::vector<bool> taken(raw.z.size());
