@@ -12,12 +12,13 @@
 #include "core/base/program_start.hpp"
 #include "core/image/colour_map.hpp"
 #include "core/text/arguments.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 namespace {
 
 int complain(const std::string& text, ErrorKind kind) {
-  std::fprintf(stderr, "sonarctl: %s\n", text.c_str());
+  std::fprintf(stderr, "sonarctl: %s\n", text::printable(text).c_str());
   return exit_code(kind);
 }
 

@@ -119,6 +119,9 @@ void check_environment(CLI::App& app) {
 
 void parse(CLI::App& app, int argc, const char* const* argv) {
   app.parse(argc, argv);
+  for (int i = 1; i < argc; ++i)  // mostly a variable of a script that is not set
+    if (*argv[i] == '\0')
+      throw CLI::ValidationError("argument " + std::to_string(i), "it is empty: write a value, or leave it out");
   check_environment(app);
 }
 

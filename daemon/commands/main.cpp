@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "core/base/program_start.hpp"
+#include "core/text/format.hpp"
 #include "daemon/commands/options/commands.hpp"
 #include "daemon/server/system/log.hpp"
 #include "daemon/server/system/shortage.hpp"
@@ -24,7 +25,7 @@ int report_error(const Error& error, bool json) {
   if (json)
     Log(options).error(error.text);
   else
-    std::fprintf(stderr, "sonard: %s\n", error.text.c_str());
+    std::fprintf(stderr, "sonard: %s\n", text::printable(error.text).c_str());
   return exit_code(error.kind);
 }
 

@@ -114,6 +114,16 @@ class Mistakes(unittest.TestCase):
         self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", "y", "--colour-map", "pink"), 64, "gray, copper")
         self.expect(run(SONARCTL, "listen", "127.0.0.1:port"), 64, "127.0.0.1:port", "HOST:PORT")
 
+    def test_an_empty_word_is_64(self):
+        for command in ([SONARD, "run", ""], [SONARD, ""], [SONARCTL, "listen", ""]):
+            self.expect(run(*command), 64, "it is empty: write a value, or leave it out")
+
+    def test_names_that_move_the_cursor_are_shown_harmless(self):
+        for command in ([SONARD, "check", "\x1b[2J"], [SONARD, "\x1b[2J"], [SONARCTL, "scene", "check", "\x1b[2J"], [SONARCTL, "listen", "\x1b[2J"]):
+            result = run(*command)
+            self.assertIn("\\x1b[2J", result.stderr)
+            self.assertNotIn("\x1b", result.stderr)
+
     def test_what_is_wrong_with_a_line_is_said_in_one(self):
         words = [(["--threads", "abc"], "--threads", '"abc" is not a whole number from 0 to 256'),
                  (["run", "--threads", "257"], "--threads", '"257" is not a whole number from 0 to 256', "sonard run --help"),

@@ -9,6 +9,7 @@
 #include "core/base/enum_names.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "core/text/arguments.hpp"
+#include "core/text/format.hpp"
 #include "core/text/nearest.hpp"
 #include "daemon/config/load_config.hpp"
 #include "daemon/config/move_addresses.hpp"
@@ -182,7 +183,7 @@ std::string complaint(const RenderCommand& render) {
 }
 
 Leave complain(const std::string& wrong) {
-  std::fprintf(stderr, "sonard: %s\n", wrong.c_str());
+  std::fprintf(stderr, "sonard: %s\n", text::printable(wrong).c_str());
   return Leave{exit_code(ErrorKind::usage)};
 }
 

@@ -54,6 +54,11 @@ TEST(Arguments, NumbersAreWholeDecimalAndInTheirRange) {
     EXPECT_THAT(complaint({"look", "x", "--rate", wrong}), HasSubstr("is not a number from 0.5 to 10")) << wrong;
 }
 
+TEST(Arguments, EmptyOnesAreRefused) {
+  EXPECT_EQ(complaint({"look", ""}), "argument 2: it is empty: write a value, or leave it out (tool look --help)");
+  EXPECT_THAT(complaint({"look", "x", "--quiet", ""}), HasSubstr("--help"));
+}
+
 TEST(Arguments, ChoicesAreNamed) {
   EXPECT_EQ(complaint({"look", "x", "--mode", "fats"}), "--mode: \"fats\" is not one of: fast, careful (tool look --help)");
   EXPECT_THAT(complaint({"look", "x", "--shape", "disc"}), HasSubstr("--shape: \"disc\" is not one of: ring"));
