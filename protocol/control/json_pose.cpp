@@ -72,7 +72,7 @@ Result<std::array<double, 4>> orientation_of(const json& object, std::string& fi
   }
   if (!*attitude) return refused("attitude [roll, pitch, yaw] or quaternion [w, x, y, z] is missing");
   for (const double angle : **attitude)
-    if (!std::isfinite(angle)) return refused("attitude has a NaN or infinite component");
+    if (!(std::abs(angle) <= 1e6)) return refused("attitude is NaN, infinite or above 1e6 rad");
   fields += " attitude";
   sent_angles = {(**attitude)[0], (**attitude)[1], (**attitude)[2]};
   const Quatd q = quat_from_rpy(sent_angles);

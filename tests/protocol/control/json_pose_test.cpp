@@ -72,6 +72,7 @@ TEST(JsonPose, RefusesWithASentence) {
   EXPECT_THAT(why(R"({"position":[0,0,1e200],"attitude":[0,0,0]})"), HasSubstr("1e8 m"));
   EXPECT_THAT(why(R"({"position":[0,0,0],"quaternion":[1,1,0,0]})"), HasSubstr("normalise"));
   EXPECT_EQ(why(R"({"position":[0,0,0],"quaternion":[1,0,0]})"), "quaternion must be a list of 4 numbers");
+  EXPECT_THAT(why(R"({"position":[0,0,0],"attitude":[0,-1e308,0]})"), HasSubstr("above 1e6 rad"));
   EXPECT_THAT(why(R"({"position":[0,0,0],"attitude":[0,0,0],"frame":"NWU"})"), HasSubstr("NED_FRD"));
   EXPECT_EQ(why(R"({"position":[0,0,0],"attitude":[0,0,0],"vehicle":3})"), "vehicle must be a string");
   EXPECT_THAT(why(R"({"position":[0,0,0],"attitude":[0,0,0],"timestamp":"now"})"), HasSubstr("seconds"));
