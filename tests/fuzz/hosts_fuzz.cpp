@@ -1,6 +1,8 @@
 // Bytes of a sonar to the hosts of every make: each input to each host. A piece is a port, a length in two bytes, and bytes. At a
 // port of kind http a piece is the body of a reply.
+#include <algorithm>
 #include <cstdlib>
+#include <span>
 
 #include "core/image/draw_picture.hpp"
 #include "protocol/host.hpp"
@@ -32,12 +34,12 @@ void converse(const protocol::Make& make, const std::uint8_t* data, std::size_t 
   for (std::size_t at = 0; at + 3 <= size;) {
     const std::size_t port = data[at] % own.size(), stated = data[at + 1] + 256u * data[at + 2];
     at += 3;
-    protocol::Bytes piece;
-    for (const std::size_t end = std::min(size, at + stated); at < end; ++at) piece.push_back(static_cast<std::byte>(data[at]));
+    const auto piece = std::as_bytes(std::span(data + at, std::min(size - at, stated)));
+    at += piece.size();
     now += std::chrono::milliseconds(100);
     if (make.ports[port].kind == protocol::HostPort::Kind::http) {
       protocol::ResourceReply reply;
-      for (const std::byte b : piece) reply.body.push_back(static_cast<char>(b));
+      reply.body.assign(reinterpret_cast<const char*>(piece.data()), piece.size());
       check(host->on_reply(reply, now), own.size());
     } else {
       check(host->on_bytes(port, piece, now), own.size());
