@@ -13,7 +13,7 @@ import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/acceptance"), str(ROOT / "tests/reliability")]
-from aris_controller import Controller  # noqa: E402
+from aris_controller import PING, Controller  # noqa: E402
 from foxglove_viewer import Closed, Viewer  # noqa: E402
 from oculus_reader import Client, fire_message  # noqa: E402
 from ping_link_test import (DOWN, OMNISCAN, PING1D, PING360, S500, SIDE, SURVEYOR, Host, frame, scan, settings, side_scan,  # noqa: E402
@@ -122,7 +122,11 @@ class BesideADriver(unittest.TestCase):
         def controls(daemon):
             link = Controller(daemon.address)
             link.set(1)
-            return link.frame
+
+            def next_frame():
+                link.command(PING)  # the sonar ends a connection that says nothing for 10 s
+                return link.frame()
+            return next_frame
 
         def listens(_):
             udp = receiver()
