@@ -128,6 +128,9 @@ class Vendor {
   /// The present gain, in the unit of SettingsOverride::gain_percent: per cent of the range that a client can set.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& /*device*/) const { return false; }
+  /// True if the settings last until the device restarts. False: only until the last client leaves; the next one finds the
+  /// initial settings.
+  virtual bool keeps_settings() const { return false; }
   /// Changes that the device makes itself after a ping, such as an automatic range. nullopt: no change.
   virtual std::optional<ChangeSettings> after_ping(const Ping& /*ping*/, const DeviceState& /*device*/) const {
     return std::nullopt;

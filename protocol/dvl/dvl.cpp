@@ -35,6 +35,7 @@ class DvlVendor final : public protocol::PushingVendor {
           1000}}};
     return all;
   }
+  bool keeps_settings() const override { return true; }  // DOC: one configuration, until a factory reset
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {

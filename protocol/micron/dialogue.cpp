@@ -26,7 +26,9 @@ constexpr std::size_t notices_per_call = 8;                                     
 class MicronDialogue final : public protocol::Dialogue {
  public:
   MicronDialogue(const protocol::DeviceState& device, Time now)
-      : device_(device), next_alive_(now + alive_period), arrives_(now), knows_parameters_(settings().has_parameters) {}
+      : device_(device), next_alive_(now + alive_period), arrives_(now), knows_parameters_(settings().has_parameters) {
+    if (knows_parameters_) arrives_ += turning(scan_.begin(settings().command));
+  }
 
   Reaction on_bytes(BytesView received, Time now) override {
     Reaction reaction;

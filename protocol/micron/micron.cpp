@@ -17,6 +17,7 @@ class MicronVendor final : public protocol::Vendor {
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return micron::options(); }
   int default_max_clients() const override { return 1; }  // a serial line
+  bool keeps_settings() const override { return true; }   // at its serial line the head cannot know that a host has left
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {

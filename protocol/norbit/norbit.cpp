@@ -25,6 +25,7 @@ class NorbitVendor final : public protocol::Vendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return norbit::gain_percent(settings_from(device.settings.get()));
   }
+  bool keeps_settings() const override { return true; }  // DFD: set_default restores the startup defaults
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
                                                Time now) const override {
     return make_dialogue(port, device, now);

@@ -27,6 +27,7 @@ class DelegatingVendor : public Vendor {
     return of_.apply_override(wanted, device);
   }
   double gain_percent(const DeviceState& device) const override { return of_.gain_percent(device); }
+  bool keeps_settings() const override { return of_.keeps_settings(); }
   PingsBy pings_by() const override { return of_.pings_by(); }
   bool pings_before_first_request(const DeviceState& device) const override { return of_.pings_before_first_request(device); }
   std::optional<ChangeSettings> after_ping(const Ping& ping, const DeviceState& device) const override {

@@ -19,14 +19,23 @@ PingSource::PingSource(SonarData& sonar, Audience& audience, const Faults& fault
 
 // ---- settings
 
+void PingSource::forget_clients() {
+  if (sonar_.vendor.keeps_settings()) return drop_pings();
+  use_initial_settings();
+}
+
 void PingSource::use_initial_settings() {
   asked_ = false;
   asked_by_.clear();
-  aim_ = {};
   protocol::ChangeSettings initial = sonar_.vendor.initial_settings(sonar_.state);
   settings_ = initial.settings;
   sonar_.state.settings = std::move(initial.vendor_settings);
   if (initial.receivers) audience_.restore_receivers(*std::move(initial.receivers));
+  drop_pings();
+}
+
+void PingSource::drop_pings() {
+  aim_ = {};
   // The ping that is being computed has the settings of clients that have left: on_ping() drops it. A tick that waits for it was
   // due for those clients too.
   busy_unwanted_ = busy_;

@@ -26,8 +26,9 @@ class PingSource {
   const PingSettings& settings() const { return settings_; }
   /// The client that last changed the settings; empty = they are the initial ones.
   const std::string& asked_by() const { return asked_by_; }
-  /// Restores the initial settings for the next client.
-  void use_initial_settings();
+  /// Prepares for the next client when there is none: pings that were requested are dropped, and the initial settings are
+  /// restored unless the device keeps its settings.
+  void forget_clients();
   /// `who`: the client, for the log and asked_by(); empty = the device itself.
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
   /// Returns whether the value changed.
@@ -79,6 +80,9 @@ class PingSource {
   std::optional<PingOutcome> take_unsent(Time now);
 
  private:
+  void use_initial_settings();
+  /// Drops the pings that were requested and not sent yet.
+  void drop_pings();
   PingRequest request_at(Time at, const protocol::RequestPing& aim) const;
   void request_ping(Time at, Actions& actions);
   PingNumber next_number();

@@ -132,8 +132,8 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const
   const bool had_audience = audience_.has_audience(), ran_itself = source_.runs_itself();
   Connection* const admitted = audience_.admit(id, role, std::move(peer), port, faults_.admission(), actions);
   if (admitted == nullptr) return actions;
-  // After a take-over without other clients, the new client starts with the stored settings, and so does the first client.
-  if (had_audience ? !audience_.has_audience() : ran_itself && role == Role::client) source_.use_initial_settings();
+  // After a take-over without other clients, the new client starts anew, and so does the first client.
+  if (had_audience ? !audience_.has_audience() : ran_itself && role == Role::client) source_.forget_clients();
   serve(*admitted, now, actions);
   return actions;
 }
@@ -158,7 +158,7 @@ void Sonar::serve_waiting(Time now, Actions& actions) {
 
 /// Called after a client has connected or left.
 void Sonar::on_membership(Time now, Actions& actions) {
-  if (!audience_.has_audience()) source_.use_initial_settings();
+  if (!audience_.has_audience()) source_.forget_clients();
   audience_.on_membership();
   source_.update_pacer(now);
   const protocol::Port* const beacon = vendor().port(protocol::Port::Kind::udp_beacon);
@@ -204,7 +204,7 @@ void Sonar::on_left(Time now, Actions& actions) {
   Connection* const next = kept_waiting ? nullptr : audience_.next_waiting();
   if (next == nullptr) return on_membership(now, actions);
   // Must come before serve(): after it, the next client would count as audience and the settings would stay.
-  if (!audience_.has_audience()) source_.use_initial_settings();
+  if (!audience_.has_audience()) source_.forget_clients();
   serve(*next, now, actions);
 }
 

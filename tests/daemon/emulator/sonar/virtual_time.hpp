@@ -62,10 +62,10 @@ class VirtualTime {
   Sonar& sonar(const std::string& name) {
     return *std::find_if(sonars.begin(), sonars.end(), [&](const Sonar& s) { return s.config().name == name; });
   }
-  ConnectionId connect(const std::string& name, Role role = Role::client) {
+  ConnectionId connect(const std::string& name, Role role = Role::client, const protocol::Port* port = nullptr) {
     const ConnectionId id = ++last_id;
     clients[id].sonar = &sonar(name);
-    perform(sonar(name), sonar(name).on_connect(id, role, {"client " + std::to_string(id), {127, 0, 0, 1}}, now));
+    perform(sonar(name), sonar(name).on_connect(id, role, {"client " + std::to_string(id), {127, 0, 0, 1}}, now, port));
     return id;
   }
   void send(ConnectionId id, const protocol::Bytes& bytes) {
