@@ -1,11 +1,14 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <string>
 #include <utility>
 
+#include "core/text/format.hpp"
 #include "protocol/aris/aris.hpp"
 #include "protocol/aris/encode_frame.hpp"
 #include "protocol/aris/models.hpp"
+#include "protocol/limits.hpp"
 
 namespace sonar::aris {
 namespace {
@@ -18,22 +21,36 @@ constexpr double nominal_sound_speed_mps = 1490;  // converts a wanted range to 
 constexpr std::uint32_t most_pulse_us = 80;
 constexpr std::size_t commands = 0, frames = 1;  // indices of ports
 
-/// The acoustic settings for a product. nullopt: it has no such range or mode.
-std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::SettingsOverride& wanted) {
+/// Settings for a product. `refusal`: why it cannot have those that are wanted; `acoustics` then are its nearest ones. Empty: it
+/// can.
+struct Choice {
+  Acoustics acoustics;
+  std::string refusal;
+};
+
+Choice choice_for(const SonarModel& model, const protocol::SettingsOverride& wanted) {
   const Product& product = product_of(model);
   Acoustics a = product.initial;
+  std::string refusal;
   if (wanted.mode) {
-    if (*wanted.mode >= model.modes.size()) return std::nullopt;
-    const ModeChoice choice = choice_of(product, static_cast<int>(*wanted.mode));
-    if (choice.telephoto) return std::nullopt;
-    a.ping_mode = choice.ping_mode;
-    a.frequency = choice.frequency;
-    a.cycle_us = shortest_cycle_us(a);
+    // The modes with the telephoto lens are the last ones.
+    const auto modes = static_cast<std::uint32_t>(model.modes.size() / (product.has_telephoto ? 2 : 1));
+    if (*wanted.mode < modes) {
+      const ModeChoice choice = choice_of(product, static_cast<int>(*wanted.mode));
+      a.ping_mode = choice.ping_mode;
+      a.frequency = choice.frequency;
+      a.cycle_us = shortest_cycle_us(a);
+    } else {
+      // Users count modes from 1.
+      refusal = text::format("an %s has the modes 1 to %u here, no mode %u", model.name.c_str(), modes, *wanted.mode + 1);
+    }
   }
   if (wanted.gain_percent) a.gain_db = static_cast<float>(highest_gain_db * *wanted.gain_percent / 100);
   if (wanted.range_m) {
-    if (*wanted.range_m > product.window_end_m) return std::nullopt;
-    const double window_us = 2e6 * *wanted.range_m / nominal_sound_speed_mps - a.start_delay_us;
+    const double least_m = static_cast<double>(model.modes.front().min_range_m);
+    if (refusal.empty()) refusal = protocol::range_complaint(*wanted.range_m, "an " + model.name, least_m, product.window_end_m);
+    const double range_m = std::min(*wanted.range_m, product.window_end_m);
+    const double window_us = 2e6 * range_m / nominal_sound_speed_mps - a.start_delay_us;
     a.sample_period_us = static_cast<std::uint32_t>(std::clamp(std::ceil(window_us / 2000), 4.0, 100.0));
     a.samples_per_beam =
         static_cast<std::uint32_t>(std::clamp<double>(window_us / a.sample_period_us, least_samples, most_samples));
@@ -43,7 +60,7 @@ std::optional<Acoustics> acoustics_for(const SonarModel& model, const protocol::
   const double rate_hz = wanted.rate_hz.value_or(static_cast<double>(a.frame_rate_hz));
   a.frame_rate_hz = static_cast<float>(std::clamp(rate_hz, 1.0, highest_frame_rate_hz(product, a, std::nullopt)));
   a.cookie = 1;
-  return judge(a, product, false).used;  // judge() limits the pulse to the longest of the product
+  return {judge(a, product, false).used, refusal};  // judge() limits the pulse to the longest of the product
 }
 
 PolarImage picture_of(const DecodedFrame& frame, const std::vector<double>& azimuth_rad) {
@@ -81,17 +98,19 @@ class ArisHost final : public protocol::Host {
 
   /// Only beacons name the product, and they may not arrive here. So the host sends settings for each product, and the device
   /// refuses those of other products. An ARIS 1800 also accepts those of a 1200, so its own are sent later. Frames begin when the
-  /// receiver is set.
+  /// receiver is set. The first one names the product; if this cannot have the wanted settings, the host gives up.
   HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
     HostActions actions;
     std::uint32_t cookie = 0;
     for (const auto& model : models()) {
-      auto acoustics = wanted_.as_it_is ? std::nullopt : acoustics_for(*model, wanted_.settings);
-      if (!acoustics) continue;
-      acoustics->cookie = asked_[product_of(*model).system] = ++cookie;
+      if (wanted_.as_it_is) break;
+      const SystemType system = product_of(*model).system;
+      Choice choice = choice_for(*model, wanted_.settings);
+      if (!choice.refusal.empty()) refusals_[system] = std::move(choice.refusal);
+      choice.acoustics.cookie = asked_[system] = ++cookie;
       Command command;
       command.type = CommandType::set_acoustics;
-      command.acoustics = *acoustics;
+      command.acoustics = choice.acoustics;
       send(command, now, actions);
     }
     Command command;
@@ -107,6 +126,8 @@ class ArisHost final : public protocol::Host {
     bytes_ += received.size();
     auto frame = assembler_.add(received);
     if (!frame) return actions;
+    if (const auto why = refusals_.find(static_cast<SystemType>(frame->header.system)); why != refusals_.end())
+      return {Error{ErrorKind::usage, why->second}};
     warn_of(*frame, actions);
     const FrequencyMode* const mode = mode_of(*frame);
     if (mode == nullptr) return actions;
@@ -159,7 +180,8 @@ class ArisHost final : public protocol::Host {
 
   protocol::Wanted wanted_;
   FrameAssembler assembler_;
-  std::map<SystemType, std::uint32_t> asked_;  // the cookie of the settings for each product; empty = none were sent
+  std::map<SystemType, std::uint32_t> asked_;   // the cookie of the settings for each product; empty = none were sent
+  std::map<SystemType, std::string> refusals_;  // why a product cannot have the wanted settings
   bool warned_of_settings_ = false, warned_of_losses_ = false;
   Time sent_at_{};
   std::size_t bytes_ = 0;  // received since the last whole frame
@@ -171,9 +193,9 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (auto known = protocol::accept_settings(wanted, "an ARIS", {"range", "rate", "gain", "mode"}); !known)
     return tl::unexpected(known.error());
   if (wanted.settings.rate_hz == 0.0) return failure(ErrorKind::usage, "an ARIS has no standby: its least rate is 1 Hz");
-  const auto fits = [&wanted](const auto& model) { return acoustics_for(*model, wanted.settings).has_value(); };
+  const auto fits = [&wanted](const auto& model) { return choice_for(*model, wanted.settings).refusal.empty(); };
   if (!wanted.as_it_is && std::none_of(models().begin(), models().end(), fits))
-    return failure(ErrorKind::usage, "no ARIS has this range and mode: the longest range is 100 m, that of an ARIS 1200");
+    return failure(ErrorKind::usage, "no ARIS has this range and mode: an ARIS 1200, which sees farthest, has 0.7 to 100 m");
   return std::make_unique<ArisHost>(wanted);
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "core/image/draw_picture.hpp"
+#include "core/text/format.hpp"
 #include "tests/is_sanitized.hpp"
 #include "tests/protocol/hosts_testing.hpp"
 
@@ -91,6 +92,33 @@ TEST_P(Hosts, TellInMetresWhyARangeIsRefused) {
     if (why.find("--range") != std::string::npos) continue;  // this make has no such setting
     EXPECT_THAT(why, testing::MatchesRegex(".*range[^_]* m([^a-z].*)?")) << wanted_m;
   }
+}
+
+/// A host that gets no pings says why, for every model and at the ends of what a user can type.
+TEST_P(Hosts, SayWhyThereAreNoPings) {
+  std::vector<Wanted> all;
+  const auto add = [&all](auto setting, auto... values) { ((all.emplace_back().settings.*setting = values), ...); };
+  add(&SettingsOverride::range_m, 0.0, 1e-3, 0.5, 1.0, 15.0, 21.0, 60.0, 99.0, 120.0, 250.0, 600.0, 1e5);
+  add(&SettingsOverride::rate_hz, 1e-3, 1.0, 70.0, 5000.0, 1e9);
+  add(&SettingsOverride::gain_percent, 0.0, 1.0, 100.0);
+  add(&SettingsOverride::mode, 0u, 1u, 2u, 3u, 4u, 5u, 8u, 98u);
+  for (const double range_m : {0.5, 60.0})
+    for (const double rate_hz : {1e-3, 5000.0}) {
+      SettingsOverride& both = all.emplace_back().settings;
+      both.range_m = range_m, both.rate_hz = rate_hz, both.gain_percent = 100;
+    }
+  if (sets_nothing(GetParam())) return;
+  for (std::size_t model = 0; model < GetParam().device->models().size(); ++model)
+    for (const Wanted& wanted : all) {
+      if (!GetParam().host(wanted)) continue;
+      Talk talk(GetParam(), wanted, 0, model);
+      for (int i = 0; i < 30 && talk.pings.empty() && !talk.error; ++i) talk.run(1);
+      const SettingsOverride& s = wanted.settings;
+      EXPECT_TRUE(talk.error ? !talk.error->text.empty() : !talk.pings.empty())
+          << talk.state.model->profile
+          << text::format(": range %g m, rate %g Hz, gain %g %%, mode %u", s.range_m.value_or(-1), s.rate_hz.value_or(-1),
+                          s.gain_percent.value_or(-1), s.mode.value_or(0));
+    }
 }
 
 TEST_P(Hosts, FindASonarWithSettingsThatItsModelHas) {
