@@ -41,5 +41,13 @@ inline std::string rate_complaint(const SettingsOverride& wanted) {
   if (!wanted.rate_hz || *wanted.rate_hz >= 0) return {};
   return text::format("the rate must be 0 Hz (standby) or above, not %g Hz (rate_hz)", *wanted.rate_hz);
 }
+/// The same for a sonar with a highest rate, such as "the rate of a Norbit is 0 to 60 Hz, not 70 Hz (set_rate)".
+inline std::string rate_complaint(const SettingsOverride& wanted, std::string_view of, float fastest_hz,
+                                  std::string_view field = {}) {
+  const double fastest = static_cast<double>(fastest_hz);
+  if (!wanted.rate_hz || *wanted.rate_hz <= fastest) return rate_complaint(wanted);
+  return "the rate of " + std::string(of) + text::format(" is 0 to %.4g Hz, not %g Hz", fastest, *wanted.rate_hz) +
+         (field.empty() ? std::string() : " (" + std::string(field) + ")");
+}
 
 }  // namespace sonar::protocol

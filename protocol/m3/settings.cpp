@@ -73,12 +73,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
       return refused(why);
     s.far_m = *wanted.range_m;
   }
-  if (wanted.rate_hz) {
-    if (!(*wanted.rate_hz >= 0 && *wanted.rate_hz <= static_cast<double>(highest_rate_hz)))
-      return refused(
-          text::format("the rate of an M3 is 0 to %g Hz, not %g Hz", static_cast<double>(highest_rate_hz), *wanted.rate_hz));
-    s.rate_hz = static_cast<float>(*wanted.rate_hz);
-  }
+  if (const std::string why = protocol::rate_complaint(wanted, "an M3", highest_rate_hz); !why.empty()) return refused(why);
+  if (wanted.rate_hz) s.rate_hz = static_cast<float>(*wanted.rate_hz);
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
     s.c_db = static_cast<float>(least_c_db + (most_c_db - least_c_db) * *wanted.gain_percent / 100);

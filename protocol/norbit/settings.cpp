@@ -87,10 +87,9 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     if (!why.empty()) return refused(why);
     s.stop_m = *wanted.range_m;
   }
-  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  if (const std::string why = protocol::rate_complaint(wanted, "a Norbit", device.model->max_rate_hz, "set_rate"); !why.empty())
+    return refused(why);
   if (wanted.rate_hz) {
-    if (*wanted.rate_hz > fastest_hz)
-      return refused(text::format("the rate of a Norbit is 0 to %g Hz, not %g Hz (set_rate)", fastest_hz, *wanted.rate_hz));
     s.power = *wanted.rate_hz > 0;
     if (s.power) s.rate_hz = *wanted.rate_hz;
   }

@@ -200,10 +200,10 @@ class Ping360Host final : public PingHost {
 }  // namespace
 
 Result<std::unique_ptr<protocol::Host>> ping360::make_host(const protocol::Wanted& wanted) {
-  return host_of<Ping360Host>("a Ping360", ping360_request, {"range", "gain", "mode"}, wanted);
+  return host_of<Ping360Host>("a Ping360", ping360::vendor(), ping360_request, {"range", "gain", "mode"}, wanted);
 }
 Result<std::unique_ptr<protocol::Host>> surveyor::make_host(const protocol::Wanted& wanted) {
-  return host_of<SurveyorHost>("a Surveyor", surveyor_request, {"range", "rate", "gain", "mode"}, wanted);
+  return host_of<SurveyorHost>("a Surveyor", surveyor::vendor(), surveyor_request, {"range", "rate", "gain", "mode"}, wanted);
 }
 
 }  // namespace sonar::ping

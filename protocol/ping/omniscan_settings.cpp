@@ -21,7 +21,7 @@ constexpr double longest_m = 150;
 constexpr std::uint32_t least_length_mm = 100;
 constexpr double processing_s = 0.0018;  // from the last echo to the next ping (REC)
 
-constexpr double usual_speed_mps = 1500;
+constexpr double fastest_mps = 2000;  // highest speed of sound that a host can set
 
 /// From one ping to the next.
 double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
@@ -43,7 +43,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "omniscan-450";
   model.name = "Omniscan 450";
-  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(1e-3 * least_length_mm, usual_speed_mps));
+  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(1e-3 * least_length_mm, fastest_mps));
   model.modes = {mode};
   return model;
 }
@@ -133,7 +133,9 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     if (!why.empty()) return refused(why);
     p.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - p.start_mm;
   }
-  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  if (const std::string why = protocol::rate_complaint(wanted, "an Omniscan", device.model->max_rate_hz, "msec_per_ping");
+      !why.empty())
+    return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.period_ms = static_cast<std::uint32_t>(std::lround(period_ms(*wanted.rate_hz)));

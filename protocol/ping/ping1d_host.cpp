@@ -79,7 +79,7 @@ class Ping1DHost final : public PingHost {
 }  // namespace
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
-  return host_of<Ping1DHost>("a Ping1D", request, {"range", "rate", "gain", "mode"}, wanted);
+  return host_of<Ping1DHost>("a Ping1D", vendor(), request, {"range", "rate", "gain", "mode"}, wanted);
 }
 
 }  // namespace sonar::ping::ping1d

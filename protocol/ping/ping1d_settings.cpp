@@ -110,7 +110,9 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     p.range.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - p.range.start_mm;
     p.mode_auto = 0;
   }
-  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  if (const std::string why = protocol::rate_complaint(wanted, "a Ping1D", device.model->max_rate_hz, "ping_interval");
+      !why.empty())
+    return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.interval_ms = static_cast<std::uint16_t>(std::lround(period_ms(*wanted.rate_hz)));

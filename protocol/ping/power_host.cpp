@@ -149,8 +149,9 @@ class PowerHost final : public PingHost {
   protocol::Waterfall waterfall_;
 };
 
-Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Product& other, const protocol::Wanted& wanted) {
-  if (auto fits = check_wanted(product.title, {"range", "rate", "gain", "mode"}, wanted); !fits)
+Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Product& other, const protocol::Vendor& device,
+                                                const protocol::Wanted& wanted) {
+  if (auto fits = check_wanted(product.title, device, {"range", "rate", "gain", "mode"}, wanted); !fits)
     return tl::unexpected(fits.error());
   return std::make_unique<PowerHost>(product, other, wanted);
 }
@@ -158,10 +159,10 @@ Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Pr
 }  // namespace
 
 Result<std::unique_ptr<protocol::Host>> omniscan::make_host(const protocol::Wanted& wanted) {
-  return host_of(omniscan_product, s500_product, wanted);
+  return host_of(omniscan_product, s500_product, vendor(), wanted);
 }
 Result<std::unique_ptr<protocol::Host>> s500::make_host(const protocol::Wanted& wanted) {
-  return host_of(s500_product, omniscan_product, wanted);
+  return host_of(s500_product, omniscan_product, vendor(), wanted);
 }
 
 }  // namespace sonar::ping

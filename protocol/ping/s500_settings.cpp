@@ -160,7 +160,9 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   }
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) asked.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain()));
-  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  if (const std::string why = protocol::rate_complaint(wanted, "an S500", device.model->max_rate_hz, "msec_per_ping");
+      !why.empty())
+    return refused(why);
   if (wanted.rate_hz && *wanted.rate_hz > 0) asked.period_ms = static_cast<std::int16_t>(std::lround(period_ms(*wanted.rate_hz)));
   if (const std::string why = one_beam_complaint(wanted, "an S500", 16); !why.empty()) return refused(why);
   if (const std::string why = complaint(asked); !why.empty()) return refused("S500: " + why);

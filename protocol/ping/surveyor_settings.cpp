@@ -24,7 +24,7 @@ constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with
 constexpr double longest_m = 200, least_m = 0.01;  // highest end of the range; least length of the range
 constexpr double db_per_gain = 0.4;                // unknown: assumed
 constexpr double processing_s = 0.01;
-constexpr double usual_speed_mps = 1500;
+constexpr double fastest_mps = 2000;  // highest speed of sound that a host can set
 
 /// From one ping to the next.
 double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
@@ -46,7 +46,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "surveyor-240";
   model.name = "Surveyor 240-16";
-  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(least_m, usual_speed_mps));
+  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(least_m, fastest_mps));
   model.modes = {mode};
   return model;
 }
@@ -137,7 +137,9 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     if (!why.empty()) return refused(why);
     p.end_mm = static_cast<std::int32_t>(std::lround(1000 * *wanted.range_m));
   }
-  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  if (const std::string why = protocol::rate_complaint(wanted, "a Surveyor", device.model->max_rate_hz, "msec_per_ping");
+      !why.empty())
+    return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.period_ms = static_cast<std::int16_t>(std::lround(period_ms(*wanted.rate_hz)));

@@ -292,6 +292,19 @@ TEST(Makes, WithOnePortHaveHostsThatFindOutWhomTheyReached) {
     }
 }
 
+TEST(Makes, RefuseARateAboveThatOfTheSonar) {
+  for (const char* name : {"surveyor240", "omniscan450", "ping1d", "s500"}) {
+    const Make& make = *find_make(name);
+    Wanted wanted;
+    wanted.settings.rate_hz = static_cast<double>(make.device->models().front()->max_rate_hz);
+    EXPECT_TRUE(make.host(wanted)) << name;
+    *wanted.settings.rate_hz *= 1.01;
+    const auto host = make.host(wanted);
+    ASSERT_FALSE(host) << name;
+    EXPECT_THAT(host.error().text, testing::StartsWith("the rate of " + std::string(make.title) + " is 0 to "));
+  }
+}
+
 TEST(Makes, HaveNamesAndPortsOfTheirOwn) {
   for (const Make& one : makes()) {
     EXPECT_FALSE(one.title.empty());

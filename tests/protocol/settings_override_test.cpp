@@ -6,6 +6,8 @@
 #include <string>
 
 #include "protocol/oculus/fire.hpp"
+#include "protocol/ping/omniscan_settings.hpp"
+#include "protocol/ping/surveyor_settings.hpp"
 #include "protocol/vendor.hpp"
 #include "tests/protocol/blueview/blueview_testing.hpp"
 
@@ -76,6 +78,37 @@ TEST(Overrides, SetNoRateAboveThatOfTheProduct) {
           EXPECT_LE(change->settings.rate_hz, 1.001f * model->max_rate_hz);
         }
     }
+}
+
+TEST(Overrides, RefuseARateAboveThatOfTheProduct) {
+  const auto why = [](std::string_view profile, double rate_hz) {
+    const auto change = protocol::find_profile(profile)->vendor->apply_override(set().rate(rate_hz), device_of(profile));
+    return change ? std::string() : change.error().text;
+  };
+  EXPECT_EQ(why("ping1d", 5000), "the rate of a Ping1D is 0 to 1000 Hz, not 5000 Hz (ping_interval)");
+  EXPECT_EQ(why("s500", 5000), "the rate of an S500 is 0 to 10 Hz, not 5000 Hz (msec_per_ping)");
+  EXPECT_EQ(why("surveyor-240", 5000), "the rate of a Surveyor is 0 to 99.9 Hz, not 5000 Hz (msec_per_ping)");
+  EXPECT_EQ(why("omniscan-450", 5000), "the rate of an Omniscan is 0 to 526.3 Hz, not 5000 Hz (msec_per_ping)");
+  EXPECT_EQ(why("norbit-wbms", 5000), "the rate of a Norbit is 0 to 60 Hz, not 5000 Hz (set_rate)");
+  EXPECT_EQ(why("m3", 5000), "the rate of an M3 is 0 to 40 Hz, not 5000 Hz");
+  for (const char* profile : {"ping1d", "s500", "surveyor-240", "omniscan-450", "norbit-wbms", "m3"})
+    EXPECT_EQ(why(profile, static_cast<double>(device_of(profile).model->max_rate_hz)), "");
+}
+
+/// Sound is never faster for these sonars, so that no settings give a higher rate.
+TEST(Overrides, KeepTheRateOfTheProductAtTheHighestSpeedOfSound) {
+  ping::surveyor::Settings surveyor;
+  surveyor.parameters.speed_mps = 2000;
+  surveyor.parameters.end_mm = 10;
+  surveyor.parameters.period_ms = 0;
+  surveyor.parameters.enable = 1;
+  EXPECT_FLOAT_EQ(ping::surveyor::ping_settings(surveyor).rate_hz, device_of("surveyor-240").model->max_rate_hz);
+  ping::omniscan::Settings omniscan;
+  omniscan.speed_mps = 2000;
+  omniscan.parameters.length_mm = 100;
+  omniscan.parameters.period_ms = 0;
+  omniscan.parameters.enable = 1;
+  EXPECT_FLOAT_EQ(ping::omniscan::ping_settings(omniscan).rate_hz, device_of("omniscan-450").model->max_rate_hz);
 }
 
 TEST(OculusOverride, IsTheFireMessageThatADriverWouldHaveSent) {
