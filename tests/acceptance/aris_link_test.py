@@ -2,7 +2,6 @@
 import math
 import pathlib
 import shutil
-import socket
 import struct
 import subprocess
 import tempfile
@@ -12,7 +11,7 @@ import unittest
 import tshark as shark
 from aris_controller import BEACONS, COMMANDS, PING, RECEIVER, SALINITY, Beacons, Controller, field, fields
 from pcap_writer import Capture
-from running_sonard import ROOT, SONARCTL, SONARD, Sonard, expect_quiet, run
+from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, expect_quiet, run
 
 DISSECTOR = ROOT / "protocol/aris/aris.lua"
 STARBOARD, PORT = range(0, 64), range(64, 128)  # beam 0 is farthest to starboard
@@ -39,20 +38,11 @@ class ArisLink(unittest.TestCase):
         cls.daemon.__exit__()
 
     def controller(self, **options):
-        """Retries, because the daemon may not have noticed yet that the previous controller has left."""
-        for _ in range(50):
-            link = Controller(self.daemon.address, **options)
-            link.tcp.settimeout(0.1)
-            try:
-                if link.tcp.recv(1) == b"":
-                    link.close()
-                    continue
-            except (TimeoutError, socket.timeout):
-                self.addCleanup(link.close)
-                return link
-            except ConnectionError:
-                link.close()
-        raise AssertionError("no connection")
+        """Connects after the daemon has noticed that the previous controller has left."""
+        eventually(lambda: not self.daemon.status()["sonars"][0].get("clients"))
+        link = Controller(self.daemon.address, **options)
+        self.addCleanup(link.close)
+        return link
 
     def test_beacons_say_whether_it_is_free(self):
         beacons = Beacons(self.daemon.address)
@@ -63,10 +53,16 @@ class ArisLink(unittest.TestCase):
         self.assertLessEqual(len(data), 256)
         self.assertEqual((beacon[1], beacon[2], beacon[4]), ([7001], [1], [0]))
         self.assertNotIn(9, beacon)
-        link = self.controller()
-        self.assertTrue(beacons.until_state(1, 0.9), "at once, not with the next beacon")
-        link.close()
+        early = any(self.tells_early(beacons) for _ in range(20))  # a busy computer delays some
+        self.assertTrue(early, "at once, not with the next beacon, a second later")
+
+    def tells_early(self, beacons):
+        """Connects after a beacon that says free. Returns whether the one that says busy comes in less than a beacon's period."""
         self.assertTrue(beacons.until_state(0, 30))
+        begin = time.monotonic()
+        with Controller(self.daemon.address):
+            self.assertTrue(beacons.until_state(1, 30))
+        return time.monotonic() - begin < 0.9
 
     def test_frames_are_whole_and_counted_from_one(self):
         for _ in range(2):
@@ -157,8 +153,8 @@ class ArisLink(unittest.TestCase):
             expect_quiet(link.udp)
 
     def test_silence_ends_it(self):
+        start = time.monotonic()
         with self.controller(receiver=False) as link:
-            start = time.monotonic()
             link.tcp.settimeout(100)
             try:
                 self.assertEqual(link.tcp.recv(1), b"")

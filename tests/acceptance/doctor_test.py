@@ -190,7 +190,7 @@ class Doctor(unittest.TestCase):
 
     def test_a_driver_that_gets_pings_is_none(self):
         with Sonard(scene="l-targets.yaml") as daemon:
-            with subprocess.Popen([str(SONARCTL), "listen", daemon.address, "--quiet"], stdout=subprocess.DEVNULL) as driver:
+            with subprocess.Popen([str(SONARCTL), "listen", daemon.address, "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL) as driver:
                 try:
                     eventually(lambda: int((daemon.status()["sonars"][0].get("clients") or [{}])[0].get("pings_written", 0)) > 0)
                     code, findings, found = doctor(daemon.address, *PATIENT)

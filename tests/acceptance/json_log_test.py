@@ -43,7 +43,7 @@ control: {{stream: off, http: off}}
                     deadline = time.monotonic() + 60
                     while process.poll() is None and b"ready in" not in log.read_bytes() and time.monotonic() < deadline:
                         time.sleep(0.02)
-                    driver = run(SONARCTL, "listen", address, "--seconds", "30", "--quiet")
+                    driver = run(SONARCTL, "listen", address, "--wait", "100", "--seconds", "100", "--quiet")
                     output = process.communicate(timeout=60)[0].decode()
                 self.assertRegex(output, r"^sha256 [0-9a-f]{64}  front client 1  \d+ bytes\n$", driver.stderr)
                 text = log.read_text(encoding="utf-8")

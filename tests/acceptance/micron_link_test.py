@@ -133,7 +133,7 @@ class MicronLink(unittest.TestCase):
             listened = run(SONARCTL, "listen", at, "--wait", "100", "--pings", 5, "--range", 8)
             self.assertEqual(len(re.findall(r"x 1  8 bit .* bearing -?\d+\.\d deg", listened.stdout)), 5, listened.stdout + listened.stderr)
             picture = pathlib.Path(folder) / "sweep.png"
-            viewed = run(SONARCTL, "view", at, "--png", picture, "--range", 8)
+            viewed = run(SONARCTL, "view", at, "--wait", "100", "--png", picture, "--range", 8)
             self.assertEqual((viewed.returncode, picture.exists()), (0, True), viewed.stderr)
 
     @unittest.skipIf(shark.why_not(), shark.why_not())

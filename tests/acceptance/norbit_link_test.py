@@ -99,7 +99,7 @@ class Link(unittest.TestCase):
     def test_a_recording_holds_whole_packets_of_all_ports(self):
         with Sonard(scene="l-targets.yaml", profile="norbit-wbms") as daemon, tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "norbit.mcap"
-            done = run(SONARCTL, "record", f"{daemon.address}:{BATHYMETRY}", "--mcap", path, "--range", 12, "--rate", 10, "--pings", 6)
+            done = run(SONARCTL, "record", f"{daemon.address}:{BATHYMETRY}", "--mcap", path, "--range", 12, "--rate", 10, "--wait", 100, "--pings", 6)
             self.assertEqual(done.returncode, 0, done.stderr)
             messages = [data for topic, _, data in mcap_checker.check(path.read_bytes()).messages if topic.endswith("/device")]
         kinds = []

@@ -173,9 +173,9 @@ class Recorded(Files):
 
     def test_ctrl_c_leaves_whole_files(self):
         with Sonard(scene="tank-rod.yaml") as daemon:
-            process = subprocess.Popen([str(SONARCTL), "record", daemon.address, "--range", "1", "--beams", "256", "--no-status",
+            process = subprocess.Popen([str(SONARCTL), "record", daemon.address, "--range", "1", "--beams", "256", "--no-status", "--wait", "100",
                                         *map(str, self.outputs())], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-            deadline = time.monotonic() + 60
+            deadline = time.monotonic() + 120
             while time.monotonic() < deadline and not (self.path("raw").exists() and self.path("raw").stat().st_size > 200_000):
                 time.sleep(0.05)
             process.send_signal(signal.SIGINT)

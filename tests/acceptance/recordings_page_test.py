@@ -114,7 +114,7 @@ class Recordings(PageChecks, unittest.TestCase):
         """A host that does not know the product at the port may ask for the other one first; then the recording contains the
         refusal."""
         with demo("s500"):
-            self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--seconds", 3).returncode, 0)
+            self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--wait", 100, "--pings", 20).returncode, 0)
         with Replay(pathlib.Path("run.mcap"), "--loop") as replay:
             done = run(SONARCTL, "listen", f"{replay.address}:51200", "--wait", "100", "--quiet", "--pings", 2)
             self.assertIn("pings 2", done.stdout, done.stderr)

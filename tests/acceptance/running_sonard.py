@@ -91,7 +91,8 @@ class Sonard(Daemon):
 
     def ctl(self, command, *arguments, **options):
         """sonarctl COMMAND ADDRESS ..."""
-        wait = () if "--wait" in arguments or "--pings" not in arguments else ("--wait", 100)  # for the first ping
+        waits = command == "view" or "--pings" in arguments
+        wait = ("--wait", 100) if waits and "--wait" not in arguments else ()  # for the first ping
         return run(SONARCTL, command, self.address, *arguments, *wait, **options)
 
     def status(self):
@@ -107,7 +108,7 @@ class Sonard(Daemon):
         """sonarctl COMMAND ... --to ENDPOINT, for poses."""
         return run(SONARCTL, command, *arguments, "--to", endpoint, **options)
 
-    def stop(self, timeout_s=20):
+    def stop(self, timeout_s=60):
         """Exit code after SIGTERM, and the seconds it took."""
         start = time.monotonic()
         return super().stop(timeout_s), time.monotonic() - start

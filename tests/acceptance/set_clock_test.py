@@ -90,11 +90,11 @@ class SetClock(unittest.TestCase):
             for hours in HOURS:
                 self.set_clock(0)
                 file = self.folder / f"{hours}.pcap"
-                with subprocess.Popen([SONARCTL, "record", daemon.address, "--pcap", file, "--pings", "30"], stdout=subprocess.PIPE,
+                with subprocess.Popen([SONARCTL, "record", daemon.address, "--pcap", file, "--wait", "100", "--pings", "30"], stdout=subprocess.PIPE,
                                       text=True) as recorder:
                     self.assertIn("connected", recorder.stdout.readline())
                     self.set_clock(hours)
-                    self.assertEqual(recorder.wait(120), 0)
+                    self.assertEqual(recorder.wait(300), 0)
                 times = self.times_of(file.read_bytes())
                 self.assertLess(max(abs(after - before) for before, after in zip(times, times[1:])), 100)
                 self.assertGreaterEqual(len(set(times)), 30, "at least one a ping, also after the clock was set")
