@@ -150,7 +150,7 @@ class MockDaemon:
                 "now_ns": self.now_ns(), "faults_armed": True,
                 "sonars": [{"name": "front", "profile": "oculus-m1200d", "listens": "127.0.0.2:52100", "pinging": self.pinging,
                             "range_m": self.parameters["/front/range_m"], "rate_hz": self.parameters["/front/rate_hz"],
-                            "gain_db": 67.2, "frequency_hz": 2.1e6, "beams": 512,
+                            "gain_db": 67.2, "frequency_hz": 0 if self.name == "on request" else 2.1e6, "beams": 512,
                             "rows": description["settings"]["rows"], "transmits": self.parameters["/front/transmit"],
                             "addresses": addresses, "clients": clients, "asked_by": DRIVER if self.name == "standby" else "",
                             "on_request": self.name == "on request",

@@ -34,7 +34,7 @@ export function drawHead(facts) {
   setClass($('rate-dot'), `dot ${dot}`);
   setText($('rate'), rate);
   const sonar = facts.sonarStatus;
-  setHidden($('frequency-chip'), !sonar);
+  setHidden($('frequency-chip'), !sonar?.frequency_hz);  // a BlueView's recording does not state it
   setText($('frequency'), frequency(sonar?.frequency_hz));
   const latency = facts.listened ? sonar?.figures?.latency_ms_p50 : 0;  // without a driver it would be that of the last one
   setText($('latency'), latency > 0 ? `${fixed(latency, 0)} ms` : dash);
