@@ -264,7 +264,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Acoustics& a = s.acoustics;
   if (wanted.rate_hz) {
     if (*wanted.rate_hz < 1 || *wanted.rate_hz > highest_rate_hz)
-      return refused("the rate of an ARIS is 1 to 15 Hz; only a controller can stop it");
+      return refused(text::format("the rate of an ARIS is 1 to %g Hz, not %g Hz; only a controller can stop it", highest_rate_hz,
+                                  *wanted.rate_hz));
     a.frame_rate_hz = static_cast<float>(*wanted.rate_hz);
   }
   if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);

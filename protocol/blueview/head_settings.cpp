@@ -105,7 +105,7 @@ Result<void> set_range(SonarSettings& all, double range_m, const protocol::Devic
 }
 
 Result<void> set_rate(SonarSettings& all, double rate_hz, const protocol::DeviceState& device) {
-  if (rate_hz < 0) return refused("a ping rate must be above 0");
+  if (rate_hz < 0) return refused(text::format("the rate of a BlueView must be above 0 Hz, not %g Hz", rate_hz));
   if (rate_hz == 0)
     return refused("BlueView sonars have no standby: they ping when a host asks; to silence one, set transmit: false");
   return set(all, Key::ping_interval, ping_interval_ms(rate_hz), device);
