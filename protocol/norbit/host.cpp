@@ -8,6 +8,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/norbit/norbit.hpp"
 #include "protocol/norbit/settings.hpp"
 
@@ -264,6 +265,11 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (auto accepted = protocol::accept_settings(wanted, "a Norbit", {"range", "rate", "gain", "mode"}); !accepted)
     return tl::unexpected(accepted.error());
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a Norbit has one mode only");
+  // The sonar would not change its settings, and ping with them.
+  for (const std::string& why :
+       {protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Norbit", shortest_m, farthest_m),
+        protocol::rate_complaint(wanted.settings, "a Norbit", models().front()->max_rate_hz)})
+    if (!why.empty()) return failure(ErrorKind::usage, why);
   return std::make_unique<NorbitHost>(wanted.as_it_is ? std::nullopt : std::optional(request_of(wanted.settings)));
 }
 

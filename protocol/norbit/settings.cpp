@@ -11,7 +11,7 @@ namespace sonar::norbit {
 namespace {
 
 constexpr int most_rows = 1024;  // limit of rows, so that a ping does not take too long to compute
-constexpr double nearest_m = 0.2, shortest_m = 1;
+constexpr double nearest_m = 0.2;
 constexpr double slowest_mps = 1300, fastest_mps = 1700;
 constexpr auto processing = std::chrono::milliseconds(5);
 

@@ -17,6 +17,7 @@ inline constexpr int bottom_beams = 256;                          // beams of ba
 inline constexpr double swath_deg = 140, beam_width_deg = 0.9;    // DFD; recalled
 inline constexpr double sample_hz = 78125;                        // DFD
 inline constexpr double farthest_m = 600, fastest_hz = 60;        // DFD
+inline constexpr double shortest_m = 1;                           // of the range; chosen
 inline constexpr double frequency_khz = 400, bandwidth_khz = 80;  // DFD
 inline constexpr int amplitude = 15, pulse_us = 500;              // DFD
 

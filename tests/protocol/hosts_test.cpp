@@ -293,7 +293,7 @@ TEST(Makes, WithOnePortHaveHostsThatFindOutWhomTheyReached) {
 }
 
 TEST(Makes, RefuseARateAboveThatOfTheSonar) {
-  for (const char* name : {"surveyor240", "omniscan450", "ping1d", "s500"}) {
+  for (const char* name : {"surveyor240", "omniscan450", "ping1d", "s500", "norbit"}) {
     const Make& make = *find_make(name);
     Wanted wanted;
     wanted.settings.rate_hz = static_cast<double>(make.device->models().front()->max_rate_hz);
