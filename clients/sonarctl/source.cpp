@@ -217,13 +217,26 @@ void print_notices(const std::vector<std::string>& notices) {
 
 std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::milliseconds(static_cast<std::int64_t>(s * 1000)); }
 
+namespace {
+
+/// Why a sonar that does what it was asked for sends nothing; empty: it should send pings.
+std::string asked_for_silence(const SourceOptions& source) {
+  const std::optional<double> rate_hz = source.wanted.settings.rate_hz;
+  if (!rate_hz || source.wanted.as_it_is) return {};
+  if (*rate_hz == 0) return "--rate standby asked for that";
+  if (*rate_hz * source.silence_limit_s >= 1) return {};
+  return text::format("--rate %g asked for less than one ping in that time; --wait makes it longer", *rate_hz);
+}
+
+}  // namespace
+
 Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
               const std::string& hint) {
-  const std::string limit = text::format("%g s", source.silence_limit_s);
-  if (received) return {ErrorKind::io, what + " arrived within " + limit + ": " + hint};
+  const std::string limit = text::format("%g s", source.silence_limit_s), asked = asked_for_silence(source);
+  if (received) return {ErrorKind::io, what + " arrived within " + limit + ": " + (asked.empty() ? hint : asked)};
   return {ErrorKind::unavailable,
           "no message of " + std::string(stream.make().title) + " arrived from tcp " + text_from(stream.device()) + " within " +
-              limit + ": is it another sonar?" +
+              limit + ": " + (asked.empty() ? "" : asked + "; or ") + "is it another sonar?" +
               (source.wanted.as_it_is ? " Some sonars send nothing before they receive settings (--as-it-is sends none)." : "") +
               " sonard's banner names the address of each sonar"};
 }

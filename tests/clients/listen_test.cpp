@@ -241,7 +241,20 @@ TEST(Listen, SaysWhenTheDeviceFallsSilent) {
   options.source.silence_limit_s = 0.3;
   const Result<void> done = listen(options);
   EXPECT_EQ(done.error().kind, ErrorKind::io);
-  EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 0.3 s"));
+  EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 0.3 s: drivers give up"));
+}
+
+TEST(Listen, SaysWhichOfItsSettingsAskedForSilence) {
+  for (const auto& [rate_hz, why] :
+       {std::pair(0.0, "within 0.3 s: --rate standby asked for that"),
+        std::pair(0.5, "within 0.3 s: --rate 0.5 asked for less than one ping in that time; --wait makes it longer")})
+    for (const std::uint32_t pings : {0u, 1u}) {
+      FakeDevice device(pings, [](std::uint32_t, const oculus::FireSettings& echo) { return ping_bytes(1, echo); });
+      ListenOptions options = quiet(device.endpoint(), 2);
+      options.source.silence_limit_s = 0.3;
+      options.source.wanted.settings.rate_hz = rate_hz;
+      EXPECT_THAT(listen(options).error().text, HasSubstr(why));
+    }
 }
 
 TEST(View, PrintsWhatTheDeviceSaysBesidePings) {
