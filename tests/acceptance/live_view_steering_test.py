@@ -94,10 +94,11 @@ class Steering(unittest.TestCase):
         with Sonard(arguments=["--faults"]) as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted()
             trouble = next(name for name in viewer.parameters() if name.startswith("/faults/") and name[8:] not in ("armed", "clear_all"))
-            self.assertGreater(viewer.set(trouble, 20), 19)
+            self.assertGreater(viewer.set(trouble, 500), 400)
             viewer.subscribe("/faults")
             self.assertTrue(viewer.first_of("/faults")["armed"])
-            self.assertEqual(viewer.set(trouble, 700), viewer.parameters("now", trouble)[trouble])
+            longest = viewer.set(trouble, 700)
+            self.assertTrue(500 < viewer.parameters("now", trouble)[trouble] <= longest <= 600, longest)
             self.assertEqual(viewer.set(trouble, 0), 0)
             self.assertEqual(viewer.set("/faults/clear_all", True), False)
 
@@ -250,7 +251,7 @@ class Playback(unittest.TestCase):
             with Viewer(daemon.address, path="/?playback=rov") as viewer:
                 viewer.greeted()
                 end_ns = viewer.info["dataEndTime"]["sec"] * self.S + viewer.info["dataEndTime"]["nsec"]
-                self.control(viewer, "near the end", to_ns=end_ns - self.S)
+                self.control(viewer, "near the end", speed=0.1, to_ns=end_ns - self.S // 10)
                 round_ = viewer.wait_for(lambda kind, value: kind == "playback" and value["did_seek"] and not value["request"])
                 self.assertLess(round_["ns"], self.S)
 

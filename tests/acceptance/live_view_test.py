@@ -13,6 +13,7 @@ import time
 import unittest
 
 from foxglove_viewer import NAMES, Closed, Refused, Viewer
+from life_cycle_test import Reader
 from oculus_reader import Client, fire_message
 from running_sonard import BUILD, SONARCTL, Sonard, eventually
 
@@ -132,7 +133,7 @@ class Channels(unittest.TestCase):
             self.assertTrue(image["data"] in pictures, "the driver got this picture")
             self.assertTrue(viewer.times and viewer.times == sorted(viewer.times))
 
-    def seen_of(self, viewer, topics, patience_s=60):
+    def seen_of(self, viewer, topics, patience_s=300):
         """Waits for all topics and some pictures. Returns the messages of each topic, and the last picture with its time."""
         seen, last = collections.Counter(), None
         deadline = time.monotonic() + patience_s
@@ -270,7 +271,7 @@ class Limits(unittest.TestCase):
         with Sonard() as daemon, Viewer(daemon.address, small_window=True) as viewer, Client(daemon.address) as client:
             viewer.greeted().subscribe("/front/image")
             client.send(fire_message(rate_hz=5))
-            deadline = time.monotonic() + 30
+            deadline = time.monotonic() + 300
             while not (count := re.search(r'sonard_viewer_dropped_total\{viewer="http 127\.[^"]+:\d+",channel="/front/image"\} ([1-9]\d*)\n',
                                           daemon.get("/metrics"))):
                 self.assertLess(time.monotonic(), deadline, daemon.get("/metrics"))
@@ -330,24 +331,19 @@ class LookingChangesNothing(unittest.TestCase):
         self.assertEqual(self.run_with(8, reads=False), alone)
 
     def test_ten_that_never_read_cost_no_ping_and_little_memory(self):
-        def take_pings(client, count):
-            while count > 0:
-                count -= client.message()[0] == 0x23
-
         viewers, picture_kb = 10, 1024
         with Sonard(more=f"limits: {{viewers: {viewers}}}") as daemon:
-            with Client(daemon.address) as client:
-                client.send(fire_message(rate_hz=10))
-                take_pings(client, 10)
-                before = resident_kb(daemon)
-                for _ in range(viewers):
-                    viewer = Viewer(daemon.address, small_window=True)
-                    self.addCleanup(viewer.socket.close)
-                    viewer.greeted().subscribe("/front/image", "/front/geometry", "/tf", "/status")
-                take_pings(client, 30)
-                print(f"{(resident_kb(daemon) - before) / viewers:.0f} kB a viewer")
-                if "SONAR_SANITIZE:STRING=\n" in (BUILD / "CMakeCache.txt").read_text(encoding="utf-8"):  # sanitizers keep freed memory
-                    self.assertLess(resident_kb(daemon) - before, 2048 * viewers + picture_kb)
+            driver = Reader(daemon.address)  # also reads while viewers connect
+            driver.wait_for(10)
+            before = resident_kb(daemon)
+            for _ in range(viewers):
+                viewer = Viewer(daemon.address, small_window=True)
+                self.addCleanup(viewer.socket.close)
+                viewer.greeted().subscribe("/front/image", "/front/geometry", "/tf", "/status")
+            driver.wait_for(len(driver.pings) + 30)
+            print(f"{(resident_kb(daemon) - before) / viewers:.0f} kB a viewer")
+            if "SONAR_SANITIZE:STRING=\n" in (BUILD / "CMakeCache.txt").read_text(encoding="utf-8"):  # sanitizers keep freed memory
+                self.assertLess(resident_kb(daemon) - before, 2048 * viewers + picture_kb)
             daemon.stop()
             self.assertRegex(daemon.log(), r"sonar front .* 0 dropped")
 

@@ -56,11 +56,11 @@ class Watcher(threading.Thread):
                 kind, message = self.client.message()
                 if kind == 0x23:
                     self.newest = message
-                    self.ids.append(Ping(message).id)
+                    self.ids.append(int.from_bytes(message[53:57], "little"))
         except (AssertionError, OSError, EOFError) as error:
             self.ending = error
 
-    def ping_after(self, more, patience_s=60):
+    def ping_after(self, more, patience_s=200):
         """The newest ping, after waiting for a number of new ones."""
         wanted, deadline = len(self.ids) + more, time.monotonic() + patience_s
         while len(self.ids) < wanted:
@@ -80,7 +80,7 @@ class Reload(unittest.TestCase):
     def config(self, daemon):
         return pathlib.Path(daemon.folder.name) / "sonard.yaml"
 
-    def hang_up(self, daemon, words, times=1, patience_s=60):
+    def hang_up(self, daemon, words, times=1, patience_s=200):
         daemon.process.send_signal(signal.SIGHUP)
         deadline = time.monotonic() + patience_s
         while daemon.log().count(words) < times:
@@ -146,7 +146,7 @@ class Reload(unittest.TestCase):
                                                  data=json.dumps({"path": str(scene)}).encode(),
                                                  headers={"Content-Type": "application/json"})
                 with self.assertRaises(urllib.error.HTTPError) as refused:
-                    urllib.request.urlopen(request, timeout=60)
+                    urllib.request.urlopen(request, timeout=300)
                 answer = refused.exception.read().decode()
                 refused.exception.close()
                 self.assertIn(name, answer)

@@ -10,7 +10,7 @@ from common import ROOT
 
 BRIDGE = ROOT / "clients/ros2_bridge"
 sys.path.insert(0, str(BRIDGE))
-PATIENCE_S = 120
+PATIENCE_S = 300
 
 
 def wait_for(found):

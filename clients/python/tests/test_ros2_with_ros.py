@@ -18,7 +18,7 @@ from ros_stand_ins import BRIDGE
 from sonard_bridge.conversions import rotate, wxyz
 from sonard_client import Control, Daemon
 
-PATIENCE_S = 120
+PATIENCE_S = 300
 HAS_ROS = importlib.util.find_spec("rclpy") is not None
 if not HAS_ROS:
     print("rclpy is not installed: the ROS 2 bridge is tested with stand-ins for ROS alone", file=sys.stderr)
