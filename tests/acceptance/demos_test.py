@@ -199,7 +199,7 @@ class EachDemo(PageChecks, unittest.TestCase):
     def echoes_at_once(self, daemon, maker, kind, pings):
         with Viewer(HTTP) as viewer:
             viewer.greeted().subscribe("/front/image", "/front/picture")
-            self.assertEqual(viewer.first_of("/front/picture", 120)["kind"], kind)
+            self.assertEqual(viewer.first_of("/front/picture")["kind"], kind)
             seen = rows_seen(viewer, pings)
             if kind == "range image":
                 share = echoes(seen, [[0] for _ in seen])  # pixels without an echo are 0

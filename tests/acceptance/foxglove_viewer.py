@@ -27,7 +27,7 @@ class Closed(Exception):
 
 
 class Viewer:
-    def __init__(self, address, port=8088, path="/", protocols=", ".join(NAMES), headers=None, small_window=False, patience_s=60):
+    def __init__(self, address, port=8088, path="/", protocols=", ".join(NAMES), headers=None, small_window=False, patience_s=200):
         self.socket = socket.socket()
         if small_window:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -154,7 +154,7 @@ class Viewer:
         service, call, length = struct.unpack_from("<III", payload, 1)
         return "answer", (service, call, payload[13:13 + length].decode(), payload[13 + length:])
 
-    def wait_for(self, wanted, patience_s=60):
+    def wait_for(self, wanted, patience_s=200):
         """The first received item for which wanted(kind, value) is true."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
@@ -215,7 +215,7 @@ class Viewer:
 
         return self.wait_for(is_answer), kinds[-1]
 
-    def first_of(self, topic, patience_s=60):
+    def first_of(self, topic, patience_s=200):
         """The first message of the channel, decoded; waits for it if there is none yet."""
         found = [payload for name, _, payload in self.messages if name == topic]
         if not found:
@@ -229,7 +229,7 @@ class Viewer:
             self.schemas[channel["schema"]] = Schema(base64.b64decode(channel["schema"]))
         return self.schemas[channel["schema"]].decode(channel["schemaName"], payload)
 
-    def status(self, part="", patience_s=60):
+    def status(self, part="", patience_s=200):
         """The next status message that contains this text."""
         return self.wait_for(lambda kind, value: kind == "word" and value["op"] == "status" and part in value["message"], patience_s)
 

@@ -84,7 +84,7 @@ class Ping:
 class Client:
     """A driver of a few lines. Messages must follow each other without a byte between."""
 
-    def __init__(self, address, port=52100, patience_s=60):
+    def __init__(self, address, port=52100, patience_s=120):
         deadline = time.monotonic() + patience_s
         while True:
             try:

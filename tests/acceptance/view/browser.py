@@ -36,7 +36,7 @@ class Browser:
              "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--user-data-dir={self.folder.name}", "about:blank"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         told = pathlib.Path(self.folder.name) / "DevToolsActivePort"  # the browser writes its port there
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 200
         while self.process.poll() is None and time.monotonic() < deadline:
             if told.is_file() and "\n" in told.read_text():
                 self.at = "127.0.0.1:" + told.read_text().splitlines()[0]
@@ -142,7 +142,7 @@ class Page:
             raise RuntimeError(result["exceptionDetails"].get("exception", {}).get("description") or str(result["exceptionDetails"]))
         return result["result"].get("value")
 
-    def wait(self, expression, patience_s=60):
+    def wait(self, expression, patience_s=200):
         """Waits until the expression is true; returns its value."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:

@@ -66,7 +66,7 @@ LACKING_PX = """((e) => {
 LAID_OUT = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
-def shown(page, patience_s=60):
+def shown(page, patience_s=200):
     """Waits until the page has drawn a ping and lists the sonars, because the page draws pings before it has the list."""
     page.wait("/\\d/.test(document.querySelector('#ping-number').textContent) && document.querySelector('#sonar').options.length", patience_s)
 
@@ -112,7 +112,7 @@ class PageChecks:
         with super().subTest(*message, **parameters), self.pictures_of_failure():
             yield
 
-    def patiently(self, condition, patience_s=60):
+    def patiently(self, condition, patience_s=200):
         deadline = time.monotonic() + patience_s
         while not condition():
             self.assertLess(time.monotonic(), deadline)
