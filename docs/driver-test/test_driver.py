@@ -50,7 +50,7 @@ class Sonar:
 
     def power_on(self):
         self.process = subprocess.Popen([SONARD, "run", "--faults", str(self.config)], stdin=subprocess.DEVNULL)
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 60
         while time.monotonic() < deadline:  # /healthz answers as soon as drivers can connect
             try:
                 with urllib.request.urlopen(f"http://{ADDRESS}:8088/healthz", timeout=1):
@@ -59,7 +59,7 @@ class Sonar:
                 if self.process.poll() is not None:
                     raise AssertionError(f"sonard ended with code {self.process.returncode}") from None
                 time.sleep(0.05)
-        raise AssertionError("sonard is not ready after 30 s")
+        raise AssertionError("sonard is not ready after 60 s")
 
     def power_off(self):
         """Like a power cut: connections are not closed in order."""
@@ -70,7 +70,7 @@ class Sonar:
         """A request of docs/control.md: request("sonar", transmit=False); without a message, it reads: request("faults")."""
         body = json.dumps(message).encode() if message else None
         post = urllib.request.Request(f"http://{ADDRESS}:8088/api/v1/{operation}", body, {"Content-Type": "application/json"})
-        with urllib.request.urlopen(post, timeout=10) as reply:
+        with urllib.request.urlopen(post, timeout=60) as reply:
             return json.load(reply)
 
     def withheld_pings(self):
@@ -140,16 +140,16 @@ class DriverTest(unittest.TestCase):
         self.assertTrue(near, f"no echo at {place[0]} m, {place[1]} deg; bright spots: {ping['bright']}")
 
     def test_targets_are_at_their_ranges_and_bearings(self):
-        ping = self.driver.wait_for_pings(3, 30)[-1]
+        ping = self.driver.wait_for_pings(3, 100)[-1]
         for place in (NEAR_TO_PORT, NEAR_TO_STARBOARD, FAR_TO_PORT):
             self.expect_echo(ping, place)
 
     def test_numbers_go_up(self):
-        numbers = [ping["number"] for ping in self.driver.wait_for_pings(20, 30)]
+        numbers = [ping["number"] for ping in self.driver.wait_for_pings(20, 100)]
         self.assertEqual(numbers, sorted(set(numbers)))  # a driver without time to read misses whole pings
 
     def test_driver_recovers_after_a_power_cut(self):
-        self.driver.wait_for_pings(3, 30)
+        self.driver.wait_for_pings(3, 100)
         self.sonar.power_off()
         time.sleep(4)
         self.sonar.power_on()
@@ -157,21 +157,25 @@ class DriverTest(unittest.TestCase):
 
     def test_driver_recovers_when_the_sonar_hangs(self):
         """A fault on purpose (docs/faults.md): the connection stays open, and no ping comes for 6 s."""
-        self.driver.wait_for_pings(3, 30)
+        self.driver.wait_for_pings(3, 100)
         self.sonar.request("faults", **{"name": "hang", "do": "silent-open", "for": {"seconds": 6}})
         time.sleep(6)
-        self.driver.wait_for_pings(3, 30)
+        self.driver.wait_for_pings(3, 100)
         # Not by the times of the lines: a busy computer delays them.
         numbers = [ping["number"] for _, ping in self.driver.pings]
         self.assertGreater(self.sonar.withheld_pings(), 0, "the fault had no effect")
         self.assertGreater(max(b - a for a, b in zip(numbers, numbers[1:])), 1, "the driver received every ping")
 
     def test_no_echo_when_the_transmitter_fails(self):
-        self.driver.wait_for_pings(3, 30)
+        def echoes(ping):
+            return [e for e in ping["bright"] if abs(e[0] - 3.9) < 0.2 and abs(e[1] + 20) < 2]
+
+        self.driver.wait_for_pings(3, 100)
         self.sonar.request("sonar", sonar="front", transmit=False)
-        time.sleep(1)
-        ping = self.driver.wait_for_pings(3, 10)[-1]
-        self.assertFalse([e for e in ping["bright"] if abs(e[0] - 3.9) < 0.2 and abs(e[1] + 20) < 2])
+        for _ in range(100):  # the first pings may be of the time before
+            if not echoes(self.driver.wait_for_pings(1, 100)[0]):
+                break
+        self.assertFalse(echoes(self.driver.wait_for_pings(3, 100)[-1]))
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ def run_example(test, **more):
     if "DRIVER" not in more:
         environment.pop("DRIVER", None)
     return subprocess.run([sys.executable, "-B", "-m", "unittest", "-v", test], cwd=EXAMPLE, env=environment,
-                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=240, check=False)
+                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=600, check=False)
 
 
 class DriverExample(unittest.TestCase):
@@ -28,7 +28,7 @@ class DriverExample(unittest.TestCase):
         self.assertEqual(run.returncode, 1, run.stdout)
         self.assertIn("the driver ended with code 3 after 0 of 20 pings", run.stdout)
         self.assertIn("starting\nno such device\n", run.stdout)
-        self.assertLess(time.monotonic() - begin, 20)  # well before the 30 s that a driver may take for its pings
+        self.assertLess(time.monotonic() - begin, 60)  # well before the 100 s that a driver may take for its pings
 
     def test_the_page_is_true(self):
         run = run_example("test_driver.py")
