@@ -178,7 +178,7 @@ TEST(Listen, EndsWhenTheDeviceConnectsAndStaysSilent) {
     FakeDevice device(3, [](std::uint32_t i, const oculus::FireSettings& echo) { return ping_bytes(i + 1, echo); });
     ListenOptions options = quiet(device.endpoint(), 0);
     options.seconds = 0;
-    options.source.silence_limit_s = 0.5;
+    options.source.silence_limit_s = 1;
     options.source.return_limit_s = 1;
     ViewOptions view_options;
     view_options.source = options.source;
@@ -195,7 +195,7 @@ TEST(Listen, EndsWhenTheDeviceConnectsAndStaysSilent) {
     EXPECT_THAT(done.error().text, HasSubstr("it did not come back within 1 s"));
     const std::regex again("connected again");
     const auto found = std::sregex_iterator(err.begin(), err.end(), again);
-    EXPECT_LE(std::distance(found, std::sregex_iterator()), 3) << err;  // each takes half a second of silence
+    EXPECT_LE(std::distance(found, std::sregex_iterator()), 3) << err;  // each takes a second of silence
   }
 }
 
@@ -220,11 +220,11 @@ TEST(Listen, CountsTimeFromTheConnection) {
 TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
   FakeDevice silent(0, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes{}; });
   ListenOptions options = quiet(silent.endpoint(), 1);
-  options.source.silence_limit_s = 0.3;
+  options.source.silence_limit_s = 1;
   const Result<void> nothing = listen(options);
   EXPECT_EQ(nothing.error().kind, ErrorKind::unavailable);
   EXPECT_THAT(nothing.error().text, HasSubstr("no message of an Oculus arrived from tcp " + text_from(silent.endpoint()) +
-                                              " within 0.3 s: is it another sonar?"));
+                                              " within 1 s: is it another sonar?"));
 
   std::uint16_t free_port = 0;
   { const Socket briefly = bound(SOCK_STREAM, free_port); }
@@ -238,20 +238,20 @@ TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
 TEST(Listen, SaysWhenTheDeviceFallsSilent) {
   FakeDevice device(1, [](std::uint32_t, const oculus::FireSettings& echo) { return ping_bytes(1, echo); });
   ListenOptions options = quiet(device.endpoint(), 2);
-  options.source.silence_limit_s = 0.3;
+  options.source.silence_limit_s = 1;
   const Result<void> done = listen(options);
   EXPECT_EQ(done.error().kind, ErrorKind::io);
-  EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 0.3 s: drivers give up"));
+  EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 1 s: drivers give up"));
 }
 
 TEST(Listen, SaysWhichOfItsSettingsAskedForSilence) {
   for (const auto& [rate_hz, why] :
-       {std::pair(0.0, "within 0.3 s: --rate standby asked for that"),
-        std::pair(0.5, "within 0.3 s: --rate 0.5 asked for less than one ping in that time; --wait makes it longer")})
+       {std::pair(0.0, "within 1 s: --rate standby asked for that"),
+        std::pair(0.5, "within 1 s: --rate 0.5 asked for less than one ping in that time; --wait makes it longer")})
     for (const std::uint32_t pings : {0u, 1u}) {
       FakeDevice device(pings, [](std::uint32_t, const oculus::FireSettings& echo) { return ping_bytes(1, echo); });
       ListenOptions options = quiet(device.endpoint(), 2);
-      options.source.silence_limit_s = 0.3;
+      options.source.silence_limit_s = 1;
       options.source.wanted.settings.rate_hz = rate_hz;
       EXPECT_THAT(listen(options).error().text, HasSubstr(why));
     }
@@ -301,7 +301,7 @@ TEST(View, TellsAnotherServiceFromASonarInStandby) {
   options.source.make = find_make("oculus");
   options.terminal = true;
   options.source.wanted = wanted();
-  options.source.silence_limit_s = 0.3;
+  options.source.silence_limit_s = 1;
   for (const bool live : {false, true}) {
     SCOPED_TRACE(live);
     FakeDevice other(1, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes(20, std::byte{'x'}); });
@@ -316,7 +316,7 @@ TEST(View, TellsAnotherServiceFromASonarInStandby) {
   options.live = false;
   const Result<void> done = view(options);
   EXPECT_EQ(done.error().kind, ErrorKind::io);
-  EXPECT_THAT(done.error().text, HasSubstr("no ping arrived within 0.3 s: is the sonar in standby?"));
+  EXPECT_THAT(done.error().text, HasSubstr("no ping arrived within 1 s: is the sonar in standby?"));
 }
 
 TEST(Endpoints, TakeWhatIsMissingFromTheDefault) {
