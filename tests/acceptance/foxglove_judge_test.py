@@ -49,7 +49,7 @@ if sys.argv[1:] == ["--install"]:  # run by ctest where a network is available
 
 
 def judge(what, where):
-    done = run("node", PLACE / "judge.mjs", what, where, patience_s=100)
+    done = run("node", PLACE / "judge.mjs", what, where, patience_s=400)
     if done.returncode != 0:
         raise AssertionError(f"{what}: {done.stderr}")
     return json.loads(done.stdout)

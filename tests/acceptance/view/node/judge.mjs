@@ -74,7 +74,7 @@ async function channels(url) {
   viewer.subscribe(...topics);
   const messages = new Map(topics.map((topic) => [topic, []]));
   const missing = () => topics.filter((topic) => messages.get(topic).length < (topic === '/front/image' ? 15 : 1));
-  for await (const { kind, value } of viewer.coming({ patience_s: 60, missing })) {
+  for await (const { kind, value } of viewer.coming({ patience_s: 200, missing })) {
     if (kind !== 'message') continue;
     const { topic, timestamp: ns } = value;
     const content = viewer.decode(value);
@@ -219,7 +219,9 @@ async function stalled(url) {
   viewer.subscribe('/front/image');
   await viewer.first('message');
   viewer.socket.pause();
-  await pause(8);
+  const dropped = /sonard_viewer_dropped_total\{[^}]*channel="\/front\/image"\} [1-9]/;
+  while (!dropped.test(await (await fetch(`${url.replace('ws', 'http')}metrics`)).text())) await pause(0.2);
+  await pause(4);
   const from = viewer.received.length;
   const now = BigInt(Date.now()) * 1_000_000n;
   viewer.socket.resume();

@@ -39,7 +39,7 @@ export class Viewer {
   }
 
   // Yields the received messages in order, from number `from` on; fails on an error or the end of the connection.
-  async *coming({ from = 0, patience_s = 60, expected = [], missing = () => expected } = {}) {
+  async *coming({ from = 0, patience_s = 200, expected = [], missing = () => expected } = {}) {
     const deadline = performance.now() + 1000 * patience_s;
     for (let i = from; ; ++i) {
       while (i === this.received.length) {
