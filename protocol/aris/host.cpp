@@ -195,7 +195,10 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (wanted.settings.rate_hz == 0.0) return failure(ErrorKind::usage, "an ARIS has no standby: its least rate is 1 Hz");
   const auto fits = [&wanted](const auto& model) { return choice_for(*model, wanted.settings).refusal.empty(); };
   if (!wanted.as_it_is && std::none_of(models().begin(), models().end(), fits))
-    return failure(ErrorKind::usage, "no ARIS has this range and mode: an ARIS 1200, which sees farthest, has 0.7 to 100 m");
+    return failure(
+        ErrorKind::usage,
+        "no ARIS has this range and mode: an ARIS 1200 has modes 1 and 2, others 1 to 4, and its range of 0.7 to 100 m is the "
+        "longest");
   return std::make_unique<ArisHost>(wanted);
 }
 
