@@ -123,6 +123,21 @@ TEST(Recording, AFileThatIsBeingWrittenIsRefusedAndKept) {
   EXPECT_EQ(std::filesystem::file_size(file.path()), 0u);
 }
 
+TEST(Recording, AFileThatOthersRemoveOrCutIsTold) {
+  const TemporaryFile file("lost.bin");
+  const auto close_after = [&](auto&& change) {
+    auto sink = create_sink(file.path());
+    EXPECT_TRUE((*sink)->append(std::as_bytes(std::span("first", 5))));
+    change();
+    EXPECT_TRUE((*sink)->append(std::as_bytes(std::span("then", 4))));
+    const Result<void> closed = (*sink)->close();
+    return closed ? "" : closed.error().text;
+  };
+  EXPECT_EQ(close_after([] {}), "");
+  EXPECT_THAT(close_after([&] { std::filesystem::remove(file.path()); }), HasSubstr("was removed while it was being written"));
+  EXPECT_THAT(close_after([&] { std::filesystem::resize_file(file.path(), 20); }), HasSubstr("another program changed it"));
+}
+
 TEST(Recording, RefusesOtherFiles) {
   const auto text_of = [](const std::string& content) {
     auto opened = open_bytes(bytes_of(content));
