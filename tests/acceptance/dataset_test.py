@@ -69,7 +69,7 @@ class Dataset(unittest.TestCase):
         return result.stderr
 
     def test_killed_it_loses_nothing_and_repeats_nothing(self):
-        self.job.write_text(small_job(6, 2), encoding="utf-8")
+        self.job.write_text(small_job(12, 2), encoding="utf-8")
         self.make("whole")
         out = self.path / "killed"
         process = subprocess.Popen([str(SONARD), "dataset", str(self.job), "--out", str(out), "--quiet"], stderr=subprocess.PIPE)
@@ -79,7 +79,7 @@ class Dataset(unittest.TestCase):
         process.kill()
         process.communicate()
         before = (out / "shard-000000.tar").stat().st_mtime_ns
-        self.assertRegex(self.make("killed"), r"[12] shards were there already")
+        self.assertRegex(self.make("killed"), r"\b[1-5] shards were there already")
         self.assertEqual((out / "shard-000000.tar").stat().st_mtime_ns, before)
         for name in ("manifest.json", "coco.json"):
             self.assertEqual((out / name).read_bytes(), (self.path / "whole" / name).read_bytes())

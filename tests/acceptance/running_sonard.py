@@ -91,7 +91,7 @@ class Sonard(Daemon):
 
     def ctl(self, command, *arguments, **options):
         """sonarctl COMMAND ADDRESS ..."""
-        waits = command == "view" or "--pings" in arguments
+        waits = command in ("view", "stats") or "--pings" in arguments
         wait = ("--wait", 100) if waits and "--wait" not in arguments else ()  # for the first ping
         return run(SONARCTL, command, self.address, *arguments, *wait, **options)
 

@@ -78,13 +78,13 @@ class Steering(unittest.TestCase):
         self.assertIn(f"control   tcp {self.daemon.address}:14770  http {self.daemon.address}:8088\n", text)
 
     def test_events_come_as_they_happen(self):
-        events = subprocess.Popen([str(SONARCTL), "events", "--clients", "--count", "1", "--seconds", "60", "--json", "--control",
+        events = subprocess.Popen([str(SONARCTL), "events", "--clients", "--count", "1", "--seconds", "120", "--json", "--control",
                                    f"{self.daemon.address}:14770"], stdout=subprocess.PIPE, text=True)
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 100
         while events.poll() is None and time.monotonic() < deadline:  # until it has subscribed and reports a client
             with socket.create_connection((self.daemon.address, 52100), 10):
                 time.sleep(0.2)
-        output = events.communicate(timeout=60)[0]
+        output = events.communicate(timeout=200)[0]
         self.assertEqual(json.loads(output.splitlines()[0])["client"]["sonar"], "front")
 
     def test_sonar_and_water_are_set(self):

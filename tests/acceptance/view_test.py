@@ -22,7 +22,7 @@ def in_a_terminal(command, until, end, **environment):
     variables.pop("NO_COLOR", None)
     process = subprocess.Popen([str(c) for c in command], stdin=slave, stdout=slave, stderr=slave, env=variables)
     os.close(slave)
-    output, ended, deadline = b"", False, time.monotonic() + 60
+    output, ended, deadline = b"", False, time.monotonic() + 200
     while time.monotonic() < deadline:
         if not select.select([master], [], [], 0.2)[0]:
             continue
@@ -60,7 +60,7 @@ class View(unittest.TestCase):
         self.assertRegex(lines[-1], r"^ping \d+  \d+\.\d\d m  2\.\d+ MHz  512 beams x \d+ rows$")
 
     def test_a_terminal_gets_colours_and_is_given_back(self):
-        code, output = in_a_terminal([SONARCTL, "view", self.daemon.address, "--term", "--live"], b" Hz  ",
+        code, output = in_a_terminal([SONARCTL, "view", self.daemon.address, "--wait", "100", "--term", "--live"], b" Hz  ",
                                      lambda process: process.send_signal(signal.SIGINT))
         self.assertEqual(code, 0, output[-500:])
         self.assertTrue(output.startswith("\x1b[?1049h\x1b[?25l"))
@@ -89,10 +89,11 @@ class View(unittest.TestCase):
             self.assertEqual(recording.read_bytes(), before)
 
     def test_listen_ends_when_its_reader_has_gone(self):
-        with subprocess.Popen([str(SONARCTL), "listen", self.daemon.address], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as listener:
+        with subprocess.Popen([str(SONARCTL), "listen", self.daemon.address, "--wait", "100"], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE) as listener:
             listener.stdout.readline()
             listener.stdout.close()
-            self.assertEqual(listener.wait(60), 0, listener.stderr.read())
+            self.assertEqual(listener.wait(200), 0, listener.stderr.read())
 
     def test_beside_a_driver_it_looks_on(self):
         control = ("--control", f"{self.daemon.address}:14770")

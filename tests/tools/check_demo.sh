@@ -7,7 +7,7 @@ folder=${1:?usage: check_demo.sh BUILD_FOLDER [PICTURE]}
 picture=${2:-out/demo.png}
 # Bare sand, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py judges these figures with 256 beams.
 sand=250:350,150:250
-pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=5 stop_goal_ms=2000 stop_limit_ms=10000 wait_s=10
+pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=20 stop_goal_ms=2000 stop_limit_ms=20000 wait_s=100
 # An emulated processor is slower by this factor, so fewer pings are made; its emulator needs memory of its own.
 if [ -n "${SONARD_DEMO_SLOWNESS:-}" ]; then
   first_ping_limit_s=$((first_ping_limit_s * SONARD_DEMO_SLOWNESS)) stop_limit_ms=$((stop_limit_ms * SONARD_DEMO_SLOWNESS))

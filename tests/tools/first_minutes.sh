@@ -35,11 +35,11 @@ cd "$scratch" || exit 70
 printf '$ sonard\n'
 HOME=$scratch sonard >"$scratch/out" 2>"$scratch/log" &
 daemon=$!
-for ((i = 0; i < 600; i++)); do grep -q '^ready in' "$scratch/log" && break; kill -0 $daemon 2>/dev/null || break; sleep 0.05; done
+for ((i = 0; i < 1200; i++)); do grep -q '^ready in' "$scratch/log" && break; kill -0 $daemon 2>/dev/null || break; sleep 0.05; done
 cat "$scratch/log"
 grep -q '^ready in' "$scratch/log" || exit 1
 echo
-sonarctl listen --pings 1 --quiet >/dev/null 2>&1  # the first ping takes longest: too long for doctor on a busy computer
+sonarctl listen --wait 100 --pings 1 --quiet >/dev/null 2>&1  # the first ping takes longest: too long for doctor on a busy computer
 said=$(wc -l <"$scratch/log")
 
 show sonarctl doctor

@@ -42,14 +42,14 @@ class FiveMinutes(unittest.TestCase):
         self.assertIn(f"info  reload: {note}", self.daemon.log())
 
     def test_the_first_look(self):
-        result = run(SONARCTL, "view", self.address, "--png", self.at / "ping.png", "--width", "600")
+        result = run(SONARCTL, "view", self.address, "--wait", "100", "--png", self.at / "ping.png", "--width", "600")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stdout, r"ping.png: 600 x \d+ pixels, 315 rows x 512 beams, 10.00 m")
         result = run(SONARCTL, "listen", self.address, "--wait", "100", "--pings", "3", "--range", "5")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn(f"connected to {self.address}:14750, BlueView P900-90, serial 7001", result.stdout)
         self.assertRegex(result.stdout, r"ping \d+  118 x 512  16 bit  5.00 m  0.9000 MHz")
-        result = run(SONARCTL, "stats", self.address)
+        result = run(SONARCTL, "stats", self.address, "--wait", "100")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("window.correlation_of_adjacent_beams", result.stdout)
 
