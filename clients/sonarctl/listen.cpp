@@ -71,7 +71,7 @@ class Listener {
       const PingStream::Item item =
           opened_->stream.next(waits_.patience(patience(options_, seconds_since(start_), silence_->left_s())));
       waits_.look(item.ping.has_value());
-      if (item.what == Wait::closed) return failure(ErrorKind::io, closed_text(item.error));
+      if (item.what == Wait::closed) return tl::unexpected(closed(item));
       if (item.what == Wait::data) {
         silence_->ends();
         received_ = true;
@@ -103,10 +103,12 @@ class Listener {
     return enough || over || interrupted != 0 || output_closed_;
   }
 
-  std::string closed_text(const std::string& error) const {
-    if (!error.empty()) return "the connection broke: " + error;
-    return "the device closed the connection after " + std::to_string(log_.counts().pings) +
-           " pings: it stopped, or another client holds it (clients.max)";
+  /// An error of usage is a whole sentence.
+  Error closed(const PingStream::Item& item) const {
+    if (item.kind == ErrorKind::usage) return {item.kind, item.error};
+    if (!item.error.empty()) return {ErrorKind::io, "the connection broke: " + item.error};
+    return {ErrorKind::io, "the device closed the connection after " + std::to_string(log_.counts().pings) +
+                               " pings: it stopped, or another client holds it (clients.max)"};
   }
 
   void handle_ping(const HostPing& ping) {

@@ -67,7 +67,7 @@ class Recorder {
         return failure(item.kind, item.error.empty()
                                       ? "the device closed the connection after " + std::to_string(files_.pings()) +
                                             " pings: it stopped, or another client holds it (clients.max)"
-                                      : "the connection broke: " + item.error);
+                                      : (item.kind == ErrorKind::usage ? "" : "the connection broke: ") + item.error);
       if (item.what == Wait::data)
         silence_.ends();
       else if (silence_.is_over())

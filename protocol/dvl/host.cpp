@@ -67,7 +67,7 @@ class DvlHost final : public protocol::Host {
     const Line line = read_line(line_);
     if (line.velocity) actions.emplace_back(ping_from(line.velocity->measured, now));
     if (line.response && !line.response->success)
-      actions.emplace_back(Error{ErrorKind::usage, "refuses " + line.response->to + ": " + line.response->error});
+      actions.emplace_back(Error{ErrorKind::usage, "the DVL refuses " + line.response->to + ": " + line.response->error});
   }
 
   HostPing ping_from(const Measurement& report, Time now) {

@@ -231,6 +231,16 @@ class Tools(unittest.TestCase):
                 struct.pack_into("<I", data, 1024 + i * (1024 + beams * samples) + place, cookie)
         file.write_bytes(data)
 
+    def test_sonarctl_says_what_the_product_cannot_do(self):
+        with Sonard(scene="l-targets.yaml", profile="aris-3000") as daemon:
+            for settings, why in ((("--range", 60), "the range of an ARIS 3000 is 0.7 to 20 m, not 60 m"),
+                                  (("--mode", 4, "--range", 21), "the range of an ARIS 3000 is 0.7 to 20 m, not 21 m"),
+                                  (("--mode", 5), "no ARIS has this range and mode: an ARIS 1200 has modes 1 and 2, others 1 to 4")):
+                for command in (("listen", "--pings", 1), ("record", "--pings", 1, "--pcap", f"{daemon.folder.name}/run.pcap")):
+                    done = run(SONARCTL, command[0], daemon.address, "--make", "aris", "--wait", 100, *command[1:], *settings)
+                    self.assertEqual(done.returncode, 64, done.stderr)
+                    self.assertIn(f"sonarctl: {why}", done.stderr)
+
     def test_faults_on_purpose(self):
         with Sonard(scene="l-targets.yaml", profile="aris-3000", arguments=("--faults",)) as daemon:
             control = ("--control", f"{daemon.address}:14770")
