@@ -6,8 +6,12 @@
 
 #include "tests/clients/bvtsdk/programs/expect.h"
 
-#if defined(__SANITIZE_ADDRESS__)
-enum { memory_is_kept_back = 1 }; /* freed memory rests for a while; leaks are found at the end */
+#if !defined(__has_feature)
+#define __has_feature(name) 0 /* of clang, which does not define the two macros of gcc */
+#endif
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || __has_feature(address_sanitizer) || \
+    __has_feature(thread_sanitizer)
+enum { memory_is_kept_back = 1 }; /* sanitizers keep freed memory for a while, and records of it; leaks are found at the end */
 #else
 enum { memory_is_kept_back = 0 };
 #endif
