@@ -53,14 +53,16 @@ std::size_t split_at(char mark, std::string_view line, Line& fields) {
 }
 
 /// Splits a line of values. Of a table with commas, semicolons or bars the empty fields count too: a missing value must not
-/// shift those after it into its column.
+/// shift those after it into its column. A line of empty fields has none, as spreadsheets write it for an empty row.
 std::size_t split_values(std::string_view line, Line& words) {
   for (const char mark : {';', '|', ','}) {
     if (line.find(mark) == line.npos) continue;
     const std::size_t count = split_at(mark, line, words);
     const bool is_table = std::none_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count),
                                        [](std::string_view word) { return word.find_first_of(" \t") != word.npos; });
-    if (is_table) return without_edges(line).empty() ? 0 : count;
+    const bool is_empty = std::all_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count),
+                                      [](std::string_view word) { return word.empty(); });
+    if (is_table) return is_empty ? 0 : count;
     break;
   }
   return split(line, words);
@@ -212,7 +214,7 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
       continue;
     }
     if (points.empty() && count == 1 && height_number(words[0])) continue;  // the number of points
-    if (points.empty() && !has_names && comment.first == count) order = comment.second;
+    if (points.empty() && !has_names && comment.first == count - (words[count - 1].empty() ? 1 : 0)) order = comment.second;
     if (points.empty()) first_count = count;  // decimal commas can change the number of words
     if (count <= order.last() || (count != first_count && has_decimal_commas(this_line))) return bad_line();
     const auto x = height_number(words[order.x]), y = height_number(words[order.y]);
