@@ -71,14 +71,14 @@ class Listener {
       const PingStream::Item item =
           opened_->stream.next(waits_.patience(patience(options_, seconds_since(start_), silence_->left_s())));
       waits_.look(item.ping.has_value());
-      if (item.what == Wait::closed) return tl::unexpected(closed(item));
+      if (item.what == Wait::closed) return tl::unexpected(closed(item, log_.counts().pings));
       if (item.what == Wait::data) {
         silence_->ends();
         received_ = true;
         print_notices(notices_.kept(item.notices));
         if (item.ping) handle_ping(*item.ping);
       } else if (silence_->is_over()) {
-        return tl::unexpected(silence(options_.source, opened_->stream, received_, "nothing more",
+        return tl::unexpected(silence(options_.source, *opened_, received_, "nothing more",
                                       "drivers give up after 10 s; is the daemon stopped or stuck?"));
       }
     }
@@ -101,14 +101,6 @@ class Listener {
     const bool enough = options_.pings > 0 && log_.counts().pings >= options_.pings;
     const bool over = options_.seconds > 0 && seconds_since(start_) >= options_.seconds;
     return enough || over || interrupted != 0 || output_closed_;
-  }
-
-  /// An error of usage is a whole sentence.
-  Error closed(const PingStream::Item& item) const {
-    if (item.kind == ErrorKind::usage) return {item.kind, item.error};
-    if (!item.error.empty()) return {ErrorKind::io, "the connection broke: " + item.error};
-    return {ErrorKind::io, "the device closed the connection after " + std::to_string(log_.counts().pings) +
-                               " pings: it stopped, or another client holds it (clients.max)"};
   }
 
   void handle_ping(const HostPing& ping) {

@@ -63,11 +63,7 @@ class Recorder {
       if (Result<void> stored = store(item); !stored) return stored;
       if (Result<void> others = take_status(); !others) return others;
       if (Result<void> others = take_poses(); !others) return others;
-      if (item.what == Wait::closed)
-        return failure(item.kind, item.error.empty()
-                                      ? "the device closed the connection after " + std::to_string(files_.pings()) +
-                                            " pings: it stopped, or another client holds it (clients.max)"
-                                      : (item.kind == ErrorKind::usage ? "" : "the connection broke: ") + item.error);
+      if (item.what == Wait::closed) return failure(item.kind, closed(item, files_.pings()).text);
       if (item.what == Wait::data)
         silence_.ends();
       else if (silence_.is_over())

@@ -119,8 +119,9 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
     waits.look(item.ping.has_value());
     print_notices(item.notices);
     if (item.what == Wait::closed)
-      return failure(ErrorKind::io,
-                     item.error.empty()
+      return failure(item.kind == ErrorKind::usage ? item.kind : ErrorKind::io,
+                     item.kind == ErrorKind::usage ? item.error
+                     : item.error.empty()
                          ? "the device closed the connection before a ping arrived: another client may be connected "
                            "(clients.max)"
                          : "no ping arrived: " + item.error);
@@ -128,7 +129,7 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
       const char* const hint = opened->observes
                                    ? "the sonar has no client that requests pings"
                                    : "is the sonar in standby? Is the daemon's clock stopped (clock), or the daemon stuck?";
-      return tl::unexpected(silence(source, *stream, received, "no ping", hint));
+      return tl::unexpected(silence(source, *opened, received, "no ping", hint));
     }
     received = received || item.what == Wait::data;
     if (!item.ping) continue;
@@ -219,10 +220,10 @@ std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::mill
 
 namespace {
 
-/// Why a sonar that does what it was asked for sends nothing; empty: it should send pings.
-std::string asked_for_silence(const SourceOptions& source) {
+/// Why a sonar that does what it was asked for sends nothing; empty: it should send pings. An observer sends no settings.
+std::string asked_for_silence(const SourceOptions& source, bool observes) {
   const std::optional<double> rate_hz = source.wanted.settings.rate_hz;
-  if (!rate_hz || source.wanted.as_it_is) return {};
+  if (!rate_hz || source.wanted.as_it_is || observes) return {};
   if (*rate_hz == 0) return "--rate standby asked for that";
   if (*rate_hz * source.silence_limit_s >= 1) return {};
   return text::format("--rate %g asked for less than one ping in that time; --wait makes it longer", *rate_hz);
@@ -230,9 +231,17 @@ std::string asked_for_silence(const SourceOptions& source) {
 
 }  // namespace
 
-Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
+Error closed(const PingStream::Item& item, std::uint64_t pings) {
+  if (item.kind == ErrorKind::usage) return {item.kind, item.error};
+  if (!item.error.empty()) return {ErrorKind::io, "the connection broke: " + item.error};
+  return {ErrorKind::io, "the device closed the connection after " + std::to_string(pings) +
+                             " pings: it stopped, or another client holds it (clients.max)"};
+}
+
+Error silence(const SourceOptions& source, const OpenedStream& opened, bool received, const std::string& what,
               const std::string& hint) {
-  const std::string limit = text::format("%g s", source.silence_limit_s), asked = asked_for_silence(source);
+  const PingStream& stream = opened.stream;
+  const std::string limit = text::format("%g s", source.silence_limit_s), asked = asked_for_silence(source, opened.observes);
   if (received) return {ErrorKind::io, what + " arrived within " + limit + ": " + (asked.empty() ? hint : asked)};
   return {ErrorKind::unavailable,
           "no message of " + std::string(stream.make().title) + " arrived from tcp " + text_from(stream.device()) + " within " +

@@ -75,8 +75,11 @@ Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& dev
 /// Writes to standard error.
 void print_notices(const std::vector<std::string>& notices);
 
+/// The error if the connection was closed (`item`) after `pings` pings. Kind usage: the sonar, or the host, refuses a setting.
+Error closed(const PingStream::Item& item, std::uint64_t pings);
+
 /// The error if `what` did not arrive within source.silence_limit_s. `received`: some message of the make arrived.
-Error silence(const SourceOptions& source, const PingStream& stream, bool received, const std::string& what,
+Error silence(const SourceOptions& source, const OpenedStream& opened, bool received, const std::string& what,
               const std::string& hint);
 
 /// Ping `number` (from 0) of a recording; nullopt: the first complete one, else the last. `sonar`: selects one of several.

@@ -123,9 +123,7 @@ class LiveView {
       PingStream::Item item = opened_->stream.next(waits_.patience(std::chrono::milliseconds(500)));
       waits_.look(item.ping.has_value());
       lost_ = item.what == Wait::closed || (item.what != Wait::data && quiet.is_over());
-      if (item.what == Wait::closed)
-        return failure(ErrorKind::io, "the device ended the connection" + (item.error.empty() ? "" : ": " + item.error) +
-                                          "; it stopped, or another client holds it (clients.max)");
+      if (item.what == Wait::closed) return tl::unexpected(closed(item, figures_.pings()));
       if (item.what == Wait::data) quiet.ends();
       received = received || item.what == Wait::data;
       item.notices = notice_log_.kept(item.notices);
@@ -133,8 +131,7 @@ class LiveView {
       for (std::string& notice : item.notices)
         if (has_screen && notices_.size() < most_notices) notices_.push_back(std::move(notice));
       if (lost_)
-        return tl::unexpected(
-            silence(options_.source, opened_->stream, received, "nothing more", "is the daemon stopped or stuck?"));
+        return tl::unexpected(silence(options_.source, *opened_, received, "nothing more", "is the daemon stopped or stuck?"));
       if (!item.ping) continue;
       const Result<bool> read = show(*item.ping, screen);
       if (!read) return tl::unexpected(read.error());
