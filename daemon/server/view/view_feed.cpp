@@ -137,6 +137,8 @@ ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel
     if (!sonar.last) continue;
     if (channel == sonar.image) return sonar.picture ? sonar.picture : image_payload(sonar.name, sonar.last);
     if (channel == sonar.geometry) return geometry_payload(*sonar.last);
+    if (channel == sonar.cloud && clouds_are_lines(sonar))
+      return cloud_payload(sonar.name, *sonar.last, threshold_of(viewer, sonar.points));
     for (const Slow* slow : {&sonar.drawn, &sonar.points})
       if (const auto made = slow->made.find({channel, threshold_of(viewer, *slow)}); made != slow->made.end())
         return made->second;
