@@ -97,13 +97,15 @@ class FileSink final : public Sink {
 
   void try_again() override { broken_.reset(); }
 
-  /// The kernel reports neither a file that was removed nor one that another program cut.
+  /// The kernel reports neither a file that was removed or replaced nor one that another program cut.
   Result<void> close() override {
     struct stat about {};
     const bool is_file = ::fstat(file_.fd(), &about) == 0 && S_ISREG(about.st_mode) && !broken_;
     if (::close(file_.release()) != 0) return failure(ErrorKind::io, "cannot finish " + name_ + ": " + std::strerror(errno));
-    if (is_file && about.st_nlink == 0 && ::access(name_.c_str(), F_OK) != 0)
-      return failure(ErrorKind::io, name_ + " was removed while it was being written; its contents are lost");
+    struct stat named {};
+    if (is_file && about.st_nlink == 0 &&
+        (::stat(name_.c_str(), &named) != 0 || named.st_ino != about.st_ino || named.st_dev != about.st_dev))
+      return failure(ErrorKind::io, name_ + " was removed or replaced while it was being written; its contents are lost");
     if (is_file && static_cast<std::uint64_t>(about.st_size) != size_)
       return failure(ErrorKind::io, name_ + " has another size than what was written: another program changed it meanwhile");
     return {};

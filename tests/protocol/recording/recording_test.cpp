@@ -134,7 +134,14 @@ TEST(Recording, AFileThatOthersRemoveOrCutIsTold) {
     return closed ? "" : closed.error().text;
   };
   EXPECT_EQ(close_after([] {}), "");
-  EXPECT_THAT(close_after([&] { std::filesystem::remove(file.path()); }), HasSubstr("was removed while it was being written"));
+  const TemporaryFile other("other.bin");
+  const auto replace = [&] {
+    std::ofstream(other.path()) << "second";
+    std::filesystem::rename(other.path(), file.path());
+  };
+  EXPECT_THAT(close_after(replace), HasSubstr("replaced while it was being written"));
+  EXPECT_THAT(close_after([&] { std::filesystem::remove(file.path()); }),
+              HasSubstr("was removed or replaced while it was being written"));
   EXPECT_THAT(close_after([&] { std::filesystem::resize_file(file.path(), 20); }), HasSubstr("another program changed it"));
 }
 
