@@ -170,12 +170,14 @@ class GeoTiffReader {
     const bool known =
         whole ? picture_.bits == 8 || picture_.bits == 16 || picture_.bits == 32 || is_packed()
               : picture_.format == SAMPLEFORMAT_IEEEFP && (picture_.bits == 16 || picture_.bits == 32 || picture_.bits == 64);
+    const bool is_complex = picture_.format == SAMPLEFORMAT_COMPLEXINT || picture_.format == SAMPLEFORMAT_COMPLEXIEEEFP;
     const bool grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE;
     if (grey && picture_.samples == 1 && !known)
       return bad(std::string("has ") +
                  (whole                                    ? "whole"
                   : picture_.format == SAMPLEFORMAT_IEEEFP ? "floating-point"
-                                                           : "complex") +
+                  : is_complex                             ? "complex"
+                                                           : "unknown") +
                  " numbers of " + std::to_string(picture_.bits) +
                  " bits, which are not read; write them otherwise: gdal_translate -ot Float32");
     if (!grey || !known || picture_.samples > most_bands ||

@@ -258,8 +258,6 @@ MeshFault glb_fault(std::string_view file) {
   if (version != 2) return "is GLB of version " + std::to_string(version) + "; export it as glTF 2.0";
   if (length > file.size())
     return "is cut short: it announces " + bytes(length) + " and has " + bytes(file.size()) + "; fetch or export it again";
-  if (length < head + chunk_head + number(head))
-    return "its head announces " + bytes(length) + ", less than its JSON takes; export it again";
   int chunk = 0;
   for (std::size_t at = head; at + chunk_head <= file.size(); ++chunk) {
     const std::uint64_t size = number(at);
@@ -273,7 +271,10 @@ MeshFault glb_fault(std::string_view file) {
              ", and GLB requires a multiple of 4, filled up with blanks or zeros; export it again";
     at += chunk_head + static_cast<std::size_t>(size);
   }
-  if (chunk == 1) return "has no binary chunk, so its vertices are missing or in another file; export it with them";
+  if (length < head + chunk_head + number(head))
+    return "its head announces " + bytes(length) + ", less than its JSON takes; export it again";
+  if (chunk == 1 && file.find("\"uri\"") == file.npos)
+    return "has no binary chunk, so its vertices are missing or in another file; export it with them";
   return std::nullopt;
 }
 
