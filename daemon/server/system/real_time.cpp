@@ -31,7 +31,7 @@ void hurry_all_threads() {
     id_t thread = 0;
     const std::string name = it->path().filename();
     std::from_chars(name.data(), name.data() + name.size(), thread);
-    if (::setpriority(PRIO_PROCESS, thread, first) != 0) return;  // not permitted
+    if (::setpriority(PRIO_PROCESS, thread, first) != 0 && errno != ESRCH) return;  // not permitted
   }
 }
 
