@@ -26,7 +26,7 @@ struct StyleArguments {
         ->check(clients::colour_map())
         ->capture_default_str();
     app.add_option("--width", width_px, "width of the picture, in pixels")->check(whole_number(1, 100000))->capture_default_str();
-    app.add_flag("--no-rings", no_rings, "draw no range rings");
+    app.add_flag("--no-rings", no_rings, "draw no ranges, bearings or times");
   }
 
   Result<FanStyle> finish() const {
