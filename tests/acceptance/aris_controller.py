@@ -4,6 +4,7 @@ import struct
 import time
 
 COMMANDS, BEACONS = 56888, 56124
+SO_TIMESTAMPNS = 35  # Linux
 CHANNELS = (10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5)
 PINGS = {1: 3, 3: 6, 6: 4, 9: 8}
 RECEIVER, ACOUSTICS, SALINITY, PING = 1, 3, 4, 14
@@ -134,11 +135,15 @@ class Controller:
 class Beacons:
     def __init__(self, address):
         self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.udp.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self.udp.bind((address, BEACONS))
+        self.arrived_s = 0.0  # when the kernel received the last beacon
 
     def next(self, patience_s=30.0):
         self.udp.settimeout(patience_s)
-        data, source = self.udp.recvfrom(256)
+        data, beside, _, source = self.udp.recvmsg(256, socket.CMSG_SPACE(16))
+        seconds, nanoseconds = struct.unpack("qq", beside[0][2])
+        self.arrived_s = seconds + 1e-9 * nanoseconds
         return fields(data), source[0], data
 
     def until_state(self, state, patience_s):

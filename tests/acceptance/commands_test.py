@@ -123,6 +123,7 @@ class Mistakes(unittest.TestCase):
             result = run(*command)
             self.assertIn("\\x1b[2J", result.stderr)
             self.assertNotIn("\x1b", result.stderr)
+            self.assertGreater(result.returncode, 0)
 
     def test_what_is_wrong_with_a_line_is_said_in_one(self):
         words = [(["--threads", "abc"], "--threads", '"abc" is not a whole number from 0 to 256'),

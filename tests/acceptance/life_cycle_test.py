@@ -186,7 +186,7 @@ class Stop(unittest.TestCase):
             self.assertLess(seconds, ROOM)
 
     def test_terminate_does_not_wait_for_threads_of_low_priority(self):
-        with Sonard() as daemon, stopped_threads(daemon.process.pid, nicer_than=1) as stopped:
+        with Sonard() as daemon, stopped_threads(daemon.process.pid) as stopped:
             self.assertGreaterEqual(stopped, 1)
             daemon.process.terminate()
             eventually(lambda: pathlib.Path(f"/proc/{daemon.process.pid}/stat").read_text(encoding="ascii").split()[2] == "Z")

@@ -222,7 +222,7 @@ class Page(PageChecks, unittest.TestCase):
         page.wait("document.querySelector('.fault-card .left')?.innerText.startsWith('0:')")
         self.assertIn(("/faults/thin_tether", 20), self.mock.set_calls)
         self.assertEqual(page.text("#fault-count"), "1")
-        self.assertIn("The tether is slow and late.", page.text(".fault-card"))
+        self.assertIn("The tether is slow and delays data.", page.text(".fault-card"))
         page.click("#clear-faults")
         page.wait("!document.querySelector('.fault-card')")
 

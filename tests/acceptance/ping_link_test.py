@@ -193,7 +193,9 @@ class SurveyorLink(unittest.TestCase):
             received = b""
             tcp.settimeout(60)
             while pings_recorded(self.daemon) < 5:
-                received += tcp.recv(65536)
+                some = tcp.recv(65536)
+                self.assertTrue(some, self.daemon.log())
+                received += some
             run(SONARCTL, "recording", "stop", *control)
             tcp.sendall(settings(0))
         self.assertIn(frame(14)[:6], received[:40], "it asks for the time")

@@ -35,7 +35,7 @@ control: {{stream: "ADDRESS:14770", http: "{http}"{control}}}
 """
 
 
-def run(*command, patience_s=120):
+def run(*command, patience_s=300):
     return subprocess.run([str(c) for c in command], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=patience_s,
                           check=False)
 

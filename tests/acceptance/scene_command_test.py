@@ -60,13 +60,14 @@ class SceneCommand(unittest.TestCase):
             holes.truncate(1 << 36)
         config = self.path / "sonard.yaml"
         config.write_text(CONFIG.replace("quay", "quai"), encoding="utf-8")
-        for command, words in (([SONARCTL, "scene", "check", self.scene], "19000001 x 19000001 cells"),
-                               ([SONARD, "check", config], "quai.yaml")):
+        for command, code, words in (([SONARCTL, "scene", "check", self.scene], 65, "19000001 x 19000001 cells"),
+                                     ([SONARD, "check", config], 66, "quai.yaml")):
             with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
                 error = process.stderr.read()
-                used = os.wait4(process.pid, 0)[2]
-                process.returncode = 65
+                _, status, used = os.wait4(process.pid, 0)
+                process.returncode = os.waitstatus_to_exitcode(status)
             self.assertIn(words, error)
+            self.assertEqual(process.returncode, code, error)
             self.assertLess(used.ru_maxrss, 300_000, "kB")
 
     def test_an_imported_box_is_heard_where_its_poses_put_it(self):

@@ -14,14 +14,17 @@ def niceness(pid, thread):
 
 
 @contextlib.contextmanager
-def stopped_threads(pid, nicer_than):
-    """Stops the threads of higher niceness than `nicer_than` until the end of the block; yields their number."""
+def stopped_threads(pid):
+    """Stops the threads of higher niceness than the first one until the end of the block; yields their number."""
     ptrace = ctypes.CDLL(None, use_errno=True).ptrace
     ptrace.argtypes = [ctypes.c_long, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
     threads = []
     try:
         for thread in map(int, os.listdir(f"/proc/{pid}/task")):
-            if niceness(pid, thread) <= nicer_than:
+            try:
+                if niceness(pid, thread) <= niceness(pid, pid):
+                    continue
+            except FileNotFoundError:  # it has ended
                 continue
             if ptrace(PTRACE_SEIZE, thread, None, None) != 0:
                 raise unittest.SkipTest(f"ptrace: {os.strerror(ctypes.get_errno())}")

@@ -48,7 +48,7 @@ class Namespaces(unittest.TestCase):
         with subprocess.Popen([*lab.unshare_prefix(), sys.executable, "-c", self.LOST, program], stdin=subprocess.DEVNULL,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               env={**os.environ, "PYTHONPATH": str(PACKAGE)}) as done:
-            self.assertEqual((done.communicate(timeout=60)[0], done.returncode), ("", 0))
+            self.assertEqual((done.communicate(timeout=300)[0], done.returncode), ("", 0))
 
     LOST = """if True:
         import subprocess, sys

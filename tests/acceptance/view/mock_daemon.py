@@ -31,7 +31,7 @@ TOPICS = {"/front/image": "foxglove.RawImage", "/front/fan": "foxglove.RawImage"
 TROUBLES = ["lease_renewal", "bad_connector", "thin_tether", "power_cycle", "wrong_subnet", "second_operator", "other_firmware",
             "overheating", "clock_step", "electrical_noise"]
 # The part of the fault report about troubles.
-ABOUT = {"thin_tether": {"sentence": "The tether is slow and late."}, "power_cycle": {"own_s": 21},
+ABOUT = {"thin_tether": {"sentence": "The tether is slow and delays data."}, "power_cycle": {"own_s": 21},
          "second_operator": {"stays": "the settings that it changed"}, "bad_connector": {"waits_for": "a ping"},
          "lease_renewal": {"sentence": "The address is withdrawn and returns.",
                            "cannot_act": [{"key": "front", "value": "needs two network namespaces: sonarctl lab"}]}}

@@ -213,14 +213,18 @@ async function stepped(url) {
   return { times: times.length };
 }
 
-// A viewer that does not read for 8 s gets a message, then the newest picture instead of those that waited.
+// A viewer that stops reading until a picture is dropped, and 4 s more, gets a message, then the newest picture instead of those that waited.
 async function stalled(url) {
   const viewer = await new Viewer(url).greeted();
   viewer.subscribe('/front/image');
   await viewer.first('message');
   viewer.socket.pause();
   const dropped = /sonard_viewer_dropped_total\{[^}]*channel="\/front\/image"\} [1-9]/;
-  while (!dropped.test(await (await fetch(`${url.replace('ws', 'http')}metrics`)).text())) await pause(0.2);
+  const deadline = performance.now() + 300_000;
+  while (!dropped.test(await (await fetch(`${url.replace('ws', 'http')}metrics`)).text())) {
+    assert(performance.now() < deadline, 'no picture was dropped in 300 s');
+    await pause(0.2);
+  }
   await pause(4);
   const from = viewer.received.length;
   const now = BigInt(Date.now()) * 1_000_000n;

@@ -42,7 +42,7 @@ TEST(KeptSettings, OutlastTheLastClientOfAMakeThatKeepsThemAndOfNoOther) {
     EXPECT_TRUE(sonar.state().settings->equals(*initial)) << "as after a restart";
     time.close(next);
   }
-  EXPECT_FALSE(keepers.empty());
+  EXPECT_THAT(keepers, ::testing::ElementsAre("dvl", "micron", "norbit"));
 }
 
 /// Drivers of a Norbit: one program sends commands, and others read pings.
