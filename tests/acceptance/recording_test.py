@@ -227,7 +227,7 @@ class Inside(Files):
             self.assertGreater(len(split(self.read("raw"))), 3)
 
     def test_labels_of_the_samples_on_request(self):
-        with Sonard(more="recording: {folder: .}\n") as self.daemon:
+        with Sonard(mount="{frame: FRD, rpy_deg: [0, -15, 0]}", more="recording: {folder: .}\n") as self.daemon:
             self.assertEqual(self.steer("recording", "start", "run.raw", "--labels").returncode, 65)
             self.assertEqual(self.steer("recording", "start", "run.mcap", "--labels").returncode, 0)
             with Client(self.daemon.address) as client:
