@@ -61,7 +61,7 @@ class SceneCommand(unittest.TestCase):
         config = self.path / "sonard.yaml"
         config.write_text(CONFIG.replace("quay", "quai"), encoding="utf-8")
         for command, code, words in (([SONARCTL, "scene", "check", self.scene], 65, "19000001 x 19000001 cells"),
-                                     ([SONARD, "check", config], 66, "quai.yaml")):
+                                     ([SONARD, "check", config], 78, "quai.yaml")):
             with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
                 error = process.stderr.read()
                 _, status, used = os.wait4(process.pid, 0)

@@ -115,7 +115,8 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (settings.mode.value_or(0) != 0) return failure(ErrorKind::usage, "an Example has one mode");
   Settings s;
   s.range_mm = static_cast<std::uint32_t>(std::lround(1000 * std::clamp(settings.range_m.value_or(10), 0.5, 50.0)));
-  s.rate_centihz = static_cast<std::uint16_t>(std::lround(100 * std::clamp(*settings.rate_hz, 0.0, 20.0)));
+  s.rate_centihz =
+      static_cast<std::uint16_t>(std::lround(100 * std::clamp(*settings.rate_hz, *settings.rate_hz > 0 ? 0.01 : 0.0, 20.0)));
   s.gain_percent = static_cast<std::uint8_t>(std::lround(settings.gain_percent.value_or(50)));
   return std::make_unique<ExampleHost>(wanted.as_it_is ? std::nullopt : std::optional(s));
 }
