@@ -167,22 +167,20 @@ class OneBeamAtATime(WithSonard):
                             .replace(str(ROOT / "scenes/demo.yaml"), str(scene)).replace("[-7, 0, -3]", "[0, 0, 0]"))
         ros = self.bridge(daemon, clouds=True, cloud_threshold=0.05, tf_static=True)
         self.listen(daemon, "ping360")
-        def sides():
-            """Metres ahead and to port, of the points in the lines whose pose has come."""
-            sent = [t for message in list(ros.published.get("/tf", [])) for t in message.transforms]
-            poses = {(t.header.stamp.sec, t.header.stamp.nanosec): t.transform for t in sent}
-            found = []
-            for cloud in list(ros.published.get("~/down/cloud", [])):
-                at = poses.get((cloud.header.stamp.sec, cloud.header.stamp.nanosec))
-                for i in range(cloud.width if at else 0):
-                    point = struct.unpack_from("<3f", cloud.data, i * cloud.point_step)
-                    x, y, _ = c.rotate(c.wxyz([getattr(at.rotation, axis) for axis in "xyzw"]), point)
-                    found.append((x + at.translation.x, y + at.translation.y))
-            return found
-        def both_sides():
-            found = sides()
-            return found if min(found)[0] < -1 and max(found)[0] > 1 else None
-        seen = wait_for(lambda: sides() and both_sides())
+        seen, poses = [], {}  # metres ahead and to port, of the points in the lines whose pose has come
+        def near_and_far():
+            sent, clouds = ros.published.get("/tf", []), ros.published.get("~/down/cloud", [])
+            while sent:
+                poses.update({(t.header.stamp.sec, t.header.stamp.nanosec): t.transform for t in sent.pop(0).transforms})
+            for cloud in [cloud for cloud in list(clouds) if (cloud.header.stamp.sec, cloud.header.stamp.nanosec) in poses]:
+                clouds.remove(cloud)
+                at = poses[cloud.header.stamp.sec, cloud.header.stamp.nanosec]
+                turn = c.wxyz([getattr(at.rotation, axis) for axis in "xyzw"])
+                for i in range(cloud.width):
+                    x, y, _ = c.rotate(turn, struct.unpack_from("<3f", cloud.data, i * cloud.point_step))
+                    seen.append((x + at.translation.x, y + at.translation.y))
+            return seen and min(seen)[0] < 1 and max(seen)[0] > 3
+        wait_for(near_and_far)
         off = sorted(abs(y - 3) for _, y in seen)
         self.assertLess(off[len(off) // 2], 0.3, off)
 
