@@ -241,7 +241,7 @@ class Tools(unittest.TestCase):
                                   (("--mode", 4, "--range", 21), "the range of an ARIS 3000 is 0.7 to 20 m, not 21 m"),
                                   (("--mode", 5), "no ARIS has this range and mode: an ARIS 1200 has modes 1 and 2, others 1 to 4")):
                 for command in (("listen", "--pings", 1), ("record", "--pings", 1, "--pcap", f"{daemon.folder.name}/run.pcap"),
-                                ("view", "--png", f"{daemon.folder.name}/fan.png"), ("view", "--live")):
+                                ("view", "--png", f"{daemon.folder.name}/fan.png"), ("view", "--live", "--term")):
                     done = run(SONARCTL, command[0], daemon.address, "--make", "aris", "--wait", 100, *command[1:], *settings)
                     self.assertEqual(done.returncode, 64, done.stderr)
                     self.assertIn(f"sonarctl: {why}", done.stderr)
