@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "core/base/geodesy.hpp"
 #include "core/base/plausible_angles.hpp"
 #include "core/base/units.hpp"
 #include "core/motion/trajectory.hpp"
@@ -37,6 +38,7 @@ struct Plan {
   std::string file = {};                // name of the file as the user wrote it
   std::string about = {};               // format, frame, length, for people
   ImplausibleAngle largest_angle = {};  // as in TrajectoryFile::Body
+  std::optional<Geodetic> origin = {};  // as in TrajectoryFile
   explicit operator bool() const { return trajectory != nullptr; }
 };
 /// True if both plans have the same points and the same rules.

@@ -217,11 +217,20 @@ class Reader {
     return word.find('.') != word.npos && nanoseconds_of_nanoseconds(word).value_or(0) < least_ns;
   }
 
+  /// Comments without a frame or an origin are ignored.
   void take_comment(std::string_view line) {
-    const std::size_t word = line.find("frame:");
-    // Comments without a frame are ignored.
-    if (word == std::string_view::npos) return;
     Words words;
+    if (const std::size_t word = line.find("origin:"); word != std::string_view::npos) {
+      split(line.substr(word + 7), ',', words);
+      if (words.size() >= 2 && is_number(words[0])) {
+        double latitude = 0, longitude = 0;
+        std::from_chars(words[0].data(), words[0].data() + words[0].size(), latitude);
+        std::from_chars(words[1].data(), words[1].data() + words[1].size(), longitude);
+        origin_ = Geodetic{rad_from_deg(latitude), rad_from_deg(longitude), 0};
+      }
+    }
+    const std::size_t word = line.find("frame:");
+    if (word == std::string_view::npos) return;
     split(line.substr(word + 6), ' ', words);
     const auto frame = words.empty() ? std::nullopt : frame_called(words.front());
     if (!frame) return set_error("the frame must be ENU_FLU or NED_FRD");
@@ -285,6 +294,7 @@ class Reader {
     }
     file.begins_at = first;
     file.duration = last - first;
+    file.origin = origin_;
     file.replaced = replaced_;
     file.unit = columns_->unit();
     file.unit_by_steps = unit_by_steps_;
@@ -308,6 +318,7 @@ class Reader {
   const ReadOptions& asked_;
   Format format_;
   std::optional<Frame> frame_;
+  std::optional<Geodetic> origin_;
   std::optional<Columns> columns_;
   char between_ = ' ', line_end_ = '\n';
   std::string_view from_here_;  // the text from the current line on

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/geodesy.hpp"
 #include "core/base/plausible_angles.hpp"
 #include "core/base/result.hpp"
 #include "core/motion/trajectory.hpp"
@@ -36,14 +37,16 @@ struct TrajectoryFile {
   std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;
   Frame frame = Frame::enu_flu;
-  Ns begins_at{0};                    // the earliest stamp, which is time 0 in the trajectories
-  Ns duration{0};                     // time from the earliest to the latest stamp of the file
-  std::size_t replaced = 0;           // poses that were replaced by a later line with the same stamp
-  std::string_view unit = "seconds";  // unit of the stamps in the file
-  bool unit_by_steps = false;         // neither the file nor its format names the unit: it is guessed from the steps
+  std::optional<Geodetic> origin = {};  // position of 0, 0, 0, if a comment states it
+  Ns begins_at{0};                      // the earliest stamp, which is time 0 in the trajectories
+  Ns duration{0};                       // time from the earliest to the latest stamp of the file
+  std::size_t replaced = 0;             // poses that were replaced by a later line with the same stamp
+  std::string_view unit = "seconds";    // unit of the stamps in the file
+  bool unit_by_steps = false;           // neither the file nor its format names the unit: it is guessed from the steps
 };
 
-/// Reads a trajectory file. A comment in the file can state the frame: `# frame: NED_FRD`. Errors: "name:line: reason".
+/// Reads a trajectory file. Comments in the file can state the frame, `# frame: NED_FRD`, and the position of 0, 0, 0 in degrees,
+/// `# origin: 47.6,-122.3`. Errors: "name:line: reason".
 Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::string& name, const ReadOptions& options);
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options);
 /// Returns the trajectory of the body with this name, or of the only body if the name is empty. Errors list the names of the

@@ -27,7 +27,7 @@ Result<void> run_check(const CheckCommand& command) {
       std::printf("  %s\n", protocol::line_of(a.protocol, text_of(a.at), a.carries, a.sonar_speaks_first).c_str());
   }
   for (const std::string& note : scene.notes) std::printf("note: %s\n", note.c_str());
-  for (const std::string& note : notes_of_options(config)) std::printf("%s\n", note.c_str());
+  for (const std::string& note : notes_of_config(config)) std::printf("%s\n", note.c_str());
   for (const VehicleConfig& v : config.vehicles)
     if (v.plan) std::printf("vehicle %s follows %s\n", v.name.c_str(), v.plan.about.c_str());
   for (const ObjectConfig& o : config.objects)

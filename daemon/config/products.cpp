@@ -1,11 +1,17 @@
 #include "daemon/config/products.hpp"
 
 #include <algorithm>
+#include <cmath>
 
+#include "core/base/geodesy.hpp"
+#include "core/text/format.hpp"
 #include "protocol/host.hpp"
 
 namespace sonar {
 namespace {
+
+constexpr double most_apart_m =
+    1;  // distance between the origins of a trajectory and of the world; converters round degrees to 1 mm
 
 bool has_option(const protocol::Vendor& vendor, std::string_view name) {
   const auto options = vendor.options();
@@ -30,7 +36,7 @@ int default_max_observers(const protocol::Vendor& vendor) {
   return vendor.default_max_clients() > 1 || vendor.pings_by() == protocol::PingsBy::datagrams ? 0 : 4;
 }
 
-std::vector<std::string> notes_of_options(const Config& config) {
+std::vector<std::string> notes_of_config(const Config& config) {
   std::vector<std::string> notes;
   for (const SonarConfig& sonar : config.sonars)
     for (const auto& [name, value] : sonar.options) {
@@ -40,6 +46,17 @@ std::vector<std::string> notes_of_options(const Config& config) {
           notes.push_back("sonar " + sonar.name + ": options." + name + " is for " + title_of(*vendor) +
                           " sonars: without effect on " + sonar.profile.model->name);
     }
+  for (const VehicleConfig& vehicle : config.vehicles) {
+    if (!config.origin || !vehicle.plan.origin) continue;
+    const Vec3d away = enu_in_enu_of(*config.origin, *vehicle.plan.origin).position_m;
+    const double away_m = std::hypot(away.x, away.y);
+    if (away_m > most_apart_m)
+      notes.push_back(
+          "vehicle " + vehicle.name + ": " + vehicle.plan.file +
+          text::format(" states an origin that is %.0f m from world.origin, so its positions are off by that: write it "
+                       "again with --origin %.8g,%.8g,0 (python3 -m sonard_client.convert)",
+                       away_m, deg_from_rad(config.origin->latitude_rad), deg_from_rad(config.origin->longitude_rad)));
+  }
   return notes;
 }
 

@@ -16,9 +16,10 @@ std::string title_of(const protocol::Vendor& vendor);
 /// Default number of observers: 0 for a product that accepts several clients or sends pings only by datagrams.
 int default_max_observers(const protocol::Vendor& vendor);
 
-/// A sentence for each option that the configuration gives to a sonar of another vendor. Such options have no effect but are
-/// allowed, so that a configuration stays valid if only its `profile` is changed.
-std::vector<std::string> notes_of_options(const Config& config);
+/// A sentence for each option that the configuration gives to a sonar of another vendor, and for each trajectory file whose
+/// origin is not world.origin. Such options have no effect but are allowed, so that a configuration stays valid if only its
+/// `profile` is changed.
+std::vector<std::string> notes_of_config(const Config& config);
 
 /// Changes the first sonar to this product, with the product's defaults. Errors list the products.
 Result<void> use_product(Config& config, std::string_view profile);

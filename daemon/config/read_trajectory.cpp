@@ -79,6 +79,7 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   plan.trajectory = *way;
   for (const auto& one : f.bodies)
     if (one.trajectory == *way) plan.largest_angle = one.largest_angle;
+  plan.origin = f.origin;
   plan.file = file.text(1024);
   plan.about = text::format("%s: %s, %s, %zu poses, %.3f s", plan.file.c_str(), std::string(name_of(f.format)).c_str(),
                             std::string(name_of(f.frame)).c_str(), (*way)->size(), seconds((*way)->duration()));

@@ -230,7 +230,7 @@ void App::take_over(Config next) {
   std::string listed;
   for (const std::string& key : keys) listed += (listed.empty() ? "" : ", ") + key;
   if (!listed.empty()) log_.warning("reload: these need a restart and stay as they were: " + listed);
-  for (const std::string& note : notes_of_options(config_)) log_.info("reload: " + note);
+  for (const std::string& note : notes_of_config(config_)) log_.info("reload: " + note);
   log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
   events_.publish_scene(config_.scene.name(), "reloaded: " + change.summary);
   on_change();

@@ -52,7 +52,7 @@ AppOptions app_options(const RunCommand& command, const FoundConfig& found) {
 
 void log_notes(const Config& config, const Scene& scene, Log& log) {
   for (const std::string& note : scene.notes) log.info(note);
-  for (const std::string& note : notes_of_options(config)) log.info(note);
+  for (const std::string& note : notes_of_config(config)) log.info(note);
   if (const std::string note = note_of_parts_left_out(config.engine.switches); !note.empty()) log.info(note);
 }
 

@@ -129,14 +129,14 @@ TEST(ConfigMistakes, AnotherProductAloneLeavesTheExampleValid) {
 }
 
 TEST(ConfigMistakes, OptionsOfAnotherVendorAreTold) {
-  EXPECT_THAT(notes_of_options(*example_with("oculus-m750d")), ::testing::IsEmpty());
+  EXPECT_THAT(notes_of_config(*example_with("oculus-m750d")), ::testing::IsEmpty());
   EXPECT_THAT(
-      notes_of_options(*example_with("blueview-p900-90")),
+      notes_of_config(*example_with("blueview-p900-90")),
       ::testing::ElementsAre("sonar front: options.before_first_fire is for Oculus sonars: without effect on BlueView P900-90",
                              "sonar front: options.gain_echo is for Oculus sonars: without effect on BlueView P900-90"));
   const auto oculus = parse_config(world + vehicles + sonar + "    options: {heads_base: strict}\n", "sonard.yaml", directory());
   ASSERT_TRUE(oculus) << oculus.error().text;
-  EXPECT_THAT(notes_of_options(*oculus),
+  EXPECT_THAT(notes_of_config(*oculus),
               ::testing::ElementsAre("sonar front: options.heads_base is for BlueView sonars: without effect on Oculus M1200d"));
 }
 

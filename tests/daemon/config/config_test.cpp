@@ -346,15 +346,15 @@ TEST(Config, TheShippedExampleIsValid) {
   const auto blueview = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard-blueview.yaml");
   ASSERT_TRUE(blueview) << blueview.error().text;
   EXPECT_EQ(blueview->sonars.at(0).profile.model->profile, "blueview-p900-90");
-  EXPECT_TRUE(notes_of_options(*blueview).empty());
+  EXPECT_TRUE(notes_of_config(*blueview).empty());
   const auto aris = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard-aris.yaml");
   ASSERT_TRUE(aris) << aris.error().text;
   EXPECT_EQ(aris->sonars.at(0).profile.model->profile, "aris-3000");
-  EXPECT_TRUE(notes_of_options(*aris).empty());
+  EXPECT_TRUE(notes_of_config(*aris).empty());
   const auto water_linked = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/sonard-3d15.yaml");
   ASSERT_TRUE(water_linked) << water_linked.error().text;
   EXPECT_EQ(water_linked->sonars.at(0).profile.model->profile, "waterlinked-3d15");
-  EXPECT_TRUE(notes_of_options(*water_linked).empty());
+  EXPECT_TRUE(notes_of_config(*water_linked).empty());
   for (const auto& [file, profile] : {std::pair{"sonard-ping360.yaml", "ping360"},
                                       {"sonard-surveyor.yaml", "surveyor-240"},
                                       {"sonard-omniscan.yaml", "omniscan-450"},
@@ -368,7 +368,7 @@ TEST(Config, TheShippedExampleIsValid) {
     const auto ping = load_config(std::string(SONARD_SOURCE_DIR) + "/scenes/" + file);
     ASSERT_TRUE(ping) << ping.error().text;
     EXPECT_EQ(ping->sonars.at(0).profile.model->profile, profile);
-    EXPECT_TRUE(notes_of_options(*ping).empty());
+    EXPECT_TRUE(notes_of_config(*ping).empty());
   }
   const auto demo = demo_config();
   ASSERT_TRUE(demo) << demo.error().text;

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "daemon/config/load_config.hpp"
+#include "daemon/config/products.hpp"
 
 namespace sonar::trajectory_config_test {
 namespace {
@@ -63,6 +64,26 @@ TEST(TrajectoryConfig, WordsAndFiles) {
             "equal.tum: tum, ENU_FLU, 2 poses, 1.000 s, 1 pose replaced by the next of the same stamp");
   std::ofstream(directory() + "/ms.tum") << "# frame: ENU_FLU\n1305031102175 0 0 -3 0 0 0 1\n1305031103175 0 0 -3 0 0 0 1\n";
   EXPECT_EQ(vehicle("ms.tum").plan.about, "ms.tum: tum, ENU_FLU, 2 poses, 1.000 s, stamps in milliseconds");
+}
+
+TEST(TrajectoryConfig, AnotherOriginThanTheWorldsIsANote) {
+  const auto notes = [](const std::string& comment, const std::string& origin) {
+    std::ofstream(directory() + "/log.csv") << "# frame: ENU_FLU\n" << comment << "\nt,x,y,z\n0,0,0,-3\n1,0,0,-3\n";
+    const auto config = parse_config("world: {scene: scene.yaml" + origin +
+                                         "}\nvehicles: [{name: rov, trajectory: log.csv}]\n"
+                                         "sonars: [{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\n",
+                                     "sonard.yaml", directory());
+    EXPECT_TRUE(config);
+    return config ? notes_of_config(*config) : std::vector<std::string>{};
+  };
+  const std::string world = ", origin: {lat: 47.6, lon: -122.33}";
+  EXPECT_THAT(notes("# origin: 47.61000000,-122.33000000,0.000", world),
+              ::testing::ElementsAre(AllOf(StartsWith("vehicle rov: log.csv states an origin that is 1112 m from world.origin"),
+                                           HasSubstr("--origin 47.6,-122.33,0"))));
+  EXPECT_THAT(notes("# origin: 47.60000000,-122.33000000,10 (the first fix)", world), ::testing::IsEmpty());
+  EXPECT_THAT(notes("# origin: 47.61,-122.33,0", ""), ::testing::IsEmpty());
+  for (const char* other : {"# origin: quay", "# origin:", "# origin: 1", "# made by hand"})
+    EXPECT_THAT(notes(other, world), ::testing::IsEmpty()) << other;
 }
 
 TEST(TrajectoryConfig, EveryKey) {
