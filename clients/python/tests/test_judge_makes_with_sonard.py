@@ -20,7 +20,9 @@ MOST_RUNS = 5
 
 
 def judged(make, plant="", tap="json"):
-    """(exit code, the only case) of a run without a fault. A run whose capture missed packets is repeated."""
+    """(exit code, the only case) of a run without a fault. A run whose capture missed packets is repeated, and so is one in which
+    a driver without a plant was too slow: beside other programs its last pings may come after the end."""
+    busy = {"UNSEEN"} if plant else {"UNSEEN", "LOST"}
     for _ in range(MOST_RUNS):
         with tempfile.TemporaryDirectory() as folder:
             driver = f"{sys.executable} -B {ROOT / 'tests/judge/make_drivers.py'} {make} {{ip}} {{port}} {plant}"
@@ -31,7 +33,7 @@ def judged(make, plant="", tap="json"):
             if not index.is_file():
                 return done.returncode, {"data": done.stdout + done.stderr}
             case = json.loads(index.read_text())["drivers"][0]["cases"][0]
-        if tap != "json" or case["data"] != "UNSEEN":
+        if tap != "json" or case["data"] not in busy:
             break
     return done.returncode, case
 
