@@ -1,12 +1,16 @@
 """Tests an emulated DVL A50 with drivers: lines of JSON over TCP, and sentences on a serial line."""
 import json
 import math
+import pathlib
 import socket
+import tempfile
 import time
 import unittest
 
+import tshark as shark
+from pcap_writer import Capture
 from pseudo_terminal import PseudoTerminal
-from running_sonard import Sonard
+from running_sonard import ROOT, Sonard
 
 PORT, SERIAL_PORT, PATIENCE_S = 16171, 4001, 120
 DOWN = "{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}"
@@ -161,6 +165,40 @@ class Velocity(unittest.TestCase):
             self.assertAlmostEqual(float(again[1]), over_tcp["vy"], delta=0.001)
             self.assertEqual(len(driver.next("wrp")), 9)
             self.assertEqual(driver.ask("wcp,1", "wra"), [])
+
+
+@unittest.skipIf(shark.why_not(), shark.why_not())
+class UnderWireshark(unittest.TestCase):
+    def test_tshark_reads_the_same(self):
+        with Sonard(scene="l-targets.yaml", profile="dvl-a50") as daemon:
+            driver = Driver(daemon.address)
+            driver.link.sendall(b'{"command": "get_config"}')
+            lines = []
+            while len({json.loads(line)["type"] for line in lines}) < 3:
+                lines.append(driver.lines.readline())
+            driver.close()
+        capture = Capture(device_port=PORT)
+        capture.connect()
+        capture.tcp("client", b'{"command": "get_config"}')
+        sent = b"".join(lines) + b"no JSON\r\n"
+        for begin in range(0, len(sent), 700):
+            capture.tcp("device", sent[begin:begin + 700])
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "dvl.pcap"
+            capture.write(path)
+            def shown(wanted, *fields):
+                chosen = [word for field in fields for word in ("-e", field)]
+                return shark.tshark("-r", path, "-Y", wanted, "-T", "fields", "-E", "separator=/s", *chosen,
+                                    dissector=ROOT / "protocol/dvl/dvl.lua").split()
+            types = ",".join(shown("dvl.type", "dvl.type")).split(",")
+            self.assertEqual(types, [json.loads(line)["type"] for line in lines])
+            self.assertEqual(shown("dvl.command", "dvl.command"), ["get_config"])
+            self.assertEqual(shown("dvl.responseTo", "dvl.responseTo", "dvl.success"), ["get_config", "1"])
+            velocity = next(report for report in map(json.loads, lines) if report["type"] == "velocity")
+            keys = "vx", "vy", "vz", "fom", "altitude"
+            for key, values in zip(keys, shown("dvl.vx", *("dvl." + key for key in keys))):
+                self.assertAlmostEqual(float(values.split(",")[0]), velocity[key], msg=key)
+            self.assertEqual(len(shown("dvl.expert.junk", "frame.number")), 1)
 
 
 if __name__ == "__main__":
