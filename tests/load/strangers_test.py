@@ -259,7 +259,7 @@ class Apart:
         return self
 
     def __exit__(self, *_):
-        said = self.process.communicate(timeout=120)[0]
+        said = self.process.communicate(timeout=400)[0]
         self.took = time.monotonic() - self.began
         self.done = int(said) if self.process.returncode == 0 else None
 
