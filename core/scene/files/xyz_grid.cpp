@@ -4,6 +4,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "core/base/letters.hpp"
@@ -36,17 +37,12 @@ std::size_t split(std::string_view line, Line& words, std::string_view between =
   return count;
 }
 
-std::string_view without_edges(std::string_view text, std::string_view edges = " \t\r\"") {
-  const std::size_t begin = text.find_first_not_of(edges);
-  return begin == text.npos ? std::string_view() : text.substr(begin, text.find_last_not_of(edges) + 1 - begin);
-}
-
 /// Splits a line into the fields between its `mark`, without blanks and quotes around them. A field may be empty.
 std::size_t split_at(char mark, std::string_view line, Line& fields) {
   std::size_t count = 0;
   for (std::size_t at = 0; at <= line.size() && count < fields.size();) {
     const std::size_t end = std::min(line.find(mark, at), line.size());
-    fields[count++] = without_edges(line.substr(at, end - at));
+    fields[count++] = trimmed(line.substr(at, end - at), " \t\r\"");
     at = end + 1;
   }
   return count;
@@ -58,11 +54,10 @@ std::size_t split_values(std::string_view line, Line& words) {
   for (const char mark : {';', '|', ','}) {
     if (line.find(mark) == line.npos) continue;
     const std::size_t count = split_at(mark, line, words);
-    const bool is_table = std::none_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count),
-                                       [](std::string_view word) { return word.find_first_of(" \t") != word.npos; });
-    const bool is_empty = std::all_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count),
-                                      [](std::string_view word) { return word.empty(); });
-    if (is_table) return is_empty ? 0 : count;
+    const auto fields = std::span(words).first(count);
+    if (std::ranges::all_of(fields, [](std::string_view field) { return field.empty(); })) return 0;
+    if (std::ranges::none_of(fields, [](std::string_view field) { return field.find_first_of(" \t") != field.npos; }))
+      return count;
     break;
   }
   return split(line, words);
