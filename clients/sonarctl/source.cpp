@@ -118,10 +118,10 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
         stream->next(std::clamp(left, std::chrono::milliseconds(0), waits.patience(std::chrono::milliseconds(500))));
     waits.look(item.ping.has_value());
     print_notices(item.notices);
+    if (item.what == Wait::closed && item.kind == ErrorKind::usage) return tl::unexpected(closed(item, 0));
     if (item.what == Wait::closed)
-      return failure(item.kind == ErrorKind::usage ? item.kind : ErrorKind::io,
-                     item.kind == ErrorKind::usage ? item.error
-                     : item.error.empty()
+      return failure(ErrorKind::io,
+                     item.error.empty()
                          ? "the device closed the connection before a ping arrived: another client may be connected "
                            "(clients.max)"
                          : "no ping arrived: " + item.error);
