@@ -108,7 +108,7 @@ class Faults {
   bool leaves_group() const;
   /// Changes a message before it is sent to a client. Returns false if it must not be sent.
   bool shape(const Connection& to, Outbox::Message& message, Time now);
-  /// Whether a ping is held back before it enters a client's outbox, and the time or number of pings for which it is held.
+  /// Tells whether a ping is held back before it enters a client's outbox, and the time or number of pings for which it is held.
   struct Hold {
     enum class Kind { pass, until, after_next, collect } kind = Kind::pass;
     Time until{};

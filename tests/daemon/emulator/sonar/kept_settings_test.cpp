@@ -73,7 +73,7 @@ struct Norbit : ::testing::Test {
 TEST_F(Norbit, MayBeConfiguredByAProgramThatLeavesBeforeAReaderConnects) {
   configure();
   time.run(seconds(1));
-  EXPECT_EQ(time.pings, 0u) << "nobody reads";
+  EXPECT_EQ(time.pings, 0u) << "no client reads pings";
   expect_pings(connect(2210));
 }
 
