@@ -1,6 +1,57 @@
+// Checks of what users request: options of a product, settings of a ping.
 #include "protocol/host.hpp"
 
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "core/text/nearest.hpp"
+
 namespace sonar::protocol {
+namespace {
+
+std::string in_quotes(std::string_view text) { return std::string("'").append(text).append("'"); }
+
+const Option* find_option(const Vendor& vendor, std::string_view name) {
+  for (const Option& option : vendor.options())
+    if (option.name == name) return &option;
+  return nullptr;
+}
+
+bool is_number_of(const Option& option, std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return false;
+  if (option.whole && std::trunc(value) != value) return false;
+  return value >= option.lowest && value <= option.highest;
+}
+
+/// The reason if the option or its value is refused, else an empty text.
+std::string complaint(const Vendor& vendor, const std::string& name, const std::string& value) {
+  const Option* option = find_option(vendor, name);
+  if (option == nullptr) {
+    std::vector<std::string_view> names;
+    for (const Option& known : vendor.options()) names.push_back(known.name);
+    return "unknown option " + in_quotes(name) + " of " + std::string(vendor.name()) + text::suggestion(name, names, "options");
+  }
+  if (option->allowed.empty()) {
+    const bool fine =
+        value == option->default_value || (!option->word.empty() && value == option->word) || is_number_of(*option, value);
+    return fine ? "" : "option " + name + " must be a " + numbers_of(*option) + ", not " + in_quotes(value);
+  }
+  if (std::find(option->allowed.begin(), option->allowed.end(), value) != option->allowed.end()) return "";
+  return "option " + name + " cannot be " + in_quotes(value) + text::suggestion(value, option->allowed, "values");
+}
+
+}  // namespace
+
+Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& given) {
+  for (const auto& [name, value] : given)
+    if (const std::string text = complaint(vendor, name, value); !text.empty()) return failure(ErrorKind::config, text);
+  OptionValues complete = given;
+  for (const Option& option : vendor.options()) complete.try_emplace(std::string(option.name), option.default_value);
+  return complete;
+}
 
 // A setting that a make does not have is an error. If it were ignored, a user would assume that the ping was made with it.
 Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known) {

@@ -1,5 +1,6 @@
 // Opens files named by configurations, scenes and users, but only regular files. Opening a FIFO can block forever. Reading a
-// device may never end, or may start an action. Recordings (protocol/recorded/byte_source.cpp) follow the same rule.
+// device may never end, or may start an action. Recordings (protocol/recorded/byte_source.cpp) follow the same rule. Checks
+// whether a folder can be written, too.
 #pragma once
 
 #include <cstddef>
@@ -39,5 +40,9 @@ std::string why_not_written(const std::filesystem::path& file, int error);
 void confine_reads(const std::filesystem::path& folder);
 /// The folder passed to confine_reads(); empty if every file may be read.
 const std::filesystem::path& readable_folder();
+
+/// The reason why files cannot be created in the folder, such as "is not a folder". It follows the folder's name in an error.
+/// Empty = files can be created. The check writes nothing.
+std::string why_no_files_in(const std::filesystem::path& folder);
 
 }  // namespace sonar

@@ -18,10 +18,8 @@
 #include "core/pipeline/ping_engine.hpp"
 #include "core/sonar/water.hpp"
 #include "daemon/config/addresses.hpp"
-#include "daemon/config/clock_mode.hpp"
 #include "daemon/config/faults/fault.hpp"
-#include "daemon/config/log_options.hpp"
-#include "daemon/config/outbox_rules.hpp"
+#include "daemon/config/runtime_options.hpp"
 #include "daemon/config/scene_file.hpp"
 #include "protocol/vendor.hpp"
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/base/regular_file.hpp"
-#include "core/base/writable_folder.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "daemon/config/config_parts.hpp"

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "daemon/config/log_options.hpp"
+#include "daemon/config/runtime_options.hpp"
 
 namespace sonar {
 

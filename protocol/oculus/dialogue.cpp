@@ -2,9 +2,9 @@
 #include <cstdio>
 #include <optional>
 
+#include "protocol/oculus/encode_ping.hpp"
 #include "protocol/oculus/framer.hpp"
 #include "protocol/oculus/oculus.hpp"
-#include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"
 
 namespace sonar::oculus {

@@ -2,7 +2,6 @@
 
 #include "protocol/oculus/encode_ping.hpp"
 #include "protocol/oculus/models.hpp"
-#include "protocol/oculus/replies.hpp"
 #include "protocol/oculus/settings.hpp"
 
 namespace sonar::oculus {

@@ -2,7 +2,7 @@
 #include <array>
 
 #include "protocol/recorded/raw_dump.hpp"
-#include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/settings.hpp"
 #include "protocol/waterlinked/sonar_file.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"

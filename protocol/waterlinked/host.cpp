@@ -6,7 +6,7 @@
 
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
-#include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
 
 namespace sonar::waterlinked {

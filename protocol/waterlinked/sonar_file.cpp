@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 
 namespace sonar::recording {
 namespace {

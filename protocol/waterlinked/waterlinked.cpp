@@ -1,6 +1,6 @@
 #include "protocol/waterlinked/waterlinked.hpp"
 
-#include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/messages.hpp"
 
 namespace sonar::waterlinked {
 namespace {

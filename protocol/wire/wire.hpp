@@ -22,7 +22,7 @@ using BytesView = std::span<const std::byte>;
 
 enum class Endian { little, big };
 
-/// One description serves writing (const message) and reading: `template <class V, wire::Like<Header> M> fields(V&, M&)`.
+/// One description serves writing (const message) and reading: `fields(auto& visit, wire::Like<Header> auto& m)`.
 template <class M, class Message>
 concept Like = std::same_as<std::remove_const_t<M>, Message>;
 

@@ -17,7 +17,7 @@
 #include "clients/sonarctl/source.hpp"
 #include "protocol/control/control.hpp"
 #include "protocol/control/json_pose.hpp"
-#include "protocol/oculus/replies.hpp"
+#include "protocol/oculus/encode_ping.hpp"
 #include "tests/clients/made_up_ping.hpp"
 
 namespace sonar::clients {

@@ -15,7 +15,7 @@
 #include "clients/sonarctl/record.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "protocol/control/control.hpp"
-#include "protocol/oculus/replies.hpp"
+#include "protocol/oculus/encode_ping.hpp"
 #include "tests/clients/bound_socket.hpp"
 #include "tests/clients/made_up_ping.hpp"
 #include "tests/protocol/control/message_from.hpp"

@@ -3,7 +3,7 @@
 // valid mesh, or a sentence.
 #include <vector>
 
-#include "core/scene/files/clean_mesh.hpp"
+#include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/shapes/polygon.hpp"
 #include "tests/fuzz/mesh_script.hpp"
 

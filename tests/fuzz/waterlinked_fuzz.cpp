@@ -7,7 +7,6 @@
 #include <string>
 
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 #include "protocol/waterlinked/waterlinked.hpp"
 
 using namespace sonar;

@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "protocol/oculus/replies.hpp"
+#include "protocol/oculus/encode_ping.hpp"
 #include "tests/protocol/blueview/blueview_testing.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 

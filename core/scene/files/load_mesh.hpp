@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "core/base/result.hpp"
-#include "core/scene/files/clean_mesh.hpp"
 #include "core/scene/files/mesh_exchange.hpp"
+#include "core/scene/files/mesh_steps.hpp"
 
 namespace sonar {
 

@@ -1,10 +1,15 @@
-// The steps that the daemon's own readers of meshes and the importer share.
+// The steps that the daemon's own readers of meshes and the importer share; one of them checks and cleans the triangles.
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <span>
 #include <string_view>
+#include <vector>
 
-#include "core/scene/files/clean_mesh.hpp"
+#include "core/base/result.hpp"
 #include "core/scene/files/mesh_exchange.hpp"
+#include "core/scene/shapes/terrain.hpp"
 
 namespace sonar {
 
@@ -25,8 +30,20 @@ tl::unexpected<Error> bad_mesh(const MeshFile& request, const std::string& what)
 /// Returns an error if the import of files of `bytes` bytes would need more memory than is free.
 Result<void> check_import_memory(const MeshFile& request, std::uintmax_t bytes);
 
+/// A function that receives the corners and the material of one triangle.
+using TriangleSink = std::function<void(std::span<const Vec3d, 3>, std::uint16_t)>;
+/// A function that passes every triangle to the sink. Each call passes the same triangles in the same order.
+using TriangleSource = std::function<void(const TriangleSink&)>;
+
 /// `source` must pass at most `triangles` triangles, in the file's units and axes.
 Result<LoadedMesh> finish_mesh(const MeshFile& request, bool y_up_by_default, std::uint64_t triangles,
                                std::vector<std::string> names, const TriangleSource& source);
+
+/// Checks that vertices are finite and within 1e7 m, drops triangles without area, merges equal vertices, and moves the mesh's
+/// middle to the origin. It calls `source` twice, to avoid a copy of the corners. Errors do not contain the file name.
+Result<CentredMesh> clean_triangles(const TriangleSource& source, std::size_t most = max_mesh_triangles);
+/// Like clean_triangles(), for a list of corners, three per triangle.
+Result<CentredMesh> clean_mesh(const std::vector<Vec3d>& corners, const std::vector<std::uint16_t>& material,
+                               std::size_t most = max_mesh_triangles);
 
 }  // namespace sonar

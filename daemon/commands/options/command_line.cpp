@@ -12,8 +12,8 @@
 #include "core/text/format.hpp"
 #include "core/text/nearest.hpp"
 #include "daemon/config/load_config.hpp"
-#include "daemon/config/move_addresses.hpp"
 #include "daemon/config/products.hpp"
+#include "daemon/config/sonar_addresses.hpp"
 #include "protocol/host.hpp"
 
 namespace sonar {

@@ -3,7 +3,7 @@
 #include <csignal>
 #include <cstdlib>
 
-#include "daemon/config/receiver_rules.hpp"
+#include "daemon/config/sonar_addresses.hpp"
 #include "daemon/emulator/connections/outbox.hpp"
 #include "daemon/server/http/http_rules.hpp"
 #include "daemon/server/system/listen.hpp"
@@ -70,8 +70,7 @@ Result<void> ReplayServer::open_http() {
 }
 
 /// An exception in one of the coroutines ends the replay. Otherwise the server would continue without serving a client.
-template <class Coroutine>
-void ReplayServer::spawn(Coroutine coroutine) {
+void ReplayServer::spawn(auto coroutine) {
   asio::co_spawn(io_, std::move(coroutine), [this](std::exception_ptr fault) {
     if (!fault) return;
     outcome_ = failure(ErrorKind::bug, "internal fault: " + text_of(fault) + " (please report it); it ended the replay");

@@ -93,8 +93,7 @@ class ReplayServer {
   asio::awaitable<void> close_stream(ClientPointer client);
   asio::awaitable<void> send_status();
   asio::awaitable<void> watch_signals();
-  template <class Coroutine>
-  void spawn(Coroutine coroutine);
+  void spawn(auto coroutine);
   void end();
 
   asio::io_context& io_;

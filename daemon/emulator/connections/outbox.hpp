@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/base/units.hpp"
-#include "daemon/config/outbox_rules.hpp"
+#include "daemon/config/runtime_options.hpp"
 
 namespace sonar {
 

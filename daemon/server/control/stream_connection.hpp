@@ -8,13 +8,23 @@
 #include <optional>
 #include <string>
 
+#include "daemon/server/api/events.hpp"
+#include "daemon/server/api/operations.hpp"
 #include "daemon/server/connections/connection_services.hpp"
 #include "daemon/server/connections/input_rate.hpp"
-#include "daemon/server/control/control_targets.hpp"
 #include "daemon/server/http/http_rules.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
 #include "protocol/control/control.hpp"
 
 namespace sonar {
+
+/// The parts of the daemon on which requests of control act.
+struct ControlTargets {
+  Operations& operations;
+  Events& events;
+  PoseIntake& poses;
+  SharedRate pose_rate;  // limit for poses without an answer (request id 0)
+};
 
 class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
  public:

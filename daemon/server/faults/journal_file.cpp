@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-#include "core/base/writable_folder.hpp"
+#include "core/base/regular_file.hpp"
 
 namespace sonar {
 namespace {

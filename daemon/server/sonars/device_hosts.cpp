@@ -2,7 +2,7 @@
 // (udp_stream).
 #include <algorithm>
 
-#include "daemon/config/receiver_rules.hpp"
+#include "daemon/config/sonar_addresses.hpp"
 #include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/sonars/device.hpp"
 

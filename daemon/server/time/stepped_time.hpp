@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/config/clock_mode.hpp"
+#include "daemon/config/runtime_options.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/time/clock.hpp"
 #include "daemon/server/time/has_left.hpp"

@@ -1,6 +1,6 @@
 // Folders in which no file can be created, even if the superuser has the permission. They are recognised without an attempt to
 // write.
-#include "core/base/writable_folder.hpp"
+#include "core/base/regular_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

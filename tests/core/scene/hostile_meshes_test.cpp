@@ -14,9 +14,9 @@
 #include <new>
 
 #include "core/base/child_process.hpp"
-#include "core/scene/files/clean_mesh.hpp"
 #include "core/scene/files/load_mesh.hpp"
 #include "core/scene/files/mesh_exchange.hpp"
+#include "core/scene/files/mesh_steps.hpp"
 #include "core/scene/import/import_limits.hpp"
 #include "tests/core/held_variable.hpp"
 #include "tests/core/scene/temporary_files.hpp"

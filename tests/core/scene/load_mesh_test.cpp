@@ -11,7 +11,7 @@
 #include "core/base/base64.hpp"
 #include "core/base/memory_left.hpp"
 #include "core/base/regular_file.hpp"
-#include "core/scene/files/clean_mesh.hpp"
+#include "core/scene/files/mesh_steps.hpp"
 #include "core/text/format.hpp"
 #include "tests/core/scene/mesh_checks.hpp"
 #include "tests/core/scene/temporary_files.hpp"

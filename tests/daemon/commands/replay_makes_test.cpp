@@ -6,7 +6,6 @@
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 #include "tests/daemon/commands/replay_on_loopback.hpp"
 
 namespace sonar {

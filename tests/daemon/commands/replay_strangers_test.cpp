@@ -12,7 +12,6 @@
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 
 namespace sonar::replay_strangers_test {
 namespace {

@@ -3,7 +3,6 @@
 
 #include "protocol/recording/recording.hpp"
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::sonar_file_test {

@@ -6,7 +6,6 @@
 #include <iterator>
 
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
 namespace sonar::waterlinked::tests {

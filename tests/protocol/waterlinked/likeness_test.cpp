@@ -12,7 +12,6 @@
 #include "core/scene/shapes/primitives.hpp"
 #include "core/sonar/range_image.hpp"
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"

@@ -1,7 +1,7 @@
 // The datagrams of a shot, read back.
 #include <cmath>
 
-#include "protocol/waterlinked/rip.hpp"
+#include "protocol/waterlinked/messages.hpp"
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
 namespace sonar::waterlinked::tests {

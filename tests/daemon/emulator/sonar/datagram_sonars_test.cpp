@@ -4,7 +4,6 @@
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/waterlinked/messages.hpp"
-#include "protocol/waterlinked/rip.hpp"
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
 
 namespace sonar::datagram_sonars_test {

@@ -1,5 +1,5 @@
-// Moves the listeners of a configuration (`--offset N`), so that they do not conflict with each other or with a second daemon on
-// the same computer.
+// Addresses of the sonars of a configuration: moves them (`--offset N`), so that they do not conflict with those of a second
+// daemon on the same computer, finds conflicts, and decides which receivers of pings clients may request.
 #pragma once
 
 #include "daemon/config/config.hpp"
@@ -17,5 +17,9 @@ Result<void> move_addresses(Config& config, int offset, bool first_too);
 
 /// Error config if two listeners of the configuration need the same port. Call it after applying the command line.
 Result<void> check_ports_apart(const Config& config);
+
+/// True for addresses that clients may request as receivers of a sonar's pings: addresses of single computers, and for broadcast
+/// addresses and multicast groups that the product (`port`, of kind udp_stream) or the configuration (SonarConfig::groups) names.
+bool may_receive(const Ipv4& ip, const protocol::Port& port, const SonarConfig& sonar);
 
 }  // namespace sonar
