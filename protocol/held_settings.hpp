@@ -17,10 +17,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 }
 
 /// The device's findings in a ping; null: none. A make whose device has findings defines this function in its own namespace.
-template <class Settings>
-std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping&) {
-  return nullptr;
-}
+std::shared_ptr<const PingFindings> findings_of(const auto&, const Ping&) { return nullptr; }
 
 /// The findings of type T, as PingFindings.
 template <class T>

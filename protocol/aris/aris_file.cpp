@@ -18,8 +18,7 @@ struct FileHeader {
   std::array<std::uint32_t, 4> reserved2{};
   std::uint32_t serial = 0;
 };
-template <class V, wire::Like<FileHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FileHeader> auto& m) {
   visit("Version", m.version);
   visit("FrameCount", m.frames);
   visit("reserved0", m.reserved0);

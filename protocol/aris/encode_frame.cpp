@@ -22,8 +22,7 @@ std::uint64_t microseconds(std::chrono::nanoseconds t) {
 }
 
 /// Calls `copy(raw index, picture index)` for each sample.
-template <class F>
-void for_each_sample(std::size_t samples, int pings, F copy) {
+void for_each_sample(std::size_t samples, int pings, auto copy) {
   const auto n = static_cast<std::size_t>(pings), beams = n * channels;
   std::size_t raw = 0;
   for (std::size_t ping = 0; ping < n; ++ping)

@@ -67,8 +67,7 @@ struct FrameHeader {
   std::array<float, 3> rotator_velocities{};
   std::uint32_t gps_age = 0, system_variant = 0, compass_revision = 1, reserved = 0;
 };
-template <class V, wire::Like<FrameHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FrameHeader> auto& m) {
   visit("FrameIndex", m.frame_index);
   visit("FrameTime", m.frame_time_us, means::time);
   visit("Version", m.version, means::version);

@@ -24,8 +24,7 @@ enum class Frequency : std::uint32_t { low = 0, high = 1 };
 struct SoftwareVersion {
   std::uint32_t major = 2, minor = 8, build = 8711;
 };
-template <class V, wire::Like<SoftwareVersion> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<SoftwareVersion> auto& m) {
   visit(1, m.major);
   visit(2, m.minor);
   visit(3, m.build);
@@ -33,10 +32,7 @@ void fields(V& visit, M& m) {
 struct Words {
   std::vector<std::string> enabled;
 };
-template <class V, wire::Like<Words> M>
-void fields(V& visit, M& m) {
-  visit(1, m.enabled);
-}
+void fields(auto& visit, wire::Like<Words> auto& m) { visit(1, m.enabled); }
 struct Availability {
   std::uint32_t serial = 0;
   SystemType system{};
@@ -51,8 +47,7 @@ struct Availability {
   std::uint32_t diver_held = 0;
   Words variants;
 };
-template <class V, wire::Like<Availability> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<Availability> auto& m) {
   visit(1, m.serial);
   visit(2, m.system);
   visit(3, m.software);
@@ -90,16 +85,12 @@ enum class CommandType : std::uint32_t {
 struct DateTime {
   std::string text;  // "2014-Jan-31 23:58:15"
 };
-template <class V, wire::Like<DateTime> M>
-void fields(V& visit, M& m) {
-  visit(1, m.text);
-}
+void fields(auto& visit, wire::Like<DateTime> auto& m) { visit(1, m.text); }
 struct Receiver {
   std::uint32_t port = 0;
   std::string ip;  // empty = the controller's own; "0.0.0.0" stops the stream
 };
-template <class V, wire::Like<Receiver> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<Receiver> auto& m) {
   visit(1, m.port);
   visit(2, m.ip);
 }
@@ -107,18 +98,14 @@ struct InterpacketDelay {
   bool enable = false;
   std::uint32_t microseconds = 0;
 };
-template <class V, wire::Like<InterpacketDelay> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<InterpacketDelay> auto& m) {
   visit(1, m.enable);
   visit(2, m.microseconds);
 }
 struct StreamSettings {
   std::optional<InterpacketDelay> delay;
 };
-template <class V, wire::Like<StreamSettings> M>
-void fields(V& visit, M& m) {
-  visit(1, m.delay);
-}
+void fields(auto& visit, wire::Like<StreamSettings> auto& m) { visit(1, m.delay); }
 /// The fields of SET_ACOUSTICS, with times in microseconds as on the wire.
 struct Acoustics {
   std::uint32_t cookie = 0;
@@ -130,8 +117,7 @@ struct Acoustics {
   float gain_db = 0;
   bool operator==(const Acoustics&) const = default;
 };
-template <class V, wire::Like<Acoustics> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<Acoustics> auto& m) {
   visit(1, m.cookie);
   visit(2, m.frame_rate_hz);
   visit(3, m.samples_per_beam);
@@ -149,16 +135,12 @@ void fields(V& visit, M& m) {
 struct Choice {
   std::uint32_t value = 0;
 };
-template <class V, wire::Like<Choice> M>
-void fields(V& visit, M& m) {
-  visit(1, m.value);
-}
+void fields(auto& visit, wire::Like<Choice> auto& m) { visit(1, m.value); }
 struct Focus {
   std::uint32_t position = 0;  // 0 to 1000; only controllers before 2.6 send it
   float range_m = 0;
 };
-template <class V, wire::Like<Focus> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<Focus> auto& m) {
   visit(1, m.position);
   visit(2, m.range_m);
 }
@@ -174,8 +156,7 @@ struct Command {
   std::optional<Focus> focus;
   std::optional<Words> ping;  // empty
 };
-template <class V, wire::Like<Command> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<Command> auto& m) {
   visit(1, m.type);
   visit(2, m.date_time);
   visit(3, m.receiver);
@@ -194,8 +175,7 @@ struct FramePart {
   BytesView data;
   std::int32_t data_offset = 0;
 };
-template <class V, wire::Like<FramePart> M>
-void fields(V& visit, M& m) {
+void fields(auto& visit, wire::Like<FramePart> auto& m) {
   visit(1, m.frame_index);
   visit(2, m.total_size);
   visit(3, m.header);

@@ -145,8 +145,7 @@ bool read(BytesView bytes, M& message) {
   return raw.ok() && fits;
 }
 
-template <class M>
-Bytes bytes_of(const M& message) {
+Bytes bytes_of(const auto& message) {
   Bytes out;
   Writer writer(out);
   fields(writer, message);

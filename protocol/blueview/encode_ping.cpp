@@ -14,8 +14,7 @@ struct PingMessage {
   FrameHeader header;
   PingHead ping;
 };
-template <class V, wire::Like<PingMessage> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PingMessage> auto& m) {
   visit("header", m.header);
   visit("ping", m.ping);
 }

@@ -42,8 +42,7 @@ struct PingHead {
   float depth_m = 0, pitch_deg = 0, roll_deg = 0, heading_deg = 0;
   std::uint32_t raw_length = 0;  // size of the samples, uncompressed
 };
-template <class V, wire::Like<PingHead> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PingHead> auto& m) {
   visit("head", m.head, means::source_id);
   visit("number", m.number, means::ping_id);
   visit("t_utc", m.utc_s, means::time);

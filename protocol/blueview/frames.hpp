@@ -26,8 +26,7 @@ struct FrameHeader {
   std::uint32_t request_id = 0;  // 0 = unsolicited
   std::uint32_t payload_length = 0;
 };
-template <class V, wire::Like<FrameHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FrameHeader> auto& m) {
   visit("magic", m.magic, means::magic);
   visit("type", m.type, means::message_type);
   visit("flags", m.flags);
@@ -45,8 +44,7 @@ using Value = std::variant<std::int32_t, float, std::string, FloatPair>;
 class Put {
  public:
   explicit Put(wire::Bytes& out) : out_(out) {}
-  template <class T>
-  void operator()(std::string_view name, const T& value) const {
+  void operator()(std::string_view name, const auto& value) const {
     wire::Writer write(out_);
     write(name, value);
   }

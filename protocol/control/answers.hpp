@@ -19,14 +19,10 @@ void fill(v1::Quat& out, Quatd q);
 Pose pose_from(const v1::Vec3& position, const v1::Quat& orientation);
 
 /// Fills messages that have a position and an orientation in the world, ENU and FLU, metres.
-template <class Message>
-void set_pose(Message& out, const Pose& in_world) {
+void set_pose(auto& out, const Pose& in_world) {
   fill(*out.mutable_position(), in_world.position_m);
   fill(*out.mutable_orientation(), in_world.orientation);
 }
-template <class Message>
-Pose pose_of(const Message& message) {
-  return pose_from(message.position(), message.orientation());
-}
+Pose pose_of(const auto& message) { return pose_from(message.position(), message.orientation()); }
 
 }  // namespace sonar::control

@@ -35,8 +35,7 @@ Result<Stamp> stamp_from(const v1::Time& time) {
 }
 
 /// Reads frame, position and orientation, which PoseUpdate, ObjectUpdate and Placement have.
-template <class Message>
-Result<RawPose> raw_from(const Message& m) {
+Result<RawPose> raw_from(const auto& m) {
   if (m.frame() != v1::FRAME_UNSPECIFIED && m.frame() != v1::NED_FRD && m.frame() != v1::ENU_FLU)
     return refused("frame has an unknown value");
   if (!m.has_position()) return refused("position is missing");
@@ -50,8 +49,7 @@ Result<RawPose> raw_from(const Message& m) {
 }
 
 /// Reads the fields that PoseUpdate and ObjectUpdate have in common: all but the name and `hidden`.
-template <class Message>
-Result<PoseSample> sample_from(const Message& m, PoseSample sample) {
+Result<PoseSample> sample_from(const auto& m, PoseSample sample) {
   auto raw = raw_from(m);
   if (!raw) return tl::make_unexpected(raw.error());
   const auto stamp = stamp_from(m.time());
@@ -72,8 +70,7 @@ Result<PoseSample> sample_from(const Message& m, PoseSample sample) {
   return checked(std::move(sample), *raw);
 }
 
-template <class Message>
-void fill_common(Message& m, const PoseSample& s) {
+void fill_common(auto& m, const PoseSample& s) {
   const bool ned = s.sent_in == Frame::ned_frd;
   const Pose pose = ned ? enu_flu_from_ned_frd(s.pose) : s.pose;  // the conversion is its own inverse
   m.set_seq(s.seq);

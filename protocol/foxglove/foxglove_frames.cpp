@@ -15,8 +15,7 @@ std::uint64_t ns_of(Time at) { return static_cast<std::uint64_t>(at.time_since_e
 class Frame {
  public:
   explicit Frame(std::uint8_t opcode) { writer_("opcode", opcode); }
-  template <class T>
-  Frame& add(T value) {
+  Frame& add(auto value) {
     writer_("field", value);
     return *this;
   }

@@ -29,8 +29,7 @@ void fill(pb::Timestamp& out, Time at) {
   out.set_seconds(whole.count());
   out.set_nanos(static_cast<std::int32_t>((since - whole).count()));
 }
-template <class Vector>
-void fill(Vector& out, Vec3d v) {
+void fill(auto& out, Vec3d v) {
   out.set_x(v.x);
   out.set_y(v.y);
   out.set_z(v.z);

@@ -30,8 +30,7 @@ struct PacketHead {
   std::array<std::uint32_t, 10> reserved_words{};
   std::uint32_t body_size = 0;  // data header and samples
 };
-template <class V, wire::Like<PacketHead> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PacketHead> auto& m) {
   visit("sync", m.sync, means::magic);
   visit("data_type", m.type, means::message_type);
   visit("reserved", m.reserved);
@@ -43,8 +42,7 @@ struct PacketFoot {
   std::uint32_t body_size = 0;  // as in the head
   std::array<std::uint32_t, 10> reserved_words{};
 };
-template <class V, wire::Like<PacketFoot> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PacketFoot> auto& m) {
   visit("body_size", m.body_size);
   visit("reserved_words", m.reserved_words);
 }
@@ -54,8 +52,7 @@ struct GainLaw {
   std::int16_t a = 20, b = 100;
   float c_db = -16, limit_db = 100;
 };
-template <class V, wire::Like<GainLaw> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<GainLaw> auto& m) {
   visit("a", m.a);
   visit("b", m.b);
   visit("c", m.c_db, means::gain);
@@ -73,8 +70,7 @@ struct DataFront {
   float start_s = 0, length_s = 0;  // sampling window; `start_s` counts from the start of the ping
   std::uint16_t beams = 0, processing = 0;
 };
-template <class V, wire::Like<DataFront> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<DataFront> auto& m) {
   visit("version", m.version, means::version);
   visit("sonar_id", m.sonar_id, means::source_id);
   visit("sonar_info", m.sonar_info, means::device_id);
@@ -93,8 +89,7 @@ constexpr void fields(V& visit, M& m) {
 struct RotatorOffset {
   float a_m = 0, b_m = 0, r_m = 0, angle_deg = 0;
 };
-template <class V, wire::Like<RotatorOffset> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<RotatorOffset> auto& m) {
   visit("a", m.a_m);
   visit("b", m.b_m);
   visit("r", m.r_m);
@@ -134,8 +129,7 @@ struct DataBack {
   float vehicle_altitude_m = 0, conductivity = 0;
   std::array<std::uint8_t, 3796> reserved{};
 };
-template <class V, wire::Like<DataBack> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<DataBack> auto& m) {
   visit("sample_interval", m.sample_interval_s, means::range_resolution);
   visit("image_destination", m.image_destination);
   visit("pulse_type", m.pulse_type);
@@ -204,8 +198,7 @@ struct DataHeader {
   std::array<float, most_beams> beam_deg{};  // the first `beams` elements are valid, in rising order
   DataBack back;
 };
-template <class V, wire::Like<DataHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<DataHeader> auto& m) {
   visit("front", m.front);
   visit("beam_angles", m.beam_deg);
   visit("back", m.back);
@@ -216,8 +209,7 @@ struct PacketFront {
   PacketHead head;
   DataHeader data;
 };
-template <class V, wire::Like<PacketFront> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PacketFront> auto& m) {
   visit("head", m.head);
   visit("data", m.data);
 }

@@ -122,8 +122,7 @@ struct StreamFront {
   PacketHead head;
   DataFront data;
 };
-template <class V, wire::Like<StreamFront> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<StreamFront> auto& m) {
   visit("head", m.head);
   visit("data", m.data);
 }

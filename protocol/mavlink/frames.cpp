@@ -57,8 +57,7 @@ struct Header2 {
   std::uint8_t sequence = 0, system = 0, component = 0;
   std::array<std::uint8_t, 3> id{};
 };
-template <class V, wire::Like<Header2> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Header2> auto& m) {
   visit("magic", m.magic), visit("len", m.payload_size), visit("flags", m.flags), visit("seq", m.sequence);
   visit("sysid", m.system), visit("compid", m.component), visit("msgid", m.id);
 }

@@ -25,8 +25,7 @@ struct Heartbeat {
   std::uint32_t custom_mode = 0;
   std::uint8_t type = 0, autopilot = 0, base_mode = 0, system_status = 0, mavlink_version = 3;
 };
-template <class V, wire::Like<Heartbeat> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Heartbeat> auto& m) {
   visit("custom_mode", m.custom_mode);
   visit("type", m.type), visit("autopilot", m.autopilot), visit("base_mode", m.base_mode);
   visit("system_status", m.system_status), visit("mavlink_version", m.mavlink_version);
@@ -39,8 +38,7 @@ struct SystemTime {
   std::uint64_t unix_us = 0;
   std::uint32_t boot_ms = 0;
 };
-template <class V, wire::Like<SystemTime> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<SystemTime> auto& m) {
   visit("time_unix_usec", m.unix_us), visit("time_boot_ms", m.boot_ms);
 }
 
@@ -52,8 +50,7 @@ struct Attitude {
   float roll_rad = 0, pitch_rad = 0, yaw_rad = 0;
   float roll_radps = 0, pitch_radps = 0, yaw_radps = 0;  // about the body's axes
 };
-template <class V, wire::Like<Attitude> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Attitude> auto& m) {
   visit("time_boot_ms", m.boot_ms);
   visit("roll", m.roll_rad), visit("pitch", m.pitch_rad), visit("yaw", m.yaw_rad);
   visit("rollspeed", m.roll_radps), visit("pitchspeed", m.pitch_radps), visit("yawspeed", m.yaw_radps);
@@ -68,16 +65,12 @@ struct AttitudeQuaternion {
   float roll_radps = 0, pitch_radps = 0, yaw_radps = 0;
   std::array<float, 4> offset{};  // rotation with which the autopilot shows attitude; the attitude itself does not include it
 };
-template <class V, wire::Like<AttitudeQuaternion> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<AttitudeQuaternion> auto& m) {
   visit("time_boot_ms", m.boot_ms);
   visit("q1", m.w), visit("q2", m.x), visit("q3", m.y), visit("q4", m.z);
   visit("rollspeed", m.roll_radps), visit("pitchspeed", m.pitch_radps), visit("yawspeed", m.yaw_radps);
 }
-template <class V, wire::Like<AttitudeQuaternion> M>
-constexpr void extensions(V& visit, M& m) {
-  visit("repr_offset_q", m.offset);
-}
+constexpr void extensions(auto& visit, wire::Like<AttitudeQuaternion> auto& m) { visit("repr_offset_q", m.offset); }
 
 struct LocalPositionNed {
   static constexpr std::uint32_t id = 32;
@@ -86,8 +79,7 @@ struct LocalPositionNed {
   std::uint32_t boot_ms = 0;
   float north_m = 0, east_m = 0, down_m = 0, north_mps = 0, east_mps = 0, down_mps = 0;
 };
-template <class V, wire::Like<LocalPositionNed> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<LocalPositionNed> auto& m) {
   visit("time_boot_ms", m.boot_ms);
   visit("x", m.north_m), visit("y", m.east_m), visit("z", m.down_m);
   visit("vx", m.north_mps), visit("vy", m.east_mps), visit("vz", m.down_mps);
@@ -102,8 +94,7 @@ struct GlobalPositionInt {
   std::int16_t north_cmps = 0, east_cmps = 0, down_cmps = 0;
   std::uint16_t heading_cdeg = 0;
 };
-template <class V, wire::Like<GlobalPositionInt> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<GlobalPositionInt> auto& m) {
   visit("time_boot_ms", m.boot_ms);
   visit("lat", m.latitude_e7_deg), visit("lon", m.longitude_e7_deg);
   visit("alt", m.altitude_mm), visit("relative_alt", m.height_mm);
@@ -118,14 +109,10 @@ struct GpsGlobalOrigin {
   std::int32_t latitude_e7_deg = 0, longitude_e7_deg = 0, altitude_mm = 0;
   std::uint64_t time_us = 0;
 };
-template <class V, wire::Like<GpsGlobalOrigin> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<GpsGlobalOrigin> auto& m) {
   visit("latitude", m.latitude_e7_deg), visit("longitude", m.longitude_e7_deg), visit("altitude", m.altitude_mm);
 }
-template <class V, wire::Like<GpsGlobalOrigin> M>
-constexpr void extensions(V& visit, M& m) {
-  visit("time_usec", m.time_us);
-}
+constexpr void extensions(auto& visit, wire::Like<GpsGlobalOrigin> auto& m) { visit("time_usec", m.time_us); }
 
 /// Values for a pilot's display.
 struct VfrHud {
@@ -136,8 +123,7 @@ struct VfrHud {
   std::int16_t heading_deg = 0;
   std::uint16_t throttle_percent = 0;
 };
-template <class V, wire::Like<VfrHud> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<VfrHud> auto& m) {
   visit("airspeed", m.airspeed_mps), visit("groundspeed", m.groundspeed_mps), visit("alt", m.altitude_m);
   visit("climb", m.climb_mps), visit("heading", m.heading_deg), visit("throttle", m.throttle_percent);
 }
@@ -153,8 +139,7 @@ struct CommandLong {
   std::uint16_t command = 0;
   std::uint8_t target_system = 0, target_component = 0, confirmation = 0;
 };
-template <class V, wire::Like<CommandLong> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<CommandLong> auto& m) {
   visit("param1", m.param1), visit("param2", m.param2), visit("param3", m.param3), visit("param4", m.param4);
   visit("param5", m.param5), visit("param6", m.param6), visit("param7", m.param7);
   visit("command", m.command), visit("target_system", m.target_system);
@@ -175,12 +160,8 @@ struct CommandAck {
   std::int32_t result_param2 = 0;
   std::uint8_t target_system = 0, target_component = 0;  // ids of the sender of the command
 };
-template <class V, wire::Like<CommandAck> M>
-constexpr void fields(V& visit, M& m) {
-  visit("command", m.command), visit("result", m.result);
-}
-template <class V, wire::Like<CommandAck> M>
-constexpr void extensions(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<CommandAck> auto& m) { visit("command", m.command), visit("result", m.result); }
+constexpr void extensions(auto& visit, wire::Like<CommandAck> auto& m) {
   visit("progress", m.progress), visit("result_param2", m.result_param2);
   visit("target_system", m.target_system), visit("target_component", m.target_component);
 }
@@ -199,14 +180,12 @@ struct DistanceSensor {
   std::array<float, 4> wxyz{};      // for orientation 100 only, else zeros
   std::uint8_t signal_percent = 0;  // 0 = unknown, 1 = no valid signal
 };
-template <class V, wire::Like<DistanceSensor> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<DistanceSensor> auto& m) {
   visit("time_boot_ms", m.boot_ms);
   visit("min_distance", m.min_cm), visit("max_distance", m.max_cm), visit("current_distance", m.current_cm);
   visit("type", m.type), visit("id", m.sensor), visit("orientation", m.orientation), visit("covariance", m.covariance_cm2);
 }
-template <class V, wire::Like<DistanceSensor> M>
-constexpr void extensions(V& visit, M& m) {
+constexpr void extensions(auto& visit, wire::Like<DistanceSensor> auto& m) {
   visit("horizontal_fov", m.horizontal_fov_rad), visit("vertical_fov", m.vertical_fov_rad);
   visit("quaternion", m.wxyz), visit("signal_quality", m.signal_percent);
 }
@@ -220,14 +199,12 @@ struct VisionPositionEstimate {
   std::array<float, 21> covariance{};
   std::uint8_t reset_counter = 0;
 };
-template <class V, wire::Like<VisionPositionEstimate> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<VisionPositionEstimate> auto& m) {
   visit("usec", m.time_us);
   visit("x", m.north_m), visit("y", m.east_m), visit("z", m.down_m);
   visit("roll", m.roll_rad), visit("pitch", m.pitch_rad), visit("yaw", m.yaw_rad);
 }
-template <class V, wire::Like<VisionPositionEstimate> M>
-constexpr void extensions(V& visit, M& m) {
+constexpr void extensions(auto& visit, wire::Like<VisionPositionEstimate> auto& m) {
   visit("covariance", m.covariance), visit("reset_counter", m.reset_counter);
 }
 
@@ -245,8 +222,7 @@ struct SimState {
   float north_mps = 0, east_mps = 0, down_mps = 0;
   std::int32_t latitude_e7_deg = 0, longitude_e7_deg = 0;
 };
-template <class V, wire::Like<SimState> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<SimState> auto& m) {
   visit("q1", m.w), visit("q2", m.x), visit("q3", m.y), visit("q4", m.z);
   visit("roll", m.roll_rad), visit("pitch", m.pitch_rad), visit("yaw", m.yaw_rad);
   visit("xacc", m.acceleration_x), visit("yacc", m.acceleration_y), visit("zacc", m.acceleration_z);
@@ -255,8 +231,7 @@ constexpr void fields(V& visit, M& m) {
   visit("std_dev_horz", m.std_dev_horizontal), visit("std_dev_vert", m.std_dev_vertical);
   visit("vn", m.north_mps), visit("ve", m.east_mps), visit("vd", m.down_mps);
 }
-template <class V, wire::Like<SimState> M>
-constexpr void extensions(V& visit, M& m) {
+constexpr void extensions(auto& visit, wire::Like<SimState> auto& m) {
   visit("lat_int", m.latitude_e7_deg), visit("lon_int", m.longitude_e7_deg);
 }
 
@@ -269,15 +244,11 @@ struct AttPosMocap {
   float north_m = 0, east_m = 0, down_m = 0;
   std::array<float, 21> covariance{};
 };
-template <class V, wire::Like<AttPosMocap> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<AttPosMocap> auto& m) {
   visit("time_usec", m.time_us), visit("q", m.wxyz);
   visit("x", m.north_m), visit("y", m.east_m), visit("z", m.down_m);
 }
-template <class V, wire::Like<AttPosMocap> M>
-constexpr void extensions(V& visit, M& m) {
-  visit("covariance", m.covariance);
-}
+constexpr void extensions(auto& visit, wire::Like<AttPosMocap> auto& m) { visit("covariance", m.covariance); }
 
 struct Odometry {
   static constexpr std::uint32_t id = 331;
@@ -292,8 +263,7 @@ struct Odometry {
   std::uint8_t reset_counter = 0, estimator_type = 0;
   std::int8_t quality = 0;
 };
-template <class V, wire::Like<Odometry> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Odometry> auto& m) {
   visit("time_usec", m.time_us);
   visit("x", m.x_m), visit("y", m.y_m), visit("z", m.z_m), visit("q", m.wxyz);
   visit("vx", m.vx_mps), visit("vy", m.vy_mps), visit("vz", m.vz_mps);
@@ -301,8 +271,7 @@ constexpr void fields(V& visit, M& m) {
   visit("pose_covariance", m.pose_covariance), visit("velocity_covariance", m.velocity_covariance);
   visit("frame_id", m.frame_id), visit("child_frame_id", m.child_frame_id);
 }
-template <class V, wire::Like<Odometry> M>
-constexpr void extensions(V& visit, M& m) {
+constexpr void extensions(auto& visit, wire::Like<Odometry> auto& m) {
   visit("reset_counter", m.reset_counter), visit("estimator_type", m.estimator_type), visit("quality", m.quality);
 }
 

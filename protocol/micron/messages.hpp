@@ -47,8 +47,7 @@ struct Header {
   std::uint8_t sequence = 0x80;  // the last piece
   std::uint8_t node = 0;
 };
-template <class V, wire::Like<Header> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Header> auto& m) {
   visit("start", m.start, means::magic);
   visit("hex_length", m.hex_length);
   visit("length", m.length, means::payload_size);
@@ -86,8 +85,7 @@ struct HeadCommand {
   std::uint16_t scan_z = 0;
   bool operator==(const HeadCommand&) const = default;
 };
-template <class V, wire::Like<HeadCommand> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<HeadCommand> auto& m) {
   visit("v3b", m.kind);
   visit("hd_ctrl", m.control);
   visit("hd_type", m.device_type);
@@ -128,8 +126,7 @@ struct HeadData {
   std::uint8_t step = 0;
   std::uint16_t bearing = 0, size = 0;
 };
-template <class V, wire::Like<HeadData> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<HeadData> auto& m) {
   visit("total", m.total, means::message_size);
   visit("device_type", m.device_type, means::device_id);
   visit("head_status", m.head_status, means::device_status);
@@ -157,8 +154,7 @@ struct Alive {
   std::uint16_t bearing = 0;
   std::uint8_t head_info = 0;
 };
-template <class V, wire::Like<Alive> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Alive> auto& m) {
   visit("state", m.lacks_parameters);
   visit("time", m.time_ms);
   visit("motor_position", m.bearing);
@@ -177,8 +173,7 @@ struct VersionData {
   std::uint16_t program_sum = 0;
   std::uint8_t node = usual_node;
 };
-template <class V, wire::Like<VersionData> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<VersionData> auto& m) {
   visit("software_version", m.software);
   visit("info_bits", m.info);
   visit("serial_number", m.serial);

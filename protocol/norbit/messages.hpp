@@ -28,8 +28,7 @@ struct Header {
   std::uint32_t version = norbit::version, reserved = 0;
   std::uint32_t crc = 0;  // checksum of everything after the header
 };
-template <class V, wire::Like<Header> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Header> auto& m) {
   visit("preamble", m.start, means::magic);
   visit("type", m.type, means::message_type);
   visit("size", m.size, means::message_size);
@@ -52,8 +51,7 @@ struct BathymetryFront {
   float tilt_rad = 0, gain = 1, frequency_hz = 0, bandwidth_hz = 0, pulse_s = 0, reserved_2 = 0, voltage = not_measured,
         swath_middle_rad = 0, swath_rad = 0, gate_tilt_rad = 0;
 };
-template <class V, wire::Like<BathymetryFront> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<BathymetryFront> auto& m) {
   visit("snd_velocity", m.sound_mps, means::sound_speed);
   visit("sample_rate", m.sample_hz, means::range_resolution);
   visit("N", m.beams, means::beams);
@@ -89,8 +87,7 @@ struct Beam {
   std::uint16_t flags = 0;
   std::uint8_t quality_flag = 0, quality_value = 0;
 };
-template <class V, wire::Like<Beam> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Beam> auto& m) {
   visit("sample_number", m.sample);
   visit("angle", m.angle_rad);
   visit("upper_gate", m.upper_gate);
@@ -128,8 +125,7 @@ struct ColumnFront {
   float gate_tilt_rad = 0, reserved_6 = 0;
   std::array<std::uint8_t, 28> reserved_7{};
 };
-template <class V, wire::Like<ColumnFront> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<ColumnFront> auto& m) {
   visit("snd_velocity", m.sound_mps, means::sound_speed);
   visit("sample_rate", m.sample_hz, means::range_resolution);
   visit("N", m.beams, means::beams);

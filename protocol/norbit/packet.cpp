@@ -18,8 +18,7 @@ constexpr std::size_t longest_packet = 24 + 168 + (1u << 20) + 4 * 512;
 constexpr double most_pixel = 32767;
 
 /// A whole packet: the header, `front`, and the bytes after it.
-template <class Front>
-Bytes sealed(Type type, const Front& front, const Bytes& rest) {
+Bytes sealed(Type type, const auto& front, const Bytes& rest) {
   Bytes body = wire::bytes_of(front);
   body.insert(body.end(), rest.begin(), rest.end());
   Header header;

@@ -20,8 +20,7 @@ std::string number(std::uint64_t value) { return std::to_string(value); }
 /// Collects a sentence for each condition that a message violates.
 class Check {
  public:
-  template <class A, class B>
-  void equal(const char* what, A value, const char* with, B expected) {
+  void equal(const char* what, auto value, const char* with, auto expected) {
     if (static_cast<std::uint64_t>(value) != static_cast<std::uint64_t>(expected))
       add(std::string(what) + " is " + number(static_cast<std::uint64_t>(value)) + " but " + with + " is " +
           number(static_cast<std::uint64_t>(expected)));

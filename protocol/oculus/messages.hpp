@@ -43,8 +43,7 @@ struct MessageHeader {
   std::uint32_t payload_size = 0;  // unreliable in messages of clients, which often send 0
   std::uint16_t part_number = 0;   // 0 except in the status message
 };
-template <class V, wire::Like<MessageHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<MessageHeader> auto& m) {
   visit("oculusId", m.oculus_id, means::magic);
   visit("srcDeviceId", m.source, means::source_id);
   visit("dstDeviceId", m.destination, means::destination_id);
@@ -66,8 +65,7 @@ struct FireSettings {
   double sound_speed_mps = 0;  // 0: the device computes it
   double salinity_ppt = 0;
 };
-template <class V, wire::Like<FireSettings> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FireSettings> auto& m) {
   visit("masterMode", m.mode);
   visit("pingRate", m.ping_rate, means::ping_rate);
   visit("networkSpeed", m.network_speed);
@@ -86,8 +84,7 @@ struct FireExtension {
   std::uint32_t beacon_locator_frequency = 0;
   std::array<std::uint32_t, 5> reserved1{};
 };
-template <class V, wire::Like<FireExtension> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FireExtension> auto& m) {
   visit("extFlags", m.flags);
   visit("reserved0", m.reserved0);
   visit("beaconLocatorFrequency", m.beacon_locator_frequency);
@@ -98,8 +95,7 @@ struct FireMessageV1 {  // versions 0 and 1
   MessageHeader header;
   FireSettings fire;
 };
-template <class V, wire::Like<FireMessageV1> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FireMessageV1> auto& m) {
   visit("header", m.header);
   visit("fire", m.fire);
 }
@@ -109,8 +105,7 @@ struct FireMessageV2 {
   FireSettings fire;
   FireExtension extension;
 };
-template <class V, wire::Like<FireMessageV2> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FireMessageV2> auto& m) {
   visit("header", m.header);
   visit("fire", m.fire);
   visit("extension", m.extension);
@@ -128,8 +123,7 @@ struct StatusMessage {
   std::array<double, 8> temperature_c{};
   double pressure_bar = 0;
 };
-template <class V, wire::Like<StatusMessage> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<StatusMessage> auto& m) {
   visit("header", m.header);
   visit("deviceId", m.device_id, means::device_id);
   visit("deviceType", m.device_type);
@@ -153,8 +147,7 @@ constexpr void fields(V& visit, M& m) {
 struct ImageSizes {
   std::uint32_t image_offset = 0, image_size = 0, message_size = 0;
 };
-template <class V, wire::Like<ImageSizes> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<ImageSizes> auto& m) {
   visit("imageOffset", m.image_offset, means::image_offset);
   visit("imageSize", m.image_size, means::image_size);
   visit("messageSize", m.message_size, means::message_size);
@@ -172,8 +165,7 @@ struct PingResultV1 {
   std::uint16_t row_count = 0, beam_count = 0;
   ImageSizes sizes;
 };
-template <class V, wire::Like<PingResultV1> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PingResultV1> auto& m) {
   visit("header", m.header);
   visit("fire", m.fire);
   visit("pingId", m.ping_id, means::ping_id);
@@ -205,8 +197,7 @@ struct PingResultV2 {
   std::array<std::uint32_t, 4> spare{};
   ImageSizes sizes;
 };
-template <class V, wire::Like<PingResultV2> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PingResultV2> auto& m) {
   visit("header", m.header);
   visit("fire", m.fire);
   visit("extension", m.extension);
@@ -234,8 +225,7 @@ struct UserConfigMessage {
   MessageHeader header;
   std::uint32_t ip_address = 0, ip_mask = 0, dhcp_enable = 0;
 };
-template <class V, wire::Like<UserConfigMessage> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<UserConfigMessage> auto& m) {
   visit("header", m.header);
   visit("ipAddr", m.ip_address);
   visit("ipMask", m.ip_mask);
@@ -246,10 +236,7 @@ constexpr void fields(V& visit, M& m) {
 struct DummyMessage {
   MessageHeader header;
 };
-template <class V, wire::Like<DummyMessage> M>
-constexpr void fields(V& visit, M& m) {
-  visit("header", m.header);
-}
+constexpr void fields(auto& visit, wire::Like<DummyMessage> auto& m) { visit("header", m.header); }
 
 static_assert(wire::wire_size<MessageHeader>() == 16);
 static_assert(wire::wire_size<FireMessageV1>() == 53);

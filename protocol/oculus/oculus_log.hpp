@@ -18,8 +18,7 @@ struct OculusLogHeader {
   std::int64_t key = 0;
   double created_unix_s = 0;
 };
-template <class V, wire::Like<OculusLogHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<OculusLogHeader> auto& m) {
   visit("fileHeader", m.magic);
   visit("sizeHeader", m.size);
   visit("source", m.source);
@@ -39,8 +38,7 @@ struct OculusLogItem {
   std::uint16_t compression = 0, pad1 = 0;  // 1 = zlib behind a 4-byte big-endian length
   std::uint32_t original_size = 0, payload_size = 0, pad2 = 0;
 };
-template <class V, wire::Like<OculusLogItem> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<OculusLogItem> auto& m) {
   visit("itemHeader", m.magic);
   visit("sizeHeader", m.size);
   visit("type", m.type);
@@ -58,8 +56,7 @@ constexpr void fields(V& visit, M& m) {
 struct OculusLogTime {
   std::uint64_t seconds = 0, nanoseconds = 0;  // since 1970
 };
-template <class V, wire::Like<OculusLogTime> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<OculusLogTime> auto& m) {
   visit("seconds", m.seconds);
   visit("nanoseconds", m.nanoseconds);
 }

@@ -86,8 +86,7 @@ struct Header {
   Id id{};
   std::uint8_t source = 0, destination = 0;
 };
-template <class V, wire::Like<Header> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Header> auto& m) {
   visit("start", m.start, means::magic);
   visit("payload_length", m.length, means::payload_size);
   visit("message_id", m.id, means::message_type);
@@ -155,8 +154,7 @@ bool holds_frame(BytesView datagram);
 struct DeviceInformation {
   std::uint8_t type = 0, revision = 0, major = 0, minor = 0, patch = 0, reserved = 0;
 };
-template <class V, wire::Like<DeviceInformation> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<DeviceInformation> auto& m) {
   visit("device_type", m.type);
   visit("device_revision", m.revision);
   visit("firmware_version_major", m.major);
@@ -168,8 +166,7 @@ constexpr void fields(V& visit, M& m) {
 struct ProtocolVersion {
   std::uint8_t major = 1, minor = 0, patch = 0, reserved = 0;
 };
-template <class V, wire::Like<ProtocolVersion> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<ProtocolVersion> auto& m) {
   visit("version_major", m.major);
   visit("version_minor", m.minor);
   visit("version_patch", m.patch);
@@ -188,8 +185,7 @@ struct Transducer {
   std::uint8_t transmit = 0, reserved = 0;
   bool operator==(const Transducer&) const = default;
 };
-template <class V, wire::Like<Transducer> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Transducer> auto& m) {
   visit("mode", m.mode);
   visit("gain_setting", m.gain);
   visit("angle", m.angle);
@@ -206,8 +202,7 @@ struct DeviceData {
   std::uint8_t mode = 1, gain = 0;
   std::uint16_t angle = 0, transmit_us = 0, period = 0, khz = 0, samples = 0, count = 0;
 };
-template <class V, wire::Like<DeviceData> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<DeviceData> auto& m) {
   visit("mode", m.mode);
   visit("gain_setting", m.gain, means::gain);
   visit("angle", m.angle, means::heading);
@@ -223,8 +218,7 @@ struct AutoTransmit {
   std::uint16_t transmit_us = 0, period = 0, khz = 0, samples = 0, start = 0, stop = 399;
   std::uint8_t steps = 1, delay_ms = 0;
 };
-template <class V, wire::Like<AutoTransmit> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<AutoTransmit> auto& m) {
   visit("mode", m.mode);
   visit("gain_setting", m.gain);
   visit("transmit_duration", m.transmit_us);
@@ -244,8 +238,7 @@ struct AutoDeviceData {
   std::uint8_t steps = 0, delay_ms = 0;
   std::uint16_t samples = 0, count = 0;
 };
-template <class V, wire::Like<AutoDeviceData> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<AutoDeviceData> auto& m) {
   visit("mode", m.mode);
   visit("gain_setting", m.gain, means::gain);
   visit("angle", m.angle, means::heading);
@@ -273,8 +266,7 @@ struct PingParameters {
   float pulse_steps = 1.5f;
   bool operator==(const PingParameters&) const = default;
 };
-template <class V, wire::Like<PingParameters> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PingParameters> auto& m) {
   visit("start_mm", m.start_mm);
   visit("end_mm", m.end_mm);
   visit("sos_mps", m.speed_mps);
@@ -303,8 +295,7 @@ struct AtofPointData {
   std::uint32_t flags = 0;
   std::uint16_t points = 0, reserved = 0;
 };
-template <class V, wire::Like<AtofPointData> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<AtofPointData> auto& m) {
   visit("pwr_up_msec", m.power_up_ms);
   visit("utc_msec", m.utc_ms, means::time);
   visit("listening_sec", m.listening_s);
@@ -320,8 +311,7 @@ struct AtofPoint {
   float angle_rad = 0, two_way_s = 0;  // from straight down, positive to port
   std::array<std::uint32_t, 2> reserved{};
 };
-template <class V, wire::Like<AtofPoint> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<AtofPoint> auto& m) {
   visit("angle", m.angle_rad);
   visit("tof", m.two_way_s);
   visit("reserved", m.reserved);
@@ -336,8 +326,7 @@ struct YzPointData {
   float temperature_c = -1000, pressure_bar = -1000, heave_m = 0, start_m = 0, end_m = 0;
   std::uint16_t reserved2 = 0, points = 0;
 };
-template <class V, wire::Like<YzPointData> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<YzPointData> auto& m) {
   visit("timestamp_msec", m.power_up_ms);
   visit("ping_number", m.ping);
   visit("sos_mps", m.speed_mps);
@@ -358,8 +347,7 @@ struct AttitudeReport {
   std::uint64_t utc_ms = 0;
   std::uint32_t power_up_ms = 0;
 };
-template <class V, wire::Like<AttitudeReport> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<AttitudeReport> auto& m) {
   visit("up_vec", m.up);
   visit("reserved", m.reserved);
   visit("utc_msec", m.utc_ms);
@@ -369,8 +357,7 @@ constexpr void fields(V& visit, M& m) {
 struct WaterStats {
   float temperature_c = 0, pressure_bar = 0;
 };
-template <class V, wire::Like<WaterStats> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<WaterStats> auto& m) {
   visit("temp_C", m.temperature_c);
   visit("pressure_bar", m.pressure_bar);
 }
@@ -379,8 +366,7 @@ struct UtcResponse {
   std::uint64_t utc_ms = 0;
   std::uint32_t accuracy_ms = 0;
 };
-template <class V, wire::Like<UtcResponse> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<UtcResponse> auto& m) {
   visit("utc_msec", m.utc_ms);
   visit("accuracy_msec", m.accuracy_ms);
 }
@@ -388,8 +374,7 @@ constexpr void fields(V& visit, M& m) {
 struct NetInfo {
   std::uint32_t ntp_ip = 0, netmask = 0, gateway = 0;  // first octet in the lowest byte
 };
-template <class V, wire::Like<NetInfo> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<NetInfo> auto& m) {
   visit("ntp_ip_address", m.ntp_ip);
   visit("subnet_mask", m.netmask);
   visit("gateway_ip", m.gateway);

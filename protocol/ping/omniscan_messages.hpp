@@ -14,8 +14,7 @@ struct OsPingParams {
   std::uint8_t enable = 0, reserved1 = 0;  // newer definitions add two bytes without meaning
   bool operator==(const OsPingParams&) const = default;
 };
-template <class V, wire::Like<OsPingParams> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<OsPingParams> auto& m) {
   visit("start_mm", m.start_mm);
   visit("length_mm", m.length_mm);
   visit("msec_per_ping", m.period_ms);
@@ -35,8 +34,7 @@ struct OsMonoProfile {
   std::uint8_t channel = 0, reserved = 0;
   float pulse_s = 0, analog_gain = 0, highest_db = 0, lowest_db = 0, transducer_heading_deg = 0, vehicle_heading_deg = 0;
 };
-template <class V, wire::Like<OsMonoProfile> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<OsMonoProfile> auto& m) {
   visit("ping_number", m.ping, means::ping_id);
   visit("start_mm", m.start_mm);
   visit("length_mm", m.length_mm, means::range);
@@ -58,9 +56,6 @@ constexpr void fields(V& visit, M& m) {
 struct SoundSpeed {
   std::uint32_t mm_per_s = 1500000;
 };
-template <class V, wire::Like<SoundSpeed> M>
-constexpr void fields(V& visit, M& m) {
-  visit("speed_of_sound", m.mm_per_s);
-}
+constexpr void fields(auto& visit, wire::Like<SoundSpeed> auto& m) { visit("speed_of_sound", m.mm_per_s); }
 
 }  // namespace sonar::ping

@@ -9,8 +9,7 @@ namespace sonar::ping {
 struct ScanRange {
   std::uint32_t start_mm = 0, length_mm = 0;
 };
-template <class V, wire::Like<ScanRange> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<ScanRange> auto& m) {
   visit("scan_start", m.start_mm);
   visit("scan_length", m.length_mm);
 }
@@ -19,8 +18,7 @@ struct FirmwareVersion {
   std::uint8_t type = 1, model = 1;
   std::uint16_t major = 0, minor = 0;
 };
-template <class V, wire::Like<FirmwareVersion> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<FirmwareVersion> auto& m) {
   visit("device_type", m.type);
   visit("device_model", m.model);
   visit("firmware_version_major", m.major);
@@ -31,8 +29,7 @@ struct GeneralInfo {
   std::uint16_t major = 0, minor = 0, voltage_mv = 0, interval_ms = 0;
   std::uint8_t gain = 0, mode_auto = 0;
 };
-template <class V, wire::Like<GeneralInfo> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<GeneralInfo> auto& m) {
   visit("firmware_version_major", m.major);
   visit("firmware_version_minor", m.minor);
   visit("voltage_5", m.voltage_mv);
@@ -45,8 +42,7 @@ struct DistanceSimple {
   std::uint32_t distance_mm = 0;
   std::uint8_t confidence = 0;
 };
-template <class V, wire::Like<DistanceSimple> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<DistanceSimple> auto& m) {
   visit("distance", m.distance_mm);
   visit("confidence", m.confidence);
 }
@@ -56,8 +52,7 @@ struct Distance {
   std::uint16_t confidence = 0, transmit_us = 0;
   std::uint32_t ping = 0, start_mm = 0, length_mm = 0, gain = 0;
 };
-template <class V, wire::Like<Distance> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Distance> auto& m) {
   visit("distance", m.distance_mm);
   visit("confidence", m.confidence);
   visit("transmit_duration", m.transmit_us);

@@ -14,8 +14,7 @@ struct SetPingParams {
   std::uint8_t chirp = 0, decimation = 0;
   bool operator==(const SetPingParams&) const = default;
 };
-template <class V, wire::Like<SetPingParams> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<SetPingParams> auto& m) {
   visit("start_mm", m.start_mm);
   visit("length_mm", m.length_mm);
   visit("gain_index", m.gain);
@@ -33,8 +32,7 @@ struct Distance2 {
   std::uint8_t ping_confidence = 0, averaged_confidence = 0;
   std::uint32_t power_up_ms = 0;
 };
-template <class V, wire::Like<Distance2> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Distance2> auto& m) {
   visit("ping_distance_mm", m.ping_mm);
   visit("averaged_distance_mm", m.averaged_mm);
   visit("reserved", m.reserved);
@@ -50,8 +48,7 @@ struct Profile6 {
   std::uint8_t confidence = 0, gain = 0, decimation = 0, smooth_confidence = 0;
   std::uint16_t results = 0;
 };
-template <class V, wire::Like<Profile6> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Profile6> auto& m) {
   visit("ping_number", m.ping, means::ping_id);
   visit("start_mm", m.start_mm);
   visit("length_mm", m.length_mm, means::range);

@@ -64,8 +64,7 @@ class JunkReport {
   explicit JunkReport(const Framing* framing) : framing_(framing) {}
 
   /// Takes the next messages, or bytes between messages. `place` returns "byte 17", the place of these bytes.
-  template <class Place>
-  void take(wire::BytesView bytes, const Place& place, Damages& damages) {
+  void take(wire::BytesView bytes, const auto& place, Damages& damages) {
     if (framing_ == nullptr) return;
     const std::size_t whole = whole_messages(bytes);
     if (whole > 0) end(damages);

@@ -25,8 +25,7 @@ struct Header {
   std::uint8_t version = 1;
   std::uint32_t payload = 0;
 };
-template <class V, wire::Like<Header> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Header> auto& m) {
   visit("magic", m.magic, means::magic);
   visit("kind", m.kind, means::message_type);
   visit("version", m.version, means::version);
@@ -40,8 +39,7 @@ struct Settings {
   std::uint8_t gain_percent = 50;
   bool operator==(const Settings&) const = default;
 };
-template <class V, wire::Like<Settings> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<Settings> auto& m) {
   visit("range_mm", m.range_mm);
   visit("rate_centihz", m.rate_centihz);
   visit("gain_percent", m.gain_percent);
@@ -56,8 +54,7 @@ struct PingHead {
   float frequency_hz = 0;
   std::uint8_t gain_percent = 0;
 };
-template <class V, wire::Like<PingHead> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PingHead> auto& m) {
   visit("number", m.number, means::ping_id);
   visit("fired_us", m.fired_us, means::time);
   visit("range_mm", m.range_mm, means::range);
@@ -73,8 +70,7 @@ struct PingMessage {
   Header header;
   PingHead head;
 };
-template <class V, wire::Like<PingMessage> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PingMessage> auto& m) {
   visit("header", m.header);
   visit("head", m.head);
 }

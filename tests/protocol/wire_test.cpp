@@ -25,13 +25,11 @@ struct Outer {
   double level = 0;
   float share = 0;
 };
-template <class V, sonar::wire::Like<Inner> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, sonar::wire::Like<Inner> auto& m) {
   visit("left", m.left);
   visit("octets", m.octets, Meaning::octets);
 }
-template <class V, sonar::wire::Like<Outer> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, sonar::wire::Like<Outer> auto& m) {
   visit("colour", m.colour, Meaning::colour);
   visit("pair", m.pair);
   visit("level", m.level);
@@ -67,8 +65,7 @@ struct Envelope {
   std::array<std::uint32_t, 2> words{};
   std::uint8_t low = 0, high = 0;
 };
-template <class V, sonar::wire::Like<Envelope> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, sonar::wire::Like<Envelope> auto& m) {
   visit("first", m.first);
   visit("second", m.second);
   visit("words", m.words, Meaning::words);

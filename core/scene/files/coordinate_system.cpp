@@ -100,8 +100,7 @@ constexpr auto systems_of_meridians =
                              {4816, 8903}, {4817, 8913}, {4818, 8909}, {4819, 8903}, {4820, 8908}, {4821, 8903}, {4901, 8914},
                              {4902, 8914}, {4903, 8905}, {4904, 8902}, {5229, 8909}, {8042, 8909}, {8043, 8909}});
 
-template <class Rows>
-const auto* row_of(const Rows& rows, std::uint32_t code) {
+const auto* row_of(const auto& rows, std::uint32_t code) {
   const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return code >= r.first && code <= r.last; });
   return row == rows.end() ? nullptr : &*row;
 }

@@ -25,8 +25,7 @@ class ShapeCache {
   static constexpr std::size_t most_triangles = 1'000'000, always_kept = 64;
 
   /// Returns the shape of this key. Calls make() if the cache does not have it. A shape without a mesh is not cached.
-  template <class Make>
-  Shape shape(const std::string& key, const Make& make) {
+  Shape shape(const std::string& key, const auto& make) {
     Kept& kept = shapes_[key];
     if (!kept.shape.mesh) {
       kept.shape = make();

@@ -35,10 +35,7 @@ struct ShapeReader {
 
  private:
   /// Returns a shape of an earlier scene, or makes a new one.
-  template <class Make>
-  Shape known_or(const std::string& key, const Make& make) const {
-    return cache != nullptr ? cache->shape(key, make) : make();
-  }
+  Shape known_or(const std::string& key, const auto& make) const { return cache != nullptr ? cache->shape(key, make) : make(); }
   Shape read_primitive(std::string_view type, text::Map& keys);
   Shape read_ground(std::string_view type, text::Map& keys);
   Shape read_mesh_file(text::Map& keys);

@@ -122,8 +122,7 @@ class Geometries {
   }
 
  private:
-  template <class Take>
-  static void each_word(std::string_view text, const Take& take) {
+  static void each_word(std::string_view text, const auto& take) {
     for (std::size_t at = text.find_first_not_of(blanks); at != none; at = text.find_first_not_of(blanks, at)) {
       const std::size_t end = std::min(text.find_first_of(blanks, at), text.size());
       take(text.substr(at, end - at));

@@ -20,8 +20,7 @@ int fine_steps(double fine_half_m, double spacing_m) {
   return static_cast<int>(std::clamp(std::ceil(fine_half_m / spacing_m - 1e-9), 1.0, 1e9));
 }
 // Calls each(distance) for rows outside the fine part, between `from_m` and `half_m`.
-template <class Each>
-void widen(double from_m, double half_m, double spacing_m, Each&& each) {
+void widen(double from_m, double half_m, double spacing_m, auto&& each) {
   double step = spacing_m;
   while (from_m < half_m - 1e-9) {
     step = std::max(spacing_m, std::min(step * widening, widest_m));

@@ -167,8 +167,7 @@ class Export {
   }
 
   /// Writes one line per picture, in the format that the image folder loader of Hugging Face reads.
-  template <class IsIn>
-  Result<void> write_metadata(std::size_t split, const IsIn& is_in) {
+  Result<void> write_metadata(std::size_t split, const auto& is_in) {
     auto file = DurableFile::open(folder_of(split) / "metadata.jsonl");
     if (!file) return tl::make_unexpected(file.error());
     for (std::uint64_t shard = 0; shard < job_.shards(); ++shard) {

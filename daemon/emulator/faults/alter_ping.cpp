@@ -28,15 +28,13 @@ class Image {
     const std::size_t at = (row * beams_ + beam) * width_;
     for (std::size_t i = 0; i < width_; ++i) ping_.samples[at + i] = static_cast<std::byte>(code >> (8 * i));
   }
-  template <class Code>
-  void fill(Code code) {
+  void fill(auto code) {
     for (std::size_t row = 0; row < rows_; ++row)
       for (std::size_t beam = 0; beam < beams_; ++beam) set(row, beam, code(row, beam));
   }
   /// Moves the complex beam signals (for messages with phases) like the samples. source(row, beam): their position before; rows
   /// beyond the last are empty.
-  template <class Source>
-  void move_signal(Source source) {
+  void move_signal(auto source) {
     auto& signal = ping_.beam_signal_upa;
     if (signal.size() != rows_ * beams_) return;
     const auto before = signal;

@@ -61,8 +61,7 @@ class Audience {
   void drop_newest(bool on);
   void end_pauses(Actions& actions);
   /// Runs a function; an exception ends only this connection. A stream, which belongs to the device, only loses a ping.
-  template <class Call>
-  void guarded(Connection& connection, Actions& actions, Call call) {
+  void guarded(Connection& connection, Actions& actions, auto call) {
     try {
       call();
     } catch (const std::exception& e) {

@@ -33,8 +33,7 @@ class ConnectionSlots {
     return taken_.size() < most_ || evict(owner, std::forward<Evicted>(evicted));
   }
   /// Evicts a connection even if a slot is free. Returns false if there is none, or if all are busy.
-  template <class Evicted>
-  bool evict(const std::string& owner, Evicted&& evicted) {
+  bool evict(const std::string& owner, auto&& evicted) {
     std::map<std::string, int> counts;
     if (owner_)
       for (const Pointer& c : taken_) ++counts[owner_(*c)];
@@ -61,8 +60,7 @@ class ConnectionSlots {
   void add(const Pointer& connection) { taken_.push_back(connection); }
   void remove(const Pointer& connection) { taken_.remove(connection); }
   /// Frees the slots of these connections without closing them.
-  template <class Is>
-  void forget_if(Is&& is) {
+  void forget_if(auto&& is) {
     taken_.remove_if([&](const Pointer& c) { return is(*c); });
   }
   void close_all() {

@@ -89,8 +89,7 @@ void SceneChanges::build_next() {
 namespace {
 
 /// Returns what `work` returns; an exception becomes an error.
-template <class Work>
-auto caught(const Work& work) -> decltype(work()) {
+auto caught(const auto& work) -> decltype(work()) {
   try {
     return work();
   } catch (const std::bad_alloc&) {

@@ -16,8 +16,7 @@ constexpr const char* policy =
 constexpr std::string_view blanks = " \t";
 
 /// Calls take(name, parameters) for each element of a list such as "text/html;q=0.9, */*", until it returns true.
-template <class Take>
-bool any_of_list(std::string_view list, Take take) {
+bool any_of_list(std::string_view list, auto take) {
   while (!list.empty()) {
     const auto comma = std::min(list.find(','), list.size());
     const std::string_view element = list.substr(0, comma);

@@ -48,8 +48,7 @@ Recordings::~Recordings() = default;
 
 // Runs `job` on the writer thread, then `after` on this thread with the result and the size of the file. All changes of state
 // happen on this thread.
-template <class Job, class After>
-void Recordings::on_thread(const std::shared_ptr<Work>& work, Job job, After after) {
+void Recordings::on_thread(const std::shared_ptr<Work>& work, auto job, auto after) {
   const auto figures = std::make_shared<RecordingFile::Figures>();
   writer_.run(
       [work, figures, job = std::move(job)]() mutable {
@@ -264,8 +263,7 @@ bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
   return is_running(recording);
 }
 
-template <class Job>
-void Recordings::write(const Pointer& recording, std::size_t size, Job job) {
+void Recordings::write(const Pointer& recording, std::size_t size, auto job) {
   if (!has_room_for(recording, size)) return;
   recording->waiting_bytes += size;
   on_thread(

@@ -81,15 +81,13 @@ class Recordings {
     RecordingFile::Figures figures;
   };
 
-  template <class Job, class After>
-  void on_thread(const std::shared_ptr<Work>& work, Job job, After after);
+  void on_thread(const std::shared_ptr<Work>& work, auto job, auto after);
   std::size_t running() const;
   /// True if `bytes` more of this recording may wait. If not, the recording with most waiting bytes ends.
   bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
   /// Queues `job`, which writes `bytes` bytes, for the writer thread.
-  template <class Job>
-  void write(const Pointer& recording, std::size_t bytes, Job job);
+  void write(const Pointer& recording, std::size_t bytes, auto job);
   void end(const Pointer& recording, const std::string& why);
   void fail(const Pointer& recording, const std::string& why);
   void ended(const Pointer& recording, const Outcome& outcome);

@@ -29,8 +29,7 @@ class WriterThread {
   WriterThread& operator=(const WriterThread&) = delete;
 
   /// `job` runs on this thread; its Result<void> goes to `after` on the I/O thread, whose loop stays alive until then.
-  template <class Job, class After>
-  void run(Job job, After after) {
+  void run(auto job, auto after) {
     ++under_way_;
     asio::post(thread_, [this, guard = asio::make_work_guard(io_), job = std::move(job), after = std::move(after)]() mutable {
       asio::post(io_, [this, result = attempt(job), after = std::move(after)]() mutable {
@@ -41,8 +40,7 @@ class WriterThread {
     });
   }
   /// Runs `job` and returns its result; an exception becomes an error.
-  template <class Job>
-  static Result<void> attempt(Job&& job) {
+  static Result<void> attempt(auto&& job) {
     try {
       return job();
     } catch (const std::bad_alloc&) {

@@ -35,8 +35,7 @@ inline std::string text_of(const std::exception_ptr& fault) {
 
 /// Runs the coroutine that `loop` returns. After an exception it calls `survives` with the text and runs the coroutine again if
 /// that returns true, so that one message cannot end a listener.
-template <class Loop, class Survives>
-void keep_running(const asio::any_io_executor& executor, Loop loop, Survives survives) {
+void keep_running(const asio::any_io_executor& executor, auto loop, auto survives) {
   asio::co_spawn(executor, loop, [executor, loop, survives](const std::exception_ptr& fault) {
     if (fault && survives(text_of(fault))) keep_running(executor, loop, survives);
   });

@@ -99,8 +99,7 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
     if (payload != nullptr && viewer.subscribes(channel)) viewer.offer(channel, payload, ViewConnection::now());
   }
 
-  template <class Job>
-  void post(Job job) {
+  void post(auto job) {
     busy_ = true;
     asio::post(thread_, [self = shared_from_this(), work = work_, job = std::move(job)]() mutable {
       try {

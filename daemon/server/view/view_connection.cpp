@@ -68,14 +68,12 @@ struct ViewConnection::Watched {
     Buffers buffers;
     std::size_t size = 0;
 
-    template <class Self>
-    void operator()(Self& self) {
+    void operator()(auto& self) {
       auto& socket = watched.from.socket();
       const Buffers own = buffers;  // a copy, because the member belongs to `self`, which is moved
       socket.async_read_some(own, std::move(self));
     }
-    template <class Self>
-    void operator()(Self& self, const error_code& ec, std::size_t read) {
+    void operator()(auto& self, const error_code& ec, std::size_t read) {
       if (ec || read == 0) return self.complete(ec, read);
       size = read;
       const auto pause = watched.from.pause_after(watched.work_of(buffers, read));
@@ -85,13 +83,11 @@ struct ViewConnection::Watched {
       rest.async_wait(std::move(self));
     }
     /// Called at the end of the pause or of the connection.
-    template <class Self>
-    void operator()(Self& self, const error_code&) {
+    void operator()(auto& self, const error_code&) {
       self.complete(watched.from.over() ? error_code(asio::error::operation_aborted) : error_code(), size);
     }
   };
-  template <class Buffers>
-  std::size_t work_of(const Buffers& buffers, std::size_t read) {
+  std::size_t work_of(const auto& buffers, std::size_t read) {
     std::size_t sum = 0;
     for (const asio::const_buffer piece : beast::buffers_range_ref(buffers)) {
       const std::size_t count = std::min(read, piece.size());

@@ -148,8 +148,7 @@ class ViewFeed final : public ViewerHost {
   ViewPayloadPointer in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const;
   /// Returns the reason if it was not set, else an empty text; nullopt if it is not a parameter of the view itself.
   std::optional<std::string> set_own(Viewer& viewer, const foxglove::Parameter& wanted);
-  template <class Visit>
-  void each(Visit visit) const {
+  void each(auto visit) const {
     for (const auto& weak : connections_)
       if (const auto connection = weak.lock(); connection && !connection->over()) visit(*connection);
   }

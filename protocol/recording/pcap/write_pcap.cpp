@@ -15,8 +15,7 @@ struct PcapFileHeader {
   std::uint16_t major = 2, minor = 4;
   std::uint32_t zone = 0, accuracy = 0, snap_length = 262'144, link_type = 101;  // raw IP
 };
-template <class V, wire::Like<PcapFileHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<PcapFileHeader> auto& m) {
   visit("magic", m.magic);
   visit("major", m.major);
   visit("minor", m.minor);
@@ -34,8 +33,7 @@ struct IpHeader {
   std::uint16_t checksum = 0;
   std::uint32_t source = 0, target = 0;
 };
-template <class V, wire::Like<IpHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<IpHeader> auto& m) {
   visit("versionAndLength", m.version_and_length);
   visit("service", m.service);
   visit("totalLength", m.total_length);
@@ -55,8 +53,7 @@ struct TcpHeader {
   std::uint8_t length = 0x50, flags = 0;
   std::uint16_t window = 65'535, checksum = 0, urgent = 0;
 };
-template <class V, wire::Like<TcpHeader> M>
-constexpr void fields(V& visit, M& m) {
+constexpr void fields(auto& visit, wire::Like<TcpHeader> auto& m) {
   visit("source", m.source);
   visit("target", m.target);
   visit("sequence", m.sequence);
