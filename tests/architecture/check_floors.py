@@ -121,8 +121,11 @@ FORBIDDEN = [
 ]
 # A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
 ANY_FOLDER = "|".join(MAKE_FOLDERS)
-MAKE = re.compile(rf"protocol/({ANY_FOLDER})/|\b({ANY_FOLDER})::|oculus|blueview|\baris\b|waterlinked|ping360|ping1d|\bs500|surveyor|omniscan|3d-?15"
-                  r"|dvl-a|(?<!/)\bm3\b|\bmicron|\bnorbit", re.I)  # not kg/m3
+# In identifiers too: is_aris, ArisFrame, m3_packet. DVL is also a kind of instrument, and per_m3 a unit.
+MAKE = re.compile(rf"protocol/({ANY_FOLDER})/|\b({ANY_FOLDER})::"
+                  r"|(?i:oculus|blueview|waterlinked|ping360|ping1d|(?<![a-z])s500|surveyor|omniscan|3d-?15|dvl-a|norbit)"
+                  r"|(?<![A-Za-z])(aris|micron|dvl)(?![a-z])|(Aris|Micron|Dvl)(?![a-z])|(?<![A-Za-z])(ARIS|MICRON)(?![a-z])"
+                  r"|(?<![/\w])[mM]3(?![a-z0-9])")  # not kg/m3
 MAY_NAME_MAKES = (rf"protocol/({ANY_FOLDER})/|protocol/makes\.cpp$|clients/(bvtsdk|ros2_bridge)/|clients/python/sonard_client/judge/makes/"
                   r"|(.*/)?tests/|docs/")  # the bridge: other people's drivers
 NAME_MAKES = {
@@ -132,8 +135,8 @@ NAME_MAKES = {
     "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py", "clients/web/src/panels/head.js",
     "daemon/commands/replay/replay_device.cpp", "daemon/commands/replay/replay_device.hpp",
 }
-CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc"}
-TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ""}
+CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc", ".inl"}
+TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ".css", ".html", ""}
 # A page of ours, and what of it is cited: docs/acoustics.md, section 8; docs/protocols/oculus.md, 5.1; docs/architecture.md, "Errors".
 PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
@@ -303,7 +306,7 @@ def violations(root):
         except UnicodeDecodeError:
             continue  # a binary without an extension
         is_code = path.suffix in CODE
-        code, comments = (without_comments(text), comments_of(text)) if is_code else (text, text)
+        code, comments = (without_comments(text), comments_of(text)) if is_code or path.suffix == ".proto" else (text, text)
         if is_code:
             for number, what in [*include_violations(name, code), *wording_violations(comments), *program_violations(name, code)]:
                 yield f"{name}:{number}: {what}"
@@ -314,7 +317,7 @@ def violations(root):
                 yield f"{name}:1: header without #pragma once"
             if not name.startswith("tests/") and text.count("\n") > LONGEST_FILE:
                 yield f"{name}:{LONGEST_FILE}: longer than {LONGEST_FILE} lines: split it"
-        if is_code or path.suffix in {".py", ".lua", ".js"}:
+        if is_code or path.suffix in {".py", ".lua", ".js", ".proto", ".css", ".html"}:
             for number, what in make_violations(name, code):
                 yield f"{name}:{number}: {what}"
         for position, what in citation_violations(root, name, comments):

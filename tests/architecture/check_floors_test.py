@@ -166,6 +166,9 @@ class Planted(unittest.TestCase):
         for name, line in [("daemon/server/a.cpp", "oculus::Framer framer;"), ("clients/sonarctl/a.cpp", '#include "protocol/ping/messages.hpp"'),
                            ("clients/python/a.py", "# of an ARIS"), ("protocol/recording/a.cpp", 'if (name == "blueview") return;'),
                            ("daemon/config/a.cpp", 'name = "m3";'), ("daemon/config/a.cpp", '#include "protocol/m3/settings.hpp"'),
+                           ("daemon/a.cpp", "bool is_aris();"), ("daemon/a.cpp", "ArisFrame a;"), ("daemon/a.cpp", "int m3_packet;"),
+                           ("daemon/a.cpp", "int dvl_port;"), ("core/pipeline/a.inl", "int s500;"), ("clients/web/a.css", ".norbit {}"),
+                           ("protocol/control/a.proto", "string oculus = 1;"), ("clients/web/a.html", "<p>Micron"),
                            *((f"daemon/emulator/{make}.cpp", f"{make}::vendor();") for make in check_floors.MAKE_FOLDERS)]:
             with self.subTest(name=name):
                 self.expect(name, line + "\n", 1, "only the make's folder")
@@ -189,7 +192,9 @@ class Innocent(unittest.TestCase):
             "protocol/oculus/a.cpp": "// reinterpret_cast is not for us\nchar t[9]; int n = std::snprintf(t, 9, \"%d\", 1);\n",
             "protocol/makes.cpp": '#include "protocol/oculus/oculus.hpp"\n',
             "protocol/m3/m3.cpp": "int m3;\n",
-            "clients/python/b.py": "water = 1025  # kg/m3\n",
+            "clients/python/b.py": "kg_per_m3 = 1025  # kg/m3, from a DVL\n",
+            "protocol/control/a.proto": "// of an ARIS\n",
+            "core/scene/a.cpp": "int comparison, arisen, microns;\n",
             "daemon/server/system/asio.hpp": "#pragma once\n#include <utility>\n#include <boost/asio.hpp>\n",
             "daemon/commands/banner.cpp": '#include "cuda/cuda_status.hpp"\n#include "core/pipeline/ping_engine.hpp"\n',
             "clients/sonarctl/a.cpp": '#include <nlohmann/json.hpp>\n#include "protocol/host.hpp"  // for an Oculus\n',

@@ -75,8 +75,8 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
 }
 #elif defined(__AVX2__)
 /// The same for vectors of four samples; a pulse overlaps three of them. Shifting a vector by a variable number of lanes is
-/// slow. Instead, the repeated taps are stored between zeros and loaded from the shifted position. This is done for so many
-/// echoes at a time that the stores have finished before the loads begin.
+/// slow. Instead, the repeated taps are stored between zeros and loaded from the shifted position. This is done for a number of
+/// echoes at a time, large enough that the stores have finished before the loads begin.
 template <>
 void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, float* columns, std::ptrdiff_t stride,
                         int first_column, int lead) {
