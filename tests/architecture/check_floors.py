@@ -132,7 +132,7 @@ NAME_MAKES = {
     "clients/python/sonard_client/__init__.py", "clients/python/sonard_client/__main__.py",
     "clients/python/sonard_client/judge/cases.py",
     "clients/python/sonard_client/layouts.py", "clients/python/sonard_client/oculus.py",
-    "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py", "clients/web/src/panels/head.js",
+    "clients/python/sonard_client/status.py", "clients/python/sonard_client/stream.py",
     "daemon/commands/replay/replay_device.cpp", "daemon/commands/replay/replay_device.hpp",
 }
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc", ".inl"}

@@ -15,7 +15,7 @@ function rateOf(facts) {
   return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: measured(facts.madeRate) };
 }
 
-/// The product as people name it, such as "Oculus M1200d". Older daemons send only the name in a configuration.
+/// The product as people name it. Older daemons send only the name in a configuration.
 const product = (facts, profile) => facts.info?.metadata?.[`sonard.product.${profile}`] ?? profile;
 
 /// Returns the time in UTC, or a dash for files without times.
@@ -34,7 +34,7 @@ export function drawHead(facts) {
   setClass($('rate-dot'), `dot ${dot}`);
   setText($('rate'), rate);
   const sonar = facts.sonarStatus;
-  setHidden($('frequency-chip'), !sonar?.frequency_hz);  // a BlueView's recording does not state it
+  setHidden($('frequency-chip'), !sonar?.frequency_hz);  // some recordings do not state it
   setText($('frequency'), frequency(sonar?.frequency_hz));
   const latency = facts.listened ? sonar?.figures?.latency_ms_p50 : 0;  // without a driver it would be that of the last one
   setText($('latency'), latency > 0 ? `${fixed(latency, 0)} ms` : dash);
