@@ -38,7 +38,11 @@ struct Extent {
 };
 
 /// The box in the axes of the mesh.
-Extent extent_of(const Mesh& mesh);
+inline Extent extent_of(const Mesh& mesh) {
+  Extent extent;
+  for (const Vec3& v : mesh.vertices) extent.add(to_double(v));
+  return extent;
+}
 
 /// A mesh that is longer than this was probably not written in metres [m].
 inline constexpr double huge_mesh_m = 200;

@@ -6,7 +6,7 @@
 
 #include "control.pb.h"
 #include "core/base/geometry.hpp"
-#include "protocol/control/request.hpp"
+#include "protocol/control/operations.hpp"
 
 namespace sonar::control {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/base/result.hpp"
-#include "protocol/control/request.hpp"
+#include "protocol/control/operations.hpp"
 
 namespace google::protobuf {
 class Message;

@@ -3,11 +3,14 @@
 // events are protobuf classes (protocol/control/answers.hpp).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "core/base/geometry.hpp"
 #include "protocol/control/pose_sample.hpp"
@@ -110,5 +113,35 @@ struct Subscribe {
 /// Requests that the daemon executes; Hello and Subscribe are handled by the connection.
 using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
                                SetTrajectory, Step, StartRecording, StopRecording, AddFault, EndFaults, GetFaults>;
+
+using Bytes = std::vector<std::byte>;
+using BytesView = std::span<const std::byte>;
+
+inline constexpr std::uint32_t protocol_version = 1;
+inline constexpr std::size_t largest_datagram = 1200;
+inline constexpr std::size_t largest_json = std::size_t{1} << 20;
+
+struct Hello {
+  std::uint32_t protocol_version = control::protocol_version;
+  std::string name;
+  std::string token = {};  // the content of control.token_file
+};
+struct Unsupported {  // a request that this version does not know
+};
+struct Request {
+  std::uint64_t id = 0;
+  std::variant<Unsupported, Hello, PoseSample, GetStatus, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
+               SetTrajectory, Step, StartRecording, StopRecording, AddFault, EndFaults, GetFaults, Subscribe>
+      op;
+};
+/// Numbers of v1::Status::Code.
+enum class StatusCode { ok = 1, refused, unsupported, failed, unauthenticated };
+
+struct RefusedRequest {  // a refused message, with the id that the Response repeats
+  std::uint64_t id = 0;
+  std::string why;
+  bool pose = false;        // true for a malformed pose
+  bool is_protobuf = true;  // true: a Request with wrong content; false: the bytes cannot be parsed
+};
 
 }  // namespace sonar::control

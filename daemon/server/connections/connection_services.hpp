@@ -8,8 +8,8 @@
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/connections/admission.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/connections/token.hpp"
-#include "daemon/server/connections/work_rate.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"
 

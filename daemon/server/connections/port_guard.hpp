@@ -2,7 +2,7 @@
 // connection beyond the limit waits, a datagram is dropped; other addresses are not affected. Pure arithmetic.
 #pragma once
 
-#include "daemon/server/connections/work_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 
 namespace sonar {
 

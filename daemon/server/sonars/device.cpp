@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "daemon/server/connections/work_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/system/listen.hpp"
 
 namespace sonar {

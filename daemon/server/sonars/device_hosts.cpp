@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "daemon/config/sonar_addresses.hpp"
-#include "daemon/server/connections/work_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/sonars/device.hpp"
 
 namespace sonar {

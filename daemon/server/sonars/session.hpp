@@ -25,7 +25,7 @@ namespace sonar {
 class SessionParent {
  public:
   virtual ~SessionParent() = default;
-  /// Handles received bytes. Returns the additional work that they caused (connections/work_rate.hpp).
+  /// Handles received bytes. Returns the additional work that they caused (connections/input_rate.hpp).
   virtual std::size_t on_bytes(ConnectionId from, protocol::BytesView bytes) = 0;
   /// Returns the next message to write; empty if there is none.
   virtual Outbox::Message next_message(ConnectionId to) = 0;

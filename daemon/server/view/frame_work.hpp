@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "daemon/server/connections/work_rate.hpp"
+#include "daemon/server/connections/input_rate.hpp"
 
 namespace sonar {
 
