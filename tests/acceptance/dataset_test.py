@@ -58,9 +58,7 @@ def learned(x, y):
 
 class Dataset(unittest.TestCase):
     def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.path = pathlib.Path(self.folder.name)
+        self.path = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.job = self.path / "mines.yaml"
 
     def make(self, out, *more):

@@ -20,9 +20,7 @@ LOST = "the CUDA engine stopped: host loops: the device is lost"
 class Device(unittest.TestCase):
     def setUp(self):
         self.assertTrue(MODULE.exists(), MODULE)
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = pathlib.Path(folder.name)
+        self.path = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.config = self.path / "sonard.yaml"
         self.config.write_text(CONFIG, encoding="utf-8")
 

@@ -46,9 +46,7 @@ WHY_NOT = why_not()
 @unittest.skipIf(WHY_NOT, WHY_NOT)
 class Farm(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.path = pathlib.Path(folder.name)
+        self.path = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.out = self.path / "farm"
         self.processes = []
         self.addCleanup(self.end_all)

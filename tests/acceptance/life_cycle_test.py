@@ -81,9 +81,7 @@ class Started:
 
     def __init__(self, case, wrap=None, **streams):
         self.address = "127.0.0.9"
-        folder = tempfile.TemporaryDirectory()
-        case.addCleanup(folder.cleanup)
-        self.config = pathlib.Path(folder.name) / "sonard.yaml"
+        self.config = pathlib.Path(case.enterContext(tempfile.TemporaryDirectory())) / "sonard.yaml"
         self.config.write_text(
             "world: {scene: demo.yaml}\nvehicles: [{name: rov, initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}}]\n"
             f"sonars: [{{name: front, profile: oculus-m1200d, bind_ip: {self.address}, status_to: [{self.address}]}}]\n"

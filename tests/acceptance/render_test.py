@@ -47,9 +47,7 @@ def open_folder(path):
 
 class Render(unittest.TestCase):
     def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.path = pathlib.Path(self.folder.name)
+        self.path = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.out = self.path / "out"
         self.config = self.path / "sonard.yaml"
         self.config.write_text(CONFIG, encoding="utf-8")

@@ -21,9 +21,7 @@ sonars: [{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}]
 
 class SceneCommand(unittest.TestCase):
     def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.path = pathlib.Path(self.folder.name)
+        self.path = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.scene = self.path / "quay.yaml"
 
     def ctl(self, *arguments, code=0):

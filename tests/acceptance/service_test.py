@@ -44,9 +44,7 @@ def calls_of(set_name, seen=()):
 
 class Unit(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.file = pathlib.Path(folder.name) / "sonard.service"
+        self.file = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) / "sonard.service"
         text = UNIT.read_text(encoding="utf-8")
         self.assertIn("ExecStart=sonard run\n", text)
         self.file.write_text(text.replace("ExecStart=sonard", f"ExecStart={SONARD.resolve()}"), encoding="utf-8")

@@ -22,9 +22,7 @@ HOURS = (2, -3)
 
 class SetClock(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.file = self.folder / "shift"
         self.set_clock(0)
         library, = BUILD.glob("tests/acceptance/libset_clock.so")

@@ -35,9 +35,7 @@ def follow(name, folder):
 
 class Tutorials(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
 
     def follow(self, name):
         code, output = follow(name, self.folder)
