@@ -4,28 +4,13 @@
 #include <thread>
 
 #include "protocol/oculus/decode.hpp"
-#include "protocol/oculus/encode_ping.hpp"
-#include "protocol/oculus/oculus_log.hpp"
-#include "protocol/recorded/raw_dump.hpp"
-#include "protocol/recording/pcap/pcap.hpp"
 #include "tests/daemon/commands/replay_on_loopback.hpp"
+#include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar {
 namespace {
 
-Bytes ping_message(std::uint32_t id) {
-  oculus::PingHead head;
-  head.fixed.header = {oculus::magic, 7001, 0, oculus::MessageType::ping_result, 0, 0, 0};
-  head.fixed.ping_id = id;
-  head.fixed.frequency_hz = 2.1e6;
-  head.fixed.sound_speed_mps = 1500;
-  head.fixed.range_resolution_m = 0.1;
-  head.fixed.row_count = 300;
-  head.fixed.beam_count = 256;
-  const std::vector<std::int16_t> bearings(256);
-  const Bytes samples(256 * 300, static_cast<std::byte>(id));
-  return oculus::encode_ping(head, {bearings, {}, samples});
-}
+Bytes ping_message(std::uint32_t id) { return recording::tests::ping_message(id, 256, 300); }
 
 std::vector<RecordedMessage> messages_of(std::uint32_t pings, milliseconds period) {
   std::vector<RecordedMessage> messages;
