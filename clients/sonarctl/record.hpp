@@ -50,7 +50,6 @@ class RecordFiles {
   std::uint64_t pings() const { return pings_; }
   std::uint64_t messages() const { return messages_; }
   std::uint64_t bytes() const { return bytes_; }
-  bool wants_poses() const { return mcap_ != nullptr; }
   /// "run.pcap 1.2 MB, run.mcap 3.4 MB"
   std::string sizes() const;
 

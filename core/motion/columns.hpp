@@ -51,7 +51,6 @@ class Columns {
   bool peek(const Words& words, double& stamp, Vec3d& position_m, std::string_view& of) const;
   /// Unit of the stamps: "seconds", "milliseconds", "microseconds" or "nanoseconds".
   std::string_view unit() const;
-  bool has_body() const { return has(body); }
   bool has_velocity() const { return has(vx); }
   bool has_angular_velocity() const { return has(wx); }
   /// Reads a line. Returns the error, or nullopt. `words` must have count() elements.

@@ -94,7 +94,6 @@ class Faults {
   // ---- time
   void on_tick(Time now);
   std::optional<Time> next_tick() const;
-  bool has_orders() const { return !orders_.empty(); }
   void on(Occasion occasion, Time now);
 
   // ---- pings

@@ -29,7 +29,6 @@ enum class Opcode : std::uint8_t {
   data_end = 0x0F,
 };
 inline constexpr std::size_t record_front_bytes = 9;         // opcode and length
-inline constexpr std::size_t message_front_bytes = 22;       // channel, sequence, two times
 inline constexpr std::size_t longest_record = 64 << 20;      // limit for files of other programs; chunks are not read whole
 inline constexpr std::size_t longest_description = 1 << 20;  // limit for a schema or channel
 inline constexpr std::uint64_t latest_time_ns = 4'000'000'000'000'000'000u;  // in 2096; later times are damage
