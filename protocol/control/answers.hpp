@@ -1,5 +1,5 @@
 // Status, events and answers: the classes that protoc generates from control.proto. The daemon fills them, clients read them.
-// They take a second to compile, so only the files named in tests/architecture/check_floors.py may include this header.
+// They take a second to compile, so headers outside of this folder do not include this one.
 #pragma once
 
 #include <string>

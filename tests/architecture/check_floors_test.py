@@ -91,7 +91,6 @@ class Planted(unittest.TestCase):
                 ("core/pipeline/a.cpp", "fftw3.h"), ("daemon/config/a.cpp", "yaml-cpp/yaml.h"),
                 ("core/scene/files/load_mesh.cpp", "assimp/scene.h"), ("protocol/oculus/a.cpp", "spdlog/spdlog.h"),
                 ("daemon/a.cpp", "google/protobuf/message.h"), ("daemon/server/sonars/session.cpp", "boost/asio.hpp"),
-                ("daemon/emulator/world/world.hpp", "protocol/control/answers.hpp"), ("daemon/server/app.cpp", "protocol/control/answers.hpp"),
                 ("core/base/a.cpp", "boost/container/small_vector.hpp"), ("core/base/parallel.cpp", "tbb/parallel_for.h"),
                 ("core/pipeline/a.cpp", "cuda_runtime.h"), ("core/base/a.hpp", "Eigen/Dense")]:
             with self.subTest(name=name, header=header):
@@ -115,6 +114,7 @@ class Planted(unittest.TestCase):
                 ("clients/a.cpp", 'std::setlocale(LC_ALL, "");', "locale"),
                 ("daemon/a.cpp", "std::locale::global(german);", "locale"),
                 ("core/sonar/a.cpp", "const int fd = ::open(name, 0);", "file"),
+                ("daemon/emulator/world/a.hpp", '#include "protocol/control/answers.hpp"', "answers"),
                 ("daemon/a.cpp", "std::mutex guard;", "mutex"),
                 ("core/scene/a.cpp", "std::mt19937 engine;", "global random"),
                 ("daemon/a.cpp", "int x;  // TO" + "DO later", "mark"),
