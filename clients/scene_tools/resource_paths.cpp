@@ -40,23 +40,31 @@ std::vector<fs::path> versions_in(const fs::path& folder) {
   return found;
 }
 
-std::string lower(std::string_view text) {
+/// In small letters, and with a blank for "_".
+std::string folded(std::string_view text) {
   std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
+  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c == '_' ? ' ' : c;
   return out;
 }
 
-/// Looks for the exact name, then ignores case, because Gazebo stores downloads in small letters.
+/// Looks for the exact name, then compares folded names: Gazebo stores downloads in small letters, and folders in repositories
+/// are often named sand_bed for the model "Sand Bed" on Fuel.
 fs::path child_of(const fs::path& folder, const std::string& name) {
   std::error_code error;
   if (name.empty() || name == "." || name == "..") return {};
   if (fs::exists(folder / name, error)) return folder / name;
   int seen = 0;
+  fs::path first;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (++seen > most_looked_at) break;
-    if (lower(entry.path().filename().string()) == lower(name)) return entry.path();
+    if (folded(entry.path().filename().string()) == folded(name) && (first.empty() || entry.path() < first)) first = entry.path();
   }
-  return {};
+  return first;
+}
+fs::path descendant_of(fs::path folder, const fs::path& wanted) {
+  for (const fs::path& part : wanted)
+    if (!folder.empty()) folder = child_of(folder, part.string());
+  return folder;
 }
 
 /// "1.10" is later than "1.9".
@@ -131,14 +139,19 @@ fs::path look_around(const fs::path& wanted, const fs::path& from_file, const st
   for (const fs::path& folder : folders)
     if (const fs::path found = another(folder / wanted); !found.empty()) return found;
   const std::string first = wanted.empty() ? std::string() : wanted.begin()->string();
+  std::vector<fs::path> places = folders;
   fs::path above = here;
   for (int up = 0; up < 8 && !above.empty(); ++up, above = above.parent_path()) {
-    for (const fs::path& place : {above / wanted, above / "models" / wanted})
-      if (const fs::path found = another(place); !found.empty()) return found;
+    for (const fs::path& place : {above, above / "models"}) {
+      if (const fs::path found = another(place / wanted); !found.empty()) return found;
+      places.push_back(place);
+    }
     if (!first.empty() && (above.filename() == first || is_package(above, first)))
       if (const fs::path found = another(above / wanted.lexically_relative(first)); !found.empty()) return found;
     if (above == above.parent_path()) break;
   }
+  for (const fs::path& place : places)
+    if (const fs::path found = another(descendant_of(place, wanted)); !found.empty()) return found;
   if (wanted == fs::path(first)) return {};  // a whole model, never the referring one
   above = here;
   for (int up = 0; up < 4 && above != above.parent_path(); ++up, above = above.parent_path())
@@ -193,9 +206,7 @@ fs::path find_in_fuel_caches(const FuelAddress& address) {
     hosts.insert(hosts.end(), {std::string(of_one_server[0]), std::string(of_one_server[1])});
   for (const fs::path& cache : fuel_caches())
     for (const std::string& host : hosts) {
-      fs::path model = cache;
-      for (const std::string& part : {host, address.owner, std::string("models"), address.name})
-        if (!model.empty()) model = child_of(model, part);
+      const fs::path model = descendant_of(cache, fs::path(host) / address.owner / "models" / address.name);
       if (model.empty()) continue;
       std::vector<fs::path> places = versions_in(model);
       const int named = version_number(address.version);
@@ -231,13 +242,12 @@ fs::path find_resource(std::string_view uri, const fs::path& from_file, const st
     const auto address = fuel_address(path);
     if (address)
       if (fs::path found = find_in_fuel_caches(*address); !found.empty()) return found;
-    const std::string name = address && address->inside.empty() ? address->name : fs::path(path).filename().string();
+    fs::path wanted = address ? fs::path(address->name) : fs::path(path).filename();
+    if (wanted.empty()) return {};
     const int version = address && address->inside.empty() ? version_number(address->version) : -1;
-    if (name.empty()) return {};
-    for (const fs::path& folder : folders)
-      if (const fs::path there = child_of(folder, name); !there.empty())
-        if (const fs::path found = file_at(there, version); !found.empty()) return found;
-    return look_around(name, from_file, folders, version);
+    if (address)
+      for (const std::string& part : address->inside) wanted /= part;
+    return look_around(wanted, from_file, folders, version);
   }
   const fs::path wanted = fs::path(path).lexically_normal();
   if (scheme == "model" || scheme == "package") {

@@ -194,6 +194,26 @@ TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
   EXPECT_THAT(error(third), HasSubstr("hmoyen/models/Sand Bed/3'"));
 }
 
+TEST_F(ImportScene, FuelModelsAreFoundInFoldersThatARepositoryNamesInItsWay) {
+  const Environment home("HOME", "/nonexistent"), none("GZ_FUEL_CACHE_PATH", ""), nor("IGN_FUEL_CACHE_PATH", "");
+  const std::string fuel = "https://fuel.gazebosim.org/1.0/hmoyen/models/";
+  write("dave/models/sunken_vase/model.sdf",
+        "<sdf version='1.9'><model name='vase'>" + mesh(fuel + "Sunken%20Vase/3/files/meshes/Pot 01.stl") + "</model></sdf>");
+  write("dave/models/sunken_vase/meshes/pot_01.stl", triangle);
+  options.model_folders = {files.path("dave/models")};
+  const auto done = run(sdf("<include><uri>" + fuel + "Sunken Vase</uri></include><include><uri>" + fuel +
+                            "sunken%20vase/2</uri><name>b</name></include><include><uri>model://Sunken Vase</uri><name>c</name>"
+                            "</include>"));
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_EQ(done->shapes, 3u);
+  EXPECT_THAT(done->left_out, ElementsAre());
+  options.model_folders.clear();
+  EXPECT_THAT(error(sdf("<include><uri>" + fuel + "Sunken Vase</uri></include>")), HasSubstr("were not found"));
+  // Beside the world, in a folder of models.
+  write("models/sunken_vase/model.sdf", "<sdf version='1.9'><model name='vase'>" + link("l") + "</model></sdf>");
+  EXPECT_EQ(error(sdf("<include><uri>" + fuel + "Sunken Vase</uri></include>")), "no error");
+}
+
 TEST_F(ImportScene, AnEmptySceneIsAnErrorThatSaysWhatIsMissing) {
   const Environment home("HOME", files.path("home").string());
   options.read.skip_missing = true;
