@@ -235,6 +235,21 @@ class Command(WithFolder):
         code, text, said = self.run_main(log, "-o", "-", "--frame", "ENU_FLU")
         self.assertEqual((code, text.splitlines()[0], "axes" in said), (0, "# frame: ENU_FLU", False), said)
 
+    def test_options_without_effect_are_refused(self):
+        tlog = self.file(made.telemetry_log(("SIM_STATE",), 3), "flight.tlog")
+        nmea = self.file(made.nmea_log(), "ship.nmea")
+        odom = [(i, made.odometry(i)) for i in range(3)]
+        recording = self.file(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", odom)]), "run.mcap")
+        for log, *option in ((tlog, "--depth", "3"), (tlog, "--bottom", "20"), (tlog, "--depth-is-vehicle"), (tlog, "--heading", "9"),
+                             (tlog, "--without-checksum"), (tlog, "--topic", "/odom"), (nmea, "--source", "SIM"),
+                             (nmea, "--system", "1"), (recording, "--component", "1"), (recording, "--depth", "-1")):
+            with self.subTest(option):
+                code, _, text = self.run_main(log, "-o", "-", *option)
+                self.assertEqual(code, 64, text)
+                kind = {tlog: "tlog", nmea: "nmea", recording: "mcap"}[log]
+                self.assertIn(f"{option[0]} has no effect on {kind}, only on ", text)
+        self.assertEqual(self.run_main(nmea, "-o", "-", "--depth", "3", "--heading", "9")[0], 0)
+
     def test_gaps_are_reported(self):
         late = made.dataflash_message("SIM", 9000000, 0, 0, 0, 0, 476000000, -1223300000, 1, 0, 0, 0)
         log = made.dataflash_log(("SIM",), 3) + late

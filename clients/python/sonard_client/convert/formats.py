@@ -118,6 +118,19 @@ def convert(path: "Union[str, pathlib.Path]", kind: Optional[str] = None, source
         raise ValueError(f"format is {chosen!r}: it must be one of {', '.join(FORMATS)}")
     if origin is not None and chosen in RECORDINGS:
         raise ValueError("an origin needs positions in degrees; poses of recordings are in metres")
+    of_nmea = "it assumes what NMEA sentences lack"
+    for option, is_given, kinds, why in (
+            ("--source", source is not None, ("dataflash", "tlog", "ulog"), "it names messages of an autopilot"),
+            ("--topic", topic is not None, RECORDINGS, "topics are in recordings of robots"),
+            ("--system", system is not None, ("tlog",), "systems are in MAVLink telemetry"),
+            ("--component", component is not None, ("tlog",), "components are in MAVLink telemetry"),
+            ("--depth", assumed.depth_m != 0, ("nmea",), of_nmea),
+            ("--bottom", assumed.bottom_m is not None, ("nmea",), of_nmea),
+            ("--depth-is-vehicle", assumed.depth_is_vehicle, ("nmea",), of_nmea),
+            ("--heading", assumed.heading_deg is not None, ("nmea",), of_nmea),
+            ("--without-checksum", without_checksum, ("nmea",), "only NMEA sentences may lack one")):
+        if is_given and chosen not in kinds:
+            raise ValueError(f"{option} has no effect on {chosen}, only on {', '.join(kinds)}: {why}")
     if frame is not None and frame not in FRAMES:
         raise ValueError(f'frame is {frame!r}: it must be one of {", ".join(FRAMES)}')
     if frame is not None and chosen not in RECORDINGS:
