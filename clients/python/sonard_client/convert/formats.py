@@ -27,6 +27,7 @@ _WRITE = "write poses as CSV, in metres: sonard_client.geodesy converts degrees 
 # Common formats that cannot be read: first bytes, name of the format, advice; {} is the file.
 _OTHERS = (
     (b"\x28\xb5\x2f\xfd", "compressed by zstd; unpack it first: zstd -d {}"),
+    (b"\x04\x22\x4d\x18", "compressed by lz4; unpack it first: lz4 -d {}"),
     (b"\x1f\x8b", "compressed by gzip; unpack it first: gunzip -k {}"),
     (b"BZh", "compressed by bzip2; unpack it first: bunzip2 -k {}"),
     (b"\xfd7zXZ\x00", "compressed by xz; unpack it first: unxz -k {}"),
