@@ -214,7 +214,7 @@ class BlueViewHost final : public protocol::Host {
   void on_answer(const Frame& frame, Time now, HostActions& actions) {
     const auto fail = [&actions](ErrorKind kind, std::string text) { actions.emplace_back(Error{kind, std::move(text)}); };
     if (frame.header.type == FrameType::error)
-      return fail(ErrorKind::bad_data, "refuses a request: " + text_of_error(frame.payload));
+      return fail(ErrorKind::usage, about() + " refuses a request: " + text_of_error(frame.payload));
     if (is_open_) {
       if (frame.header.type == FrameType::ping_data && asked_) on_ping(frame, actions);
       return;

@@ -67,7 +67,7 @@ HostActions PingHost::on_bytes(std::size_t, BytesView received, Time now) {
       std::string text;  // after the number of the request
       for (std::size_t i = 2; i < frame->payload.size(); ++i) text += static_cast<char>(frame->payload[i]);
       if (const auto why = on_nack(refused_in(*frame), std::move(text), actions))
-        actions.emplace_back(Error{ErrorKind::bad_data, "refused a request: " + *why});
+        actions.emplace_back(Error{ErrorKind::usage, about() + " refuses a request: " + *why});
     }
     if (auto ping = ping_from(*frame, now)) {
       ping->facts.message_size = header_size + frame->payload.size() + sum_size;

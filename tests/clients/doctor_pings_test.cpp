@@ -331,7 +331,7 @@ TEST(Doctor, PrintsWhatTheSonarAnswered) {
   s = {};
   s.outcome = Outcome::no_ping;
   s.refuses = true;
-  s.error = "tcp 127.0.0.2:62312 refused a request: wrong range";
+  s.error = "a Surveyor refuses a request: wrong range";
   expect(line(facts, "ping"), Level::fail, s.error, "sonarctl status");
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("another program")));
 }

@@ -228,7 +228,7 @@ TEST(WatchPings, KeepsWhatTheSonarRefuses) {
   doctor::watch_pings(sonar, nullptr, doctor::Steady::now() + 60s, clocks);
   EXPECT_EQ(sonar.stream.outcome, doctor::StreamFacts::Outcome::no_ping);
   EXPECT_TRUE(sonar.stream.refuses);
-  EXPECT_EQ(sonar.stream.error, "tcp 127.0.0.9:62312 refused a request: wrong range");
+  EXPECT_EQ(sonar.stream.error, "a Surveyor refuses a request: wrong range");
   EXPECT_THAT(sonar.stream.own, testing::StartsWith("127.0.0.1:"));
 }
 

@@ -105,7 +105,7 @@ Outcome outcome_of(const Error& error, const SonarFacts& sonar) {
   using Kind = protocol::HostPort::Kind;
   const Kind first = sonar.make->ports.front().kind;
   if (error.kind == ErrorKind::io) return Outcome::closed_without_a_byte;
-  if (error.kind == ErrorKind::bad_data) return Outcome::no_ping;
+  if (error.kind == ErrorKind::bad_data || error.kind == ErrorKind::usage) return Outcome::no_ping;
   const bool by_tcp = first == Kind::tcp || first == Kind::http;
   const bool is_refused = by_tcp ? refuses(sonar.at) : sonar.on_this_host && sonar.listeners.empty();
   return is_refused ? Outcome::refused : Outcome::unreachable;
@@ -136,6 +136,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
       PingStream::open(sonar.at, sonar.make, wanted, std::min<std::chrono::milliseconds>(connect_patience, left_until(deadline)));
   if (!stream) {
     facts.error = stream.error().text;
+    facts.refuses = stream.error().kind == ErrorKind::usage;
     facts.outcome = outcome_of(stream.error(), sonar);
     return;
   }

@@ -233,6 +233,17 @@ TEST(BlueViewDialogue, GarbageEndsOnlyTheConversation) {
   }
 }
 
+TEST(BlueViewHost, ARefusalIsAnErrorOfUsage) {
+  const auto host = *make_host({});
+  host->on_open({}, at_s(0));
+  const auto actions = host->on_bytes(0, make_error(1, Code::bad_parameter, "no such head"), at_s(0.1));
+  ASSERT_EQ(actions.size(), 1u);
+  const auto* refusal = std::get_if<Error>(&actions[0]);
+  ASSERT_NE(refusal, nullptr);
+  EXPECT_EQ(refusal->kind, ErrorKind::usage);
+  EXPECT_EQ(refusal->text.find("a BlueView sonar refuses a request: no such head"), 0u) << refusal->text;
+}
+
 TEST(BlueViewDialogue, NoMoreThanEightTriggersWait) {
   auto device = test::device();
   Host host(device);
