@@ -42,11 +42,12 @@ Line powers_in(BytesView rest, std::size_t count, float lowest_db, float highest
   return line;
 }
 
-Result<void> check_wanted(std::string_view title, const protocol::Vendor& device, std::initializer_list<std::string_view> known,
+Result<void> check_wanted(std::string_view title, std::optional<float> fastest_hz, std::initializer_list<std::string_view> known,
                           const protocol::Wanted& wanted) {
   if (auto accepted = protocol::accept_settings(wanted, title, known); !accepted) return accepted;
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, std::string(title) + " has one mode only");
-  const std::string why = protocol::rate_complaint(wanted.settings, title, device.models().front()->max_rate_hz);
+  const std::string why = fastest_hz ? protocol::rate_complaint(wanted.settings, title, *fastest_hz)
+                                     : protocol::rate_complaint(wanted.settings);
   if (!why.empty()) return protocol::refused(why);
   return {};
 }

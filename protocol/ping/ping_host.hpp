@@ -59,16 +59,16 @@ class PingHost : public protocol::Host {
   Framer framer_{65535};
 };
 
-/// Checks the wanted settings of a sonar with one mode and these options of sonarctl. Error usage: a setting that it does not
-/// have.
-Result<void> check_wanted(std::string_view title, const protocol::Vendor& device, std::initializer_list<std::string_view> known,
+/// Checks the wanted settings of a sonar with one mode, this highest rate (nullopt: not known yet) and these options of sonarctl.
+/// Error usage: a setting that it does not have.
+Result<void> check_wanted(std::string_view title, std::optional<float> fastest_hz, std::initializer_list<std::string_view> known,
                           const protocol::Wanted& wanted);
 
 template <class Product>
 Result<std::unique_ptr<protocol::Host>> host_of(std::string_view title, const protocol::Vendor& device,
                                                 Bytes (*request)(const protocol::SettingsOverride&),
                                                 std::initializer_list<std::string_view> known, const protocol::Wanted& wanted) {
-  if (auto fits = check_wanted(title, device, known, wanted); !fits) return tl::unexpected(fits.error());
+  if (auto fits = check_wanted(title, device.models().front()->max_rate_hz, known, wanted); !fits) return tl::unexpected(fits.error());
   return std::make_unique<Product>(title, wanted.as_it_is ? std::nullopt : std::optional(request(wanted.settings)));
 }
 

@@ -1,5 +1,5 @@
 // The host of an Omniscan and of an S500. Both have the same port. The host first asks for a message that only an S500 has, which
-// changes nothing. If the sonar refuses the request of the one product nevertheless, the host sends that of the other.
+// changes nothing. While the sonar is silent, the host repeats this question, and sends the request of an Omniscan once.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/text/format.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping_host.hpp"
 #include "protocol/ping/products.hpp"
@@ -38,14 +39,15 @@ Bytes s500_request(const protocol::SettingsOverride& wanted) {
 
 struct Product {
   std::string_view title;
-  Id request_id;
+  Id request_id, ping_id;
   Bytes (*request)(const protocol::SettingsOverride&);
+  const protocol::Vendor& (*device)();
 };
-constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, omniscan_request};
-constexpr Product s500_product{"an S500", Id::s500_set_ping_params, s500_request};
+constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, Id::os_mono_profile, omniscan_request, omniscan::vendor};
+constexpr Product s500_product{"an S500", Id::s500_set_ping_params, Id::s500_profile6, s500_request, s500::vendor};
 
 constexpr Id only_s500_has = Id::ping1d_range;           // an Omniscan refuses the request for this message
-constexpr std::chrono::milliseconds answer_within{500};  // a sonar that has not answered by then counts as an Omniscan
+constexpr std::chrono::milliseconds answer_within{500};  // our choice
 
 /// A ping of `rows` powers; its note, such as the distance, is not set yet.
 HostPing ping_of(std::uint32_t number, std::uint32_t start_mm, double row_m, std::size_t rows, double hz,
@@ -64,46 +66,67 @@ class PowerHost final : public PingHost {
  public:
   PowerHost(const Product& wanted, const Product& other, const protocol::Wanted& settings)
       : PingHost(wanted.title, settings.as_it_is ? std::nullopt : std::optional(wanted.request(settings.settings))),
-        title_(wanted.title),
-        refusable_(wanted.request_id),
-        other_(other),
+        product_(&wanted),
+        other_(&other),
         settings_(settings.settings) {}
-  HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
-    if (!asks() || title_ != omniscan_product.title) return PingHost::on_open(own, now);
-    ask_at_ = now + answer_within;
-    return {protocol::HostSend{0, request_for(only_s500_has)}};
+  HostActions on_open(std::span<const std::uint16_t>, Time now) override {
+    if (!asks()) return {};
+    if (product_ == &omniscan_product) return question(now);
+    HostActions actions;
+    request_pings(actions);
+    return actions;
   }
   HostActions on_tick(Time now) override {
-    HostActions actions;
-    if (ask_at_ && now >= *ask_at_) ask_once(actions);
+    if (!ask_at_ || now < *ask_at_) return {};
+    HostActions actions = question(now);
+    if (!has_requested_) request_pings(actions);
     return actions;
   }
   std::optional<Time> next_tick() const override { return ask_at_; }
-  bool is_open() const override { return !ask_at_; }
+  bool is_open() const override { return has_requested_ || !ask_at_; }
   /// Both products until the sonar shows which one it is: they share the port.
   std::string about() const override {
-    return shown_.empty() ? std::string(title_) + " or " + std::string(other_.title) : std::string(shown_);
+    return shown_.empty() ? std::string(product_->title) + " or " + std::string(other_->title) : std::string(shown_);
   }
 
  private:
-  void ask_once(HostActions& actions) {
-    if (std::exchange(ask_at_, std::nullopt)) ask(actions);
+  HostActions question(Time now) {
+    ask_at_ = now + answer_within;
+    return {protocol::HostSend{0, request_for(only_s500_has)}};
+  }
+  void request_pings(HostActions& actions) {
+    has_requested_ = true;
+    const std::string why =
+        protocol::rate_complaint(settings_, product_->title, product_->device().models().front()->max_rate_hz);
+    if (why.empty())
+      actions.emplace_back(protocol::HostSend{0, product_->request(settings_)});
+    else
+      actions.emplace_back(Error{ErrorKind::usage, why});
   }
   void switch_to_other(HostActions& actions) {
-    title_ = shown_ = other_.title;
-    actions.emplace_back(protocol::HostSend{0, other_.request(settings_)});
+    ask_at_.reset();
+    std::swap(product_, other_);
+    has_switched_ = true;
+    shown_ = product_->title;
+    request_pings(actions);
   }
+  /// The sonar is an Omniscan, to which the host's first request belongs.
+  void keep_product(HostActions& actions) {
+    if (std::exchange(ask_at_, std::nullopt) && !has_requested_) request_pings(actions);
+  }
+  /// An answer may come after the request of an Omniscan was sent. Pings may come before, if another host has requested them.
   void on_frame(const Frame& frame, HostActions& actions) override {
-    if (frame.header.id == only_s500_has && std::exchange(ask_at_, std::nullopt)) switch_to_other(actions);
+    const Id id = frame.header.id;
+    if (ask_at_ && (id == only_s500_has || id == s500_product.ping_id)) return switch_to_other(actions);
+    if (id == omniscan_product.ping_id) keep_product(actions);
   }
   /// The request was refused: the sonar is perhaps the other product. Its request is sent once; a second refusal is an error. A
   /// recording holds refusals of another host's request, which are ignored.
   std::optional<std::string> on_nack(Id refused, std::string why, HostActions& actions) override {
-    if (refused == only_s500_has) return ask_once(actions), std::nullopt;
-    const bool has_switched = title_ == other_.title;
-    if (refused != refusable_ && refused != other_.request_id) return why;
-    if (!asks() || refused != (has_switched ? other_.request_id : refusable_)) return std::nullopt;
-    if (has_switched) return refusal_.empty() ? why : refusal_ + "; as " + std::string(title_) + ": " + why;
+    if (refused == only_s500_has) return keep_product(actions), std::nullopt;
+    if (refused != product_->request_id && refused != other_->request_id) return why;
+    if (!asks() || refused != product_->request_id) return std::nullopt;
+    if (has_switched_) return refusal_.empty() ? why : refusal_ + "; as " + std::string(product_->title) + ": " + why;
     refusal_ = std::move(why);
     switch_to_other(actions);
     return std::nullopt;
@@ -139,19 +162,19 @@ class PowerHost final : public PingHost {
     return format("distance %.3f m, confidence %d %%", static_cast<double>(data.depth_m), data.confidence);
   }
 
-  std::string_view title_;  // the product whose request was sent last
+  const Product* product_;  // whose request was sent last, or is sent first
+  const Product* other_;
   std::string refusal_;     // why the request of the first product was refused
   std::string_view shown_;  // the product that refused the other's request, or whose ping came; empty: not known
-  Id refusable_;
-  const Product& other_;
   protocol::SettingsOverride settings_;
-  std::optional<Time> ask_at_;  // when the request is sent even if the sonar has not shown its product; nullopt: it was sent
+  std::optional<Time> ask_at_;  // when the question is repeated; nullopt: the product is known
+  bool has_requested_ = false, has_switched_ = false;
   protocol::Waterfall waterfall_;
 };
 
-Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Product& other, const protocol::Vendor& device,
-                                                const protocol::Wanted& wanted) {
-  if (auto fits = check_wanted(product.title, device, {"range", "rate", "gain", "mode"}, wanted); !fits)
+/// The rate is compared with the limit of the product that answers.
+Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Product& other, const protocol::Wanted& wanted) {
+  if (auto fits = check_wanted(product.title, std::nullopt, {"range", "rate", "gain", "mode"}, wanted); !fits)
     return tl::unexpected(fits.error());
   return std::make_unique<PowerHost>(product, other, wanted);
 }
@@ -159,10 +182,10 @@ Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Pr
 }  // namespace
 
 Result<std::unique_ptr<protocol::Host>> omniscan::make_host(const protocol::Wanted& wanted) {
-  return host_of(omniscan_product, s500_product, vendor(), wanted);
+  return host_of(omniscan_product, s500_product, wanted);
 }
 Result<std::unique_ptr<protocol::Host>> s500::make_host(const protocol::Wanted& wanted) {
-  return host_of(s500_product, omniscan_product, vendor(), wanted);
+  return host_of(s500_product, omniscan_product, wanted);
 }
 
 }  // namespace sonar::ping

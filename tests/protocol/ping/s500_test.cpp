@@ -237,10 +237,43 @@ TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
   const auto unanswered = opened();
   EXPECT_THAT(unanswered->on_tick(at_s(0.4)), testing::IsEmpty());
   EXPECT_FALSE(unanswered->is_open());
-  EXPECT_THAT(sent(unanswered->on_tick(*unanswered->next_tick())), ElementsAre(Id::os_ping_params));
+  EXPECT_THAT(sent(unanswered->on_tick(*unanswered->next_tick())), ElementsAre(Id::general_request, Id::os_ping_params));
   EXPECT_TRUE(unanswered->is_open());
   EXPECT_THAT(sent(unanswered->on_bytes(0, nack(Id::os_ping_params, 1, "unknown message"), at_s(1))),
               ElementsAre(Id::s500_set_ping_params));
+  EXPECT_FALSE(unanswered->next_tick());
+
+  // Some sonars are silent at first, for example behind a bridge that starts, and do not refuse messages that they do not know.
+  const auto silent = [&] {
+    auto host = opened();
+    host->on_tick(*host->next_tick());
+    EXPECT_THAT(sent(host->on_tick(*host->next_tick())), ElementsAre(Id::general_request)) << "the other request was sent";
+    return host;
+  };
+  EXPECT_THAT(sent(silent()->on_bytes(0, range, at_s(2))), ElementsAre(Id::s500_set_ping_params));
+  const auto omniscan = silent();
+  EXPECT_THAT(sent(omniscan->on_bytes(0, unknown, at_s(2))), ElementsAre());
+  EXPECT_FALSE(omniscan->next_tick());
+}
+
+/// The limit of the product that answers counts, not that of the one that was supposed.
+TEST(PowerHost, RefusesARateAboveThatOfTheProductThatAnswers) {
+  protocol::Wanted wanted;
+  wanted.settings.rate_hz = 20;
+  const auto opened = [&](const Bytes& answer) {
+    auto host = *omniscan::make_host(wanted);
+    host->on_open({}, at_s(0));
+    return host->on_bytes(0, answer, at_s(0.1));
+  };
+  const auto from_an_omniscan = opened(nack(Id::ping1d_range, 1, "unknown message"));
+  ASSERT_EQ(from_an_omniscan.size(), 1u);
+  EXPECT_TRUE(std::holds_alternative<protocol::HostSend>(from_an_omniscan[0]));
+  const auto from_an_s500 = opened(framed_message(Id::ping1d_range, 1, ScanRange{0, 5000}));
+  ASSERT_EQ(from_an_s500.size(), 1u);
+  const auto* error = std::get_if<Error>(&from_an_s500[0]);
+  ASSERT_NE(error, nullptr);
+  EXPECT_EQ(error->kind, ErrorKind::usage);
+  EXPECT_EQ(error->text, "the rate of an S500 is 0 to 10 Hz, not 20 Hz");
 }
 
 }  // namespace
