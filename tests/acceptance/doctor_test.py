@@ -110,6 +110,13 @@ class Doctor(unittest.TestCase):
         self.expect(findings, "status", "warn", "cannot listen on udp 52102, held without address reuse by", f"pid {os.getpid()}")
         self.assertEqual(command.returncode, 69)
 
+    def test_the_rate_is_that_which_was_set(self):
+        with Sonard(profile="m3") as daemon:
+            done = run(SONARCTL, "set", "sonar", "--rate", 2, "--control", f"{daemon.address}:14770")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            _, findings, _ = doctor(daemon.address, *PATIENT)
+        self.assertIn("(asked 2)", findings["rate"][0]["text"])
+
     def test_a_busy_sonar_is_left_alone(self):
         with Sonard() as daemon, socket.create_connection((daemon.address, 52100), 10) as driver:
             driver.settimeout(10)

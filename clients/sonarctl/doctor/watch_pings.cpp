@@ -21,7 +21,7 @@ class Watch {
  public:
   Watch(StreamFacts& facts, Steady::time_point deadline) : facts_(facts), deadline_(deadline) {}
 
-  void run(PingStream stream) {
+  void run(PingStream& stream) {
     bool ended = false;
     while (!ended && !over() && interrupted == 0) {
       const PingStream::Item item = stream.next(std::min<std::chrono::milliseconds>(50ms, left_until(deadline_)));
@@ -124,6 +124,19 @@ void set_latency(SonarFacts& sonar, std::vector<double> delays_s, ControlFacts& 
   sonar.stream.latency_p99_ms = 1000 * p99;
 }
 
+namespace {
+
+/// The rate with which the sonar pings for us, by its daemon; 0: unknown.
+double present_rate_hz(ControlClient& control, const std::string& sonar) {
+  const auto status = control.status(500ms);
+  if (!status) return 0;
+  for (const v1::SonarStatus& s : (*status)->sonars())
+    if (s.name() == sonar) return s.rate_hz();
+  return 0;
+}
+
+}  // namespace
+
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks) {
   StreamFacts& facts = sonar.stream;
   Wanted wanted;
@@ -142,7 +155,10 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
   }
   facts.own = stream->own();
   facts.asked_hz = stream->host().expects_echo() ? usual_hz : 0;
-  watch.run(std::move(*stream));
+  watch.run(*stream);
+  // Some sonars forget their rate when we leave.
+  if (facts.asked_hz == 0 && control != nullptr && !sonar.make->scans) facts.asked_hz = present_rate_hz(*control, sonar.name);
+  stream = failure(ErrorKind::io, "closed");
   if (control == nullptr || sonar.make->own_numbers) return;
   const Watch::DaemonTimes daemon_times = watch.daemon_times(*control, sonar.name);
   if (!daemon_times.computing_ms.empty()) facts.computing_ms = percentile(daemon_times.computing_ms, 0.5);
