@@ -170,7 +170,9 @@ class Ping360Host final : public PingHost {
     const auto line_of = [&](auto data) -> std::optional<HostPing> {
       const auto rest = read_front(frame, data);
       if (!rest || data.count == 0) return std::nullopt;
-      return line(data.angle, data.period, data.khz, rest->first(std::min<std::size_t>(rest->size(), data.count)));
+      HostPing ping = line(data.angle, data.period, data.khz, rest->first(std::min<std::size_t>(rest->size(), data.count)));
+      compare_gain(data.gain, 2, ping);
+      return ping;
     };
     if (frame.header.id == Id::auto_device_data) return line_of(AutoDeviceData{});
     return frame.header.id == Id::device_data ? line_of(DeviceData{}) : std::nullopt;

@@ -30,7 +30,7 @@ Bytes request(const protocol::SettingsOverride& wanted) {
     const Bytes range = framed_message(Id::ping1d_set_range, 0, ScanRange{0, static_cast<std::uint32_t>(std::lround(length_mm))});
     all.insert(all.end(), range.begin(), range.end());
     if (wanted.gain_percent)
-      add_value(all, Id::ping1d_set_gain, static_cast<std::uint8_t>(std::lround(6 * *wanted.gain_percent / 100)));
+      add_value(all, Id::ping1d_set_gain, static_cast<std::uint8_t>(std::lround(most_gain * *wanted.gain_percent / 100)));
   }
   const double period_ms = wanted.rate_hz ? period_ms_of(wanted) : 100;
   if (period_ms > 0) add_value(all, Id::ping1d_set_interval, static_cast<std::uint16_t>(std::lround(period_ms)));
@@ -62,6 +62,7 @@ class Ping1DHost final : public PingHost {
                    static_cast<double>(vendor().models().front()->modes.front().centre_hz),
                    0};
     found.facts.note = text::format("distance %.3f m, confidence %d %%", 1e-3 * data.distance_mm, data.confidence);
+    compare_gain(static_cast<int>(data.gain), most_gain, found);
     found.picture = []() -> Result<PolarImage> {
       return failure(ErrorKind::usage, "one ping of one beam makes no picture: sonarctl listen prints the distances of a Ping1D");
     };

@@ -16,6 +16,8 @@ namespace sonar::ping::ping1d {
 
 std::span<const std::shared_ptr<const SonarModel>> models();
 
+inline constexpr int most_gain = 6;
+
 struct Parameters {
   ScanRange range{0, 5000};
   std::uint32_t speed_mm_per_s = 1500000;

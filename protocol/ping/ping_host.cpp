@@ -1,9 +1,11 @@
 #include "protocol/ping/ping_host.hpp"
 
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "core/sonar/ping.hpp"
+#include "core/text/format.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/ping/products.hpp"
 
@@ -46,10 +48,16 @@ Result<void> check_wanted(std::string_view title, std::optional<float> fastest_h
                           const protocol::Wanted& wanted) {
   if (auto accepted = protocol::accept_settings(wanted, title, known); !accepted) return accepted;
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, std::string(title) + " has one mode only");
-  const std::string why = fastest_hz ? protocol::rate_complaint(wanted.settings, title, *fastest_hz)
-                                     : protocol::rate_complaint(wanted.settings);
+  const std::string why =
+      fastest_hz ? protocol::rate_complaint(wanted.settings, title, *fastest_hz) : protocol::rate_complaint(wanted.settings);
   if (!why.empty()) return protocol::refused(why);
   return {};
+}
+
+void PingHost::compare_gain(int step, int most, HostPing& ping) const {
+  const double percent = 100.0 * step / most;
+  if (wanted_gain_percent_ && std::abs(percent - *wanted_gain_percent_) > 0.5)
+    ping.limited.push_back(text::format("gain %.0f %% (step %d of %d), not %g %%", percent, step, most, *wanted_gain_percent_));
 }
 
 HostActions PingHost::on_open(std::span<const std::uint16_t>, Time) {

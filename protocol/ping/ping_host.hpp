@@ -36,7 +36,8 @@ Line powers_in(BytesView rest, std::size_t count, float lowest_db, float highest
 
 class PingHost : public protocol::Host {
  public:
-  PingHost(std::string_view title, std::optional<Bytes> request) : title_(title), request_(std::move(request)) {}
+  PingHost(std::string_view title, std::optional<Bytes> request, const protocol::SettingsOverride& wanted = {})
+      : title_(title), request_(std::move(request)), wanted_gain_percent_(wanted.gain_percent) {}
 
   protocol::HostActions on_open(std::span<const std::uint16_t>, Time) override;
   protocol::HostActions on_bytes(std::size_t, BytesView received, Time now) override;
@@ -47,6 +48,8 @@ class PingHost : public protocol::Host {
   void ask(protocol::HostActions& actions) const {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
+  /// Tells the user if the gain of the ping, `step` of 0 to `most`, is not the wanted one, because a gain has few steps.
+  void compare_gain(int step, int most, protocol::HostPing& ping) const;
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
   /// The reason of the error; nullopt: none, because the host sends another request in place of the refused one. `why`: what the
   /// sonar says.
@@ -56,6 +59,7 @@ class PingHost : public protocol::Host {
  private:
   std::string_view title_;
   std::optional<Bytes> request_;  // the request for pings; empty: the host requests none
+  std::optional<double> wanted_gain_percent_;
   Framer framer_{65535};
 };
 
@@ -68,8 +72,10 @@ template <class Product>
 Result<std::unique_ptr<protocol::Host>> host_of(std::string_view title, const protocol::Vendor& device,
                                                 Bytes (*request)(const protocol::SettingsOverride&),
                                                 std::initializer_list<std::string_view> known, const protocol::Wanted& wanted) {
-  if (auto fits = check_wanted(title, device.models().front()->max_rate_hz, known, wanted); !fits) return tl::unexpected(fits.error());
-  return std::make_unique<Product>(title, wanted.as_it_is ? std::nullopt : std::optional(request(wanted.settings)));
+  if (auto fits = check_wanted(title, device.models().front()->max_rate_hz, known, wanted); !fits)
+    return tl::unexpected(fits.error());
+  return std::make_unique<Product>(title, wanted.as_it_is ? std::nullopt : std::optional(request(wanted.settings)),
+                                   wanted.as_it_is ? protocol::SettingsOverride{} : wanted.settings);
 }
 
 }  // namespace sonar::ping

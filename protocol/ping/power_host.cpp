@@ -42,9 +42,10 @@ struct Product {
   Id request_id, ping_id;
   Bytes (*request)(const protocol::SettingsOverride&);
   const protocol::Vendor& (*device)();
+  int most_gain;
 };
-constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, Id::os_mono_profile, omniscan_request, omniscan::vendor};
-constexpr Product s500_product{"an S500", Id::s500_set_ping_params, Id::s500_profile6, s500_request, s500::vendor};
+constexpr Product omniscan_product{"an Omniscan", Id::os_ping_params, Id::os_mono_profile, omniscan_request, omniscan::vendor, 7};
+constexpr Product s500_product{"an S500", Id::s500_set_ping_params, Id::s500_profile6, s500_request, s500::vendor, 13};
 
 constexpr Id only_s500_has = Id::ping1d_range;           // an Omniscan refuses the request for this message
 constexpr std::chrono::milliseconds answer_within{500};  // our choice
@@ -65,7 +66,8 @@ HostPing ping_of(std::uint32_t number, std::uint32_t start_mm, double row_m, std
 class PowerHost final : public PingHost {
  public:
   PowerHost(const Product& wanted, const Product& other, const protocol::Wanted& settings)
-      : PingHost(wanted.title, settings.as_it_is ? std::nullopt : std::optional(wanted.request(settings.settings))),
+      : PingHost(wanted.title, settings.as_it_is ? std::nullopt : std::optional(wanted.request(settings.settings)),
+                 settings.as_it_is ? protocol::SettingsOverride{} : settings.settings),
         product_(&wanted),
         other_(&other),
         settings_(settings.settings) {}
@@ -143,12 +145,15 @@ class PowerHost final : public PingHost {
     const double row_m = 1e-3 * data.length_mm / std::max<double>(data.results, 1);
     shown_ = title_of(data);
     HostPing found = ping_of(data.ping, data.start_mm, row_m, powers.size(), hz_of(data), title_of(data));
+    compare_gain(data.gain, most_gain_of(data), found);
     if (powers.empty()) return found;
     found.facts.note = note_of(data, powers, row_m);
     waterfall_.add(std::move(powers), 1e-3 * data.start_mm, row_m, now, found);
     return found;
   }
 
+  static int most_gain_of(const OsMonoProfile&) { return omniscan_product.most_gain; }
+  static int most_gain_of(const Profile6&) { return s500_product.most_gain; }
   static double hz_of(const OsMonoProfile& data) { return data.hz; }
   static double hz_of(const Profile6& data) { return (data.start_hz + data.end_hz) / 2.0; }
   static std::string_view title_of(const OsMonoProfile&) { return omniscan_product.title; }

@@ -310,6 +310,25 @@ TEST(Makes, RefuseARateAboveThatOfTheSonar) {
   }
 }
 
+TEST(Makes, TellTheGainOfTheNearestStep) {
+  for (const auto& [name, told] :
+       {std::pair("ping1d", "gain 33 % (step 2 of 6), not 40 %"), std::pair("s500", "gain 38 % (step 5 of 13), not 40 %"),
+        std::pair("omniscan450", "gain 43 % (step 3 of 7), not 40 %"),
+        std::pair("ping360", "gain 50 % (step 1 of 2), not 40 %")}) {
+    Wanted wanted;
+    wanted.settings.gain_percent = 40;
+    Talk talk(*find_make(name), wanted);
+    talk.run(3);
+    ASSERT_FALSE(talk.pings.empty()) << name;
+    EXPECT_THAT(talk.pings.back().limited, testing::ElementsAre(told)) << name;
+    wanted.settings.gain_percent = 100;
+    Talk exact(*find_make(name), wanted);
+    exact.run(3);
+    ASSERT_FALSE(exact.pings.empty()) << name;
+    EXPECT_THAT(exact.pings.back().limited, testing::IsEmpty()) << name;
+  }
+}
+
 TEST(Makes, HaveNamesAndPortsOfTheirOwn) {
   for (const Make& one : makes()) {
     EXPECT_FALSE(one.title.empty());
