@@ -9,9 +9,9 @@
 
 namespace sonar {
 
-/// Pictures of points come from multibeam echo sounders, which look down.
+/// Points of a sonar that looks down are drawn below it.
 inline Opens opens_of(const SonarPicture& picture) {
-  return picture.kind == PictureKind::points ? Opens::downwards : Opens::upwards;
+  return picture.kind == PictureKind::points && picture.elevation_rad < 0 ? Opens::downwards : Opens::upwards;
 }
 
 /// Height of the picture in pixels, for the width in `style`. The picture must be one that PicturePainter accepts.

@@ -67,7 +67,7 @@ struct SonarPicture {
   /// a column for each range, `row_spacing_m` apart, beginning at `start_m`.
   PolarImage image;
   double head_rad = 0;                 // sweep: direction of the head, positive to port
-  double elevation_rad = 0;            // range image: elevation of the highest row; the lowest row has the negative value
+  double elevation_rad = 0;            // range image: of the highest row, minus that of the lowest; points: where the fan looks
   std::vector<double> row_age_s = {};  // waterfall: time from the ping of each row to the newest; empty: not known
   std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
   enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: `image` is empty

@@ -74,6 +74,9 @@ PolarImage with_samples(PolarImage fan, const Column& column) {
   return fan;
 }
 
+/// Where the fan looks: mode 0 is that of a forward-looking sonar.
+double elevation_of(int sonar_mode) { return sonar_mode == 0 ? 0 : -pi / 2; }
+
 /// A fan without samples. Points are drawn on it if there is no water column.
 PolarImage empty_fan(double range_m) {
   const double half_rad = rad_from_deg(swath_deg / 2);
@@ -204,6 +207,7 @@ class NorbitHost final : public protocol::Host {
       ping.facts.rows = 1;
       ping.facts.frequency_hz = static_cast<double>(front.frequency_hz);
       ping.fired_s = front.time_s;
+      seen.elevation_rad = elevation_of(front.sonar_mode);
       double nearest_m = 0, farthest_m = 0;
       for (const auto& [azimuth, range_m] : seen.points) {
         nearest_m = nearest_m == 0 ? range_m : std::min(nearest_m, range_m);
@@ -224,6 +228,7 @@ class NorbitHost final : public protocol::Host {
       ping.facts.range_m = (front.first_sample - 0.5 + static_cast<double>(front.samples)) * column.sample_m();
       ping.facts.frequency_hz = 1e3 * static_cast<double>(front.frequency_khz);
       ping.fired_s = front.time_s;
+      seen.elevation_rad = elevation_of(front.sonar_mode);
       fan = fan_of(column);
       if (!fan) ping.errors.emplace_back("the directions of the beams do not rise, or its samples have no range");
     }

@@ -329,6 +329,20 @@ TEST(Makes, TellTheGainOfTheNearestStep) {
   }
 }
 
+/// A fan of points opens downwards if the sonar looks down.
+TEST(Makes, DrawASonarThatLooksAheadUpwards) {
+  std::map<std::string, bool> downwards;
+  for (const Make& make : makes())
+    for (std::size_t model = 0; model < make.device->models().size() && make.picture == PictureKind::points; ++model) {
+      Talk talk(make, {}, 0, model);
+      talk.run(30);
+      ASSERT_FALSE(talk.pings.empty()) << make.name();
+      downwards[talk.state.model->profile] = talk.pings.back().drawing().elevation_rad < 0;
+    }
+  EXPECT_THAT(downwards, testing::ElementsAre(std::pair("norbit-fls", false), std::pair("norbit-wbms", true),
+                                              std::pair("surveyor-240", true)));
+}
+
 TEST(Makes, HaveNamesAndPortsOfTheirOwn) {
   for (const Make& one : makes()) {
     EXPECT_FALSE(one.title.empty());

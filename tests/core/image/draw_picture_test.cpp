@@ -148,7 +148,7 @@ TEST(SonarPicture, LabelsCanBeReadOverTheBrightestEchoes) {
 }
 
 TEST(SonarPicture, PointsLieOverAFanThatOpensDownwards) {
-  SonarPicture picture{.kind = PictureKind::points, .image = cells(100, 2), .points = {{0.3, 5}, {0, 99}}};
+  SonarPicture picture{.kind = PictureKind::points, .image = cells(100, 2), .elevation_rad = -1, .points = {{0.3, 5}, {0, 99}}};
   picture.image.azimuth_rad = {0.7, -0.7};
   const Raster raster = *PicturePainter(style()).draw(picture);
   const FanLayout layout = fan_layout(picture.image, style(), Opens::downwards);
@@ -182,6 +182,7 @@ TEST(SonarPicture, AFanThatOpensDownwardsIsTheOtherUpsideDown) {
   PicturePainter painter(style());
   const Raster up = *painter.draw(picture);
   picture.kind = PictureKind::points;
+  picture.elevation_rad = -1;
   const Raster down = *painter.draw(picture);
   ASSERT_EQ(up.height, down.height);
   const int y = up.height / 3, x = up.width / 2 - 20;

@@ -121,7 +121,7 @@ export class Fan {
 
   showDrawn({ image, about }) {
     const is_polar = about.starboard_rad !== about.port_rad && about.kind !== 'range image';
-    this.polar = is_polar ? { start_m: about.range_start_m, range_m: about.range_m, azimuth_rad: [about.port_rad, about.starboard_rad], beams: 2, up: about.kind === 'points' ? -1 : 1 } : null;
+    this.polar = is_polar ? { start_m: about.range_start_m, range_m: about.range_m, azimuth_rad: [about.port_rad, about.starboard_rad], beams: 2, up: about.kind === 'points' && about.elevation_rad < 0 ? -1 : 1 } : null;
     this.samples = null;
     const shape = JSON.stringify([image.width, image.height, this.polar]);
     if (shape !== this.shape) this.layout = null;
