@@ -28,6 +28,7 @@ constexpr auto answer_patience = 3000ms;       // minimum once a sonar has answe
 constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
 constexpr auto probe_after = 500ms;            // without a datagram; sonard takes longer to start again
 constexpr auto longest_pause = 160ms;          // between attempts
+constexpr auto leave_patience = 1000ms;        // for the sonar to close the connection too
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
 
@@ -125,8 +126,21 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
   }
 }
 
+/// Waits until the sonar closes the connection too: a close with unread bytes would reset it, and lose the last messages.
 PingStream::~PingStream() {
-  if (host_ != nullptr && is_started_ && !ended_) carry_out(host_->on_leave());
+  if (host_ == nullptr || !is_started_ || ended_) return;
+  protocol::HostActions last = host_->on_leave();
+  if (last.empty()) return;
+  carry_out(std::move(last));
+  const auto until = Clock::now() + leave_patience;
+  for (std::size_t port = 0; port < sockets_.size(); ++port) {
+    if (make_->ports[port].kind != Kind::tcp || !sockets_[port]) continue;
+    ::shutdown(sockets_[port]->fd(), SHUT_WR);
+    for (pollfd ready{sockets_[port]->fd(), POLLIN, 0}; Clock::now() < until;) {
+      if (::poll(&ready, 1, static_cast<int>(left_until(until).count())) < 0 && errno == EINTR) continue;
+      if (::recv(ready.fd, chunk_.data(), chunk_.size(), MSG_DONTWAIT) <= 0) break;
+    }
+  }
 }
 
 std::string PingStream::place() const { return (make_->is_by_udp() ? "udp " : "tcp ") + text_from(device_); }

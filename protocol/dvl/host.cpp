@@ -16,13 +16,19 @@ constexpr std::string_view title = "a DVL";
 constexpr std::size_t points = 200;  // points of a line of the waterfall
 constexpr float silent_db = -2000;   // below every echo, so that lines without one are dark
 
-Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
-  const bool enable = wanted.rate_hz.value_or(1) > 0;
-  const nlohmann::ordered_json message{
-      {"command", "set_config"},
-      {"parameters",
-       {{"acoustic_enabled", enable}, {"range_mode", wanted.range_m ? range_mode_for(*wanted.range_m, product) : "auto"}}}};
+Bytes set_config(bool acoustics, const std::string& range_mode) {
+  const nlohmann::ordered_json message{{"command", "set_config"},
+                                       {"parameters", {{"acoustic_enabled", acoustics}, {"range_mode", range_mode}}}};
   return line_of(message.dump());
+}
+
+/// First asks for the settings, so that on_leave() can put them back: the device keeps those of the last driver.
+Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
+  Bytes all = line_of(R"({"command":"get_config"})");
+  const Bytes ours =
+      set_config(wanted.rate_hz.value_or(1) > 0, wanted.range_m ? range_mode_for(*wanted.range_m, product) : "auto");
+  all.insert(all.end(), ours.begin(), ours.end());
+  return all;
 }
 
 /// The reach of the shortest range mode that covers the distance. The picture has this range, so that its scale is steady.
@@ -60,12 +66,17 @@ class DvlHost final : public protocol::Host {
     }
     return actions;
   }
+  HostActions on_leave() override {
+    if (!before_ || !before_->acoustics) return {};
+    return {protocol::HostSend{0, set_config(*before_->acoustics, before_->range_mode)}};
+  }
   std::string about() const override { return std::string(title); }
 
  private:
   void on_line(HostActions& actions, Time now) {
     const Line line = read_line(line_);
     if (line.velocity) actions.emplace_back(ping_from(line.velocity->measured, now));
+    if (line.response && request_ && line.response->to == "get_config" && !before_) before_ = line.response;
     if (line.response && !line.response->success)
       actions.emplace_back(Error{ErrorKind::usage, "the DVL refuses " + line.response->to + ": " + line.response->error});
   }
@@ -96,7 +107,8 @@ class DvlHost final : public protocol::Host {
 
   const Product& product_ = product_of(*models().front());  // the first product, because reports do not name the model
   std::optional<Bytes> request_;
-  double window_m_ = 0;  // the picture has at least the wanted range
+  std::optional<Response> before_;  // settings that the device had
+  double window_m_ = 0;             // the picture has at least the wanted range
   Bytes line_;
   std::uint32_t number_ = 0;
   protocol::Waterfall waterfall_;

@@ -160,9 +160,13 @@ Line read_line(BytesView line) {
   const std::string type = text(message, "type");
   if (type == "velocity") return {.velocity = velocity_from(message)};
   if (type == "position_local") return {.position = position_from(message)};
-  if (type == "response")
-    return {.response = Response{text(message, "response_to"), text(message, "error_message"),
-                                 truth(message, "success").value_or(false)}};
+  if (type == "response") {
+    const auto result = message.find("result");
+    const Json found = result != message.end() && result->is_object() ? *result : Json::object();
+    return {.response =
+                Response{text(message, "response_to"), text(message, "error_message"), truth(message, "success").value_or(false),
+                         truth(found, "acoustic_enabled"), text(found, "range_mode")}};
+  }
   return {};
 }
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "core/text/format.hpp"
@@ -14,8 +15,9 @@ namespace {
 using protocol::HostActions;
 using protocol::HostPing;
 
-constexpr double usual_range_m = 10, sound_mps = 1500;     // bins are intervals of time; drivers assume 1500 m/s
-constexpr auto patience = std::chrono::milliseconds(500);  // time after which a request without a scan line is repeated
+constexpr double usual_range_m = 10, sound_mps = 1500;      // bins are intervals of time; drivers assume 1500 m/s
+constexpr auto patience = std::chrono::milliseconds(500);   // time after which a request without a scan line is repeated
+constexpr auto learning = std::chrono::milliseconds(2500);  // longest wait for the parameters that the head has
 
 /// Parameters for a scan of the half circle ahead in steps of a grad.
 HeadCommand command_of(const protocol::SettingsOverride& wanted) {
@@ -34,17 +36,47 @@ HeadCommand command_of(const protocol::SettingsOverride& wanted) {
   return c;
 }
 
+/// The parameters with which a scan line was made.
+HeadCommand command_of(const HeadData& line) {
+  HeadCommand c;
+  c.control = line.control;
+  c.device_type = line.device_type;
+  c.range_dm = line.range_dm;
+  c.left = line.left;
+  c.right = line.right;
+  c.ad_span = line.ad_span;
+  c.ad_low = line.ad_low;
+  c.gain = c.gain2 = line.gain;
+  c.slope.fill(line.slope);
+  c.step = line.step;
+  c.interval = line.interval;
+  c.bins = static_cast<std::uint16_t>((line.control & control::eight_bits) != 0 ? line.size : 2 * line.size);
+  return c;
+}
+
+/// The head keeps the parameters of the last driver. If it has some, the host first requests a line, which states them, and puts
+/// them back when it leaves.
 class MicronHost final : public protocol::Host {
  public:
   explicit MicronHost(std::optional<HeadCommand> command) : command_(std::move(command)) {}
 
   HostActions on_open(std::span<const std::uint16_t>, Time now) override {
-    if (!command_) return {};
-    return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))}, request(now)};
+    if (command_) learns_until_ = now + learning;
+    return {};
   }
   /// Repeats the request, because it or its answer may be lost.
-  HostActions on_tick(Time now) override { return command_ && now >= *next_tick() ? HostActions{request(now)} : HostActions{}; }
-  std::optional<Time> next_tick() const override { return command_ ? std::optional(requested_at_ + patience) : std::nullopt; }
+  HostActions on_tick(Time now) override {
+    if (!command_ || now < *next_tick()) return {};
+    return learns_until_ ? begin(now) : HostActions{request(now)};
+  }
+  std::optional<Time> next_tick() const override {
+    if (!command_) return std::nullopt;
+    return learns_until_ ? learns_until_ : std::optional(requested_at_ + patience);
+  }
+  HostActions on_leave() override {
+    if (!before_) return {};
+    return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*before_))}};
+  }
   HostActions on_bytes(std::size_t, BytesView received, Time now) override {
     HostActions actions;
     splitter_.append(now, received);
@@ -55,8 +87,13 @@ class MicronHost final : public protocol::Host {
         continue;
       }
       ++counts_.messages;
-      if (message->header.id == Id::alive) on_alive(message->payload, actions);
+      if (message->header.id == Id::alive) on_alive(message->payload, now, actions);
       if (message->header.id != Id::head_data) continue;
+      if (learns_until_) {
+        if (const auto line = read_front<HeadData>(message->payload)) before_ = command_of(*line);
+        std::ranges::move(begin(now), std::back_inserter(actions));
+        continue;
+      }
       if (auto ping = ping_from(message->payload)) {
         ping->facts.message_size = whole->bytes.size();
         actions.emplace_back(*std::move(ping));
@@ -74,10 +111,22 @@ class MicronHost final : public protocol::Host {
     return {0, from_host(Id::send_data, Bytes(4))};
   }
 
+  /// Sends the parameters and the first request.
+  HostActions begin(Time now) {
+    learns_until_.reset();
+    return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))}, request(now)};
+  }
+
   /// Sends the parameters again to a head that has lost them by a restart.
-  void on_alive(BytesView payload, HostActions& actions) const {
+  void on_alive(BytesView payload, Time now, HostActions& actions) {
     const auto alive = read_front<Alive>(payload);
-    if (alive && command_ && (alive->head_info & head_info::received_parameters) == 0)
+    if (!alive || !command_) return;
+    const bool has_parameters = (alive->head_info & head_info::received_parameters) != 0;
+    if (learns_until_ && has_parameters)
+      actions.emplace_back(request(now));
+    else if (learns_until_)
+      std::ranges::move(begin(now), std::back_inserter(actions));
+    else if (!has_parameters)
       actions.emplace_back(protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))});
   }
 
@@ -109,6 +158,8 @@ class MicronHost final : public protocol::Host {
   }
 
   std::optional<HeadCommand> command_;  // nullopt: this host sends nothing, as for a recording
+  std::optional<HeadCommand> before_;   // parameters that the head had
+  std::optional<Time> learns_until_;    // while the host waits for them
   recording::MessageSplitter splitter_{recording::Origin::device, framing};
   protocol::Sweep sweep_{400};
   Time requested_at_{};

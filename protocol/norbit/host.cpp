@@ -3,7 +3,10 @@
 #include <chrono>
 #include <cmath>
 #include <deque>
+#include <map>
 #include <set>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/base/geometry.hpp"
@@ -20,18 +23,28 @@ using protocol::HostPing;
 using text::format;
 
 constexpr std::size_t empty_rows = 500;
+constexpr std::size_t longest_reply = 512;
 constexpr double usual_range_m = 10, usual_rate_hz = 10;
 constexpr auto patience = std::chrono::seconds(2);  // wait for a silent port after the other port has sent its packet
 constexpr std::size_t most_waiting = 1024, most_waiting_bytes = 64u << 20;
 
+constexpr std::array<std::string_view, 4> set_by_us{"set_range", "set_gain", "set_rate", "set_power"};
+
+Bytes bytes_of(std::string_view text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return Bytes(bytes.begin(), bytes.end());
+}
+
+/// First queries the settings, so that on_leave() can put them back: the sonar keeps those of the last driver.
 Bytes request_of(const protocol::SettingsOverride& wanted) {
-  std::string text = format("set_range 0 %g\r\n", wanted.range_m.value_or(usual_range_m));
+  std::string text;
+  for (const std::string_view name : set_by_us) text.append(name).append("\r\n");
+  text += format("set_range 0 %g\r\n", wanted.range_m.value_or(usual_range_m));
   if (wanted.gain_percent) text += format("set_gain %g\r\n", most_gain_db * *wanted.gain_percent / 100);
   const double rate_hz = wanted.rate_hz.value_or(usual_rate_hz);
   if (rate_hz != 0) text += format("set_rate %g\r\n", rate_hz);
   text += rate_hz == 0 ? "set_power 0\r\n" : "set_power 1\r\n";
-  const auto bytes = std::as_bytes(std::span(text));
-  return Bytes(bytes.begin(), bytes.end());
+  return bytes_of(text);
 }
 
 std::vector<std::pair<double, double>> points_of(const Bathymetry& bathymetry) {
@@ -92,12 +105,13 @@ class NorbitHost final : public protocol::Host {
   HostActions on_open(std::span<const std::uint16_t>, Time now) override {
     begun_ = now;
     if (!request_) return {};
-    return {protocol::HostSend{std::size(host_ports) - 1, *request_}};
+    return {protocol::HostSend{command_port_index, *request_}};
   }
   HostActions on_bytes(std::size_t port, BytesView received, Time now) override {
     HostActions actions;
     if (!begun_) begun_ = now;
     if (port < kinds) heard_at_[port] = now;
+    if (port == command_port_index && request_) return on_replies(received);
     auto& splitter = splitters_[std::min(port, splitters_.size() - 1)];  // a recording has the packets of all ports in one stream
     splitter.append(now, received);
     while (auto whole = splitter.next()) {
@@ -126,10 +140,33 @@ class NorbitHost final : public protocol::Host {
     if (waiting_.empty()) return std::nullopt;
     return given_up_at(waiting_.front());
   }
+  HostActions on_leave() override {
+    std::string text;
+    for (const auto& [name, values] : before_) text.append(name).append(" ").append(values).append("\r\n");
+    if (text.empty()) return {};
+    return {protocol::HostSend{command_port_index, bytes_of(text)}};
+  }
   std::string about() const override { return "a Norbit"; }
   std::optional<Counts> counts() const override { return counts_; }
 
  private:
+  static constexpr std::size_t command_port_index = std::size(host_ports) - 1;
+
+  /// The first reply with a name has the values before our settings: "set_range 0 10 # m".
+  HostActions on_replies(BytesView received) {
+    for (const std::byte b : received) {
+      const char c = std::to_integer<char>(b);
+      if (c != '\n' && reply_.size() < longest_reply) reply_ += c;
+      if (c != '\n') continue;
+      const std::string line = std::exchange(reply_, {});
+      const std::size_t space = line.find(' '), end = std::min(line.find_first_of("#\r"), line.size());
+      if (space >= end) continue;
+      const auto name = std::ranges::find(set_by_us, std::string_view(line).substr(0, space));
+      if (name != set_by_us.end()) before_.try_emplace(*name, line.substr(space + 1, end - space - 1));
+    }
+    return {};
+  }
+
   enum Kind : std::size_t { of_bottom, of_column, kinds };  // packets, by their port
   struct Parts {
     std::uint32_t number = 0;
@@ -252,6 +289,8 @@ class NorbitHost final : public protocol::Host {
   }
 
   std::optional<Bytes> request_;
+  std::string reply_;                               // the beginning of a reply
+  std::map<std::string_view, std::string> before_;  // settings that the sonar had, by the name of their command
   static recording::MessageSplitter splitter() { return {recording::Origin::device, framing}; }
   std::array<recording::MessageSplitter, 3> splitters_{splitter(), splitter(), splitter()};
   std::deque<Parts> waiting_;  // the first ping of the queue lacks a packet

@@ -90,6 +90,19 @@ class Link(unittest.TestCase):
             self.assertIn("unchanged", driver.say("set_range 0 1000"))
             eventually(lambda: "set_range is refused" in daemon.log())
 
+    def test_sonarctl_leaves_the_settings_of_the_last_driver(self):
+        with Sonard(profile="norbit-wbms") as daemon, tempfile.TemporaryDirectory() as folder:
+            at, control = f"{daemon.address}:{BATHYMETRY}", ("--control", f"{daemon.address}:14770")
+            wanted = ("set_power 0", "set_range 0 7", "set_rate 3", "set_gain 11")
+            with Driver(daemon.address) as driver:
+                settings = [driver.say(f"{command}\r\n") for command in wanted]
+            for command in (("view", at, "--png", f"{folder}/ping.png", "--range", 5, "--gain", 50, "--wait", 100),
+                            ("doctor", at, "--within", 40, "--http", f"{daemon.address}:8088", *control)):
+                done = run(SONARCTL, *command)
+                self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
+                with Driver(daemon.address) as driver:
+                    self.assertEqual([driver.say(f"{name.split()[0]}\r\n") for name in wanted], settings, command[0])
+
     def test_sonarctl_hears_it_over_a_floor(self):
         with Sonard(scene="demo.yaml", profile="norbit-wbms", mount="{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}") as daemon:
             done = run(SONARCTL, "listen", f"{daemon.address}:{BATHYMETRY}", "--range", 20, "--rate", 5, "--wait", 100, "--pings", 3)

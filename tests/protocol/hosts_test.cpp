@@ -264,6 +264,22 @@ TEST_P(Hosts, AskForSlowPingsWhenTheRateIsLessThanTheWireCanSay) {
   }
 }
 
+/// A doctor or a viewer must not change what the next driver finds.
+TEST_P(Hosts, LeaveASonarThatKeepsItsSettingsAsTheyFoundIt) {
+  if (!GetParam().device->keeps_settings() || sets_nothing(GetParam())) return;
+  Talk talk(GetParam(), all_that_is_known(GetParam(), 7));
+  talk.run(30);
+  const auto found = talk.state.settings;
+  talk.pings.clear();
+  talk.open(*GetParam().host(all_that_is_known(GetParam(), range_m)));
+  talk.run(30);
+  ASSERT_FALSE(talk.error) << talk.error->text;
+  EXPECT_FALSE(talk.pings.empty());
+  EXPECT_FALSE(talk.state.settings->equals(*found)) << "it sets what is wanted";
+  talk.carry_out(talk.host->on_leave());
+  EXPECT_TRUE(talk.state.settings->equals(*found));
+}
+
 TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   Wanted nothing;
   nothing.as_it_is = true;

@@ -65,6 +65,11 @@ class Talk {
     settings = first.settings;
     if (sets_nothing(of)) apply({*device.apply_override(wanted.settings, state)});
     for (const auto& [at, port] : test::conversations_of(make)) lines_.push_back({at, port, device.converse(*port, state, now)});
+    open(std::move(host));
+  }
+  /// The host takes the place of the present one.
+  void open(std::unique_ptr<Host> next) {
+    host = std::move(next);
     const std::vector<std::uint16_t> own(make.ports.size(), 40000);
     carry_out(host->on_open(own, now));
   }
