@@ -118,7 +118,10 @@ void PingSource::update_pacer(Time now) {
 
 void PingSource::run_itself(bool on, Time now) {
   if (std::exchange(runs_itself_, on) == on || audience_.has_audience()) return;
-  use_initial_settings();
+  if (on)
+    drop_pings();
+  else
+    forget_clients();  // as when the last client leaves
   update_pacer(now);
 }
 

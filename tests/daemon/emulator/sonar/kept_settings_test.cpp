@@ -45,6 +45,21 @@ TEST(KeptSettings, OutlastTheLastClientOfAMakeThatKeepsThemAndOfNoOther) {
   EXPECT_THAT(keepers, ::testing::ElementsAre("dvl", "micron", "norbit"));
 }
 
+TEST(KeptSettings, ASonarThatStartsToPingByItselfUsesThePresentOnes) {
+  VirtualTime time(one("ping1d"));
+  Sonar& sonar = time.sonar("front");
+  const auto initial = sonar.state().settings;
+  protocol::SettingsOverride rate;
+  rate.rate_hz = 5;
+  ASSERT_TRUE(sonar.change(rate, "a client", time.now));
+  const auto changed = sonar.state().settings;
+  ASSERT_FALSE(changed->equals(*initial));
+  sonar.run_itself(true, time.now);
+  EXPECT_TRUE(sonar.state().settings->equals(*changed));
+  sonar.run_itself(false, time.now);
+  EXPECT_TRUE(sonar.state().settings->equals(*initial)) << "as when the last client leaves";
+}
+
 /// Drivers of a Norbit: one program sends commands, and others read pings.
 struct Norbit : ::testing::Test {
   VirtualTime time{one("norbit-wbms")};
