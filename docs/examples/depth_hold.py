@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Holds a vehicle above the bed by DISTANCE_SENSOR, as an autopilot does: docs/poses.md, "Distances".
 
-sonard with clock: lockstep sends the distances (udpout, distance_sensor: true) to this program, which answers with poses.
+`sonard run depth_hold.yaml` sends the distances to this program, which answers with poses.
     depth_hold.py [--listen 127.0.0.1:14552] [--sonard 127.0.0.1] [--altitude 2] [--steps 300]
 """
 import argparse

@@ -45,10 +45,11 @@ std::string_view name_of(Source source) {
   return names[index_of(source)];
 }
 
-MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject, HasRangeFinder has_range_finder)
+MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject, HasRangeFinder has_finder, HasOtherPoses has_others)
     : settings_(std::move(settings)),
       inject_(std::move(inject)),
-      has_range_finder_(std::move(has_range_finder)),
+      has_range_finder_(std::move(has_finder)),
+      has_other_poses_(std::move(has_others)),
       distances_(settings_.sends_distances) {
   self_.component = own_component;
   if (settings_.system_id != 0) self_.system = settings_.system_id;

@@ -52,6 +52,8 @@ using InjectFailure = std::function<MavResult(std::uint32_t unit, FailureType ty
 
 /// True if the vehicle has a range finder, whose distances can be sent.
 using HasRangeFinder = std::function<bool()>;
+/// True while the vehicle's poses come otherwise than by MAVLink, so that this link need not bring any.
+using HasOtherPoses = std::function<bool()>;
 
 struct SourcedPose {
   control::PoseSample sample;
@@ -76,13 +78,14 @@ class MavlinkPoses {
 
   /// Without `inject` the command to inject a failure is answered as unsupported.
   /// Without `has_range_finder` the commands that ask for DISTANCE_SENSOR are answered as unsupported.
-  explicit MavlinkPoses(Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = {});
+  explicit MavlinkPoses(Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = {},
+                        HasOtherPoses has_other_poses = {});
   /// `now` may have any origin, but never goes back.
   Reaction on_datagram(BytesView datagram, Time now);
   /// Call several times a second. Sends heartbeats and requests. Reports the selected system and the missing parts of a pose:
   /// when poses start or stop, and at growing intervals while none arrive.
   Reaction on_tick(Time now);
-  /// Empty while poses arrive; else one sentence with everything that is missing.
+  /// Empty while poses arrive, here or otherwise; else one sentence with everything that is missing.
   std::string health_error(Time now) const;
   /// Names another vehicle (system) whose messages are ignored, while it sends. Else empty.
   std::string rival(Time now) const;
@@ -169,6 +172,7 @@ class MavlinkPoses {
   Settings settings_;
   InjectFailure inject_;
   HasRangeFinder has_range_finder_;
+  HasOtherPoses has_other_poses_;
   DistanceRequests distances_;
   Identity self_;
   FrameCounts counts_;

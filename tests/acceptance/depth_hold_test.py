@@ -9,7 +9,7 @@ import unittest
 import urllib.request
 
 import mavlink_frames
-from running_sonard import ROOT, SONARCTL, Sonard, run
+from running_sonard import ROOT, SONARCTL, SONARD, Daemon, Sonard, run
 
 sys.path.insert(0, str(ROOT / "clients/python"))
 from sonard_client import Control  # noqa: E402
@@ -107,6 +107,15 @@ class DepthHold(unittest.TestCase):
             self.assertAlmostEqual(distance, 2, delta=0.15)
         climbed = held[-1][1] - held[0][1]
         self.assertAlmostEqual(climbed / (held[-1][0] - held[0][0]), SLOPE, delta=0.04, msg="the vehicle follows the slope")
+
+    def test_the_example_runs_with_its_configuration_and_the_link_misses_nothing(self):
+        with Daemon(ROOT / "docs/examples/depth_hold.yaml", str(SONARD)):
+            done = run(sys.executable, ROOT / "docs/examples/depth_hold.py", "--steps", 30, patience_s=600)
+            status = run(SONARCTL, "status").stdout
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreater(done.stdout.count("distance"), 25, done.stdout)
+        self.assertRegex(status, r"mavlink +udpout:127.0.0.1:14552  rov  3\d distances sent, 0 dropped\n")
+        self.assertNotIn("no poses yet", status, "the example sends them otherwise")
 
     def test_each_ping_is_a_message_with_the_time_of_the_scene(self):
         autopilot = Autopilot()

@@ -38,13 +38,13 @@ MavlinkServer::MavlinkServer(asio::io_context& io, const Config& config, PoseInt
 Result<void> MavlinkServer::open() {
   for (const MavlinkConfig& wanted : config_.poses.mavlink) {
     const auto has_range_finder = [this, vehicle = wanted.vehicle] { return !range_finders_of(config_, vehicle).empty(); };
-    Link& link = links_.emplace_back(Link{wanted,
-                                          mavlink::MavlinkPoses(settings_of(wanted, config_), inject_, has_range_finder),
-                                          udp::socket(io_),
-                                          asio::steady_timer(io_),
-                                          std::nullopt,
-                                          {},
-                                          {}});
+    const auto has_other_poses = [this, vehicle = wanted.vehicle] {
+      const std::string_view source = intake_.live_source(vehicle);
+      return !source.empty() && !source.starts_with("mavlink ");
+    };
+    mavlink::MavlinkPoses poses(settings_of(wanted, config_), inject_, has_range_finder, has_other_poses);
+    Link& link =
+        links_.emplace_back(Link{wanted, std::move(poses), udp::socket(io_), asio::steady_timer(io_), std::nullopt, {}, {}});
     const Endpoint at = wanted.dials ? Endpoint{} : wanted.at;
     if (auto r = bind_udp(link.socket, at, false); !r)
       return failure(r.error().kind, r.error().text + "; poses.mavlink in the configuration can set another address");

@@ -5,7 +5,8 @@
 namespace sonar {
 namespace {
 constexpr auto wall_tolerance = std::chrono::milliseconds(1);
-}
+constexpr auto longest_pause = std::chrono::seconds(5);  // between poses that count as arriving
+}  // namespace
 
 void PoseIntake::log_refusal(const std::string& why, const Sender& sender) {
   log_limited(log_, refusals_, LogLevel::warning, "pose refused: " + why, {{"from", sender.id}});
@@ -33,8 +34,15 @@ std::string PoseIntake::take(control::PoseSample sample, const Sender& sender) {
   if (!outcome.notice.empty()) log_limited(log_, notices_, LogLevel::info, outcome.notice);
   if (plausibility_ != nullptr && outcome.verdict == PoseVerdict::accepted && sample.of == control::PoseSample::Of::vehicle)
     for (const Note& note : plausibility_->use(sample, clock_.now())) log_.warning(text_of(note), {{"from", sender.id}});
+  if (outcome.verdict == PoseVerdict::accepted && sample.of == control::PoseSample::Of::vehicle)
+    newest_[sample.name] = {sender.source, clock_.now()};
   on_pose_();
   return outcome.refusal;
+}
+
+std::string_view PoseIntake::live_source(const std::string& vehicle) const {
+  const auto named = newest_.find(vehicle), found = named != newest_.end() ? named : newest_.find({});
+  return found != newest_.end() && clock_.now() - found->second.at <= longest_pause ? found->second.source : std::string_view();
 }
 
 std::string PoseIntake::place(const control::SetObject& asked, std::size_t body, const Sender& sender) {

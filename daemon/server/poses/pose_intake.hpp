@@ -4,7 +4,9 @@
 
 #include <chrono>
 #include <functional>
+#include <map>
 #include <string>
+#include <string_view>
 
 #include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/emulator/world/world.hpp"
@@ -26,6 +28,8 @@ class PoseIntake {
   std::string place(const control::SetObject& asked, std::size_t body, const Sender& sender);
   /// Pauses, seeks or plays a trajectory. Returns like take().
   std::string steer(const control::SetTrajectory& asked, const Sender& sender);
+  /// The source of a vehicle's poses while they arrive, else empty.
+  std::string_view live_source(const std::string& vehicle) const;
   /// Counts and logs an invalid pose message.
   void refuse(const std::string& why, const Sender& sender);
 
@@ -40,6 +44,11 @@ class PoseIntake {
   Events* events_;
   Plausibility* plausibility_;
   LogLimiter refusals_, notices_;
+  struct Newest {
+    std::string source;
+    Time at{};
+  };
+  std::map<std::string, Newest> newest_;    // the last accepted pose, by the name of the vehicle in it; empty: the only one
   std::uint32_t placements_ = 0;            // placements of moving objects; each begins a new history
   std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
 };

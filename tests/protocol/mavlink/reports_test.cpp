@@ -151,6 +151,15 @@ std::vector<std::pair<int, std::string>> notices_of(MavlinkPoses& poses, int fro
   return all;
 }
 
+TEST(MavlinkReports, NothingIsMissingWhilePosesComeOtherwise) {
+  bool come = true;
+  MavlinkPoses poses({}, {}, {}, [&come] { return come; });
+  EXPECT_THAT(notices_of(poses, 0, 60, [](int) {}), IsEmpty());
+  EXPECT_EQ(poses.health_error(at_s(60)), "");
+  come = false;
+  EXPECT_THAT(poses.health_error(at_s(60)), HasSubstr("no message received"));
+}
+
 TEST(MavlinkReports, WhatIsMissingIsSaidAgainEverMoreSeldomAndWhenItIsThere) {
   Sender v;
   MavlinkPoses poses({});
