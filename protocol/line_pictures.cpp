@@ -9,7 +9,7 @@
 namespace sonar::protocol {
 namespace {
 
-constexpr double shown_db = 60;  // levels down to this far below the strongest echo are shown
+constexpr float not_measured = -1;
 constexpr float silent_db = -std::numeric_limits<float>::infinity();
 
 }  // namespace
@@ -20,7 +20,7 @@ float Waterfall::level_at(const Row& row, double range_m) {
 }
 
 /// The scale follows the strongest echo of all lines shown, so that it is the same for all of them.
-SonarPicture Waterfall::picture_of(const std::deque<Row>& rows) {
+SonarPicture Waterfall::picture_of(const std::deque<Row>& rows, float shown_db) {
   const Row& newest = rows.front();
   SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};
   seen.image.rows = rows.size();
@@ -34,7 +34,7 @@ SonarPicture Waterfall::picture_of(const std::deque<Row>& rows) {
   }
   const float most_db = std::max(-1000.0f, *std::ranges::max_element(seen.image.samples));
   for (float& sample : seen.image.samples)
-    sample = std::clamp(255 * (1 + (sample - most_db) / static_cast<float>(shown_db)), 0.0f, 255.0f);
+    sample = sample == silent_db ? not_measured : std::clamp(255 * (1 + (sample - most_db) / shown_db), 0.0f, 255.0f);
   return seen;
 }
 
@@ -43,7 +43,7 @@ void Waterfall::add(Line line, double start_m, double row_m, Time received_at, H
   if (rows_.size() > waterfall_rows) rows_.pop_back();
   ping.lines = rows_.size();
   ping.whole_lines = waterfall_fewest_rows;
-  ping.drawing = [rows = rows_] { return picture_of(rows); };
+  ping.drawing = [rows = rows_, shown_db = shown_db_] { return picture_of(rows, shown_db); };
 }
 
 double Sweep::bearing_rad(std::size_t direction) const {

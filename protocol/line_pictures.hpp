@@ -14,6 +14,8 @@ using Line = std::vector<float>;  // by range, [dB]
 /// The lines of the last pings, one below the other, the newest on top.
 class Waterfall {
  public:
+  /// `shown_db`: levels down to this far below the strongest echo are shown.
+  explicit Waterfall(float shown_db = 60) : shown_db_(shown_db) {}
   /// Adds a line and puts the drawing into `ping`; it has the ranges of this line, also for earlier lines, which may have had
   /// others. `received_at`: for the times beside the picture.
   void add(Line line, double start_m, double row_m, Time received_at, HostPing& ping);
@@ -25,8 +27,9 @@ class Waterfall {
     Time received_at;
   };
   static float level_at(const Row& row, double range_m);
-  static SonarPicture picture_of(const std::deque<Row>& rows);
+  static SonarPicture picture_of(const std::deque<Row>& rows, float shown_db);
 
+  float shown_db_;
   std::deque<Row> rows_;
 };
 

@@ -12,6 +12,7 @@ namespace {
 constexpr Rgb head_colour{79, 184, 255};
 constexpr double waterfall_shape = 0.75;  // height divided by width
 constexpr double closest_marks = 0.06;    // of the height
+constexpr float not_measured = -1;
 
 /// The number of rows that fill the height of a waterfall.
 std::size_t rows_shown(const PolarImage& waterfall) { return std::clamp(waterfall.rows, waterfall_fewest_rows, waterfall_rows); }
@@ -22,11 +23,17 @@ std::pair<std::size_t, std::size_t> cells_under(int at, int pixels, std::size_t 
   return {first, std::max(first + 1, static_cast<std::size_t>(at + 1) * cells / static_cast<std::size_t>(pixels))};
 }
 
+/// The mean of the cells that were measured.
 float mean_of(const PolarImage& image, std::pair<std::size_t, std::size_t> rows, std::pair<std::size_t, std::size_t> columns) {
   float sum = 0;
+  int count = 0;
   for (std::size_t row = rows.first; row < rows.second; ++row)
-    for (std::size_t column = columns.first; column < columns.second; ++column) sum += image.at(row, column);
-  return sum / static_cast<float>((rows.second - rows.first) * (columns.second - columns.first));
+    for (std::size_t column = columns.first; column < columns.second; ++column) {
+      if (image.at(row, column) < 0) continue;
+      sum += image.at(row, column);
+      ++count;
+    }
+  return count > 0 ? sum / static_cast<float>(count) : not_measured;
 }
 
 /// Draws a rectangle of cells. `rows` cells fill the height, even if the image has fewer rows.
@@ -34,11 +41,12 @@ Raster draw_cells(const PolarImage& image, std::size_t rows, const FanStyle& sty
   Raster raster(style.width_px, height);
   for (int y = 0; y < height; ++y) {
     const auto [first, last] = cells_under(y, height, rows);
-    for (int x = 0; x < style.width_px; ++x)
-      raster.at(x, y) = first >= image.rows
-                            ? outside_colour
-                            : style.colours.colour(image.brightness(mean_of(image, {first, std::min(last, image.rows)},
-                                                                            cells_under(x, style.width_px, image.beams))));
+    for (int x = 0; x < style.width_px; ++x) {
+      const float mean = first >= image.rows
+                             ? not_measured
+                             : mean_of(image, {first, std::min(last, image.rows)}, cells_under(x, style.width_px, image.beams));
+      raster.at(x, y) = mean < 0 ? outside_colour : style.colours.colour(image.brightness(mean));
+    }
   }
   return raster;
 }

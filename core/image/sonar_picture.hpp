@@ -26,7 +26,7 @@ struct PolarImage {
   std::size_t rows = 0, beams = 0;
   double row_spacing_m = 0;         // row i covers start_m + [i, i + 1) * row_spacing_m
   std::vector<double> azimuth_rad;  // [beams], positive to port, strictly falling
-  std::vector<float> samples;       // [rows][beams], codes as sent
+  std::vector<float> samples;       // [rows][beams], codes as sent; below 0 (only in a waterfall): not measured
   float full_scale = 255;           // the code with the brightest colour
   double start_m = 0;               // range at which the samples begin
   Shades shades = {};

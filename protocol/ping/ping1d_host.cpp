@@ -74,7 +74,8 @@ class Ping1DHost final : public PingHost {
     return found;
   }
 
-  Waterfall waterfall_;
+  static constexpr float step_db = 48;  // samples of 8 bits: from 1, which is nearly noise, to 255
+  Waterfall waterfall_{step_db};
 };
 
 }  // namespace

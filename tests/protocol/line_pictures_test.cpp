@@ -18,7 +18,14 @@ TEST(Waterfall, EarlierLinesHaveTheRangesOfTheNewest) {
   EXPECT_EQ(seen.image.rows, 3u);
   EXPECT_EQ(seen.image.beams, 3u);
   EXPECT_EQ(seen.range_m(), 3);
-  EXPECT_THAT(seen.image.samples, testing::ElementsAre(127.5, 255, 0, 255, 0, 0, 0, 255, 127.5));
+  EXPECT_THAT(seen.image.samples, testing::ElementsAre(127.5, 255, 0, 255, -1, -1, 0, 255, 127.5));
+}
+
+TEST(Waterfall, ShowsTheDecibelsThatItsSamplesHave) {
+  Waterfall waterfall(48);
+  HostPing ping;
+  waterfall.add({0, -24, -48, -68}, 0, 1, Time{}, ping);
+  EXPECT_THAT(ping.drawing().image.samples, testing::ElementsAre(255, 127.5, 0, 0));
 }
 
 TEST(Waterfall, RowsHaveTheirAgesAndNoneIsInTheFuture) {
@@ -30,11 +37,11 @@ TEST(Waterfall, RowsHaveTheirAgesAndNoneIsInTheFuture) {
   EXPECT_THAT(ping.drawing().row_age_s, testing::ElementsAre(0, 6, 3, 5));
 }
 
-TEST(Waterfall, ALineWithoutALengthIsBlack) {
+TEST(Waterfall, ALineWithoutALengthIsEmpty) {
   Waterfall waterfall;
   HostPing ping;
   waterfall.add({0, 0}, 0, 0, Time{}, ping);
-  EXPECT_THAT(ping.drawing().image.samples, testing::Each(0));
+  EXPECT_THAT(ping.drawing().image.samples, testing::Each(-1));
 }
 
 }  // namespace

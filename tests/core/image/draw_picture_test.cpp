@@ -160,6 +160,14 @@ TEST(SonarPicture, PointsLieOverAFanThatOpensDownwards) {
   EXPECT_LT(x, raster.width / 2) << "port is on the left";
 }
 
+TEST(SonarPicture, WhatAWaterfallHasNotMeasuredIsNotBlack) {
+  SonarPicture picture{.kind = PictureKind::waterfall, .image = cells(100, 2)};
+  for (std::size_t row = 0; row < 100; ++row) picture.image.samples[2 * row] = 0, picture.image.samples[2 * row + 1] = -1;
+  const Raster raster = *PicturePainter(style()).draw(picture);
+  EXPECT_EQ(raster.at(raster.width / 4, 10).b, 0);
+  EXPECT_EQ(raster.at(3 * raster.width / 4, 10).b, outside_colour.b);
+}
+
 TEST(SonarPicture, GammaBrightensWhatIsDark) {
   for (const PictureKind kind : {PictureKind::fan, PictureKind::waterfall}) {
     SonarPicture picture{.kind = kind, .image = cells(100, 2)};
