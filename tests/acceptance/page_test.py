@@ -17,7 +17,7 @@ import unittest
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
 from browser import Browser  # noqa: E402
-from page_checks import FAINT_WORDS, LACKING_PX, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, WITHOUT_WEBGL, PageChecks, shown  # noqa: E402
+from page_checks import FAINT_WORDS, LACKING_PX, LAID_OUT, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, WITHOUT_WEBGL, PageChecks, shown  # noqa: E402
 from running_sonard import ROOT, Sonard  # noqa: E402
 
 from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-import-order
@@ -342,6 +342,22 @@ class Page(PageChecks, unittest.TestCase):
         number = page.text("#ping-number")
         page.wait(f"document.querySelector('#ping-number').textContent !== '{number}'")
         self.assertEqual(page.run("[...new Set(window.outside)]"), [])
+
+    def test_the_browser_draws_changes_in_each_corner(self):
+        """It skips frames that change only what lies outside of its window. Clicks there would seem slow."""
+        page = self.opened(self.browser.open("about:blank", 1600, 1000))
+        events = []
+        page.note = lambda word: events.append(word)
+        page.run("document.body.innerHTML = '<p id=corner style=\"position:fixed;right:0;bottom:0;margin:0\">0</p>', 0")
+        page.run(LAID_OUT)
+        page.call("Tracing.start", transferMode="ReportEvents", traceConfig={"includedCategories": ["viz"]})
+        for number in range(1, 31):
+            page.run(f"corner.textContent = {number}, {LAID_OUT}")
+        page.call("Tracing.end")
+        self.patiently(lambda: page.run("0") == 0 and any(word.get("method") == "Tracing.tracingComplete" for word in events))
+        names = [event["name"] for word in events if word.get("method") == "Tracing.dataCollected" for event in word["params"]["value"]]
+        self.assertGreater(names.count("Display::DrawAndSwap"), 0)
+        self.assertLess(names.count("Draw skipped."), 5)
 
     def test_keys(self):
         page = self.open()

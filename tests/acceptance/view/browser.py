@@ -15,6 +15,8 @@ from websocket import TEXT, WebSocket
 
 KEY_NUMBERS = {"Backspace": 8, "Home": 36, "ArrowLeft": 37, "ArrowRight": 39, "Tab": 9, "Enter": 13, "Escape": 27, "ArrowUp": 38, "ArrowDown": 40}
 
+WINDOW = "1640,1100"  # larger than all pages of the tests: frames that change only what lies outside of it are not drawn
+
 
 def program():
     """The browser, or None."""
@@ -33,7 +35,7 @@ class Browser:
         self.process = subprocess.Popen(
             [program(), "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-sandbox",
              "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
-             "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--user-data-dir={self.folder.name}", "about:blank"],
+             "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--window-size={WINDOW}", f"--user-data-dir={self.folder.name}", "about:blank"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         told = pathlib.Path(self.folder.name) / "DevToolsActivePort"  # the browser writes its port there
         deadline = time.monotonic() + 200
