@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "daemon/config/faults/kinds.hpp"
+#include "protocol/fault_kinds.hpp"
 
 namespace sonar {
 

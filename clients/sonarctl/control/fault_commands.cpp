@@ -8,6 +8,7 @@
 #include "clients/sonarctl/control/status_text.hpp"
 #include "core/text/arguments.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/fault_report.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -32,12 +33,25 @@ Result<std::shared_ptr<const v1::FaultReport>> report_of(ControlClient& client, 
   return std::shared_ptr<const v1::FaultReport>(*answer, &(*answer)->faults());
 }
 
+void print(const FaultArguments& a, const v1::FaultReport& report, std::string (*text)(const v1::FaultReport&)) {
+  std::fputs(a.json ? (control::json_of(report) + "\n").c_str() : text(report).c_str(), stdout);
+}
+
 Result<void> print_report(const FaultArguments& a, bool kinds, std::string (*text)(const v1::FaultReport&)) {
   auto client = ControlClient::open(a.control);
   if (!client) return tl::unexpected(client.error());
   const auto report = report_of(*client, {.kinds = kinds, .journal_after = std::numeric_limits<std::uint64_t>::max()});
   if (!report) return tl::unexpected(report.error());
-  std::fputs(a.json ? (control::json_of(**report) + "\n").c_str() : text(**report).c_str(), stdout);
+  print(a, **report, text);
+  return {};
+}
+
+/// The kinds that this version knows, without a daemon.
+Result<void> print_own_kinds(const FaultArguments& a) {
+  v1::FaultReport report;
+  for (const FaultKind& kind : fault_kinds()) fill(*report.add_kinds(), kind);
+  for (const Trouble& trouble : troubles()) fill(*report.add_troubles(), trouble);
+  print(a, report, fault_kinds_text);
   return {};
 }
 
@@ -129,8 +143,12 @@ Run add_fault(CLI::App& app) {
       [&a] { return a.support ? print_report(a, true, fault_support_text) : print_report(a, false, fault_list_text); });
   list.add_flag("--support", a.support,
                 "list the kinds that take effect on each vendor's sonars, and the reasons for the others");
-  CLI::App& kinds = add_command(fault, a, "kinds", "the catalogue: kinds with their parameters, and troubles",
-                                "  sonarctl fault kinds", [&a] { return print_report(a, true, fault_kinds_text); });
+  CLI::App& kinds = add_command(fault, a, "kinds",
+                                "the catalogue: kinds with their parameters, and troubles; with --control, those of that daemon",
+                                "  sonarctl fault kinds", [&a, &fault] {
+                                  const bool asks = fault.get_subcommand("kinds")->count("--control") > 0;
+                                  return asks ? print_report(a, true, fault_kinds_text) : print_own_kinds(a);
+                                });
   CLI::App& journal = add_command(fault, a, "journal", "the effects of faults, the latest 1000 entries",
                                   "  sonarctl fault journal --follow --json", [&a] { return print_journal(a); });
   journal.add_flag("--follow", a.follow, "then print each new entry, until Ctrl-C");

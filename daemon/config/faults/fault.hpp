@@ -12,8 +12,8 @@
 
 #include "core/base/result.hpp"
 #include "core/text/ipv4.hpp"
-#include "daemon/config/faults/kinds.hpp"
 #include "protocol/control/operations.hpp"
+#include "protocol/fault_kinds.hpp"
 
 namespace sonar {
 

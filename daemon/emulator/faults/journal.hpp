@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/base/units.hpp"
-#include "daemon/config/faults/kinds.hpp"
+#include "protocol/fault_kinds.hpp"
 
 namespace sonar {
 

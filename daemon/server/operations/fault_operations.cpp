@@ -7,6 +7,7 @@
 #include "daemon/config/fault_support.hpp"
 #include "daemon/server/operations/operation_results.hpp"
 #include "protocol/control/answers.hpp"
+#include "protocol/fault_report.hpp"
 
 namespace sonar {
 namespace {
@@ -15,26 +16,8 @@ constexpr const char* name_by_mavlink = "mavlink";
 constexpr std::array<std::string_view, 8> kinds_of_failures = {"",    "L05", "P01", "P04",
                                                                "P12", "T11", "T10", "P13"};  // by FailureType
 
-void fill(v1::FaultKind& out, const FaultKind& kind) {
-  out.set_code(std::string(kind.code));
-  out.set_name(std::string(kind.name));
-  out.set_tier(static_cast<std::uint32_t>(kind.tier));
-  out.set_stage(std::string(fault_stage_names[static_cast<std::size_t>(kind.stage)]));
-  out.set_sentence(std::string(kind.sentence));
-  out.set_good_driver(std::string(kind.good_driver));
-  out.set_default_s(kind.default_s);
-  for (const FaultParameter& p : kind.given()) {
-    v1::FaultParameter& parameter = *out.add_parameters();
-    parameter.set_name(std::string(p.name));
-    parameter.set_value(std::string(p.value));
-    parameter.set_lowest(p.lowest);
-    parameter.set_highest(p.highest);
-    for (std::string_view rest = p.words; !rest.empty();) {
-      const std::size_t end = std::min(rest.find(' '), rest.size());
-      parameter.add_words(std::string(rest.substr(0, end)));
-      rest.remove_prefix(std::min(end + 1, rest.size()));
-    }
-  }
+void fill_effects(v1::FaultKind& out, const FaultKind& kind) {
+  fill(out, kind);
   for (const protocol::Vendor* vendor : protocol::vendors())
     if (const std::string why = why_without_effect(kind, *vendor); !why.empty())
       (*out.mutable_without_effect())[std::string(vendor->name())] = why;
@@ -49,14 +32,12 @@ std::string awaited(const Fault& fault) {
 }
 
 void fill(v1::Trouble& out, const Trouble& trouble, const Fleet& fleet) {
-  out.set_name(std::string(trouble.name));
-  out.set_sentence(std::string(trouble.sentence));
+  fill(out, trouble);
   control::FaultRecord record;
   record.what = trouble.name;
   const auto faults = check_fault(record, true);
   if (!faults) return;
   for (const Fault& fault : *faults) {
-    out.add_codes(std::string(fault.kind->code));
     if (out.waits_for().empty()) out.set_waits_for(awaited(fault));
     if (fault.kind->effect == FaultEffect::power_cycle)
       out.set_own_s(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
@@ -145,7 +126,7 @@ OperationResult FaultOperations::report(const control::GetFaults& asked) const {
     if (entry->seq() > asked.journal_after) *report->add_journal() = *entry;
   for (const Trouble& trouble : troubles()) fill(*report->add_troubles(), trouble, fleet_);
   if (asked.kinds)
-    for (const FaultKind& kind : fault_kinds()) fill(*report->add_kinds(), kind);
+    for (const FaultKind& kind : fault_kinds()) fill_effects(*report->add_kinds(), kind);
   OperationResult result;
   result.faults = std::move(report);
   return result;

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "daemon/config/faults/fault.hpp"
-#include "daemon/config/faults/kinds.hpp"
+#include "protocol/fault_kinds.hpp"
 
 namespace sonar {
 namespace {

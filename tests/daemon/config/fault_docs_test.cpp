@@ -8,7 +8,7 @@
 #include <regex>
 
 #include "core/text/format.hpp"
-#include "daemon/config/faults/kinds.hpp"
+#include "protocol/fault_kinds.hpp"
 
 namespace sonar {
 namespace {

@@ -1,4 +1,4 @@
-#include "daemon/config/faults/kinds.hpp"
+#include "protocol/fault_kinds.hpp"
 
 #include <algorithm>
 
