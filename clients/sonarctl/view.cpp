@@ -48,6 +48,11 @@ std::string size_of(const SonarPicture& picture) {
   return picture.column == SonarPicture::Column::none ? points : points + ", " + cells;
 }
 
+/// An empty picture could be mistaken for a failure.
+std::string caption_of(std::string text, const SonarPicture& picture) {
+  return picture.nothing_detected() ? text + text::format("  nothing detected within %g m", picture.range_m()) : text;
+}
+
 Result<void> view_one(const ViewOptions& options) {
   const Result<HostPing> ping = fetch_ping(options.source, options.ping);
   if (!ping) return tl::unexpected(ping.error());
@@ -57,9 +62,9 @@ Result<void> view_one(const ViewOptions& options) {
     PicturePainter painter(options.style);
     const Result<Raster> raster = write_picture(options, painter, *picture);
     if (!raster) return tl::unexpected(raster.error());
+    const std::string kind = picture->kind == PictureKind::fan ? "" : ", " + std::string(name_of(picture->kind));
     std::printf("%s: %d x %d pixels, %s, %.2f m%s\n", options.png.c_str(), raster->width, raster->height,
-                size_of(*picture).c_str(), picture->range_m(),
-                picture->kind == PictureKind::fan ? "" : (", " + std::string(name_of(picture->kind))).c_str());
+                size_of(*picture).c_str(), picture->range_m(), caption_of(kind, *picture).c_str());
   }
   if (!options.terminal) return {};
   const auto lines = lines_of(options, *picture, 2);
@@ -67,7 +72,7 @@ Result<void> view_one(const ViewOptions& options) {
   for (const std::string& line : *lines) std::puts(line.c_str());
   ViewCaption caption("");  // one ping has no rate
   caption.add(*ping, std::nullopt, 0);
-  std::puts(caption.text().c_str());
+  std::puts(caption_of(caption.text(), *picture).c_str());
   return {};
 }
 
@@ -150,12 +155,13 @@ class LiveView {
       if (const Result<Raster> drawn = write_picture(options_, painter_, *picture); !drawn) return tl::unexpected(drawn.error());
     if (!options_.terminal) {
       const bool overwrites = terminal_facts().is_terminal;  // one line that changes, or one line per ping
-      std::printf(overwrites ? "\r\x1b[K%s  %s" : "%s  %s\n", options_.png.c_str(), figures_.text().c_str());
+      std::printf(overwrites ? "\r\x1b[K%s  %s" : "%s  %s\n", options_.png.c_str(),
+                  caption_of(figures_.text(), *picture).c_str());
       return std::fflush(stdout) == 0;
     }
     auto lines = lines_of(options_, *picture, 1);
     if (!lines) return tl::unexpected(lines.error());
-    lines->push_back(figures_.text());
+    lines->push_back(caption_of(figures_.text(), *picture));
     return screen.show(*lines);
   }
 

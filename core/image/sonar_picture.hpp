@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -71,8 +72,10 @@ struct SonarPicture {
   std::vector<double> row_age_s = {};  // waterfall: time from the ping of each row to the newest; empty: not known
   std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
   enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: `image` is empty
+  std::optional<std::size_t> detections = {};  // in the messages of the newest ping; nullopt: they carry samples alone
 
   bool is_polar() const { return kind == PictureKind::fan || kind == PictureKind::points || kind == PictureKind::sweep; }
+  bool nothing_detected() const { return detections == std::size_t{0}; }
   /// Far end of the shown ranges [m].
   double range_m() const {
     return kind == PictureKind::waterfall ? image.start_m + static_cast<double>(image.beams) * image.row_spacing_m

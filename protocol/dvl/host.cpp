@@ -102,6 +102,12 @@ class DvlHost final : public protocol::Host {
       point = std::max(point, static_cast<float>(std::clamp(beam.rssi_dbm, -200.0, 200.0)));
     }
     waterfall_.add(std::move(echoes), 0, row_m, now, ping);
+    ping.drawing = [waterfall = std::move(ping.drawing),
+                    valid = static_cast<std::size_t>(std::ranges::count_if(report.beams, &Beam::is_valid))] {
+      SonarPicture seen = waterfall();
+      seen.detections = valid;
+      return seen;
+    };
     return ping;
   }
 

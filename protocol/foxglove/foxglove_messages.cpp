@@ -300,6 +300,7 @@ Bytes picture(const SonarPicture& picture, std::span<const TimeMark> times) {
   message.set_elevation_rad(picture.elevation_rad);
   constexpr std::array<const char*, 3> columns = {"none", "sent", "model"};
   if (picture.kind == PictureKind::points) message.set_column(columns[static_cast<std::size_t>(picture.column)]);
+  message.set_nothing_detected(picture.nothing_detected());
   message.set_gamma(static_cast<double>(picture.image.shades.gamma));
   message.set_per_mille(static_cast<std::uint32_t>(picture.image.shades.per_mille));
   for (const auto& [part, age_s] : times) {

@@ -239,6 +239,7 @@ class NorbitHost final : public protocol::Host {
     if (parts.bathymetry) {
       const BathymetryFront& front = parts.bathymetry->front;
       seen.points = points_of(*parts.bathymetry);
+      seen.detections = seen.points.size();
       ping.facts.number = front.ping;
       ping.facts.beams = front.beams;
       ping.facts.rows = 1;

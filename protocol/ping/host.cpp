@@ -115,6 +115,7 @@ HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
     if (image.beams >= 2) return image;
     return failure(ErrorKind::usage, "a picture needs two points at least: sonarctl listen prints those of a Surveyor");
   };
+  seen.detections = polar.size();
   seen.points = std::move(polar);
   found.drawing = [seen = std::move(seen)] { return seen; };
   return found;

@@ -79,6 +79,7 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
       returns == 0 ? "no returns" : text::format("%zu returns from %.2f to %.2f m", returns, nearest_m, farthest_m);
   if (strengths == nullptr) found.facts.note += "; no strengths given";
   seen.image.azimuth_rad = image.azimuth_rad;
+  seen.detections = returns;
   found.picture = [image = std::move(image)]() -> Result<PolarImage> { return image; };
   found.drawing = [seen = std::move(seen)] { return seen; };
   return found;

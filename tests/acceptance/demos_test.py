@@ -9,6 +9,7 @@ import socket
 import struct
 import subprocess
 import sys
+import tempfile
 import time
 import unittest
 import urllib.request
@@ -311,6 +312,20 @@ class Pages(PageChecks, unittest.TestCase):
             for unit in ("m", "s"):
                 page.wait(f"[...window.words.keys()].some((text) => /^[\\d.]+ {unit}$/.test(text))")
             page.close()
+
+    def test_a_picture_without_detections_says_so(self):
+        """The vehicle moves; most of the time nothing is within 3 m of this demo's sonar."""
+        with demo("3d15"):
+            page = self.opened(self.browser.open(f"http://{HTTP}:8088/", 1600, 1000))
+            shown(page)
+            page.wait("!document.querySelector('#badges').innerText.includes('nothing detected')")
+            page.run("document.querySelector('[name=\"/front/range_m\"]').focus(), document.activeElement.select()")
+            for key in ("3", "Enter"):
+                page.press(key)
+            page.wait("document.querySelector('#badges').innerText.includes('nothing detected within 3 m')")
+            page.close()
+            with tempfile.TemporaryDirectory() as folder:
+                eventually(lambda: "nothing detected within 3 m" in run(SONARCTL, "view", "--png", f"{folder}/3d15.png", "--as-it-is").stdout)
 
     def test_range_labels_lie_beside_a_picture_that_opens_downwards(self):
         for maker in ("norbit", "surveyor"):

@@ -72,7 +72,9 @@ export function badgesOf(facts) {
   const out = [];
   const sonar = facts.sonarStatus;
   if (facts.connection !== 'open' || !sonar) return out;
-  if (facts.recording) return [{ text: 'RECORDING', level: 'note', title: facts.recording }];
+  const seen = facts.ping?.about;
+  if (seen?.nothing_detected) out.push({ text: `nothing detected within ${short(seen.range_m)} m`, level: 'note', title: "the sonar's messages have no echo" });
+  if (facts.recording) return [{ text: 'RECORDING', level: 'note', title: facts.recording }, ...out];
   if (facts.noScene) out.push({ text: 'no scene', level: 'note', title: facts.noScene });
   if (facts.preview) out.push({ text: 'PREVIEW', level: 'note', title: 'for viewers only; it ends when a driver connects' });
   if (!sonar.transmits) out.push({ text: 'transmit is off: noise only', level: 'warning', title: 'see the settings' });

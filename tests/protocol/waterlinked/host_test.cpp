@@ -54,6 +54,8 @@ TEST(WaterlinkedHost, DrawsRangesWithoutTheirStrengthsAndSaysSo) {
   EXPECT_THAT(ping_from(ranges, nullptr)->facts.note, HasSubstr("no returns; no strengths given"));
   ranges.pixels[columns + 2] = 10;
   EXPECT_EQ(ping_from(ranges, nullptr)->picture()->at(100, 2), 255) << "5 m of 15, ahead";
+  EXPECT_FALSE(ping_from(ranges, nullptr)->drawing().nothing_detected());
+  EXPECT_TRUE(ping_from(nothing_there(), nullptr)->drawing().nothing_detected());
 }
 
 TEST(WaterlinkedHost, TakesNoImageWhoseFieldsCannotBe) {
