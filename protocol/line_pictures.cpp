@@ -1,6 +1,7 @@
 #include "protocol/line_pictures.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -14,9 +15,16 @@ constexpr float silent_db = -std::numeric_limits<float>::infinity();
 
 }  // namespace
 
-float Waterfall::level_at(const Row& row, double range_m) {
-  const double place = (range_m - row.start_m) / row.row_m;
-  return place >= 0 && place < static_cast<double>(row.line->size()) ? (*row.line)[static_cast<std::size_t>(place)] : silent_db;
+/// The strongest sample between two ranges, so that a thin echo stays in the picture when the newest line has larger rows.
+float Waterfall::level_between(const Row& row, double from_m, double to_m) {
+  if (!(row.row_m > 0)) return silent_db;
+  constexpr double rounding = 1e-6;  // in samples
+  const double all = static_cast<double>(row.line->size());
+  const double first = std::max(0.0, std::floor((from_m - row.start_m) / row.row_m + rounding));
+  const double last = std::min(all, std::ceil((to_m - row.start_m) / row.row_m - rounding));
+  if (!(first < last)) return silent_db;
+  const auto at = [&row](double sample) { return row.line->begin() + static_cast<std::ptrdiff_t>(sample); };
+  return *std::max_element(at(first), at(last));
 }
 
 /// The scale follows the strongest echo of all lines shown, so that it is the same for all of them.
@@ -29,8 +37,10 @@ SonarPicture Waterfall::picture_of(const std::deque<Row>& rows, float shown_db) 
   seen.image.start_m = newest.start_m;
   for (const Row& row : rows) {
     seen.row_age_s.push_back(std::max(0.0, seconds(newest.received_at - row.received_at)));
-    for (std::size_t i = 0; i < newest.line->size(); ++i)
-      seen.image.samples.push_back(level_at(row, newest.start_m + (static_cast<double>(i) + 0.5) * newest.row_m));
+    for (std::size_t i = 0; i < newest.line->size(); ++i) {
+      const double from_m = newest.start_m + static_cast<double>(i) * newest.row_m;
+      seen.image.samples.push_back(level_between(row, from_m, from_m + newest.row_m));
+    }
   }
   const float most_db = std::max(-1000.0f, *std::ranges::max_element(seen.image.samples));
   for (float& sample : seen.image.samples)

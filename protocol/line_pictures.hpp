@@ -26,7 +26,7 @@ class Waterfall {
     double start_m, row_m;
     Time received_at;
   };
-  static float level_at(const Row& row, double range_m);
+  static float level_between(const Row& row, double from_m, double to_m);
   static SonarPicture picture_of(const std::deque<Row>& rows, float shown_db);
 
   float shown_db_;

@@ -18,7 +18,17 @@ TEST(Waterfall, EarlierLinesHaveTheRangesOfTheNewest) {
   EXPECT_EQ(seen.image.rows, 3u);
   EXPECT_EQ(seen.image.beams, 3u);
   EXPECT_EQ(seen.range_m(), 3);
-  EXPECT_THAT(seen.image.samples, testing::ElementsAre(127.5, 255, 0, 255, -1, -1, 0, 255, 127.5));
+  EXPECT_THAT(seen.image.samples, testing::ElementsAre(127.5, 255, 0, 255, 127.5, -1, 0, 255, 127.5));
+}
+
+TEST(Waterfall, AThinEchoStaysWhenTheNewestLineHasLargerRows) {
+  Waterfall waterfall;
+  HostPing ping;
+  std::vector<float> thin(30, -60);
+  thin[4] = thin[25] = 0;
+  waterfall.add(thin, 0, 0.1, Time{}, ping);           // 0 to 3 m
+  waterfall.add({-60, -60, -60}, 0, 1, Time{}, ping);  // 0 to 3 m
+  EXPECT_THAT(ping.drawing().image.samples, testing::ElementsAre(0, 0, 0, 255, 0, 255));
 }
 
 TEST(Waterfall, ShowsTheDecibelsThatItsSamplesHave) {
