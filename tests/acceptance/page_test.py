@@ -359,6 +359,18 @@ class Page(PageChecks, unittest.TestCase):
         self.assertGreater(names.count("Display::DrawAndSwap"), 0)
         self.assertLess(names.count("Draw skipped."), 5)
 
+    def test_a_list_that_changes_keeps_the_focus(self):
+        page = self.open(query="?test=500")
+        shown(page)
+        page.run("""window.files = ['a'],
+          sonardTest.facts.setStatus = ((old) => function (status, ns) {
+            old.call(this, { ...status, recordings: files.map((file) => ({ file: `/tmp/${file}.mcap`, sonar: 'front', pings: 5, bytes: 1e6, why: 'ended' })) }, ns);
+          })(sonardTest.facts.setStatus), 0""")
+        page.wait("document.querySelectorAll('#recordings a').length === 1")
+        page.run("document.querySelector('#recordings a').focus(), window.files.push('b')")
+        page.wait("document.querySelectorAll('#recordings a').length === 2")
+        self.assertIn("a.mcap", page.run("document.activeElement.href ?? ''"))
+
     def test_keys(self):
         page = self.open()
         shown(page)

@@ -24,12 +24,17 @@ export function make(tag, options = {}, ...children) {
   return element;
 }
 
-/// Calls build() for new children of the element only when `content` (anything JSON can hold) is not what was shown last.
+const nameOf = (control) => control.href || control.name || control.textContent;
+
+/// Calls build() for new children of the element only when `content` (anything JSON can hold) is not what was shown last. The
+/// control that has the focus keeps it.
 export function showList(element, content, build) {
   const key = JSON.stringify(content);
   if (element.shown === key) return;
   element.shown = key;
+  const focused = element.contains(document.activeElement) && nameOf(document.activeElement);
   element.replaceChildren(...build());
+  if (focused) [...element.querySelectorAll('a, button, input, select')].find((e) => nameOf(e) === focused)?.focus({ preventScroll: true });
 }
 
 /// A sign beside a coloured element, because its meaning must not depend on the colour.
