@@ -35,7 +35,7 @@ std::string line_of(std::string_view protocol, std::string_view at, std::string_
   std::string line = text::format("%-10.*s %-26.*s ", static_cast<int>(protocol.size()), protocol.data(),
                                   static_cast<int>(at.size()), at.data());
   if (!carries.empty()) line.append(carries).append("; ");
-  return line + (sonar_speaks_first ? "sends without a request" : "waits for the driver");
+  return line + (sonar_speaks_first ? "sent without a request" : "waits for the driver");
 }
 
 Result<SonarPicture> drawing_of(const HostPing& ping) {

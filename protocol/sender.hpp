@@ -1,4 +1,4 @@
-// Finds the make that sent a recorded message, and the host's port that receives it.
+// Finds the make of the sonar that sent a recorded message, and the port of a host that receives such messages.
 #pragma once
 
 #include <algorithm>
@@ -14,14 +14,14 @@ struct SentBy {
   const protocol::Make* make = nullptr;
   Sender sender;
 };
-/// nullopt: a client sent it, or no known make.
+/// Returns the sender of a message; nullopt if a client sent it, or a sonar of an unknown make.
 std::optional<SentBy> sender_of(const RecordedMessage& message);
 /// The index of the port at which a host of the make receives messages of this carrier; nullopt: there is none.
 std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by);
 
-/// The framing of the device's recorded stream; null if the stream also has bytes without it: those of a make without framing,
-/// or of several ports, such as the replies of a port for commands.
-inline const Framing* only_framing(const protocol::Make& make) {
+/// Returns the framing if all recorded TCP bytes of the device have it. Returns null if the make has no framing, or if several
+/// TCP ports are recorded, because those of the others, such as a port for commands, have none.
+inline const Framing* common_framing(const protocol::Make& make) {
   const auto streams = std::count_if(make.ports.begin(), make.ports.end(),
                                      [](const auto& port) { return port.kind == protocol::HostPort::Kind::tcp; });
   return streams > 1 ? nullptr : make.codec.framing;

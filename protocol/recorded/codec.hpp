@@ -35,7 +35,7 @@ struct FileKind {
   bool (*begins)(BytesView) = nullptr;  // true if a file with these first 16 bytes (fewer if the file is shorter) has this format
   Result<std::unique_ptr<RecordingReader>> (*read)(std::unique_ptr<Source>) = nullptr;
   std::unique_ptr<RecordingWriter> (*write)(std::unique_ptr<Sink>) = nullptr;
-  bool is_raw_dump = false;  // the format equals a raw dump, whose reader is used
+  bool is_raw_dump = false;  // true: a file of this format is a raw dump, and is read as one
 };
 
 /// The device that sent a message, as far as the message identifies it.
@@ -67,16 +67,17 @@ struct Codec {
   std::optional<Samples> (*samples)(BytesView message) = nullptr;
   /// Converts the bytes of Vendor::frame() to the message that a client receives. Null: they are equal.
   Bytes (*message)(BytesView framed) = nullptr;
-  /// Finds the ping, or the part of a ping, in a message. Set if hosts request their pings, or if several ports send parts of a
-  /// ping; a replay then emulates the whole device with the recorded pings. nullopt: the message has no part of a ping.
+  /// Finds the ping, or the part of a ping, in a message. It is set for makes whose hosts request each
+  /// ping, or whose sonars send parts of a ping from several ports; a replay then emulates the whole device with the recorded
+  /// pings. nullopt: the message has no part of a ping.
   std::optional<PingPart> (*ping_part)(BytesView message) = nullptr;
-  /// Converts a message of ping_part() to the messages that Vendor::frame() or Vendor::datagrams() would make of a ping that was
-  /// requested with `request`, in order. Null: the same bytes.
+  /// Converts a message that has a PingPart to the messages that Vendor::frame() or Vendor::datagrams() would make of a ping that
+  /// was requested with `request`, in order. Null: the same bytes.
   std::vector<Bytes> (*answer)(BytesView message, const VendorSettings* request) = nullptr;
-  /// True if a message of ping_part() holds everything that another message of the same ping holds, and more. Null: no ping has
-  /// two such messages.
+  /// True if a message that has a PingPart holds everything that another message of the same ping holds, and more. Null: no ping
+  /// has two such messages.
   bool (*is_richer)(BytesView message, BytesView than) = nullptr;
-  /// The model of a replay's device, if that must differ from an emulated one. Null: the recorded model.
+  /// Returns the model with which a replay emulates the recorded sonar. Null: the recorded model.
   std::shared_ptr<const SonarModel> (*replayed)(const SonarModel& recorded) = nullptr;
 };
 

@@ -26,7 +26,7 @@ bool is_capture(BytesView front) {
 Result<std::optional<std::uint32_t>> address_from(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const auto ip = text::parse_ipv4(text);
-  if (!ip) return failure(ErrorKind::usage, "\"" + text + "\" is not an IPv4 address; a capture names its sonars by address");
+  if (!ip) return failure(ErrorKind::usage, "\"" + text + "\" is not an IPv4 address; captures need the address of a sonar");
   return text::number_from_ipv4(*ip);
 }
 
@@ -37,24 +37,24 @@ Result<Recording> opened(std::string_view format, OpenedReader reader) {
   return Recording{format, std::move(*reader)};
 }
 
-/// Opens a file that holds one sonar: a kind of file of some make, else a raw dump. Kinds come first, because the files of some
-/// makes begin like messages of their stream.
+/// Opens a file that holds one sonar: in a file format of some make, else a raw dump. The formats of makes are tried first,
+/// because some of their files begin with the same bytes as a raw dump.
 Result<Recording> open_file(std::unique_ptr<Source> source, BytesView front, const std::string& sonar) {
-  const auto complaint = [&](std::string_view format) {
+  const auto selection_error = [&](std::string_view format) {
     const bool vowel = std::string_view("aeio").find(format[format[0] == '.' ? 1 : 0]) != std::string_view::npos;
     return failure(ErrorKind::usage, source->name() + (vowel ? " is an " : " is a ") + std::string(format) +
-                                         ", which holds one sonar without a name: leave out the choice of one");
+                                         ", which holds one sonar without a name: do not select a sonar");
   };
   for (const protocol::Make& make : protocol::makes())
     for (const FileKind& kind : make.codec.files) {
       if (!kind.begins(front)) continue;
-      if (!sonar.empty()) return complaint(kind.name);
+      if (!sonar.empty()) return selection_error(kind.name);
       return opened(kind.name, kind.read(std::move(source)));
     }
   for (const protocol::Make& make : protocol::makes()) {
     const Framing* const framing = make.codec.framing;
     if (framing == nullptr || !begins_with(front, {framing->magic[0], framing->magic[1]})) continue;
-    if (!sonar.empty()) return complaint("raw dump");
+    if (!sonar.empty()) return selection_error("raw dump");
     return opened("raw dump", read_raw_dump(std::move(source), *framing));
   }
   return failure(ErrorKind::bad_data,
@@ -135,8 +135,8 @@ Result<RecordedPings> RecordedPings::open(std::unique_ptr<RecordingReader> reade
   return pings;
 }
 
-/// The host decodes messages of a recording as it decodes those of a sonar. Nothing is sent (as_it_is). With a new host the
-/// sequence and the pictures of a scan begin anew.
+/// The host decodes messages of a recording as it decodes those of a sonar. `as_it_is`: there is no sonar to send settings to. A
+/// new host accepts any number of the next ping, and begins a new picture of a scan.
 Result<void> RecordedPings::make_host() {
   protocol::Wanted wanted;
   wanted.as_it_is = true;

@@ -172,7 +172,7 @@ class Mistakes(unittest.TestCase):
 
     def test_a_good_configuration_lists_what_drivers_find_where(self):
         for profile, lines in (("oculus-m1200d", ["sonar front, Oculus M1200d", "  tcp        127.0.0.2:52100            settings, pings; waits for the driver",
-                                                  "  status     127.255.255.255:52102      address, state; sends without a request"]),
+                                                  "  status     127.255.255.255:52102      address, state; sent without a request"]),
                                ("norbit-wbms", ["  tcp        127.0.0.2:2211             water column; waits for the driver"])):
             said = check(GOOD.replace("oculus-m1200d", profile)).stdout.splitlines()
             self.assertEqual([line for line in lines if line not in said], [], said)

@@ -47,7 +47,7 @@ class Doctor(unittest.TestCase):
             self.expect(findings, "status", "ok", f"received back on udp 52102 from {daemon.address}")
             self.expect(findings, "ping", "ok", "accepts, first ping decoded after", "512 beams", "8 bit, size fields consistent")
             self.assertIn(findings["rate"][0]["level"], ("ok", "warn"))  # a busy machine is slow
-            self.assertIn("(asked 10)", findings["rate"][0]["text"])
+            self.assertIn("(requested 10)", findings["rate"][0]["text"])
             self.expect(findings, "control", "ok", "sonard", "1 sonar")
             self.expect(findings, "engine", "ok", "trace backend")
             self.expect(findings, "poses", "ok", "rov")

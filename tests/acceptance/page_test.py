@@ -283,7 +283,7 @@ class Page(PageChecks, unittest.TestCase):
         self.assertIn("2 driver connections", page.text("#connection-count"))
         self.assertIn("for commands: it gets no pings", page.run("document.querySelector('#clients tr:nth-child(2) .who').title"))
         self.assertEqual(page.run("[...document.querySelectorAll('#addresses li')].map((e) => e.innerText)"),
-                         ["tcp 127.0.0.2:2210 · points", "tcp 127.0.0.2:2209 · commands", "status 127.255.255.255:9 · sends without a request"])
+                         ["tcp 127.0.0.2:2210 · points", "tcp 127.0.0.2:2209 · commands", "status 127.255.255.255:9 · sent without a request"])
 
     def test_log_lines_that_a_new_connection_brings_again_are_shown_once(self):
         page = self.open(1100, 760, query="?test=300")

@@ -98,7 +98,7 @@ TEST(Doctor, MeasuresTheRate) {
   Facts facts = healthy();
   StreamFacts& s = facts.sonars[0].stream;
   s.rate_hz = 6.2;
-  expect(line(facts, "rate"), Level::warn, "rate 6.2 Hz (asked 10)", "engine.threads");
+  expect(line(facts, "rate"), Level::warn, "rate 6.2 Hz (requested 10)", "engine.threads");
   s.rate_hz = 10, s.missing = 4;
   expect(line(facts, "rate"), Level::warn, "4 pings missing", "outbox");
   s.missing = 0, s.latency_p50_ms.reset(), s.spread_p99_ms = 7.0;
@@ -108,7 +108,7 @@ TEST(Doctor, MeasuresTheRate) {
   figures.set_latency_ms_p99(31);
   expect(line(facts, "rate"), Level::ok, "image latency 25 ms p50, 31 ms p99", "");
   s.asked = false, s.rate_hz = 3;
-  expect(line(facts, "rate"), Level::warn, "rate 3.0 Hz (asked 10)", "fewer beams");
+  expect(line(facts, "rate"), Level::warn, "rate 3.0 Hz (requested 10)", "fewer beams");
   s.pings = 1;
   expect(line(facts, "rate"), Level::warn, "one ping only", "sonarctl listen 127.0.0.2");
 }
@@ -125,7 +125,7 @@ TEST(Doctor, SaysWhatComputingAllows) {
   sonar.stream.computing_ms = 12;
   EXPECT_THAT(line(facts, "rate").text, Not(HasSubstr("computing"))) << "as fast as an Oculus can be asked for";
   sonar.stream.computing_ms = 52;
-  expect(line(facts, "rate"), Level::ok, "rate 10.0 Hz (asked 10)", "");
+  expect(line(facts, "rate"), Level::ok, "rate 10.0 Hz (requested 10)", "");
   expect(line(facts, "rate"), Level::ok, ", computing takes 52 ms per ping: 19 Hz at most here", "");
   sonar.stream.computing_ms = 193, sonar.stream.rate_hz = 5.2;
   expect(line(facts, "rate"), Level::warn, "computing takes 193 ms per ping: 5.2 Hz at most here: the simulation is slower",

@@ -26,7 +26,7 @@ TEST(Doctor, PraisesWhatIsWell) {
       text_from(run_checks(healthy())),
       "ok    status broadcast received back on udp 52102 from 127.0.0.2\n"
       "ok    tcp 127.0.0.2:52100 accepts, first ping decoded after 96 ms: 512 beams x 437 ranges, 8 bit, size fields consistent\n"
-      "ok    rate 10.0 Hz (asked 10), image latency 18 ms p50, 21 ms p99\n"
+      "ok    rate 10.0 Hz (requested 10), image latency 18 ms p50, 21 ms p99\n"
       "ok    control tcp 127.0.0.1:14770 answers: sonard 0.1.0, 1 sonar, realtime clock\n"
       "ok    trace backend: embree, avx2\n"
       "ok    poses of rov: demo orbit\n"
@@ -151,7 +151,7 @@ TEST(Doctor, KnowsThatARecordingHasItsOwnRateAndNoControl) {
   facts.control.error = "no answer";
   facts.http.text = "ok: replays run.mcap";
   facts.sonars[0].stream.rate_hz = 5;
-  expect(line(facts, "rate"), Level::ok, "rate 5.0 Hz (asked 10)", "");
+  expect(line(facts, "rate"), Level::ok, "rate 5.0 Hz (requested 10)", "");
   EXPECT_THAT(text_from(run_checks(facts)), AllOf(HasSubstr(", as in the recording\n"), Not(HasSubstr("no answer"))));
 }
 

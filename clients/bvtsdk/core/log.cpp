@@ -12,7 +12,7 @@ struct Log {
   std::FILE* target = stderr;
   bool owned = false;
 
-  void to(std::FILE* file, bool own) {
+  void set_target(std::FILE* file, bool own) {
     if (owned) std::fclose(target);
     target = file;
     owned = own;
@@ -44,12 +44,12 @@ bool set_log_target(const std::string& name) {
   Log& out = the_log();
   const std::lock_guard lock(out.mutex);
   if (name == "stdout" || name == "stderr" || name == "null") {
-    out.to(name == "stdout" ? stdout : name == "stderr" ? stderr : nullptr, false);
+    out.set_target(name == "stdout" ? stdout : name == "stderr" ? stderr : nullptr, false);
     return true;
   }
   std::FILE* file = name.empty() ? nullptr : std::fopen(name.c_str(), "ae");
   if (!file) return false;
-  out.to(file, true);
+  out.set_target(file, true);
   return true;
 }
 

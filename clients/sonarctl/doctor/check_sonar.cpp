@@ -369,7 +369,8 @@ class SonarChecks {
     const bool is_asked_hz = s.asked && s.asked_hz > 0;
     const double expected_hz = is_asked_hz ? s.asked_hz : sonar_.reported && !sonar_.make->scans ? sonar_.reported->rate_hz() : 0;
     std::string text = "rate " + format("%.1f ", s.rate_hz) + std::string(sonar_.make->rate_unit());
-    if (expected_hz > 0) text += (sonar_.make->each_ping_requested ? " (at most " : " (asked ") + format("%g", expected_hz) + ")";
+    if (expected_hz > 0)
+      text += (sonar_.make->each_ping_requested ? " (at most " : " (requested ") + format("%g", expected_hz) + ")";
     text += latency_text();
     const bool slow = expected_hz > 0 && s.rate_hz < 0.85 * expected_hz;
     const bool is_refuted = too_slow_for(s.rate_hz / 1.2);  // the computer was busier when the known time was measured

@@ -121,7 +121,7 @@ Steps steps_of(const motion::Trajectory& trajectory) {
     const motion::Motion m = way.at(times[i]).moves;  // the motion on the way to the next pose
     const double mps = length(m.velocity_mps), radps = length(m.angular_velocity_radps);
     ++steps.all;
-    if (!(mps <= fastest_vehicle_mps && radps <= fastest_vehicle_radps)) ++steps.too_far;
+    if (!(mps <= fastest_vehicle_mps && radps <= fastest_vehicle_radps)) ++steps.too_fast;
     steps.fastest_mps = std::max(steps.fastest_mps, mps);
     steps.fastest_radps = std::max(steps.fastest_radps, radps);
   }
@@ -130,7 +130,7 @@ Steps steps_of(const motion::Trajectory& trajectory) {
 
 bool are_snapshots(const motion::Trajectory& trajectory) {
   const Steps steps = steps_of(trajectory);
-  return steps.too_far * steps_to_one_too_far > steps.all;
+  return steps.too_fast * steps_per_fast_step > steps.all;
 }
 
 std::string note_of_snapshots(const motion::Trajectory& trajectory) {
@@ -138,7 +138,7 @@ std::string note_of_snapshots(const motion::Trajectory& trajectory) {
   return text::format(
       "the poses are read as unconnected snapshots: %zu of %zu steps from one to the next are faster than a vehicle "
       "(%g m/s, %g rad/s; the fastest: %.3g m/s, %.3g rad/s). The sonar does not move during a ping; --motion on moves it",
-      steps.too_far, steps.all, fastest_vehicle_mps, fastest_vehicle_radps, steps.fastest_mps, steps.fastest_radps);
+      steps.too_fast, steps.all, fastest_vehicle_mps, fastest_vehicle_radps, steps.fastest_mps, steps.fastest_radps);
 }
 
 }  // namespace sonar::render

@@ -1,5 +1,5 @@
-// The input of `sonard render`: one sonar over one scene with its settings and trajectory, read from a configuration or from a
-// render file (docs/render.md), which may sweep values.
+// The input of `sonard render`: a scene and one sonar with its settings and trajectory, read from a configuration or from a
+// render file. A render file may list several values of a key (a sweep, docs/render.md); this gives a job for each.
 #pragma once
 
 #include <filesystem>
@@ -22,7 +22,7 @@ class ShapeCache;
 namespace sonar::render {
 
 struct RenderJob {
-  /// One sonar, without a product, at rest on one vehicle.
+  /// Makes a job with one vehicle, which does not move, and on it one sonar, which has no profile.
   RenderJob() {
     config.vehicles.resize(1);
     config.sonars.resize(1);
@@ -31,11 +31,11 @@ struct RenderJob {
   std::string name;
   std::shared_ptr<const Scene> scene;
   Config config;                // for a render file: its one sonar and vehicle, water, seed and engine
-  std::size_t sonar_index = 0;  // in config.sonars; keys the noise, as in the daemon
+  std::size_t sonar_index = 0;  // in config.sonars; the random noise depends on it, as in the daemon
   PingSettings settings;
   Time begins_at{};           // the time stamp at which trajectories begin
   bool snapshots = false;     // the vehicle's poses are unrelated: the sonar rests within each ping
-  bool wants_motion = false;  // engine.motion: on is written in the file
+  bool wants_motion = false;  // true if the file contains `engine: {motion: on}`
   Values values;              // values of the sweep and of `let`
 
   SonarConfig& sonar() { return config.sonars.at(sonar_index); }
@@ -53,21 +53,22 @@ struct RenderInput {
   std::vector<std::string> notes = {};  // decisions about the input that users should see; written to render.json
 };
 
-/// Reads a configuration (it has `world:`) or a render file. `sonar`: selects one of a configuration's sonars.
+/// Reads a configuration (recognised by its key `world`) or a render file. `sonar`: selects one of a configuration's sonars.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar = {});
-/// A render file from text; paths in it are relative to `folder`. `known`: shapes of files that were read before.
+/// Parses the text of a render file; paths in it are relative to `folder`. `known`: shapes of files that were read before.
 Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder,
                                       ShapeCache* known = nullptr);
 
-/// Returns a sentence if the product cannot be set to the range, which is rendered nevertheless; else empty.
+/// Returns a note for the user if the real sonar cannot be set to the range of the job (pings are rendered anyway); else empty.
 std::string note_of_range(const RenderJob& job);
 /// Returns the width of a range cell in the mode of the job, equal at every range; nullopt for a sonar without range images.
 std::optional<float> range_cell_m(const RenderJob& job);
-/// Returns the pulse width that the device has in the mode of the job, at the job's row spacing. Needs a product with rows.
+/// Returns the pulse width that the device has in the mode of the job, at the job's row spacing. Call it
+/// only for a sonar that has a profile and sends no range images.
 float pulse_of_mode_m(const RenderJob& job);
 
-/// The vehicle follows its trajectory in a file, in the file's own time; an empty name: of the only body in it. Errors:
-/// name:line: what.
+/// Makes the vehicle of the job follow the trajectory of `body` in the file, with the times of the file. An empty `body` means
+/// the only body of the file. Errors begin with `name`, the name of the file.
 Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const std::string& name, const std::string& body);
 /// Returns the times of the poses of the vehicle's trajectory; empty if it has none.
 std::vector<Time> pose_times(const RenderJob& job);
@@ -77,24 +78,24 @@ World world_of(const RenderJob& job);
 /// Returns everything on which a ping of the job depends. `world` = world_of(job).
 PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at);
 
-/// Depth of the sonar at time 0 [m], before there is a scene.
+/// Depth of the sonar at time 0 [m]. The scene is not used, so it need not be loaded yet.
 double first_depth_m(const RenderJob& job);
-/// The initial settings, at that depth, of a sonar with a vendor.
+/// The initial settings of the sonar at first_depth_m(). The sonar must have a profile.
 PingSettings device_settings(const RenderJob& job);
 
 // Detects files of unrelated poses, as in data sets. Such poses are too far apart for a trajectory, so they do not define the
 // motion within a ping.
 
 /// Highest speeds of a carrier of an imaging sonar: a fast boat, and a towfish that rolls. If more than one in
-/// `steps_to_one_too_far` steps is faster, the file contains snapshots, not a trajectory, unless it has velocities.
+/// `steps_per_fast_step` steps is faster, the file contains snapshots, not a trajectory, unless it has velocities.
 inline constexpr double fastest_vehicle_mps = 15, fastest_vehicle_radps = 5;
-inline constexpr std::size_t steps_to_one_too_far = 10;
+inline constexpr std::size_t steps_per_fast_step = 10;
 /// Poses that are closer in time count as one step, because the jitter of a fast log is not motion.
 inline constexpr motion::Ns shortest_step = std::chrono::milliseconds(100);
 
 /// The steps of a trajectory.
 struct Steps {
-  std::size_t all = 0, too_far = 0;
+  std::size_t all = 0, too_fast = 0;
   double fastest_mps = 0, fastest_radps = 0;
 };
 Steps steps_of(const motion::Trajectory& trajectory);

@@ -148,9 +148,9 @@ void add(Sha256& hash, const json& value) {
   hash.add(std::as_bytes(std::span(text.data(), text.size())));
 }
 
-void add_way(Sha256& hash, const std::shared_ptr<const motion::Trajectory>& way, Time begins_at) {
-  if (!way) return;
-  const motion::Points& p = way->points();
+void add_trajectory(Sha256& hash, const std::shared_ptr<const motion::Trajectory>& trajectory, Time begins_at) {
+  if (!trajectory) return;
+  const motion::Points& p = trajectory->points();
   add(hash, {begins_at.time_since_epoch().count(), p.times.size()});
   hash.add(std::as_bytes(std::span(p.times)));
   hash.add(std::as_bytes(std::span(p.poses)));
@@ -158,7 +158,7 @@ void add_way(Sha256& hash, const std::shared_ptr<const motion::Trajectory>& way,
   hash.add(std::as_bytes(std::span(p.angular_velocities_radps)));
 }
 
-/// Meshes count by content, not by the name of their file.
+/// Adds meshes by their content, not by the names of their files.
 void add_scene(Sha256& hash, const Scene& scene) {
   for (const Object& o : scene.objects) {
     add(hash, {o.name, o.label, o.visible, json_of(o.in_world)});
@@ -178,7 +178,7 @@ json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, 
   const PingRequest& r = ping.request;
   const PingSettings& s = r.settings;
   const FrequencyMode& mode = ping.mode();
-  const bool of_ranges = range_image_of(r) != nullptr;  // its rows are elevations
+  const bool of_ranges = range_image_of(r) != nullptr;  // the rows of a range image are elevations, so they have no range
   json settings = json_of(s);
   if (of_ranges) settings["row_spacing_m"] = nullptr;
   const double depth_m = depth_from_z(r.sonar_in_world.position_m.z);
@@ -229,13 +229,13 @@ std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictu
          job.values, static_cast<int>(job.config.engine.simd) + 16 * static_cast<int>(job.config.engine.device),
          json_of(job.sonar().mount), static_cast<int>(job.sonar().bearings), json_of(job.vehicle().initial_pose),
          job.vehicle().orbits});
-    add_way(hash, job.vehicle().plan.trajectory, job.begins_at);
+    add_trajectory(hash, job.vehicle().plan.trajectory, job.begins_at);
     if (job.snapshots) add(hash, "snapshots");
     // The index of a moving object is added, because its trajectory alone does not say which object moves.
     const std::vector<BodyStart> bodies = bodies_of(*job.scene, job.config);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       if (bodies[i].plan) add(hash, i);
-      add_way(hash, bodies[i].plan.trajectory, job.begins_at);
+      add_trajectory(hash, bodies[i].plan.trajectory, job.begins_at);
     }
     add_scene(hash, *job.scene);
   }

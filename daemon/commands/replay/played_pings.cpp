@@ -7,7 +7,7 @@
 namespace sonar {
 namespace {
 
-constexpr double same_direction_rad = 1e-4;  // steps of heads are 10 times wider
+constexpr double same_direction_rad = 1e-4;  // the smallest step of a scanning head is about 10 times as large
 
 double between(double a_rad, double b_rad) { return std::abs(std::remainder(a_rad - b_rad, 2 * std::numbers::pi)); }
 
@@ -53,7 +53,8 @@ std::optional<PlayedPings::Part> PlayedPings::read() {
   }
 }
 
-/// Reads the messages of a ping and returns the richest. They are ordered from the poorest to the richest, or the reverse.
+/// Reads the messages of a ping and returns the one with the most content. From each message to the next the content grows, or
+/// from each to the next it shrinks.
 recording::Bytes PlayedPings::take_richest() {
   recording::Bytes richest = std::move(ahead_->bytes);
   ahead_ = read();

@@ -1,4 +1,4 @@
-// Answers requests for the page of the live view with its files. Pure. The page contains no data, so it needs no token.
+// Answers requests for the page of the live view with its files, without I/O. The page contains no data, so it needs no token.
 #pragma once
 
 #include <optional>

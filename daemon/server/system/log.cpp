@@ -65,7 +65,7 @@ struct Log::Sink {
 Log::Log(LogOptions options) : options_(std::move(options)) {
   if (options_.sink) return;
   sink_ = std::make_unique<Sink>();
-  sink_->logger.set_level(spdlog::level::debug);  // filtered below, by our own level
+  sink_->logger.set_level(spdlog::level::debug);  // write() drops the lines below options_.level
   sink_->logger.set_pattern(options_.json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%f%z","level":"%l",%v})"
                                           : "%Y-%m-%d %H:%M:%S.%e %^%l%$  %v");
 }

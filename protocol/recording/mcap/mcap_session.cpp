@@ -65,7 +65,7 @@ class McapRecordingReader final : public RecordingReader {
 
  private:
   void find_junk(const protocol::Make& make, BytesView bytes, std::uint64_t at) {
-    if (!junk_) junk_.emplace(only_framing(make));
+    if (!junk_) junk_.emplace(common_framing(make));
     junk_->take(
         bytes, [at] { return "the record at byte " + std::to_string(at); }, reader_.damages());
   }

@@ -99,7 +99,7 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
 /// A TCP connection of a client with the sonar. Each direction is put in order (TcpStream), then split into messages.
 struct Connection {
   explicit Connection(const Make& make)
-      : device(Origin::device, *make.codec.framing), client(Origin::client, *make.codec.framing), junk(only_framing(make)) {}
+      : device(Origin::device, *make.codec.framing), client(Origin::client, *make.codec.framing), junk(common_framing(make)) {}
 
   TcpStream device_stream, client_stream;
   MessageSplitter device, client;

@@ -1,4 +1,5 @@
-"""Runs the driver under test as its user would. Its processes are observed through /proc; its output is the log and the tap."""
+"""Runs the driver under test as its user would. Measures its processes by /proc. Splits its output into log lines and lines of
+the tap: JSON about published pings and the state of the link (docs/judge.md)."""
 from __future__ import annotations
 
 import json
@@ -67,7 +68,7 @@ def expand(command: str, ip: str, port: int, device_id: int) -> List[str]:
 
 
 class Driver:
-    """The driver from start() to stop(). tap: whether its standard output has lines of a tap."""
+    """The processes of the driver; start() starts them, stop() ends them. tap: whether standard output has lines of the tap."""
 
     def __init__(self, words: Sequence[str], prefix: Sequence[str], log: pathlib.Path, tap: bool) -> None:
         self._words, self._prefix, self._log_path, self._tap = list(words), list(prefix), log, tap
@@ -78,8 +79,8 @@ class Driver:
         self.started = time.monotonic()  # start of the case; times in the log count from here
         self.published: List[Published] = []
         self.states: List[State] = []
-        self.lines: Dict[int, int] = {}      # log lines by tenth of a second
-        self.line_times: List[float] = []    # times of the first lines after each start
+        self.lines: Dict[int, int] = {}      # number of log lines in each tenth of a second
+        self.line_times: List[float] = []    # times of the first 10000 log lines
         self.samples: List[Sample] = []
         self.peak_mib = 0.0
         self.exited: Optional[Tuple[float, int]] = None  # time and exit code
@@ -195,7 +196,7 @@ class Driver:
 
 
 def family_of(pid: int) -> List[int]:
-    """Returns the numbers of a process and all its descendants."""
+    """Returns the IDs of a process and of all its descendants."""
     found = [pid]
     for one in found:
         try:

@@ -69,7 +69,7 @@ export function drawConnections(facts) {
   const addresses = facts.sonarStatus?.addresses ?? [];
   const wait = facts.listened ? '' : ' · waits for the driver';
   showList($('addresses'), [addresses, wait], () =>
-    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), a.carries && ` · ${a.carries}`, a.sonar_speaks_first ? ' · sends without a request' : wait)));
+    addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), a.carries && ` · ${a.carries}`, a.sonar_speaks_first ? ' · sent without a request' : wait)));
 }
 
 /// The pings made a second in the last minute; the newest on the right. Draws only what has changed.
@@ -89,7 +89,7 @@ export function drawHistory(canvas, facts) {
   const y = (rate) => height - 2 - (rate / top) * (height - 4);
   g.fillStyle = style.getPropertyValue('--line');
   g.fillRect(0, height - ratio, width, ratio);
-  if (asked > 0) {  // the requested rate, dashed
+  if (requested > 0) {  // the requested rate, dashed
     g.strokeStyle = style.getPropertyValue('--line');
     g.setLineDash([4 * ratio, 4 * ratio]);
     g.beginPath();
