@@ -1,4 +1,4 @@
-// Bytes as base64 (RFC 4648, 4).
+// Converts bytes to base64 and back (RFC 4648, section 4).
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace sonar {
 
 constexpr std::string_view base64_digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// With padding.
+/// Returns base64 text with padding.
 inline std::string base64(std::span<const std::byte> bytes) {
   std::string text;
   text.reserve((bytes.size() + 2) / 3 * 4);

@@ -54,7 +54,7 @@ struct UtmZone {
 
 /// The name of the zone: "33N", "33S".
 std::string text_of(UtmZone zone);
-/// Reads "33N" or "33 south"; empty for any other text.
+/// Reads "33N" or "33 south"; returns nullopt for any other text.
 std::optional<UtmZone> utm_zone_from(std::string_view text);
 /// The zone that contains a position, without the exceptions for Norway and Svalbard.
 UtmZone utm_zone_at(const Geodetic& place);

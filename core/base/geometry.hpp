@@ -87,7 +87,7 @@ SONAR_HD constexpr Vec3d rotate(Quatd q, Vec3d v) {
 SONAR_HD constexpr Pose compose(const Pose& b_in_c, const Pose& a_in_b) {
   return {b_in_c.position_m + rotate(b_in_c.orientation, a_in_b.position_m), b_in_c.orientation * a_in_b.orientation};
 }
-/// b_in_a from a_in_b
+/// b_in_a = inverse(a_in_b)
 SONAR_HD constexpr Pose inverse(const Pose& a_in_b) {
   const Quatd q = conjugate(a_in_b.orientation);
   return {rotate(q, Vec3d{-a_in_b.position_m.x, -a_in_b.position_m.y, -a_in_b.position_m.z}), q};

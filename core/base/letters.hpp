@@ -1,4 +1,4 @@
-// Letters of texts: converts ASCII capitals to small letters; the locale has no effect.
+// Converts ASCII capitals to small letters; the locale has no effect.
 #pragma once
 
 #include <algorithm>

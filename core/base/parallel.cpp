@@ -27,7 +27,7 @@ struct Parallel::Pool {
 
   std::exception_ptr fault;  // the first exception of a call
 
-  // Also called if one of the workers cannot be started.
+  // This is also called if a worker cannot be started.
   ~Pool() {
     {
       std::lock_guard lock(mutex);

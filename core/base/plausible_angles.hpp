@@ -36,7 +36,8 @@ inline ImplausibleAngle angle_beyond_radians(const RollPitchYaw& a, bool counts_
 /// anywhere, jumps after a turn, and changes 57 times as fast.
 class TurnCount {
  public:
-  /// Adds the yaw of a pose; poses must be in the order of time. False: this yaw cannot follow from that of the previous pose.
+  /// Adds the yaw of a pose; poses must be in the order of time. Returns false if this yaw cannot follow from that of the
+  /// previous pose.
   bool add(double yaw_rad, Time at) {
     const bool goes_on = last_ && is_turn(yaw_rad, at);
     if (!goes_on) {
@@ -73,7 +74,7 @@ class TurnCount {
   }
 
   std::optional<Heading> last_;
-  Heading first_;  // the first of the poses that continue each other
+  Heading first_;  // the first pose of the continuous series
   bool begins_count_ = false;
   double low_rad_ = 0, high_rad_ = 0;
 };

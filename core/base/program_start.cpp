@@ -36,7 +36,7 @@ namespace {
 
 constexpr std::size_t least_stack_bytes = std::size_t{1} << 20;
 
-/// New threads get the soft limit that the program was started with, which raising it does not change.
+/// Without this call, new threads would get the soft limit that the program was started with, even after it was raised.
 void give_threads_the_usual_size() {
   pthread_attr_t attributes;
   std::size_t bytes = 0;

@@ -34,7 +34,7 @@ tl::unexpected<Error> not_opened(const std::filesystem::path& file) {
   return failure(ErrorKind::missing_file, file.string() + ": cannot be opened: " + why);
 }
 
-std::filesystem::path& folder_to_read() {  // empty = all
+std::filesystem::path& folder_to_read() {  // empty: files of every folder may be read
   static std::filesystem::path folder;
   return folder;
 }

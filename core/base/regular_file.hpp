@@ -18,8 +18,8 @@ struct CloseFile {
 };
 using OpenFile = std::unique_ptr<std::FILE, CloseFile>;
 
-/// True if nothing has this name: no file, no folder, and no link, even one that leads nowhere. For all other names
-/// open_regular() gives the reason why they cannot be read.
+/// True if no file, folder or link has this name, not even a link without a target. For all other names open_regular() gives the
+/// reason why they cannot be read.
 bool is_absent(const std::filesystem::path& file);
 
 /// Opens a file for reading in binary mode. Error: missing_file if it does not exist or is not a regular file ("x.png: is a
@@ -29,7 +29,8 @@ Result<OpenFile> open_regular(const std::filesystem::path& file);
 /// reading fails, unavailable if there is too little memory.
 Result<std::string> read_regular(const std::filesystem::path& file, std::size_t most_bytes);
 
-/// open() for writing, without the wait for the reader of a FIFO. -1: errno has the reason, and why_not_written() explains it.
+/// open() for writing, without the wait for the reader of a FIFO. Returns -1 on failure; errno then has the reason, and
+/// why_not_written() explains it.
 int open_to_write(const std::filesystem::path& file, int flags);
 std::string why_not_written(const std::filesystem::path& file, int error);
 

@@ -21,7 +21,7 @@ enum class ErrorKind : int {
 
 struct Error {
   ErrorKind kind = ErrorKind::bug;
-  std::string text;  // one sentence: what, where, why, next step
+  std::string text;  // one sentence: what failed, where, why, and the next step
 };
 
 template <class T>

@@ -19,13 +19,13 @@ struct Rgb {
 
 struct ColourMap {
   struct Anchor {
-    float at = 0;  // 0..1, rising from 0 to 1
+    float at = 0;  // position in the map; the anchors rise from 0 to 1
     float r = 0, g = 0, b = 0;
   };
   std::string_view name;
   std::vector<Anchor> anchors;
 
-  /// Values outside 0..1 get the colour at that end; NaN gets the first colour.
+  /// Values outside 0..1 get the colour at the nearer end; NaN gets the first colour.
   Rgb colour(float value) const;
 };
 

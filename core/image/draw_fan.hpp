@@ -40,7 +40,7 @@ FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens
 /// more than a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
-/// Draws a series of pings like draw_fan, in a third of the time. It reuses the footprints of the pixels until the number of
+/// Draws a series of pings like draw_fan, but three times as fast. It reuses the footprints of the pixels until the number of
 /// rows or beams, the bearings or the direction change. It needs 32 bytes per pixel.
 class FanPainter {
  public:

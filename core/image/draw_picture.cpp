@@ -51,7 +51,7 @@ Raster draw_cells(const PolarImage& image, std::size_t rows, const FanStyle& sty
   return raster;
 }
 
-/// Writes a value whose upper left corner is (x, y).
+/// Writes a value; its upper left corner is (x, y).
 void draw_label(Raster& raster, int x, int y, double value, const char* unit, int scale) {
   char label[32];
   std::snprintf(label, sizeof label, "%g%s", value == 0 ? 0 : value, unit);
@@ -153,12 +153,13 @@ std::vector<TimeMark> time_marks(const SonarPicture& waterfall) {
   if (ages.size() < 2 || ages.size() != waterfall.image.rows || !(ages.back() > 0)) return marks;
   const auto rows = static_cast<double>(rows_shown(waterfall.image));
   const double step_s = ring_spacing_m(ages.back() * rows / static_cast<double>(ages.size()));
-  double passed = 0;  // steps
+  double passed = 0;  // number of steps that the rows so far have passed
   for (std::size_t row = 1; row < ages.size(); ++row) {
     const double steps = std::floor(ages[row] / step_s);
     if (!(steps > passed)) continue;
     passed = steps;
-    const double beyond = (steps * step_s - ages[row - 1]) / (ages[row] - ages[row - 1]);  // the middle of the row before
+    const double beyond =
+        (steps * step_s - ages[row - 1]) / (ages[row] - ages[row - 1]);  // distance from the middle of the row before
     const double part = (static_cast<double>(row) - 0.5 + beyond) / rows;
     if (part - (marks.empty() ? 0 : marks.back().part) >= closest_marks) marks.push_back({part, steps * step_s});
   }

@@ -41,7 +41,7 @@ Result<std::vector<std::byte>> encode_png(const Raster& raster);
 /// system's reason) the temporary file is removed.
 Result<void> write_whole_file(const std::filesystem::path& file, std::initializer_list<std::span<const std::byte>> parts);
 
-/// Writes a PNG file by write_whole_file(), and makes its folder if needed.
+/// Writes a PNG file with write_whole_file(), and makes its folder if needed.
 Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
 
 // Writes 8-bit or 16-bit integers, such as samples and labels, as grey PNG files without a colour map.

@@ -85,7 +85,7 @@ struct SonarPicture {
 
 /// A time beside a waterfall (time_marks() in draw_picture.hpp).
 struct TimeMark {
-  double part = 0;   // distance from the upper edge, in heights of the picture
+  double part = 0;   // distance from the upper edge, divided by the height of the picture
   double age_s = 0;  // before the newest ping
 };
 

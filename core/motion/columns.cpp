@@ -196,7 +196,7 @@ void Columns::guess_unit(const Words& words) {
   if (!has(t) || says_unit_) return;
   const std::string_view text = word(words, t);
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return;
-  // True for times after 1973. Such numbers of 12 or more digits cannot be seconds, because seconds would exceed every stamp.
+  // The unit is known only for numbers of 12 or more digits (times after 1973), because such seconds would exceed every stamp.
   if (text.size() < 12) return;
   power_ = text.size() <= 14 ? 6 : text.size() <= 17 ? 3 : 0;
 }
@@ -244,7 +244,7 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   }
   if (auto wrong = fill({qw, qx, qy, qz})) return wrong;
   const Quatd q{v[0], v[1], v[2], v[3]};
-  // Corrects a rounding error of the norm. With a larger error the columns cannot be a quaternion.
+  // Corrects a rounding error of the norm. With a larger error the columns do not hold a quaternion.
   const double norm = std::sqrt(norm_squared(q));
   if (norm == 0) return "the quaternion is zero";
   if (!(std::abs(norm - 1) <= norm_allowed)) return "the quaternion's norm is " + std::to_string(norm) + ", it must be 1";

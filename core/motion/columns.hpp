@@ -33,7 +33,7 @@ class Columns {
   /// Returns an error without the prefix "file:line: ", or nullopt.
   static std::optional<std::string> refuse_header(const Words& header, Columns& out);
   static Columns tum();
-  /// Number of words: 8 without velocity, 11 with velocity, 17 with velocity and the biases of an IMU, which are ignored.
+  /// `words`: 8 without velocity, 11 with velocity, 17 with velocity and the biases of an IMU, which are ignored.
   static Columns euroc(std::size_t words);
   /// Twelve numbers and no time: the first three rows of the matrix that converts points from body axes to world axes.
   static Columns kitti();

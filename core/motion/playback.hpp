@@ -36,7 +36,7 @@ struct Plan {
   std::shared_ptr<const Trajectory> trajectory = {};  // null = none
   PlaybackRules rules = {};
   std::string file = {};                // name of the file as the user wrote it
-  std::string about = {};               // format, frame, length, for people
+  std::string about = {};               // format, frame and length, as text for the user
   ImplausibleAngle largest_angle = {};  // as in TrajectoryFile::Body
   std::optional<Geodetic> origin = {};  // as in TrajectoryFile
   explicit operator bool() const { return trajectory != nullptr; }

@@ -1,6 +1,6 @@
 // The trajectory of one body: poses at known times. The class computes the pose and motion at any time between them.
-// trajectory_file.hpp reads trajectories from files, playback.hpp plays them by a clock. This class uses neither clocks nor
-// files.
+// trajectory_file.hpp reads trajectories from files, playback.hpp plays them at the pace of a clock. This class uses neither
+// clocks nor files.
 #pragma once
 
 #include <chrono>

@@ -19,7 +19,7 @@ double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
 }  // namespace
 
 double elevation_pattern(const Prepared& p, double elevation_rad) {
-  // One sinc pattern of the quoted width, sinc(0.884 sin(phi) / width) (section 8).
+  // One sinc pattern of the quoted width, sinc(0.884 sin(phi) / width) (docs/acoustics.md, section 8).
   return p.elevation_per_sine > 0 ? sinc(p.elevation_per_sine * std::sin(elevation_rad)) : 1.0;
 }
 
@@ -31,7 +31,7 @@ bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNo
   // Choi 2025, eq. 1: sqrt(cross-section) D(phi) e^{-2 a r} / r^2 times the source.
   const double amplitude =
       s.source_upa * std::sqrt(cross_section_m2) * pattern * two_way_transmission(range_m, s.absorption_np_per_m);
-  // In expected power: (39). Otherwise: the factor xi and the phase (12).
+  // In expected-power mode, eq. 39 applies; otherwise the factor xi and the phase of eq. 12.
   if (p.plan.expected_power)
     echoes.push_back({turns, {amplitude * amplitude, 0}});
   else
@@ -73,8 +73,8 @@ void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const
   for (const PaperHit& hit : hits) {
     const double turns = turns_of(hit.range_m, p, s);
     if (!(turns >= 0 && turns < 1)) continue;
-    // sqrt(printed_cross_section_m2) / r^2
     const bool audible = hit.range_m >= nearest_scatterer_m;
+    // The amplitude contains sqrt(printed_cross_section_m2) / r^2.
     const double amplitude =
         s.source_upa * std::sqrt(mu_of(hit) * hit.solid_angle_sr) * hit.cosine * pattern_of(hit) / hit.range_m;
     // Choi 2025, eq. 2 as printed: cos^2(incidence) times the footprint r^2 dOmega, without 1 / cos.

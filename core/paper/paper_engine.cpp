@@ -21,8 +21,8 @@ class ComparisonEngine {
   Ping run(const PingRequest& asked) {
     // At the sea surface, a ping is computed at a pose that differs from the requested one. The result states the requested
     // pose.
-    std::vector<PingRequest> room;
-    const PingRequest& request = in_water({&asked, 1}, *scene_, room).front();
+    std::vector<PingRequest> changed;
+    const PingRequest& request = in_water({&asked, 1}, *scene_, changed).front();
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);

@@ -15,12 +15,12 @@ namespace sonar::paper {
 /// Default number of rays per column: the number in the paper's model, and the number of rows in its raster run.
 inline constexpr int default_rays = 300, default_raster_rows = 11;
 
-/// Directions of the rays, with one column per beam. Fan (paper): uniform in azimuth and elevation. Grid (raster): uniform on an
-/// image plane ahead of the sonar, like the pixels of a camera.
+/// Directions of the rays, with one column per beam. The rays of a fan (paper) are uniform in azimuth and elevation, those of a
+/// grid (raster) are uniform on an image plane ahead of the sonar, like the pixels of a camera.
 struct PaperFan {
   bool perspective = false;
   std::vector<double> azimuth_rad;     // [columns] falling from port to starboard: directions of the beams
-  std::vector<double> column_width;    // [columns] of azimuth [rad]; perspective: of the tangent
+  std::vector<double> column_width;    // [columns] width in azimuth [rad]; perspective: in its tangent
   double first_row = 0, row_step = 0;  // elevation [rad] of row 0; perspective: its tangent over the horizontal x axis
   int rows = 0;
   std::vector<Vec3d> ahead;         // [columns]: the part of the direction that depends on the column
@@ -36,8 +36,8 @@ struct PaperFan {
   double solid_angle_sr(int column, int row) const;
 };
 
-/// `mode` is paper or raster; `rays` per column, 0 = the default. The fan spans twice the quoted vertical width (P900: 40 degrees
-/// for 20), like the paper's model.
+/// `mode` is paper or raster; `rays` is the number of rays per column, 0 = the default. The fan spans twice the quoted vertical
+/// width (P900: 40 degrees for 20), like the paper's model.
 PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays);
 
 /// The hit of a ray on a surface.

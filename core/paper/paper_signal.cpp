@@ -20,7 +20,7 @@ PaperSpectrum make_spectrum(const PingPlan& plan) {
   PaperSpectrum s;
   s.samples = plan.samples;
   s.sample_offset = plan.sample_offset - plan.start_samples;
-  // T [s], for the way out and back.
+  // The length T [s] of the record, in two-way travel time.
   const double record_s = plan.samples * 2 * plan.sample_spacing_m / static_cast<double>(plan.settings.device_sound_speed_mps);
   // Choi 2025, eq. 4: df = 1 / T, M = b T frequencies about the carrier.
   const double band = plan.envelope_hz * record_s;                  // b T, in units of df
@@ -88,7 +88,7 @@ std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azi
   double energy = 0;
   for (std::size_t d = 0; d < n; ++d) {
     if (std::abs(azimuth_rad[d] - azimuth_rad[0] - static_cast<double>(d) * step) > 1e-9) return nullptr;
-    // The weight of make_correction(). Among n azimuths, n - d pairs are d apart in each direction.
+    // This is the weight of make_correction(). Among n azimuths, n - d pairs are d apart in each direction.
     const double y = pi * 0.884 / spacing_rad * std::sin(static_cast<double>(d) * step);
     v.push_back(d == 0 ? 1.0 : std::abs(std::sin(y) / y));
     energy += v.back() * v.back() * static_cast<double>(n - d) * (d == 0 ? 1 : 2);

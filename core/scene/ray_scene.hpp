@@ -1,4 +1,4 @@
-// Traces rays through a scene by a bounding-volume hierarchy (Embree, used only by embree_scene.cpp and embree_trees.hpp).
+// Traces rays through a scene with a bounding-volume hierarchy (Embree, used only by embree_scene.cpp and embree_trees.hpp).
 // Static geometry is built once, relative to `origin()`. Moving bodies are instances that are placed for each ping. A program
 // can replace the tracer at link time by defining the members of RayScene. Tests that trace analytic primitives under the
 // thread sanitizer do so (tests/core/pipeline/analytic_rays.cpp).

@@ -40,7 +40,7 @@ struct Material {
   std::string name;
   ScatteringLaw law = ScatteringLaw::lambert;
   float lambert_db = -27;         // 10 log10 mu, Mackenzie coefficient; at most largest_lambert_db
-  GsabLaw gsab = {};              // when law is gsab
+  GsabLaw gsab = {};              // used if law is gsab
   float trend_db_per_decade = 0;  // change of the scattering strength with frequency, re trend_reference_hz
   float trend_reference_hz = 1e6f;
   float roughness_m = 1e-3f;  // rms; divides the echo into coherent reflection and scattering

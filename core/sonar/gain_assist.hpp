@@ -26,8 +26,8 @@ double percentile_of_full_scale(const Ping& ping, double share = assisted_share)
 /// which that part would have reached assisted_level. `overload_db` is the assumed level of a saturated picture above full scale.
 double next_gain_db(double gain_db, double level, double gamma, double passed_s, double overload_db = most_overload_db);
 
-/// State of a device's gain. It begins at the client's gain. After a change of mode, or after the assist was off, it begins
-/// there again.
+/// State of a device's gain. It begins at the client's gain. After a change of mode, or after the assist was off, it begins at
+/// that gain again.
 class GainAssist {
  public:
   /// The gain [dB] of a ping fired at `at`; the client's gain if settings.gain_assist is off or the samples are logarithmic.

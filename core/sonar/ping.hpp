@@ -176,7 +176,7 @@ struct Ping {
   std::vector<std::uint32_t> row_gain;  // [rows] when format.row_gains: power gain applied to the row, at least 1
   std::vector<float> pressure_upa;      // [rows][beams] before TVG, when switches.keep_pressure
   std::vector<std::complex<float>>
-      beam_signal_upa;                           // [samples][beams] before TVG, when switches.keep_beams; not in expected power
+      beam_signal_upa;                           // [samples][beams] before TVG, when switches.keep_beams, not in expected power
   std::vector<BeamTruth> truth;                  // [beams], when switches.keep_truth
   std::shared_ptr<const PingLabels> labels;      // when switches.keep_labels
   std::shared_ptr<const PingFindings> findings;  // set by look_at()

@@ -41,7 +41,7 @@ struct PingSettings {
   bool gain_assist = false;              // the device changes the gain itself, starting at gain_db (core/sonar/gain_assist.hpp)
   bool tvg = true;                       // false: no time-varied gain, only G0 (Oculus 32-bit "scientific" data)
   float device_sound_speed_mps = 1500;   // sound speed that the device assumes
-  float device_absorption_db_per_m = 0;  // one way, assumed by its TVG
+  float device_absorption_db_per_m = 0;  // one way, as the device's TVG assumes
   bool triggered = false;                // one ping per request of the client
   bool transmit = true;                  // false: it receives noise only
   SampleFormat format;

@@ -57,7 +57,7 @@ struct BeamPattern {
 /// Measured differences between beams (docs/acoustics.md, sections 5 and 6). Each table has values at uniform steps of the
 /// sine, from the port edge of the sector to its starboard edge; empty = no difference.
 struct BeamProfile {
-  std::vector<float> noise_db;       // receiver noise re (30), far from the sonar
+  std::vector<float> noise_db;       // receiver noise re eq. 30, far from the sonar
   std::vector<float> near_noise_db;  // the same at range 0; same length as noise_db
   float near_m = 0.2f;               // weight of noise_db at range r: 1 - e^{-r / near_m}
   std::vector<float> blend;          // amplitude, re the beam's own, of the added neighbours half a beam width away

@@ -19,7 +19,7 @@ struct Kind {
 constexpr std::string_view points =
     "is a cloud of points, not a surface; make a grid of it: pdal translate IN OUT.tif --writers.gdal.resolution=1 "
     "--writers.gdal.output_type=mean";
-constexpr std::string_view soundings = "holds pings of a multibeam sonar, not a grid; make one of them (MB-System: mbgrid)";
+constexpr std::string_view soundings = "holds pings of a multibeam sonar, not a grid; make a grid of them (MB-System: mbgrid)";
 constexpr std::string_view netcdf = "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif";
 
 constexpr std::array<Kind, 22> kinds{

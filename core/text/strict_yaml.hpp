@@ -100,7 +100,7 @@ class Node {
   /// Returns the value as a map; an empty map if it is absent or not a map.
   Map map() const;
 
-  /// Records an error at this value, e.g. `node.fail("is not an address; write it as 127.0.0.2")`. The first error wins.
+  /// Records an error at this value, e.g. `node.fail("is not an address; write it as 127.0.0.2")`. Only the first error is kept.
   void fail(std::string_view what) const;
   std::string path() const;      // "sonars[0].mount.xyz_m"
   std::string location() const;  // "file:line:col"

@@ -47,7 +47,7 @@ std::int16_t normal_counts(double value) {
   return static_cast<std::int16_t>(std::lround(std::clamp(value * 32767, -32767.0, 32767.0)));
 }
 
-/// The tests lattice::owns and lattice::height. All values that do not depend on the point are computed in advance.
+/// Prepares the tests lattice::owns and lattice::height: computes all values that do not depend on the point.
 cell_lanes::FacetTest test_of(const lattice::Facet& f, const TileAddress& a, CellRange cols, CellRange rows) {
   const double s = lattice::cell_size_m(a.level), edge = lattice::tile_edge_m(a.level), turn = f.nw > 0 ? 1.0 : -1.0;
   const auto border = [&](std::int32_t tile, int cell) { return (static_cast<double>(tile) * side + cell) * s; };

@@ -42,10 +42,10 @@ struct CellView {
   float main_elevation_rad = 2, side_from_rad = 2;
   float side_area_per_range_m = 0;  // cell area divided by range at grazing incidence; larger at steep incidence
   int side_coarser = 0;
-  // Objects with few cells get finer ones, because without speckle the positions of cells would be visible.
+  // Objects with few cells get finer cells, because without speckle the positions of cells would be visible.
   bool exact_small = false;
   /// If set, it replaces the bounds of the fan. For a ball around a point in the sonar's axes it returns the distances at which
-  /// the ball is visible; nullopt if it is not visible. Via mirrors, the distances are larger than the true one.
+  /// the ball is visible; nullopt if it is not visible. Via mirrors, the distances are larger than the true distance.
   std::function<std::optional<DistanceSpan>(Vec3d from_sonar_m, double radius_m)> seen_between;
 };
 

@@ -31,7 +31,7 @@ struct TileInView {
   bool in_side_lobes = false;  // true: a tile for side lobes; its weights have constant magnitude
 };
 
-/// Cells of a view. Valid until the next call of in_view() or in_views().
+/// Cells of a view. They are valid until the next call of in_view() or in_views().
 struct CellsInView {
   std::vector<TileInView> tiles;
   std::vector<Rotation> sonar_from_object;  // rotations to the sonar's axes, per object

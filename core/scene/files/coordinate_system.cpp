@@ -1,4 +1,4 @@
-// The coordinate system of a grid by WKT and .prj files: degrees or lengths, their units, and the zone of UTM.
+// Reads the coordinate system of a grid from WKT and .prj files: degrees or lengths, their units, and the zone of UTM.
 
 #include <algorithm>
 #include <array>
@@ -73,7 +73,7 @@ struct Meridian {
   double degrees;
 };
 
-/// Prime meridians other than Greenwich, in degrees east of it.
+/// Prime meridians, in degrees east of Greenwich.
 constexpr auto meridians = std::to_array<Meridian>({
     {8901, 0},                 // Greenwich
     {8902, -9.131906111111},   // Lisbon

@@ -49,7 +49,7 @@ struct Header {
   std::string no_data = "-9999";
 };
 
-/// The normalised name of a key: without case, "_" and British spelling.
+/// The normalised name of a key: in small letters, without "_", and with American spelling.
 std::string key_of(std::string_view word) {
   std::string key = small_letters(word.substr(0, 20));
   std::erase(key, '_');
@@ -77,7 +77,8 @@ Result<Header> read_header(Words& words) {
     static constexpr std::array<const char*, 10> keys{"ncols",     "nrows",    "xllcorner", "yllcorner", "xllcenter",
                                                       "yllcenter", "cellsize", "dx",        "dy",        "nodata_value"};
     if (std::none_of(keys.begin(), keys.end(), [&](const char* k) { return key == k; })) {
-      return bad(word_text(key) + " is not a header word of an ESRI ASCII grid; others: gdal_translate -of AAIGrid IN OUT.asc");
+      return bad(word_text(key) +
+                 " is not a header word of an ESRI ASCII grid; convert other grids: gdal_translate -of AAIGrid IN OUT.asc");
     }
     const std::string_view value = words.next();
     const auto number = height_number(value);

@@ -124,8 +124,7 @@ class GeoTiffReader {
     TIFFSetDirectory(tiff_, number);
     const Picture mask = picture_at(tiff_);
     if (mask.columns != picture_.columns || mask.rows != picture_.rows || mask.samples != 1 || (mask.bits != 1 && mask.bits != 8))
-      return bad(
-          "marks cells without data in a mask that is not like its heights; write them as a value: gdalwarp -dstnodata -9999");
+      return bad("marks cells without data in a mask of another size or kind; write them as a value: gdalwarp -dstnodata -9999");
     if (auto r = check_blocks(tiff_); !r) return r;
     return each_row_of_blocks(
         tiff_, mask,
@@ -179,7 +178,7 @@ class GeoTiffReader {
                   : is_complex                             ? "complex"
                                                            : "unknown") +
                  " numbers of " + std::to_string(picture_.bits) +
-                 " bits, which are not read; write them otherwise: gdal_translate -ot Float32");
+                 " bits, which are not read; convert them: gdal_translate -ot Float32");
     if (!grey || !known || picture_.samples > most_bands ||
         (picture_.samples != 1 && picture_.bits <= 8 && planes == PLANARCONFIG_CONTIG))
       return bad("not one band of heights but a picture; choose a band of numbers: gdal_translate -b 1 -ot Float32");
@@ -196,7 +195,7 @@ class GeoTiffReader {
     for (std::uint16_t k = 0; k < count; ++k)
       if (kinds[k] != EXTRASAMPLE_UNSPECIFIED) picture_.alpha = static_cast<std::uint16_t>(picture_.samples - count + k);
     if (picture_.alpha && picture_.bands == 1)
-      return bad("marks cells without data in a band of its own; write them as a value: gdalwarp -dstnodata -9999 IN OUT.tif");
+      return bad("marks cells without data in a separate band; write them as a value: gdalwarp -dstnodata -9999 IN OUT.tif");
     const int further_bands = picture_.samples - (picture_.alpha ? 2 : 1);
     if (further_bands > 0) raw_.notes.push_back(text::format("its heights are the first of %d bands", further_bands + 1));
     return {};
@@ -232,7 +231,7 @@ class GeoTiffReader {
       if (!raw_.system.geographic) raw_.system = system_by_prj(file_);
       return check(*beside);
     } else if (tie.size() > 6) {
-      return bad("has control points instead of a regular grid; make one of them: gdalwarp IN OUT.tif");
+      return bad("has control points instead of a regular grid; make a grid of them: gdalwarp IN OUT.tif");
     } else {
       return bad("has no coordinates (no GeoTIFF); give it some: gdal_translate -a_ullr WEST NORTH EAST SOUTH");
     }

@@ -1,4 +1,4 @@
-// Common parts of readers of height grids with coordinates: cells without data, and degrees. Internal to these readers.
+// Common parts of readers of height grids with coordinates: cells without data, and degrees. Only these readers use the file.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class HeightValues {
  public:
   /// `declared`: the no-data value in the file's header, which may have fewer digits than in the grid.
   explicit HeightValues(std::optional<std::string_view> declared);
-  /// NaN for no data; nullopt for a number that is neither a height nor a usual fill value.
+  /// Returns NaN for no data, and nullopt for a number that is neither a height nor a usual fill value.
   std::optional<float> height_of(double value);
   std::size_t fill_values() const { return fill_values_; }
 
@@ -79,7 +79,7 @@ CoordinateSystem system_of_wkt(std::string_view text);
 double prime_meridian_of_epsg(std::uint32_t code);
 /// A prime meridian of the EPSG data set, in degrees east of Greenwich; nullopt for an unknown code.
 std::optional<double> degrees_of_prime_meridian(std::uint32_t code);
-/// The zone of a projected system of the EPSG data set; empty for other projections, and for older datums.
+/// The zone of a projected system of the EPSG data set; nullopt for other projections, and for older datums.
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
 /// True for the codes, in the EPSG data set, of latitudes and longitudes within 2 m of WGS 84.
 bool agrees_with_wgs84(std::uint32_t code);

@@ -12,9 +12,10 @@
 
 namespace sonar {
 
-/// Errors: missing, unknown format, unreadable, empty, not finite, beyond 1e7 m, more than 20 million
-/// triangles, no triangle with an area, files elsewhere, too much memory or time. y up becomes z up by (x, y, z) -> (x, -z, y).
-/// A separate program reads all formats but binary STL (docs/decisions/0023-meshes-in-a-child.md).
+/// Reads a mesh file. Errors: the file is missing, unreadable, empty or of an unknown format; vertices are not finite or beyond
+/// 1e7 m; there are more than 20 million triangles, or none with an area; the file names files in other folders; it needs too
+/// much memory or time. y up becomes z up by (x, y, z) -> (x, -z, y). A separate program reads all formats but binary STL
+/// (docs/decisions/0023-meshes-in-a-child.md).
 Result<LoadedMesh> load_mesh(const MeshFile& request);
 
 // Reads binary STL files, a few triangles at a time. The importer of other formats would need three times the file's size in

@@ -34,7 +34,7 @@ Result<std::shared_ptr<const Scene>> load_built_in_scene(std::string_view name);
 std::shared_ptr<const Scene> read_scene(text::Map map, const std::filesystem::path& folder, const std::string& name,
                                         ShapeCache* known = nullptr);
 
-// The objects of a scene file: shapes with poses, instances, moving bodies, point targets. Internal to the scene loader.
+// The objects of a scene file: shapes with poses, instances, moving bodies, point targets. Only the scene loader uses this.
 
 inline constexpr std::size_t max_objects = 20000;
 inline constexpr std::size_t max_bodies = 256;

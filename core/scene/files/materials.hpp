@@ -1,4 +1,4 @@
-// Finds materials by name while a scene is read: first in the scene, then in the library. Internal to the loader.
+// Finds materials by name while a scene is read: first in the scene, then in the library. Only the loader uses it.
 #pragma once
 
 #include <cstdint>

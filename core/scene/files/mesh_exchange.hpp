@@ -1,5 +1,5 @@
 // Messages between the daemon and the program that imports meshes: the request as arguments and standard input, the answer as a
-// file. Neither side trusts the lengths that the other sends.
+// file. Both sides check the lengths that they receive.
 #pragma once
 
 #include <cstdint>

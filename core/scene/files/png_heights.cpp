@@ -1,4 +1,4 @@
-// Reads heights from grey PNG images, also if stored as colours. No other file of the scene includes libpng.
+// Reads heights from grey PNG images, even if they are stored as colours. No other file of the scene includes libpng.
 #include <png.h>
 
 #include <algorithm>

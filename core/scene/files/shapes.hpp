@@ -1,5 +1,5 @@
-// Makes the mesh of an object from its keys: primitives, generated ground, height files and mesh files. Internal to the scene
-// loader.
+// Makes the mesh of an object from its keys: primitives, generated ground, height files and mesh files. Only the scene loader
+// uses it.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// Reads TIFF files: the list of pictures in a file, and the cells of a picture strip by strip or tile by tile. Internal to
-// geo_tiff.cpp.
+// Reads TIFF files: the list of pictures in a file, and the cells of a picture strip by strip or tile by tile. Only geo_tiff.cpp
+// uses it.
 #pragma once
 
 #include <cstddef>
@@ -23,12 +23,12 @@ struct CloseTiff {
 };
 using Tiff = std::unique_ptr<tiff, CloseTiff>;
 
-/// Null if the file is not a TIFF or is damaged; last_tiff_error() then returns the reason.
+/// Returns null if the file is not a TIFF or is damaged; last_tiff_error() then returns the reason.
 Tiff open_tiff(const std::filesystem::path& file);
 /// libtiff's last error of this thread; "damaged" if it gave none.
 std::string last_tiff_error();
 
-/// The number of the picture that is the mask of the first one. The file must be at the first picture, and is again afterwards.
+/// The number of the picture that is the mask of the first one. Before and after the call, the file is at the first picture.
 std::optional<std::uint16_t> mask_of(tiff* file);
 
 struct Picture {

@@ -48,8 +48,8 @@ std::size_t split_at(char mark, std::string_view line, Line& fields) {
   return count;
 }
 
-/// Splits a line of values. Of a table with commas, semicolons or bars the empty fields count too: a missing value must not
-/// shift those after it into its column. A line of empty fields has none, as spreadsheets write it for an empty row.
+/// Splits a line of values. In a table with commas, semicolons or bars, empty fields count too, because a missing value must not
+/// shift the values after it. A line with only empty fields, which spreadsheets write for an empty row, has no values.
 std::size_t split_values(std::string_view line, Line& words) {
   for (const char mark : {';', '|', ','}) {
     if (line.find(mark) == line.npos) continue;
@@ -63,13 +63,13 @@ std::size_t split_values(std::string_view line, Line& words) {
   return split(line, words);
 }
 
-/// Uniform coordinates. Two points far apart can have millions, so they are made once their number is checked.
+/// Uniform coordinates. An axis between two far points can have millions, so they are made only after their number is checked.
 struct EvenAxis {
   double first = 0, step = 0;
   std::size_t size = 0;
 };
 
-/// The uniform coordinates that contain all given ones. Some may be missing among the given ones. Size 0: there are none.
+/// Finds the uniform coordinates that contain all given ones, among which some may be missing. Size 0: there are none.
 EvenAxis even_axis(std::vector<double> given) {
   std::sort(given.begin(), given.end());
   given.erase(std::unique(given.begin(), given.end()), given.end());
@@ -122,8 +122,8 @@ struct Order {
   bool operator==(const Order&) const = default;
 };
 
-/// The order according to column names, such as "lat lon depth", "id,x,y,z" or "OBJECTID,POINT_X,POINT_Y,grid_code". For other
-/// names: the first three columns.
+/// The order according to column names, such as "lat lon depth", "id,x,y,z" or "OBJECTID,POINT_X,POINT_Y,grid_code". With other
+/// names, the first three columns are x, y and z.
 Order order_by(const Line& names, std::size_t count) {
   using Begins = std::initializer_list<std::string_view>;
   const auto column = [&](Begins begins, std::size_t otherwise, std::string_view whole, std::string_view last) {
@@ -243,7 +243,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
     return even_axis(std::move(all));
   };
   const EvenAxis x = axis_of(&Point::x), y = axis_of(&Point::y);
-  const char* const way = "; make one of them: gdal_grid, or gmt surface, then gdal_translate -of AAIGrid";
+  const char* const way = "; make a grid of them: gdal_grid, or gmt surface, then gdal_translate -of AAIGrid";
   if (points->empty()) return bad("has no line of three numbers, x y z; coordinates must be metres or decimal degrees");
   if (x.size == 0 || y.size == 0)
     return bad(std::string("its ") + std::to_string(points->size()) + " points are not a uniform grid" + way);

@@ -142,7 +142,7 @@ std::uint64_t number_at(std::string_view file, std::size_t at) {
   return v;
 }
 
-constexpr std::size_t json_at = 20;  // behind magic, version, length, length of the first part, its kind
+constexpr std::size_t json_at = 20;  // after magic, version, length, length of the first part, its kind
 
 std::uint64_t triangles_of(const GltfWalk& walk, const GltfWalk::Primitive& primitive) {
   const auto at = walk.accessors.find(primitive.indices.empty() ? primitive.positions : primitive.indices);
@@ -172,7 +172,7 @@ MeshFault unread_extension(const GltfWalk& walk) {
   return std::nullopt;
 }
 
-/// True if the importer would take positions, or weights of bones, for floating-point numbers that they are not.
+/// True if the importer would misread positions, or weights of bones, as floating-point numbers.
 bool has_whole_numbers(const GltfWalk& walk) {
   constexpr std::uint64_t floating = 5126;
   const auto is_whole = [&](const std::string& accessor) {

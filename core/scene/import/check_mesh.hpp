@@ -49,7 +49,7 @@ struct ListedFaces {
 
 /// `head`: the header of a file of `file_bytes`.
 MeshFault check_ply(const PlyHead& head, std::uint64_t file_bytes);
-/// Text or binary (GLB), version 1 or 2. `is_itself` returns true if the URI of a buffer names the file.
+/// Checks a file in text or binary (GLB), version 1 or 2. `is_itself` returns true if the URI of a buffer names the file.
 MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr,
                      const std::function<bool(const std::string& uri)>& is_itself = {});
 MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);

@@ -118,7 +118,7 @@ MeshFault check_stl_text(std::string_view file) {
         ended = ended || ends;
         if (ends && in_facet && corners != 3) return wrong_corners();
         in_facet = in_facet && !ends;
-        // Its name follows, up to the end of the line unless the file has only one line.
+        // The name of the solid follows, up to the end of the line unless the file has only one line.
         constexpr std::string_view begin = "facet normal";
         const auto* const next_facet = std::search(line.begin(), line.end(), begin.begin(), begin.end(),
                                                    [](char a, char b) { return small_letter(a) == b; });

@@ -93,7 +93,7 @@ class Rewriter {
 
   static constexpr std::size_t head = 12, chunk_head = 8;
 
-  /// Error if the file exceeds its limit with this many more bytes.
+  /// Returns an error if the file exceeds its limit with this many more bytes.
   Result<void> make_room(std::uint64_t more) const {
     constexpr std::size_t filling = 2 * 3;
     if (data_.size() <= most_bytes_ && more + head + 2 * chunk_head + filling <= most_bytes_ - data_.size()) return {};
@@ -103,7 +103,7 @@ class Rewriter {
 
   void align() { data_.resize((data_.size() + 3) / 4 * 4); }
 
-  /// Puts all buffers behind each other.
+  /// Joins all buffers, in their order.
   Result<void> take_buffers() {
     for (const Json& buffer : list_in(in_, "buffers")) {
       const auto uri = buffer.is_object() ? buffer.find("uri") : buffer.end();
@@ -237,7 +237,7 @@ class Rewriter {
   Json in_, out_ = Json::object();
   std::vector<Buffer> buffers_;
   std::vector<bool> sound_;  // by view of the file: it lies within its buffer
-  std::string data_;         // of all buffers, and the new numbers
+  std::string data_;         // bytes of all buffers, and of the new numbers
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ using ReadBeside = std::function<std::optional<std::string>(const std::string& n
 Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside,
                                      std::uint64_t most_bytes = std::numeric_limits<std::uint32_t>::max());
 
-/// Replaces "%20" by a blank, and so on. A zero byte ("%00") stays as it is.
+/// Replaces "%20" with a blank, and other codes likewise. A zero byte ("%00") stays as it is.
 std::string without_percents(const std::string& uri);
 
 }  // namespace sonar

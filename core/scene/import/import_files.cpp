@@ -282,7 +282,7 @@ std::optional<std::string> ImportFiles::bytes_of(const std::string& file) {
   return bytes;
 }
 
-/// URIs of glTF have %20 for a blank. The name of the folder is as it is.
+/// URIs of glTF have %20 for a blank. The name of the folder is not encoded.
 std::string ImportFiles::plain_name(const std::string& file) const {
   const std::string folder = folders_.empty() ? std::string() : folders_[0].string();
   return file.starts_with(folder) ? folder + without_percents(file.substr(folder.size())) : file;

@@ -29,7 +29,7 @@ class ImportFiles final : public Assimp::DefaultIOSystem {
   std::uint64_t free_form_surfaces() const { return free_form_; }
 
   /// The bytes of the mesh or of a file that it names. `file` is a path relative to the mesh. nullopt if the file cannot be read
-  /// or is neither of these.
+  /// or is not one of these.
   std::optional<std::string> bytes_of(const std::string& file);
 
   bool Exists(const char* file) const override;

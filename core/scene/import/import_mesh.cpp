@@ -32,7 +32,7 @@ std::vector<std::uint64_t> triangles_of_meshes(const aiScene& scene) {
       triangles[m] += std::max(scene.mMeshes[m]->mFaces[f].mNumIndices, 2u) - 2;
   return triangles;
 }
-/// Triangles of a node and those below it; many nodes may show the same mesh.
+/// Number of triangles of a node and the nodes below it; many nodes may show the same mesh.
 std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint64_t>& of_meshes, unsigned depth = 0) {
   if (depth > NodeGraph::deepest) return 0;
   std::uint64_t triangles = 0;

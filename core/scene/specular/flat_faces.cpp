@@ -14,7 +14,7 @@ namespace {
 constexpr double least_area_m2 = 0.05;
 constexpr double least_width_m = 0.1;        // least area divided by greatest extent; a mirror is many Fresnel zones wide
 constexpr double same_plane_m = 2e-4;        // an eighth of a wavelength at 1 MHz
-constexpr double same_normal = 1 - 1e-6;     // cosine
+constexpr double same_normal = 1 - 1e-6;     // cosine of the largest angle between normals of one plane
 constexpr double most_gentle_border = 0.25;  // fraction of a face's border; a face with more is part of a curved surface
 
 using Triangles = std::vector<std::uint32_t>;
@@ -51,7 +51,7 @@ struct Candidate {
 class FaceSorter {
  public:
   void add(const Mesh& mesh, std::uint32_t t) {
-    // The plane of the largest triangle so far, because its rounding error is smallest.
+    // Keeps the plane of the largest triangle so far, because its rounding error is smallest.
     const Vec3d twice = area_vector(mesh, t);
     const double area = 0.5 * length(twice);
     if (!(area > 0)) return;

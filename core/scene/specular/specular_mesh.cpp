@@ -222,7 +222,7 @@ double SpecularMesh::walk(std::uint32_t index, Vec3d from, Vec3d direction, cons
       const double s = std::max(share[k], 0.0) / -rate[k];
       if (s < leave) leave = s, through = k;
     }
-    if (through == 3) return unlimited;  // numerically caught at a corner
+    if (through == 3) return unlimited;  // because of rounding, the walk does not leave a corner
     from = from + leave * along;
     walked += leave;
     Vec3d normal;

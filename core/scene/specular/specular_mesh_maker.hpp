@@ -1,4 +1,4 @@
-// Makes a SpecularMesh. Internal to specular_mesh.
+// Makes a SpecularMesh. Only specular_mesh uses it.
 #pragma once
 
 #include <vector>

@@ -198,7 +198,7 @@ TEST_F(GeoTiff, CellsThatAMaskHidesAreHoles) {
   EXPECT_EQ(holes(masked(8, {255, 255, 255, 255, 0, 255})), "xoxxxx");
   EXPECT_FLOAT_EQ(masked(8, {255, 255, 255, 255, 0, 255})->z_m[3], -1);
   EXPECT_EQ(holes(masked(8, {0, 0, 0, 0, 0, 0}, 3, 5)), "xoxxxx") << "of a reduced picture; -9999 is far from all heights";
-  EXPECT_THAT(masked(8, {255, 255, 255, 255}, 2).error().text, HasSubstr("a mask that is not like its heights"));
+  EXPECT_THAT(masked(8, {255, 255, 255, 255}, 2).error().text, HasSubstr("a mask of another size or kind"));
   EXPECT_THAT(masked(4, {255, 255, 255, 255, 255, 255}).error().text, HasSubstr("gdalwarp -dstnodata"));
   files.write("g.tif.msk", "?");
   EXPECT_THAT(read(TiffFile::of(3, 2, six).at(0, 100, 10, 10)).error().text, HasSubstr("in a file beside it (.msk)"));
@@ -366,7 +366,7 @@ TEST_F(GeoTiff, NumbersThatAreNotWholeBytes) {
   with_sign.shorts(339, {2});
   const auto refused = read(with_sign);
   ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().text, HasSubstr("whole numbers of 12 bits, which are not read; write them otherwise: gdal_tr"));
+  EXPECT_THAT(refused.error().text, HasSubstr("whole numbers of 12 bits, which are not read; convert them: gdal_tr"));
   TiffFile complex = TiffFile::of<double>(2, 2, {1, 2, 3, 4}).at(0, 0, 1, 1).without(339);
   EXPECT_THAT(read(complex.shorts(339, {6})).error().text, HasSubstr("complex numbers of 64 bits"));
 }
@@ -381,7 +381,8 @@ TEST_F(GeoTiff, WrongFilesAreRefusedWithTheCommandThatHelps) {
   EXPECT_THAT(refusal(TiffFile::of(3, 2, six)), HasSubstr("gdal_translate -a_ullr"));
   TiffFile points = TiffFile::of(3, 2, six);
   points.doubles(33922, {0, 0, 0, 5, 60, 0, 3, 0, 0, 5.1, 60, 0, 0, 2, 0, 5, 59.9, 0});
-  EXPECT_THAT(refusal(points), HasSubstr("has control points instead of a regular grid; make one of them: gdalwarp IN OUT.tif"));
+  EXPECT_THAT(refusal(points),
+              HasSubstr("has control points instead of a regular grid; make a grid of them: gdalwarp IN OUT.tif"));
   TiffFile picture = good().without(262).without(277);
   picture.shorts(262, {2}), picture.shorts(277, {3});
   EXPECT_THAT(refusal(picture), HasSubstr("not one band of heights but a picture"));

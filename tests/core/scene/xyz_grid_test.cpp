@@ -180,7 +180,7 @@ TEST(XyzGrid, WrongFilesAreRefused) {
   EXPECT_THAT(refusal("1 2 3\n1e9 2 3\n"), HasSubstr("line 2: the point is farther"));
   EXPECT_THAT(refusal("1 2 3\nnan 2 3\n"), HasSubstr("line 2: the point is farther"));
   EXPECT_THAT(refusal("1 2 3\n2 2 1e9\n"), HasSubstr("line 2: the height 1e9 is beyond"));
-  EXPECT_THAT(refusal("0 0 1\n1 0.3 1\n2.5 1 1\n3.1 2.7 2\n"), HasSubstr("not a uniform grid; make one of them: gdal_grid"));
+  EXPECT_THAT(refusal("0 0 1\n1 0.3 1\n2.5 1 1\n3.1 2.7 2\n"), HasSubstr("not a uniform grid; make a grid of them: gdal_grid"));
   EXPECT_THAT(refusal("0 0 1\n1 1 1\n99999 99999 1\n"), HasSubstr("more than 10 million"));
 }
 
