@@ -28,7 +28,7 @@ SONAR_HD inline Vector load_aligned(const float* from) {
 #endif
 }
 
-/// Weight `i` of [points and pulses][beams].
+/// Computes weight `i` of [points and pulses][beams].
 SONAR_HD inline void point_weights(const PingView& p, std::uint32_t i) {
   const auto beams = static_cast<std::uint32_t>(p.beams);
   const std::uint32_t point = i / beams;
@@ -94,8 +94,8 @@ SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::i
   im += sum_im;
 }
 
-/// Sums of one sample over columns, for the beams of `panels` panels that have the same columns. `weight`: weights of each
-/// panel.
+/// Computes the sums of one sample over columns, for the beams of `panels` panels that have the same columns. `weight`: weights
+/// of each panel.
 template <std::uint32_t panels>
 SONAR_HD inline void sum_over_columns(const float* const* weight, const float* column, std::int64_t stride, std::int32_t count,
                                       float* re, float* im) {
@@ -112,8 +112,8 @@ SONAR_HD inline void sum_over_columns(const float* const* weight, const float* c
   }
 }
 
-/// Sample `i` of [pairs of panels][samples], for the eight beams of two panels. The two panels mostly have the same columns, so
-/// that each sample is read once for all eight beams.
+/// Computes sample `i` of [pairs of panels][samples], for the eight beams of two panels. The two panels mostly have the same
+/// columns, so that each sample is read once for all eight beams.
 SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples), beams = static_cast<std::uint32_t>(p.beams);
   const std::uint32_t panels = (beams + beams_a_panel - 1) / beams_a_panel;

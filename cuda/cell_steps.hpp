@@ -149,7 +149,7 @@ SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
   add_count(p.in_chunk[chunk * static_cast<std::uint32_t>(p.sea.columns) + static_cast<std::uint32_t>(column)], 1u);
 }
 
-/// For column `k`: replaces the count of each chunk by the sum of the counts of earlier chunks.
+/// Replaces, in column `k`, the count of each chunk with the sum of the counts of earlier chunks.
 SONAR_HD inline void scan_chunks(const PingView& p, std::uint32_t k) {
   const auto columns = static_cast<std::uint32_t>(p.sea.columns);
   constexpr std::uint32_t at_once =

@@ -67,8 +67,8 @@ class DeviceEngine final : public PingEngine {
       if (call.invalid = why_invalid(picture); !call.invalid.empty()) return;
     for (const PingRequest& picture : requests)
       for (PingRequest& ping : pings_of(picture)) call.pings.push_back(std::move(ping));
-    std::vector<PingRequest> room;
-    for (const PingRequest& request : in_water(call.pings, *scene_, room)) wanted_.push_back({request});
+    std::vector<PingRequest> changed;
+    for (const PingRequest& request : in_water(call.pings, *scene_, changed)) wanted_.push_back({request});
     try {
       on_device([this] { begin_open(); });
     } catch (...) {  // collect() tries again, and throws if it fails, too
@@ -307,7 +307,7 @@ class DeviceEngine final : public PingEngine {
       machine_->run(room.lane, launch);
       launch.from = to;
     };
-    // (25): the transform of the grids comes before fold, the inverse transform before unfold.
+    // Eq. 25: the transform of the grids comes before fold, the inverse transform before unfold.
     if (launch.largest[static_cast<int>(Step::spread)] > 0) {
       for (const bool inverse : {false, true}) {
         run_to(static_cast<int>(inverse ? Step::unfold : Step::fold));

@@ -170,7 +170,7 @@ struct PingView {
   FanRay* fan_rays;          // [elevations][columns]
   float* depth;              // [columns][bins + 1]
   float* depth_slope;        // [columns][bins + 1], DepthMap::per_column
-  FirstHit* first_hits;      // [elevations - 1][columns], null = not wanted
+  FirstHit* first_hits;      // [elevations - 1][columns], null = not needed
   FirstHit* column_truth;    // [columns], a result
   Echo* echoes;              // [slots]
   std::uint32_t* rank;       // [slots]: number of earlier echoes of the chunk in the same column
@@ -215,8 +215,8 @@ struct PingView {
   std::uint32_t max_code;
   std::int32_t bytes_a_sample, logarithmic;
   std::uint8_t* codes;      // [rows][beams][bytes]
-  float* pressure;          // [rows][beams], null = not wanted
-  float* kept_beams;        // complex [samples][beams], null = not wanted
+  float* pressure;          // [rows][beams], null = not needed
+  float* kept_beams;        // complex [samples][beams], null = not needed
   std::uint32_t* counters;  // [0] rays, [1] echoes: counters_a_ping of them
 };
 

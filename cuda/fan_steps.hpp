@@ -47,7 +47,7 @@ SONAR_HD inline FanRay look(const PingView& p, ColumnSine column, BaseElevation 
   return r;
 }
 
-/// Base ray `i` of [elevations][columns].
+/// Traces base ray `i` of [elevations][columns].
 SONAR_HD inline void trace_base(const PingView& p, std::uint32_t i) {
   const std::uint32_t columns = static_cast<std::uint32_t>(p.sea.columns);
   const auto e = static_cast<std::int32_t>(i / columns), sides = p.sea.side_elevations, step = p.sea.side_columns;
@@ -84,7 +84,7 @@ SONAR_HD inline bool interpolates(const FanRay& a, const FanRay& m, const FanRay
   return planes_agree(a, m, tolerance_m) && planes_agree(b, m, tolerance_m);
 }
 
-/// As in FanTracer::per_column (core/pipeline/trace_fan.cpp).
+/// Computes the same as FanTracer::per_column (core/pipeline/trace_fan.cpp).
 SONAR_HD inline float per_column(const SeaView& s, const FanRay& a, ColumnSine column) {
   if (a.object == no_object || a.offset == 0) return 0;
   const float* m = s.world_from_sonar;
@@ -128,7 +128,7 @@ SONAR_HD inline void note(const FanRay& r, float widest_rad, FirstHit& nearest) 
   nearest.object = r.object;
 }
 
-/// Interval `i` of [elevations - 1][columns].
+/// Refines interval `i` of [elevations - 1][columns].
 SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   const SeaView& s = p.sea;
   const auto columns = static_cast<std::uint32_t>(s.columns);
@@ -177,7 +177,7 @@ SONAR_HD inline void refine(const PingView& p, std::uint32_t i) {
   if (rays > 0) add_count(p.counters[0], rays);
 }
 
-/// For column `i`: the nearest hit of its intervals; if two are equally near, the lower one.
+/// Finds, for column `i`, the nearest hit of its intervals; if two are equally near, the lower one.
 SONAR_HD inline void first_hits(const PingView& p, std::uint32_t i) {
   FirstHit nearest{0, no_object};
   for (int e = 0; e + 1 < p.sea.elevations; ++e) {

@@ -44,7 +44,7 @@ void PingPreparer::place_fan(Making& m) {
   for (int i = 0; i < 9; ++i) sea.world_from_sonar[i] = static_cast<float>(s.world_from_sonar.m[i / 3][i % 3]);
   // Largest true range [m] whose echoes reach the last sample.
   sea.far_m = static_cast<float>(s.max_range_m);
-  // Tolerance of the refinement (section 2) [m].
+  // Tolerance of the refinement (docs/acoustics.md, section 2) [m].
   sea.pulse_width_m = static_cast<float>(plan.pulse_width_m);
   sea.column_spacing = static_cast<float>(plan.columns.spacing);
   sea.truth_half_width_rad = truth_half_width_rad(plan);
@@ -69,7 +69,7 @@ void PingPreparer::place_fan(Making& m) {
 void PingPreparer::add_water(Making& m) {
   const Volume volume(scene_->water_column, m.plan, m.scalars);
   if (!volume.is_audible()) return;
-  // (17): slices of the fan [rad], power by sample [uPa^2], width of a column in u.
+  // Eq. 17: slices of the fan [rad], power by sample [uPa^2], width of a column in u.
   std::vector<VolumeSlice> slices;
   for (const Volume::Slice& s : volume.slices()) slices.push_back({s.range_per_x, s.weight, s.bin, 0});
   std::vector<double> width;
@@ -92,13 +92,13 @@ void PingPreparer::add_receiver(Making& m) {
   view.noise_key = {key_of(m.request().seed, Domain::noise_place), m.request().sonar_id,
                     static_cast<std::uint32_t>(m.request().number)};
   view.has_noise = m.request().switches.noise ? 1 : 0;
-  // rms of a column [uPa]: (30) over the root of sum_k W_jk^2.
+  // rms of a column [uPa]: eq. 30 divided by the root of sum_k W_jk^2.
   view.noise_rms = static_cast<float>(m.plan.column_noise_upa);
   const Leak leak(m.plan, m.request().switches);
   if (leak.is_audible() && !m.request().blank) {
     view.leak_rms = m.room.tables.put(leak.rms_upa());
     view.leak_samples = static_cast<std::int32_t>(leak.rms_upa().size());
-    // (31): powers of the steady and the changing part add up to 1. If the leak is shared, its steady part is added to the
+    // Eq. 31: powers of the steady and the changing part add up to 1. If the leak is shared, its steady part is added to the
     // beams.
     view.leak_steady = leak.steady();
     view.shared_leak_samples = static_cast<std::int64_t>(m.plan.shared_noise.leak_upa().size());
@@ -106,7 +106,7 @@ void PingPreparer::add_receiver(Making& m) {
   }
   const Crosstalk crosstalk(m.plan, m.request().switches);
   if (crosstalk.is_audible()) {
-    // (35).
+    // Eq. 35.
     const Crosstalk::Mix mix = crosstalk.mix(m.plan.expected_power);
     view.crosstalk_own = mix.own;
     view.crosstalk_leaked = mix.leaked;
@@ -114,7 +114,7 @@ void PingPreparer::add_receiver(Making& m) {
   }
   if (m.plan.beam_mix.blurs() || m.plan.beam_mix.blends())
     view.mixed = m.room.work.allocate<float>(2 * m.samples() * m.beams()).device;
-  // (36), (37): gain TVG / full scale, squared, because the receiver works on powers.
+  // Eq. 36 and 37: gain TVG / full scale, squared, because the receiver works on powers.
   view.row_power_factor = m.room.tables.put(m.plan.row_power_factor);
   // Complex values: columns before beamforming, beams after it [uPa].
   view.signals = m.room.work.allocate<float>(2 * m.samples() * m.columns()).device;

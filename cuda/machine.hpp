@@ -21,8 +21,8 @@ class DeviceMemoryFull : public std::runtime_error {
 };
 
 /// Lanes are queues of work. A lane keeps the order of its work; different lanes run at the same time. Failures throw
-/// std::runtime_error. After it the device must not be used again, except after DeviceMemoryFull. Only one thread may call a
-/// machine at a time, except for allocate, allocate_host and upload, which several threads that prepare pings may call at once.
+/// std::runtime_error. After such an error, except DeviceMemoryFull, the device must not be used again. Only one thread may call
+/// a machine at a time, except for allocate, allocate_host and upload, which several threads that prepare pings may call at once.
 class Machine {
  public:
   static constexpr int lanes = 3;
@@ -47,11 +47,11 @@ class Machine {
   /// spectrum. The first call loads the library.
   virtual std::string why_no_transforms() const = 0;
   /// Queues x[k] = sum_n x[n] e^{-+ i 2 pi k n / size} for `rows` rows of complex values, which are stored one after the other
-  /// on the device. In place, not scaled. It is timed if the previous launch on the lane was timed.
+  /// on the device. The transform is in place and not scaled. It is timed if the previous launch on the lane was timed.
   virtual void transform(int lane, double* values, int size, int rows, bool inverse) = 0;
   /// The times of the steps in timed launches since the last call. wait() for the lane must have returned before.
   virtual StepSeconds step_seconds(int lane) = 0;
-  /// Work that is queued on `lane` from now on begins after the work that is already queued on `earlier`.
+  /// Makes work that is queued on `lane` from now on begin after the work that is already queued on `earlier`.
   virtual void order(int lane, int earlier) = 0;
   virtual void wait(int lane) = 0;
 };

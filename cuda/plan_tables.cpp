@@ -17,17 +17,17 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
       memory_(machine, Arena::Where::both, 1u << 20),
       noise_memory_(machine, Arena::Where::both, 0) {
   const PingPlan& p = plan_;
-  // (11): u and sqrt(1 - u^2) in float for the rays, which only determine shadows; u in double for the beams.
+  // Eq. 11: u and sqrt(1 - u^2) in float for the rays, which only determine shadows; u in double for the beams.
   std::vector<ColumnSine> sines;
   std::vector<double> u;
   for (int k = 0; k < p.columns.count; ++k) {
     u.push_back(p.columns.sine(k));
     sines.push_back({static_cast<float>(u.back()), static_cast<float>(std::sqrt(std::max(0.0, 1 - u.back() * u.back())))});
   }
-  // Elevations about the array axis [rad] (section 2).
+  // Elevations about the array axis [rad] (docs/acoustics.md, section 2).
   std::vector<BaseElevation> base;
   for (const float angle : p.fan.elevation_rad) base.push_back({angle, std::cos(angle), std::sin(angle)});
-  // (9): bands of weights, four beams for each panel. The device does not use the beam transform.
+  // Eq. 9: bands of weights, four beams for each panel. The device does not use the beam transform.
   std::vector<BeamWeightRow> rows;
   for (const BeamPanel& panel : p.beam_weights.panels)
     rows.push_back({panel.first_column, panel.count, static_cast<std::uint32_t>(panel.weights), 0});
@@ -51,7 +51,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.code_factor = static_cast<float>(p.settings.format.max_code) + (p.truncates() ? 1.0f : 0.0f);
   view_.code_rounding = p.truncates() ? 0.0f : 0.5f;
   view_.half_gamma = p.settings.format.gamma / 2;
-  // (40) as a straight line in log2 of the power.
+  // Eq. 40 as a straight line in log2 of the power.
   const LevelLine line = level_line(p.settings.format);
   view_.per_octave = static_cast<float>(line.per_octave);
   view_.at_full_scale = static_cast<float>(line.at_full_scale);
@@ -78,7 +78,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   view_.mix.reach = memory_.put(p.beam_mix.reach());
   if (p.beam_mix.blends()) view_.mix.own = memory_.put(p.beam_mix.own());
   view_.mix.share = memory_.put(p.beam_mix.share());
-  // Tables for pulses without a table of rows, (25).
+  // Tables for pulses without a table of rows (eq. 25).
   if (p.spectral) add_spectrum(*p.spectral);
   memory_.upload(lane);
 }
@@ -89,11 +89,11 @@ void PlanTables::add_spectrum(const SpectralColumns& s) {
   v.points = s.sums().grid_points();
   v.period = s.period_samples();
   v.frequencies = s.frequencies();
-  // The width of (26), the number of terms of its polynomials, and their padding to whole vectors.
+  // The width of eq. 26, the number of terms of its polynomials, and their padding to whole vectors.
   v.width = t.width, v.terms = t.terms, v.padded = t.padded;
   v.kernel = memory_.put(t.polynomial);
   v.correction = memory_.put(t.correction);
-  // (25): P(nu_m) / period, interleaved.
+  // Eq. 25: P(nu_m) / period, interleaved.
   std::vector<double> response;
   for (const spectral::Complex& r : s.response()) response.push_back(r.real()), response.push_back(r.imag());
   v.response = memory_.put(response);

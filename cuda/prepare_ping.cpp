@@ -102,11 +102,12 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   return left;
 }
 
-/// The part that must not run in parallel: the plan's gain and noise, and the number of the view.
+/// Makes the parts that must not run in parallel: the plan's gain and noise, and the number of the view.
 PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, BatchRoom& room) {
   const PingRequest& request = asked.wanted->request;
   PlanTables& plan = *asked.plan;
-  // Leak and volume also read a table of shaped noise: that of the noise, or one with the pulse's correlation (section 5).
+  // Leak and volume also read a table of shaped noise: that of the noise, or one with the pulse's correlation (docs/acoustics.md,
+  // section 5).
   const bool leak = request.switches.leak && plan.plan().mode.receiver.leak_upa > 0;
   const bool wants_noise = request.switches.noise || leak || (request.switches.volume && scene_->water_column.has_volume());
   set_gain(plan.plan(), request.settings.gain_db);
@@ -135,7 +136,7 @@ void PingPreparer::look(std::span<Making> all, SurfaceCells& cells) {
   if (views.empty()) return;
   if (found_.size() < views.size()) found_.resize(views.size());
   const std::span<CellsInView> found(found_.data(), views.size());
-  if (views.size() == 1) {  // by all threads
+  if (views.size() == 1) {  // all threads process one view
     found[0].tiles = cells.in_view(views[0], pool_);
     found[0].built = cells.built_last_time();
     found[0].sonar_from_object.assign(cells.sonar_from_objects().begin(), cells.sonar_from_objects().end());
@@ -163,7 +164,7 @@ void PingPreparer::complete(Making& m, const PingContext& context, int lane, Wor
     add_water(m);
     if (m.plan.spectral) {
       SpectralView& v = m.view.spectral;
-      // Number of complex values of all columns: the fine grids of (25), and the spectra folded to one value per sample.
+      // Number of complex values of all columns: the fine grids of eq. 25, and the spectra folded to one value per sample.
       v.grids = m.room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.points)).device;
       v.folded = m.room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.period)).device;
     }
@@ -199,7 +200,7 @@ void PingPreparer::add_points(Making& m, std::span<const PointEcho> points, std:
   const PingPlan& plan = m.plan;
   std::vector<PulseInBeams> in_beams;
   const auto add = [&](double sine, const SampledPulse& pulse) {
-    // Samples [from, from + count) of (8), complex, in double as on the CPU.
+    // Samples [from, from + count) of eq. 8, complex, in double as on the CPU.
     const auto& [from, values] = pulse;
     if (values.empty()) return;
     static_assert(sizeof(std::complex<double>) == 2 * sizeof(double));

@@ -39,7 +39,7 @@ SONAR_HD inline void spread(const PingView& p, std::uint32_t i) {
   }
 }
 
-/// Value `i` of [columns][period]: the sum of all frequencies that are folded to it, the lowest first.
+/// Computes value `i` of [columns][period]: the sum of all frequencies that are folded to it, the lowest first.
 SONAR_HD inline void fold(const PingView& p, std::uint32_t i) {
   const SpectralView& s = p.spectral;
   const auto period = static_cast<std::uint32_t>(s.period);
@@ -57,7 +57,7 @@ SONAR_HD inline void fold(const PingView& p, std::uint32_t i) {
   s.folded[2 * static_cast<std::int64_t>(i) + 1] = im;
 }
 
-/// Sample `i` of [columns][samples].
+/// Computes sample `i` of [columns][samples].
 SONAR_HD inline void unfold(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples);
   const double* from = p.spectral.folded + 2 * (static_cast<std::int64_t>(i / samples) * p.spectral.period + i % samples);

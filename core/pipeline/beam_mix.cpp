@@ -14,7 +14,7 @@ constexpr double most_rad = 16;  // largest phase error; at shorter ranges it st
 constexpr int aperture_points = 512;
 constexpr double neighbour_in_beams = 0.56;  // distance of a neighbour in -3 dB widths; equals one of 256 beams of the M1200d
 
-/// The first sample after `n` with another set of taps than `n`. Sets change with 1 / range.
+/// The first sample after `n` whose set of taps differs from that of `n`. Sets change with 1 / range.
 int end_of_set(const BeamMixView& v, int j, int first_sample, int n, std::int32_t set, int samples) {
   const float until_m = v.turn_m[j] * v.sets_per_rad / (static_cast<float>(set) - 0.5f);
   const float guess = std::clamp((until_m - v.first_range_m) / v.sample_m - static_cast<float>(first_sample),
@@ -63,8 +63,8 @@ BeamMix::BeamMix(const PingPlan& plan) {
 }
 
 /// With the delays of broadside, the phase pi x^2 sin^2(theta) / (lambda r) remains at position x of the aperture L (eq. 44).
-/// Beams that are even in the sine are samples of the aperture's transform. Therefore a factor on the aperture is a convolution
-/// across the beams.
+/// Beams that are uniform in the sine are samples of the aperture's transform. Therefore a factor on the aperture is a
+/// convolution across the beams.
 void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   const double wavelengths = plan.beam_pattern[0].aperture_wavelengths;
   const double wavelength_m = device_wavelength_m(plan.mode, plan.settings);

@@ -68,9 +68,10 @@ std::string why_unusable(const SampleFormat& f) {
 }
 
 std::string why_unusable(const RangeImageSettings& image, const PingSettings& s) {
-  if (s.format.bits != 32 || s.format.max_code >> 16 == 0) return "range images have samples of 32 bits, half of them strength";
+  if (s.format.bits != 32 || s.format.max_code >> 16 == 0)
+    return "range images have samples of 32 bits, 16 of them for the strength";
   if (!(image.beam_height_rad > 0 && std::isfinite(image.beam_height_rad))) return "the height of a beam is impossible";
-  if (!(image.range_unit_m * RangePixel::most_range >= s.range_m)) return "the range does not fit its unit in 16 bits";
+  if (!(image.range_unit_m * RangePixel::most_range >= s.range_m)) return "the range, counted in its unit, exceeds 16 bits";
   return {};
 }
 

@@ -36,7 +36,7 @@ struct SurfaceHit {
   }
 };
 
-/// One direction of a column. Users derive from it and add the hits, one surface per stage.
+/// One direction of a column. Derived types add the hits, one surface per stage.
 struct FanSample {
   float elevation_rad = 0, tangent = 0, forward = 0;  // forward: x of the unit direction
   std::int32_t next = -1;                             // the sample above in the same column, -1 = last

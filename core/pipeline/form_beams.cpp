@@ -14,7 +14,7 @@ void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, c
 }
 
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, BeamChoice wanted,
-                std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out) {
+                std::span<const ColumnRange> used, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out) {
   // A window of complex samples of all columns: two floats per sample.
   const int floats = static_cast<int>(out.stride), first_sample = out.first_sample;
   // Eq. 9 for all beams at once, as a convolution over columns that are uniform in u = sin(azimuth) (simd/kernels.hpp).
@@ -28,7 +28,7 @@ void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, B
   scratch.window.resize(static_cast<std::size_t>(floats) * static_cast<std::size_t>(columns.columns));
   const auto place_of = [&](int k) { return scratch.window.begin() + static_cast<std::ptrdiff_t>(k) * floats; };
   int done = 0;
-  for (const ColumnRange& range : heard) {
+  for (const ColumnRange& range : used) {
     // Panels read the other columns with weights of 0. These columns may contain any values.
     std::fill(place_of(done), place_of(range.first), 0.0f);
     for (int k = range.first; k < range.last; ++k) {

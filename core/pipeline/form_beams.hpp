@@ -20,10 +20,10 @@ struct BeamScratch {
 /// Computes the samples of the window for which `out` has been shaped.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, const simd::Kernels& kernels, BeamScratch& scratch,
                 BeamSignals& out);
-/// Forms only some beams; the others are undefined. `heard`: the columns that these beams use (columns_of()); others are not
+/// Forms only some beams; the others are undefined. `used`: the columns that these beams use (columns_of()); others are not
 /// read.
 void form_beams(const ColumnSignals& columns, const BeamWeights& beam_weights, BeamChoice wanted,
-                std::span<const ColumnRange> heard, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out);
+                std::span<const ColumnRange> used, const simd::Kernels& kernels, BeamScratch& scratch, BeamSignals& out);
 
 /// The part of the point's pulse that lies within the samples [from, to).
 SampledPulse place_pulse(const PointEcho& point, const PingPlan& plan, int from, int to);

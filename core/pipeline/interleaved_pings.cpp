@@ -54,15 +54,15 @@ std::vector<ColumnRange> columns_of(const PingPlan& plan, BeamChoice beams) {
   if (beams.is_all() || of.transform || plan.beam_mix.blurs() || plan.beam_mix.blends() ||
       Crosstalk(plan, plan.switches).is_audible())
     return {{0, plan.columns.count}};
-  std::vector<bool> heard(static_cast<std::size_t>(plan.columns.count));
+  std::vector<bool> used(static_cast<std::size_t>(plan.columns.count));
   for (const BeamPanel& panel : of.panels)
     for (int j = panel.first_beam; j < panel.first_beam + 4; ++j)
       for (int k = 0; beams.has(j) && k < panel.count; ++k)
         if (of.weights[panel.weights + static_cast<std::size_t>(4 * k + j - panel.first_beam)] != 0)
-          heard[static_cast<std::size_t>(panel.first_column + k)] = true;
+          used[static_cast<std::size_t>(panel.first_column + k)] = true;
   std::vector<ColumnRange> ranges;
   for (int k = 0; k < plan.columns.count; ++k) {
-    if (!heard[static_cast<std::size_t>(k)]) continue;
+    if (!used[static_cast<std::size_t>(k)]) continue;
     if (ranges.empty() || ranges.back().last < k) ranges.push_back({k, k});
     ranges.back().last = k + 1;
   }

@@ -33,7 +33,7 @@ struct LabelWork::Point {
   std::size_t object = 0;
   int first_row = 0;
   std::vector<float> rows;   // mean of |pulse|^2 in each row [uPa^2]
-  std::vector<float> beams;  // power pattern at its direction
+  std::vector<float> beams;  // power pattern of each beam in the direction of the point
 };
 
 namespace {

@@ -23,7 +23,7 @@ class NoiseTable {
   void prepare(Seed seed, const std::vector<float>& filter, std::span<const NoiseTable* const> others = {});
   /// column[2 n], column[2 n + 1] += rms * noise for n in [0, samples). It depends only on (seed, sonar, ping, column, n).
   void add(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
-  /// Like add(), but replaces the values of the column by the noise.
+  /// Like add(), but replaces the values of the column with the noise.
   void set(std::uint32_t sonar, std::uint32_t ping, int column_index, float rms, int samples, float* column) const;
   /// The table that add() reads: noise_table_samples complex values (core/pipeline/arithmetic/noise_place.hpp).
   const std::vector<float>& shaped() const { return *shaped_; }
@@ -40,7 +40,7 @@ class NoiseTable {
   std::shared_ptr<const std::vector<float>> white_, shaped_ = std::make_shared<std::vector<float>>();  // complex, interleaved
 };
 
-/// The noise of one ping of one sonar; `table` null = none.
+/// The noise of one ping of one sonar. A null `table` means no noise.
 struct PingNoise {
   const NoiseTable* table = nullptr;
   std::uint32_t sonar = 0, ping = 0;

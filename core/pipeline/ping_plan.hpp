@@ -80,8 +80,8 @@ struct PingPlan {
   Fan fan;
   BeamWeights beam_weights;
   double bearing_scale = 1;                  // bearing_scale_of() the request
-  std::vector<float> beam_azimuth_rad;       // reported
-  std::vector<double> beam_sine;             // true sines; all sines here are true, except in tables by reported sine
+  std::vector<float> beam_azimuth_rad;       // as the device reports them
+  std::vector<double> beam_sine;             // true sines, like all sines here except in tables by reported sine
   std::vector<ReceivePattern> beam_pattern;  // [beams]
 
   // The sample grid. Sample n lies at the device range (n + sample_offset) sample_spacing_m.
@@ -106,14 +106,14 @@ struct PingPlan {
   SharedNoiseTable shared_noise;
   BeamMix beam_mix;
   std::vector<float> row_power_factor;   // per row: (gain * TVG / full scale)^2
-  std::vector<std::uint32_t> row_gain;   // when settings.format.row_gains
+  std::vector<std::uint32_t> row_gain;   // set if settings.format.row_gains
   std::vector<float> beam_power_factor;  // per beam: gain of its channel, squared; empty = all equal
 
   /// Direction of a point in the sonar's axes, for conical beams (about the array's axis) or flat ones.
   ConicalDirection direction_of(Vec3d from_sonar) const {
     return switches.conical ? conical_from_sonar(from_sonar) : flat_from_sonar(from_sonar);
   }
-  /// nullopt: the direction is outside the fan, or farther than half_angle_rad from its middle.
+  /// Returns nullopt if the direction is outside the fan, or farther than half_angle_rad from its middle.
   std::optional<std::size_t> column_of(const ConicalDirection& direction, double half_angle_rad) const;
   /// A cell counts as visible up to this distance behind the depth map, because the map is interpolated linearly between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }

@@ -29,7 +29,7 @@ struct PingScalars {
 
   // The origin of rays and cells, and its motion. An echo from range r is reflected at r / c and received at 2 r / c.
   Pose seen_from;        // the sonar in the world at the middle of the ping; the pose of firing if it does not move
-  double seen_at_s = 0;  // after firing
+  double seen_at_s = 0;  // time of `seen_from` after firing
   bool moves = false;
   Twist twist;
   double doppler_m_per_mps = 0;  // added to the range of an echo that approaches by 1 m/s (docs/acoustics.md, section 4)

@@ -60,7 +60,7 @@ double at_sine(const std::vector<float>& table, double sine, double top);
 class BeamMix {
  public:
   BeamMix() = default;
-  /// Leaves the tables empty if beams are not uniform in the sine.
+  /// The tables stay empty if beams are not uniform in the sine.
   explicit BeamMix(const PingPlan& plan);
   bool blurs() const { return !turn_m_.empty(); }
   bool blends() const { return !own_.empty(); }
@@ -100,11 +100,11 @@ class SharedNoiseTable {
   /// channels of one group; in the last part, in all channels.
   std::vector<float> response() const;
   std::size_t bytes() const {
-    return sizeof(float) * (heard_.capacity() + noise_upa_.capacity() + steady_upa_.capacity() + leak_upa_.capacity()) +
+    return sizeof(float) * (stored_.capacity() + noise_upa_.capacity() + steady_upa_.capacity() + leak_upa_.capacity()) +
            sizeof(std::uint32_t) * at_.capacity();
   }
   // Levels in a channel by sample: noise_upa, rms of the noise that differs between pings and groups; steady_upa, amplitude of
-  // the noise that does not; leak_upa, amplitude of the leak, up to its last sample.
+  // the noise that does not differ; leak_upa, amplitude of the leak, up to its last sample.
   const std::vector<float>& noise_upa() const { return noise_upa_; }
   const std::vector<float>& steady_upa() const { return steady_upa_; }
   const std::vector<float>& leak_upa() const { return leak_upa_; }
@@ -116,14 +116,14 @@ class SharedNoiseTable {
 
  private:
   /// [2][block_samples] of a part in a beam, or null if the block is omitted.
-  const float* heard(std::size_t part, std::size_t beam, std::size_t block) const;
+  const float* stored(std::size_t part, std::size_t beam, std::size_t block) const;
   struct Block;
   void gather(std::vector<Block>& blocks);
 
   int samples_ = 0;
   std::size_t parts_ = 0, beams_ = 0, blocks_ = 0;
-  std::vector<std::uint32_t> at_;  // [parts][beams][blocks]: number of the block in heard_, from 1; 0: none
-  std::vector<float> heard_;       // [received blocks][2][block_samples]
+  std::vector<std::uint32_t> at_;  // [parts][beams][blocks]: number of the block in stored_, from 1; 0: none
+  std::vector<float> stored_;      // [received blocks][2][block_samples]
   std::vector<float> noise_upa_, steady_upa_, leak_upa_;
 };
 

@@ -57,7 +57,7 @@ class Profile {
   std::ptrdiff_t first() const { return first_; }
   std::ptrdiff_t last() const { return last_; }
   double power(std::ptrdiff_t k) const { return k < first_ || k > last_ ? 0 : steps_[static_cast<std::size_t>(k)]; }
-  /// The strongest cell in [from, to], which must lie within [first(), last()]. If several are equal, it is the first of them.
+  /// The strongest cell in [from, to], which must lie within [first(), last()]. If several are equal, the first one is returned.
   std::ptrdiff_t strongest(std::ptrdiff_t from, std::ptrdiff_t to) const {
     const auto begin = steps_.begin();
     return std::max_element(begin + from, begin + to + 1) - begin;

@@ -59,7 +59,8 @@ class RangeReturns {
   }
   /// Returns of the point targets that are not hidden.
   std::vector<PointReturn> of_points() const;
-  /// Speckle of a return in one range cell, for one block of rows. For images in which each range cell has its own speckle.
+  /// Speckle of a return in one range cell, for one block of rows. It is used for images in which each range cell has its own
+  /// speckle.
   ComplexNormal speckle_in(const RangeReturn& r, std::ptrdiff_t cell, int block) const {
     const std::uint32_t of_cell = static_cast<std::uint32_t>(cell) * 389u + static_cast<std::uint32_t>(block) * 1543u;
     return draws_[(r.draw + of_cell) % static_cast<std::uint32_t>(draws_.size())];
@@ -97,7 +98,7 @@ class RangeReturns {
   void add(const RangeReturn& r, const RayPacket& p, int lane, std::vector<RangeReturn>& to, std::size_t first) const;
   void look_closer(Parallel& pool);
   bool aim_at(std::uint32_t object, std::vector<std::uint8_t>& is_listed, std::vector<Cell>& cells) const;
-  std::vector<Cell> thin_cells(std::vector<std::uint8_t>& is_thin) const;  // by object
+  std::vector<Cell> thin_cells(std::vector<std::uint8_t>& is_thin) const;  // is_thin: by object
   std::vector<Cell> crossed_cells(Parallel& pool) const;
   Vec3d direction(int column, int row) const;  // direction of a beam in sonar axes
   std::size_t index(Cell cell) const {
@@ -112,7 +113,7 @@ class RangeReturns {
   const PingRequest& request_;
   RangeImageGrid grid_;
   double cell_m_;
-  double column_step_rad_ = 0, row_step_rad_ = 0;  // between directions of beams, in the middle of the picture
+  double column_step_rad_ = 0, row_step_rad_ = 0;  // steps between directions of beams, in the middle of the picture
   Rotation world_from_sonar_;
   Vec3 origin_;
   double device_per_true_ = 1, absorption_np_ = 0, source_ = 1;

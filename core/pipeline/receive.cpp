@@ -80,7 +80,7 @@ void receive(const BeamSignals& beams, const PingPlan& plan, const simd::Kernels
   const bool logarithmic = s.format.scale == SampleFormat::Scale::logarithmic;
   const LevelLine line = level_line(s.format);
   const auto per_octave = static_cast<float>(line.per_octave), at_full_scale = static_cast<float>(line.at_full_scale);
-  // The gain (36) depends on the row in the picture, not on the row in the window.
+  // The gain (eq. 36) depends on the row in the picture, not on the row in the window.
   for (int row = 0; row < rows; ++row) {
     float* power = scratch.power.data() + static_cast<std::ptrdiff_t>(row) * width;
     const std::size_t at = static_cast<std::size_t>(first_row + row) * static_cast<std::size_t>(s.beam_count);

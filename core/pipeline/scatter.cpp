@@ -25,7 +25,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   const Rotation sonar_from_object = s.moves ? at.turn * seen_from_object : seen_from_object;
   const Vec3d from_sonar_object_m =
       s.moves ? t.from_sonar_object_m - transposed(seen_from_object) * at.moved_m : t.from_sonar_object_m;
-  // This value is computed in double. Cells add a difference in float to it (section 1).
+  // This value is computed in double. Cells add a difference in float to it (docs/acoustics.md, section 1).
   const double range = length(at.from_sonar_m);
   seen.tile = &tile;
   const Vec3 q = to_float(from_sonar_object_m), p = to_float(at.from_sonar_m);
@@ -52,7 +52,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   seen.amplitude = static_cast<float>(constant * static_cast<double>(tile.weight_unit));
   // In expected power the edge of a cell [m], the root of its area, replaces the weight, because the mean of |xi|^2 is 1.
   seen.area_amplitude = static_cast<float>(constant * lattice::cell_size_m(tile.level));
-  // Levels cross-fade over 15 % of the range (section 3).
+  // Levels cross-fade over 15 % of the range (docs/acoustics.md, section 3).
   seen.fade_in_from_m = t.level->fade_in_from_m;
   seen.fade_in_per_m = per_metre(t.level->fade_in_from_m, t.level->full_from_m);
   seen.fade_out_to_m = t.level->fade_out_to_m;
@@ -183,9 +183,9 @@ std::size_t scatter(const std::vector<PreparedTile>& tiles, std::span<const std:
       if (echoes.count > 0) break;
       echoes.reserve(seen.tile->count);
     }
-    const int heard = kernels.scatter_tile(seen, group, echoes.at(echoes.count));
-    echoes.count += heard;
-    if (echoes.keeps_power && heard > 0) echoes.runs.push_back({wanted[from], echoes.count});
+    const int written = kernels.scatter_tile(seen, group, echoes.at(echoes.count));
+    echoes.count += written;
+    if (echoes.keeps_power && written > 0) echoes.runs.push_back({wanted[from], echoes.count});
   }
   return from;
 }
@@ -216,13 +216,13 @@ std::optional<PointEcho> point_echo(Vec3d from_sonar_m, std::complex<double> str
   // Eq. 6 for one scatterer: sqrt(sigma_b A_c) is replaced by |strength|, which is 10^(TS/20) for a point.
   const Vec3d p = s.echo_geometry(from_sonar_m).from_sonar_m;
   const double r = length(p);
-  // (29) has moved the point. (27) shifts the echo of a sweep.
+  // Eq. 29 has moved the point; eq. 27 shifts the echo of a sweep.
   const double at_sample = s.sample_of(r) + s.doppler_samples(p);
   if (r < nearest_scatterer_m || at_sample <= -plan.taps / 2 || at_sample >= plan.samples + plan.taps / 2 - 1) return {};
   const ConicalDirection direction = plan.direction_of(p);
   const std::optional<std::size_t> column = plan.column_of(direction, plan.fan.reach_rad);
   if (!column) return {};
-  // 10^(SL/20) e^{-2 a r} / r^2 D_v T [uPa per m]. The phase is (12).
+  // 10^(SL/20) e^{-2 a r} / r^2 D_v T [uPa per m]. The phase is that of eq. 12.
   const double transmit = static_cast<double>(plan.columns.transmit[*column]);
   const double amplitude = s.source_upa * two_way_transmission(r, s.absorption_np_per_m) *
                            elevation_two_way(plan.mode.pattern, direction.psi_rad) * transmit;

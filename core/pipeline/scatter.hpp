@@ -1,4 +1,4 @@
-// Stage two: computes the echo of each visible surface cell: position on the sample grid, column, amplitude and carrier phase.
+// Stage two computes the echo of each visible surface cell: its position on the sample grid, column, amplitude and carrier phase.
 // The speckle is fixed to the surface. The stage also computes the echoes of the fixed fan and of point targets.
 #pragma once
 

@@ -22,7 +22,7 @@ constexpr double none_db = -150;
 /// m. The recording has no such noise at 1.75 m. Between 0.6 m and 1.75 m the recorded bed hides it.
 constexpr double margin = 3, fades_from = 2;
 
-/// A block of a part in a beam is omitted if its values are everywhere below this fraction of the channels' own noise (30),
+/// A block of a part in a beam is omitted if its values are everywhere below this fraction of the channels' own noise (eq. 30),
 /// divided by the number of parts.
 constexpr double silent = 0.03;
 constexpr std::size_t block_samples = SharedNoiseTable::block_samples;
@@ -31,7 +31,7 @@ constexpr int most_groups = 32;  // each group has a table
 // Limits of the number of complex values of a table (1 GiB) and of the steps of its sums (about 10 s).
 constexpr double most_values = 1 << 27, most_steps = 1e9;
 
-/// Least mean power of the leak in the beams, re the sum of the channels' powers, at which the level of (31) is applied. At
+/// Least mean power of the leak in the beams, re the sum of the channels' powers, at which the level of eq. 31 is applied. At
 /// lower powers the beams point at nulls of the leak.
 constexpr double faint = 1e-3;
 
@@ -164,13 +164,13 @@ std::string why_table_too_large(const FrequencyMode& mode, const PingSettings& s
          "or in receiver.shared_noise a larger group or a sine outside the sector, or a leak that ends";
 }
 
-/// Audible parts in a block of samples, in order.
+/// The parts in a block of samples that are not omitted, in order.
 struct SharedNoiseTable::Block {
   std::vector<std::size_t> at;  // part * beams + beam
-  std::vector<float> heard;     // [at][2][block_samples]
+  std::vector<float> stored;    // [at][2][block_samples]
 };
 
-/// Eq. 47.
+/// Computes the table (eq. 47).
 SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   const SharedNoise& law = plan.mode.receiver.shared_noise;
   const bool noise = has_noise(law);
@@ -187,7 +187,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   std::size_t samples = 0;
   while (samples < all && (range_m(samples) < noise_reach.end_m || samples < leak_samples)) ++samples;
   samples_ = static_cast<int>(samples);
-  // (30) is the level of a channel's own noise at a beam's output.
+  // Eq. 30 is the level of a channel's own noise at a beam's output.
   const double own_upa = plan.column_noise_upa * std::sqrt(plan.beam_weights.weight_energy / law.channels);
   const double level_upa = noise ? own_upa * amplitude_from_db(static_cast<double>(law.level_db)) : 0;
   const auto steady = static_cast<double>(law.steady);
@@ -224,7 +224,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
         responses.of(parts_ - 1, j, re, im);
         for (std::size_t n = 0; n < to - from; ++n) power[n] += static_cast<double>(re[n] * re[n] + im[n] * im[n]);
       }
-      // (31) is the mean level at the outputs of beams.
+      // Eq. 31 is the mean level at the outputs of beams.
       for (std::size_t n = from; n < std::min(to, leak_samples); ++n) {
         const double per_channel =
             std::sqrt(plan.beam_weights.weight_energy * static_cast<double>(beams_) / std::max(power[n - from], least));
@@ -244,8 +244,8 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
         for (std::size_t n = 0; n < to - from; ++n) most = std::max(most, upa[n] * upa[n] * (re[n] * re[n] + im[n] * im[n]));
         if (most <= audible) continue;
         blocks[block].at.push_back(part * beams_ + j);
-        blocks[block].heard.insert(blocks[block].heard.end(), re, re + block_samples);
-        blocks[block].heard.insert(blocks[block].heard.end(), im, im + block_samples);
+        blocks[block].stored.insert(blocks[block].stored.end(), re, re + block_samples);
+        blocks[block].stored.insert(blocks[block].stored.end(), im, im + block_samples);
       }
     }
   });
@@ -255,20 +255,20 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
 /// The table does not depend on the number of threads.
 void SharedNoiseTable::gather(std::vector<Block>& blocks) {
   std::size_t floats = 0;
-  for (const Block& block : blocks) floats += block.heard.size();
-  heard_.reserve(floats);
+  for (const Block& block : blocks) floats += block.stored.size();
+  stored_.reserve(floats);
   at_.assign(parts_ * beams_ * blocks_, 0);
   for (std::size_t b = 0; b < blocks_; ++b) {
-    auto count = static_cast<std::uint32_t>(heard_.size() / (2 * block_samples));
+    auto count = static_cast<std::uint32_t>(stored_.size() / (2 * block_samples));
     for (const std::size_t at : blocks[b].at) at_[at * blocks_ + b] = ++count;
-    heard_.insert(heard_.end(), blocks[b].heard.begin(), blocks[b].heard.end());
+    stored_.insert(stored_.end(), blocks[b].stored.begin(), blocks[b].stored.end());
     blocks[b] = {};
   }
 }
 
-const float* SharedNoiseTable::heard(std::size_t part, std::size_t beam, std::size_t block) const {
+const float* SharedNoiseTable::stored(std::size_t part, std::size_t beam, std::size_t block) const {
   const std::size_t at = at_[(part * beams_ + beam) * blocks_ + block];
-  return at == 0 ? nullptr : heard_.data() + 2 * block_samples * (at - 1);
+  return at == 0 ? nullptr : stored_.data() + 2 * block_samples * (at - 1);
 }
 
 std::vector<float> SharedNoiseTable::response() const {
@@ -276,7 +276,7 @@ std::vector<float> SharedNoiseTable::response() const {
   std::vector<float> dense(2 * parts_ * beams_ * samples, 0.0f);
   for (std::size_t i = 0; i < parts_ * beams_; ++i)
     for (std::size_t block = 0; block < blocks_; ++block) {
-      const float* r = heard(i / beams_, i % beams_, block);
+      const float* r = stored(i / beams_, i % beams_, block);
       if (r == nullptr) continue;
       const std::size_t from = block * block_samples, count = std::min(block_samples, samples - from);
       std::copy(r, r + count, dense.data() + 2 * i * samples + from);
@@ -289,7 +289,7 @@ double SharedNoiseTable::noise_power(std::size_t beam, std::size_t sample) const
   if (sample >= noise_upa_.size()) return 0;
   double power = 0;
   for (std::size_t part = 0; part < parts_; ++part) {
-    const float* r = heard(part, beam, sample / block_samples);
+    const float* r = stored(part, beam, sample / block_samples);
     if (r == nullptr) continue;
     const float re = r[sample % block_samples], im = r[block_samples + sample % block_samples];
     const float rms = part + 1 < parts_ ? noise_upa_[sample] : steady_upa_[sample];
@@ -329,7 +329,7 @@ void SharedNoiseTable::add(const std::vector<float>& shared, bool expected_power
       const auto count = static_cast<int>(to - from);
       float re[block_samples] = {}, im[block_samples] = {};
       for (std::size_t part = 0; part < parts_; ++part) {
-        const float* __restrict r = heard(part, j, block);
+        const float* __restrict r = stored(part, j, block);
         if (r == nullptr) continue;
         r += from - block * block_samples;
         const float* __restrict r_im = r + block_samples;

@@ -46,7 +46,7 @@ struct FanHit {
   std::uint32_t object = 0, triangle = 0;
 };
 
-/// Echoes waiting to be summed. In expected power, re holds the power and im is 0.
+/// Echoes to be summed. In expected power, re holds the power and im is 0.
 struct Echoes {
   explicit Echoes(int capacity = 0) { reserve(capacity); }
   void reserve(int capacity);

@@ -6,7 +6,7 @@
 namespace sonar {
 namespace {
 
-// w of (26): relative L2 error 8e-6.
+// w of eq. 26; its relative L2 error is 8e-6.
 constexpr int kernel_width = 6;
 
 /// Number of frequencies per sample of the period. The pulse's band determines it.

@@ -27,7 +27,7 @@ bool begins_with_noise(const PingPlan& plan, const PingNoise& noise, int column)
 
 namespace {
 
-/// Multiplies the noise of column `k` by the root of its profile, (46).
+/// Multiplies the noise of column `k` by the root of its profile (eq. 46).
 void level_noise(const NoiseProfile& profile, int k, int count, float* noise) {
   if (profile.is_even()) return;
   const float far = profile.far[static_cast<std::size_t>(k)], more = profile.near_less_far[static_cast<std::size_t>(k)];
@@ -44,7 +44,7 @@ void level_noise(const NoiseProfile& profile, int k, int count, float* noise) {
 }  // namespace
 
 void begin_columns(const PingPlan& plan, const PingNoise& noise, int first, int last, ColumnSignals& signals) {
-  // rms of one column: the level at a beam's output divided by sqrt(sum_k W_jk^2) (section 5).
+  // rms of one column: the level at a beam's output divided by sqrt(sum_k W_jk^2) (docs/acoustics.md, section 5).
   const auto rms = static_cast<float>(plan.column_noise_upa);
   for (int k = first; k < last; ++k) {
     float *at = signals.column(k), *end = at + signals.stride;

@@ -40,7 +40,7 @@ class PacketFiller {
 
   void add(ColumnSine column, Elevation e) {
     const auto i = static_cast<std::size_t>(count_++);
-    // Inverse of (11): a unit direction in sonar axes from the column's u and the elevation psi.
+    // Inverse of eq. 11: a unit direction in sonar axes from the column's u and the elevation psi.
     const auto [x, y, z] = ray_in_sonar(conical_, column.along, column.across, e.cosine, e.sine);
     packet.direction_x[i] = m_[0] * x + m_[1] * y + m_[2] * z;
     packet.direction_y[i] = m_[3] * x + m_[4] * y + m_[5] * z;
@@ -84,7 +84,7 @@ class FanTracer {
       ahead_[i] = static_cast<float>(scalars.world_from_sonar.m[i][0]);
       port_[i] = static_cast<float>(scalars.world_from_sonar.m[i][1]);
     }
-    // One pulse width [m]. The depth map needs no higher accuracy (section 2).
+    // One pulse width [m]. The depth map needs no higher accuracy (docs/acoustics.md, section 2).
     tolerance_m_ = static_cast<float>(plan.pulse_width_m);
     columns_ = column_sines(plan.columns, first, last);
     base_.reserve(plan.fan.elevation_rad.size());
@@ -244,8 +244,8 @@ class FanTracer {
         // Bins up to `end` lie between a and b; the last interval gets bins that rounding left over.
         const float top = bin_of_tangent(fan.axis, b.tangent);
         const int end = at(at(i).next).next < 0 ? fan.bins : std::min(static_cast<int>(top), fan.bins);
-        // 1 / x is linear in tan psi along a plane (section 2). 0 is infinitely far, so the smaller value is the farther
-        // surface.
+        // 1 / x is linear in tan psi along a plane (docs/acoustics.md, section 2). 0 is infinitely far, so the smaller value is
+        // the farther surface.
         const float inverse_a = a.surface.inverse_x, inverse_b = b.surface.inverse_x, farther = std::min(inverse_a, inverse_b);
         const float per_tangent = (inverse_b - inverse_a) / (b.tangent - a.tangent);
         if (bin > end) continue;
@@ -257,7 +257,7 @@ class FanTracer {
           std::fill(map + bin, map + end + 1, with_mark(farther, mark));
         } else {
           const float* __restrict tangent = fan.tangent.data();
-          // By rounding, a bin may lie slightly outside [a, b]. 1 / x must not become negative there.
+          // Because of rounding, a bin may lie slightly outside [a, b]. 1 / x must not become negative there.
           for (int place = bin; place <= end; ++place)
             map[place] = with_mark(std::max(0.0f, inverse_a + per_tangent * (tangent[place] - a.tangent)), mark);
         }
@@ -301,7 +301,8 @@ std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingSca
 void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                      std::vector<FanHit>& hits) {
   PacketFiller filler(plan, scalars, static_cast<float>(scalars.max_range_m));
-  // Every ray is a scatterer, as in P25 (section 8). Elevations are uniform and the same in every column.
+  // Every ray is a scatterer, as in Choi 2025 (docs/acoustics.md, section 8). Elevations are uniform and the same in every
+  // column.
   const int rays = plan.fixed_fan;
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
   // A packet is a tile of neighbouring columns and rays. Its rays visit more of the same boxes and triangles than those of one

@@ -20,7 +20,7 @@ float truth_half_width_rad(const PingPlan& plan) {
   const BeamPattern& pattern = plan.mode.pattern;
   // Without a pattern, the beam is as wide as the data sheet's width.
   if (pattern.elevation_taper == Taper::unit) return pattern.elevation_width_rad / 2;
-  // The |psi| [rad] at which D_v of (34) has fallen to sqrt(1/2) in amplitude, -3 dB.
+  // The |psi| [rad] at which D_v of eq. 34 has fallen to sqrt(1/2) in amplitude, -3 dB.
   return static_cast<float>(elevation_reach_rad(pattern, std::sqrt(0.5)));
 }
 

@@ -12,12 +12,12 @@
 namespace sonar {
 namespace {
 
-// Largest number of slices for the integral over psi in (17). Every column processes all slices for its shadows.
+// Largest number of slices for the integral over psi in eq. 17. Every column processes all slices for its shadows.
 constexpr int most_slices = 256;
 
 }  // namespace
 
-// The width of a column in (17): du for cones. For flat beams it is dtheta = du / cos(theta), with u = sin(theta).
+// The width of a column in eq. 17: du for cones. For flat beams it is dtheta = du / cos(theta), with u = sin(theta).
 double volume_column_width(const PingPlan& plan, int column) {
   const double u = plan.columns.sine(column), across = 1 - u * u;
   if (!(across > 0)) return 0;
@@ -27,7 +27,7 @@ double volume_column_width(const PingPlan& plan, int column) {
 Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars) : plan_(plan), scalars_(scalars) {
   if (!plan.switches.volume || !water.has_volume()) return;
   const Fan& fan = plan.fan;
-  // D_v of (34). Without a pattern the factor is 1 in the whole fan.
+  // D_v of eq. 34. Without a pattern the factor is 1 in the whole fan.
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
   const int bins_a_slice = std::max(1, fan.bins / most_slices);
@@ -45,7 +45,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
   // docs/acoustics.md, eq. 17: sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff. Its echo falls as r^-4.
   const double at_1_m = scalars.source_upa * scalars.source_upa * power_from_db(static_cast<double>(water.volume_db)) * 0.5 *
                         scalars.sound_speed_mps * plan.pulse_shape.energy_width_s();
-  // [uPa^2] for Psi = 1: source^2 times sigma of (17), times e^{-4 a r} / r^4 for the way out and back.
+  // [uPa^2] for Psi = 1: source^2 times sigma of eq. 17, times e^{-4 a r} / r^4 for the way out and back.
   for (int n = 0; n < plan.samples; ++n) {
     const double r = (n + scalars.sample_offset) / scalars.samples_per_m;
     open_power_.push_back(at_1_m * std::pow(r * two_way_transmission(r, scalars.absorption_np_per_m), 2));

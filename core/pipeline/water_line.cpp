@@ -25,9 +25,9 @@ void change(PingRequest& r) {
   }
   double& z = r.sonar_in_world.position_m.z;
   double& climbs_mps = r.sonar_moves.velocity_mps.z;
-  // Moves a sonar at the surface to 1 mm below it (section 3).
+  // Moves a sonar at the surface to 1 mm below it (docs/acoustics.md, section 3).
   z = std::min(z, -least_depth_m);
-  // Reduces the speed of a rising sonar, so that it is just below the surface at that time. Others keep their speed.
+  // Reduces the speed of a rising sonar, so that it is just below the surface at that time. Other sonars keep their speed.
   if (const double rise = rise_m(r); rise > 0) climbs_mps *= std::clamp((-least_depth_m - z) / rise, 0.0, 1.0);
 }
 
@@ -35,13 +35,14 @@ void change(PingRequest& r) {
 
 bool is_in_air(const Pose& sonar_in_world, const Scene& scene) { return scene.sea_surface.present && is_above(sonar_in_world); }
 
-std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room) {
+std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene,
+                                      std::vector<PingRequest>& changed) {
   if (!scene.sea_surface.present || std::none_of(requests.begin(), requests.end(), is_to_change)) return requests;
   // Requests are copied only if one changes, which is rare.
-  room.assign(requests.begin(), requests.end());
-  for (PingRequest& r : room)
+  changed.assign(requests.begin(), requests.end());
+  for (PingRequest& r : changed)
     if (is_to_change(r)) change(r);
-  return room;
+  return changed;
 }
 
 void restore_requested_pose(std::span<const PingRequest> requests, std::span<Ping> pings) {

@@ -17,10 +17,11 @@ inline constexpr double least_depth_m = 1e-3;
 /// True if a sonar at this position is above the sea surface and receives only noise. False in scenes without a sea surface.
 bool is_in_air(const Pose& sonar_in_world, const Scene& scene);
 
-/// The requests to be computed: the given ones if they need no change, else changed copies in `room`. In scenes with a sea
+/// The requests to be computed: the given ones if they need no change, else changed copies in `changed`. In scenes with a sea
 /// surface the ping of a sonar above it is blank, a sonar at it is moved just below it, and no sonar leaves the water during
 /// its ping.
-std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene, std::vector<PingRequest>& room);
+std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene,
+                                      std::vector<PingRequest>& changed);
 
 /// Restores the requested poses of the sonars in the pings of changed requests. PingRequest::blank stays as computed.
 void restore_requested_pose(std::span<const PingRequest> requests, std::span<Ping> pings);

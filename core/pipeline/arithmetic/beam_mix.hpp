@@ -1,5 +1,5 @@
 // Mixes neighbouring beams: the blur of an array that is focused for broadside only, and a fitted fraction of the next beams
-// (docs/acoustics.md, section 6). Only C++17 and the standard library.
+// (docs/acoustics.md, section 6). The file uses only C++17 and the standard library.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ struct BeamMixView {
   const std::int32_t* reach;               // [sets]: number of taps on either side that are not 0
   const float *own, *share;                // [beams]: weight of the beam, and of each neighbour
   std::int32_t beams, sets, widest, step;  // widest: largest reach; step: number of beams between two neighbours that are mixed
-  float sets_per_rad, first_range_m, sample_m;  // range of sample 0; spacing
+  float sets_per_rad, first_range_m, sample_m;  // first_range_m: of sample 0; sample_m: spacing
 };
 
 /// The set of taps for this beam and sample; 0 = no change.

@@ -1,5 +1,5 @@
-// Closed forms of the directivity: of the receive array in azimuth, and of transmitter times receiver in elevation. Only C++17
-// and the standard library, because nvcc compiles it, too.
+// Closed forms of the directivity: of the receive array in azimuth, and of transmitter times receiver in elevation. The file uses
+// only C++17 and the standard library, because nvcc compiles it, too.
 #pragma once
 
 #include <cmath>
@@ -162,7 +162,7 @@ SONAR_HD inline ConicalDirection flat_from_sonar(Vec3d direction_in_sonar) {
   const double h = std::sqrt(direction_in_sonar.x * direction_in_sonar.x + direction_in_sonar.y * direction_in_sonar.y);
   return {direction_in_sonar.y / h, std::atan2(direction_in_sonar.z, h)};
 }
-/// The inverse functions. They return unit vectors.
+/// sonar_from_conical() and sonar_from_flat() invert the two functions above; they return unit vectors.
 SONAR_HD inline Vec3d sonar_from_conical(const ConicalDirection& d) {
   const double across = std::sqrt(std::fmax(0.0, 1 - d.u * d.u));
   return {across * std::cos(d.psi_rad), d.u, across * std::sin(d.psi_rad)};

@@ -1,5 +1,5 @@
-// Fresnel integrals C(x) and S(x), which give the echo of a limited mirror (docs/acoustics.md, section 3). Only C++17 and the
-// standard library.
+// Fresnel integrals C(x) and S(x), which give the echo of a limited mirror (docs/acoustics.md, section 3). The file uses only
+// C++17 and the standard library.
 #pragma once
 
 #include <cmath>
@@ -15,7 +15,8 @@ struct FresnelPair {
   double c = 0, s = 0;
 };
 
-/// Sum of the power series: C + iS = sum_n (i pi / 2)^n x^(2n + 1) / (n! (2n + 1)). For small x; at x = 2.4 it loses 4 digits.
+/// Sum of the power series: C + iS = sum_n (i pi / 2)^n x^(2n + 1) / (n! (2n + 1)). It is used for small x; at x = 2.4 it loses 4
+/// digits.
 SONAR_HD inline FresnelPair fresnel_series(double x) {
   const double step = 0.5 * pi * x * x;
   FresnelPair sum;
@@ -42,7 +43,7 @@ SONAR_HD inline FresnelPair fresnel_series(double x) {
 }
 
 /// C + iS = (1 + i) / 2 (1 - erfc z), z = sqrt(pi) / 2 (1 - i) x. The continued fraction of erfc (Abramowitz & Stegun 7.1.14)
-/// is evaluated backwards. For x of at least 2.4.
+/// is evaluated backwards. It is used for x of at least 2.4.
 SONAR_HD inline FresnelPair fresnel_fraction(double x) {
   const double zr = 0.5 * std::sqrt(pi) * x, zi = -zr;
   double fr = zr, fi = zi;
@@ -58,7 +59,7 @@ SONAR_HD inline FresnelPair fresnel_fraction(double x) {
   return {0.5 * (1 - er + ei), 0.5 * (1 - er - ei)};
 }
 
-/// Accurate to 1e-9 for every x, infinities included.
+/// Returns both integrals, accurate to 1e-9 for every x, also at infinity.
 SONAR_HD inline FresnelPair fresnel(double x) {
   const double a = std::fabs(x), sign = x < 0 ? -1.0 : 1.0;
   if (a > 1e8) return {0.5 * sign, 0.5 * sign};

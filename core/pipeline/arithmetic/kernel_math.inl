@@ -15,7 +15,7 @@ SONAR_HD inline float sine_of_quarter(float x) {
   p = p * y2 - 1.6666667e-1f;
   return y + y * y2 * p;
 }
-/// |x| up to a half.
+/// sin(2 pi x), |x| up to a half.
 SONAR_HD inline float sine_of_half(float x) {
   const float folded = (x > 0 ? 0.5f : -0.5f) - x;
   return sine_of_quarter(std::fabs(x) > 0.25f ? folded : x);

@@ -1,5 +1,5 @@
 // Converts beam pressure to samples: thermal noise level, time-varied gain, row gains, quantisation (docs/acoustics.md, section
-// 7). Only C++17 and the standard library.
+// 7). The file uses only C++17 and the standard library.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // Echo of a scatterer: Lambert cross-sections, spreading, absorption, carrier phase (docs/acoustics.md, section 3).
-// Only C++17 and the standard library.
+// The file uses only C++17 and the standard library.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // Formulas for pulses p(t) after the receiver's filter (Gaussian, rectangular tone, linear sweep), and for their widths.
-// See docs/acoustics.md, section 4. Only C++17 and the standard library.
+// See docs/acoustics.md, section 4. The file uses only C++17 and the standard library.
 #pragma once
 
 #include <cmath>

@@ -59,8 +59,8 @@ class CpuEngine final : public ChangingEngine, private Interruption {
   Ping run_picture(const PingRequest& picture, PingStatistics& statistics) {
     const std::vector<PingRequest> wanted = pings_of(picture);
     std::vector<Ping> pings;
-    std::vector<PingRequest> room;
-    for (const PingRequest& request : in_water(wanted, *scene_, room)) {
+    std::vector<PingRequest> changed;
+    for (const PingRequest& request : in_water(wanted, *scene_, changed)) {
       pings.push_back(run(request, beams_of(picture, pings.size())));
       add(statistics, work_[0].statistics());
     }

@@ -154,7 +154,7 @@ class PingSimulation {
   const simd::Kernels& kernels_;
   Workspace::Buffers& w_;
   Parallel& pool_;
-  PingLabels* labels_;  // null = not wanted
+  PingLabels* labels_;  // null = no labels
   BeamChoice beams_;
   PreparedSettings& prepared_;
   const PingPlan& plan_;
@@ -294,7 +294,7 @@ void PingSimulation::scatter_cells_of(std::size_t number, Workspace::Buffers::Pe
     return from < to ? trace_fan(scene_, plan_, scalars_, from, to, mine.fan, mine.seen) : 0;
   };
   for (int from = first; from < last; from += traced_columns()) {
-    // Rays draw the depth map of these columns (section 2).
+    // Rays draw the depth map of these columns (docs/acoustics.md, section 2).
     const int to = std::min(from + traced_columns(), last);
     mine.statistics.rays += trace(from, to);  // the rays of columns beside the group count in the group of those columns
     if (!w_.first_hits.empty()) note_first_hits(mine.fan, plan_, from, to, w_.first_hits);

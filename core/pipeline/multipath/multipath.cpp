@@ -5,7 +5,7 @@
 namespace sonar {
 namespace {
 
-// A batch is the work of one task. A round limits the memory for echoes. The sums depend on neither of them.
+// A batch is the work of one task. A round limits the memory for echoes. The sums depend on neither size.
 constexpr std::size_t tiles_a_batch = 16;
 constexpr std::size_t batches_a_round = 64;  // echoes of one round are stored and then summed
 

@@ -1,5 +1,5 @@
 // Multipath, off by default (Switches::multipath): computes all echoes via flat mirrors as column signals, which are added to
-// the direct ones. It runs once for each ping, before the columns are simulated (docs/acoustics.md, section 3).
+// the direct echoes. It runs once for each ping, before the columns are simulated (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>
@@ -17,7 +17,7 @@ struct MultipathWork {
   ImagePaths image_paths;
   ColumnSignals columns;                     // echoes via mirrors
   bool has_echoes = false;                   // false: `columns` has no echoes
-  std::vector<std::vector<Echoes>> batches;  // echoes waiting, per batch of tiles and group of columns
+  std::vector<std::vector<Echoes>> batches;  // echoes to be summed, by batch of tiles and group of columns
   std::vector<SpectralScratch> spectral;     // per group of columns, if pulses are summed via the spectrum
 };
 struct MultipathCounts {

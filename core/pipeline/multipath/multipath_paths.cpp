@@ -17,7 +17,7 @@ struct Image {
 Image image_in(const FlatMirror& m) {
   const double n[3] = {m.normal.x, m.normal.y, m.normal.z};
   Image image;
-  // Reflects axes and shift: Householder matrix I - 2 n n^T, and the shift of the plane.
+  // The axes are reflected by the Householder matrix I - 2 n n^T; the plane's distance gives the shift.
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) image.turn.m[i][j] -= 2 * n[i] * n[j];
   image.shift_m = (-2 * m.height_m) * m.normal;

@@ -38,7 +38,7 @@ struct Path {
   Rotation turn;                // improper for one bounce
   Vec3d shift_m;
   Vec3d second_normal;       // normal of the second mirror, as seen in the first
-  bool beyond_front = true;  // true if it leads to the side of the last mirror on which the sonar is
+  bool beyond_front = true;  // true if the path leads to the side of the last mirror on which the sonar is
 
   Vec3d image_of(Vec3d p) const { return turn * p + shift_m; }
 };

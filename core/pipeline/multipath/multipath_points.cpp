@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// A point target seen by one path.
+/// The values of a point target for one path.
 struct PointArrival {
   double range_m = 0, sine = 0, transmit = 0, sample_shift = 0;
   std::complex<double> carried;  // pressure per source, includes the phase of the carrier
@@ -58,7 +58,7 @@ class PointMultipath {
  private:
   std::optional<PointArrival> arrive(const Path& path, Vec3d place) const {
     if (!is_lit(path, image_paths_.mirrors, place)) return {};
-    // The path leaves in the direction of the image. Therefore (29) applies to the image.
+    // The path leaves in the direction of the image. Therefore eq. 29 applies to the image.
     const Vec3d image = path.image_of(place);
     const Vec3d p = s_.echo_geometry(image).from_sonar_m;
     const double r = length(p);

@@ -127,7 +127,7 @@ MultipathScatterer::TilePath MultipathScatterer::look_at(const TileInView& tile,
   tile_path.range_m = static_cast<float>(range);
   tile_path.sample_shift = static_cast<float>(s_.doppler_samples(at.from_sonar_m));
   tile_path.half_turns = static_cast<float>(fraction_of_turn(0.5 * range * s_.turns_per_m));
-  // One way: e^{-a r} of eq. 10 for the tile's centre. arrive() adds the rest for each cell.
+  // The factor e^{-a r} of eq. 10 for one way to the tile's centre. arrive() adds the rest for each cell.
   tile_path.amplitude = static_cast<float>(std::exp(-s_.absorption_np_per_m * range));
   if (image_paths_.bubbles.present())
     tile_path.amplitude *= static_cast<float>(bubble_factor(image_paths_.bubbles, path, image_paths_.mirrors, tile_middle_, s_));
@@ -186,7 +186,7 @@ void MultipathScatterer::scatter_cell(const Cell& cell, const LawTable& law, con
                                       std::vector<Echoes>& by_group) {
   const auto offset_of = [&cell](const TilePath& w, float& range_m) {  // range, and range minus that of the tile's centre
     const float* q = w.from_sonar_object;
-    // r^2 = r0^2 + e, with e from the cell's offset. This avoids a difference of large floats (section 1).
+    // r^2 = r0^2 + e, with e from the cell's offset. This avoids a difference of large floats.
     const float e = cell.x * (2 * q[0] + cell.x) + cell.y * (2 * q[1] + cell.y) + cell.z * (2 * q[2] + cell.z);
     range_m = std::sqrt(std::max(w.range_m * w.range_m + e, 1e-6f));
     return e / (w.range_m + range_m);

@@ -29,7 +29,7 @@ class PathReach {
   const Path& path_;
   const ImagePaths& image_paths_;
   struct Span {
-    double low_rad = 1, high_rad = -1;  // elevations; empty at first
+    double low_rad = 1, high_rad = -1;  // elevations; initially an empty interval
   };
   const PingPlan& plan_;
   double longest_m_;         // length of the ways out and back together
@@ -63,7 +63,7 @@ class MultipathScatterer {
     float reflection, rough_normal[2][3];  // product of the mirrors' Rc; their normals times sqrt(2) k h, sonar axes
     float lit_normal[3], lit_height;       // object axes; points with dot + height above 0 are lit by the last mirror
   };
-  struct Arrival {                      // one cell seen by one path
+  struct Arrival {                      // values of one cell for one path
     float range_m, sample_shift, size;  // size: pressure per source, includes the root of the scattering law
     std::complex<float> carried;        // `size` with the carrier's phase
     float transmit, sine;

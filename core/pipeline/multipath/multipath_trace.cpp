@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-constexpr double fan_edge_two_way = 0.01;  // 0.1 of one pattern
+constexpr double fan_edge_two_way = 0.01;  // the square of 0.1 in the one-way pattern
 constexpr float lift_m = 1e-4f;            // distance from the mirror at which reflected rays start
 
 /// Traces sixteen rays via mirrors.
@@ -100,7 +100,8 @@ struct Chain : FanSample {
   bool same_mirrors(const Chain& b) const { return std::equal(mirror, mirror + 2, b.mirror); }
 };
 
-/// Columns [first, last), at most one packet wide. Samples are refined where neighbours differ, and then drawn into the map.
+/// Traces columns [first, last), at most one packet wide. It refines samples where neighbours differ, and draws them into the
+/// map.
 class ColumnsTracer {
  public:
   ColumnsTracer(ChainTracer& rays, const PingPlan& plan, float far_m, int first, int last, BounceMap& map)
@@ -192,7 +193,8 @@ class ColumnsTracer {
       }
     }
   }
-  /// Linear between hits of one sequence of surfaces. Across edges: the farther surface behind the nearer sequence of mirrors.
+  /// Draws a node between two samples. The map is linear between hits of one sequence of surfaces. Across an edge it has the
+  /// farther surface behind the nearer sequence of mirrors.
   void draw_node(const Chain& a, const Chain& b, float part, int column, int bin) {
     const std::size_t node =
         static_cast<std::size_t>(column) * static_cast<std::size_t>(map_.fan.bins + 1) + static_cast<std::size_t>(bin);
@@ -259,7 +261,7 @@ BounceFan make_bounce_fan(const PingPlan& plan) {
       2 * plan.fan.half_angle_rad / (static_cast<double>(plan.fan.elevation_rad.size()) - 2 * plan.fan.side_elevations);
   const int n = static_cast<int>(std::ceil(2 * fan.half_angle_rad / step)) + 1;
   for (int e = 0; e < n; ++e) {
-    const double nudge = e == 0 || e == n - 1 ? 0 : 0.0137;  // off the edges between triangles, as in make_plan
+    const double nudge = e == 0 || e == n - 1 ? 0 : 0.0137;  // moves rays off the edges between triangles, as in make_plan
     fan.elevation_rad.push_back(static_cast<float>(fan.half_angle_rad * (2 * (e + nudge) / (n - 1) - 1)));
   }
   return fan;

@@ -37,7 +37,7 @@ double sweep_bandwidth_hz(double width_s) { return sweep_width_times_bandwidth /
 Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape), width_s_(width_s) {
   switch (shape_) {
     case Shape::gaussian:
-      // (22): b [1/s].
+      // Eq. 22: b [1/s].
       scale_hz_ = 2 * half_power_bt / width_s;
       reach_s_ = gaussian_reach_widths * width_s;
       band_hz_ = gaussian_band_over_b * scale_hz_;
@@ -45,7 +45,7 @@ Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape),
       noise_bandwidth_hz_ = sonar::noise_bandwidth_hz(scale_hz_);
       return;
     case Shape::cw:
-      // (23): 1 / T [Hz].
+      // Eq. 23: 1 / T [Hz].
       scale_hz_ = tone_width_per_length / width_s;
       reach_s_ = 1 / scale_hz_;
       band_hz_ = band_of_tone * scale_hz_;
@@ -53,7 +53,7 @@ Pulse::Pulse(const Waveform& waveform, double width_s) : shape_(waveform.shape),
       noise_bandwidth_hz_ = 2 * scale_hz_ / 3;
       return;
     case Shape::lfm:
-      // (24): B [Hz].
+      // Eq. 24: B [Hz].
       scale_hz_ = sweep_bandwidth_hz(width_s);
       reach_s_ = sweep_reach / scale_hz_;
       band_hz_ = band_of_sweep * scale_hz_;
@@ -99,7 +99,7 @@ std::complex<double> Pulse::at(double time_s) const {
     case Shape::measured:
       break;
   }
-  // Interpolates between samples by a windowed sinc: `neighbours`, `window_sharpness`.
+  // Interpolates between samples with a windowed sinc (`neighbours`, `window_sharpness`).
   const double place = middle_ + time_s * scale_hz_;
   const int near = static_cast<int>(std::floor(std::clamp(place, -1e9, 1e9)));
   const int from = std::max(near - neighbours / 2 + 1, 0);
@@ -119,7 +119,7 @@ std::vector<std::complex<double>> Pulse::spectrum_s(const spectral::FrequencyGri
     }
     return values;
   }
-  // Computes from the samples, which contain no frequencies above half of their rate.
+  // The spectrum is computed from samples, which contain no frequencies above half of their rate.
   const double rate = shape_ == Shape::lfm ? 4 * scale_hz_ : scale_hz_;
   std::vector<spectral::Arrival> arrivals;
   if (shape_ == Shape::lfm)
@@ -159,7 +159,7 @@ void Pulse::integrate() {
 
 std::complex<double> Pulse::correlation(double time_s) const {
   if (shape_ == Shape::gaussian) return noise_correlation(scale_hz_, time_s);
-  if (shape_ == Shape::cw) {  // a triangle: interpolated by a cubic spline
+  if (shape_ == Shape::cw) {  // a triangle, interpolated with a cubic spline
     const double x = std::fabs(time_s) * scale_hz_;
     return x < 1 ? 1 - 1.5 * x * x + 0.75 * x * x * x : x < 2 ? 0.25 * (2 - x) * (2 - x) * (2 - x) : 0.0;
   }

@@ -1,5 +1,5 @@
 // The pulse of one ping: the receiver's output for one point echo, as a function of time and of frequency, for all shapes
-// (docs/acoustics.md, section 4). Also the tables of the pulse that synthesis and noise use.
+// (docs/acoustics.md, section 4). The file also declares the tables of the pulse for synthesis and noise.
 #pragma once
 
 #include <complex>

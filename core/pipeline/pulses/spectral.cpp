@@ -9,7 +9,7 @@
 namespace sonar::spectral {
 namespace {
 
-// (26): 2.3 per point of width, on a grid twice as fine. FrequencySums lists the errors by width.
+// Eq. 26: 2.3 per point of width, on a grid twice as fine. FrequencySums lists the errors by width.
 constexpr int oversampling = 2;
 constexpr double sharpness_per_width = 2.3;
 constexpr int small_padding = 8, large_padding = 16;  // widths are padded, so that loops over them are whole vectors
@@ -59,7 +59,7 @@ std::vector<double> fit(const Function& f, int terms) {
 std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid) {
   std::vector<Complex> sums(static_cast<std::size_t>(grid.count));
   for (const Arrival& a : arrivals) {
-    // In (25) the factor from one frequency to the next is e^{-i 2 pi df tau}.
+    // In eq. 25 the factor from one frequency to the next is e^{-i 2 pi df tau}.
     const Complex step = turned(-grid.step_hz * a.delay_s);
     Complex now;
     for (int m = 0; m < grid.count; ++m) {

@@ -38,7 +38,7 @@ inline __attribute__((always_inline)) void pack_weights(const CellTile& t, int i
   pack(c.weight_im + m, keep, im);
 }
 
-/// True for cells behind the hit facet, extended to their direction. It is computed for cells of another object than the one
+/// True for cells behind the plane of the hit facet. It is computed for cells of another object than the one
 /// hit in their direction. `at`: index into the map; `nearness`: 1 / x of the cells with the tolerance for contact.
 inline __attribute__((noinline)) LaneMask hidden(const GroupView& g, LaneNumbers at, Lanes seen, Lanes column, Lanes nearness) {
   const Lanes beside = column - as_floats(whole_part(column)) - 0.5f;
@@ -92,7 +92,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     const Lanes x = px0 + m00 * dx + m01 * dy + m02 * dz;
     const Lanes y = py0 + m10 * dx + m11 * dy + m12 * dz;
     const Lanes z = pz0 + m20 * dx + m21 * dy + m22 * dz;
-    // Reference of elevations.
+    // Elevations refer to x; for flat beams, to the horizontal distance.
     const Lanes inverse_h = conical ? reciprocal(larger(x, all(1e-6f))) : inverse_root(larger(x * x + y * y, all(1e-12f)));
     const Lanes column = (g.first_edge_sine - y * (conical ? inverse_r : inverse_h)) * g.columns_per_sine;
     // Direction of the cell from the origin of the rays. The sonar may have turned since the rays were traced.
@@ -115,7 +115,7 @@ __attribute__((noinline)) int see_cells(const TileSeen& s, const GroupView& g, W
     keep = both(keep, below(all(1e-6f), x));
     if (!any(keep)) continue;
 
-    // Compares the cell's own 1 / x with the depth map between two bins, with the tolerances of section 3.
+    // Compares the cell's own 1 / x with the depth map between two bins, with the tolerances of docs/acoustics.md, section 3.
     // The parentheses select the function of this instruction set instead of the one that argument-dependent lookup would find.
     const Lanes bin_here = smaller((bin_of_tangent<Lanes>)(g.axis, choose(keep, tangent, all(0))), last_bin);
     const LaneNumbers bin_below = whole_part(bin_here);
@@ -190,7 +190,8 @@ __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView&
   }
 }
 
-/// The same in expected power. |xi|^2 is 1, so only the cell's area is needed and no carrier.
+/// Computes the power of every visible cell in expected-power mode. |xi|^2 is 1, so only the cell's area is needed and no
+/// carrier.
 __attribute__((noinline)) void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, float* power) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i);

@@ -40,7 +40,7 @@ __attribute__((noinline)) void draw_hits(const HitDraw& d, int n, float* __restr
 __attribute__((noinline)) void turn_carriers(const float* __restrict range, double turns_per_m, int n, float* __restrict turns) {
 #pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
-    // (12) in turns.
+    // The phase of eq. 12 in turns.
     const double carrier = static_cast<double>(range[i]) * turns_per_m;
     turns[i] -= static_cast<float>(carrier - std::floor(carrier));
   }

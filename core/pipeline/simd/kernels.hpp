@@ -28,7 +28,7 @@ struct BeamTransform {
   const float* response = nullptr;  // [4 * quarter]: divided by the size; frequencies in the order of the passes' output
   int taps = 1;                     // columns from which a beam is interpolated
   const std::int32_t* first_column = nullptr;  // [beams]: first of these columns
-  const float* between = nullptr;              // [beams][taps]: their weights
+  const float* between = nullptr;              // [beams][taps]: weights of these columns
 };
 
 /// One tile in one ping.

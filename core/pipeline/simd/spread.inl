@@ -30,7 +30,7 @@ __attribute__((noinline)) void place_on_grid(const SpreadGrid& g, const SpreadEc
     const double c = sine_of_turns_exact(phase - std::floor(phase) + 0.25), s = sine_of_turns_exact(phase - std::floor(phase));
     re[i] = in_re[i] * c - in_im[i] * s;
     im[i] = in_re[i] * s + in_im[i] * c;
-    // The delay in grid points. `first` and `between` determine the kernel (26), as in FrequencySums::spread.
+    // The delay in grid points. `first` and `between` determine the kernel (eq. 26), as in FrequencySums::spread.
     const double place = (turns[i] - std::floor(turns[i])) * points;
     first[i] = std::ceil(place - 0.5 * SpreadGrid::width);
     between[i] = 2 * (first[i] - place + 0.5 * SpreadGrid::width) - 1;

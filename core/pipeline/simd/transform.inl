@@ -113,7 +113,8 @@ __attribute__((noinline)) void take_columns(const BeamTransform& t, const float*
   const int q = t.quarter;
   const Shuffles s = shuffles();
   const float* w = t.split;
-  // Fetches the values for the next call to the second-level cache. Columns are so far apart that processors do not foresee them.
+  // Fetches the values for the next call to the second-level cache. Columns are so far apart that the hardware prefetcher misses
+  // them.
   const auto fetch_next = [&](int column) {
     for (int f = 2 * lanes; f < 4 * lanes; f += 16) __builtin_prefetch(columns + column * stride + f, 0, 2);
   };

@@ -30,7 +30,7 @@ struct Direction {
 };
 
 Direction direction_of(const SpecularPoint& p, std::size_t k, double wavelength_m) {
-  // q of (19) [1/m]; 1 + r / R is negative behind a focus.
+  // q of eq. 19 [1/m]; 1 + r / R is negative behind a focus.
   return {1 / fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]), bending(p.range_m, p.curvature[k]) < 0};
 }
 
@@ -73,7 +73,7 @@ SpecularWindow make_window(const SpecularPoint& p, double wavelength_m) {
   for (std::size_t k = 0; k < 2; ++k) {
     // The window has four Fresnel radii around the foot, or around the nearest point of the surface.
     double reach = window_in_units * fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]);
-    // Beyond half a radius of curvature [m] the surface is not a parabola, as (19) assumes.
+    // Beyond half a radius of curvature [m] the surface is not a parabola, as eq. 19 assumes.
     if (p.curvature[k] != 0) reach = std::min(reach, window_in_radii / std::abs(p.curvature[k]));
     const double middle = std::clamp(0.0, p.from[k], p.to[k]);
     const double from = std::max(p.from[k], middle - reach), to = std::min(p.to[k], middle + reach);
@@ -152,7 +152,7 @@ class Sight {
   Sight(const RayScene& scene, const PingScalars& s, std::uint32_t object, const Pose& object_in_world)
       : scene_(scene), s_(s), object_(object), object_in_world_(object_in_world) {}
 
-  /// Bit i: point i of the surface is the first hit of a ray towards it. At most 16 points.
+  /// Returns a mask. Bit i is set if point i of the surface is the first hit of a ray towards it. At most 16 points.
   std::uint32_t seen(const SpecularPoint& point, std::span<const std::array<double, 2>> places) const {
     // The distance of facets from the true surface grows with its curvature.
     double slack = sight_slack_m;
@@ -261,7 +261,7 @@ std::complex<double> visible_factor(const SpecularPoint& point, double wavelengt
 
 /// Largest angle of columns from straight ahead; it is larger if the sonar turns during the ping.
 double widest_direction_rad(const PingPlan& plan) {
-  // Bearings are measured at reception (29). A turning sonar receives echoes from farther aside, by at most this angle [rad].
+  // Bearings are measured at reception (eq. 29). A turning sonar receives echoes from farther aside, by at most this angle [rad].
   constexpr double while_turning_rad = 0.05;
   const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
   return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(plan.fan.reach_rad), pi / 2))) +
@@ -363,7 +363,7 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
       // range). The strength is Rc r^2 / (2 r sqrt((1 + r / R1) (1 + r / R2))), times K_1 K_2 (visible_factor).
       const double bends = bending(point.range_m, point.curvature[0]) * bending(point.range_m, point.curvature[1]);
       const double strength = reflection * r * r / (2 * point.range_m * std::sqrt(std::abs(bends)));
-      // point_echo() applies the phase of range r. (7) has the phase of the foot's range, and K has the rest.
+      // point_echo() applies the phase of range r. Eq. 7 has the phase of the foot's range, and K has the rest.
       const double beside_turns = (r - point.range_m) * s.turns_per_m;
       std::optional<PointEcho> echo = point_echo(from_sonar, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
       if (!echo) continue;
