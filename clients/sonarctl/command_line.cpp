@@ -147,7 +147,7 @@ void SettingArguments::add_to(CLI::App& app) {
   value("--gain", settings.gain_percent, "gain in per cent of the possible range")->check(number(0.0, 100.0));
   group(app.add_option_function<std::string>(
             "--rate", [this](const std::string& given) { settings.rate_hz = given == "standby" ? 0 : std::stod(given); },
-            "maximum ping rate [Hz], any number, of some makes the nearest of these; or standby"))
+            "maximum ping rate [Hz], or standby; some makes use the nearest of their own rates"))
       ->check(CLI::Validator(complaint_about_rate, "2|5|10|15|40|standby", "rate"));
   group(app.add_option_function<std::uint32_t>(
             "--beams", [this](std::uint32_t given) { settings.beams = given; }, "default: 512"))
@@ -161,9 +161,9 @@ void SettingArguments::add_to(CLI::App& app) {
   extra("salinity", "ppt. Default: 0")->check(number(0.0, 50.0));
   extra("version", "version of the messages. Default: 0")->check(whole_number(0, 2));
   group(app.add_flag_function(
-      "--gains", [this](std::int64_t) { settings.row_gains = true; }, "request a gain in front of every row"));
+      "--gains", [this](std::int64_t) { settings.row_gains = true; }, "request a gain before every row"));
   group(app.add_flag_function(
-      "--gain-assist", [this](std::int64_t) { more["gain-assist"] = "on"; }, "flag bit 4"));
+      "--gain-assist", [this](std::int64_t) { more["gain-assist"] = "on"; }, "set bit 4 of the flags"));
   group(app.add_flag_function(
       "--trigger", [this](std::int64_t) { more["trigger"] = "on"; }, "one ping for each request (network trigger)"));
 }
@@ -195,7 +195,8 @@ void SourceArguments::add_to(CLI::App& app, bool recordings, const std::string& 
   if (!recordings) return;
   CLI::Option* const from =
       app.add_option("--from,--from-raw", recording, "read this recording, of any kind, instead of a sonar")->excludes(stream);
-  app.add_option("--sonar", sonar, "with --from: selects one of several: by address in captures, by name in MCAP")->needs(from);
+  app.add_option("--sonar", sonar, "with --from: selects one of several sonars, by address in captures, by name in MCAP")
+      ->needs(from);
 }
 
 Result<SourceOptions> SourceArguments::finish() const {

@@ -71,7 +71,7 @@ struct SettingArguments {
   protocol::SettingsOverride settings;
   std::map<std::string, std::string> more;  // options that only some makes have
 
-  /// The command must outlive this.
+  /// The command must outlive this object.
   void add_to(CLI::App& app);
   /// Returns the options that the user gave.
   protocol::Wanted wanted() const;

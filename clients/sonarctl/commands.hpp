@@ -77,11 +77,11 @@ struct PoseOptions {
   control::Frame frame = control::Frame::enu_flu;  // frame of the positions and angles below, and of the sent poses
   std::string vehicle, object;                     // at most one of them; both empty = the only vehicle. Objects use TCP
   double rate_hz = 20, seconds = 0;                // seconds 0 = one turn, or one line
-  std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // once
-  std::vector<double> centre_m{0, 0, 0};                      // circle
+  std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // for "once"
+  std::vector<double> centre_m{0, 0, 0};                      // for "circle"
   double radius_m = 5, period_s = 60;
   bool look_inwards = true;
-  std::vector<double> from_m{0, 0, 0}, to_m{10, 0, 0};  // line
+  std::vector<double> from_m{0, 0, 0}, to_m{10, 0, 0};  // for "line"
   double speed_mps = 0.5;
   double pitch_deg = 0;  // circle and line, bow up positive
 };

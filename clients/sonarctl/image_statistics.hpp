@@ -1,5 +1,5 @@
 // Statistics of the samples of an image: speckle correlation, shadow depth, noise floor over range.
-// Computed from the sent codes; `sonarctl stats` prints them.
+// They are computed from the sent codes; `sonarctl stats` prints them.
 #pragma once
 
 #include <cstddef>

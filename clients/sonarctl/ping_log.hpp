@@ -1,5 +1,5 @@
-// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. No I/O: `listen` feeds it,
-// prints its lines and derives the exit code from it.
+// Statistics of a stream of pings: number, regularity, faults, and whether the settings took effect. It does no I/O: `listen`
+// passes pings to it, prints its lines and derives the exit code from it.
 #pragma once
 
 #include <cstdint>
@@ -41,12 +41,12 @@ class PingLog {
   std::vector<Seconds> arrivals_;
 };
 
-/// Shortens notices that come with each ping. Those that differ in numbers alone are of one kind: of each kind the first three
+/// Shortens notices that come with each ping. Notices that differ only in numbers are of one kind. Of each kind the first three
 /// are kept, then the 10th, the 100th and so on, with their number.
 class NoticeLog {
  public:
   std::vector<std::string> kept(const std::vector<std::string>& notices);
-  /// Call it at the end: the last notice of each kind of which some were not kept, with their number.
+  /// Call it at the end. For each kind of which some notices were not kept, it returns the last one, with their number.
   std::vector<std::string> rest() const;
 
  private:
@@ -64,7 +64,7 @@ double percentile(std::vector<double> values, double share);
 /// Describes the faults of the stream that a driver would notice; empty = none.
 std::vector<std::string> complaints(const PingSummary& summary, bool asked);
 
-std::string line_from(const HostPing& ping);  // one line per ping
+std::string line_from(const HostPing& ping);  // returns one line per ping
 /// `rate_unit`: that of the sonar's make.
 std::string text_from(const PingSummary& summary, bool asked, std::string_view rate_unit);
 std::string json_from(const HostPing& ping, Seconds at);

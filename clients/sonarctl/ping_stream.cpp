@@ -366,10 +366,10 @@ std::string PingStream::about() const { return text_from(device_) + ", " + host_
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (make_->ports.size() != 1 || make_->ports.front().kind != Kind::tcp)
-    return failure(ErrorKind::usage, "only pings that come by TCP are recorded as raw bytes; this is " + about());
+    return failure(ErrorKind::usage, "only pings that come over TCP are recorded as raw bytes; this is " + about());
   if (make_->each_ping_requested)  // a recording would begin after the greeting, without which its pings are not readable
-    return failure(ErrorKind::usage, "only sonars that send pings unasked are recorded as raw bytes; this is " + about() +
-                                         ": sonarctl record keeps the messages of both ends");
+    return failure(ErrorKind::usage, "only sonars that send pings without a request are recorded as raw bytes; this is " +
+                                         about() + ": sonarctl record keeps the messages of both ends");
   const int opened = open_to_write(file, O_CREAT);  // a stream would wait for the reader of a pipe
   const int error = errno;
   if (opened < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(file, error));

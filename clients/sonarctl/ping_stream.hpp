@@ -58,9 +58,9 @@ class PingStream {
   };
   /// The next ping or message, or the event that occurred instead within `patience`. Requests a ping if the make requires that.
   Item next(std::chrono::milliseconds patience);
-  /// Waits at most `patience` for the first byte. True if the sonar closes the connection before it.
+  /// Waits at most `patience` for the first byte. Returns true if the sonar closes the connection before this byte.
   bool is_rejected(std::chrono::milliseconds patience) const;
-  /// Also writes every byte received by TCP to this file. Error usage: the sonar does not send its pings over TCP.
+  /// Also writes every byte received over TCP to this file. Error usage: the sonar does not send its pings over TCP.
   Result<void> record_to(const std::filesystem::path& file);
 
   /// The clock of the times of Item::messages.
@@ -89,7 +89,7 @@ class PingStream {
   void carry_out(protocol::HostActions actions);
   void take(std::size_t port, std::span<const std::byte> bytes);
   void keep(std::size_t port, recording::Origin from, std::span<const std::byte> bytes);
-  /// False: a signal ended the wait.
+  /// Returns false if a signal ended the wait.
   bool receive(std::chrono::milliseconds patience);
   void read_port(std::size_t port);
   /// UDP has no connection whose end would show that a silent sonar has gone, but a closed port refuses a datagram. An empty one
@@ -118,7 +118,7 @@ class PingStream {
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 
-/// The result of waiting for a device's beacon, of a make whose beacons contain the address for hosts.
+/// The result of waiting for the beacon of a device. Only makes whose beacons contain the address for hosts can be waited for.
 struct Discovered {
   Endpoint device;
   protocol::Announcement announced;

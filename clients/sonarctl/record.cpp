@@ -267,7 +267,7 @@ Result<void> record(const RecordOptions& options) {
   std::erase_if(paths, [](const auto& path) { return path.empty(); });
   if (paths.empty())
     return failure(ErrorKind::usage,
-                   "give at least one output: --pcap, --mcap, --raw or a kind of the makers' own, any of them "
+                   "give at least one output: --pcap, --mcap, --raw or a file format of a maker; several are possible "
                    "(sonarctl record --help)");
   for (std::size_t i = 0; i < paths.size(); ++i)
     for (std::size_t k = 0; k < i; ++k)

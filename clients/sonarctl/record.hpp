@@ -61,7 +61,8 @@ class RecordFiles {
   std::uint64_t pings_ = 0, messages_ = 0, bytes_ = 0;
 };
 
-/// Succeeds at its limits, on Ctrl-C and at the end of a recording. After an error, too, the files contain everything so far.
+/// Records until the limits, Ctrl-C or the end of a recording, none of which is an error. After an error, too, the files contain
+/// everything so far.
 Result<void> record(const RecordOptions& options);
 
 }  // namespace sonar::clients

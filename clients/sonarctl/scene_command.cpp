@@ -87,8 +87,8 @@ void add_import(CLI::App& scene, SceneArguments& a) {
   CLI::Option* collision = command.add_flag("--collision", o.read.collisions, "import collision shapes");
   command.add_flag("--visual", a.visual, "import visual shapes (the default)")->excludes(collision);
   command.add_option("--material", o.materials, "NAME for everything, or MODEL=NAME (repeatable)")->allow_extra_args(false);
-  command.add_option("--moving", o.moving, "MODEL moves by poses (repeatable)")->allow_extra_args(false);
-  command.add_option("--offset", a.offset, "X,Y,Z added to every place, m; z = 0 is the water's surface")
+  command.add_option("--moving", o.moving, "MODEL accepts poses (repeatable)")->allow_extra_args(false);
+  command.add_option("--offset", a.offset, "X,Y,Z added to every position, m; z = 0 is the water's surface")
       ->delimiter(',')
       ->expected(3)
       ->check(text::number());

@@ -40,7 +40,7 @@ bool is_at(const v1::SonarStatus& s, const Endpoint& device) {
 
 Error no_observers(const v1::SonarStatus& s, const Make& make) {
   const bool by_datagrams = make.device->pings_by() == protocol::PingsBy::datagrams;
-  const std::string why = by_datagrams                             ? "because it sends pings by datagrams to its host"
+  const std::string why = by_datagrams                             ? "because it sends pings in datagrams to its host"
                           : make.device->default_max_clients() > 1 ? "because it serves several clients"
                                                                    : "because observers.max is 0 in its configuration";
   return {ErrorKind::unavailable, s.name() + ", " + std::string(make.title) + ", accepts no observers, " + why +
@@ -220,13 +220,14 @@ std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::mill
 
 namespace {
 
-/// Why a sonar that does what it was asked for sends nothing; empty: it should send pings. An observer sends no settings.
-std::string asked_for_silence(const SourceOptions& source, bool observes) {
+/// The reason why a sonar with the requested settings sends nothing; empty if it should send pings. An observer sends no
+/// settings.
+std::string reason_for_silence(const SourceOptions& source, bool observes) {
   const std::optional<double> rate_hz = source.wanted.settings.rate_hz;
   if (!rate_hz || source.wanted.as_it_is || observes) return {};
-  if (*rate_hz == 0) return "--rate standby asked for that";
+  if (*rate_hz == 0) return "--rate standby requested that";
   if (*rate_hz * source.silence_limit_s >= 1) return {};
-  return text::format("--rate %g asked for less than one ping in that time; --wait makes it longer", *rate_hz);
+  return text::format("--rate %g requested less than one ping in that time; --wait makes it longer", *rate_hz);
 }
 
 }  // namespace
@@ -241,7 +242,7 @@ Error closed(const PingStream::Item& item, std::uint64_t pings) {
 Error silence(const SourceOptions& source, const OpenedStream& opened, bool received, const std::string& what,
               const std::string& hint) {
   const PingStream& stream = opened.stream;
-  const std::string limit = text::format("%g s", source.silence_limit_s), asked = asked_for_silence(source, opened.observes);
+  const std::string limit = text::format("%g s", source.silence_limit_s), asked = reason_for_silence(source, opened.observes);
   if (received) return {ErrorKind::io, what + " arrived within " + limit + ": " + (asked.empty() ? hint : asked)};
   return {ErrorKind::unavailable,
           "no message of " + std::string(stream.make().title) + " arrived from tcp " + text_from(stream.device()) + " within " +
@@ -284,7 +285,7 @@ Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std:
   std::size_t count = 0;
   const auto note_damage = [&pings] {
     if (const auto damage = pings->reader().damage())
-      std::fprintf(stderr, "sonarctl: %s; the ping is one of the rest\n", damage->text.c_str());
+      std::fprintf(stderr, "sonarctl: %s; the ping is from the undamaged part\n", damage->text.c_str());
   };
   while (auto found = pings->next()) {
     if (number ? count == *number : found->ping.is_whole()) note_damage();

@@ -22,14 +22,14 @@ Result<Endpoint> find_device(const SourceOptions& source, bool say);
 struct OpenedStream {
   PingStream stream;
   std::chrono::steady_clock::time_point connected_at;
-  bool observes;   // no settings sent: pings as requested by the sonar's clients
+  bool observes;   // true: no settings are sent, so pings are as the sonar's clients requested them
   Endpoint again;  // for open_again(): the sonar's own address, because its port for observers may change
 };
 /// Connects as an observer if source.observe is set. It also does so, with a note on standard error, if the sonar has no free
 /// client slot and its sonard reports an address for observers.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
-/// find_device() and open_stream().
+/// Calls find_device() and open_stream().
 Result<OpenedStream> connect(const SourceOptions& source, bool say);
 
 /// The time without a message, in a run of many pings.

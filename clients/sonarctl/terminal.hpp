@@ -1,4 +1,4 @@
-// Capabilities of the terminal, and a full-screen picture that is redrawn. Used by view.
+// Capabilities of the terminal, and a full-screen picture that is redrawn. `sonarctl view` uses them.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +46,7 @@ class LiveScreen {
   bool is_terminal_;
 };
 
-// The line under a picture: ping number, geometry, rate and number of missed pings. No I/O.
+// Makes the line under a picture: ping number, geometry, rate and number of missed pings.
 
 class ViewCaption {
  public:

@@ -17,8 +17,8 @@ Result<void> check(const ViewOptions& o) {
   if (o.png.empty() && !o.terminal)
     return failure(ErrorKind::usage, "choose an output: --png FILE, or --term, which is usual on a terminal");
   if (o.live && !o.source.recording.empty())
-    return failure(ErrorKind::usage, "--live is for devices; of a recording, choose a ping with --ping");
-  if (o.pings > 0 && !o.live) return failure(ErrorKind::usage, "--pings goes with --live");
+    return failure(ErrorKind::usage, "--live is for devices; choose a ping of a recording with --ping");
+  if (o.pings > 0 && !o.live) return failure(ErrorKind::usage, "--pings needs --live");
   return check_output(o.source, o.png);
 }
 
@@ -87,8 +87,8 @@ class LiveView {
         painter_(options.style),
         figures_(opened_->stream.make().rate_unit()) {}
 
-  /// Succeeds when interrupted, after the requested pings, or when the output is closed. A run without limits connects again if
-  /// the device has disconnected.
+  /// Shows pings until it is interrupted, the requested pings were shown, or the output is closed. A run without limits connects
+  /// again if the device has disconnected.
   Result<void> run() {
     const bool has_screen = options_.terminal && terminal_facts().is_terminal;
     Result<void> ran;

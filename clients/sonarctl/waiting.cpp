@@ -20,8 +20,8 @@ FirstPingWait::FirstPingWait(const SourceOptions& source, const PingStream& stre
                              Clock::time_point now)
     : due_(now + moment) {
   const bool asks = !observes && (!source.wanted.as_it_is || stream.make().each_ping_requested);
-  line_ = "connected to " + stream.about() + (asks ? "; asked for pings" : "; nothing asked") + "; waiting for the first one" +
-          (observes && !is_limited ? "" : text::format(", at most %g s", source.silence_limit_s));
+  line_ = "connected to " + stream.about() + (asks ? "; requested pings" : "; nothing requested") +
+          "; waiting for the first one" + (observes && !is_limited ? "" : text::format(", at most %g s", source.silence_limit_s));
 }
 
 std::chrono::milliseconds FirstPingWait::patience(std::chrono::milliseconds most, Clock::time_point now) const {

@@ -9,7 +9,7 @@
 
 namespace sonar::clients {
 
-/// The wait for the first ping. Prints a line unless the wait is very short.
+/// Prints a line about the wait for the first ping, unless the wait is very short.
 class FirstPingWait {
  public:
   using Clock = std::chrono::steady_clock;

@@ -421,13 +421,13 @@ class Tools(unittest.TestCase):
             with said.open("w") as errors, subprocess.Popen([SONARCTL, "listen", daemon.address, "--observe", "--pings", "2", *control],
                                                             stdout=subprocess.DEVNULL, stderr=errors) as waits:
                 try:
-                    eventually(lambda: "nothing asked; waiting for the first one\n" in said.read_text())
+                    eventually(lambda: "nothing requested; waiting for the first one\n" in said.read_text())
                     self.assertIn("it has none now: pings come when a driver requests them\n", said.read_text())
                     self.assertEqual(daemon.ctl("listen", "--pings", 4).returncode, 0)
                     self.assertEqual(waits.wait(60), 0, said.read_text())
                 finally:
                     waits.kill()
-        for profile, why in (("ping360", "it sends pings by datagrams to its host"), ("norbit-wbms", "serves several clients")):
+        for profile, why in (("ping360", "it sends pings in datagrams to its host"), ("norbit-wbms", "serves several clients")):
             with Sonard(profile=profile) as daemon:
                 refused = daemon.ctl("listen", "--observe", "--control", f"{daemon.address}:14770")
                 self.assertEqual(refused.returncode, 69, refused.stderr)

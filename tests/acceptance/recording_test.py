@@ -375,7 +375,7 @@ class OneIntoAnother(Files):
             self.assertEqual(done.returncode, 65)
             self.assertIn(f": 13 bytes from {place}", done.stderr)
             self.assertEqual((self.folder / f"again-{kind}.raw").read_bytes(), junk.read_bytes())
-        for number, words in ((3, ""), (4, f"sonarctl: {self.folder}/{told}; the ping is one of the rest\n")):
+        for number, words in ((3, ""), (4, f"sonarctl: {self.folder}/{told}; the ping is from the undamaged part\n")):
             done = run(SONARCTL, "view", "--from", junk, "--ping", str(number), "--png", self.folder / "a.png")
             self.assertEqual((done.returncode, done.stderr), (0, words))
         junk.write_bytes(sound[:16] + b"nothing but junk" * 9)

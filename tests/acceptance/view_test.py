@@ -163,7 +163,7 @@ class View(unittest.TestCase):
                     said = waits.stderr.readline()
                     waits.terminate()
                     waits.stderr.read()
-                    self.assertRegex(said, rf"connected to {daemon.address}:52100, .*; asked for pings; waiting for the first one, at most 10 s")
+                    self.assertRegex(said, rf"connected to {daemon.address}:52100, .*; requested pings; waiting for the first one, at most 10 s")
 
     def test_contradictions_are_named(self):
         for arguments, word in [((), "--term"), (("--term", "--live", "--from-raw", "x"), "--ping"),

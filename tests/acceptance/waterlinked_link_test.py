@@ -178,7 +178,7 @@ class Images(unittest.TestCase):
                 begun = run(SONARCTL, "recording", "start", "run.sonar", *control)
                 self.assertEqual(begun.returncode, 0, begun.stderr)
                 said = run(SONARCTL, "doctor", "--within", 60, *control, "--http", f"{daemon.address}:8088")
-                self.assertRegex(said.stdout, r"images by UDP, [0-9.]+ Hz \(5 requested\)")
+                self.assertRegex(said.stdout, r"images over UDP, [0-9.]+ Hz \(5 requested\)")
                 self.assertNotIn("A fault acts", said.stdout)
                 self.assertEqual(run(SONARCTL, "fault", "add", "deaf-head", *control).returncode, 0)
                 said = run(SONARCTL, "doctor", "--within", 60, *control, "--http", f"{daemon.address}:8088")

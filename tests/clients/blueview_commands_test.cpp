@@ -172,7 +172,7 @@ TEST(BlueViewCommands, NoFileIsWrittenThatCouldNotBeRead) {
   const Result<void> done = listen(options);
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().kind, ErrorKind::usage);
-  EXPECT_THAT(done.error().text, HasSubstr("only sonars that send pings unasked are recorded"));
+  EXPECT_THAT(done.error().text, HasSubstr("only sonars that send pings without a request are recorded"));
   EXPECT_FALSE(std::filesystem::exists(options.record));
 }
 

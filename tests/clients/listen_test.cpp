@@ -246,8 +246,8 @@ TEST(Listen, SaysWhenTheDeviceFallsSilent) {
 
 TEST(Listen, SaysWhichOfItsSettingsAskedForSilence) {
   for (const auto& [rate_hz, why] :
-       {std::pair(0.0, "within 1 s: --rate standby asked for that"),
-        std::pair(0.5, "within 1 s: --rate 0.5 asked for less than one ping in that time; --wait makes it longer")})
+       {std::pair(0.0, "within 1 s: --rate standby requested that"),
+        std::pair(0.5, "within 1 s: --rate 0.5 requested less than one ping in that time; --wait makes it longer")})
     for (const std::uint32_t pings : {0u, 1u}) {
       FakeDevice device(pings, [](std::uint32_t, const oculus::FireSettings& echo) { return ping_bytes(1, echo); });
       ListenOptions options = quiet(device.endpoint(), 2);

@@ -143,7 +143,7 @@ TEST(Observe, ASinglePictureTellsHowLongItWaits) {
   options.png = testing::TempDir() + "/observe_test.png";
   testing::internal::CaptureStderr();
   EXPECT_FALSE(view(options));
-  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("; nothing asked; waiting for the first one, at most 1 s\n"));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("; nothing requested; waiting for the first one, at most 1 s\n"));
 }
 
 TEST(Observe, WhoNamesThePortForObserversFindsTheNextOne) {

@@ -93,7 +93,7 @@ TEST(PingLog, SaysItInTextAndInJson) {
   EXPECT_THAT(json_from(ping(77), 0), HasSubstr("\"ping\":77"));
   const protocol::Host::Counts counts{1, 0, 0, 5};
   EXPECT_THAT(text_from(log.summary(counts), true, "Hz"),
-              testing::AllOf(HasSubstr("echoed as asked: ping 1"), HasSubstr("missing ids 5")));
+              testing::AllOf(HasSubstr("echoed as requested: ping 1"), HasSubstr("missing ids 5")));
   EXPECT_THAT(json_from(log.summary(counts), true),
               testing::AllOf(HasSubstr("\"echo_satisfied_at\":1"), HasSubstr("\"missing_ids\":5")));
   EXPECT_THAT(json_from(log.summary(std::nullopt), false), HasSubstr("\"missing_ids\":null")) << "of a wire that does not number";

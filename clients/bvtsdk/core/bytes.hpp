@@ -79,7 +79,7 @@ class Reader {
     const BytesView field = block(read<std::uint16_t>());
     return std::string(field.data, field.data + field.size);
   }
-  /// The next bytes as they are; empty when fewer are left.
+  /// Returns the next `size` bytes unchanged; empty if fewer are left.
   BytesView block(std::size_t size) {
     if (size > left()) ok_ = false;
     if (!ok_) return {};

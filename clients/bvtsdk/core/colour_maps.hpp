@@ -50,7 +50,7 @@ class ColourMapper {
   Code set_thresholds(int top, int bottom);
   /// Returns bad_parameter unless 0 < gamma <= 100.
   Code set_gamma(float gamma);
-  /// Automatic top: the larger of lowest_auto_top and the 99.5th percentile of the non-zero pixels (our assumption).
+  /// In auto mode, top is the larger of lowest_auto_top and the 99.5th percentile of the non-zero pixels (our assumption).
   void set_auto_mode(bool on);
   int top() const { return top_; }  // in auto mode: the top of the last image
   int bottom() const { return bottom_; }

@@ -1,4 +1,4 @@
-// Angles of the libraries' interface are in degrees, those inside in radians.
+// The interface of the libraries has angles in degrees; the code inside uses radians.
 #pragma once
 
 namespace sonar::bvt {

@@ -47,8 +47,8 @@ struct SonarDescription {
 std::optional<SonarDescription> decode_description(BytesView payload);
 Bytes encode_description(const SonarDescription& sonar);
 
-// Finds sonars: sends "BVE?" datagrams and receives "BVE!" datagrams (docs/protocols/blueview-link.md, "Discovery"). Needs no
-// thread: answers wait in the socket until they are read.
+// Finds sonars: sends "BVE?" datagrams and receives "BVE!" datagrams (docs/protocols/blueview-link.md, "Discovery"). It needs no
+// thread, because answers stay in the socket until they are read.
 
 class DiscoveryAgent {
  public:

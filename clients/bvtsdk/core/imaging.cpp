@@ -55,7 +55,7 @@ int rows_by_resolution(const Extent& extent, const ImageSettings& settings, doub
   return std::max(1, to_int(std::min(std::round(rows), std::floor(usual))));
 }
 
-/// Verified, by a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m
+/// Verified with a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m
 /// requested, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows short of the sonar,
 /// and the distances of pixels from it are whole numbers of rows and columns. Inferred: the bottom passes through the sector's
 /// nearest corners, at start * cos(half angle); the top is at the stop range, and the sides touch the widest points of the

@@ -33,8 +33,8 @@ enum FilterFlags : int { no_filter = 0, mean_3x3 = 2, mean_9x2 = 16 };
 struct ImageSettings {
   ImageRes resolution = ImageRes::automatic;
   XyBottom xy_bottom = xy_bottom_from_environment();
-  /// Requests of the program; 0 = none. A size has priority over a range resolution, which has priority over `resolution`
-  /// (our choice).
+  /// Values that the program requested; 0 = none. A size has priority over a range resolution, which has priority over
+  /// `resolution` (our choice).
   float range_resolution_m = 0;                   // metres per row; at most a million pixels are made for it
   int requested_height = 0, requested_width = 0;  // XY keeps the height and adjusts the width (verified); a width alone sets both
   int r_theta_width = 0;                          // columns; has priority over requested_width

@@ -1,4 +1,4 @@
-// The SDK's log: one line a message, filtered by level, to stdout, stderr, a file or nowhere (BVTLogger_*). As in the SDK, the
+// The SDK's log: one line per message, filtered by level, to stdout, stderr, a file or nowhere (BVTLogger_*). As in the SDK, the
 // process has one log; any thread may write.
 #pragma once
 

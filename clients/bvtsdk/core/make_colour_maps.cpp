@@ -1,4 +1,4 @@
-// Writes the colour maps into a folder, each as NAME.cmap. Run by the build.
+// Writes the colour maps into a folder, each as NAME.cmap. The build runs it.
 #include <cstdio>
 #include <filesystem>
 

@@ -52,7 +52,7 @@ struct PingObject : Object {
   }
 };
 
-/// Only in the 4.x interface.
+/// Makes images of pings; only the 4.x interface has it.
 struct ImageGeneratorObject : Object {
   bool has_head = false;
   ImageSettings image;

@@ -317,7 +317,7 @@ SampleGrid::SampleGrid(const PolarPing& ping, float noise_threshold, float clipp
                    [=](std::uint16_t v) { return std::min(v < lowest ? std::uint16_t{0} : v, highest); });
     samples = made_.data();
   }
-  if (bins == 1) {  // each sample twice, each half as long
+  if (bins == 1) {  // each sample appears twice, half as long
     Samples twice(2 * beams);
     for (std::size_t j = 0; j < beams; ++j) twice[2 * j] = twice[2 * j + 1] = samples[j];
     made_ = std::move(twice);
@@ -325,7 +325,7 @@ SampleGrid::SampleGrid(const PolarPing& ping, float noise_threshold, float clipp
     bins = 2;
     pooled_ *= 0.5;
   }
-  if (beams == 1) {  // the beam twice, each half as wide
+  if (beams == 1) {  // the beam appears twice, half as wide
     Samples twice(samples, samples + bins);
     twice.insert(twice.end(), samples, samples + bins);
     made_ = std::move(twice);

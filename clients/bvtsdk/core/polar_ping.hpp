@@ -102,7 +102,7 @@ struct PolarPing {
   std::int32_t sound_speed_mps = 1500;
   float fov_min_deg = 0, fov_max_deg = 0;
   float bin_m = 0;
-  int beams = 0, bins = 0;  // 0 of either: a ping without a signal (4011)
+  int beams = 0, bins = 0;  // if one is 0, the ping has no signal (error 4011)
   NavData nav;              // present == 0: none
   std::vector<std::uint16_t> samples;
 

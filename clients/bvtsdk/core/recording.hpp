@@ -32,7 +32,7 @@ struct FramePlace {
   std::uint64_t offset = 0;
 };
 
-/// Not for several threads at once.
+/// Writes a recording. Only one thread at a time may use it.
 class RecordingWriter {
  public:
   /// Creates or overwrites the file. `hello`: payload of HELLO_OK. Returns file_create or file_write on failure.
@@ -63,7 +63,7 @@ class RecordingWriter {
   std::vector<FramePlace> places_;
 };
 
-/// Not for several threads at once.
+/// Reads a recording. Only one thread at a time may use it.
 class RecordingReader {
  public:
   /// Returns file_open, file_too_new, or file_header_bad for a file of another kind, such as the vendor's .son. `why` is a line
@@ -78,7 +78,7 @@ class RecordingReader {
   /// False if the writer did not close the file, or if its end is damaged.
   bool has_index() const { return has_index_; }
 
-  /// Frames in order of arrival.
+  /// Frames are numbered in order of arrival.
   int ping_count(std::int32_t head) const { return static_cast<int>(places(FrameType::ping_data, head).size()); }
   int nav_count() const { return static_cast<int>(places(FrameType::nav_data).size()); }
   int event_count() const { return static_cast<int>(places(FrameType::event_mark).size()); }

@@ -74,7 +74,7 @@ int give(std::shared_ptr<Object> object, H* out) {
   return handle ? success : memory_alloc;
 }
 
-/// Creates an N, fills it by work(object, fresh), and writes its handle to *out; *out is null on failure.
+/// Creates an N, fills it with work(object, fresh), and writes its handle to *out; *out is null on failure.
 template <class T, class N, class H, class F>
 int make(const void* handle, H* out, F work) noexcept {
   if (!out) return invalid_ptr;

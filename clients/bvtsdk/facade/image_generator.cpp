@@ -10,7 +10,7 @@ using Generator = sonar::bvt::ImageGeneratorObject;
 
 namespace {
 
-/// Creates an N and fills it by work(generator, ping, N). Returns bad_head if SetHead was not called.
+/// Creates an N and fills it with work(generator, ping, N). Returns bad_head if SetHead was not called.
 template <class N, class H, class F>
 RetVal from_ping(BVTImageGenerator self, BVTPing ping, H* out, F work) {
   return make<Generator, N>(self, out, [&](Generator& o, N& fresh) -> int {

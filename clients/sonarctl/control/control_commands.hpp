@@ -25,7 +25,7 @@ struct EventsOptions {
 };
 Result<void> print_events(const EventsOptions& options);
 
-/// A request, and the text to print if it succeeds.
+/// Sends a request, and prints `done` if it succeeds.
 Result<void> steer(const ControlOptions& control, ControlClient::Operation operation, const std::string& done);
 
 struct StepOptions {
@@ -34,7 +34,7 @@ struct StepOptions {
   std::uint64_t count = 1;
   bool json = false;
 };
-/// Steps until interrupted; prints the time and the number of pings of each step.
+/// Steps the time until interrupted; prints the time and the number of pings of each step.
 Result<void> step_time(const StepOptions& options);
 
 /// Returns the path to send to the daemon: absolute if the file exists here, because the daemon has another working directory.

@@ -1,4 +1,4 @@
-// Converts status, events and faults of a daemon to text, and the arguments of `fault add` to a record. No I/O.
+// Converts status, events and faults of a daemon to text, and the arguments of `fault add` to a record. It does no I/O.
 #pragma once
 
 #include <string>

@@ -93,7 +93,8 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   add_control_options(command, steering->control);
   command.add_option("SONAR", s.sonar, "its name (default: the only one)");
   add_optional(command, "--range", s.range_m, "metres")->check(number());
-  add_optional(command, "--rate", s.rate_hz, "ping rate [Hz], rounded to one of the product; 0 = standby")->check(number());
+  add_optional(command, "--rate", s.rate_hz, "ping rate [Hz], rounded to a rate that the product has; 0 = standby")
+      ->check(number());
   add_optional(command, "--gain", s.gain_percent, "per cent")->check(number());
   add_optional(command, "--mode", s.mode, "frequency mode, from 0: lowest first")->check(whole_number(0, 255));
   add_optional(command, "--beams", s.beams, "number of beams; depends on the product")->check(whole_number(0, 65535));
@@ -148,7 +149,7 @@ struct TrajectoryArguments {
     control::SetTrajectory finished = wanted;
     if (object) finished.of = control::PoseSample::Of::object;
     if (object && finished.name.empty()) return failure(ErrorKind::usage, "give the name of the object");
-    if (pause && resume) return failure(ErrorKind::usage, "either --pause or --resume");
+    if (pause && resume) return failure(ErrorKind::usage, "give --pause or --resume, not both");
     if (pause || resume) finished.paused = pause;
     if (!finished.paused && !finished.position_s && !finished.speed)
       return failure(ErrorKind::usage, "nothing to change: give --pause, --resume, --seek or --speed");

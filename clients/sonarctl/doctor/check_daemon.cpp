@@ -19,7 +19,7 @@ void check_control(const Facts& facts, std::vector<Finding>& findings) {
       return s.on_this_host && (s.stream.outcome == StreamFacts::Outcome::pings || !s.clients.empty());
     });
     if (!control.given && !control.token_required && (!ours || is_replay(facts.http)))
-      return;  // a sonar of another computer, none, or a recording: no daemon is expected here
+      return;  // no daemon is expected here: the sonar is on another computer or a recording, or there is none
     if (control.token_required)
       findings.push_back({Level::warn, "control",
                           at + " requires a token, and none was given: poses, clients and engine were not checked",

@@ -68,7 +68,7 @@ class SonarChecks {
 
   bool answers() const { return sonar_.stream.outcome >= Outcome::closed_without_a_byte || !sonar_.clients.empty(); }
 
-  /// Checks images by UDP, for which no client connects; only the daemon's status shows them.
+  /// Checks images over UDP, for which no client connects; only the daemon's status shows them.
   void check_images() {
     const std::string at = "http at " + sonar_.at.host;
     if (!sonar_.reported && is_replay(facts_.http))
@@ -83,7 +83,7 @@ class SonarChecks {
     }
     const double asked_hz = sonar_.reported->rate_hz();
     const v1::SonarFigures& figures = sonar_.reported->figures();
-    const std::string text = at + ": images by UDP, " + format("%.1f Hz (%g requested), ", figures.made_hz(), asked_hz) +
+    const std::string text = at + ": images over UDP, " + format("%.1f Hz (%g requested), ", figures.made_hz(), asked_hz) +
                              text::counted(figures.skipped_ticks(), "tick") + " skipped";
     if (too_slow_for(asked_hz))
       add(Level::warn, "ping", text + ", " + computing_text(computing_ms()), less_to_compute);
@@ -167,7 +167,7 @@ class SonarChecks {
       return add(Level::fail, "ping",
                  first + (s.broken > 0 ? std::to_string(s.broken) + " of " + std::to_string(s.pings) +
                                              " pings broken: " + s.first_complaint
-                                       : text::counted(s.junk_bytes, "byte") + " between messages, part of none"),
+                                       : text::counted(s.junk_bytes, "byte") + " between messages"),
                  "sonarctl listen shows every ping; if this is sonard, please report it");
     add(Level::ok, "ping", first + "size fields consistent", "");
   }

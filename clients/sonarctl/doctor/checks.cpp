@@ -62,7 +62,8 @@ std::vector<Finding> run_checks(const Facts& facts) {
   return findings;
 }
 
-/// Names the broadcasts, multicasts and streams that a router, a NAT or a bridge does not pass, by the kinds of a make's ports.
+/// Names the broadcasts, multicasts and streams that a router, a NAT or a bridge does not pass, according to the kinds of a
+/// make's ports.
 void check_networks(const Facts& facts, std::vector<Finding>& findings) {
   using Kind = protocol::Port::Kind;
   for (const SonarFacts& sonar : facts.sonars) {
@@ -92,7 +93,7 @@ void check_networks(const Facts& facts, std::vector<Finding>& findings) {
   }
 }
 
-/// Returns the ports of the examined sonars of all makes.
+/// Reports whether outgoing connections may occupy the ports of the examined sonars.
 void check_ports(const Facts& facts, std::vector<Finding>& findings) {
   const KernelPorts& ports = facts.kernel_ports;
   if (!ports.known) return;

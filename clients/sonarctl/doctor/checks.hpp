@@ -1,4 +1,5 @@
-// Interprets the facts: one finding per check, with the cause of a fault and a remedy. Pure functions, tested without a network.
+// Interprets the facts: one finding per check, with the cause of a fault and a remedy. The functions are pure, so tests need no
+// network.
 #pragma once
 
 #include <string>
@@ -14,7 +15,7 @@ using sonar::doctor::Level;
 
 std::vector<Finding> run_checks(const Facts& facts);
 
-/// Parts of run_checks().
+/// run_checks() calls the next four functions.
 void check_sonar(const Facts& facts, const SonarFacts& sonar, std::vector<Finding>& findings);
 void check_daemon(const Facts& facts, std::vector<Finding>& findings);
 void check_ports(const Facts& facts, std::vector<Finding>& findings);

@@ -101,7 +101,7 @@ struct FoundSonar {
   const protocol::Make* make = nullptr;
   std::string at, about;  // "BlueView head P900-90 (7001)"
 };
-/// True if drivers control the sonar by HTTP and receive its images by UDP. Such a sonar has no client connections.
+/// True if drivers control the sonar over HTTP and receive its images over UDP. Such a sonar has no client connections.
 inline bool is_by_http(const SonarFacts& sonar) { return sonar.make->ports.front().kind == protocol::HostPort::Kind::http; }
 /// True if drivers find the sonar by status messages to the port of `status`.
 inline bool sends_status(const SonarFacts& sonar, const StatusFacts& status) {

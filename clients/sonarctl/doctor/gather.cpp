@@ -144,7 +144,7 @@ class Gathering {
     return s.advertised() == host || s.listens().starts_with(host + ":");
   }
 
-  /// Without a port, uses that of the sonar known at this address.
+  /// Adds the port of the sonar known at this address if `given` has none.
   Endpoint with_port(const Endpoint& given) const {
     if (given.port != 0) return given;
     if (facts_.control.status)
@@ -224,7 +224,7 @@ class Gathering {
     update_stats(sonar);
   }
 
-  /// Status of the daemon including the pings just received.
+  /// Updates the status of the daemon, which then includes the pings just received.
   void update_stats(SonarFacts& sonar) {
     if (!control_) return;
     const auto status = control_->status(until(short_patience));
@@ -234,7 +234,7 @@ class Gathering {
   }
 
   void listen_to_all() {
-    for (const SonarFacts& sonar : facts_.sonars)  // the others have no such message
+    for (const SonarFacts& sonar : facts_.sonars)  // the other sonars have no such message
       if (sends_status(sonar, status_.facts())) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
     status_.finish();
     facts_.status = status_.facts();
