@@ -89,7 +89,7 @@ std::vector<std::string> complaints(const PingSummary& summary, bool asked) {
     found.push_back(std::to_string(summary.identity_errors) + " broken identities: drivers would drop these pings");
   if (const auto& of = summary.of_wire; of && of->junk_bytes > 0)
     found.push_back(text::counted(of->junk_bytes, "byte") + " between messages");
-  if (requested && summary.pings > 0 && !summary.echo_satisfied_at)
+  if (asked && summary.pings > 0 && !summary.echo_satisfied_at)
     found.push_back("the echoed settings never matched the request; a recording that is replayed keeps its own: --as-it-is");
   if (summary.echo_lost > 0)
     found.push_back("the echo was lost again in " + std::to_string(summary.echo_lost) +

@@ -89,7 +89,7 @@ export function drawHistory(canvas, facts) {
   const y = (rate) => height - 2 - (rate / top) * (height - 4);
   g.fillStyle = style.getPropertyValue('--line');
   g.fillRect(0, height - ratio, width, ratio);
-  if (requested > 0) {  // the requested rate, dashed
+  if (asked > 0) {  // the requested rate, dashed
     g.strokeStyle = style.getPropertyValue('--line');
     g.setLineDash([4 * ratio, 4 * ratio]);
     g.beginPath();

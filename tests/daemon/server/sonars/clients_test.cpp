@@ -184,7 +184,7 @@ void expect_only_its_own_pings(Daemon& daemon, Client& heir, PingGate& gate) {
   const auto ping = heir.next_ping();
   ASSERT_TRUE(ping);
   EXPECT_EQ(ping->head.fixed.fire.range, 3);
-  EXPECT_EQ(daemon.requests().at(requested - 1).settings.range_m, 2) << "the other one was under way, or this shows nothing";
+  EXPECT_EQ(daemon.requests().at(asked - 1).settings.range_m, 2) << "the other one was under way, or this shows nothing";
 }
 
 TEST(Clients, APingUnderWayIsNotForTheNextClient) {
