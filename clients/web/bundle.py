@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-# Served file -> source file where it begins. The scene has a script of its own, for it is loaded after the first picture.
+# Served file -> source file where it begins. The scene has a separate script, which is loaded after the first picture.
 SOURCES = {"app.js": "src/main.js", "scene.js": "src/scene/scene.js", "graphics.js": "src/graphics.js", "app.css": "style/app.css"}
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
          ".svg": "image/svg+xml"}

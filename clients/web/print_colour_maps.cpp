@@ -1,4 +1,4 @@
-// Prints the colour maps of core/image/colour_map.cpp as a module of the page: name -> [[at, r, g, b], ...]. Run by the build.
+// Prints the colour maps of core/image/colour_map.cpp as a module of the page: name -> [[at, r, g, b], ...]. The build runs it.
 #include <cstdio>
 
 #include "core/image/colour_map.hpp"

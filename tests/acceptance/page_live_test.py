@@ -245,7 +245,7 @@ class Live(PageChecks, unittest.TestCase):
             page.wait(f"!!{field}")
             page.run(f"((f) => {{ f.value = '7'; f.dispatchEvent(new Event('change')); }})({field})")
             self.patiently(lambda: ask(daemon, "status")["sonars"][0]["range_m"] == 7)
-            page.wait("document.querySelector('#asked-by').innerText === 'last asked by a page'")
+            page.wait("document.querySelector('#asked-by').innerText === 'last changed by a page'")
             page.wait("document.querySelector('#timeline').offsetWidth > 0")
             page.press(" ")
             self.patiently(lambda: ask(daemon, "status")["vehicles"][0]["trajectory"].get("paused"))

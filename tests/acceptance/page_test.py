@@ -31,7 +31,7 @@ STATES = {  # of the mock -> the page's name of it, what the user reads, the but
     "lockstep": ("lockstep-waits", "Time stands still at 41.600 s", "Step 0.1 s"),
     "follow": ("no-pose-yet", "Waiting for the first pose: time follows the poses.", ""),
     "transmit off": ("fine", "transmit is off: noise only", ""),
-    "no pose": ("fine", "rov stands where it was", ""),
+    "no pose": ("fine", "rov stays where it was", ""),
     "slow engine": ("fine", " of 10 Hz: computing takes 138 ms", ""),
     "fault": ("fine", "Thin tether", ""),
     "look only": ("fine", "read-only", ""),

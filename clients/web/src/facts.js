@@ -85,7 +85,7 @@ export class Facts {
   get sonarStatus() {
     return this.status?.sonars.find((s) => s.name === this.sonar) ?? null;
   }
-  /// Who changed the settings last, as the page names it: "a page", or the address of a driver; '' = nobody.
+  /// The page or driver that changed the settings last: "a page", or the address of a driver; '' if there is none.
   get asker() {
     const by = this.sonarStatus?.asked_by ?? '';
     return by.startsWith('live view ') ? 'a page' : by;
@@ -126,7 +126,7 @@ export class Facts {
     const wanted = this.wantedRate;
     return Boolean(this.realtime && wanted > 0 && this.rate < 0.9 * wanted && this.rate * (sonar.figures?.simulation_ms ?? 0) > 300);
   }
-  /// The vehicle that carries the sonar, by the frames, or the only vehicle.
+  /// The vehicle that carries the sonar, according to the frames, or the only vehicle.
   get vehicle() {
     const name = this.frames.get(this.sonar)?.parent;
     const vehicles = this.status?.vehicles ?? [];
@@ -200,7 +200,7 @@ export class Facts {
     if (this.ping?.ns === ns) this.count(this.ping, event);
   }
 
-  /// `drawn`: a picture that sonard has drawn, not the ping's samples.
+  /// `drawn` is true for a picture that sonard has drawn, false for the ping's samples.
   image(image, ns, drawn) {
     const geometry = this.geometry.get(this.sonar);
     if (!geometry && !drawn) return;

@@ -10,7 +10,7 @@ export function listenToKeys(keys) {
     if (event.ctrlKey || event.altKey || event.metaKey || in_field(event.target)) return;
     const arrow = event.key.startsWith('Arrow') && event.target.matches('[type=range]');
     const press = event.key === ' ' && event.target.matches('button, summary');
-    if (arrow || press) return;  // the control's own
+    if (arrow || press) return;  // the control handles this key
     const entry = keys.find(([names]) => names.includes(event.key));
     if (!entry) return;
     event.preventDefault();

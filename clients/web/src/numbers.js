@@ -10,7 +10,7 @@ export const fixed = (value, digits) => (known(value) ? value.toFixed(digits).re
 /// The shortest form: 10, 7.5
 export const short = (value, digits = 2) => (known(value) ? String(Number(value.toFixed(digits))) : dash);
 export const clockTime = (ns) => new Date(ns / 1e6).toTimeString().slice(0, 8);
-/// 0:09, 1:30
+/// Formats seconds as 0:09 or 1:30.
 export const countdown = (seconds) => {
   const left = Math.max(0, Math.ceil(seconds));
   return `${Math.floor(left / 60)}:${String(left % 60).padStart(2, '0')}`;

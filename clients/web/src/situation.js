@@ -81,11 +81,11 @@ export function badgesOf(facts) {
   const vehicle = facts.vehicle;
   if (vehicle?.stale) {
     const since = facts.staleSince ? ` for ${fixed(now_s() - facts.staleSince, 1)} s` : ' since before this page opened';
-    out.push({ text: `no pose${since}; ${vehicle.name} stands where it was`, level: 'warning', title: '' });
+    out.push({ text: `no pose${since}; ${vehicle.name} stays where it was`, level: 'warning', title: '' });
   }
   const wanted = facts.wantedRate;
   if (sonar.pinging && facts.isSlow && sonar.figures?.simulation_ms > 900 / wanted)
-    out.push({ text: `${short(facts.madeRate, 1)} of ${short(wanted, 1)} ${facts.rateUnit}: computing takes ${short(sonar.figures.simulation_ms, 0)} ms`, level: 'warning', title: 'the engine is slower than the rate asked for' });
+    out.push({ text: `${short(facts.madeRate, 1)} of ${short(wanted, 1)} ${facts.rateUnit}: computing takes ${short(sonar.figures.simulation_ms, 0)} ms`, level: 'warning', title: 'the engine is slower than the requested rate' });
   const age_s = facts.ping ? now_s() - facts.ping.at : 0;
   if (sonar.pinging && wanted > 0 && facts.ping && age_s > Math.max(1, 2 / wanted) && facts.realtime)
     out.push({ text: `picture is ${fixed(age_s, 1)} s old`, level: 'warning', title: '' });

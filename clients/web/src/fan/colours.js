@@ -1,11 +1,11 @@
-// The colour maps: names and anchors come from core/image/colour_map.cpp, by the build.
+// The colour maps. The build takes their names and anchors from core/image/colour_map.cpp.
 import { anchors } from 'generated/colour-maps.js';
 
 export const mapNames = Object.keys(anchors);
 
 const byte = (unit) => Math.round(Math.min(1, Math.max(0, unit)) * 255);
 
-/// 256 x RGBA.
+/// Returns the map as 256 x RGBA bytes.
 export function colourTable(name) {
   const table = new Uint8Array(1024);
   const stops = anchors[name] ?? anchors.copper;

@@ -194,7 +194,7 @@ export class Fan {
   }
   painted = 0;
 
-  /// On slow machines a picture uses one sample per pixel, then also half of the pixels.
+  /// Reduces the quality on slow machines: first to one sample per pixel, then also to half of the pixels.
   adapt(ms) {
     this.cost_ms = this.cost_ms ? 0.6 * this.cost_ms + 0.4 * ms : ms;
     const worst = this.quality === 2 ? slow_ms : very_slow_ms;
@@ -231,7 +231,7 @@ export class Fan {
     setClass($('fan-glass'), picture);
   }
 
-  /// The picture and its marks as a PNG file.
+  /// Saves the picture and its marks as a PNG file.
   save() {
     if (!this.layout) return;  // nothing drawn yet
     const whole_picture = document.createElement('canvas');

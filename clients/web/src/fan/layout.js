@@ -1,6 +1,6 @@
 // Converts between a ping's metres and the picture's pixels, and between directions and beams, as core/image/draw_fan.cpp does.
 
-/// The layout of an image by its geometry message: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
+/// The layout of an image from its geometry message: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
 export function polarOf(image, geometry) {
   const spacing_m = geometry.row_spacing_m;
   const start_m = geometry.range_start_m ?? 0;

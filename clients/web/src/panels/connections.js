@@ -72,7 +72,7 @@ export function drawConnections(facts) {
     addresses.map((a) => make('li', { class: 'dim' }, `${a.protocol} `, make('b', {}, a.address), a.carries && ` · ${a.carries}`, a.sonar_speaks_first ? ' · sent without a request' : wait)));
 }
 
-/// The pings made a second in the last minute; the newest on the right. Draws only what has changed.
+/// Draws the rate of pings in the last minute, the newest on the right, if it has changed.
 export function drawHistory(canvas, facts) {
   const ratio = Math.min(2, devicePixelRatio || 1);
   const [width, height] = [Math.round(canvas.clientWidth * ratio), Math.round(34 * ratio)];

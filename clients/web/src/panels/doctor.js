@@ -30,8 +30,8 @@ export function drawDoctor(facts, steering) {
   const ofFault = (finding) => (finding.check === 'fault' ? active.find((f) => finding.text.includes(troubleOf(f)) || finding.text.includes(titleOf(troubleOf(f))) || finding.text.includes(f.name) || active.length === 1) : null);
   showList($('findings'), [bad, active.map((f) => f.name), facts.maySteer, findings === null, facts.judged, facts.connection], () => {
     if (facts.connection !== 'open') return [make('li', { class: 'dim' }, 'Not known now.')];
-    if (bad.length === 0 && !findings) return [make('li', { class: 'dim' }, facts.judged ? 'Not looked at yet.' : 'Run sonarctl doctor: it looks at the daemon and the network.')];
-    if (bad.length === 0) return [item({ level: 0, text: 'Nothing is in the way of a driver.', cure: '' })];
+    if (bad.length === 0 && !findings) return [make('li', { class: 'dim' }, facts.judged ? 'Not checked yet.' : 'Run sonarctl doctor: it checks the daemon and the network.')];
+    if (bad.length === 0) return [item({ level: 0, text: 'No problem was found for drivers.', cure: '' })];
     return bad.map((finding) => {
       const fault = ofFault(finding);
       const clear = fault && make('button', { class: 'link', onclick: () => steering.clear(fault), disabled: !facts.maySteer, title: facts.maySteer ? `ends ${titleOf(troubleOf(fault))}` : 'this page is read-only' }, 'Clear it');

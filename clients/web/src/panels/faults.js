@@ -7,7 +7,7 @@ export const titleOf = (trouble) => trouble.replace(/[-_]/g, ' ').replace(/^./, 
 /// The requested fault: a trouble or a single kind. Its kinds are separate faults with the same `do`.
 export const troubleOf = (fault) => fault.do || fault.name;
 
-/// The faults that are active or waiting, one entry a trouble and sonar: {trouble, sonar, names, ends_ns, by}.
+/// The faults that are active or waiting, one entry per trouble and sonar: {trouble, sonar, names, ends_ns, by}.
 export function activeTroubles(facts) {
   const groups = new Map();
   for (const fault of facts.faults) {
@@ -43,7 +43,7 @@ function card(group, about) {
     make('div', {}, make('b', {}, titleOf(group.trouble)), make('span', { class: 'left' })),
     about && make('div', {}, about.sentence),
     about?.stays && make('div', { class: 'dim' }, `At its end it does not put back ${about.stays}.`),
-    make('div', { class: 'dim' }, [group.sonar || 'every sonar', group.by && `asked by ${group.by}`].filter(Boolean).join(' · ')),
+    make('div', { class: 'dim' }, [group.sonar || 'every sonar', group.by && `requested by ${group.by}`].filter(Boolean).join(' · ')),
     make('progress', { max: 1, 'aria-label': 'time left' }),
   );
 }

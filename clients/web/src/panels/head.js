@@ -41,7 +41,7 @@ export function drawHead(facts) {
   const faults = new Set(facts.faults.map((f) => f.do + f.sonar)).size;
   setHidden($('chip-faults'), faults === 0);
   setText($('fault-count'), String(faults));
-  setHidden($('tab-faults'), faults === 0);  // phones have no room for the count at the top
+  setHidden($('tab-faults'), faults === 0);  // phones have no space for the count at the top
   setText($('tab-faults'), String(faults));
   setText($('fault-word'), faults === 1 ? 'fault' : 'faults');
   setHidden($('chip-look'), facts.connection !== 'open' || facts.maySteer);

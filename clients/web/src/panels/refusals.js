@@ -8,7 +8,7 @@ const rows = '.setting, #troubles > button, .row, .panel > header';
 export class Refusals {
   constructor() {
     this.box = $('refusal');
-    this.asked = new Map();  // id of a request -> its control, and where that was
+    this.asked = new Map();  // id of a request -> its control, and the place of the control
     for (const kind of ['pointerdown', 'keydown', 'click'])
       document.addEventListener(kind, (event) => {
         this.touched = event.target;

@@ -80,6 +80,6 @@ export function drawSettings(facts, steering) {
     if (document.activeElement !== field && field.value !== text) field.value = text;
   }
   const { asker } = facts;
-  setText($('asked-by'), asker ? `last asked by ${asker}` : '');
+  setText($('asked-by'), asker ? `last changed by ${asker}` : '');
   $('asked-by').title = asker ? facts.sonarStatus.asked_by : '';
 }

@@ -35,7 +35,7 @@ export class Timeline {
     this.finishSeek();
   }
 
-  /// While the bar is dragged: at most five requests a second, and the last one always.
+  /// Sends at most five requests a second while the bar is dragged, and always the last one.
   seek(position_s) {
     this.wanted = position_s;
     this.timer ??= setTimeout(() => {

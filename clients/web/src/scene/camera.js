@@ -44,7 +44,7 @@ export class Camera {
     const last = this.pointers.get(event.pointerId);
     if (!last) return;
     const [dx, dy] = [event.clientX - last.x, event.clientY - last.y];
-    if (this.pointers.size === 2) {  // two fingers: closer or farther, and along
+    if (this.pointers.size === 2) {  // two fingers zoom, and move the view along
       const other = [...this.pointers].find(([id]) => id !== event.pointerId)[1];
       const before = Math.hypot(last.x - other.x, last.y - other.y);
       this.zoom(before / Math.max(1, Math.hypot(event.clientX - other.x, event.clientY - other.y)));
@@ -94,7 +94,7 @@ export class Camera {
     }
     const azimuth = this.azimuth + (this.mode === 'follow' ? heading : 0);
     const target = this.pan ? this.target.clone().add(this.pan) : this.target;
-    const distance = this.distance * Math.max(1, 1.2 / aspect);  // narrow panes show as much sideways
+    const distance = this.distance * Math.max(1, 1.2 / aspect);  // so narrow panes show the same width
     const flat = distance * Math.cos(this.elevation);
     this.camera.position.set(target.x + flat * Math.cos(azimuth), target.y + flat * Math.sin(azimuth), target.z + distance * Math.sin(this.elevation));
     this.camera.aspect = aspect;
@@ -105,7 +105,7 @@ export class Camera {
   }
 }
 
-/// North on a small round card; `view`: the direction of the camera.
+/// Draws north on a small round card; `view`: the direction of the camera.
 export function drawCompass(canvas, view) {
   const g = canvas.getContext('2d');
   g.setTransform(2, 0, 0, 2, 0, 0);

@@ -4,7 +4,7 @@ import { BufferAttribute, BufferGeometry } from 'three.module.js';
 const arrays = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
 const widths = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
-/// {geometry, colour: [r, g, b] of 0 to 1}; axes z up again.
+/// Returns {geometry, colour: [r, g, b] of 0 to 1}; in the geometry, z is up again.
 export function readGlb(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   if (view.getUint32(0, true) !== 0x46546c67) throw new Error('not a GLB file');
@@ -19,7 +19,7 @@ export function readGlb(bytes) {
     const count = accessor.count * widths[accessor.type];
     return new Array(data.buffer.slice(from, from + count * Array.BYTES_PER_ELEMENT));
   };
-  const turned = (vectors) => {  // (x, z, -y) is written
+  const turned = (vectors) => {  // the file has (x, z, -y)
     for (let i = 0; i < vectors.length; i += 3) [vectors[i + 1], vectors[i + 2]] = [-vectors[i + 2], vectors[i + 1]];
     return new BufferAttribute(vectors, 3);
   };

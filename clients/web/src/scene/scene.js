@@ -59,7 +59,7 @@ export class Scene {
     for (const id of [...this.objects.keys()]) this.remove(id);
   }
 
-  /// A new session: nothing of the old scene is valid.
+  /// Call it for a new session: it removes the old scene.
   forget() {
     if (this.missing) return;
     this.removeObjects();
@@ -70,7 +70,7 @@ export class Scene {
     this.camera.placed = false;
   }
 
-  /// The group of a frame, below that of its parent. "world" and unknown parents are the graph's root.
+  /// Returns the group of a frame, below that of its parent. "world" and unknown parents are the graph's root.
   frame(name) {
     if (!name || name === 'world') return this.graph;
     if (!this.frames.has(name)) this.frames.set(name, new Group());
@@ -119,7 +119,7 @@ export class Scene {
     this.objects.delete(id);
   }
 
-  /// The edges of the beams.
+  /// Shows the edges of the beams.
   swath({ entities }) {
     if (this.missing) return;
     for (const entity of entities) {
@@ -131,7 +131,7 @@ export class Scene {
     this.stale = true;
   }
 
-  /// The echoes of the last ping in space.
+  /// Shows the echoes of the last ping in space.
   cloud(message) {
     if (this.missing) return;
     this.points?.parent?.remove(this.points);

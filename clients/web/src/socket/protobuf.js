@@ -1,5 +1,5 @@
-// Decodes protobuf messages by the descriptors that the daemon advertises with each channel. Fields are found by name; those that
-// are not on the wire have protobuf's defaults. 64-bit numbers become doubles:
+// Decodes protobuf messages with the descriptors that the daemon advertises with each channel. Fields are found by name; those
+// that are not on the wire have protobuf's defaults. 64-bit numbers become doubles:
 // those below 2^53 are exact, and time stamps in nanoseconds are rounded to a quarter of a microsecond.
 
 const utf8 = new TextDecoder();
@@ -92,7 +92,7 @@ export function readDescriptors(bytes) {
 // Wrapper types such as google.protobuf.DoubleValue hold one value. A field that is absent is decoded as null: no value was given.
 const isWrapper = (type) => /^google\.protobuf\.(Double|Float|U?Int(32|64)|Bool|String)Value$/.test(type);
 
-/// `bytes` as an object of the type. Absent messages are null, absent lists are empty.
+/// Returns `bytes` as an object of the type. Absent messages are null, absent lists are empty.
 export function decode(types, type, bytes) {
   const fields = types.get(type);
   if (!fields) throw new Error(`the descriptors do not hold ${type}`);
