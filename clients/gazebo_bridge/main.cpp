@@ -1,4 +1,4 @@
-// gazebo_bridge: follows models of a Gazebo world and sends their poses to sonard, JSON by UDP.
+// gazebo_bridge: follows models of a Gazebo world and sends their poses to sonard, as JSON over UDP.
 // Built with SONAR_GAZEBO where Ignition Transport 11 is installed. model_poses.hpp converts the messages.
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -19,7 +19,7 @@ struct Options {
   std::vector<std::string> models;
 };
 
-/// Used only by the thread that delivers messages; the main thread waits.
+/// Only the thread that delivers messages uses this; the main thread waits.
 struct Following {
   std::vector<FollowedModel> models;
   Socket socket;

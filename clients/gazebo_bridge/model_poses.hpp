@@ -1,5 +1,5 @@
-// Converts model poses of a Gazebo world to JSON lines of poses for sonard. It does not need Gazebo, so tests can use it. Used by
-// the bridge's main.cpp. Gazebo's world is ENU and its bodies FLU, as sonard's: only formatting and checks are needed.
+// Converts model poses of a Gazebo world to JSON lines of poses for sonard. It does not need Gazebo, so tests can use it. It is
+// used by the bridge's main.cpp. Gazebo's world is ENU and its bodies FLU, as sonard's: only formatting and checks are needed.
 #pragma once
 
 #include <cmath>
@@ -20,7 +20,7 @@ struct FollowedModel {
   std::optional<std::int64_t> last_ns;
 };
 
-/// "MODEL" or "MODEL=VEHICLE".
+/// Parses "MODEL" or "MODEL=VEHICLE".
 inline Result<FollowedModel> parse_followed(const std::string& text) {
   const std::size_t equals = text.find('=');
   FollowedModel followed{text.substr(0, equals), equals == std::string::npos ? std::string() : text.substr(equals + 1), {}};

@@ -10,7 +10,7 @@ setup(
                 ("share/sonard_bridge/launch", ["launch/bridge.launch.py", "launch/sonard.launch.py"])],
     install_requires=["setuptools"],
     zip_safe=True,
-    description="Poses of a ROS 2 system to sonard, and what sonard knows as topics",
+    description="Poses of a ROS 2 system to sonard, and sonard's data as topics",
     license="Apache-2.0",
     entry_points={"console_scripts": ["bridge = sonard_bridge.node:main"]},
 )

@@ -83,7 +83,7 @@ class MaterialChooser {
     return chooser;
   }
 
-  /// Chooses a material by names in the files: of the appearance, the shape, the model, and the file or library of the model.
+  /// Chooses a material from names in the files: of the appearance, the shape, the model, and the file or library of the model.
   std::string choose(const PlacedShape& shape, const ImportedModel& model) const {
     for (const auto& [path, name] : for_model_)
       if (model.path == path || model.path.starts_with(path + "/")) return name;

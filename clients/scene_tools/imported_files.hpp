@@ -1,5 +1,5 @@
 // Finds the mesh and heightmap files that an imported world names, and tests whether the scene's loader can read them. A scene
-// file has one positive scale for a mesh, so meshes with other scales are written again, scaled. Used by import_scene.
+// file has one positive scale for a mesh, so meshes with other scales are written again, scaled. import_scene uses this class.
 #pragma once
 
 #include <filesystem>

@@ -32,7 +32,7 @@ struct PlacedShape {
 };
 
 struct ImportedModel {
-  std::string path;  // ship, ship/crane
+  std::string path;  // such as ship or ship/crane
   Pose in_world;
   bool is_static = false;
   Place at = {};

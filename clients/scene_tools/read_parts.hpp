@@ -1,4 +1,4 @@
-// The parts that SDF and URDF share: geometry, and adding it to the world. Internal to the readers.
+// The parts that SDF and URDF share: geometry, and adding it to the world. Only the readers use it.
 #pragma once
 
 #include <optional>

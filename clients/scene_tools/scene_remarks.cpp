@@ -109,7 +109,7 @@ Remarks remarks_on(const SceneDescription& scene) {
     out.warnings.push_back(std::string("materials that nothing uses: ") + list_of(scene.unused_materials));
   if (scene.triangles > many_triangles)
     out.warnings.push_back(grouped(scene.triangles) +
-                           " triangles: starting takes long; are the meshes finer than the sonar sees?");
+                           " triangles: starting takes long; are the meshes finer than the sonar can resolve?");
   const auto hidden = names_where(scene, [](const DescribedObject& o) { return !o.visible; });
   if (!hidden.empty()) out.notes.push_back(std::string("not visible: ") + list_of(hidden));
   if (!scene.moving.empty()) out.notes.push_back(std::string("moved by poses that name them: ") + list_of(scene.moving));

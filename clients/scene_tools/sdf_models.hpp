@@ -1,4 +1,4 @@
-// The models of an SDF file as a tree, with includes resolved, and the poses of their frames. Internal to read_sdf.
+// The models of an SDF file as a tree, with includes resolved, and the poses of their frames. Only read_sdf uses it.
 #pragma once
 
 #include <map>

@@ -83,7 +83,7 @@ class Findings {
   std::vector<std::string> left_out_;
   struct Counted {
     std::size_t count = 0;
-    std::set<std::string> names = {};  // the first few
+    std::set<std::string> names = {};  // the first few names
     bool more_names = false;
   };
   std::map<std::string, Counted> of_no_echo_;

@@ -1,4 +1,5 @@
-"""Sends poses to sonard, receives pings and controls a running daemon. Standard library only; uses numpy if installed.
+"""Sends poses to sonard, receives pings and controls a running daemon. It needs only the standard library, and uses numpy
+if installed.
 
     from sonard_client import OculusClient, PoseSender, Control, Daemon, discover
 """

@@ -20,7 +20,7 @@ def _parser() -> argparse.ArgumentParser:
     listen.add_argument("--rate", type=int, default=10, help="pings per second: 2, 5, 10, 15 or 40")
     listen.add_argument("--gain", type=float, default=50, help="per cent")
     listen.add_argument("--count", type=int, help="number of pings (default: until Ctrl-C)")
-    listen.add_argument("--timeout", type=float, default=10, help="s without a ping before it fails")
+    listen.add_argument("--timeout", type=float, default=10, help="longest time without a ping [s]")
     found = commands.add_parser("discover", help="list the sonars whose status datagrams arrive")
     found.add_argument("--seconds", type=float, default=2.5)
     found.add_argument("--listen", default="0.0.0.0", help="local address")

@@ -34,7 +34,7 @@ class ControlError(Exception):
 
 
 class Events(Iterator[Json]):
-    """for event in control.events(pings=True): ...   Also a context manager. close() ends the subscription."""
+    """for event in control.events(pings=True): ...   It is also a context manager. close() ends the subscription."""
 
     def __init__(self, connection: http.client.HTTPConnection, reply: http.client.HTTPResponse,
                  sock: Optional[socket.socket], timeout: Optional[float]) -> None:
@@ -59,7 +59,7 @@ class Events(Iterator[Json]):
             if self._socket is not None:
                 self._socket.shutdown(socket.SHUT_RDWR)
         except OSError:
-            pass  # it has ended
+            pass  # the connection has ended
 
     def close(self) -> None:
         self._reply.close()
@@ -203,7 +203,7 @@ class Control:
         """Stops one recording, or all. Returns when the files are complete."""
         self._post("stop_recording", _given(file=file or None))
 
-    # ---- faults on purpose, of a daemon that runs with --faults
+    # ---- injected faults, of a daemon that runs with --faults
     def fault(self, what: str, **record: Any) -> Fault:
         """with control.fault("L05", seconds=6) as fault: ...       Arguments as add_fault()."""
         return Fault(self, what, record)
@@ -226,7 +226,7 @@ class Control:
         self._post("faults/reset", {})
 
     def faults(self) -> List[Json]:
-        """name, do, code, sonar, state ("waiting", "active", "over"), injections, expires_s."""
+        """Returns the faults, each with name, do, code, sonar, state ("waiting", "active", "over"), injections and expires_s."""
         return list(_read_json(self._get(f"/api/v1/faults?after={_LATEST}"))["faults"])
 
     def fault_kinds(self) -> Json:

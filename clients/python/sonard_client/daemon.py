@@ -84,7 +84,7 @@ class Daemon:
         return f"killed by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
 
     def stop(self, timeout_s: float = 20.0) -> int:
-        """Stops sonard by SIGTERM and returns its exit code."""
+        """Stops sonard with SIGTERM and returns its exit code."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
         return self.process.wait(timeout_s)

@@ -18,7 +18,7 @@ class Geodetic(NamedTuple):
 
     @property
     def is_fix(self) -> bool:
-        """Receivers without a fix report 0, 0."""
+        """True if the position is possible. 0, 0 is not, because receivers without a fix report it."""
         return all(map(math.isfinite, self)) and abs(self.latitude_deg) <= 90 and abs(self.longitude_deg) <= 360 and \
             (self.latitude_deg, self.longitude_deg) != (0, 0)
 
@@ -27,7 +27,7 @@ class Geodetic(NamedTuple):
 
 
 def parse_origin(text: str) -> Geodetic:
-    """"LAT,LON" or "LAT,LON,ALT": degrees, metres."""
+    """Parses "LAT,LON" or "LAT,LON,ALT": degrees, metres."""
     try:
         numbers = [float(part) for part in text.split(",")]
         place = Geodetic(*numbers)

@@ -3,7 +3,7 @@
 examples:
     sonarctl lab -- mydriver --ip 10.77.0.2              SONARD_IP is set too
     sonarctl lab --do L06:seconds=5,after=10 -- mydriver
-The same as python3 -m sonard_client.lab. Lines on standard input apply faults while the command runs: `L06 seconds=5`,
+python3 -m sonard_client.lab does the same. Lines on standard input apply faults while the command runs: `L06 seconds=5`,
 `end L06`, `list`.
 
 A process cannot imitate a pulled cable, because its kernel continues to acknowledge. Here the packets themselves are dropped.
@@ -249,8 +249,8 @@ def enter(module: str, arguments: Sequence[str]) -> None:
 
 def lab_config(profile: str, address: str = DEVICE, more: Optional[Dict[str, object]] = None,
                sonar: Optional[Mapping[str, object]] = None) -> str:
-    """A configuration for tests of drivers: a small scene and a model that costs little. JSON, which is YAML too. `sonar`: further
-    keys of the sonar."""
+    """A configuration for tests of drivers: a small scene and a model that costs little. It is JSON, which is also YAML. `sonar`:
+    further keys of the sonar."""
     config: Dict[str, object] = {
         "world": {"scene": "tank-rod.yaml", "seed": 1}, "vehicles": [{"name": "rov", "trajectory": "none"}],
         "sonars": [{"name": "front", "profile": profile, "bind_ip": address, **(sonar or {})}],

@@ -1,4 +1,4 @@
-"""Byte layout of Oculus messages, typed by hand from the public sources of docs/protocols/oculus.md; shares no code.
+"""Byte layout of Oculus messages, written independently of sonard's code from the public sources of docs/protocols/oculus.md.
 
 All numbers are little-endian and packed. Lengths in messages are checked here before use.
 """
@@ -71,7 +71,7 @@ class FireSettings:
 
 
 def fire_bytes(settings: FireSettings, version: int, destination: int = 0) -> bytes:
-    """The whole message."""
+    """Encodes the whole message."""
     payload = settings.payload(version)
     return header_bytes(FIRE, version, len(payload), destination) + payload
 

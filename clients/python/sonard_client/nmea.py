@@ -39,7 +39,7 @@ def checksum(body: str) -> int:
 
 
 def parse_sentence(line: str, without_checksum: bool = False) -> Sentence:
-    """Text before the $, such as a time, is skipped. A missing checksum is an error unless `without_checksum`."""
+    """Parses a line. Text before the $, such as a time, is skipped. A missing checksum is an error unless `without_checksum`."""
     start = line.find("$")
     if start < 0:
         raise NmeaError("not a sentence: $ is missing")
@@ -87,7 +87,7 @@ def _true_heading(fields: Tuple[str, ...]) -> Optional[float]:
 
 
 def time_of_day_s(text: str) -> Optional[float]:
-    """hhmmss.ss"""
+    """Converts hhmmss.ss to seconds."""
     seconds = _number(text[4:])
     if not text[:4].isdigit() or seconds is None or not 0 <= seconds < 61:
         return None

@@ -1,4 +1,4 @@
-"""Sends poses of a vehicle to sonard, by UDP or TCP."""
+"""Sends poses of a vehicle to sonard, over UDP or TCP."""
 from __future__ import annotations
 
 import math
@@ -28,7 +28,7 @@ class PoseSender:
         if transport not in ("udp", "tcp"):
             raise ValueError(f'transport is {transport!r}: it must be "udp" or "tcp"')
         if transport == "tcp" and encoding == "protobuf":
-            raise ValueError("protobuf is sent by UDP only: use encoding=\"json\" for TCP, or Control.send_pose()")
+            raise ValueError("protobuf is sent over UDP only: use encoding=\"json\" for TCP, or Control.send_pose()")
         if clock not in CLOCKS or clock == "arrival":
             raise ValueError(f'clock is {clock!r}: it must be "sim" or "wall"; poses without a timestamp use the time of receipt')
         if clock == "wall" and encoding == "json":

@@ -9,7 +9,7 @@ Vector3 = Tuple[float, float, float]
 
 
 def quaternion_from_rpy(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
-    """Intrinsic Z-Y-X: yaw first, then pitch, then roll."""
+    """Converts intrinsic Z-Y-X angles: yaw first, then pitch, then roll."""
     cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
     cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
     cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)

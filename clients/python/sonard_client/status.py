@@ -25,7 +25,7 @@ class SonarFound:
     status_word: int
     temperature_c: float
     pressure_bar: float
-    sender: str = ""         # source of the datagram; differs behind address translation
+    sender: str = ""         # source of the datagram; differs if addresses are translated
 
 
 def read_status(data: bytes, sender: str = "") -> Optional[SonarFound]:

@@ -1,4 +1,4 @@
-"""Shared by the tests: adds the package to the path, a configuration, and synthetic pings.
+"""Parts that the tests share: the package on the path, a configuration, and synthetic pings.
 
 SONARD_BUILD names the build folder; ctest sets it. SONARD_CLIENT_NUMPY=hidden disables numpy.
 """

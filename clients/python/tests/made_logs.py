@@ -11,7 +11,7 @@ ORIGIN = (47.6, -122.33, 10.0)  # degrees, m
 
 
 def moment(step):
-    """Time [s], north, east, down [m], roll, pitch, yaw [rad]."""
+    """Returns time [s], north, east, down [m], roll, pitch, yaw [rad]."""
     t = STEP_S * step
     return t, 0.5 * t, 0.25 * t, 2 + 0.1 * t, 0.02 * math.sin(t), -0.1, 0.5 + 0.05 * t
 
@@ -22,7 +22,7 @@ def times(a, b):
 
 
 def quaternion(roll, pitch, yaw):
-    """w, x, y, z, as a product of rotations about single axes."""
+    """Returns w, x, y, z, computed as a product of rotations about single axes."""
     about = [(math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)), (math.cos(pitch / 2), 0, math.sin(pitch / 2), 0),
              (math.cos(roll / 2), math.sin(roll / 2), 0, 0)]
     return functools.reduce(times, about)

@@ -53,7 +53,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
     do_GET = do_POST = do_DELETE = answer
 
     def log_message(self, *_):
-        """No output."""
+        """Suppresses the log."""
 
 
 class Refused(unittest.TestCase):

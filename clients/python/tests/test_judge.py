@@ -27,7 +27,7 @@ CRC = 0x1000  # of made pings: CRC + number
 
 
 def published(*items):
-    """(time, number) or (time, number, crc)."""
+    """Makes published pings from items (time, number) or (time, number, crc)."""
     return [driver.Published(i[0], i[1], i[2] if len(i) > 2 else CRC + i[1], None, None) for i in items]
 
 

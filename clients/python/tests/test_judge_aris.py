@@ -29,7 +29,7 @@ def block(field, data):
 
 
 def raw_of(picture):
-    """Ping by ping, sample by sample, channel by channel."""
+    """Returns the samples ping by ping, sample by sample, channel by channel."""
     return bytes(picture[row * BEAMS + first * 2 + ping] for ping in range(2) for row in range(ROWS) for first in FIRST_BEAMS)
 
 

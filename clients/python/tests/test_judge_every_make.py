@@ -13,7 +13,7 @@ READERS, DRIVERS = "clients/python/sonard_client/judge/makes", "tests/judge/make
 
 
 def products():
-    """{title of a make: names of its products}"""
+    """Returns {title of a make: names of its products}."""
     lines = subprocess.run([PRINT_MAKES], capture_output=True, text=True, check=True).stdout.splitlines()
     return {title: names.split() for title, _, names in (line.partition(":") for line in lines)}
 

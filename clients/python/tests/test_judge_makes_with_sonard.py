@@ -20,8 +20,8 @@ MOST_RUNS = 5
 
 
 def judged(make, plant="", tap="json"):
-    """(exit code, the only case) of a run without a fault. A run whose capture missed packets is repeated, and so is one in which
-    a driver without a plant was too slow: beside other programs its last pings may come after the end."""
+    """Returns (exit code, the only case) of a run without a fault. A run whose capture missed packets is repeated, and so is one in
+    which a driver without a plant was too slow: beside other programs its last pings may come after the end."""
     busy = {"UNSEEN"} if plant else {"UNSEEN", "LOST"}
     for _ in range(MOST_RUNS):
         with tempfile.TemporaryDirectory() as folder:

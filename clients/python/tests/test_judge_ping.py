@@ -1,4 +1,4 @@
-"""The judge's reader of the ping protocol, by TCP and by UDP: docs/protocols/ping.md."""
+"""The judge's reader of the ping protocol, over TCP and UDP: docs/protocols/ping.md."""
 import struct
 import unittest
 import zlib

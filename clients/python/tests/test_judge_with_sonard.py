@@ -41,7 +41,7 @@ class Judging(unittest.TestCase):
     maxDiff = None
 
     def judged(self, driver, *more, code=None):
-        """The index of a run."""
+        """Returns the index of a run."""
         with tempfile.TemporaryDirectory() as folder:
             out = pathlib.Path(folder) / "report"
             command = f"{sys.executable} -B {ROOT / 'tests/judge'}/{driver}"

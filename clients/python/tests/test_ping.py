@@ -21,7 +21,7 @@ def decoded(data):
 
 
 def listed(values):
-    """Rows of either kind of grid as lists."""
+    """Returns the rows of either kind of grid as lists."""
     return values if isinstance(values, list) else values.tolist()
 
 

@@ -84,7 +84,7 @@ def axes_of(frame_id: str) -> str:
 
 def json_line(position: Sequence[float], orientation: Quaternion, stamp_s: Optional[float] = None, vehicle: str = "",
               velocity_in_body: Optional[Sequence[float]] = None, frame: str = "ENU_FLU") -> bytes:
-    """Makes the line that sonard receives by UDP. The velocity is in body axes, as in ROS; the line has it in world axes."""
+    """Makes the line that sonard receives over UDP. The velocity is in body axes, as in ROS; the line has it in world axes."""
     if len(position) != 3 or not all(map(math.isfinite, position)):
         raise Unusable(f"position {tuple(position)} is not three finite numbers")
     line: Dict[str, Any] = {"frame": frame, "position": list(position), "quaternion": list(orientation)}

@@ -1,4 +1,4 @@
-"""Shared by both launch files: a launch argument for each parameter, and the node."""
+"""The parts that both launch files share: a launch argument for each parameter, and the node."""
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
@@ -14,7 +14,7 @@ def _text(value):
 def arguments():
     return ([DeclareLaunchArgument(p.name, default_value=_text(p.default), description=p.meaning) for p in PARAMETERS] +
             [DeclareLaunchArgument("use_sim_time", default_value="false", description="take the time from /clock"),
-             DeclareLaunchArgument("namespace", default_value="", description="of the node and its topics")])
+             DeclareLaunchArgument("namespace", default_value="", description="namespace of the node and its topics")])
 
 
 def bridge():

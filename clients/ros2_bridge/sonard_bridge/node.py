@@ -1,5 +1,5 @@
-"""The node. It sends the poses of one ROS source to sonard by UDP and can publish sonard's data as topics. The executor's thread
-sends the poses and never blocks; other threads receive the data from sonard."""
+"""The node. It sends the poses of one ROS source to sonard over UDP and can publish sonard's data as topics. The executor's
+thread sends the poses and never blocks; other threads receive the data from sonard."""
 from __future__ import annotations
 
 import array
@@ -45,7 +45,7 @@ def is_same(a: live_view.Transform, b: live_view.Transform) -> bool:
 
 
 def has_turned(before: live_view.Transform, now: live_view.Transform) -> bool:
-    """Returns true if the sonar looks elsewhere from the same place, as the head of a scanning sonar does with every line."""
+    """Returns true if the sonar turns but stays in place, as the head of a scanning sonar does with every line."""
     return before.parent == now.parent and is_near(before.position, now.position) and not is_same(before, now)
 
 

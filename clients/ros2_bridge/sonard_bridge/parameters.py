@@ -37,11 +37,11 @@ PARAMETERS: Tuple[Parameter, ...] = (
     Parameter("http", f"127.0.0.1:{HTTP_PORT}", "control.http of sonard"),
     Parameter("token_file", "", "file with the secret of control.token_file"),
     Parameter("truth", "~/vehicle_pose", "topic of the pose that sonard uses, geometry_msgs/PoseStamped"),
-    Parameter("truth_rate_hz", 0.0, "its rate; 0: it is not published"),
+    Parameter("truth_rate_hz", 0.0, "rate of that topic; 0: it is not published"),
     Parameter("tf_static", False, "publish where the sonars are mounted"),
     Parameter("base_frame", "", "frame that they are mounted on; empty: tf_child, else the vehicle's name"),
     Parameter("clouds", False, "publish ~/SONAR/cloud, sensor_msgs/PointCloud2"),
-    Parameter("cloud_threshold", 0.35, "of samples in clouds, part of the full scale; of returns in space, of the strongest; 0: all"),
+    Parameter("cloud_threshold", 0.35, "threshold of clouds: part of the full scale for samples, of the strongest for returns in space; 0: all"),
     Parameter("scans", False, "publish ~/SONAR/scan, sensor_msgs/LaserScan: the true range of the first hit of each beam"),
     Parameter("clock", False, "publish /clock, of a sonard whose clock is stepped or lockstep"),
 )

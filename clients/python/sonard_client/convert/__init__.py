@@ -1,6 +1,6 @@
 """Converts logs to trajectory files: `python3 -m sonard_client.convert IN -o OUT.csv`, or convert(IN).
 
-Standard library only, except lz4 and zstandard for logs with these compressions.
+The code needs only the standard library, and lz4 or zstandard for logs with these compressions.
 """
 from ..geodesy import Geodetic
 from .formats import FORMATS, convert, format_of

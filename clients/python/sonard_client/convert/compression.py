@@ -1,4 +1,4 @@
-"""Decompresses chunks of recordings: bz2 by the standard library, lz4 and zstd if their modules are installed."""
+"""Decompresses chunks of recordings: bz2 with the standard library, lz4 and zstd if their modules are installed."""
 from __future__ import annotations
 
 import bz2

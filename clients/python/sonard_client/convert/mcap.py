@@ -1,6 +1,6 @@
 """Reads MCAP recordings sequentially, without the index. A record has an opcode, a length and content; chunks contain records.
 
-Written from the specification at mcap.dev. A truncated recording is read up to its last complete record.
+The code follows the specification at mcap.dev. A truncated recording is read up to its last complete record.
 """
 from __future__ import annotations
 

@@ -35,8 +35,8 @@ def read_nmea(path: pathlib.Path, warn: Warn, origin: Optional[Geodetic] = None,
         else:
             rows.append(Row(poses.instruments.fix_time_s, pose[0], quaternion_from_rpy(*pose[1])))
     if refused:
-        way_out = " (--without-checksum accepts such lines)" if first_refused.endswith(NO_CHECKSUM) else ""
-        warn(f"{first_refused}{way_out}; lines omitted: {refused}")
+        advice = " (--without-checksum accepts such lines)" if first_refused.endswith(NO_CHECKSUM) else ""
+        warn(f"{first_refused}{advice}; lines omitted: {refused}")
     if poses.instruments.unread:
         warn(f"sentences that are not read: {', '.join(sorted(poses.instruments.unread))}")
     if not rows:

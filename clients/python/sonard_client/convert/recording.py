@@ -81,7 +81,7 @@ def _clock_reset(rows: Stream[Found]) -> str:
 
 
 def _unpacked(message: Recorded, name: str) -> bytes:
-    """Some recordings of ROS 2 compress each message."""
+    """Decompresses a message if needed, because some recordings of ROS 2 compress each one."""
     if message.encoding != "cdr" or not message.data.startswith(ZSTD_MAGIC):
         return message.data
     try:

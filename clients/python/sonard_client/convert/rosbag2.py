@@ -55,7 +55,7 @@ class _Base:
         return self.exceeded
 
     def _check(self) -> None:
-        """Views, virtual tables and generated columns are programs, not data."""
+        """Refuses views, virtual tables and generated columns, which are programs, not data."""
         self.base.execute("PRAGMA trusted_schema=OFF")
         if self.base.execute("SELECT 1 FROM sqlite_master WHERE name = 'message_types'").fetchone():
             raise ConvertError("a log of Gazebo, which is not read; play it (gz sim --playback FOLDER) and take the "

@@ -98,7 +98,7 @@ def _metres(f: Dict[str, float]) -> "Optional[Tuple[float, float, float]]":
 
 
 def _simulated_place(f: Dict[str, float]) -> Geodetic:
-    """Older simulators send positions as float degrees only, in steps of 0.4 m at middle latitudes."""
+    """Returns the position. Older simulators send it as float degrees only, in steps of 0.4 m at middle latitudes."""
     if f["lat_int"] or f["lon_int"]:
         return Geodetic(1e-7 * f["lat_int"], 1e-7 * f["lon_int"], f["alt"])
     return Geodetic(f["lat"], f["lon"], f["alt"])

@@ -193,7 +193,8 @@ def gap_warning(rows: Sequence[Row]) -> str:
 
 
 def write_csv(track: Track, out: TextIO, body: str = "", keep_time: bool = False) -> None:
-    """Times start at 0 unless keep_time; a comment gives the original start. `body` adds a column with that name."""
+    """Writes the track. Times start at 0 unless keep_time; a comment gives the original start. `body` adds a column with that
+    name."""
     zero_s = 0.0 if keep_time else track.rows[0].t_s
     out.write(f"# frame: {track.frame}\n")
     for comment in [f"source: {track.source}"] + track.comments + ([] if keep_time else [f"t = 0 was {zero_s:.6f} s"]):

@@ -4,7 +4,7 @@ examples:
     sonarctl judge --driver 'mydriver --ip {ip}' --tap json --out report
     sonarctl judge --list
     sonarctl judge merge report-a report-b --out matrix
-The same as python3 -m sonard_client.judge.
+python3 -m sonard_client.judge does the same.
 """
 from __future__ import annotations
 

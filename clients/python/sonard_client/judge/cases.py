@@ -204,7 +204,7 @@ CASES: List[Case] = [
     row("F06.2", {"lengths": "declared"}, "once", "The last row of a ping is missing, and its lengths exclude it."),
     row("F07.1", {}, "once", "The size of the image does not fit its rows and beams."),
     row("F08.1", {"value": 0}, "once", "The header states that the image begins at offset 0."),
-    row("F08.2", {"value": 0xFFFFFF00}, "once", "The header states that the image begins far behind the end."),
+    row("F08.2", {"value": 0xFFFFFF00}, "once", "The header states that the image begins far after the end."),
     row("F10.1", {"field": "rows", "value": 65535}, "once", "A ping states that it has 65535 rows.", must=_LEAN, measured=True),
     row("F10.2", {"field": "rows", "value": 0}, "once", "A ping states that it has no rows."),
     row("F10.3", {"field": "beams", "value": 65535}, "once", "A ping states that it has 65535 beams.", must=_LEAN),

@@ -93,7 +93,7 @@ def main() -> int:
 
 
 def ended_as(code: int) -> int:
-    """If a signal ended the driver, ends this process by the same signal, so that the judge sees it."""
+    """If a signal ended the driver, ends this process with the same signal, so that the judge detects it."""
     if code < 0:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no second core file
         if -code not in (signal.SIGKILL, signal.SIGSTOP):

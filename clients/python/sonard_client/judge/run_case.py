@@ -279,7 +279,7 @@ def _restart(scene: Scene) -> bool:
 
 
 def touched_pings(journal: Sequence[Dict[str, Any]], seen: Sequence[Seen], numbered: bool) -> List[int]:
-    """Numbers of the pings that the fault affected. If the journal numbers pings differently, the number of the next ping sent."""
+    """Returns the numbers of the affected pings; if the journal numbers pings differently, those of the next pings sent."""
     injected = [r for r in journal if int(r.get("ping", 0) or 0) > 0 and r.get("event") == "injected"]
     if numbered:
         return [int(r["ping"]) for r in injected]

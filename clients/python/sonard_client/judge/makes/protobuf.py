@@ -7,7 +7,7 @@ Value = Union[int, bytes]
 
 
 def varint(data: bytes, at: int) -> Tuple[int, int]:
-    """The number and the offset of its end. Raises ValueError."""
+    """Returns the number and the offset of its end. Raises ValueError."""
     value = shift = 0
     while at < len(data) and shift < 64:
         value |= (data[at] & 127) << shift
@@ -25,7 +25,7 @@ def varints(data: bytes) -> Iterator[int]:
 
 
 def fields(data: bytes) -> Dict[int, Value]:
-    """The last value of each field: a number, or bytes. Raises ValueError."""
+    """Returns the last value of each field: a number, or bytes. Raises ValueError."""
     found: Dict[int, Value] = {}
     at = 0
     while at < len(data):
@@ -45,7 +45,7 @@ def fields(data: bytes) -> Dict[int, Value]:
 
 
 def number(message: Dict[int, Value], field: int) -> int:
-    """A number; 0 if it is missing. Raises ValueError."""
+    """Returns a number; 0 if it is missing. Raises ValueError."""
     value = message.get(field, 0)
     if not isinstance(value, int):
         raise ValueError(f"field {field} is not a number")
@@ -53,7 +53,7 @@ def number(message: Dict[int, Value], field: int) -> int:
 
 
 def block(message: Dict[int, Value], field: int) -> bytes:
-    """Bytes, a text or a message; empty if it is missing. Raises ValueError."""
+    """Returns bytes, a text or a message; empty if it is missing. Raises ValueError."""
     value = message.get(field, b"")
     if not isinstance(value, bytes):
         raise ValueError(f"field {field} is a number")
