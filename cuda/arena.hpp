@@ -41,7 +41,7 @@ class Arena {
     const Place at = allocate_bytes(count * sizeof(T));
     return {static_cast<T*>(at.device), static_cast<T*>(at.host), count};
   }
-  /// Returns the device's copy of `values`, which upload() will transfer. Only with Where::both.
+  /// Returns the device's copy of `values`, which upload() will transfer. It works only with Where::both.
   template <class T>
   T* put(std::span<const T> values) {
     const Slice<T> slice = allocate<T>(values.size());

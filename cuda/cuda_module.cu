@@ -136,7 +136,7 @@ int open(void** machine) {
     close(m);
     return error;
   }
-  // Only for measurements: switches graphs off. A graph makes launches faster, but a launch that differs needs a new capture.
+  // For measurements, this switches graphs off. A graph makes launches faster, but a launch that differs needs a new capture.
   const char* graphs = std::getenv("SONARD_CUDA_GRAPHS");
   m->graphs_work = !graphs || std::strcmp(graphs, "0") != 0;
   *machine = m;

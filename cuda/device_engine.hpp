@@ -20,7 +20,8 @@ struct DeviceEngineOptions {
   int batch = 0;                                  // pings that are launched together; 0 = 8, more with more threads, at most 32
   std::size_t work_bytes = std::size_t{1} << 30;  // device memory of a batch; if pings are large, a batch has fewer
   bool cpu_after_failure = true;                  // false: run() throws EngineUnavailable if the device fails
-  /// Called with a text for users when the CPU computes pings instead of the device, once for each reason. May be empty.
+  /// The engine calls it with a text for users when the CPU computes pings instead of the device, once for each reason. May be
+  /// empty.
   std::function<void(const std::string&)> say = {};
 };
 

@@ -1,4 +1,4 @@
-// Structs in the device's memory. They are plain; the host fills them and the kernel bodies read them. Only C++17 and
+// Structs in the device's memory. They are plain; the host fills them and the kernel bodies read them. They use only C++17 and
 // fixed-width members. Both sides are compiled from this file, and cuda_module.hpp checks that they agree.
 #pragma once
 

@@ -13,8 +13,8 @@
 
 namespace sonar::cuda {
 
-/// Thrown if the memory of the device, or the host memory for copies, is full. The device can then be used again with smaller
-/// allocations.
+/// This is thrown if the memory of the device, or the host memory for copies, is full. The device can then be used again with
+/// smaller allocations.
 class DeviceMemoryFull : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

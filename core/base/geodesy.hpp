@@ -1,5 +1,5 @@
-// Converts latitudes and longitudes (WGS84) to the plane that is tangent to the ellipsoid at an origin. Used for poses with
-// satellite positions. All calculations are in double, exact to micrometres near the origin.
+// Converts latitudes and longitudes (WGS84) to the plane that is tangent to the ellipsoid at an origin. This is used for poses
+// with satellite positions. All calculations are in double, exact to micrometres near the origin.
 #pragma once
 
 #include <cmath>

@@ -35,7 +35,7 @@ struct Names {  // files of one version of control groups
 constexpr Names version_1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file "};
 constexpr Names version_2{"memory.max", "memory.current", "inactive_file "};
 
-/// Minimum of the memory left to a control group and to its parents, as far as this process can see them.
+/// Minimum of the memory left to a control group and to its parents, as far as this process can read them.
 std::optional<std::uint64_t> left_of_groups(const path& mount, path group, const Names& names) {
   std::optional<std::uint64_t> least;
   for (group = group.relative_path();; group = group.parent_path()) {

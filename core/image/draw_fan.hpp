@@ -36,8 +36,8 @@ struct FanLayout {
 /// The layout of the fan for an image that draw_fan accepts.
 FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens = Opens::upwards);
 
-/// Draws the image. Error if it has no rows or beams, if its bearings do not decrease from port to starboard, or if they span
-/// more than a circle.
+/// Draws the image. Returns an error if it has no rows or beams, if its bearings do not decrease from port to starboard, or if
+/// they span more than a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
 /// Draws a series of pings like draw_fan, but three times as fast. It reuses the footprints of the pixels until the number of

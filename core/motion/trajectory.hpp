@@ -61,7 +61,7 @@ struct Points {
 
 class Trajectory {
  public:
-  /// Needs at least one point. `duration` is the duration of the whole file, at least the last time.
+  /// `points` must have at least one point. `duration` is the duration of the whole file, at least the last time.
   explicit Trajectory(Points points, Ns duration = Ns{0});
 
   /// Between points the body moves in a straight line (lerp) and turns at constant rate (slerp). Before the first and after the

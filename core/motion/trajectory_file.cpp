@@ -52,7 +52,7 @@ bool is_comment(std::string_view line) {
   return line.front() == '#' || line.starts_with("//") || line.starts_with("% ") || line == "%";
 }
 
-/// Used to distinguish a line of numbers from a header.
+/// True for a number; this distinguishes a line of numbers from a header.
 bool is_number(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
   double v = 0;

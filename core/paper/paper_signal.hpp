@@ -62,8 +62,8 @@ void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, c
 /// by the root of the sum of all V^2. `squared`: V_jk^2, for expected power. [beams][columns]
 std::vector<float> make_correction(std::span<const double> azimuth_rad, double spacing_rad, bool squared);
 
-/// The correction for uniform azimuths, for which V depends only on the difference of two azimuths; not squared. Null if the
-/// azimuths are not uniform.
+/// Makes the correction, not squared, for uniform azimuths, for which V depends only on the difference of two azimuths. Returns
+/// null if the azimuths are not uniform.
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad);
 /// out[j][...] = sum_k V_jk in[k][...] by these tables; rows have `values` floats, a multiple of 32.
 void correct(const BeamTransformTables& even, std::span<const float> in, int values, const simd::Kernels& kernels, Parallel& pool,

@@ -1,5 +1,5 @@
 // Refines fans of rays. An interval between two directions of a column is halved until both ends are on a surface that can be
-// interpolated, or until the interval counts as an edge. Used for direct views (trace_fan) and for views via mirrors
+// interpolated, or until the interval counts as an edge. This is used for direct views (trace_fan) and for views via mirrors
 // (multipath_trace).
 #pragma once
 

@@ -47,12 +47,12 @@ class Interruption {
   virtual ~Interruption() = default;
   /// True if another ping is likely to be requested. The present ping is then computed in smaller parts.
   virtual bool expected() const = 0;
-  /// Called between two parts, on the thread of run(). It may call run() of the same engine. That run() does not call
-  /// run_other().
+  /// The engine calls it between two parts, on the thread of run(). It may call run() of the same engine. That run() does not
+  /// call run_other().
   virtual void run_other() = 0;
 };
 
-/// Thrown if the device that an engine needs has failed and the options allow no other device.
+/// This is thrown if the device that an engine needs has failed and the options allow no other device.
 class EngineUnavailable : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -76,7 +76,7 @@ class PingEngine {
   /// Largest number of requests like these two that one run() computes faster than several runs. 1: a common run is not faster,
   /// or delays one of the two too much.
   virtual std::size_t most_together(const PingRequest& /*a*/, const PingRequest& /*b*/) const { return 1; }
-  /// Sets the interruption; null = none. Engines that cannot be interrupted ignore it. Must not be called during a ping.
+  /// Sets the interruption; null = none. Engines that cannot be interrupted ignore it. It must not be called during a ping.
   virtual void set_interruption(Interruption* /*interruption*/) {}
   virtual std::string description() const = 0;  // "cpu, AVX-512, 2 threads, Embree 3.13.5"
   /// Statistics of the last ping.

@@ -90,7 +90,7 @@ class SharedNoiseTable {
  public:
   static constexpr std::size_t block_samples = 32;  // samples that are stored or omitted together
   SharedNoiseTable() = default;
-  /// Leaves the table empty if the receiver has no shared noise. Needs the plan's columns and the level of their noise.
+  /// The table stays empty if the receiver has no shared noise. The plan must have its columns and the level of their noise.
   SharedNoiseTable(const PingPlan& plan, Parallel& pool);
   bool is_audible() const { return samples_ > 0; }
   bool has_leak() const { return !leak_upa_.empty(); }

@@ -200,7 +200,7 @@ std::vector<PointEcho> scatter_points(const PingContext& context) {
     const Vec3d in_world = scene.scene().in_world(target, context.bodies_in_world);
     const Vec3d seen = transform(world_in_sonar, in_world);
     ++instance;
-    // Inside the housing 1 / r^2 does not apply. The array receives nothing from behind.
+    // Inside the housing 1 / r^2 does not apply. The array receives nothing from directions behind it.
     if (length(seen) < nearest_scatterer_m || seen.x <= 0) continue;
     const double strength = amplitude_from_db(static_cast<double>(target.target_strength_db));
     std::optional<PointEcho> echo = point_echo(seen, strength, context.plan, s);

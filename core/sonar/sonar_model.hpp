@@ -84,8 +84,8 @@ struct ReceiverModel {
   float tvg_ceiling_db = 80;  // upper limit of the TVG; infinity: no limit
   float full_scale_upa = 1;   // pressure amplitude that reaches full scale at TVG 0 dB and gain 0 dB
   float noise_figure_db = 10;
-  // -3 dB width of the noise filter divided by the width of the pulse's filter. Unused for a measured pulse, because the pulse
-  // is then the filter.
+  // -3 dB width of the noise filter divided by the width of the pulse's filter. It is unused for a measured pulse, because the
+  // pulse is then the filter.
   float noise_width = 1;
   float crosstalk_db = -200;  // amplitude, re the channel, of every channel in every beam; below -150 = none
   float leak_upa = 0;         // rms pressure of the transmitter's direct leakage, at range 0; 0 = none

@@ -1,4 +1,4 @@
-// Parses decimal numbers; the whole text must be a number. Used by the strict YAML cursors, command lines and grid files.
+// Parses decimal numbers; the whole text must be a number. The strict YAML cursors, command lines and grid files use it.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// IPv4 addresses as dotted text and as 32-bit numbers. Used by recordings, the daemon's configuration and sonarctl.
+// IPv4 addresses as dotted text and as 32-bit numbers. Recordings, the daemon's configuration and sonarctl use it.
 #pragma once
 
 #include <array>

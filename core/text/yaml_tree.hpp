@@ -26,7 +26,7 @@ struct YamlNode {
   std::string scalar;
   std::vector<YamlNode*> children;
 
-  // Set while a reader uses this map.
+  // This is set while a reader uses this map.
   bool opened = false;
   bool any_key = false;  // its keys are names chosen by the user
   std::vector<std::string> asked, missing;

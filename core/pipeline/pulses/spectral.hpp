@@ -1,5 +1,5 @@
-// Sums of delayed echoes at every frequency of a regular grid, by the definition and by a fast method. Used for measured
-// pulses, for the exact mode, and for the frequency sum of Choi 2025 (docs/acoustics.md, section 4).
+// Sums of delayed echoes at every frequency of a regular grid, by the definition and with a fast method. They are used for
+// measured pulses, for the exact mode, and for the frequency sum of Choi 2025 (docs/acoustics.md, section 4).
 #pragma once
 
 #include <complex>
@@ -53,7 +53,7 @@ class FrequencySums {
   /// Adds one echo. `turns`: delay times the frequency step, any finite number. Delays that differ by whole turns give the same
   /// result.
   void add(double turns, Complex amplitude, Complex* grid) const;
-  /// Adds many echoes, each multiplied by e^{-i 2 pi turn_on turns} first. Only for width 8. The grid must have room for
+  /// Adds many echoes, each multiplied by e^{-i 2 pi turn_on turns} first. The width must be 8. The grid must have room for
   /// `padding` more values.
   void add(std::span<const double> turns, std::span<const double> re, std::span<const double> im, double turn_on,
            const simd::Kernels& kernels, Complex* grid) const;

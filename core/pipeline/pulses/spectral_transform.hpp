@@ -1,5 +1,5 @@
-// The discrete Fourier transform of the frequency-domain path (docs/acoustics.md, section 4): FFTW behind one class. Its .cpp
-// is the only file that includes FFTW. In a build without FFTW (SONAR_FFTW=OFF), have_transform is false.
+// The discrete Fourier transform of the frequency-domain path (docs/acoustics.md, section 4): one class, which calls FFTW. Its
+// .cpp is the only file that includes FFTW. In a build without FFTW (SONAR_FFTW=OFF), have_transform is false.
 #pragma once
 
 #include <complex>

@@ -1,4 +1,4 @@
-// Computes the echoes of rays that are scatterers. Each ray has its own random draw. Included by kernels.inl.
+// Computes the echoes of rays that are scatterers. Each ray has its own random draw. kernels.inl includes it.
 
 /// The draw of core/base/random.hpp, in a form that compilers vectorise.
 inline void philox_of(std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3, std::uint32_t k0, std::uint32_t k1,

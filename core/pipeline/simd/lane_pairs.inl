@@ -1,6 +1,6 @@
 // Two vectors of `lanes` floats that are computed together. A formula of many dependent steps leaves most of a processor's units
 // idle, because each step waits for the one before it. The two halves of a pair do not wait for each other. Every lane gets the
-// same value as from single vectors. Included by kernels.inl.
+// same value as from single vectors. kernels.inl includes it.
 
 struct LanePair {
   Lanes a, b;

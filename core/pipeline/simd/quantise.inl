@@ -1,4 +1,4 @@
-// Converts powers to codes. Included by kernels.inl.
+// Converts powers to codes. kernels.inl includes it.
 
 template <class V>  // Lanes or LanePair
 inline V log2_of(V x) {  // as log2_of(float)

@@ -1,4 +1,4 @@
-// The spreading of the non-uniform transform (core/pipeline/pulses/spectral.hpp), in double. Included by kernels.inl.
+// The spreading of the non-uniform transform (core/pipeline/pulses/spectral.hpp), in double. kernels.inl includes it.
 
 inline double sine_of_turns_exact(double turns) {  // accurate to 1e-11
   double x = turns - std::floor(turns + 0.5);

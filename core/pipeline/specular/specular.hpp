@@ -15,7 +15,7 @@
 namespace sonar {
 
 // Computes how much of a mirror's echo reaches the sonar if the surface is finite and partly hidden: Fresnel integrals over the
-// visible part (docs/acoustics.md, section 3). Used by specular.
+// visible part (docs/acoustics.md, section 3).
 
 /// Divides the extent into cells around the point that contributes most, to find hidden parts. The outermost cells reach to the
 /// edge.

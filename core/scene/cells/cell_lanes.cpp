@@ -131,7 +131,7 @@ SONAR_CLONES void draw_points(const DrawKey& key, std::int32_t first_i, std::int
 
 SONAR_CLONES bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners,
                             BlockHeights& found) {
-  const FacetTest t = test;  // a local copy; with it the compiler knows that stores do not change it
+  const FacetTest t = test;  // a local copy, so that the compiler can assume that stores do not change it
   const auto& [e0, e1, e2] = t.edge;
   const double *at_u = in.u + which * block, *at_v = in.v + which * block;
   std::int64_t* owner = owners.facet + which * block;

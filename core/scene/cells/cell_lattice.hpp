@@ -58,7 +58,7 @@ inline double edge(double pu, double pv, double qu, double qv, double xu, double
   return -((pu - qu) * (xv - qv) - (pv - qv) * (xu - qu));
 }
 
-/// Half-open: a point on a shared edge belongs to exactly one of the two triangles (top-left rule).
+/// True if the point belongs to the facet. A point on a shared edge belongs to exactly one of the two triangles (top-left rule).
 inline bool owns(const Facet& f, double xu, double xv) {
   const double turn = f.nw > 0 ? 1.0 : -1.0;
   for (int i = 0; i < 3; ++i) {

@@ -1,4 +1,4 @@
-// Used instead of geo_tiff.cpp if libtiff was not found.
+// This file replaces geo_tiff.cpp if libtiff was not found.
 #include "core/scene/shapes/terrain.hpp"
 
 namespace sonar {

@@ -85,7 +85,7 @@ Result<std::string> text_of(const MeshFile& request, std::size_t most) {
   return read_regular(request.file, most);
 }
 
-/// The reason why the importer cannot read the file, if this check knows it better than the importer.
+/// The reason why the importer cannot read the file, if this check finds a better one than the importer.
 std::string better_reason(const MeshFile& request, const std::string& extension, std::string reason) {
   if (extension == ".stl") return reason + "; is it cut short? Export it again";
   if (extension != ".glb" && extension != ".gltf") return reason;

@@ -38,7 +38,7 @@ struct CentredMesh {
   std::size_t left_out = 0;  // triangles without area
 };
 
-/// Makes the mesh. Error if no four neighbouring heights exist, or if the mesh would exceed max_mesh_triangles.
+/// Makes the mesh. Returns an error if no four neighbouring heights exist, or if the mesh would exceed max_mesh_triangles.
 Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
 
 /// Reads a grey PNG of 8 or 16 bits, which may be stored as colours. It covers size_x by size_y metres about the origin; the
@@ -52,8 +52,8 @@ struct HeightOptions {
   std::optional<bool> geographic = {};  // coordinates in degrees; unset: from the file
   std::optional<UtmZone> utm = {};      // zone of coordinates in metres; unset: from the file, unless `geographic` is set
   std::optional<Geodetic> origin = {};  // origin of a grid in degrees or UTM
-  /// Used if `origin` is unset. Without both, degrees are relative to the middle of the grid, and UTM coordinates are used
-  /// unchanged.
+  /// This is used if `origin` is unset. Without both, degrees are relative to the middle of the grid, and UTM coordinates are
+  /// used unchanged.
   std::optional<Geodetic> world_origin = {};
   bool centred = false;  // the caller positions the middle of the grid; the coordinates of the file have no effect
 };
