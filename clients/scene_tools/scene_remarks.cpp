@@ -55,7 +55,7 @@ void remark_on_sizes(const SceneDescription& scene, Remarks& out) {
   }
 }
 
-/// True if a vehicle at the origin, at any depth of the sea, cannot see the object.
+/// True if a vehicle at the origin, at any depth of the sea, is too far to detect the object.
 bool is_far(const DescribedObject& o) {
   constexpr double deepest_sea_m = 11'000;
   const double depth_m = std::clamp(-o.in_world.high_m.z, 0.0, deepest_sea_m);

@@ -32,8 +32,8 @@ class ControlClient {
   /// sonard answers Hello at once, even if busy. No answer within this time means that another service listens there.
   static constexpr std::chrono::milliseconds greeting_patience{2000};
 
-  /// Connects and sends Hello. Error if there is no connection, another service answers, or the token is missing or wrong.
-  /// `token_required` is set if sonard requires a token but no token file is given.
+  /// Connects and sends Hello. Returns an error if there is no connection, another service answers, or the token is missing or
+  /// wrong. `token_required` is set if sonard requires a token but no token file is given.
   static Result<ControlClient> open(const ControlOptions& options, bool* token_required = nullptr);
 
   /// Sends a request and returns its answer; a refusal is an error with sonard's text. Events that arrive meanwhile are kept.

@@ -11,7 +11,7 @@
 
 namespace sonar::clients {
 
-/// Half-open: rows [row_begin, row_end), beams [beam_begin, beam_end).
+/// The rows [row_begin, row_end) and beams [beam_begin, beam_end).
 struct Window {
   std::size_t row_begin = 0, row_end = 0, beam_begin = 0, beam_end = 0;
 };

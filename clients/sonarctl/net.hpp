@@ -1,4 +1,4 @@
-// Blocking sockets with deadlines, for the client side. Only IPv4, like the devices.
+// Blocking sockets with deadlines, for the client side. They support only IPv4, as the devices do.
 #pragma once
 
 #include <netinet/in.h>
@@ -85,7 +85,7 @@ Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chro
 bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 
-/// Set by Ctrl-C and SIGTERM. Commands then end as at a time-out and make no connections.
+/// Ctrl-C and SIGTERM set it. Commands then end as at a time-out and make no connections.
 extern std::atomic<int> interrupted;
 static_assert(std::atomic<int>::is_always_lock_free, "handlers of signals set it");
 /// Waits are cut into steps of this length: a signal that comes between a check of `interrupted` and the wait is noticed soon.

@@ -1,5 +1,5 @@
-// Runs the host of a make over blocking sockets to get the pings of a device. Also reads pings of recordings, and finds devices
-// by their status datagrams.
+// Runs the host of a make over blocking sockets to get the pings of a device. It also reads pings of recordings, and finds
+// devices by their status datagrams.
 #pragma once
 
 #include <chrono>

@@ -12,7 +12,7 @@ namespace sonar::clients {
 
 std::chrono::milliseconds milliseconds_from(double s);
 
-/// Error if an output file is the recording that is being read.
+/// Returns an error if an output file is the recording that is being read.
 Result<void> check_output(const SourceOptions& source, const std::filesystem::path& output);
 
 /// Returns the given address, or that of a status broadcast; `say` prints the result.
@@ -83,7 +83,7 @@ Error silence(const SourceOptions& source, const OpenedStream& opened, bool rece
               const std::string& hint);
 
 /// Ping `number` (from 0) of a recording; nullopt: the first complete one, else the last. `sonar`: selects one of several.
-/// Error usage: there are fewer pings.
+/// Returns error usage if there are fewer pings.
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
 
 /// Returns read_ping() of a recording, or the first ping of a device with the requested settings. If a picture consists of many

@@ -54,7 +54,7 @@ enum Code : int {
 };
 
 /// The name of a return code (BVTError_GetName), also for numbers that are not return codes. Returns a name of the SDK's
-/// constants such as "BVT_SUCCESS", and "BVT_UNKNOWN_ERROR" for an unknown number. Never null; always valid.
+/// constants such as "BVT_SUCCESS", and "BVT_UNKNOWN_ERROR" for an unknown number. The pointer is never null and always valid.
 const char* error_name(int code);
 /// The text of a return code (BVTError_GetString). The texts are ours: one sentence with the cause and the remedy.
 const char* error_text(int code);

@@ -25,7 +25,7 @@ inline void put_header(Bytes& out, const FrameHeader& header) {
   put(out, header.payload_size);
 }
 
-/// False for fewer than 16 bytes, another magic, or a payload longer than the link allows.
+/// Returns false for fewer than 16 bytes, another magic, or a payload longer than the link allows.
 inline bool read_header(BytesView bytes, FrameHeader& header) {
   Reader reader(bytes);
   const BytesView magic = reader.block(blueview::magic.size());

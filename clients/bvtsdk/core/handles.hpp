@@ -49,7 +49,7 @@ class Handles {
   std::size_t live_ = 0;
 };
 
-/// The only table of this library. Never destroyed, because programs destroy handles in destructors of global objects.
+/// The only table of this library. It is never destroyed, because programs destroy handles in destructors of global objects.
 Handles& handles();
 
 }  // namespace sonar::bvt

@@ -83,7 +83,7 @@ class Imager {
   std::array<std::shared_ptr<const PolarLookup>, 4> recent_;  // latest first
 };
 
-/// `pixels`: row-major, rows x columns. Replaces each pixel by the mean of 3 x 3 pixels, or of 9 rows x 2 columns (this column
+/// `pixels`: row-major, rows x columns. Replaces each pixel with the mean of 3 x 3 pixels, or of 9 rows x 2 columns (this column
 /// and the next: our choice, because the vendor's is unknown). Pixels outside the image do not count. Other flags have no effect.
 /// May throw std::bad_alloc.
 void filter_image(int flags, int rows, int columns, std::vector<std::uint16_t>& pixels);

@@ -19,7 +19,7 @@ struct Log {
   }
 };
 
-// Never destroyed, because other threads of the program may still log while the process ends.
+// The log is never destroyed, because other threads of the program may still log while the process ends.
 Log& the_log() {
   static Log& log = *new Log;
   return log;

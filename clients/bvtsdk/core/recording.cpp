@@ -29,7 +29,7 @@ bool read_all(std::FILE* file, std::uint8_t* to, std::size_t size) { return std:
 
 bool write_all(std::FILE* file, const Bytes& bytes) { return std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size(); }
 
-/// Fills in the index entry of a frame. False: frames of that type are not in the index, or the payload is too short.
+/// Fills in the index entry of a frame. Returns false if frames of that type are not in the index, or the payload is too short.
 bool place_of(FrameType type, BytesView payload, FramePlace& place) {
   Reader reader(payload);
   place.type = type;

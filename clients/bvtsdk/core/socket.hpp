@@ -25,7 +25,7 @@ class Descriptor {
   int fd_;
 };
 
-/// Splits "host" or "host:port". False when the host is empty or the port is not a number from 1 to 65535.
+/// Splits "host" or "host:port". Returns false if the host is empty or the port is not a number from 1 to 65535.
 bool split_endpoint(const std::string& endpoint, std::string& host, std::string& port);
 
 /// Connects to the first address of the host that accepts. Returns lookup_host if the name is unknown, or connection_timed_out if

@@ -1,5 +1,5 @@
 // The source or target of a sonar's pings: a live link, a recording being played, or a recording being written.
-// Used by Sonar and Head; any thread may call.
+// Sonar and Head use it; any thread may call it.
 #pragma once
 
 #include <memory>

@@ -197,7 +197,7 @@ class Lab:
         return self
 
     def add_route(self) -> None:
-        """For drivers that join a multicast group without naming an interface. On a computer the default route serves for that."""
+        """Adds a route for drivers that join a multicast group without naming an interface; computers have a default route."""
         _run(*self.host, "ip", "route", "replace", "224.0.0.0/4", "dev", _HOST_LINK)
 
     def __exit__(self, *_: object) -> None:

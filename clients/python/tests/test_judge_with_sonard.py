@@ -63,7 +63,7 @@ FEW = ("--case", "N00.1", "--case", "L02.1", "--case", "F01.1")
 
 
 class Few(Judging):
-    """Run at every change: the judge runs, and distinguishes a correct driver from one that never recovers."""
+    """This runs at every change: the judge runs, and distinguishes a correct driver from one that never recovers."""
 
     def test_a_right_driver_passes_what_it_must(self):
         index = self.judged("right_driver.py {ip}", *FEW)

@@ -21,7 +21,7 @@ from sonard_client.nmea_to_pose import main
 
 class Sentences(unittest.TestCase):
     def test_known_sentences(self):
-        """With checksums from other sources."""
+        """The checksums come from other sources."""
         self.assertEqual(parse_sentence("$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n").kind, "GGA")
         self.assertEqual(parse_sentence("$PHTRO,0.03,P,0.22,T*56"), Sentence("PHTRO", ("0.03", "P", "0.22", "T")))
         self.assertEqual(parse_sentence("12:00:00.123 $HEHDT,4.55,T*1B").fields, ("4.55", "T"))

@@ -78,7 +78,7 @@ class Scans(unittest.TestCase):
 
 
 class ViewMessages(unittest.TestCase):
-    """Bytes by the rules of protobuf's encoding: field number times 8 plus type, then the value."""
+    """The bytes follow protobuf's encoding: field number times 8 plus type, then the value."""
 
     def test_a_transform(self):
         turn = bytes([0x11]) + struct.pack("<d", -0.5) + bytes([0x21]) + struct.pack("<d", 0.5)  # y, w; x and z are 0

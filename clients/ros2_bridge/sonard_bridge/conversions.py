@@ -1,4 +1,4 @@
-"""Converts between ROS and sonard: frames, poses to lines of JSON, the daemon's status, beams to laser scans. Needs no ROS.
+"""Converts between ROS and sonard: frames, poses to lines of JSON, the daemon's status, beams to laser scans. It needs no ROS.
 
 sonard and ROS (REP 103) use the same frames: the world is ENU, the body is FLU. Only the order of a quaternion differs: x, y, z, w
 in ROS, w, x, y, z in sonard. The images of oculus_sonar_driver (marine_acoustic_msgs) have their own frame: z points ahead, in the

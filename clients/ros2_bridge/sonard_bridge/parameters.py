@@ -1,4 +1,4 @@
-"""The parameters of the node: one table for the node, the launch files and the tests. Needs no ROS."""
+"""The parameters of the node: one table for the node, the launch files and the tests. It needs no ROS."""
 from __future__ import annotations
 
 import math

@@ -1,4 +1,4 @@
-"""Requests sonard's status over HTTP in its own thread, so that a slow reply does not delay poses. Needs no ROS."""
+"""Requests sonard's status over HTTP in its own thread, so that a slow reply does not delay poses. It needs no ROS."""
 from __future__ import annotations
 
 import http.client

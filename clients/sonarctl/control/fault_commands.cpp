@@ -55,7 +55,8 @@ Result<void> print_own_kinds(const FaultArguments& a) {
   return {};
 }
 
-/// With `follow` the subscription comes first, so that no entry is missed between the report and the first event.
+/// Prints the journal. With `follow` the subscription comes first, so that no entry is missed between the report and the first
+/// event.
 Result<void> print_journal(const FaultArguments& a) {
   auto client = ControlClient::open(a.control);
   if (!client) return tl::unexpected(client.error());

@@ -290,7 +290,7 @@ class SonarChecks {
         less_to_compute);
   }
 
-  /// Checks the connected drivers by the daemon's status. A driver without pings is an error.
+  /// Checks the connected drivers with the daemon's status. A driver without pings is an error.
   void check_drivers() {
     if (!sonar_.reported) return;
     const v1::DaemonStatus now = without_us();

@@ -124,7 +124,7 @@ class Gathering {
   }
 
   /// Adds the sonars that a sonard of this computer serves without a control stream, such as a recording. `usual`: the address
-  /// to look at if it serves all.
+  /// to examine if it serves all addresses.
   void add_daemons_sonars(const std::string& usual) {
     for (const PortHolder& daemon : facts_.daemons) {
       auto at = parse_endpoint(daemon.at, {});

@@ -228,7 +228,7 @@ export class Facts {
     const before = this.vehicle;
     this.status = status;
     if (!this.vehicle?.stale) this.staleSince = undefined;
-    else if (before && !before.stale) this.staleSince = now_s();  // a page that was opened later does not know it
+    else if (before && !before.stale) this.staleSince = now_s();  // unknown in a page that was opened later
     this.clock = status.clock || this.clock;
     this.setTime(status.now_ns || ns);
     if (!status.sonars.some((s) => s.name === this.sonar)) this.sonar = status.sonars[0]?.name ?? '';

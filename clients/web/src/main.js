@@ -110,7 +110,7 @@ function choose() {
   connection.want(topics);
 }
 
-/// Called once for each sonar that makes range images and each connection. A recording has no cloud and no settings.
+/// Requests the cloud of all echoes, once per connection and sonar with range images. A recording has no cloud and no settings.
 function showAllEchoes(threshold) {
   const able = facts.maySteer && facts.connection === 'open' && !facts.recording;
   const wanted = able && facts.pictureKind === 'range image' ? facts.sonar : '';

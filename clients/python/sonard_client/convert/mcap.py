@@ -121,7 +121,7 @@ class _Reader:
 
 
 def mcap_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[Recorded]:
-    """seen: receives the types of all topics."""
+    """Reads the messages. seen: receives the types of all topics."""
     reader = _Reader(str(path), warn)
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:

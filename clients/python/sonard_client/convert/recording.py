@@ -92,7 +92,8 @@ def _unpacked(message: Recorded, name: str) -> bytes:
 
 def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optional[str] = None,
                seen: Mapping[str, str] = {}, frame: Optional[str] = None) -> Track:
-    """seen: the types of all topics of the recording. frame: the axes that the user named; None = those of the recording."""
+    """Makes the track. seen: the types of all topics of the recording. frame: the axes that the user named; None = those of the
+    recording."""
     topics: Dict[str, _Topic] = {}
     faults: List[str] = []
     for message in messages:

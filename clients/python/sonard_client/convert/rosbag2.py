@@ -122,7 +122,7 @@ def _rows(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> Iterator[Reco
 
 
 def db3_messages(path: pathlib.Path, warn: Warn, seen: Dict[str, str]) -> List[Recorded]:
-    """seen: receives the types of all topics."""
+    """Reads the messages with poses. seen: receives the types of all topics."""
     found = Kept()
     try:
         found.extend(_rows(path, warn, seen))

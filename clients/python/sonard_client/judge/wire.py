@@ -113,7 +113,7 @@ class DatagramFlow(Connection):
 
 
 class Capture(threading.Thread):
-    """Captures packets from start() to stop(). Needs CAP_NET_RAW, which a process has in its own network namespace.
+    """Captures packets from start() to stop(). It needs CAP_NET_RAW, which a process has in its own network namespace.
 
     interface: "lo" or our end of the veth pair. device: the sonar's address. port: where a driver connects first; tcp_ports:
     further ones. make: None reads no pings."""

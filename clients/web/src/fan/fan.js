@@ -42,7 +42,8 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
-  /// Draws with the graphics processor from now on. Not used with a software renderer, because the table is many times faster.
+  /// Draws with the graphics processor from now on. It is not used with a software renderer, because the table is many times
+  /// faster.
   useGraphics() {
     const canvas = this.canvas.cloneNode();  // a canvas keeps the kind of its first context
     const painter = this.exact ? null : makeFanPainter(canvas);

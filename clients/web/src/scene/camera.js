@@ -89,7 +89,7 @@ export class Camera {
   update(place, heading, aspect) {
     if (place && (this.mode !== 'orbit' || !this.placed)) {
       this.target.copy(place);
-      if (this.mode === 'orbit') this.target.multiplyScalar(0.5).setZ(place.z - 1);  // between the vehicle and what it looks at
+      if (this.mode === 'orbit') this.target.multiplyScalar(0.5).setZ(place.z - 1);  // between the vehicle and the origin, 1 m below the vehicle
       this.placed = true;
     }
     const azimuth = this.azimuth + (this.mode === 'follow' ? heading : 0);
