@@ -17,7 +17,8 @@ struct Parallel::Pool {
   std::mutex mutex;
   std::condition_variable start, finished;
   std::vector<std::thread> workers;
-  int free_places = 0, busy = 0;  // workers that may still join the current call; workers that compute
+  int free_places = 0;  // number of workers that may still join the current call
+  int busy = 0;         // number of workers that compute
   bool stop = false;
 
   std::atomic<std::size_t> next{0};

@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-/// Horner: c[0] + c[1] x + c[2] x^2 + ...
+/// Evaluates c[0] + c[1] x + c[2] x^2 + ...
 template <std::size_t N>
 double polynomial(double x, const double (&c)[N]) {
   double sum = 0;

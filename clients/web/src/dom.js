@@ -12,7 +12,8 @@ export function setClass(element, name) {
   if (element.className !== name) element.className = name;
 }
 
-/// make('button', {class: 'x', onclick}, 'text', child...). Keys that are functions or known properties are set as properties.
+/// Makes an element: make('button', {class: 'x', onclick}, 'text', child...). Options that are properties of the element are set
+/// as properties, others as attributes.
 export function make(tag, options = {}, ...children) {
   const element = document.createElement(tag);
   for (const [key, value] of Object.entries(options)) {
@@ -37,6 +38,6 @@ export function showList(element, content, build) {
   if (focused) [...element.querySelectorAll('a, button, input, select')].find((e) => nameOf(e) === focused)?.focus({ preventScroll: true });
 }
 
-/// A sign beside a coloured element, because its meaning must not depend on the colour.
+/// Makes a sign to stand beside a coloured element, because the meaning must not depend on the colour.
 export const sign = (level) =>
   make('span', { class: `sign ${level}`, 'aria-hidden': 'true' }, level === 'error' || level === 'warning' ? '!' : level === 'ok' ? '✓' : '•');

@@ -5,7 +5,7 @@ const log_lines = 500;
 const replayed_lines = 100;  // limit of the repeated lines of a new connection; the daemon's lines_kept
 const recent_pings = 64;
 const history_s = 60;
-const preview_stalls_s = 3;  // without a preview
+const preview_stalls_s = 3;  // time without a preview after which the rate of previews is 0
 
 const now_s = () => performance.now() / 1000;
 const sameLine = (a, b) => a.ns === b.ns && a.message === b.message && a.name === b.name && a.level === b.level;
@@ -54,7 +54,7 @@ export class Facts {
     this.receivedBytes = 0;
     this.missed = 0;
     this.lastNumber = Infinity;  // number of the ping before
-    this.history = [];  // {time_s, rate} of pings made, the last minute
+    this.history = [];  // {time_s, made, rate} of the sonar's pings in the last minute
     this.droppedAt = new Map();  // client -> time (now_s) of the last increase of its drops
     this.drops = new Map();
     this.movedAt = now_s();  // time of the last change of the daemon's time
@@ -64,7 +64,7 @@ export class Facts {
 
   opened(info) {
     const same = this.info?.sessionId === info.sessionId;
-    const daemonOf = (one) => one?.sessionId.split('-')[0];  // the rest counts its sessions
+    const daemonOf = (one) => one?.sessionId.split('-')[0];  // the rest is the number of the session
     if (this.connection !== 'open') this.replayed = daemonOf(this.info) === daemonOf(info) ? [] : null;
     this.info = info;
     this.connection = 'open';
@@ -255,13 +255,13 @@ export class Facts {
     }
   }
 
-  /// Pings that the page receives in a second; 0 if none has come for preview_stalls_s.
+  /// The rate at which previews are made [Hz]; 0 if the page has received none for preview_stalls_s.
   get previewRate() {
     const last = this.numbered.readings.at(-1);
     return last && now_s() - last.time_s > preview_stalls_s ? 0 : this.numbered.rate;
   }
 
-  /// Pings that the sonar makes in a second; 0 if it has made none for longer than its rate allows.
+  /// The rate at which the sonar makes pings [Hz], over about two seconds; undefined if there are fewer than two readings.
   get rate() {
     const last = this.history.at(-1);
     const first = this.history.findLast((h) => h.time_s <= (last?.time_s ?? 0) - 1.9) ?? this.history[0];

@@ -19,7 +19,7 @@ import { makeRemembered } from './remember.js';
 import { mapNames } from './fan/colours.js';
 import { activeTroubles, titleOf } from './panels/faults.js';
 
-const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: width of the fan, without rings
+const test = Number(new URLSearchParams(location.search).get('test'));  // for tests: the width of a fan without rings
 const look = makeRemembered('look', { theme: '', tab: 'fan' });
 
 const scene_waits_s = 1.5;  // longest wait for the first picture after the connection

@@ -1,10 +1,10 @@
 // Rates of counters that are read from time to time.
 
 const window_s = 4;  // counts are integers: with a shorter window 7.0 would be shown as 6.5
-const slow_window_s = 5;  // below slow_hz
+const slow_window_s = 5;  // the window for rates below slow_hz
 const slow_hz = 2;
 
-/// Readings of one counter; the rate over the last four seconds, or five when it is slow.
+/// The readings of one counter. Its rate is over window_s, or slow_window_s if it is below slow_hz.
 export class Counter {
   readings = [];
 

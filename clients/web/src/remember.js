@@ -1,6 +1,6 @@
 // Choices of the viewer that a browser keeps for the next visit. Without storage they last as long as the page.
 
-/// An object whose properties, with these defaults, are read from and written to localStorage.
+/// Makes an object whose properties are read from localStorage and written to it; `defaults` are their values until then.
 export function makeRemembered(name, defaults) {
   const key = `sonard.${name}`;
   let values = { ...defaults };

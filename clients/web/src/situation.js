@@ -35,7 +35,8 @@ function stands(facts) {
   return { kind: `${clock}-waits`, picture: 'dim', text, button };
 }
 
-/// {kind, picture: 'as is' | 'dim' | 'old' | 'none', text, button?: {label, parameter, value | service, request}}; null = all is well.
+/// Returns {kind, picture: 'as is' | 'dim' | 'old' | 'none', text, button?: {label, parameter, value | service, request}}, or
+/// null if all is well.
 export function situationOf(facts, connection) {
   if (facts.connection === 'token') return { kind: 'token', picture: 'none', text: `${facts.tokenRefused ? 'That token was refused. ' : ''}Enter the token of sonard: the text in the file that control.token_file names.` };
   if (facts.connection !== 'open') return { kind: 'lost', picture: 'old', text: lost(facts, connection) };
@@ -67,7 +68,7 @@ export function situationOf(facts, connection) {
   return null;
 }
 
-/// Short remarks above the picture: {text, level, title}.
+/// Returns the short remarks above the picture: {text, level, title}.
 export function badgesOf(facts) {
   const out = [];
   const sonar = facts.sonarStatus;

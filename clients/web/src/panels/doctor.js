@@ -17,7 +17,7 @@ function item(finding, clear) {
   );
 }
 
-/// `steering.clear(fault)` ends it.
+/// Draws the findings. `steering.clear(fault)` ends a fault.
 export function drawDoctor(facts, steering) {
   const findings = facts.connection === 'open' ? facts.findings : null;
   setText($('checked'), findings ? `${Math.max(0, Math.round(now_s() - facts.checkedAt))} s ago` : dash);

@@ -4,10 +4,10 @@ import { countdown } from '../numbers.js';
 
 /// "thin_tether" and "thin-tether" -> "Thin tether".
 export const titleOf = (trouble) => trouble.replace(/[-_]/g, ' ').replace(/^./, (c) => c.toUpperCase());
-/// The requested fault: a trouble or a single kind. Its kinds are separate faults with the same `do`.
+/// Returns the requested fault: a trouble or a single kind. The kinds of a trouble are separate faults with the same `do`.
 export const troubleOf = (fault) => fault.do || fault.name;
 
-/// The faults that are active or waiting, one entry per trouble and sonar: {trouble, sonar, names, ends_ns, by}.
+/// Returns the faults that are active or waiting, one entry per trouble and sonar: {trouble, sonar, names, ends_ns, by}.
 export function activeTroubles(facts) {
   const groups = new Map();
   for (const fault of facts.faults) {
@@ -22,7 +22,7 @@ export function activeTroubles(facts) {
   return [...groups.values()];
 }
 
-/// Parameters /faults/TROUBLE, or /faults/SONAR/TROUBLE: {name, trouble, sonar}.
+/// Returns the parameters /faults/TROUBLE, or /faults/SONAR/TROUBLE: {name, trouble, sonar}.
 function offered(facts) {
   const out = [];
   for (const name of facts.parameters.keys()) {
@@ -49,10 +49,10 @@ function card(group, about) {
 }
 
 const aboutOf = (trouble, facts) => facts.troubles.get(trouble.replace(/_/g, '-'));
-/// The reason why the trouble cannot act on the sonar; undefined if it can.
+/// Returns the reason why the trouble cannot act on the sonar; undefined if it can.
 const whyNot = (trouble, facts) => aboutOf(trouble, facts)?.cannot_act.find((entry) => entry.key === facts.sonar)?.value;
 
-/// A button that begins a trouble, with its description or the reason why it cannot act.
+/// Makes a button that begins a trouble, with its description or the reason why it cannot act.
 function button({ name, trouble }, facts, able, steering) {
   const about = aboutOf(trouble, facts);
   const cannot = whyNot(trouble, facts);

@@ -6,8 +6,8 @@ const names = { 3: 'warning', 4: 'error', 5: 'error' };
 const near_end_px = 30;
 const field = / +([a-z_]+)=("(?:[^"\\]|\\.)*"|\S*)/g;
 
-/// "viewer connected  from=\"http 127.0.0.1\"  steers=yes": {words: 'viewer connected', fields: 'from http 127.0.0.1 · steers yes'}.
-/// The field `hidden` is left out.
+/// Splits a line, without its field `hidden`. "viewer connected  from=\"http 127.0.0.1\"  steers=yes" becomes
+/// {words: 'viewer connected', fields: 'from http 127.0.0.1 · steers yes'}.
 export function partsOf(message, hidden = '') {
   const fields = [];
   const words = message.replace(field, (_, key, value) => {

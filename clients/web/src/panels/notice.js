@@ -1,4 +1,4 @@
-// The sentence over the fan, its button, and the badges beside the ping's number.
+// Shows the sentence over the fan, its button, and the badges beside the ping's number.
 import { $, make, setHidden, setText, showList, sign } from '../dom.js';
 import { badgesOf, situationOf } from '../situation.js';
 

@@ -5,7 +5,7 @@ import {
 } from 'three.module.js';
 import { table_entries } from '../fan/layout.js';
 
-/// A box of the size of a small vehicle, with a cone at the bow; hollow() is called while it has no poses.
+/// Makes a box of the size of a small vehicle, with a cone at the bow; call hollow() while the vehicle has no poses.
 export function makeVehicle() {
   const group = new Group();
   const paint = new MeshPhongMaterial({ color: 0xe0a526, shininess: 20 });
@@ -18,7 +18,7 @@ export function makeVehicle() {
   return { group, hollow: (yes) => (body.visible = !yes) };
 }
 
-/// A line through the positions of the last minute.
+/// Makes a line through the positions of the last minute.
 export function makeTrail() {
   const most = 900;
   const points = [];  // {t, x, y, z}
@@ -50,7 +50,7 @@ export function makeGrid() {
   return grid;
 }
 
-/// Lines of a SceneUpdate's entity: pairs of points.
+/// Makes the lines of a SceneUpdate's entity. Its points are pairs.
 export function makeLines(lines) {
   const points = lines.flatMap((line) => line.points.flatMap((p) => [p.x, p.y, p.z]));
   const geometry = new BufferGeometry();
@@ -58,7 +58,7 @@ export function makeLines(lines) {
   return new LineSegments(geometry, new LineBasicMaterial({ color: 0x4fb8ff, transparent: true, opacity: 0.65 }));
 }
 
-/// A PointCloud, whose points begin with x, y and z.
+/// Makes the points of a PointCloud; each begins with x, y and z.
 export function makePoints({ point_stride, data }) {
   const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
   const places = [];
@@ -99,7 +99,7 @@ const texture = (array, width, height, format, type) => {
   return made;
 };
 
-/// The sonar's plane: x ahead, y to port. show(fan) takes over the ping, colour map and gain that the fan shows.
+/// Makes the sonar's plane: x ahead, y to port. show(fan) takes over the ping, colour map and gain that the fan shows.
 export function makeFanPlane() {
   const uniforms = { strength: { value: 1 } };
   for (const name of ['samples', 'table', 'colours', 'azimuths', 'shape', 'ranges', 'gain']) uniforms[name] = { value: null };
@@ -119,7 +119,7 @@ export function makeFanPlane() {
     uniforms[name].value = value;
   };
 
-  /// A sector that covers the fan, in slices; the shader cuts it exactly.
+  /// Makes a sector of slices that covers the fan; the shader cuts it exactly.
   const shape = ({ first, last }, reach) => {
     const slices = Math.max(8, Math.ceil((first - last) / 0.1));
     const reached = reach / Math.cos((first - last) / slices / 2);
@@ -157,7 +157,7 @@ export function makeFanPlane() {
   return { mesh, show };
 }
 
-/// Samples as bytes: those of more bits are scaled to the brightest.
+/// Returns the samples as bytes: those of more bits are scaled to the brightest.
 function bytesOf({ samples, full_scale, shades }) {
   if (samples instanceof Uint8Array) return samples;
   return Uint8Array.from(samples, (v) => 255 * Math.min(1, v / full_scale) ** shades.gamma);

@@ -35,8 +35,8 @@ export function readGlb(bytes) {
 
 const most_triangles = 20000, fewest_triangles = 2000, most_cells_aside = 1600;
 
-/// A geometry with fewer triangles, for software renderers, whose time for a frame grows with their number. A long thin mesh has
-/// smaller cells, because in large ones few of its triangles remain, or none.
+/// Returns a geometry with fewer triangles, for software renderers, whose time for a frame grows with their number. A long thin
+/// mesh has smaller cells, because in large ones few of its triangles remain, or none.
 export function coarsened(geometry) {
   if (!geometry.index || geometry.index.count < 3 * most_triangles) return geometry;
   geometry.computeBoundingBox();
@@ -49,7 +49,7 @@ export function coarsened(geometry) {
   return geometry;
 }
 
-/// The indices of the triangles that remain if only the first vertex in a cell does.
+/// Returns the indices of the triangles that remain if each cell keeps only its first vertex.
 function keptIn(cells_aside, { index, attributes, boundingBox: { min, max } }) {
   const places = attributes.position.array;
   const cell = Math.max(max.x - min.x, max.y - min.y, max.z - min.z) / cells_aside;

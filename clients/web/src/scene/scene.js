@@ -9,12 +9,13 @@ import { coarsened, readGlb } from './glb.js';
 const water = 0x0b2233;
 const least_interval_ms = 1000 / 15;
 const slow_ms = 60;  // a frame that takes longer is slow
-const free_ms = 17;  // a frame's end is noticed one frame of the browser later
+const free_ms = 17;  // the browser reports the end of a frame one of its own frames later
 const rest_ms = 100;  // pause after the press of a button or key, so that its effect is painted before the next frame
 const click_px = 4;
 
 export class Scene {
-  /// `software`: without a graphics processor. Smooth edges take two thirds of a frame's time there, and clicks wait for frames.
+  /// `software` is true without a graphics processor. Smooth edges take two thirds of a frame's time there, and clicks wait for
+  /// frames.
   constructor(facts, fan, software) {
     this.facts = facts;
     this.fan = fan;
@@ -47,7 +48,7 @@ export class Scene {
     this.canvas.addEventListener('click', (event) => this.pick(event));
   }
 
-  /// The new view is drawn at once, because nothing else shows the press.
+  /// Selects a view. It is drawn at once, because nothing else shows that the button was pressed.
   use(mode) {
     this.restUntil = 0;
     this.camera.use(mode);
@@ -195,8 +196,8 @@ export class Scene {
     gl.flush();
   }
 
-  /// True if the last frame is drawn; never waits for it. On slow machines the scene takes half of the pixels, and leaves most of the
-  /// time to the rest of the page.
+  /// True if the last frame is drawn; never waits for it. On slow machines the scene has half as many pixels, and leaves most of
+  /// the time to the rest of the page.
   finished(now) {
     if (!this.fence) return true;
     const gl = this.renderer.getContext();

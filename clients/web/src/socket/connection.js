@@ -13,7 +13,7 @@ export class Connection {
     this.tries = 0;
     this.lostAt = null;  // performance.now() of the loss; null = connected
     this.retryAt = 0;
-    this.topics = new Set();  // wanted
+    this.topics = new Set();  // topics to subscribe to
     this.forget();
   }
 
@@ -60,10 +60,10 @@ export class Connection {
       if (socket !== this.socket) return;
       if (this.lostAt === null || this.tries === 0) this.on.lost();
       this.lostAt ??= performance.now();
-      if (!this.heard && (await this.refused())) return this.on.needsToken(false);
+      if (!this.greeted && (await this.refused())) return this.on.needsToken(false);
       this.retry();
     };
-    this.heard = false;
+    this.greeted = false;  // true once serverInfo has come
   }
 
   /// Returns whether the socket was refused because the token is missing. Browsers do not report that, so this sends a request.
@@ -93,8 +93,8 @@ export class Connection {
   word(word) {
     switch (word.op) {
       case 'serverInfo':
-        if (!this.heard) this.forget();  // later messages of a connection do not change channels and subscriptions
-        this.heard = true;
+        if (!this.greeted) this.forget();  // later messages of a connection do not change channels and subscriptions
+        this.greeted = true;
         this.tries = 0;
         this.lostAt = null;
         this.on.open(word);
@@ -171,7 +171,7 @@ export class Connection {
     if (frame?.op !== 'data') return;
     const channel = this.subscriptions.get(frame.subscription);
     if (!channel) return;
-    // Parsed here, because most channels are never subscribed to.
+    // A channel's descriptors are parsed here, because most channels are never subscribed to.
     channel.types ??= readDescriptors(Uint8Array.from(atob(channel.schema), (c) => c.charCodeAt(0)));
     this.on.message(channel.topic, decode(channel.types, channel.schemaName, frame.payload), frame.ns);
   }

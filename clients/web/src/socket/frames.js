@@ -2,7 +2,7 @@
 
 const utf8 = new TextDecoder();
 
-/// {op: 'data', subscription, ns, payload}, {op: 'time', ns}, {op: 'answer', call, payload}; null for other opcodes.
+/// Returns {op: 'data', subscription, ns, payload}, {op: 'time', ns} or {op: 'answer', call, payload}; null for other opcodes.
 export function readFrame(buffer) {
   const view = new DataView(buffer);
   switch (view.getUint8(0)) {
@@ -19,7 +19,7 @@ export function readFrame(buffer) {
   }
 }
 
-/// A call of a service whose request is JSON.
+/// Returns the frame that calls a service; `request` is sent as JSON.
 export function callFrame(service, call, request) {
   const words = new TextEncoder().encode('json' + JSON.stringify(request));
   const frame = new Uint8Array(13 + words.length);

@@ -65,7 +65,7 @@ const kinds = {
   18: [0, (r) => zigzag(r.varint()), 0],
 };
 
-/// A field of a message type. `type`: for a message, the full name of its type, such as sonar.v1.Event.
+/// Makes a field of a message type. `type`: for a message, the full name of its type, such as sonar.v1.Event.
 const field = (name, kind, repeated = false, type = '') => ({ name, kind, repeated, type });
 
 // The part of descriptors that is needed to read descriptors themselves (google/protobuf/descriptor.proto).
@@ -76,7 +76,7 @@ const ofDescriptors = new Map([
   ['Field', new Map([[1, field('name', 9)], [3, field('number', 5)], [4, field('label', 14)], [5, field('kind', 14)], [6, field('type', 9)]])],
 ]);
 
-/// The message types of a FileDescriptorSet: name -> (number -> field). Names have no dot in front.
+/// Returns the message types of a FileDescriptorSet: name -> (number -> field). Names have no dot in front.
 export function readDescriptors(bytes) {
   const types = new Map();
   const add = (message, prefix) => {
