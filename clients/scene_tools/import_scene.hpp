@@ -1,5 +1,5 @@
-// `sonarctl scene import`: converts a Gazebo world or model, or a URDF, to a scene file: finds and tries meshes
-// and heightmaps, chooses materials, writes and checks the result.
+// `sonarctl scene import`: converts a Gazebo world or model, or a URDF, to a scene file. It finds meshes
+// and heightmaps, tests them, chooses materials, and writes and checks the scene file.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ struct ImportOptions {
   std::vector<std::filesystem::path> model_folders;
   ReadOptions read;
   std::vector<std::string> materials;  // NAME for everything, MODEL=NAME for one model and what is in it
-  std::vector<std::string> moving;     // models by path
+  std::vector<std::string> moving;     // paths of the models that move
   Vec3d offset_m = {};
   bool check = true;  // load every mesh, and finally the scene, as the daemon does
   bool overwrite = false;
@@ -34,10 +34,10 @@ struct Imported {
 /// on disk, so that the user can inspect it.
 Result<Imported> import_scene(const ImportOptions& options);
 
-// Describes the content of a scene file in numbers that its author can check: `sonarctl scene info` and the basis of
-// `sonarctl scene check`. Uses the scene loader of the daemon.
+// The functions below describe the content of a scene file in numbers that its author can check. `sonarctl scene info` prints
+// them, and `sonarctl scene check` uses them. The loader is that of the daemon.
 
-// Numbers, lengths and sizes of a scene as text. Internal to the scene tools.
+// Numbers, lengths and sizes of a scene as text. Only the scene tools use these functions.
 
 /// 139000 -> "139 000"
 std::string grouped(std::size_t number);
@@ -55,13 +55,13 @@ struct DescribedObject {
   std::vector<std::string> materials = {};
   std::size_t triangles = 0;
   Extent own = {}, in_world = {};  // along its own axes, and along the world's axes at its pose in the scene
-  std::string moves_with = {};     // the moving object that it is or is attached to
+  std::string moves_with = {};     // name of the moving object: itself, or the one that it is attached to
   bool visible = true;
 };
 
 struct DescribedMaterial {
   std::string name, law;
-  double strength_db = 0;  // at normal incidence and the trend's reference frequency
+  double strength_db = 0;  // at normal incidence and at trend_reference_hz
   double roughness_m = 0, reflection = 0;
   std::size_t objects = 0, triangles = 0;  // 0: not used, or only as a base of other materials
 };
@@ -80,12 +80,12 @@ struct SceneDescription {
   std::vector<std::string> notes;  // the loader's
 };
 
-/// Returns the errors of the daemon. `file` may also name a built-in scene.
+/// Its errors are those of the daemon. `file` may also name a built-in scene.
 Result<SceneDescription> describe_scene(const std::filesystem::path& file);
 
 /// Remarks on a valid scene for its author.
 struct Remarks {
-  std::vector<std::string> warnings;  // probably unintended
+  std::vector<std::string> warnings;  // parts of the scene that are probably unintended
   std::vector<std::string> notes;
 };
 Remarks remarks_on(const SceneDescription& scene);

@@ -63,8 +63,9 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options, bool* t
   if (!token) return tl::unexpected(token.error());
   auto socket = connect_tcp(*at, options.connect_patience);
   if (!socket && socket.error().kind == ErrorKind::unavailable)
-    return failure(ErrorKind::unavailable, "no sonard answers on the control stream, tcp " + text_from(*at) +
-                                               ": is one running there? Its banner names the address (--control HOST:PORT)");
+    return failure(ErrorKind::unavailable,
+                   "no sonard answers on the control stream, tcp " + text_from(*at) +
+                       ". Is sonard running there? Its banner names the address (--control HOST:PORT; for poses --to)");
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
   const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, greeting_patience);
@@ -126,10 +127,10 @@ Result<std::shared_ptr<const v1::Event>> ControlClient::next_event(std::chrono::
 }
 
 Error ControlClient::no_control_stream(const std::string& why) const {
-  return {ErrorKind::bad_data, "the service at tcp " + text_from(at_) + " is not sonard's control stream (" + why +
-                                   "): another service, or a suspended sonard. The control stream is on tcp " +
-                                   std::to_string(control_port) +
-                                   " unless configured otherwise; sonard's banner names it (--control HOST:PORT)"};
+  return {ErrorKind::bad_data,
+          "the service at tcp " + text_from(at_) + " does not answer as sonard's control stream (" + why +
+              "): it is another service, or sonard is suspended. The control stream is on tcp " + std::to_string(control_port) +
+              " unless configured otherwise; sonard's banner names it (--control HOST:PORT; for poses --to)"};
 }
 
 /// Returns null when the time is over or, with `until_signal`, after a signal.

@@ -242,7 +242,7 @@ Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t size = ::send(socket.fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (size < 0 && errno == EINTR) continue;
-    if (size < 0) return failure(ErrorKind::io, std::string("cannot send: ") + std::strerror(errno));
+    if (size < 0) return failure(ErrorKind::io, std::string("cannot send over the connection: ") + std::strerror(errno));
     bytes = bytes.subspan(static_cast<std::size_t>(size));
   }
   return {};

@@ -94,8 +94,9 @@ std::vector<std::byte> bytes_of(const std::string& text) {
 
 /// Sends over a connected UDP socket, which reports after the first datagram if no program listens.
 Result<void> send_datagram(const Socket& socket, const Endpoint& to, const std::vector<std::byte>& datagram) {
-  const tl::unexpected<Error> no_listener = failure(
-      ErrorKind::unavailable, "no program listens on udp " + text_from(to) + ": is sonard running with poses there? (--to)");
+  const tl::unexpected<Error> no_listener =
+      failure(ErrorKind::unavailable, "no program listens on udp " + text_from(to) +
+                                          ": does sonard run there, and receive poses at this port? (--to HOST:PORT)");
   if (!write_all(socket, datagram)) return no_listener;
   std::array<std::byte, 16> nothing;
   if (read_some(socket, nothing, std::chrono::milliseconds(5)).what == Wait::closed) return no_listener;
@@ -126,7 +127,7 @@ Result<void> check(const PoseOptions& options) {
   if (!options.vehicle.empty() && !options.object.empty())
     return failure(ErrorKind::usage, "give either --vehicle or --object, not both");
   if (options.json && (options.confirm || !options.object.empty()))
-    return failure(ErrorKind::usage, "--json is for datagrams about a vehicle; leave out --json to move objects or to --confirm");
+    return failure(ErrorKind::usage, "--json is for datagrams about a vehicle; leave out --json, or both --object and --confirm");
   return {};
 }
 

@@ -21,7 +21,7 @@ void add_pose_options(CLI::App& command, PoseOptions& options) {
   command.add_option("--vehicle", options.vehicle, "name of the vehicle, if there are several");
   command.add_option("--object", options.object, "move an object of the scene instead");
   command.add_option("--rate", options.rate_hz, "poses per second")->check(number(0.001, 1000.0))->capture_default_str();
-  command.add_option("--seconds", options.seconds, "how long; 0 = once, one turn, one line")->check(number(0));
+  command.add_option("--seconds", options.seconds, "duration in seconds; 0 = one pose, one turn or one line")->check(number(0));
 }
 
 void add_triple(CLI::App& command, const std::string& name, std::vector<double>& value, const std::string& help) {
@@ -66,7 +66,7 @@ Run add_pose(CLI::App& app) {
   for (CLI::App* command : {&once, &circle, &line}) add_pose_options(*command, *options);
   return [options]() -> Result<void> {
     if (options->path == PoseOptions::Path::circle && std::abs(options->period_s) < 0.01)
-      return failure(ErrorKind::usage, "--period must be at least 0.01 s either way");
+      return failure(ErrorKind::usage, "--period must be 0.01 s or more, or -0.01 s or less (clockwise)");
     return send_poses(*options);
   };
 }

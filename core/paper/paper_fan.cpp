@@ -7,7 +7,7 @@ namespace {
 
 constexpr double widest_half_angle_rad = 1.48;  // 85 degrees: an image plane has no pixels at 90
 
-/// Widths of columns: half the distance between both neighbours. The outermost columns have the width of their neighbours.
+/// Width of each column: half the distance between its neighbours; for an outermost column, the distance to its neighbour.
 std::vector<double> widths_of(const std::vector<double>& centres, double lone) {
   const std::size_t n = centres.size();
   if (n < 2) return std::vector<double>(n, lone);
@@ -37,7 +37,7 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
   PaperFan fan;
   fan.perspective = mode == Mode::raster;
   fan.rows = rays > 0 ? rays : fan.perspective ? default_raster_rows : default_rays;
-  // Half of the fan's angle. The fan's angle is twice the quoted width, as in P25.
+  // Half of the fan's angle. The fan's angle is twice the quoted width, as in Choi 2025 (P25).
   const double vertical = std::min(static_cast<double>(plan.mode.pattern.elevation_width_rad), widest_half_angle_rad);
   const double top = fan.perspective ? std::tan(vertical) : vertical;
   fan.row_step = 2 * top / fan.rows;
@@ -46,7 +46,7 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
 
   const double aperture = static_cast<double>(plan.mode.horizontal_aperture_rad);
   if (!fan.perspective) {
-    // Constant azimuth, not a cone about the array (O46).
+    // A column has a constant azimuth; it is not a cone about the array (O46).
     for (const double sine : plan.beam_sine) fan.azimuth_rad.push_back(std::asin(sine));
     fan.column_width = widths_of(fan.azimuth_rad, aperture);
     tabulate(fan);
@@ -71,7 +71,7 @@ Vec3d PaperFan::direction(int column, int row) const {
 
 double PaperFan::solid_angle_sr(int column, int row) const {
   const double cell = column_width[static_cast<std::size_t>(column)] * row_step;
-  // P25's (2) as printed: dtheta dphi, without cos(phi) [sr].
+  // The solid angle [sr] of P25's eq. (2) as printed: dtheta dphi, without cos(phi).
   if (!perspective) return cell;
   const double x = direction(column, row).x;  // a pixel of the plane x = 1 has the solid angle dy dz x^3
   return cell * x * x * x;

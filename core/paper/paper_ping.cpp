@@ -11,7 +11,7 @@
 namespace sonar::paper {
 namespace {
 
-constexpr int sum_width = 8;              // width of the fast sum, for a relative error of 1e-7
+constexpr int sum_width = 8;              // grid points for each echo in the fast sum; its relative error is 1e-7
 constexpr double width_constant = 0.884;  // from P25's code, for sinc patterns: -3 dB width times aperture
 
 /// The comparison modes have no motion within the ping.
@@ -82,7 +82,7 @@ class PaperPing {
         now_s_(now_s),
         statistics_(statistics),
         work_(static_cast<std::size_t>(pool.threads())) {
-    // Number of floats: one per sample in expected power, else two per frequency. Kernels of beams need multiples of 32.
+    // Number of floats: one per sample in expected power, else two per frequency. Kernels that form beams need multiples of 32.
     values_ = static_cast<std::size_t>((p_.plan.expected_power ? p_.plan.samples : 2 * p_.spectrum.count) + 31) / 32 * 32;
     columns_.resize(values_ * static_cast<std::size_t>(p_.fan.columns()));
     if (request.switches.keep_truth) truth_.resize(static_cast<std::size_t>(p_.fan.columns()));
@@ -115,13 +115,13 @@ class PaperPing {
   PingStatistics& statistics_;
   std::vector<Work> work_;  // per worker
   std::vector<PointInView> points_;
-  std::size_t values_ = 0;  // floats per column, a multiple of a vector: the spectrum, or samples in expected power
+  std::size_t values_ = 0;  // floats per column, a multiple of 32: the spectrum, or the samples in expected power
   std::vector<float> columns_, beams_;
   std::vector<BeamTruth> truth_;
 };
 
 void PaperPing::simulate_columns() {
-  // Above the sea surface there are no echoes, and these modes have no noise.
+  // A blank ping has no echoes, and these modes have no noise.
   if (request_.blank) return;
   points_ = points_in_view(scene_, p_, s_, request_);
   pool_.for_each(static_cast<std::size_t>(p_.fan.columns()), [&](std::size_t column, int worker) {
@@ -141,7 +141,7 @@ void PaperPing::simulate_column(int column, Work& work) {
   const double begin = now();
   std::vector<PaperHit>& hits = work.hits;
   hits.clear();
-  // Traces the rays of one column and applies eq. 2 to each hit.
+  // Traces the rays of one column; echoes_of() below applies eq. 2 to each hit.
   trace_column(scene_, p_.fan, s_, column, static_cast<float>(s_.max_range_m), hits);
   const double traced = now();
   if (!truth_.empty())
@@ -161,8 +161,7 @@ void PaperPing::simulate_column(int column, Work& work) {
     for (std::size_t i = 0; i < echoes.size(); ++i)
       p_.pulse_power->add(echoes[i], out.first(static_cast<std::size_t>(p_.plan.samples)));
   } else {
-    // An array of complex numbers may be read as an array of floats.
-    // Eq. 1 for this column, times |S(f)|.
+    // Eq. 1 for this column, times |S(f)|. The floats of `out` are the real and imaginary parts of complex numbers.
     sum_frequencies(echoes, p_.spectrum, p_.fast.get(), kernels_, work.sum,
                     {reinterpret_cast<std::complex<float>*>(out.data()), static_cast<std::size_t>(p_.spectrum.count)});
   }
@@ -216,7 +215,7 @@ Ping PaperPing::image() {
 
 /// Computes envelope, gain and codes, one window of rows at a time.
 void PaperPing::receive_rows(const BeamSignals& signals, Ping& ping) {
-  // Number of rows of a task, small enough to stay in the cache from envelope to codes.
+  // Rows of a task: few enough for their data to stay in the cache from envelope to codes.
   constexpr int rows_at_once = 64;
   struct Scratch {
     BeamSignals window;
@@ -256,7 +255,7 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   if (!even)
     correction =
         panels_of(make_correction(fan.azimuth_rad, spacing, plan.expected_power), plan.settings.beam_count, fan.columns());
-  // D(phi) = sinc(0.884 sin(phi) / width), one pattern of the quoted width (section 8).
+  // D(phi) = sinc(0.884 sin(phi) / width), one pattern of the quoted width (decision 0010).
   if (plan.mode.pattern.elevation_taper != Taper::unit)
     elevation_per_sine = width_constant / static_cast<double>(plan.mode.pattern.elevation_width_rad);
   // In a fan each row has one elevation. On an image plane the elevation also depends on the column.
@@ -270,7 +269,7 @@ Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared&
               Parallel& pool, double (*now_s)(), PingStatistics& statistics) {
   PaperPing ping(scene, request, prepared, kernels, pool, now_s, statistics);
   ping.simulate_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, one column per beam
-  ping.correct_beams();     // "as coded"
+  ping.correct_beams();     // by the weights "as coded" in P25's program (make_correction)
   return ping.image();
 }
 

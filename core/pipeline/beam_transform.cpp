@@ -22,7 +22,7 @@ int smooth_size(int n) {
 }
 
 /// e^{-i 2 pi i m / size} for m = 1 ... most: the twiddle factors of a pass.
-void append_turns(int size, int count, int most, std::vector<float>& turns) {
+void append_twiddles(int size, int count, int most, std::vector<float>& turns) {
   for (int i = 0; i < count; ++i)
     for (int m = 1; m <= most; ++m) {
       const double angle = -2 * pi * static_cast<double>(static_cast<long>(i) * m % size) / size;
@@ -31,7 +31,7 @@ void append_turns(int size, int count, int most, std::vector<float>& turns) {
     }
 }
 
-/// Solves a x = b for a symmetric, positive a, by Gauss's method without pivots.
+/// Solves a x = b for a symmetric positive definite a, by Gaussian elimination without pivoting.
 std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
   const std::size_t n = b.size();
   for (std::size_t k = 0; k < n; ++k)
@@ -50,7 +50,7 @@ std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
 /// Weights of `taps` values at 0, 1, ... that give the value at `place`, by least squares, for any signal whose spectrum lies
 /// within +-band / 2 cycles per step.
 std::vector<double> weights_between(int taps, double place, double band) {
-  constexpr double ridge = 1e-13;  // the matrix is nearly singular; for the same reason a few taps are enough
+  constexpr double ridge = 1e-13;  // oversampling makes the matrix nearly singular; it is also why a few taps are enough
   std::vector<double> matrix, right;
   for (int a = 0; a < taps; ++a) {
     for (int b = 0; b < taps; ++b) matrix.push_back(sinc(band * (a - b)) + (a == b ? ridge : 0));
@@ -67,15 +67,15 @@ BeamTransformTables::BeamTransformTables(const ReceivePattern& pattern, const Co
   lay_out(columns.count, static_cast<int>(beam_sines.size()));
   std::vector<double> of_distance;
   for (int d = 0; d < columns.count; ++d) of_distance.push_back(pattern(d * columns.spacing));
-  weigh(of_distance);
-  read_between(pattern.aperture_wavelengths * columns.spacing, columns, beam_sines);
+  transform_weights(of_distance);
+  compute_interpolation(pattern.aperture_wavelengths * columns.spacing, columns, beam_sines);
   point_at_tables();
 }
 
 BeamTransformTables::BeamTransformTables(const std::vector<double>& of_distance) {
   const int count = static_cast<int>(of_distance.size());
   lay_out(count, count);
-  weigh(of_distance);
+  transform_weights(of_distance);
   tables_.taps = 1;
   between_.assign(of_distance.size(), 1.0f);
   for (int j = 0; j < count; ++j) first_column_.push_back(j);
@@ -97,7 +97,7 @@ void BeamTransformTables::point_at_tables() {
 }
 
 void BeamTransformTables::plan_passes() {
-  append_turns(4 * tables_.quarter, tables_.quarter, 3, split_);
+  append_twiddles(4 * tables_.quarter, tables_.quarter, 3, split_);
   // The last pass has no factors and is combined with the first inverse pass. Radix 4 needs the fewest operations per value.
   // Radix 6 replaces passes of 2 and 3, because loads and stores limit the speed of every pass.
   const auto largest = [](int size, std::initializer_list<int> radices) {
@@ -106,15 +106,16 @@ void BeamTransformTables::plan_passes() {
   const int last = largest(tables_.quarter, {4, 3, 2});
   for (int size = tables_.quarter; size > 1;) {
     const int radix = size == last ? last : largest(size / last, {4, 6, 3, 2});
-    append_turns(size, size / radix, radix - 1, turns_.emplace_back());
+    append_twiddles(size, size / radix, radix - 1, turns_.emplace_back());
     tables_.level[tables_.levels++] = {radix, size, nullptr};
     size /= radix;
   }
   for (int l = 0; l < tables_.levels; ++l) tables_.level[l].turns = turns_[static_cast<std::size_t>(l)].data();
 }
 
-/// Computes the transform of the weights, which is real because the weights are symmetric. Larger distances are not needed.
-void BeamTransformTables::weigh(const std::vector<double>& of_distance) {
+/// Computes the transform of the weights, which is real because the weights are symmetric. Distances beyond
+/// those in `of_distance` do not occur.
+void BeamTransformTables::transform_weights(const std::vector<double>& of_distance) {
   const int size = 4 * tables_.quarter;
   std::vector<double> cosine, weight;
   for (int i = 0; i < size; ++i) cosine.push_back(std::cos(2 * pi * i / size));
@@ -138,8 +139,8 @@ void BeamTransformTables::weigh(const std::vector<double>& of_distance) {
     }
 }
 
-void BeamTransformTables::read_between(double aperture_in_spacings, const Columns& columns,
-                                       const std::vector<double>& beam_sines) {
+void BeamTransformTables::compute_interpolation(double aperture_in_spacings, const Columns& columns,
+                                                const std::vector<double>& beam_sines) {
   const auto place_of = [&](double sine) { return (columns.first_sine - sine) / columns.spacing; };
   const bool on_columns = std::all_of(beam_sines.begin(), beam_sines.end(),
                                       [&](double sine) { return std::abs(place_of(sine) - std::round(place_of(sine))) < 1e-6; });

@@ -42,9 +42,9 @@ class BeamTransformTables {
  private:
   void lay_out(int columns, int beams);
   void plan_passes();
-  void weigh(const std::vector<double>& of_distance);
+  void transform_weights(const std::vector<double>& of_distance);
   void point_at_tables();
-  void read_between(double aperture_in_spacings, const Columns& columns, const std::vector<double>& beam_sines);
+  void compute_interpolation(double aperture_in_spacings, const Columns& columns, const std::vector<double>& beam_sines);
 
   simd::BeamTransform tables_;
   std::vector<float> split_, response_, between_;

@@ -1,4 +1,4 @@
-// The Ping1D: its product, the checks of its settings, its automatic mode, and the frames of a ping. Pure functions; sources:
+// The Ping1D: its model, the checks of its settings, its automatic mode, and the frames of a ping. Pure functions; sources:
 // protocol/ping/README.md.
 #pragma once
 
@@ -41,7 +41,7 @@ inline Results results_of(Id id) {
 struct Settings {
   std::uint8_t id = 1;  // id of the device
   Parameters parameters;
-  Results results = no_result;  // results for which the ping is fired; without a host: the profile
+  Results results = no_result;  // results that hosts requested; no_result: no host did, and the profile is sent
 };
 /// Compares settings without the results, which differ from ping to ping.
 bool same_settings(const Settings& a, const Settings& b);
@@ -55,7 +55,7 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 
 /// The reason if the device refuses the parameters, else an empty text.
 std::string complaint(const Parameters& parameters);
-/// Duration of its pulse.
+/// Duration of the pulse with these parameters.
 std::uint16_t transmit_us(const Parameters& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
@@ -66,11 +66,11 @@ using ping::find_echo;
 /// The automatic mode: range and gain after a ping in which `echo` was found.
 Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
-/// The frames for Settings::results, in the order of their numbers.
+/// The frames for Settings::results, in the order of their message ids.
 std::vector<Bytes> frames_of(const Ping& ping);
 /// The frames for the results `wanted`, made from a recorded frame. The recorded frame is returned unchanged if it is one of
 /// them, or if `wanted` is no_result. A frame with more values than the recorded one gets no samples, and 0 for the missing
-/// values. Empty: the message does not hold a result.
+/// values. Returns none if the recorded frame holds no result.
 std::vector<Bytes> answer(BytesView recorded, Results wanted);
 
 }  // namespace sonar::ping::ping1d

@@ -32,7 +32,7 @@ inline Results results_of(Id id) {
 struct Settings {
   std::uint8_t id = 0;  // id of the device; its value in a new device is unknown
   Parameters parameters;
-  Results results = no_result;  // results for which the ping is fired; without a host: the profile
+  Results results = no_result;  // results that hosts requested; no_result: no host did, and the profile is sent
   std::vector<Echo> earlier;    // the newest is the last
 };
 /// Compares settings without the results and the echoes, which differ from ping to ping.

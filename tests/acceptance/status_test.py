@@ -123,7 +123,7 @@ class Steering(unittest.TestCase):
         self.assertIn("no sonard answers on the control stream", result.stderr)
 
     def test_other_ports_are_named(self):
-        for port, word in [(8088, "it speaks HTTP"), (52100, "not sonard's control stream")]:
+        for port, word in [(8088, "it speaks HTTP"), (52100, "does not answer as sonard's control stream")]:
             result = run(SONARCTL, "status", "--control", f"{self.daemon.address}:{port}")
             self.assertEqual(result.returncode, 65, result.stderr)
             for expected in (f"{self.daemon.address}:{port}", word, "--control HOST:PORT", "14770"):

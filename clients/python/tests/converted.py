@@ -1,4 +1,4 @@
-"""Shared by the tests of converters: a folder for the log, the warnings, and a comparison of tracks with their source."""
+"""Base class of the tests of converters. It has a folder for the log, a list of warnings, and a comparison of tracks."""
 import math
 import pathlib
 import tempfile
@@ -27,7 +27,7 @@ class WithFolder(unittest.TestCase):
         return convert(self.file(data), warn=self.warned.append, **how)
 
     def assert_track(self, track, steps, every=1, t0=0.0, metres=0.01, radians=2e-4, origin_down=0.0):
-        """Compares track with made_logs.moment(), in NED_FRD or ENU_FLU; angles to a hundredth of a degree."""
+        """Compares track with made_logs.moment(), in the frame of the track. By default, angles may differ by 2e-4 rad."""
         self.assertEqual(len(track.rows), len(steps), track.rows[:2])
         for row, step in zip(track.rows, steps):
             t, north, east, down, roll, pitch, yaw = made.moment(step)

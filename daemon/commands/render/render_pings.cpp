@@ -34,7 +34,7 @@ Result<void> write_picture(const Ping& ping, bool rings, const path& file) {
   return write_output(file, {*png});
 }
 
-/// A ping on its way into files.
+/// A ping that is computed and then written to files.
 struct MadePing {
   std::uint64_t number = 0;
   PingRequest request;
@@ -54,7 +54,7 @@ Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, con
   const std::string stem = folder.stem(made.number);
   if (o.complex && ping.beam_signal_upa.empty())
     return failure(ErrorKind::usage,
-                   "there is no complex beam signal in expected power and in the comparison modes; leave out --complex");
+                   "the expected-power mode and the comparison modes have no complex beam signal; leave out --complex");
   Result<void> done;
   const auto put = [&](bool wanted, const char* end, const std::string& header, std::span<const std::byte> data) {
     if (wanted && done) done = write_output(stem + end, {bytes_of(header), data});
@@ -106,7 +106,7 @@ class JobRun {
     batch_.push_back({number, std::move(request), {}, {}, {}});
     return batch_.size() < static_cast<std::size_t>(folder_.options().batch) ? Result<void>{} : take_turns();
   }
-  /// A ping that exists already ends a batch.
+  /// Counts a ping whose files exist already. Such a ping ends the batch.
   Result<void> keep() {
     if (!batch_.empty())
       if (auto done = take_turns(); !done) return done;
@@ -135,7 +135,7 @@ class JobRun {
     }
   }
   Result<void> submit() {
-    if (!engine_) {  // loaded only when needed: a finished folder needs no scene
+    if (!engine_) {  // the engine is started only when needed: a finished folder needs none
       auto started = engine_for(job_, pool_, folder_.options().labels);
       if (!started) return tl::make_unexpected(started.error());
       engine_ = *std::move(started);
@@ -190,7 +190,8 @@ PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t n
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
   const std::vector<Time> lines = pose_times(job);
   const std::uint64_t before = o.first - 1;
-  // The number of pings from the first wanted one on. `all`: number of pings that the poses cover.
+  // The number of pings to make, from --first on. `all`: number of pings that the poses cover;
+  // `how`: end of the error's sentence.
   const auto count_of = [&](std::uint64_t all, const char* how) -> Result<std::uint64_t> {
     if (before < all && o.pings.value_or(1) <= all - before) return o.pings.value_or(all - before);
     const std::string asked = (before > 0 ? " --first " + std::to_string(o.first) : std::string()) +
@@ -198,7 +199,7 @@ Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions
     return failure(ErrorKind::usage, asked.substr(1) + ": the poses cover only " + std::to_string(all) + how);
   };
   if (!lines.empty() && !o.rate_hz) {
-    const auto n = count_of(lines.size(), ", one at each line; or give --rate");
+    const auto n = count_of(lines.size(), ", one at each line; request fewer, or give --rate");
     if (!n) return tl::make_unexpected(n.error());
     const auto begin = lines.begin() + static_cast<std::ptrdiff_t>(before);
     return std::vector<Time>(begin, begin + static_cast<std::ptrdiff_t>(*n));
@@ -231,9 +232,9 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
     const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // z = 0 of this scene is not a water surface
     for (const Time at : *times) {
       const Pose sonar_in_world = compose(world.vehicle_at(sonar.vehicle, at), sonar.mount);
-      const bool is_above = sonar_in_world.position_m.z > least_depth_m, hears_nothing = is_in_air(sonar_in_world, *job.scene);
-      in_air += hears_nothing ? 1 : 0;
-      above += is_above && !hears_nothing && !lies_above ? 1 : 0;
+      const bool is_above = sonar_in_world.position_m.z > least_depth_m, gets_noise_only = is_in_air(sonar_in_world, *job.scene);
+      in_air += gets_noise_only ? 1 : 0;
+      above += is_above && !gets_noise_only && !lies_above ? 1 : 0;
     }
   }
   constexpr const char* cure = "were NED poses read as ENU? Check the poses and their frame";
@@ -244,8 +245,8 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
         in_air, all, cure);
   if (above == 0) return {};
   return text::format(
-      "%zu of %zu pings: the sonar is above z = 0, where the sea surface is, and is computed as in water since the scene has no "
-      "sea_surface; %s",
+      "%zu of %zu pings: the sonar is above z = 0, the usual sea surface; the scene has no sea_surface, so these pings are "
+      "computed as in water; %s",
       above, all, cure);
 }
 
@@ -254,7 +255,7 @@ Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, 
                               const std::function<void(const Progress&)>& on_progress) {
   if (o.first > 1 && input.jobs.size() > 1)
     return failure(ErrorKind::usage,
-                   "--first: " + input.source + " sweeps values, and its pings are counted through all steps; leave it out");
+                   "--first: " + input.source + " has a sweep, whose pings are numbered through all steps; leave out --first");
   Progress progress;
   std::vector<std::vector<Time>> times;
   for (const RenderJob& job : input.jobs) {

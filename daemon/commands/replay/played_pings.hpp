@@ -21,16 +21,16 @@ class PlayedPings {
  public:
   static constexpr std::size_t most_scan_bytes = 512u << 20;  // limit, because a scan is kept in memory
 
-  /// `codec` must have ping_part. Both must outlive the object.
+  /// `codec` must have ping_part. `reader` and `codec` must outlive the object.
   PlayedPings(recording::RecordingReader& reader, const recording::Codec& codec) : reader_(reader), codec_(codec) {}
   /// Reads the first ping, or all of a scan. Errors: bad_data if there is no ping or a scan is too
   /// long; they name `file`.
   Result<void> open(const std::string& file);
-  /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all others.
+  /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all other recordings.
   bool is_scan() const { return !lines_.empty(); }
 
   /// The next ping; nullopt at the end. Packets of different ports that follow each other are one ping.
-  /// Of several messages of a ping it is the richest.
+  /// If a ping has several messages, the one with the most content is returned.
   std::optional<PlayedPing> next();
   /// True if next() has returned the last ping.
   bool at_end() const { return !ahead_; }

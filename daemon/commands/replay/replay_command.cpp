@@ -54,7 +54,7 @@ Result<Endpoint> endpoint_from(const std::string& place, const std::string& opti
   if (colon == std::string::npos) return Endpoint{*ip, 0};
   const auto port = text::parse_integer(std::string_view(place).substr(colon + 1));
   if (!port || *port < 0 || *port > 65535)
-    return failure(ErrorKind::usage, option + ": \"" + place + "\" is not IP or IP:PORT, such as 127.255.255.255");
+    return failure(ErrorKind::usage, option + ": \"" + place + "\": the port is not a number from 0 to 65535");
   return Endpoint{*ip, static_cast<std::uint16_t>(*port)};
 }
 
@@ -119,11 +119,12 @@ Result<void> run_replay(const ReplayCommand& command) {
   auto device = find_replay_device(*opened->reader, command.file, command.part_number);
   if (!device) return tl::make_unexpected(device.error());
   if (device->by_requests() && (command.stepped || command.port != 0))
-    return failure(ErrorKind::usage, std::string(command.stepped ? "--stepped: its driver and --speed set the pace of "
-                                                                 : "--port: only --ip sets where drivers find ") +
-                                         std::string(device->make->title));
+    return failure(ErrorKind::usage,
+                   std::string(command.stepped ? "leave out --stepped: the driver's requests and --speed set the pace of "
+                                               : "leave out --port: drivers always use the same ports of ") +
+                       std::string(device->make->title));
   if (device->by_datagrams() && command.stepped)
-    return failure(ErrorKind::usage, "--stepped: datagrams have a pace; --speed changes it");
+    return failure(ErrorKind::usage, "leave out --stepped: no driver confirms datagrams; --speed sets their pace");
   if (command.port == 0 && !device->by_requests()) options->at.port = device->tcp_port();
   LogOptions log_options;
   log_options.json = command.json;

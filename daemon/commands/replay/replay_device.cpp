@@ -12,7 +12,7 @@ constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // a status comes eve
 /// The reason if pings of that make cannot be served to a driver; empty if they can.
 std::string why_only_seen(const protocol::Make& make) {
   if (make.codec.ping_part != nullptr) return "";
-  if (make.each_ping_requested || make.scans) return "depend on the requests of its host";
+  if (make.each_ping_requested || make.scans) return "depend on the requests of the driver";
   return make.has_several_streams() ? "are sent over several connections" : "";
 }
 
@@ -97,8 +97,9 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
     if (const auto named = recording::find_sender(reader)) device.state->model = named->sender.model;
   if (device.vendor != nullptr) return device;
   if (unserved != nullptr) {
-    device.is_only_seen = file + " holds pings of " + std::string(unserved->title) + ", which " + why_only_seen(*unserved) +
-                          ": they cannot be replayed to a driver, the page shows them";
+    device.is_only_seen = file + " holds pings of " + std::string(unserved->title) +
+                          ". They cannot be replayed to a driver, because they " + why_only_seen(*unserved) +
+                          "; the page (--http IP:PORT) shows them";
     return device;
   }
   if (!id)

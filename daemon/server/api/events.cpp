@@ -55,7 +55,7 @@ void Events::publish_scene(const std::string& scene, const std::string& text) {
 /// The next event that is queued carries the count of dropped events.
 bool EventQueue::offer(const v1::Event& event) {
   if (!subscribes_to(event)) return false;
-  if (waiting_.size() == deepest) {
+  if (waiting_.size() == limit) {
     ++unsent_;
     return false;
   }

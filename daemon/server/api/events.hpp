@@ -1,4 +1,4 @@
-// Events of the daemon, published to clients that subscribe. I/O thread only.
+// Events of the daemon, published to clients that subscribe. Used only in the I/O thread.
 #pragma once
 
 #include <cstdint>
@@ -36,15 +36,15 @@ class Events {
   std::list<std::weak_ptr<Listener>> listeners_;
 };
 
-/// The events queued for one subscriber: only the kinds it subscribed to, at most `deepest`. Events dropped for a slow subscriber
+/// The events queued for one subscriber: only the kinds it subscribed to, at most `limit`. Events dropped for a slow subscriber
 /// are counted; the count is sent with the next event.
 class EventQueue {
  public:
-  static constexpr std::size_t deepest = 64;
+  static constexpr std::size_t limit = 64;
 
   void subscribe(const control::Subscribe& wanted) { wanted_ = wanted; }
   bool subscribes_any() const { return wanted_.pings || wanted_.clients || wanted_.poses || wanted_.scene || wanted_.faults; }
-  /// Queues the event if it is subscribed. Returns true if it was queued.
+  /// Queues the event if its kind is subscribed and the queue is not full. Returns true if it was queued.
   bool offer(const v1::Event& event);
   /// Returns the next event, or null.
   std::shared_ptr<v1::Event> next();

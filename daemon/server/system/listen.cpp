@@ -23,15 +23,16 @@ Error explain(const error_code& ec, Endpoint at) {
   if (ec == asio::error::address_in_use) {
     const std::string port = std::to_string(at.port);
     text +=
-        "port in use by another program (another sonard? --offset 1, 2, ... starts one beside it, sonard replay --ip; see: ss "
+        "port in use by another program (another sonard? --offset 1, 2, ... starts one beside it; sonard replay needs another "
+        "--ip; see: ss "
         "-anp | grep " +
         port + ")";
     const auto [low, high] = ephemeral_range();
     if (at.port >= low && at.port <= high)
       text += "; it lies in the ephemeral range " + std::to_string(low) + "-" + std::to_string(high) +
-              ", so an outgoing connection may hold it. Reserve it: sysctl net.ipv4.ip_local_reserved_ports=52100,52102";
+              ", so an outgoing connection may hold it. Reserve the port: sysctl net.ipv4.ip_local_reserved_ports=" + port;
   } else if (ec.value() == EADDRNOTAVAIL) {
-    text += "address not on this host. Add it: ip addr add " + text_of(at.ip) + "/24 dev eth0 (or use --bind 127.0.0.2)";
+    text += "address not on this host. Add it: ip addr add " + text_of(at.ip) + "/24 dev eth0 (or use 127.0.0.2)";
   } else if (ec == asio::error::access_denied) {
     const std::string port = std::to_string(at.port);
     text += "ports below 1024 need a right. Give it to all programs: sysctl net.ipv4.ip_unprivileged_port_start=" + port +

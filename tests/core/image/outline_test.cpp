@@ -33,9 +33,9 @@ TEST(Outline, PixelsThatTouchAtACornerAreTwoRegions) {
   EXPECT_EQ(outlines_of({".#", "#."}).size(), 2u);
 }
 
-TEST(Outline, OfNothingThereIsNone) { EXPECT_TRUE(outlines_of({"..", ".."}).empty()); }
+TEST(Outline, NoPixelsGiveNoOutline) { EXPECT_TRUE(outlines_of({"..", ".."}).empty()); }
 
-TEST(GrayPng, RefusesWhatIsNoPicture) {
+TEST(GrayPng, RefusesAWrongNumberOfBytesOrBits) {
   const std::vector<std::byte> values(6);
   EXPECT_TRUE(encode_gray_png(values, 3, 2, 8));
   EXPECT_TRUE(encode_gray_png(values, 3, 1, 16));

@@ -56,7 +56,7 @@ TEST(TerminalFan, LeavesTheTerminalsColoursAsTheyWere) {
   }
 }
 
-TEST(TerminalFan, UsesTheCodesOfItsColours) {
+TEST(TerminalFan, UsesTheEscapeCodesOfTheChosenColours) {
   const auto palette = draw_terminal_picture({.image = two_patches()}, small(TerminalColours::palette_256));
   const auto exact = draw_terminal_picture({.image = two_patches()}, small(TerminalColours::true_colour));
   std::string palette_text, exact_text;
@@ -68,7 +68,7 @@ TEST(TerminalFan, UsesTheCodesOfItsColours) {
   EXPECT_THAT(exact_text, Not(HasSubstr("38;5;")));
 }
 
-TEST(TerminalFan, FitsItsRoomAndKeepsItsShape) {
+TEST(TerminalFan, FitsTheAvailableSpaceAndKeepsItsProportions) {
   for (const auto& [columns, rows] : {std::pair{80, 24}, {200, 30}, {30, 60}}) {
     TerminalStyle style = small(TerminalColours::none);
     style.columns = columns, style.lines = rows;
@@ -83,7 +83,7 @@ TEST(TerminalFan, FitsItsRoomAndKeepsItsShape) {
   }
 }
 
-TEST(TerminalFan, RefusesRoomForNothing) {
+TEST(TerminalFan, RefusesTooFewColumnsAndEmptyImages) {
   TerminalStyle style = small(TerminalColours::none);
   style.columns = 10;
   const auto refused = draw_terminal_picture({.image = two_patches()}, style);
@@ -97,7 +97,7 @@ TEST(TerminalFan, FindsTheNearestOfXtermsColours) {
   EXPECT_EQ(palette_index({255, 255, 255}), 231);
   EXPECT_EQ(palette_index({255, 0, 0}), 196);
   EXPECT_EQ(palette_index({95, 135, 175}), 67);
-  EXPECT_EQ(palette_index({18, 18, 18}), 233) << "the grays are finer than the cube";
+  EXPECT_EQ(palette_index({18, 18, 18}), 233) << "the grey scale has finer steps than the colour cube";
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ TEST(MavlinkFrames, TheChecksumIsThatOfMcrf4xx) {
   EXPECT_EQ(checksum(digits), 0x6F91) << "the check value of CRC-16/MCRF4XX";
 }
 
-TEST(MavlinkFrames, SeveralInOneDatagramOfBothVersions) {
+TEST(MavlinkFrames, ReadsSeveralFramesOfBothVersionsFromOneDatagram) {
   Sender v;
   const Bytes first = v(autopilot_heartbeat()), second = v.version_1(local(7, 1, 2, 3)), third = v(attitude(8, 0.5f));
   const Read r = read(first + second + third);
@@ -40,7 +40,7 @@ TEST(MavlinkFrames, SeveralInOneDatagramOfBothVersions) {
   EXPECT_EQ(r.counts.junk_bytes, 0u);
 }
 
-TEST(MavlinkFrames, ZerosAtTheEndAreLeftOutAndComeBack) {
+TEST(MavlinkFrames, TrailingZerosAreOmittedAndRestored) {
   Sender v;
   const Bytes frame = v(local(9, 5, 0, 0));
   EXPECT_EQ(frame.size(), 10u + 8u + 2u) << "4 bytes of time, 4 of north";
@@ -48,7 +48,7 @@ TEST(MavlinkFrames, ZerosAtTheEndAreLeftOutAndComeBack) {
   ASSERT_EQ(r.frames.size(), 1u);
   EXPECT_EQ(message_in<LocalPositionNed>(r.frames[0]).north_m, 5);
   EXPECT_EQ(message_in<LocalPositionNed>(r.frames[0]).down_mps, 0);
-  EXPECT_EQ(v(local(0, 0, 0, 0)).size(), 10u + 1u + 2u) << "one byte stays, as the protocol wants";
+  EXPECT_EQ(v(local(0, 0, 0, 0)).size(), 10u + 1u + 2u) << "one byte stays, as the protocol requires";
 }
 
 TEST(MavlinkFrames, SignaturesAreSkipped) {
@@ -65,7 +65,7 @@ TEST(MavlinkFrames, SignaturesAreSkipped) {
   EXPECT_EQ(read(frame + Bytes(12, std::byte{1})).frames.size(), 0u) << "one byte of the signature is missing";
 }
 
-TEST(MavlinkFrames, UnknownMessagesAndUnknownFlagsAreSkippedWhole) {
+TEST(MavlinkFrames, FramesWithUnknownMessagesOrFlagsAreSkippedWhole) {
   Sender v;
   Bytes flagged = v(attitude(1, 1));
   flagged[2] = std::byte{0x02};
@@ -75,7 +75,7 @@ TEST(MavlinkFrames, UnknownMessagesAndUnknownFlagsAreSkippedWhole) {
   EXPECT_EQ(r.counts.junk_bytes, 0u);
 }
 
-TEST(MavlinkFrames, JunkIsCountedAndHidesNothing) {
+TEST(MavlinkFrames, JunkIsCountedAndHidesNoFrame) {
   Sender v;
   const Bytes good = v(attitude(1, 1));
   for (const Bytes& junk : {bytes({1, 2, 3}), bytes({0xFD, 200, 0, 0}), bytes({0xFE, 0xFF, 9, 9, 9, 30, 0, 0}),
@@ -87,7 +87,7 @@ TEST(MavlinkFrames, JunkIsCountedAndHidesNothing) {
   }
 }
 
-TEST(MavlinkFrames, EveryFlippedBitIsSeen) {
+TEST(MavlinkFrames, EveryFlippedBitIsDetected) {
   Sender v;
   const Bytes good = v(odometry(123456, 3));
   for (std::size_t i = 0; i < good.size(); ++i)
@@ -98,14 +98,14 @@ TEST(MavlinkFrames, EveryFlippedBitIsSeen) {
     }
 }
 
-TEST(MavlinkFrames, EveryTruncationIsSeen) {
+TEST(MavlinkFrames, EveryTruncationIsDetected) {
   Sender v;
   for (const Bytes& good : {v(odometry(123456, 3)), v.version_1(local(1, 2, 3, 4))})
     for (std::size_t n = 0; n < good.size(); ++n)
       EXPECT_TRUE(read(Bytes(good.begin(), good.begin() + static_cast<long>(n))).frames.empty());
 }
 
-TEST(MavlinkFrames, Version1MustHaveTheMessagesLength) {
+TEST(MavlinkFrames, Version1FramesMustHaveTheFullLength) {
   Bytes shorter{std::byte{0xFE},         std::byte{2}, std::byte{0}, std::byte{1}, std::byte{1},
                 std::byte{Attitude::id}, std::byte{9}, std::byte{9}};
   const std::uint16_t crc = checksum(std::array{std::byte{Attitude::crc_extra}}, checksum(BytesView(shorter).subspan(1)));
@@ -116,7 +116,7 @@ TEST(MavlinkFrames, Version1MustHaveTheMessagesLength) {
   EXPECT_EQ(r.counts.wrong_size, 1u);
 }
 
-TEST(MavlinkFrames, LaterExtensionsAreNoTrouble) {
+TEST(MavlinkFrames, LaterExtensionFieldsAreIgnored) {
   Sender v;
   Bytes payload;
   const LocalPositionNed m = local(1, 2, 3, 4);

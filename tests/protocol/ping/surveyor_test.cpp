@@ -26,7 +26,7 @@ Ping ping_of(const Talk& talk, double at) {
   return ping;
 }
 
-TEST(Surveyor, ASessionStartsAndEndsByEnable) {
+TEST(Surveyor, TheEnableFieldStartsAndEndsASession) {
   Talk talk("surveyor-240");
   talk.say(general(Id::device_information));
   ASSERT_EQ(talk.take().size(), 1u);
@@ -41,7 +41,7 @@ TEST(Surveyor, ASessionStartsAndEndsByEnable) {
   EXPECT_EQ(talk.settings.rate_hz, 0);
 }
 
-TEST(Surveyor, WhatComesWithEveryPingIsAnsweredByTheNext) {
+TEST(Surveyor, RequestsForMessagesOfEachPingAreAnsweredByTheNextPing) {
   Talk talk("surveyor-240");
   const auto answered = [&](Id id) {
     talk.say(general(id));
@@ -54,7 +54,7 @@ TEST(Surveyor, WhatComesWithEveryPingIsAnsweredByTheNext) {
   EXPECT_TRUE(answered(Id::atof_point_data)) << "refused: it is not enabled";
 }
 
-TEST(Surveyor, ItsClockIsWhatAHostTold) {
+TEST(Surveyor, ItsClockIsSetByTheHost) {
   Talk talk("surveyor-240");
   talk.say(pings());
   talk.run_to(0);
@@ -63,7 +63,7 @@ TEST(Surveyor, ItsClockIsWhatAHostTold) {
   EXPECT_EQ(asked[0].header.id, Id::utc_request);
   EXPECT_EQ(talk.dialogue->next_tick(), at_s(10));
   talk.say(pings());
-  EXPECT_EQ(talk.dialogue->next_tick(), at_s(10)) << "it has asked";
+  EXPECT_EQ(talk.dialogue->next_tick(), at_s(10)) << "the device has asked already";
   const auto utc = [&](double at) {
     return message_in<AttitudeReport>(frames_in({*talk.vendor.frame(ping_of(talk, at), talk.state)}).front()).utc_ms;
   };
@@ -73,7 +73,7 @@ TEST(Surveyor, ItsClockIsWhatAHostTold) {
   EXPECT_EQ(talk.settings.rate_hz, 10) << "the settings stay";
 }
 
-/// A question in the packet of an answer would hold back the answer from a host that reads one message of each packet.
+/// If the device asked in the packet of an answer, a host that reads one message of each packet would get the answer late.
 TEST(Surveyor, AHostIsAskedForTheTimeOnceItEnablesPings) {
   Talk talk("surveyor-240");
   const auto times_asked = [&] {
@@ -89,10 +89,10 @@ TEST(Surveyor, AHostIsAskedForTheTimeOnceItEnablesPings) {
   EXPECT_EQ(times_asked(), 1);
   Talk other("surveyor-240");
   other.run_to(10);
-  EXPECT_EQ(other.take().size(), 1u) << "asked without pings, too";
+  EXPECT_EQ(other.take().size(), 1u) << "after 10 s it asks even if no pings are enabled";
 }
 
-TEST(Surveyor, OneFrameADatagramAndTheSameFramesOverTcp) {
+TEST(Surveyor, SendsOneFramePerDatagramAndTheSameFramesOverTcp) {
   Talk talk("surveyor-240");
   talk.state.powered_up_at = at_s(0);
   for (const bool atof : {false, true}) {
@@ -110,7 +110,8 @@ TEST(Surveyor, OneFrameADatagramAndTheSameFramesOverTcp) {
     for (const Bytes& one : datagrams) all.insert(all.end(), one.begin(), one.end());
     EXPECT_EQ(*talk.vendor.frame(ping, talk.state), all);
   }
-  EXPECT_EQ(talk.vendor.datagrams(talk.vendor.ports()[1], ping_of(talk, 6.05), talk.state).size(), 4u) << "118 once a second";
+  EXPECT_EQ(talk.vendor.datagrams(talk.vendor.ports()[1], ping_of(talk, 6.05), talk.state).size(), 4u)
+      << "water_stats (118) is added once a second";
 }
 
 TEST(Surveyor, PointsAreLookedForOnce) {
@@ -122,12 +123,12 @@ TEST(Surveyor, PointsAreLookedForOnce) {
     ping.beam_azimuth_rad[i] = 0.7f - 1.4f * static_cast<float>(i) / static_cast<float>(beams - 1);
   ping.samples[2 * (100 * beams + beams / 2) + 1] = std::byte{0xF0};
   const auto said = [&] { return *talk.vendor.frame(ping, talk.state); };
-  const Bytes looked_for_now = said();
+  const Bytes found_in_samples = said();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(said(), looked_for_now) << "the device has found it before the samples were lost";
+  EXPECT_EQ(said(), found_in_samples) << "the device found the point before the samples were cleared";
   look_at(ping);
-  EXPECT_LT(said().size(), looked_for_now.size()) << "it has no points";
+  EXPECT_LT(said().size(), found_in_samples.size()) << "without samples there is no point";
 }
 
 /// An AtofPointData of a ping that ends at 15 m, with one point 10 m away and 0.1 rad to port; or the same as YzPointData.
@@ -147,7 +148,7 @@ Bytes one_point(Id id, std::uint32_t ping) {
   return framed(id, 0, payload);
 }
 
-TEST(Surveyor, ItsHostReadsPointsFromEitherMessageOnceAPing) {
+TEST(Surveyor, ItsHostReadsThePointsOfAPingOnceFromEitherMessage) {
   const auto host = *make_host({.as_it_is = true, .settings = {}});
   const auto read = [&](const Bytes& bytes) {
     std::vector<protocol::HostPing> pings;
@@ -186,14 +187,14 @@ TEST(Surveyor, RefusesWhatItCannotDo) {
   }
 }
 
-TEST(Surveyor, AHostByDatagramsThatAsksForNoPingsIsForgotten) {
+TEST(Surveyor, AUdpHostThatEnablesNoPingsIsForgotten) {
   Talk tcp("surveyor-240", 0), udp("surveyor-240", 1);
   EXPECT_FALSE(tcp.dialogue->longest_silence());
   EXPECT_EQ(udp.dialogue->longest_silence(), std::chrono::seconds(10));
   udp.say(pings());
   tcp.say(pings());
-  EXPECT_EQ(udp.dialogue->longest_silence(), std::chrono::seconds(60)) << "its sender may be forged";
-  EXPECT_FALSE(udp.dialogue->hosts_fall_silent()) << "they answer requests for the time";
+  EXPECT_EQ(udp.dialogue->longest_silence(), std::chrono::seconds(60)) << "the sender of a datagram may be forged";
+  EXPECT_FALSE(udp.dialogue->hosts_fall_silent()) << "hosts answer requests for the time";
   EXPECT_FALSE(tcp.dialogue->longest_silence());
 }
 

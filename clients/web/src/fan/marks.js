@@ -1,10 +1,10 @@
-// Range rings, bearings and the cursor's cross above the fan, on a 2D canvas.
+// Draws range rings, bearings and the lines through the cursor on top of the fan, on a 2D canvas.
 import { ringSpacing_m } from './layout.js';
 import { short } from '../numbers.js';
 
 const ring = 'rgba(200, 214, 229, 0.32)';
 const edge = 'rgba(200, 214, 229, 0.45)';
-const words = '#aeb9c4';
+const text_colour = '#aeb9c4';
 const font = '11px system-ui, sans-serif';
 const label_gap_px = 30;
 
@@ -43,8 +43,8 @@ function drawRings(g, polar, layout, port, starboard) {
     if (n % every || outermost) continue;
     const [x, y] = place(layout, n * spacing, starboard);
     const flat = starboard < -1.2;
-    const away = 9 * Math.max(1, layout.scale ?? 1);  // the picture ends half a beam farther, and so do its points
-    const outside = layout.up > 0 ? 4 + away : -3 - away;  // of a fan that opens downwards, above its edge, which rises to the left
+    const away = 9 * Math.max(1, layout.scale ?? 1);  // the picture extends half a beam beyond the outermost beam, and may be enlarged
+    const outside = layout.up > 0 ? 4 + away : -3 - away;  // below the edge; above it if the fan opens downwards
     g.textAlign = flat ? 'center' : 'left';
     g.fillText(`${short(n * spacing)} m`, x + (flat ? 0 : away * Math.cos(starboard)), y + (flat ? outside : 4 - away * layout.up * Math.sin(starboard)));
   }
@@ -74,7 +74,7 @@ function drawBearings(g, polar, layout, port, starboard) {
   }
 }
 
-/// The direction of the head of a sweep.
+/// Draws the direction of a scanning sonar's head.
 function drawHead(g, polar, layout, head_rad) {
   g.strokeStyle = 'rgba(79, 184, 255, 0.9)';
   g.lineWidth = 2;
@@ -100,7 +100,7 @@ function cleared(canvas, layout, ratio) {
   g.setTransform(ratio, 0, 0, ratio, 0, 0);
   g.clearRect(0, 0, layout.width, layout.height);
   g.font = font;
-  g.fillStyle = words;
+  g.fillStyle = text_colour;
   g.lineWidth = 1;
   return g;
 }

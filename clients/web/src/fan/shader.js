@@ -1,17 +1,17 @@
-// The fan on the graphics processor: each pixel is the mean of the samples under its footprint, as core/image/draw_fan.cpp has it.
+// The fan on the graphics processor: each pixel is the mean of the samples under its footprint, as in core/image/draw_fan.cpp.
 import { table_entries } from './layout.js';
 
 const vertex = `#version 300 es
 in vec2 corner;
 void main() { gl_Position = vec4(corner, 0.0, 1.0); }`;
 
-// SINGLE: one sample per pixel, for slow machines. Rows and beams of large footprints are read with a stride.
+// `single`: one sample per pixel, for slow machines. Otherwise rows and beams of large footprints are read with a stride.
 const fragment = (single, sampler) => `#version 300 es
 precision highp float;
 precision highp ${sampler};
 uniform ${sampler} samples;
 uniform sampler2D table, colours;
-uniform vec2 apex, azimuths, shape;  // apex: pixels from below; azimuths: first and last of the table; shape: rows, beams
+uniform vec2 apex, azimuths, shape;  // apex: pixels from bottom left; azimuths: first and last of the table; shape: rows, beams
 uniform float metresPerPixel, startM, spacingM, rangeM, beamSpacing, scale, gamma;
 uniform vec3 outside;
 out vec4 colour;
@@ -33,7 +33,7 @@ void main() {
   vec2 at = (gl_FragCoord.xy - apex) * metresPerPixel;
   float range = length(at);
   if (range < startM || range >= rangeM) return;
-  float beam = beamAt(atan(at.x == 0.0 ? 1e-9 : -at.x, at.y));  // software renderers have no atan(0, y)
+  float beam = beamAt(atan(at.x == 0.0 ? 1e-9 : -at.x, at.y));  // software renderers cannot compute atan(0, y)
   if (beam < -0.5 || beam > shape.y - 0.5) return;
   float row = (range - startM) / spacingM;
   ${single ? `
@@ -166,7 +166,7 @@ class FanPainter {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /// Waits until the picture is drawn, to measure the time.
+  /// Waits until the picture is drawn, so that the caller can measure how long drawing takes.
   finish() {
     this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
   }

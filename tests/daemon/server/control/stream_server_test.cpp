@@ -201,7 +201,7 @@ TEST(ControlStream, EventsComeToSubscribersAndLossIsReported) {
     bench.events.publish_scene("s", "not asked for");
     for (std::uint32_t i = 0; i < 100; ++i) bench.events.publish(ping_event(i));  // more than can wait for one client
   });
-  for (std::uint32_t i = 0; i < EventQueue::deepest; ++i) {
+  for (std::uint32_t i = 0; i < EventQueue::limit; ++i) {
     const auto event = client.next();
     ASSERT_TRUE(event);
     EXPECT_EQ(event->id(), 0u);
@@ -210,7 +210,7 @@ TEST(ControlStream, EventsComeToSubscribersAndLossIsReported) {
   bench.on_io([&] { bench.events.publish(ping_event(100)); });
   const auto after = client.next();
   ASSERT_TRUE(after);
-  EXPECT_EQ(after->event().unsent(), 100 - EventQueue::deepest);
+  EXPECT_EQ(after->event().unsent(), 100 - EventQueue::limit);
   client.send({3, control::Subscribe{}});
   ASSERT_EQ(client.next()->id(), 3u);
   bench.on_io([&] { bench.events.publish(ping_event(101)); });
