@@ -11,7 +11,7 @@ const std::array<protocol::Option, 22> option_rows{{
     {option_name::before_first_fire,
      {"dummies", "pings"},
      "dummies",
-     "what a client gets before its first fire message; pings use the stored configuration and version 0"},
+     "messages to a client before its first fire message; pings have the stored configuration and version 0"},
     {option_name::gain_echo,
      {"auto", "verbatim", "mapped", "used"},
      "auto",
@@ -37,7 +37,7 @@ const std::array<protocol::Option, 22> option_rows{{
     {option_name::honour_network_speed,
      {"false", "true"},
      "false",
-     "true lowers the ping rate to the Mbit/s the client asked for"},
+     "true lowers the ping rate to the Mbit/s that the client requested"},
     {option_name::reply_version,
      {"mirror", "0", "1", "2"},
      "mirror",
@@ -54,7 +54,7 @@ const std::array<protocol::Option, 22> option_rows{{
     {option_name::row_rate_hz,
      {},
      "262237.76223776224",
-     "sample rate behind the row law, 37.5 MHz / 143 in the capture",
+     "sample rate that determines the row spacing; 37.5 MHz / 143 in the capture",
      1e4,
      1e7},
     {option_name::row_origin,
@@ -75,7 +75,7 @@ const std::array<protocol::Option, 22> option_rows{{
     {option_name::elevation_width_is,
      {"two_way", "one_way"},
      "two_way",
-     "which pattern the elevation width belongs to: transmit times receive, or one of them"},
+     "pattern that has the elevation width: transmit times receive, or one of them"},
 }};
 
 float& aperture(FrequencyMode& mode) { return mode.horizontal_aperture_rad; }
