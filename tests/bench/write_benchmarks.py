@@ -35,12 +35,12 @@ NAME = "benchmarks"  # of both pages
 PEER = "## Beside a peer"  # a chapter that is written by hand
 # Reasons for the cost of a ping, by the quantity that grows.
 KNEES = {
-    "rays a column": "every ray is traced and is a scatterer; a ray costs less the denser the fan is; the knee is weak",
+    "rays a column": "every ray is traced and is a scatterer; a ray of a denser fan costs less; the knee is weak",
     "rows": "the cell count is constant up to 437 rows; finer rows need finer cells in both directions, 14.6 times as many from 874 to 3,496 rows",
     "beams": "cells do not depend on beams; beyond the columns of the default fan, rays and coupling grow with beams",
-    "triangles, finer": "cells and rays stay constant; the tree grows; likely cause: its memory, not measured",
+    "triangles, finer": "cells and rays stay constant; the tree grows (probably its memory; not measured)",
     "triangles, wider": "triangles out of range are not visited",
-    "sonars": "sonars share scene and cells; a ping costs what it costs alone",
+    "sonars": "sonars share scene and cells; a ping costs as much as with one sonar",
 }
 PAPER = [  # Choi 2025, Table 3: 512 beams, 10 m, RTX 2080 Ti and i9-9900K
     ("paper, 300 rays a beam, GPU", 0.3),
@@ -89,7 +89,7 @@ def rates(report, scene):
         one = f"{found[1]['pings_per_second']:.0f}" if 1 in found else ""
         rows.append([case, most["description"], one, f"{most['pings_per_second']:.0f}", f"{1e3 / most['min_ms']:.0f}",
                      f"{most['processor_ms']:.2f}", must, goal or "", verdict(most["pings_per_second"], must, goal)])
-    return table(["case", "what", "1 thread", "all threads", "best ping", "processor ms", "required", "goal", ""], rows)
+    return table(["case", "what", "1 thread", "all threads", "best ping", "processor ms", "required", "goal", "result"], rows)
 
 
 def stages(report, scene):
@@ -124,9 +124,9 @@ def demos(report):
 
 
 def service(report):
-    rows = [["P0", f"{d['make']} ({demo_of(d)}), {d['threads']} threads",
+    rows = [["P0", f"{d['make']} ({demo_of(d)})",
              f"median {d['latency']['median_ms']:.1f} ms, p95 {d['latency']['p95_ms']:.1f} ms; {d['processor_ms']:.1f} "
-             f"processor ms; {ticks_of(d)}", "no tick skipped", "", "holds" if d["skipped_ticks"] == 0 else "**missed**"]
+             f"processor ms; {ticks_of(d)}", "none skipped", "", "holds" if d["skipped_ticks"] == 0 else "**missed**"]
             for d in report.get("demos", []) if d["demo"]]
     if "latency" in report:
         t = report["latency"]
@@ -153,7 +153,7 @@ def service(report):
                      f"{o['place']['median_ms']:.3f} ms; {o['added']['median_ms']:+.2f} ms", "0.5 ms", "0.1 ms",
                      verdict(o["place"]["median_ms"], 0.5, 0.1, True)])
     for s in report.get("side_lobes", []):
-        rows.append(["P15", f"{s['case']} with side lobes (the default) / without, alternating",
+        rows.append(["P15", f"{s['case']} with / without side lobes, alternating",
                      f"{s['with']['median_ms']:.2f} / {s['without']['median_ms']:.2f} processor ms; median ratio {round(100 * s['ratio'] - 100):+d} %",
                      "", "+10 %", "goal" if s["ratio"] <= 1.1 else "**missed**"])
     for c in report.get("clients", []):
@@ -164,7 +164,7 @@ def service(report):
     for h in report.get("hashes", []):
         rows.append(["P9", f"{h['case']} with 1, 2, 4 and again 1 threads", "the same bytes" if h["same"] else "**different bytes**",
                      "the same", "", f"SHA-256 {h['sha256'][:16]}..."])
-    return table(["case", "what", "measured", "required", "goal", ""], rows)
+    return table(["case", "what", "measured", "required", "goal", "result"], rows)
 
 
 def empty_bins(report):
@@ -269,7 +269,7 @@ def growth(report):
                      f"{1e3 / cost(points[0]):.0f} to {1e3 / cost(points[-1]):.0f}", in_words(found, points), "; then ".join(grown),
                      KNEES.get(c["name"], "")])
     return ["## How times grow", "",
-            f"Pings/s of one thread, from the processor time of the ping least disturbed by other programs "
+            f"The figures are pings/s of one thread, from the lowest processor time of a ping "
             f"(`sonard_bench --scene local-search --case P1 --curves`; {rates_title(report)}). The exponent is the slope of the processor "
             f"time over the quantity in logarithms; the dashed line is the knee, where two slopes fit better than one. Stages are in "
             f"processor ms per ping, up to the knee and beyond it.", "",
@@ -381,25 +381,25 @@ def page(report, scene="local-search", other_rates=()):
     results, other_rates = report["results"], list(other_rates)
     times = [f"{name}: {r['pings_per_second'] / PAPER[0][1]:.0f}" for name, r in by_case_and_threads(report, scene)]
     lines = ["# Benchmarks", "",
-             "Written by `tests/tools/benchmarks.sh` from results of `sonard_bench`. Stages, instruction sets, ratios of the hot loops and "
-             "the values of the curves are in the tables that it leaves in the build folder.", "",
-             "A ping is timed from pose to framed bytes: median of many, warm cells, default quality (noise, specular echoes, motion; side lobes unless a heading says off). "
+             "`tests/tools/benchmarks.sh` writes this page from results of `sonard_bench`. It also writes tables of stages, instruction sets, ratios "
+             "of the hot loops and values of the curves, into the build folder.", "",
+             "A ping is timed from the pose to the framed bytes. Times are medians of many pings with warm cells and default quality (noise, specular "
+             "echoes, motion, and side lobes unless a heading says off). "
              f"The sonar moves at 0.9 m/s and up to 20 deg/s over rough sand of {results[0]['triangles'] if results else 0:,} triangles "
              f"(scene `{scene}`). Processor ms are those of all threads together. Other programs on the machine lengthen wall times, not "
              "ratios.", "",
              "## Rates", "",
-             "Pings/s, by the instruction set of the machine that measured them. The goals are for two threads; why some are missed, and "
-             "what comes next, is in [decision 0017](decisions/0017-cpu-engine-speed.MD). The chapters below are of the "
-             "machine named last, unless they name another.".replace(".MD", ".md"), ""]
+             "Rates are pings/s. The goals are for two threads; [decision 0017](decisions/0017-cpu-engine-speed.MD) lists missed goals. The "
+             "chapters below are about the last machine of this chapter, unless they name another.".replace(".MD", ".md"), ""]
     lines += other_rates + [f"### {rates_title(report)}", ""] + rates(report, scene)
     lines += ["## Beside the published times", "",
               "Choi 2025, Table 3 (512 beams, 10 m; NVIDIA RTX 2080 Ti, Intel i9-9900K): 0.9 s for the rays and 2.31 s for the sum, "
-              "0.3 Hz with 300 rays a beam. Its public successor reports about 36 ms a frame. Our rates without a GPU, in multiples "
+              "0.3 Hz with 300 rays per beam. Its public successor reports about 36 ms per frame. Our rates without a GPU, in multiples "
               f"of the paper's {PAPER[0][1]:g} Hz: " + ("; ".join(times) or "not measured") + ".", "", "![rates](benchmarks-rates.svg)", ""]
     lines += ["## As a service", "",
               "P0 times each demo (`sonard --profile NAME`) from a ping's pose to its last byte at a driver on loopback "
               "(`build/release/tests/own_network/in_own_network build/release/tests/bench/sonard_bench --scene local-search --case P0`; "
-              "the tables have a row for every product).", ""] + service(report)
+              "the tables have a row for every product), with two threads.", ""] + service(report)
     if report.get("curves"):
         lines += growth(report)
     return "\n".join(lines)

@@ -53,8 +53,8 @@ class Page(unittest.TestCase):
         page = [line for line in write_benchmarks.page(report).splitlines() if line.startswith("| P0")]
         self.assertEqual(len(page), 2)
         self.assertIn("an ARIS (aris-3000, 12 Hz)", page[0])
-        self.assertIn("median 2.0 ms, p95 3.5 ms; 9.2 processor ms; 0 of 36 ticks skipped | no tick skipped |  | holds |", page[0])
-        self.assertIn("4 of 40 ticks skipped | no tick skipped |  | **missed** |", page[1])
+        self.assertIn("median 2.0 ms, p95 3.5 ms; 9.2 processor ms; 0 of 36 ticks skipped | none skipped |  | holds |", page[0])
+        self.assertIn("4 of 40 ticks skipped | none skipped |  | **missed** |", page[1])
         self.assertIn("| aris-1200 | 12 Hz | 128 | 800 | 3.4 | 2.0 | 3.5 | 9.2 | 0 of 36 ticks skipped |", write_benchmarks.tables(report))
 
     def test_everything_found_is_told(self):
