@@ -210,7 +210,7 @@ TEST(BlueViewCommands, StatsMeasureTheSamplesAsSent) {
   EXPECT_THAT(text, HasSubstr("\"saturated_share\":0.125"));
 }
 
-TEST(BlueViewCommands, WhatIsWishedIsSet) {
+TEST(BlueViewCommands, RequestedSettingsAreSent) {
   FakeHead head;
   SourceOptions source = anything_there();
   source.wanted.settings.range_m = 20;
@@ -230,7 +230,7 @@ TEST(BlueViewCommands, WhatIsWishedIsSet) {
   EXPECT_THAT(refused.text, HasSubstr("--beams does not apply to a BlueView sonar, which has --range, --rate, --gain, --mode"));
 }
 
-TEST(BlueViewCommands, WhatIsNoHeadIsSaidToBeNone) {
+TEST(BlueViewCommands, AServiceThatIsNotAHeadIsReported) {
   SourceOptions source = anything_there();
   source.connect_patience_s = 0.1;
   const std::string refused = fetch_ping(source, 0).error().text;

@@ -280,7 +280,7 @@ TEST(View, PrintsWhatTheDeviceSaysBesidePings) {
   }
 }
 
-TEST(Record, RefusesSettingsBeforeItReplacesAFile) {
+TEST(Record, RefusedSettingsReplaceNoFile) {
   FakeDevice device(0, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes{}; });
   RecordOptions options;
   options.source = quiet(device.endpoint(), 1).source;

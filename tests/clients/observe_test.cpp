@@ -146,7 +146,7 @@ TEST(Observe, ASinglePictureTellsHowLongItWaits) {
   EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("; nothing requested; waiting for the first one, at most 1 s\n"));
 }
 
-TEST(Observe, WhoNamesThePortForObserversFindsTheNextOne) {
+TEST(Observe, TheSonarsOrTheObserversPortCanBeGiven) {
   const Server observers(send_a_dummy);
   for (const std::string& named : {std::string("127.0.0.2:52100"), observers.at()}) {
     const Control control(observers.at(), 1, "127.0.0.2:52100");
@@ -231,7 +231,7 @@ Error error_at(const Endpoint& device, const char* make = nullptr) {
   return opened ? Error{} : opened.error();
 }
 
-TEST(Observe, TheSonarAtAnAddressIsNotOneThatSendsToIt) {
+TEST(Observe, TheAddressIsTheSonarsNotTheReceivers) {
   const Error several = error_at({"127.0.0.3", 0});
   EXPECT_EQ(several.kind, ErrorKind::usage);
   EXPECT_THAT(several.text, testing::EndsWith("with its port: 127.0.0.3:12345 (scan), 127.0.0.3:51200 (side)"));

@@ -17,7 +17,7 @@ HostPing ping(std::uint32_t id, std::vector<std::string> echo_mismatches = {}) {
   return ping;
 }
 
-TEST(PingLog, IsContentWithASoundStream) {
+TEST(PingLog, AcceptsAGoodStream) {
   PingLog log;
   for (std::uint32_t i = 0; i < 11; ++i) log.add(ping(100 + i), 0.1 * i);
   const PingSummary s = log.summary(protocol::Host::Counts{});
@@ -28,7 +28,7 @@ TEST(PingLog, IsContentWithASoundStream) {
   EXPECT_THAT(complaints(s, true), ElementsAre());
 }
 
-TEST(PingLog, ComplainsOfBrokenIdentities) {
+TEST(PingLog, ReportsBrokenIdentities) {
   PingLog log;
   HostPing broken = ping(5);
   broken.errors = {"image_size is 1"};
@@ -36,7 +36,7 @@ TEST(PingLog, ComplainsOfBrokenIdentities) {
   EXPECT_THAT(complaints(log.summary(std::nullopt), false), ElementsAre(HasSubstr("1 broken identities")));
 }
 
-TEST(PingLog, TellsWhenTheSettingsTookAndWhetherTheyStayed) {
+TEST(PingLog, ReportsWhenSettingsTookEffectAndWhetherTheyStayed) {
   PingLog log;
   log.add(ping(1, {"range is 5 m, not 2 m"}), 0);
   EXPECT_THAT(complaints(log.summary(std::nullopt), true), ElementsAre(HasSubstr("never matched the request")));
@@ -81,12 +81,12 @@ TEST(NoticeLog, KeepsTheFirstOfAKindAndThenFew) {
   EXPECT_THAT(log.rest(), testing::Contains("one kind too many  (the last of 103 messages of further kinds)"));
 }
 
-TEST(PingLog, ComplainsOfSilenceAndJunk) {
+TEST(PingLog, ReportsSilenceAndJunk) {
   const protocol::Host::Counts junk{0, 0, 3, 0};
   EXPECT_THAT(complaints(PingLog().summary(junk), true), ElementsAre("no ping arrived", HasSubstr("3 bytes between messages")));
 }
 
-TEST(PingLog, SaysItInTextAndInJson) {
+TEST(PingLog, PrintsTextAndJson) {
   PingLog log;
   log.add(ping(77), 0);
   EXPECT_THAT(line_from(ping(77)), HasSubstr("ping 77  4 x 3  8 bit  2.00 m"));

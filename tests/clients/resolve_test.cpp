@@ -84,7 +84,7 @@ class NoThreads {
   pthread_attr_t before_;
 };
 
-TEST(Resolve, WithoutAThreadTheNameIsLookedUpAllTheSame) {
+TEST(Resolve, ANameIsLookedUpWithoutAThread) {
   const NoThreads limit;
   EXPECT_THROW(std::thread([] {}).join(), std::system_error);
   std::thread::id looked_up_by;

@@ -171,7 +171,7 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
 }
 
 /// The client then may ask for the sonar's address for observers.
-TEST(Search, NamesTheSonarThatClosesTheConnectionBeforeItAnswers) {
+TEST(Search, NamesASonarThatClosesTheConnectionWithoutAnAnswer) {
   for (const bool answers : {false, true}) {
     SCOPED_TRACE(answers);
     const SocketServer full(address, find_make("omniscan450")->ports.front().number, [answers](const Socket& client) {

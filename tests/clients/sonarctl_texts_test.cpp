@@ -142,7 +142,7 @@ TEST(StatusText, TellsHowLongAHostWithoutAConnectionIsSilent) {
   EXPECT_THAT(text_of("silent_s: 0.4"), HasSubstr("0.0 MB, 90 s\n"));
 }
 
-TEST(StatusText, TellsEvents) {
+TEST(StatusText, PrintsEvents) {
   const auto told = [](const std::string& event) { return text_from(control::message_from<v1::Event>(event)); };
   EXPECT_EQ(told(R"(client { sonar: "front" client: "10.0.0.9:4000" connected: true })"),
             "client 10.0.0.9:4000 connected to front");

@@ -47,7 +47,9 @@ TEST(Line, RunsFromItsStartToItsEndAndStays) {
   expect_near(on_line(line, 99).velocity_mps, {0, 0, 0});
 }
 
-TEST(Line, OfNoLengthStandsStill) { expect_near(on_line({{1, 1, 1}, {1, 1, 1}, 1, 0}, 5).body_in_world.position_m, {1, 1, 1}); }
+TEST(Line, ALineWithoutLengthStandsStill) {
+  expect_near(on_line({{1, 1, 1}, {1, 1, 1}, 1, 0}, 5).body_in_world.position_m, {1, 1, 1});
+}
 
 }  // namespace
 }  // namespace sonar::clients

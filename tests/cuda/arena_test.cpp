@@ -9,7 +9,7 @@
 namespace sonar::cuda {
 namespace {
 
-TEST(Arena, SetsMemoryThatComesBackToZero) {
+TEST(Arena, ClearsMemoryForResults) {
   const auto machine = make_host_loops(LoopOrder::backwards);  // its memory begins as 0xFF
   Arena results(*machine, Arena::Where::both, 4096, 0);
   const auto few = results.allocate<std::uint8_t>(8), more = results.allocate<std::uint8_t>(8);

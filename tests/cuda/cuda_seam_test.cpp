@@ -43,7 +43,7 @@ TEST(CudaSeam, SaysThatThereIsNoModule) {
   expect_no_engine();
 }
 
-TEST(CudaSeam, SaysThatAModuleIsNone) {
+TEST(CudaSeam, SaysThatAFileIsNotAModule) {
   look_at(SONARD_SOURCE_DIR "/LICENSE");
   EXPECT_THAT(cuda_status(), StartsWith("not loadable: "));
   EXPECT_EQ(cuda_presence(), "not used");  // it did not try to load the module

@@ -172,7 +172,7 @@ TEST_F(LostDevice, GoesOnAfterAFaultOfTheProgram) {
   EXPECT_GT(thrown, 0);
 }
 
-TEST_F(LostDevice, IsNotAskedForTransformsThatItDoesNotHave) {
+TEST_F(LostDevice, GetsNoTransformsThatItDoesNotHave) {
   if (!spectral::have_transform) GTEST_SKIP() << "no exact pulses in this build";
   auto machine = std::make_unique<FailingMachine>(calls_, never);
   machine->no_transforms = "no libcufft.so.12";
@@ -187,7 +187,7 @@ TEST_F(LostDevice, IsNotAskedForTransformsThatItDoesNotHave) {
 }
 
 /// A device whose memory is full is not lost. All its memory is released, batches become smaller, and no ping is lost.
-TEST_F(LostDevice, IsNotWhatAFullOneIs) {
+TEST_F(LostDevice, AFullDeviceIsNotLost) {
   constexpr std::size_t megabyte = 1u << 20;
   const std::vector<Ping> there = engine(never, false)->run(requests_);
   bool any_full = false, all_fit = false;
@@ -218,7 +218,7 @@ TEST_F(LostDevice, IsNotWhatAFullOneIs) {
   EXPECT_TRUE(any_full) << "no room was too small";
 }
 
-TEST_F(LostDevice, IsOneThatHasNoRoomForAPing) {
+TEST_F(LostDevice, ADeviceWithoutMemoryForAPingCountsAsLost) {
   auto machine = std::make_unique<FailingMachine>(calls_, never);
   machine->room_bytes = 8u << 20;
   cuda::DeviceEngineOptions device;
@@ -229,7 +229,7 @@ TEST_F(LostDevice, IsOneThatHasNoRoomForAPing) {
   EXPECT_EQ(said_.back(), "the CUDA engine stopped: out of memory; from here on the CPU computes");
 }
 
-TEST_F(LostDevice, IsNoEngineWhenItIsLostWhileTheSceneIsSent) {
+TEST_F(LostDevice, NoEngineIsMadeIfTheDeviceIsLostDuringTheUpload) {
   const int first = (engine(never, true), calls_);
   for (int last = 0; last < first; ++last) EXPECT_THROW(engine(last, true), std::runtime_error) << last;
 }

@@ -39,7 +39,7 @@ Launch launch_of(std::int32_t pings, std::uint32_t slots) {
   return l;
 }
 
-TEST(GraphShelf, KnowsALaunchAgain) {
+TEST(GraphShelf, FindsARepeatedLaunch) {
   GraphShelf<const char*> shelf;
   const char* dropped = nullptr;
   EXPECT_EQ(shelf.look_up(GraphKey(launch_of(8, 170000)), dropped).seen, 1);
@@ -55,7 +55,7 @@ TEST(GraphShelf, KnowsALaunchAgain) {
   EXPECT_EQ(shelf.look_up(GraphKey(half), dropped).seen, 1);
 }
 
-TEST(GraphShelf, DropsWhatWasNotSeenForLongest) {
+TEST(GraphShelf, DropsTheLeastRecentlyUsedGraph) {
   GraphShelf<const char*> shelf;
   const char* dropped = nullptr;
   shelf.look_up(GraphKey(launch_of(100, 1)), dropped).graph = "first";

@@ -42,7 +42,7 @@ TEST(Patience, RestsWhileItTakesLonger) {
 
 TEST(Patience, EndsWithWhatWentWrong) { EXPECT_EQ(wait(0.5, 719).code, 719); }
 
-TEST(Patience, HasAnEnd) {
+TEST(Patience, EndsAfterTheLongestWait) {
   const Waited w = wait(1e9, 0);
   EXPECT_EQ(w.code, hung);
   EXPECT_NEAR(w.s, longest_wait_s, 0.1);

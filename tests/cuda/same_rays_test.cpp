@@ -131,7 +131,7 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 
 // A repeated launch may be a captured graph, a timed launch never is one. A batch may end because memory is full, and cells may
 // be sent again.
-TEST(DeviceEngine, IsTheSameBytesHoweverItIsLaunched) {
+TEST(DeviceEngine, MakesTheSameBytesForEveryKindOfLaunch) {
   SKIP_WITHOUT_A_MACHINE();
   PingRequest request;
   for (auto& [what, r] : on_device_turns())
@@ -159,7 +159,7 @@ TEST(DeviceEngine, IsTheSameBytesHoweverItIsLaunched) {
     }
 }
 
-TEST(DeviceEngine, LeavesToTheCpuWhatItCannotDoAndSaysSoOnce) {
+TEST(DeviceEngine, UsesTheCpuForOtherPingsAndReportsThisOnce) {
   SKIP_WITHOUT_A_MACHINE();
   BothEngines both(basin());
   std::vector<PingRequest> requests{high(), high(), low(), low(), high()};

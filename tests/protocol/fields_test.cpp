@@ -70,7 +70,7 @@ wire::Bytes oculus_ping(int version) {
   return encode_ping(head, {bearings, {}, samples});
 }
 
-TEST(Fields, OfAnOculusPingOfEitherVersion) {
+TEST(Fields, AnOculusPingOfEachVersionHasItsFields) {
   const protocol::Vendor& vendor = *protocol::vendors().front();
   for (const int version : {0, 1, 2}) {
     std::map<FieldName, double> expected{{FieldName::magic, 0x4F53},
@@ -104,7 +104,7 @@ TEST(Fields, OfAnOculusPingOfEitherVersion) {
   EXPECT_EQ(vendor.field(Part::ping, FieldName::heading, {}), vendor.field(Part::ping, FieldName::heading, oculus_ping(2)));
 }
 
-TEST(Fields, OfAnOculusStatus) {
+TEST(Fields, AnOculusStatusHasItsFields) {
   protocol::DeviceState state = oculus::tests::device();
   state.water.temperature_c = 12.25;
   state.connected_client = {10, 0, 0, 7};
@@ -135,7 +135,7 @@ TEST(Fields, OfAnOculusStatus) {
   EXPECT_EQ(bytes(FieldName::mac), hex("02 00 00 00 1B 59"));
 }
 
-TEST(Fields, RegionsOfAnOculusPing) {
+TEST(Fields, AnOculusPingHasItsRegions) {
   const protocol::Vendor& vendor = *protocol::vendors().front();
   for (const auto& [version, fixed_size] : {std::pair{1, std::size_t{122}}, {2, std::size_t{202}}}) {
     const wire::Bytes ping = oculus_ping(version);
@@ -163,7 +163,7 @@ wire::Bytes blueview_ping(const protocol::DeviceState& device) {
   return blueview::make_frame(blueview::FrameType::ping_data, 3, *blueview::vendor().frame(ping, device));
 }
 
-TEST(Fields, OfABlueViewPing) {
+TEST(Fields, ABlueViewPingHasItsFields) {
   const protocol::DeviceState device = blueview::test::device();
   const wire::Bytes message = blueview_ping(device);
   const auto image = blueview::vendor().region(Region::image, message);
@@ -192,7 +192,7 @@ TEST(Fields, OfABlueViewPing) {
   EXPECT_FALSE(blueview::vendor().field(Part::beacon, FieldName::magic, {}));
 }
 
-TEST(Fields, RegionsOfABlueViewPing) {
+TEST(Fields, ABlueViewPingHasItsRegions) {
   const wire::Bytes message = blueview_ping(blueview::test::device());
   const protocol::Vendor& vendor = blueview::vendor();
   EXPECT_EQ(vendor.region(Region::header, message), (Place{0, 16}));

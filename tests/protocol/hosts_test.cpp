@@ -294,7 +294,7 @@ TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   }
 }
 
-TEST(Makes, WithOnePortHaveHostsThatFindOutWhomTheyReached) {
+TEST(Makes, HostsOfMakesWithTheSamePortDetectTheSonar) {
   for (const Make& one : makes())
     for (const Make& other : makes()) {
       if (&one == &other || one.ports.front().number != other.ports.front().number) continue;

@@ -38,7 +38,7 @@ protocol::DeviceState device_of(std::string_view name) {
 protocol::DeviceState oculus_device() { return device_of("oculus-m1200d"); }
 const protocol::Vendor& oculus() { return *protocol::vendors().front(); }
 
-TEST(Overrides, OfEachProductAreRefusedInTheWordsOfTheirSettingsWithThePermittedRange) {
+TEST(Overrides, AreRefusedWithThePermittedRangeOfEachProduct) {
   const std::regex ends("the range of .* is ([0-9.e+]+) to ([0-9.e+]+) m.*, not ([-0-9.e+]+) m.*");
   for (const protocol::Vendor* vendor : protocol::vendors())
     for (const auto& model : vendor->models()) {
@@ -134,7 +134,7 @@ TEST(OculusOverride, IsTheFireMessageThatADriverWouldHaveSent) {
   EXPECT_TRUE(change->settings.triggered);
 }
 
-TEST(OculusOverride, ModesBeamsAndStandby) {
+TEST(OculusOverride, ModesBeamsAndStandbyCanBeSet) {
   const protocol::DeviceState device = oculus_device();
   const auto low = oculus().apply_override(set().of_mode(0).with_beams(256), device);
   ASSERT_TRUE(low);
@@ -175,7 +175,7 @@ TEST(OculusOverride, SampleBitsAndRowGainsAreFlags) {
   EXPECT_EQ(back->settings.format.bits, 16);
 }
 
-TEST(OculusOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
+TEST(OculusOverride, SettingsBeyondTheProductAreRefusedWithThePermittedOnes) {
   const protocol::DeviceState device = oculus_device();
   const auto why = [&](const protocol::SettingsOverride& asked) {
     const auto change = oculus().apply_override(asked, device);
@@ -205,7 +205,7 @@ TEST(BlueViewOverride, IsWhatAHostWouldHaveSet) {
   EXPECT_FLOAT_EQ(change->settings.rate_hz, 4);
 }
 
-TEST(BlueViewOverride, WhatTheProductCannotDoIsRefusedWithWhatItCan) {
+TEST(BlueViewOverride, SettingsBeyondTheProductAreRefusedWithThePermittedOnes) {
   const protocol::DeviceState device = blueview::test::device();
   const auto why = [&](const protocol::SettingsOverride& asked) {
     const auto change = blueview::vendor().apply_override(asked, device);

@@ -101,7 +101,7 @@ TEST_F(ColourMaps, FollowTheirFormulas) {
   EXPECT_TRUE(make_colour_map("mauve").empty());
 }
 
-TEST_F(ColourMaps, AreRefusedWhenTheyAreNoMaps) {
+TEST_F(ColourMaps, FilesThatAreNotMapsAreRefused) {
   ColourMapper mapper = grey_mapper();
   EXPECT_EQ(mapper.load(folder / "missing.cmap"), file_open);
   for (const std::size_t size : {0u, 12287u, 12289u}) {
@@ -145,7 +145,7 @@ TEST_F(ColourMaps, FindTheirTopThemselvesInAutoMode) {
   EXPECT_EQ(mapper.set_thresholds(65535, 0), success);
 }
 
-TEST_F(ColourMaps, GiveBlueGreenRedAlphaInMemoryUnlessToldOtherwise) {
+TEST_F(ColourMaps, AreBlueGreenRedAlphaInMemoryByDefault) {
   for (const bool rgba : {false, true}) {
     ASSERT_EQ(setenv("BVE_PIXEL", rgba ? "rgba" : "bgra", 1), 0);
     ColourMapper mapper;

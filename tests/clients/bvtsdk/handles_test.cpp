@@ -27,7 +27,7 @@ TEST(Handles, AreSmallAndDifferentAndSurviveBeingCutTo32Bits) {
   EXPECT_EQ(table.live(), 5000u);
 }
 
-TEST(Handles, FindOnlyWhatTheyStandFor) {
+TEST(Handles, FindOnlyTheirOwnObject) {
   Handles table;
   const auto fish = std::make_shared<Fish>();
   void* handle = table.add(fish);
@@ -40,7 +40,7 @@ TEST(Handles, FindOnlyWhatTheyStandFor) {
   EXPECT_EQ(table.find<Fish>(reinterpret_cast<void*>(~std::uintptr_t{0})), nullptr);
 }
 
-TEST(Handles, StaleOnesStayStaleWhenTheirPlaceIsUsedAgain) {
+TEST(Handles, StaleHandlesStayStaleWhenTheSlotIsReused) {
   Handles table;
   void* stale = table.add(std::make_shared<Fish>());
   EXPECT_NE(table.remove<Fish>(stale), nullptr);

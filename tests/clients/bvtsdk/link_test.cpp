@@ -176,7 +176,7 @@ TEST(Link, RefusalsArriveWithTheirCode) {
   EXPECT_TRUE(link->connected());
 }
 
-TEST(Link, SendsKeepAliveWhenItHasNothingToSay) {
+TEST(Link, SendsKeepAliveInSilence) {
   std::atomic<int> heard{0};
   {
     FakeSonar fake([&heard](Peer& peer) {
@@ -238,7 +238,7 @@ TEST(Link, AReplyThatComesTooLateIsForgotten) {
   EXPECT_THAT(answer, testing::ElementsAre(2));
 }
 
-TEST(Link, AFrameCutInTheMiddleEndsIt) {
+TEST(Link, ATruncatedFrameEndsTheLink) {
   FakeSonar fake([](Peer& peer) {
     peer.greet();
     Bytes payload, cut;
@@ -254,7 +254,7 @@ TEST(Link, AFrameCutInTheMiddleEndsIt) {
   EXPECT_FALSE(link->connected());
 }
 
-TEST(Link, WhatIsNoFrameEndsIt) {
+TEST(Link, BytesThatAreNotAFrameEndTheLink) {
   for (const bool too_long : {false, true}) {
     FakeSonar fake([too_long](Peer& peer) {
       peer.greet();

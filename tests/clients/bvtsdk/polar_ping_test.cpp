@@ -119,7 +119,7 @@ TEST(PolarPing, IsRefusedWithFieldsThatAreNone) {
   }
 }
 
-TEST(PolarPing, IsNotInflatedPastWhatItAnnounces) {
+TEST(PolarPing, IsNotInflatedBeyondTheStatedSize) {
   // Two bad streams: one announces 70 bytes and has 2 MB of zeros; the other announces 60 MB and has 20 bytes.
   const Bytes small = encode_ping(some_ping(), Packing::deflate);
   const PolarPing zeros = make_ping(512, 2048, 1, 0.01f, [](int, int) { return 0; });
@@ -139,7 +139,7 @@ TEST(PolarPing, IsNotInflatedPastWhatItAnnounces) {
   EXPECT_FALSE(decode_ping(bomb));
 }
 
-TEST(PolarPing, InPlanesIsSmallerThanInOneStream) {
+TEST(PolarPing, IsSmallerInPlanesThanInOneStream) {
   std::uint32_t state = 1;
   const PolarPing noise = make_ping(256, 500, 1, 0.02f, [&](int, int) {
     state = state * 1664525u + 1013904223u;
@@ -151,7 +151,7 @@ TEST(PolarPing, InPlanesIsSmallerThanInOneStream) {
   EXPECT_LT(planes, 0.95 * static_cast<double>(stream));
 }
 
-TEST(PolarPing, WithoutSamplesIsAPingWithoutASignal) {
+TEST(PolarPing, MayHaveNoSamples) {
   const auto p = decode_ping(encode_ping(make_ping(0, 0, 0, 0.1f, [](int, int) { return 0; })));
   EXPECT_FALSE(p);  // stop = start
   PolarPing empty = make_ping(4, 0, 0, 0.1f, [](int, int) { return 0; });

@@ -77,7 +77,7 @@ TEST(RangeList, TakesOnlyWhatIsAboveTheThreshold) {
   EXPECT_EQ(list_of(two_echoes(), settings).valid_count(), 1);
 }
 
-TEST(RangeList, OfNoiseIsEmptyUnlessTheThresholdIsLowered) {
+TEST(RangeList, IsEmptyForNoiseAtTheDefaultThreshold) {
   std::uint32_t state = 1;
   PolarPing noise = make_ping(64, 500, 1, 0.1f, [&](int, int) {
     state = state * 1664525u + 1013904223u;

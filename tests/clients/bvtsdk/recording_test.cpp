@@ -172,7 +172,7 @@ TEST_F(Recording, NeverGivesAFrameThatWasChanged) {
   }
 }
 
-TEST_F(Recording, IsRefusedWhenItIsNone) {
+TEST_F(Recording, OtherFilesAreRefused) {
   RecordingReader reader;
   std::string why;
   EXPECT_EQ(reader.open(folder / "missing.son", &why), file_open);

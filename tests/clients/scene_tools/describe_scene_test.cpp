@@ -42,7 +42,7 @@ struct Files : ::testing::Test {
 
 using DescribeScene = Files;
 
-TEST_F(DescribeScene, ObjectsAndMaterials) {
+TEST_F(DescribeScene, ListsObjectsAndMaterials) {
   const auto scene = describe(harbour);
   ASSERT_TRUE(scene) << scene.error().text;
   ASSERT_EQ(scene->objects.size(), 7u);
@@ -74,7 +74,7 @@ TEST_F(DescribeScene, ObjectsAndMaterials) {
   EXPECT_TRUE(json["volume_db"].is_null());
 }
 
-TEST_F(DescribeScene, RemarksOnASoundScene) {
+TEST_F(DescribeScene, AGoodSceneHasFewRemarks) {
   const Remarks r = remarks(harbour);
   EXPECT_THAT(r.warnings, ElementsAre("materials that nothing uses: spare"));
   EXPECT_THAT(r.notes, ElementsAre("not visible: ghost", "moved by poses that name them: diver"));
@@ -154,7 +154,7 @@ TEST_F(DescribeScene, WarnsOfGroundAndOfObjectsAtTheSurface) {
       IsEmpty());
 }
 
-TEST_F(DescribeScene, ErrorsAreTheLoadersOwn) {
+TEST_F(DescribeScene, HasTheErrorsOfTheLoader) {
   const auto wrong = files.write("s.yaml", "objects: [{type: bix}]");
   EXPECT_EQ(describe_scene(wrong).error().text, load_scene(wrong).error().text);
   EXPECT_EQ(describe_scene(wrong).error().kind, ErrorKind::bad_data);
@@ -169,7 +169,7 @@ TEST_F(DescribeScene, KnowsAConfiguration) {
   EXPECT_THAT(scene.error().text, HasSubstr("this is a configuration of sonard, not a scene; to check both: sonard check "));
 }
 
-TEST(DescribeShippedScenes, NothingIsWrongWithThem) {
+TEST(DescribeShippedScenes, HaveNoWarnings) {
   for (const char* name : {"demo", "local-search", "tank-rod", "tank-two-cylinders"}) {
     const auto scene = describe_scene(std::filesystem::path(SONARD_SOURCE_DIR "/scenes") / (std::string(name) + ".yaml"));
     ASSERT_TRUE(scene) << scene.error().text;

@@ -345,7 +345,7 @@ TEST_F(ImportScene, MaterialsByArgumentByNameAndByGuess) {
   EXPECT_THAT(error(world), HasSubstr("--material shop=steel: no model of that name"));
 }
 
-TEST_F(ImportScene, MaterialsByWordsThatMeanThem) {
+TEST_F(ImportScene, MaterialsAreFoundByWordsInNames) {
   const auto material_of = [&](const std::string& world) {
     const auto done = run(world);
     if (!done) return done.error().text;

@@ -178,7 +178,7 @@ TEST(ReadSdf, MissingLengthsAreTheDefaultsOfSdfAndAreTold) {
                                                  "w.sdf:5: radius of capsule: missing; SDF's default is used, 0.5 m"));
 }
 
-TEST(ReadSdf, CollisionsInsteadOfVisuals) {
+TEST(ReadSdf, CollisionsCanReplaceVisuals) {
   Reading r;
   const std::string text = sdf(model("m",
                                      "<link name='l'><collision name='c'><geometry><sphere><radius>2</radius></sphere></geometry>"
@@ -191,7 +191,7 @@ TEST(ReadSdf, CollisionsInsteadOfVisuals) {
   EXPECT_EQ(r.read(text)->shapes[0].shape.kind, Shape::Kind::sphere);
 }
 
-TEST(ReadSdf, WhatASceneCannotHoldIsNamedOnceWithItsLine) {
+TEST(ReadSdf, UnsupportedElementsAreNamedOnceWithTheirLine) {
   Reading r;
   r.files["model://cam"] =
       "<sdf version='1.6'><model name='cam'><link name='l'>\n<sensor name='eye' type='camera'/></link></model></sdf>";

@@ -18,7 +18,7 @@ std::string written(const std::string& world, const WriteOptions& options = {}) 
   return scene_text(*read, r.findings.left_out(), options);
 }
 
-TEST(WriteScene, OneObjectAShapeNamedAsShortAsItCanBe) {
+TEST(WriteScene, EachShapeBecomesAnObjectWithAShortName) {
   const std::string text = written(model("crate", std::string("<static>1</static><pose>1 2 -3 0 0 0.5</pose>") + link("link")) +
                                    model("arm", link("a") + link("b")));
   EXPECT_THAT(text, HasSubstr("  # crate (w.sdf:3)\n  - {name: crate, type: box, material: sand, size_m: [1, 2, 3], "

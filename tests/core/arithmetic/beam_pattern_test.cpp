@@ -33,7 +33,7 @@ TEST(BeamPattern, Oracle14_ReceiveWidthIsTheDataSheets) {
   }
 }
 
-TEST(BeamPattern, WidthFactorsOfTheTable) {
+TEST(BeamPattern, WidthFactorsAreThoseOfTheTable) {
   EXPECT_NEAR(width_factor(Taper::uniform), 0.886, 0.001);
   EXPECT_NEAR(width_factor(Taper::taylor30), 1.125, 0.001);
   EXPECT_NEAR(width_factor(Taper::hamming), 1.31, 0.01);
@@ -62,7 +62,7 @@ TEST(BeamPattern, TaylorHasItsMovedZerosAndThenTheUniformOnes) {
   for (int n = 4; n < 9; ++n) EXPECT_NEAR(beam_amplitude(Taper::taylor30, n), 0, 1e-12) << n;
 }
 
-TEST(BeamPattern, SignedEvenAndOneOnAxis) {
+TEST(BeamPattern, AmplitudesAreSignedEvenAndOneOnTheAxis) {
   for (const Taper taper : shaped) {
     EXPECT_DOUBLE_EQ(beam_amplitude(taper, 0), 1);
     for (double x = 0.1; x < 9; x += 0.37) EXPECT_NEAR(beam_amplitude(taper, x), beam_amplitude(taper, -x), 1e-12);
@@ -101,7 +101,7 @@ TEST(BeamPattern, Oracle16_TwoWayElevationProduct) {
   }
 }
 
-TEST(BeamPattern, ElevationFansTwentyDecibelPointsAndIntegral) {
+TEST(BeamPattern, ElevationPatternHasTheRightReachAndIntegral) {
   BeamPattern pattern;
   pattern.elevation_width_rad = static_cast<float>(rad_from_deg(20));
   const double half = 0.5 * rad_from_deg(20);

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-TEST(Fresnel, TabledValues) {  // Abramowitz & Stegun, table 7.7
+TEST(Fresnel, HasTheTabledValues) {  // Abramowitz & Stegun, table 7.7
   EXPECT_NEAR(fresnel(0.5).c, 0.4923442, 1e-7);
   EXPECT_NEAR(fresnel(0.5).s, 0.0647324, 1e-7);
   EXPECT_NEAR(fresnel(1).c, 0.7798934, 1e-7);

@@ -36,7 +36,7 @@ TEST(Receiver, Oracle41_QuantisationRoundTripWithRowGains) {
   }
 }
 
-TEST(Receiver, RowGains) {
+TEST(Receiver, RowGainsAreAtLeastOne) {
   EXPECT_EQ(row_power_gain(-9, -9), 1u);
   EXPECT_EQ(row_power_gain(1, -9), 10u);
   EXPECT_EQ(row_power_gain(-8.5, -9), 1u);
@@ -45,7 +45,7 @@ TEST(Receiver, RowGains) {
   EXPECT_EQ(row_power_gain(std::numeric_limits<double>::quiet_NaN(), -9), 1u);
 }
 
-TEST(Receiver, QuantisesLevels) {
+TEST(Receiver, LevelsAreQuantised) {
   const SampleFormat decibels{
       .bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = -20, .ceiling_db = 60};
   EXPECT_EQ(quantise(0, decibels), 0u);
@@ -66,7 +66,7 @@ TEST(Receiver, QuantisesLevels) {
   }
 }
 
-TEST(Receiver, Quantise) {
+TEST(Receiver, SamplesAreQuantised) {
   const SampleFormat linear8{.bits = 8, .max_code = 254, .gamma = 1, .row_gains = false};
   EXPECT_EQ(quantise(0, linear8), 0u);
   EXPECT_EQ(quantise(-1, linear8), 0u);
@@ -98,7 +98,7 @@ TEST(Receiver, Oracle42_TvgCancelsSpreadingAndAbsorption) {
   }
 }
 
-TEST(Receiver, TvgClampAndCeiling) {
+TEST(Receiver, TvgHasAMinimumRangeAndACeiling) {
   ReceiverModel law;
   EXPECT_NEAR(tvg_db(law, 0.01, 0.3), tvg_db(law, 0.5, 0.3), 1e-9);
   EXPECT_NEAR(tvg_db(law, 0.5, 0.3), 30 * std::log10(0.5) + 0.3, 1e-6);
@@ -114,7 +114,7 @@ TEST(Receiver, FullScale) {
   EXPECT_NEAR(full_scale_factor(law, 20) * 20, 1, 1e-9);
 }
 
-TEST(Receiver, NoiseLevelOfTheSpecification) {
+TEST(Receiver, NoiseLevelIsThatOfTheSpecification) {
   EXPECT_NEAR(thermal_noise_db(900e3), 44.1, 0.05);
   EXPECT_NEAR(thermal_noise_db(2100e3), 51.4, 0.05);
   EXPECT_NEAR(directivity_index_db(rad_from_deg(1), rad_from_deg(20)), 33.1, 0.1);

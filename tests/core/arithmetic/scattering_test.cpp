@@ -22,7 +22,7 @@ TEST(Scattering, SolidAngleFormIsMuTimesOneCosine) {
   EXPECT_EQ(sigma(0), 0);
 }
 
-TEST(Scattering, TwoWayTransmission) {
+TEST(Scattering, TwoWayTransmissionFollowsTheRange) {
   const double alpha = nepers_from_db(0.3);
   EXPECT_NEAR(20 * std::log10(two_way_transmission(10, alpha)), -40 - 2 * 0.3 * 10, 1e-9);
   EXPECT_NEAR(nepers_from_db(8.685889638), 1, 1e-9);
@@ -32,7 +32,7 @@ TEST(Scattering, TwoWayTransmission) {
   EXPECT_TRUE(std::isfinite(two_way_transmission(nearest_scatterer_m, alpha)));
 }
 
-TEST(Scattering, LambertCoefficient) {
+TEST(Scattering, LambertCoefficientFollowsTheStrength) {
   EXPECT_NEAR(lambert_coefficient(-27), 1.995e-3, 1e-6);
   EXPECT_NEAR(lambert_coefficient(largest_lambert_db), largest_lambert, 2e-4);
 }

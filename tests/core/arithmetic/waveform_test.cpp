@@ -21,7 +21,7 @@ TEST(Waveform, Oracle17_PulseWidth) {
   EXPECT_NEAR(half_power_bt, std::sqrt(std::log(2.0) / 2), 1e-15);
 }
 
-TEST(Waveform, IntegralsOfThePulse) {
+TEST(Waveform, ThePulseHasItsIntegrals) {
   const double b = 34.8e3, dt = 1e-8, nu = 0.31 * b;
   double energy = 0, spectrum = 0;
   for (int i = -20000; i <= 20000; ++i) {
@@ -38,7 +38,7 @@ TEST(Waveform, IntegralsOfThePulse) {
   EXPECT_NEAR(noise_bandwidth_hz(b), 0.3989 * b, 1e-4 * b);
 }
 
-TEST(Waveform, NoiseCorrelationOfNeighbouringRows) {
+TEST(Waveform, NeighbouringRowsHaveTheirNoiseCorrelation) {
   const double c = 1500, dr = 0.02, b = envelope_parameter_hz(c, dr);
   EXPECT_NEAR(noise_correlation(b, 2 * dr / c), 0.50, 0.005);         // rows one pulse width apart
   EXPECT_NEAR(noise_correlation(b, 2 * dr / 0.9 / c), 0.425, 0.005);  // pulse 0.9 of a row

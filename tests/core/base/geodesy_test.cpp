@@ -28,7 +28,7 @@ void expect_near(Vec3d is, Vec3d wanted, double tolerance) {
   EXPECT_NEAR(is.z, wanted.z, tolerance);
 }
 
-TEST(Geodesy, AxesOfTheEarth) {
+TEST(Geodesy, EarthAxesPointToTheEquatorAndThePole) {
   expect_near(ecef_from(at_deg(0, 0)), {earth_semi_major_m, 0, 0}, 1e-6);
   expect_near(ecef_from(at_deg(0, 90, 100)), {0, earth_semi_major_m + 100, 0}, 1e-6);
   expect_near(ecef_from(at_deg(90, 37)), {0, 0, semi_minor_m}, 1e-6);

@@ -29,7 +29,7 @@ class Geometry : public testing::Test {
   std::uniform_real_distribution<double> uniform_{-1, 1};
 };
 
-TEST_F(Geometry, RotateAndMultiply) {
+TEST_F(Geometry, QuaternionsRotateAndMultiply) {
   for (int i = 0; i < 100; ++i) {
     const Quatd a = turn(), b = turn();
     const Vec3d v = place();
@@ -72,7 +72,7 @@ TEST_F(Geometry, RollPitchYawIsIntrinsicZYX) {
 
 // NED to ENU swaps the first two axes and reverses the third. FRD to FLU reverses the last two. Here as matrices, independent
 // of our quaternions.
-TEST_F(Geometry, NorthEastDownConversions) {
+TEST_F(Geometry, ConvertsToNorthEastDown) {
   Eigen::Matrix3d enu_from_ned_axes, flu_from_frd_axes;
   enu_from_ned_axes << 0, 1, 0, 1, 0, 0, 0, 0, -1;
   flu_from_frd_axes << 1, 0, 0, 0, -1, 0, 0, 0, -1;
@@ -98,7 +98,7 @@ TEST_F(Geometry, NorthEastDownConversions) {
 
 // A vehicle that heads east, with its nose 10 degrees up and its right side 20 degrees down, in ArduPilot's convention and in
 // ours.
-TEST_F(Geometry, AttitudeOfAVehicleInBothConventions) {
+TEST_F(Geometry, AttitudesAgreeInBothConventions) {
   const Quatd frd_in_ned = quat_from_rpy({rad_from_deg(20), rad_from_deg(10), rad_from_deg(90)});
   const Quatd flu_in_enu = enu_flu_from_ned_frd(frd_in_ned);
   EXPECT_NEAR(deg_from_rad(heading_rad(flu_in_enu)), 90, 1e-9);

@@ -32,12 +32,12 @@ TEST_F(MemoryLeft, IsUnknownWhereNothingSaysIt) {
   EXPECT_GT(memory_left_bytes().value_or(1), 0u);
 }
 
-TEST_F(MemoryLeft, OfTheComputer) {
+TEST_F(MemoryLeft, TheComputerLimitsTheMemory) {
   write("proc/meminfo", "MemTotal:  9000 kB\nMemAvailable:    2000 kB\nSwapFree:  48 kB\n");
   EXPECT_EQ(memory_left_bytes(), 2048u * 1024);
 }
 
-TEST_F(MemoryLeft, OfGroupsOfVersion2AndThoseAboveThem) {
+TEST_F(MemoryLeft, GroupsOfVersion2AndTheirParentsLimitTheMemory) {
   write("proc/meminfo", "MemAvailable: 900000000 kB\n");
   write("proc/self/cgroup", "0::/system.slice/sonard.service\n");
   write("sys/fs/cgroup/system.slice/sonard.service/memory.max", "max\n");
@@ -54,7 +54,7 @@ TEST_F(MemoryLeft, OfGroupsOfVersion2AndThoseAboveThem) {
   EXPECT_EQ(memory_left_bytes(), 4000u) << "in a container the group is the root";
 }
 
-TEST_F(MemoryLeft, OfGroupsOfVersion1) {
+TEST_F(MemoryLeft, GroupsOfVersion1LimitTheMemory) {
   write("proc/self/cgroup", "12:cpu,cpuacct:/x\n9:memory:/docker/ab\n0::/docker/ab\n");
   write("sys/fs/cgroup/memory/memory.limit_in_bytes", "3000000\n");  // the value visible from inside the group
   write("sys/fs/cgroup/memory/memory.usage_in_bytes", "1000000\n");

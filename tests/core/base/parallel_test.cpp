@@ -21,7 +21,7 @@ namespace {
 
 class ParallelPool : public testing::TestWithParam<int> {};
 
-TEST_P(ParallelPool, EveryItemOnce) {
+TEST_P(ParallelPool, RunsEveryItemOnce) {
   Parallel pool(GetParam());
   EXPECT_EQ(pool.threads(), GetParam());
   for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{10000}}) {
@@ -48,7 +48,7 @@ TEST_P(ParallelPool, NoWorkerIsInTwoItemsAtOnce) {
   EXPECT_FALSE(overlap);
 }
 
-TEST_P(ParallelPool, ManySmallRounds) {
+TEST_P(ParallelPool, RunsManySmallRounds) {
   Parallel pool(GetParam());
   std::vector<int> sum(64);
   for (int round = 0; round < 500; ++round) {

@@ -38,7 +38,7 @@ TEST_F(RegularFile, IsReadWholeOrOneByteBeyondTheLimit) {
   EXPECT_EQ(*read_regular(folder / "link", 100), "four");
 }
 
-TEST_F(RegularFile, WhatElseHasTheNameIsSaid) {
+TEST_F(RegularFile, OtherKindsOfFilesAreNamed) {
   EXPECT_EQ(refusal(folder / "none"), (folder / "none").string() + ": cannot be opened: No such file or directory");
   EXPECT_THAT(refusal(folder), HasSubstr(": is a folder, not a regular file"));
   EXPECT_THAT(refusal("/dev/zero"), HasSubstr("/dev/zero: is a device, not a regular file"));

@@ -52,7 +52,7 @@ TEST(Utm, IsTrueToAngles) {
     }
 }
 
-TEST(Utm, AKnownPlace) {  // the CN Tower: 43 deg 38' 33.24" north, 79 deg 23' 13.7" west is 17N 630084 4833438
+TEST(Utm, AKnownPlaceHasItsCoordinates) {  // the CN Tower: 43 deg 38' 33.24" north, 79 deg 23' 13.7" west is 17N 630084 4833438
   const Geodetic tower = geodetic_from_utm({17, false}, 630'084, 4'833'438);
   EXPECT_NEAR(deg_from_rad(tower.latitude_rad), 43 + 38 / 60.0 + 33.24 / 3600, 1e-5);
   EXPECT_NEAR(deg_from_rad(tower.longitude_rad), -(79 + 23 / 60.0 + 13.7 / 3600), 1e-5);

@@ -19,7 +19,7 @@ TEST(WritableFolder, ATemporaryFolderIsOne) {
   EXPECT_EQ(why_no_files_in("."), "");
 }
 
-TEST(WritableFolder, WhatIsNoneIsSaid) {
+TEST(WritableFolder, OtherPathsAreRefusedWithAReason) {
   EXPECT_EQ(why_no_files_in("/no/such/folder"), "is not a folder");
   EXPECT_EQ(why_no_files_in("/proc/self/exe"), "is not a folder");
   EXPECT_EQ(why_no_files_in("/dev/null"), "is not a folder");

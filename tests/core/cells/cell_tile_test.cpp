@@ -235,7 +235,7 @@ Mesh heap(std::uint32_t count, std::uint32_t seed) {
   return mesh;
 }
 
-TEST(CellTile, EqualsTheOneMadePointByPointForEveryAxisSideAndSize) {
+TEST(CellTile, EqualsATileMadePointByPointForEveryAxisSideAndSize) {
   const Mesh mesh = heap(240, 4);
   for (int axis = 0; axis < 3; ++axis)
     for (const bool negative : {false, true})
@@ -247,7 +247,7 @@ TEST(CellTile, EqualsTheOneMadePointByPointForEveryAxisSideAndSize) {
       }
 }
 
-TEST(CellTile, EqualsTheOneMadePointByPointWithTexture) {
+TEST(CellTile, EqualsATileMadePointByPointWithTexture) {
   const TextureField texture({.shape = 0.7f, .correlation_m = 0.2f}, 9, Seed{2});
   Compared sum;
   compare(heap(40, 6), {.axis = 2, .level = 4}, 1, &texture, sum);
@@ -271,7 +271,7 @@ TEST(CellTile, PointsWithSeveralSurfacesKeepTheirOrder) {
 }
 
 // Lattice points of a grid of squares whose edges run along cell borders, at every level.
-TEST(CellTile, EqualsTheOneMadePointByPointOnATerrain) {
+TEST(CellTile, EqualsATileMadePointByPointOnATerrain) {
   Mesh mesh;
   constexpr std::uint32_t n = 12;
   for (std::uint32_t j = 0; j <= n; ++j)

@@ -215,7 +215,7 @@ std::vector<std::int16_t> bytes_of(const std::vector<TileInView>& tiles) {
   return all;
 }
 
-TEST(SurfaceCells, SameBytesForAnyPoolAndAfterBeingForgotten) {
+TEST(SurfaceCells, BytesAreTheSameForAnyPoolAndAfterEviction) {
   const auto scene = scene_of(terrain(20, 4.0, gentle));
   Parallel one(1), three(3);
   SurfaceCells a(scene, Seed{5}, 1u << 30), b(scene, Seed{5}, 1u << 30), small(scene, Seed{5}, 1u << 16);

@@ -127,7 +127,7 @@ TEST(SonarPicture, TimesOfAWaterfallAreDrawnAcrossIt) {
   EXPECT_GT(raster.at(340, y).r, raster.at(340, y + 6).r);
 }
 
-TEST(Labels, HaveTheLettersOfTheirUnits) {
+TEST(Labels, LettersOfUnitsAreDrawn) {
   for (const char* const unit : {"m", "s"}) {
     Raster raster(8, 8);
     draw_text(raster, 0, 0, unit, {255, 255, 255}, 1);

@@ -101,7 +101,7 @@ TEST(Playback, AfterItsEndAnotherSpeedIsNoWayBack) {
   EXPECT_EQ(shown(waits, 9), seconds(1));
 }
 
-TEST(Playback, OfOnePoseRests) {
+TEST(Playback, RestsWithOnePose) {
   const Playback p(seconds(0), looped(), at(0));
   EXPECT_EQ(shown(p, 5), seconds(0));
   EXPECT_EQ(p.place(at(5)).rate, 0);

@@ -117,7 +117,7 @@ TEST(TrajectoryFile, StepsTellTheUnitOfStampsThatBeginAtZero) {
   expect("1.403636580838555e+18,0,0,0,1,0,0,0\n1.403636580838556e+18,1,0,0,1,0,0,0\n", "nanoseconds", milliseconds(0), false);
 }
 
-TEST(TrajectoryFile, WhatOtherProgramsWriteIsRead) {
+TEST(TrajectoryFile, FilesOfOtherProgramsAreRead) {
   for (const char* text :
        {"T_S;X_M;Y_M;Z_M;\n10.5;1;2;3;\n11;1;2;4;\n", "\"timestamp\",\"tx\",\"ty\",\"tz\"\n10.5,1,2,3\n11,1,2,4\n",
         "% made by hand\n// t x y z\ntime x y z\n10.5 1 2 3\n11 1 2 4\n", "t x y z\r10.5 1 2 3\r11 1 2 4\r",
@@ -296,7 +296,7 @@ TEST(TrajectoryFile, FindsAnglesThatAreNoRadians) {
   EXPECT_EQ(largest("deg", "0,-10,90"), 0);
 }
 
-TEST(TrajectoryFile, OneThatIsMissingIsSaidToBe) {
+TEST(TrajectoryFile, AMissingFileIsReported) {
   for (const char* place : {"no-such-file.csv", ".", "/dev/null"}) {
     const auto file = load_trajectories(place, enu);
     ASSERT_FALSE(file) << place;
@@ -304,7 +304,7 @@ TEST(TrajectoryFile, OneThatIsMissingIsSaidToBe) {
   }
 }
 
-TEST(TrajectoryFile, LogsAreToldTheConverter) {
+TEST(TrajectoryFile, ErrorsForLogsNameTheConverter) {
   const std::filesystem::path file = testing::TempDir() + "poses-log-" + std::to_string(getpid());
   for (const std::string& bytes :
        {std::string("\0\5\xfd\x1c", 4), std::string("#ROSBAG V2.0\nE\0\0\0", 17), std::string("$GPGGA,1,2\n"),

@@ -191,7 +191,7 @@ TEST(PaperEngine, SumsAndThreadsDoNotMatter) {
   }
 }
 
-TEST(PaperEngine, WhatLiesBeyondTheRecordIsDroppedAndABlankPingIsSilent) {
+TEST(PaperEngine, EchoesBeyondTheRecordAreDroppedAndABlankPingIsSilent) {
   Comparison c(SceneMaker().add(wall(9, 9), -10, {5, 0, 0}).make(), p900(), small_settings());
   for (const float p : c.ping(Mode::paper).pressure_upa) ASSERT_EQ(p, 0);
   Comparison near(SceneMaker().add(wall(9, 9), -10, {2, 0, 0}).make(), p900(), small_settings());
@@ -201,7 +201,7 @@ TEST(PaperEngine, WhatLiesBeyondTheRecordIsDroppedAndABlankPingIsSilent) {
   EXPECT_THROW(near.ping(Mode::paper), std::invalid_argument);
 }
 
-TEST(PaperEngine, MovingBodiesAndTruth) {
+TEST(PaperEngine, HasMovingBodiesAndTruth) {
   SceneMaker maker;
   maker.add_body(box({0.1, 2, 2}), -10, {{1.6, 0, 0}, {}});
   Comparison c(maker.make(), p900(), small_settings());

@@ -35,7 +35,7 @@ PingPlan paper_plan(int beams = 512) {
   return make_plan(p900(), s, {});
 }
 
-TEST(PaperSpectrum, EquationsThreeAndFour) {
+TEST(PaperSpectrum, FollowsEquationsThreeAndFour) {
   const PaperSpectrum s = make_spectrum(paper_plan());
   EXPECT_EQ(s.count, 394);  // M = b T, T the time of 394 inches
   EXPECT_NEAR(s.first_frequency, 1 - 197, 1e-2);
@@ -133,7 +133,7 @@ TEST(PaperPower, OneEchoIsTheSquareOfItsSignal) {
   }
 }
 
-TEST(PaperCorrection, OfEvenAzimuthsIsTheSameByATransform) {
+TEST(PaperCorrection, IsTheSameWithATransformForEvenAzimuths) {
   const double spacing = rad_from_deg(90.0 / 512);
   const PaperFan fan = make_paper_fan(paper_plan(), Mode::paper, 0);
   const auto even = even_correction(fan.azimuth_rad, spacing);

@@ -195,7 +195,7 @@ TEST(NoiseProfile, IsTheTablesByBeamNearAndFar) {
   }
 }
 
-TEST(Bandwidth, OfTheNoiseIsItsOwn) {
+TEST(Bandwidth, TheNoiseHasItsOwnBandwidth) {
   Sounding s = with([](ReceiverModel& law) { law.noise_width = 0.7f; });
   s.request.switches.noise = s.request.switches.keep_beams = true;
   for (const bool on : {true, false}) {

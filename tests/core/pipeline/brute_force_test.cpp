@@ -179,7 +179,7 @@ FrequencyMode narrow_p900() {
 }
 
 // With wavelengths of 0.4 and 0.45 m, equal steps of the fan's refinement would hit only crests somewhere on the bed.
-TEST(Truths, ARippledBottomIsAsBruteForceSeesIt) {
+TEST(Truths, ARippledBottomAgreesWithBruteForce) {
   for (const double period_m : {0.5, 0.45, 0.4}) {
     const auto ripples = [period_m](double x, double) { return 0.01 * std::cos(2 * pi * x / period_m); };
     const Relief relief(2, 11, -2, 2, 0.02, ripples);

@@ -122,7 +122,7 @@ TEST(Everything, SwitchedOffIsAsIfItsDataWereNotThere) {
   same(&Switches::crosstalk, as_it_is, receiver([](ReceiverModel& law) { law.crosstalk_db = -200; }));
 }
 
-TEST(Everything, AtRestMotionAndDopplerChangeNothing) {
+TEST(Everything, MotionAndDopplerChangeNothingAtRest) {
   Engine engine(basin());
   for (const PingRequest& moving : {high(), low()}) {
     PingRequest rest = moving;

@@ -85,7 +85,7 @@ void for_each_tile(const Case& c, const Pose& pose, int first, int last, const F
 
 constexpr Vec3d place{0, 0, -0.3};
 
-TEST(HiddenTiles, NoEchoIsLostWithTilesThatAreLeftOut) {
+TEST(HiddenTiles, OmittedTilesHaveNoEcho) {
   for (const Case& c : cases) {
     Counts all, narrow;
     const auto look = [&](double yaw, int first, int last, Counts& counts) {

@@ -280,7 +280,7 @@ TEST(Crosstalk, PutsALoneEchoIntoAllBeamsAtItsLevel) {
     }
 }
 
-TEST(Crosstalk, OfADiffuseSceneIsItsTotalPowerWhateverTheBeamCount) {
+TEST(Crosstalk, OfADiffuseSceneHasTheTotalPowerForAnyNumberOfBeams) {
   // A wall all around, in expected power: every beam gets e^2 times the power of all columns.
   const auto added = [](int beam_count) {
     PingSettings settings = default_rows(5, 700);

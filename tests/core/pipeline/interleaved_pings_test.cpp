@@ -142,7 +142,7 @@ TEST(InterleavedPings, BeamsOfTheFirstPingAreThoseOfOnePing) {
   EXPECT_GT(error, 0);
 }
 
-TEST(InterleavedPings, AtRestWithoutNoiseAreOnePing) {
+TEST(InterleavedPings, EqualOnePingAtRestWithoutNoise) {
   Sounding s = over_bed(pings), one = over_bed(1);
   EXPECT_EQ(s.ping().samples, one.ping().samples);
 }

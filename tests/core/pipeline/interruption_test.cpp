@@ -68,7 +68,7 @@ class Other final : public Interruption {
 
 class Interrupted : public testing::TestWithParam<int> {};
 
-TEST_P(Interrupted, PingsAreAsTheyAreAlone) {
+TEST_P(Interrupted, PingsAreTheSameAsWithoutInterruption) {
   const auto scene = world();
   const PingRequest slow = seen_from(-1, 0.5, 3, p900(), default_rows(8, 400));
   const PingRequest quick = seen_from(2, -1.5, 9, oculus_high(), default_rows(4, 200));
@@ -91,7 +91,7 @@ TEST_P(Interrupted, PingsAreAsTheyAreAlone) {
 
 INSTANTIATE_TEST_SUITE_P(Threads, Interrupted, testing::Values(1, 2, 3));
 
-TEST(Heap, AWarmPingAsksLittleAndNoMoreForMoreCells) {
+TEST(Heap, AWarmPingAllocatesLittleForAnyNumberOfCells) {
   const auto scene = world();
   Parallel pool(1);
   const auto engine = make_cpu_engine(scene, pool);

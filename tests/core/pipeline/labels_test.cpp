@@ -140,7 +140,7 @@ struct SphereBeforeBox {
   }
 };
 
-TEST(Labels, OfTwoThingsInTheWayTheNearerCastsTheShadow) {
+TEST(Labels, TheNearerOfTwoObjectsCastsTheShadow) {
   const SphereBeforeBox things;
   Labelled l(things.scene(), 2);
   const PingLabels& labels = l.run();

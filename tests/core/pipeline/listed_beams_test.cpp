@@ -40,7 +40,7 @@ PingSettings settings() {
   return s;
 }
 
-TEST(ListedBeams, EvenOnesAreThoseOfTheEvenSpacing) {
+TEST(ListedBeams, EvenlyListedBeamsEqualEvenSpacing) {
   Parallel pool(2);
   const auto engine = make_cpu_engine(basin(), pool, {});
   for (const bool expected_power : {false, true}) {

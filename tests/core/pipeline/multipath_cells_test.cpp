@@ -37,7 +37,7 @@ double energy(const Sounding& s, double from_m, double to_m, int first_beam, int
   return sum;
 }
 
-TEST(MultipathCells, LevelOfTheGhostsOfALambertSphere) {
+TEST(MultipathCells, GhostsOfALambertSphereHaveTheirLevel) {
   // A Lambert sphere that is seen by one path and lit by another, with the angle b between them, scatters (sin b + (pi - b) cos
   // b) / pi of its echo straight back. The amplitudes of the two directions add.
   const double sonar_depth = 1, depth = 1.5, distance = 8, radius = 0.04;
@@ -128,7 +128,7 @@ TEST(MultipathCells, ARippledBedHasNoDarkBandsInAMirror) {
   EXPECT_GT(close, 0.99 * all);  // 0.95 if rays hit equal phases
 }
 
-TEST(MultipathCells, SpeckleOfTheTwoWaysRoundIsOne) {
+TEST(MultipathCells, BothDirectionsOfAPathHaveTheSameSpeckle) {
   // A narrow strip straight ahead under a still surface. Both directions of a pair come from the same bearing and add in
   // amplitude, for any speckle of the cells. Expected power must equal the mean over many draws (a sum of powers would be 1.8
   // dB less).
@@ -259,7 +259,7 @@ TEST(FlatFaces, CurvedAndNarrowThingsHaveNone) {
             1u);  // only the floor of a round tank is a face
 }
 
-TEST(FlatFaces, WhatHardlyReflectsIsNoFace) {
+TEST(FlatFaces, AWeaklyReflectingFaceIsNoMirror) {
   auto scene = std::make_shared<Scene>(*SceneMaker().add(make_box({2, 2, 2}, 1), -20).make());
   scene->materials[0].reflection = 0.04f;
   EXPECT_TRUE(find_flat_faces(*scene, 0.05).faces.empty());

@@ -183,7 +183,7 @@ TEST(Multipath, TwoWallsMakeImagesOfImages) {
   EXPECT_NEAR(peak_near(s, mixed, beam).offset, s.row_of_range(mixed), 1);
 }
 
-TEST(Multipath, WhatHidesTheMirrorHidesTheGhost) {
+TEST(Multipath, AnObjectThatHidesTheMirrorHidesTheGhost) {
   const UnderSurface u{1, 1.5, 8};
   const auto ghost = [&](Vec3d box_at) {
     const SceneMaker maker = SceneMaker()
@@ -204,7 +204,7 @@ TEST(Multipath, WhatHidesTheMirrorHidesTheGhost) {
   EXPECT_NEAR(ghost({4, 0, -3}), free, 1e-6 * free);                // elsewhere
 }
 
-TEST(Multipath, OffIsTheDefaultAndNothingToMirrorIsNoChange) {
+TEST(Multipath, IsOffByDefaultAndChangesNothingWithoutMirrors) {
   EXPECT_FALSE(Switches{}.multipath);
   SceneMaker maker;
   maker.add(height_field(0, 12, -12, 12, 0.5, rough_relief(0.05, 32)), -25, {0, 0, -2}).add(sphere(0.4, 4), -20, {6, 1, -1.5});

@@ -63,7 +63,7 @@ TEST(RangeImage, LeftIsTheFirstColumnAndUpTheLastRow) {
   EXPECT_NEAR(s.range_m(static_cast<int>(std::lround(column)), static_cast<int>(std::lround(row))), std::sqrt(38.0), 0.005);
 }
 
-TEST(RangeImage, NearestOrStrongest) {
+TEST(RangeImage, ReportsTheNearestOrTheStrongestReturn) {
   const auto scene = SceneMaker().add_point({5, 0, 0}, -40).add_point({8, 0, 0}, -20).make();
   RangeImageSounding s(scene);
   s.request().switches.expected_power = true;

@@ -49,7 +49,7 @@ TEST(Reference, TimeAndFrequencyAgree) {
   EXPECT_LT(std::sqrt(error / power), 1e-4);
 }
 
-TEST(Reference, OnePointHasItsLevelAndRange) {
+TEST(Reference, APointHasItsLevelAndRange) {
   const Medium medium{1500, nepers_from_db(0.3), amplitude_from_db(210)};
   const Grid grid = grid_of(0.0254, 3, 400);
   const double r = 3 + 100 * grid.spacing_m;
@@ -62,7 +62,7 @@ TEST(Reference, OnePointHasItsLevelAndRange) {
 
 // Compares the closed forms with brute force: points of equal area over the surface, each with its own range, sine and
 // incidence.
-TEST(Reference, SeabedClosedFormAgainstPoints) {
+TEST(Reference, SeabedClosedFormAgreesWithPoints) {
   FrequencyMode mode = p900();
   const Medium medium{1500, 0, 1};
   const double height = 2, lambert_db = -27, mu = lambert_coefficient(lambert_db), step = 0.004, tilt = 0.25;
@@ -83,7 +83,7 @@ TEST(Reference, SeabedClosedFormAgainstPoints) {
   }
 }
 
-TEST(Reference, WallEnergyClosedFormAgainstPoints) {
+TEST(Reference, WallEnergyClosedFormAgreesWithPoints) {
   FrequencyMode mode = p900();
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(3));  // coarser points are sufficient
   const double mu = 0.01, d = 3, step = 0.03, half_fan = 0.3;

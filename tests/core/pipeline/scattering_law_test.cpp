@@ -103,7 +103,7 @@ TEST(ScatteringLaw, TheTableFollowsTheLaw) {
   }
 }
 
-TEST(ScatteringLaw, TrendWithFrequency) {
+TEST(ScatteringLaw, TheTrendScalesWithFrequency) {
   for (Material m : {gsab(-20, 5, -32), Material{}}) {
     m.trend_db_per_decade = 12.5f;
     m.trend_reference_hz = 3e5f;

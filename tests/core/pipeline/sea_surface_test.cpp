@@ -62,7 +62,7 @@ TEST(SeaSurface, WaterColumnHasPresetsAndANumber) {
   EXPECT_THAT(refusal("water_column: {volume: -60}"), HasSubstr("volume_db"));
 }
 
-TEST(SeaSurface, TheRougherTheLessItMirrorsTheMoreItScatters) {
+TEST(SeaSurface, ARougherSurfaceMirrorsLessAndScattersMore) {
   double last = -1;
   for (const char* roughness : {"0", "0.00005", "0.0001", "0.0002", "0.01", "0.3"}) {
     const Material m = sea(std::string("roughness_m: ") + roughness)->materials.at(0);
@@ -99,7 +99,7 @@ TEST(SeaSurface, DiffuseEchoIsMuSquareSine) {
 
 // The middle of a tile that extends through a mirror may lie where no path via this mirror leads. The factor must still be a
 // number.
-TEST(Bubbles, OfAPlaceBehindTheMirrorAreStillAFactor) {
+TEST(Bubbles, TheFactorIsBetweenZeroAndOneBehindTheMirror) {
   const std::vector<FlatMirror> mirrors{{.face = 0, .normal = {0, 0, -1}, .height_m = 1, .reflection = -1}};
   const BubbleLayer bubbles(SeaSurface{.present = true, .bubble_layer_m = 0.5f, .bubble_loss_db_per_m = 4});
   PingScalars s;
@@ -161,7 +161,7 @@ struct OverABed {
   }
 };
 
-TEST(SeaSurface, OneAtItSeesAsOneJustBelow) {
+TEST(SeaSurface, ASonarAtTheSurfaceReceivesTheSameAsJustBelow) {
   OverABed bed;
   const auto below = bed.from(-0.001).samples;
   for (const double z : {0.0, -1e-9, 5e-4, 0.001}) {
@@ -179,7 +179,7 @@ TEST(SeaSurface, OneAtItSeesAsOneJustBelow) {
   EXPECT_NEAR(10 * std::log10(at_it / deeper), 0, 0.5) << "the bed";
 }
 
-TEST(SeaSurface, OneAboveItReceivesNoise) {
+TEST(SeaSurface, ASonarAboveTheSurfaceReceivesNoise) {
   OverABed bed, without("");
   const Ping& in_air = bed.from(0.0011);
   EXPECT_TRUE(in_air.request.blank) << "the ping is marked blank, so that its encoder can report it";
@@ -200,7 +200,7 @@ TEST(SeaSurface, ASonarStaysInTheWaterDuringAPing) {
   EXPECT_NE(bed.from(-0.001, -5).samples, at_rest) << "a sonar may sink";
 }
 
-TEST(SeaSurface, TheModesForComparisonKnowIt) {
+TEST(SeaSurface, TheComparisonModesSupportTheSurface) {
   auto scene = OverABed::scene("sea_surface: {size_m: [60, 60]}\n");
   Parallel pool(1);
   const auto engine = make_engine(scene, pool);

@@ -158,7 +158,7 @@ TEST(FocusedArray, IsTheSumOverItsChannels) {
   }
 }
 
-TEST(SharedNoise, KeepsOnlyWhatIsHeard) {
+TEST(SharedNoise, KeepsOnlyAudibleParts) {
   Sounding s = with([](ReceiverModel& law) { law.shared_noise.level_db = 3.4f; });
   const SharedNoiseTable table = make_plan(s.mode(), s.request.settings, {}).shared_noise;
   ASSERT_TRUE(table.is_audible());
@@ -166,7 +166,7 @@ TEST(SharedNoise, KeepsOnlyWhatIsHeard) {
 }
 
 // The noise ends without a step in all beams.
-TEST(SharedNoise, FadesAway) {
+TEST(SharedNoise, FadesOutBeyondTheSector) {
   Sounding s = with([](ReceiverModel& law) { law.shared_noise.level_db = 10; });
   s.request.switches.expected_power = true;
   s.ping();
@@ -246,7 +246,7 @@ TEST(SharedNoise, HasASteadyPart) {
 
 // The leak through the same channels: fringes of the focused array. Their mean over the beams equals the leak without sharing.
 // Only the changing part differs from ping to ping.
-TEST(SharedLeak, IsWhatTheFocusedArrayMakesOfIt) {
+TEST(SharedLeak, IsTheSumOfTheFocusedArray) {
   const auto leaking = [](ReceiverModel& law) {
     law.leak_upa = 1e8f;
     law.leak_decay_db_per_m = 200;
@@ -294,7 +294,7 @@ TEST(SharedLeak, IsWhatTheFocusedArrayMakesOfIt) {
 }
 
 // One beam straight ahead, where the signs cancel. It must not get the level of the mean.
-TEST(SharedLeak, IsNotRaisedWhereItCancels) {
+TEST(SharedLeak, IsNotRaisedInNulls) {
   Sounding s = with([](ReceiverModel& law) {
     law.leak_upa = 1e8f;
     law.leak_decay_db_per_m = 200;

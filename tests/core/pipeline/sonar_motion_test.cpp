@@ -142,7 +142,7 @@ TEST(Motion, RangeIsThatOfTheBounce) {
   }
 }
 
-TEST(Motion, SwitchedOffOrAtRestItChangesNoByte) {
+TEST(Motion, ChangesNoByteAtRestOrWithoutTheSwitch) {
   SceneMaker maker;
   maker.add(height_field(-2, 14, -8, 8, 2, [](double, double) { return 0.0; }), -20).add_point({6, 1, 1}, -20);
   Sounding s = looking_at(maker.make());

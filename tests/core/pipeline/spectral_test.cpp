@@ -71,7 +71,7 @@ TEST_F(SpectralWithTransform, DelaysOutsideOnePeriodAndAtItsSeamAreJustPhases) {
   EXPECT_LE(relative_error(fast_sum(arrivals, grid, 10), direct_sum(arrivals, grid)), 2e-9);
 }
 
-TEST_F(SpectralWithTransform, TransformsThereAndBackAgain) {
+TEST_F(SpectralWithTransform, TransformAndInverseGiveTheInput) {
   for (const int size : {2, 6, 30, 394, 1050}) {
     std::vector<Complex> x;
     for (const Arrival& a : random_arrivals(size, 1)) x.push_back(a.amplitude);

@@ -101,7 +101,7 @@ TEST_P(BothWays, Oracle12_WallFarFromItsEdges) {
   record(12, "wall: 1 / (2 r)", db(1 / 6.0), db(s.strength_per_m(3)), 0.3);
 }
 
-TEST_P(BothWays, PlateBesideTheFoot) {
+TEST_P(BothWays, AnEdgeEchoesWhenTheFootPointIsBesideThePlate) {
   // If the plate is turned a little, the foot of the perpendicular lies outside it, and the main lobe continues beyond its
   // edge.
   for (const double tilt : {0.0, 0.004, 0.008, 0.02}) {
@@ -132,7 +132,7 @@ TEST_P(BothWays, TiltedPolishedRodLosesTensOfDecibels) {
   EXPECT_LT(level(rad_from_deg(15)), upright - 20);
 }
 
-TEST_P(BothWays, CapOfACylinder) {
+TEST_P(BothWays, TheCapOfACylinderEchoesLikeAPlate) {
   Mirror drum = specular_cylinder(0.09, 0.8);
   drum.in_world = facing(2.4);
   SpecularSounding s(world_of({drum}, as_meshes()), p900(), native_rows(12, 0.0254));
@@ -142,7 +142,7 @@ TEST_P(BothWays, CapOfACylinder) {
   EXPECT_NEAR(db(s.strength_per_m(2)), db(expected), 1);
 }
 
-TEST_P(BothWays, SilentBehindABox) {
+TEST_P(BothWays, AMirrorBehindABoxIsSilent) {
   Mirror sphere = specular_sphere(0.25);
   sphere.in_world.position_m = {4.25, 0, 0};
   Mirror box = specular_box({0.2, 1, 1});
@@ -189,7 +189,7 @@ TEST(SpecularOracles, ReflectionScalesTheEcho) {
   EXPECT_NEAR(db(s.strength_per_m(2)), db(0.1 / (4 * 5.0)), 0.1);
 }
 
-TEST_P(BothWays, SwitchedOffThereIsNothing) {
+TEST_P(BothWays, WithoutTheSwitchThereIsNoEcho) {
   Mirror sphere = specular_sphere(0.5);
   sphere.in_world.position_m = {2.5, 0, 0};
   SpecularSounding s(world_of({sphere}, as_meshes()), p900(), native_rows(12, 0.0254));
@@ -218,7 +218,7 @@ TEST_P(BothWays, ExpectedPowerHoldsTheSameEcho) {
   EXPECT_NEAR(db(s.strength_per_m(2)), db(level), 0.01);
 }
 
-TEST_P(BothWays, TankFromInside) {
+TEST_P(BothWays, ATankEchoesFromInside) {
   // The round wall, seen from a point beside its axis. In front 1 - r / a is negative, because the echo has passed a line of
   // focus.
   const double a = 1.1684, height = 1.2;
@@ -252,7 +252,7 @@ TEST_P(BothWays, MovesWithItsBody) {
   }
 }
 
-TEST(SpecularOracles, MeshOfASphereFromEverySide) {
+TEST(SpecularOracles, AMeshOfASphereEchoesOnEverySide) {
   for (int i = 0; i < 10; ++i) {
     Mirror sphere = specular_sphere(0.25);
     sphere.in_world = {{3.25, 0, 0}, quat_from_rpy({0.61 * i, 0.37 * i, 1.13 * i})};
@@ -261,7 +261,7 @@ TEST(SpecularOracles, MeshOfASphereFromEverySide) {
   }
 }
 
-TEST(SpecularOracles, CapsuleAndTorusFromFacets) {
+TEST(SpecularOracles, FacetsOfCapsuleAndTorusHaveTheirEcho) {
   // Shapes for which the engine has no closed form: radii a (half sphere, end-on), and a with R + a (torus, seen in its plane).
   Mirror capsule{.mesh = make_capsule(0.3, 0.8, segments_for(0.3))};
   capsule.in_world = facing(2.7);

@@ -12,7 +12,7 @@
 namespace sonar::test {
 namespace {
 
-TEST(SpecularStatistics, WhatDoesNotMirrorScatters) {
+TEST(SpecularStatistics, EnergyThatIsNotMirroredIsScattered) {
   const double c = 1500, hz = 900e3;
   for (const double kh : {0.02, 0.1, 0.3, 0.7, 1.0, 1.4}) {
     Material m = mirror();

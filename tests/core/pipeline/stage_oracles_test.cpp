@@ -217,7 +217,7 @@ TEST(StageOracles, Oracle41_SamplesUndoTheirRowGain) {
   }
 }
 
-TEST(StageOracles, GammaAndThirtyTwoBits) {
+TEST(StageOracles, GammaAnd32BitsAreCoded) {
   const auto scene = SceneMaker().add(height_field(-2, 40, -40, 40, 2, [](double, double) { return 0.0; }), -20).make();
   for (const SampleFormat& format :
        {SampleFormat{8, 254, 0.5f, false}, SampleFormat{16, 65535, 0.7f, false}, SampleFormat{32, 4294967295u, 1, false}}) {
@@ -373,7 +373,7 @@ TEST(StageOracles, Oracle44_PicturesBeyondAllMemoryAreRefusedWithASentence) {
 }
 
 // A ping is a pure function of its request. Earlier pings must have no effect on it.
-TEST(StageOracles, PingsForgetTheirPredecessors) {
+TEST(StageOracles, PingsDoNotDependOnEarlierPings) {
   SceneMaker maker;
   maker.add(height_field(-2, 14, -10, 10, 1, [](double, double) { return 0.0; }), -20);
   maker.add_body(box({0.3, 0.3, 0.5}), -5, {{4, 0, 0.5}, {}});

@@ -140,7 +140,7 @@ TEST(Texture, CellsOfEveryLevelCarryTheSameField) {
   }
 }
 
-TEST(Texture, SwitchedOffItIsNotThereAndExpectedPowerHasTheMean) {
+TEST(Texture, WithoutTheSwitchAndInExpectedPowerTheMeanIsUsed) {
   Sounding plain(bed({}), p900(), default_rows(10, 394)), patchy(bed({1, 0.5f}), p900(), default_rows(10, 394));
   const RollPitchYaw attitude{0, tilt_rad, 0};
   const std::vector<float> none = plain.ping_from({0, 0, height_m}, attitude).pressure_upa;
@@ -189,7 +189,7 @@ TEST(Texture, EchoesAreKDistributed) {
 }
 
 // A grain is a separate field. If it is as long as a patch, echoes are as with a texture. Both fields together multiply.
-TEST(Grain, IsATextureBesideTheTexture) {
+TEST(Grain, IsAddedToTheTexture) {
   const FrequencyMode mode = oculus_high();
   Scene scene = *bed({});
   scene.materials[0].grain = {2, 0.35f};

@@ -14,7 +14,7 @@ using tests::TemporaryFiles;
 
 std::string zone_text(const std::optional<UtmZone>& zone) { return zone ? text_of(*zone) : "none"; }
 
-TEST(CoordinateSystems, CodesOfUtmOnModernDatums) {
+TEST(CoordinateSystems, CodesOfUtmOnModernDatumsAreKnown) {
   for (const auto& [code, zone] : {std::pair{2959u, "18N"},                                   // NAD83(CSRS)
                                    {3156u, "9N"},           {22710u, "10N"}, {3717u, "10N"},  // NAD83(NSRS2007)
                                    {3740u, "10N"},                                            // NAD83(HARN)
@@ -67,7 +67,7 @@ TEST(CoordinateSystems, WktIsUtmByItsParametersWhateverItsName) {
   EXPECT_FALSE(system_of_wkt("GEOGCS[\"WGS 84\"]").other_datum) << "without an ellipsoid";
 }
 
-TEST(CoordinateSystems, OfPrjFilesOfSeveralWriters) {
+TEST(CoordinateSystems, PrjFilesOfSeveralWritersAreRead) {
   const auto of = [](std::string_view wkt) {
     const CoordinateSystem s = system_of_wkt(wkt);
     return text::format("%s %.4f %.4f%s",
@@ -244,7 +244,7 @@ struct UnknownSystem : ::testing::Test {
   }
 };
 
-TEST_F(UnknownSystem, IsNamedWithTheCommandThatConvertsIt) {
+TEST_F(UnknownSystem, TheErrorNamesTheCommandThatConverts) {
   const std::string prj = wkt("British_National_Grid", bessel, transverse);
   EXPECT_THAT(said(prj, {}), HasSubstr("of British_National_Grid, are read as plain metres"));
   EXPECT_THAT(said(prj, {}), HasSubstr("gdalwarp -t_srs EPSG:4326"));

@@ -138,7 +138,7 @@ TEST_F(CutMeshes, UnusualTextsWithoutAFaultAreRead) {
 }
 
 // The search for a facet behind the name of a solid must not read the rest of the line again for each solid.
-TEST(CutMeshTexts, OneLineOfManySolidsTakesLittleTime) {
+TEST(CutMeshTexts, ALineWithManySolidsTakesLittleTime) {
   std::string text;
   for (int k = 0; k < 40'000; ++k)
     text += "solid a facet normal 0 0 0 outer loop vertex 0 0 0 vertex 0 1 0 vertex 2 0 0 endloop endfacet endsolid a ";

@@ -137,7 +137,7 @@ TEST(EsriGrid, KnowsNoDataInEveryForm) {
   EXPECT_FLOAT_EQ(trench->z_m[2], -9999);
 }
 
-TEST(EsriGrid, OblongCells) {
+TEST(EsriGrid, CellsMayBeOblong) {
   TemporaryFiles files;
   const auto grid =
       read_esri_heights(files.write("g.asc", "ncols 3\nnrows 2\nxllcorner 10\nyllcorner 20\ndx 2\ndy 4\n1 2 3 4 5 6"), {});
@@ -191,7 +191,7 @@ TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
   }
 }
 
-TEST(EsriGrid, SaysWhatItTakesForDegrees) {
+TEST(EsriGrid, NamesCoordinatesThatItTreatsAsDegrees) {
   TemporaryFiles files;
   const auto is_geographic = [&](const std::string& text, const HeightOptions& options = {}) -> std::string {
     const auto grid = read_esri_heights(files.write("g.asc", text), options);

@@ -31,7 +31,7 @@ struct GeoTiff : ::testing::Test {
 };
 const std::vector<float> six{-1, -2, -3, -4, -9999, -6};
 
-TEST_F(GeoTiff, MetresByCornerAndByPoint) {
+TEST_F(GeoTiff, MetresAreReadByCornerAndByPoint) {
   TiffFile area = TiffFile::of(3, 2, six).at(500000, 6600020, 10, 5).keys({{{1024, 1}, {1025, 1}}});
   area.text(42113, "-9999");
   const auto grid = read(area);
@@ -52,7 +52,7 @@ TEST_F(GeoTiff, MetresByCornerAndByPoint) {
   EXPECT_NEAR(feet->z_m[3], -0.3048, 1e-6);
 }
 
-TEST_F(GeoTiff, HeightsInFeetBecomeMetresWhereverTheFileSaysIt) {
+TEST_F(GeoTiff, HeightsInFeetBecomeMetres) {
   const auto first = [&](TiffFile tiff) {
     const auto grid = read(tiff.without(42113));
     return grid ? static_cast<double>(grid->z_m[3]) : -9;
@@ -118,7 +118,7 @@ std::string zlib_of(const std::string& data) {
   return "\x78\x01\x01" + TiffFile::bytes_of(std::vector{size, not_size}) + data + sum;
 }
 
-TEST_F(GeoTiff, FloatingPointPredictorInBothByteOrders) {
+TEST_F(GeoTiff, TheFloatingPointPredictorIsReadInBothByteOrders) {
   const std::vector<float> heights{-1, -2.5f, -3, -1000.25f, -5, -6};
   std::string predicted;
   for (std::size_t row = 0; row < 2; ++row) {
@@ -204,7 +204,7 @@ TEST_F(GeoTiff, CellsThatAMaskHidesAreHoles) {
   EXPECT_THAT(read(TiffFile::of(3, 2, six).at(0, 100, 10, 10)).error().text, HasSubstr("in a file beside it (.msk)"));
 }
 
-TEST_F(GeoTiff, FloatingPointNumbersOf16Bits) {
+TEST_F(GeoTiff, FloatingPointNumbersOf16BitsAreRead) {
   const std::vector<std::uint16_t> halves{0x0000, 0xBC00, 0xD640, 0x3555, 0x8001, 0x7E00};
   const auto grid = read(TiffFile::of(3, 2, halves).at(0, 100, 10, 10).without(339).shorts(339, {3}));
   ASSERT_TRUE(grid) << grid.error().text;
@@ -285,7 +285,7 @@ TEST_F(GeoTiff, DegreesStandAboutAnOrigin) {
   EXPECT_FALSE(read(TiffFile::of(3, 2, six).at(5, 60, 0.01, 0.01).keys({{{1024, 1}}}))->origin) << "metres, says the file";
 }
 
-TEST_F(GeoTiff, ItsZoneOfUtmPlacesItAboutAnOrigin) {
+TEST_F(GeoTiff, TheUtmZoneOfAFilePlacesTheGridAboutAnOrigin) {
   const auto tiff = [](std::uint16_t system) {
     return TiffFile::of(3, 2, std::vector<float>(6, -5))
         .at(500000, 6651500, 100, 100)
@@ -307,7 +307,7 @@ TEST_F(GeoTiff, ItsZoneOfUtmPlacesItAboutAnOrigin) {
   EXPECT_THAT(read(tiff(23033), {.origin = origin}).error().text, HasSubstr("origin is for a grid in degrees or UTM"));
 }
 
-TEST_F(GeoTiff, EveryKindOfNumber) {
+TEST_F(GeoTiff, EveryKindOfNumberIsRead) {
   const auto first = [&](const TiffFile& tiff) {
     const auto grid = read(TiffFile(tiff).at(0, 100, 10, 10));
     return grid ? static_cast<double>(grid->z_m[2]) : -1;

@@ -106,7 +106,7 @@ struct GltfFloats : ::testing::Test {
   }
 };
 
-TEST_F(GltfFloats, EveryTypeOfNumber) {
+TEST_F(GltfFloats, EveryTypeOfNumberIsRead) {
   const auto read = [&](int type, bool normalized, const std::string& positions, std::size_t stride) {
     return vertices("a.gltf", Triangle(type, normalized, positions, stride).embedded());
   };
@@ -131,7 +131,7 @@ TEST_F(GltfFloats, EveryTypeOfNumber) {
 const std::string shorts = corners<std::int16_t>({0, 0, 0, 100, 0, 0, 0, 50, 25}, 8);
 const std::vector<Vec3d> of_shorts{{0, 0, 0}, {100, 0, 0}, {0, 50, 25}};
 
-TEST_F(GltfFloats, EveryContainer) {
+TEST_F(GltfFloats, EveryContainerIsRead) {
   const Triangle triangle(5122, false, shorts, 8);
   expect_vertices(vertices("a.gltf", triangle.embedded()), of_shorts);
   expect_vertices(vertices("a.glb", triangle.glb()), of_shorts);
@@ -157,7 +157,7 @@ TEST_F(GltfFloats, NodesGiveTheSize) {
   expect_vertices(vertices("a.glb", triangle.glb()), {{10, 20, 30}, {14, 20, 30}, {10, 22, 30}});
 }
 
-TEST_F(GltfFloats, WeightsOfBones) {
+TEST_F(GltfFloats, WeightsOfBonesAreRead) {
   Triangle triangle(5126, false, bytes_of(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0}), 12);
   const std::size_t joints_at = triangle.data.size(), weights_at = joints_at + 12;
   triangle.data += std::string(12, '\0');
@@ -207,7 +207,7 @@ TEST_F(GltfFloats, DamagedFilesAreRefused) {
   EXPECT_THAT(refusal(triangle.beside("data:;base64,*")), HasSubstr("has a buffer (0) that is not base64"));
 }
 
-TEST_F(GltfFloats, DracoIsReadOrNamedWithTheCommandThatUnpacksIt) {
+TEST_F(GltfFloats, DracoIsReadOrTheErrorNamesTheCommandToUnpack) {
   // Two triangles, 4 m by 2 m, one corner 1 m high, from gltf-transform 4.5.1: positions are rounded to 14 bits.
   const json extension{{"KHR_draco_mesh_compression", {{"bufferView", 0}, {"attributes", {{"POSITION", 0}}}}}};
   json file = Triangle(5126, false, "", 0).description;

@@ -14,7 +14,7 @@ namespace {
 using namespace load_mesh_testing;
 using ::testing::HasSubstr;
 
-TEST_F(LoadMesh, ZUpFormats) {
+TEST_F(LoadMesh, ZUpFormatsStayAsTheyAre) {
   expect_extent(good("a.obj", obj), {0, 0, 0}, {2, 1, 3});
   expect_extent(good("a.stl", stl), {0, 0, 0}, {2, 1, 3});
   expect_extent(good("b.stl", binary_stl()), {0, 0, 0}, {2, 1, 3});
@@ -28,7 +28,7 @@ TEST_F(LoadMesh, YUpFormatsAreTurned) {
   expect_extent(good("z.dae", collada("Z_UP")), {0, 0, 0}, {2, 1, 3});
 }
 
-TEST_F(LoadMesh, BinaryStlOnDiskIsWhatTheImporterMakesOfIt) {
+TEST_F(LoadMesh, BinaryStlGivesTheSameMeshAsTheImporter) {
   const std::string bytes = binary_stl();
   const LoadedMesh ours = good("b.stl", bytes);
   MeshFile held;
@@ -73,7 +73,7 @@ TEST_F(LoadMesh, TrianglesThatChangeBetweenThePassesAreRefused) {
   }
 }
 
-TEST_F(LoadMesh, UpAndScaleAsAsked) {
+TEST_F(LoadMesh, UpAndScaleCanBeSet) {
   MeshFile y_up;
   y_up.up = UpAxis::y;
   expect_extent(good("a.obj", obj, y_up), {0, -3, 0}, {2, 0, 1});
@@ -244,7 +244,7 @@ TEST_F(LoadMesh, FaultsOfAGlbAreNamed) {
   EXPECT_THAT(refusal("b.glb", alone), HasSubstr("b.glb: cannot be read: has no binary chunk"));
 }
 
-TEST_F(LoadMesh, WrongFilesAreRefusedWithOneSentence) {
+TEST_F(LoadMesh, WrongFilesAreRefusedWithOneLine) {
   EXPECT_THAT(refusal("n.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n"), HasSubstr("n.obj: has vertices that are not finite"));
   EXPECT_THAT(refusal("h.obj", "v 0 0 0\nv 2e7 0 0\nv 0 1 0\nf 1 2 3\n"),
               HasSubstr("h.obj: reaches beyond 1e7 m; set \"scale\""));
@@ -288,7 +288,7 @@ TEST_F(LoadMesh, TruncatedFilesNeverCrash) {
   }
 }
 
-TEST(CleanMesh, Limits) {
+TEST(CleanMesh, RefusesEmptyNonFiniteAndTooLargeMeshes) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(clean_mesh({}, {}).error().text, HasSubstr("has no triangles"));
   EXPECT_THAT(clean_mesh({{0, 0, 0}, {1, 0, nan}, {0, 1, 0}}, {}).error().text, HasSubstr("not finite"));

@@ -147,7 +147,7 @@ objects:
   EXPECT_NEAR(length(scene->in_world(scene->point_targets[0], moved) - Vec3d{7, 7, 7}), 0, 1e-12);
 }
 
-TEST(LoadScene, MeshFilesMaterialsByNameAndSharing) {
+TEST(LoadScene, MeshFilesHaveMaterialsByNameAndShareMeshes) {
   TemporaryFiles files;
   files.write("m.mtl", "newmtl hull\nnewmtl deck\n");
   files.write("m.obj",
@@ -174,7 +174,7 @@ objects:
               StartsWith("s.yaml:2:24: objects[0].file: no mesh file at "));
 }
 
-TEST(LoadScene, FilesThatAreNoneAreSaidToBeAndNeverWaitedFor) {
+TEST(LoadScene, PipesAndDevicesAreRefusedWithoutWaiting) {
   TemporaryFiles files;
   for (const char* pipe : {"p.png", "p.asc", "p.obj", "p.ply", "p.yaml", "p.mtl"})
     ASSERT_EQ(::mkfifo(files.path(pipe).c_str(), 0600), 0);
@@ -266,7 +266,7 @@ TEST(LoadScene, TheMiddleOfACentredGridInDegreesIsAtThePose) {
   EXPECT_NEAR(middle_m.y, own_m.y, 1e-6);
 }
 
-TEST(LoadScene, MaterialLibrariesOfOnesOwn) {
+TEST(LoadScene, AMaterialLibraryCanBeGiven) {
   TemporaryFiles files;
   files.write("lib.yaml", "kelp: {lambert_db: -40}\n");
   const std::string text = "material_library: lib.yaml\n" + object("type: sphere, radius_m: 1, material: kelp");
@@ -349,7 +349,7 @@ TEST(LoadScene, OtherSonarsHaveAPlaceALevelAndARhythm) {
 
 TEST(LoadScene, AnEmptyListIsAnEmptyScene) { EXPECT_EQ(parsed("objects: []")->objects.size(), 0u); }
 
-TEST(LoadScene, MutationsEndInASceneOrASentence) {
+TEST(LoadScene, MutationsGiveASceneOrAnError) {
   const std::string good = R"(name: m
 materials: {a: {like: sand, lambert_db: -20}}
 objects:

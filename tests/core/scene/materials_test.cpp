@@ -85,7 +85,7 @@ TEST(Materials, TheLibraryHasTheNamesWePromise) {
     EXPECT_GT(library[harder].reflection, library[softer].reflection) << harder << " " << softer;
 }
 
-TEST(Materials, WhatCannotBeIsRefusedWithASentence) {
+TEST(Materials, ImpossibleValuesAreRefused) {
   EXPECT_THAT(refusal("lambert_db: -4"), HasSubstr("materials.it.lambert_db"));
   EXPECT_THAT(refusal("law: gsab, gsab: {a_db: -6, c_db: -10}"),
               HasSubstr("materials.it.gsab: backscatters more than 1/pi (-4.97 dB) at normal incidence"));

@@ -20,7 +20,7 @@ std::pair<Vec3d, double> areas(const std::vector<Vec3d>& p) {
   return {sum, plain};
 }
 
-TEST(Polygon, ConcaveOnesAreCutWithoutOverlap) {
+TEST(Polygon, ConcavePolygonsAreTriangulatedWithoutOverlap) {
   const std::vector<Vec3d> l{{0, 0, 0}, {3, 0, 0}, {3, 1, 0}, {1, 1, 0}, {1, 3, 0}, {0, 3, 0}};
   EXPECT_EQ(triangulate(l).size(), 4u);
   EXPECT_NEAR(areas(l).first.z, 5, 1e-12);
@@ -36,7 +36,7 @@ TEST(Polygon, ConcaveOnesAreCutWithoutOverlap) {
   }
 }
 
-TEST(Polygon, AStarOfManyCorners) {
+TEST(Polygon, AStarOfManyCornersIsTriangulated) {
   std::vector<Vec3d> star;
   for (int i = 0; i < 100; ++i) {
     const double r = i % 2 ? 1.0 : 2.5, a = 2 * pi * i / 100;
@@ -46,7 +46,7 @@ TEST(Polygon, AStarOfManyCorners) {
   EXPECT_NEAR(length(areas(star).first), areas(star).second, 1e-9);
 }
 
-TEST(Polygon, OddOnesGiveTheRightCountAndEnd) {
+TEST(Polygon, DegeneratePolygonsGiveTheRightCount) {
   EXPECT_TRUE(triangulate({}).empty());
   const std::vector<Vec3d> line{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
   EXPECT_EQ(triangulate(line).size(), 2u);

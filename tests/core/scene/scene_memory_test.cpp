@@ -43,7 +43,7 @@ class SceneMemory : public ::testing::Test {
   }
 };
 
-TEST_F(SceneMemory, OfAMillionTrianglesInBinaryStl) {
+TEST_F(SceneMemory, AMillionTrianglesInBinaryStlTakeLittleMemory) {
   constexpr std::size_t edge = 708, count = 2 * (edge - 1) * (edge - 1);
   const tests::TemporaryFiles files;
   std::string bytes(80, '\0');
@@ -71,7 +71,7 @@ TEST_F(SceneMemory, OfAMillionTrianglesInBinaryStl) {
   EXPECT_LT(peak / static_cast<double>(count), 45) << "bytes a triangle";  // 31; the importer needs 240
 }
 
-TEST_F(SceneMemory, OfTwoMillionTrianglesBehindTheRays) {
+TEST_F(SceneMemory, TwoMillionTracedTrianglesTakeLittleMemory) {
   constexpr std::size_t edge = 1001;
   HeightGrid grid;
   for (std::size_t i = 0; i < edge; ++i) grid.x.push_back(0.1 * static_cast<double>(i));

@@ -31,7 +31,7 @@ std::pair<std::string, float> look(const RayScene& rays, Vec3d from, double azim
   return {rays.scene().objects[packet.object[0]].name, packet.far[0]};
 }
 
-TEST(ShippedScenes, ThePrintedFigures) {
+TEST(ShippedScenes, AllScenesLoadWithoutNotes) {
   for (const char* name : {"demo", "local-search", "tank-rod", "tank-two-cylinders", "l-targets"}) {
     const auto start = std::chrono::steady_clock::now();
     const auto scene = shipped(name);
@@ -45,7 +45,7 @@ TEST(ShippedScenes, ThePrintedFigures) {
   }
 }
 
-TEST(ShippedScenes, DemoStaysSmallAndHasWhatItPromises) {
+TEST(ShippedScenes, DemoStaysSmallAndHasTheListedObjects) {
   const auto scene = shipped("demo");
   EXPECT_EQ(scene->name, "harbour");
   EXPECT_LE(scene->triangle_count(), 150000u);
@@ -95,7 +95,7 @@ TEST(ShippedScenes, TankRodFrontIsHalfAMetreAhead) {
   EXPECT_EQ(look(rays, {-0.4, 0, -0.61}, 0, 80).first, "nothing");  // the tank has no lid
 }
 
-TEST(ShippedScenes, TwoCylindersInTheirTank) {
+TEST(ShippedScenes, TheTankHasTwoCylinders) {
   const RayScene rays(shipped("tank-two-cylinders"), 1);
   const Vec3d sonar{2.1, 1.0, -2.0};
   EXPECT_EQ(look(rays, sonar, 90, 0), (std::pair<std::string, float>{"standing", look(rays, sonar, 90, 0).second}));
@@ -108,7 +108,7 @@ TEST(ShippedScenes, TwoCylindersInTheirTank) {
   EXPECT_EQ(look(rays, sonar, 0, -89).first, "floor");
 }
 
-TEST(ShippedScenes, LocalSearchSizeAndPose) {
+TEST(ShippedScenes, LocalSearchHasItsSizeAndPose) {
   const auto scene = shipped("local-search");
   EXPECT_NEAR(static_cast<double>(scene->triangle_count()), 200000, 10000);
   const RayScene rays(scene, 2);

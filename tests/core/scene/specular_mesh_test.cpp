@@ -43,7 +43,7 @@ TEST(SpecularMesh, SphereHasANearAndAFarPoint) {
   }
 }
 
-TEST(SpecularMesh, CylinderEndsWhereItEnds) {
+TEST(SpecularMesh, ACylinderHasNoEchoBeyondItsEnds) {
   const Mesh mesh = make_cylinder(0.3, 1.2, segments_for(0.3));
   for (const double angle : {0.0, 0.1, 1.234}) {
     for (const double z : {0.0, 0.25, -0.4}) {
@@ -142,7 +142,7 @@ TEST(SpecularMesh, SmallAngleIsACurveLargeAngleAnEdge) {
   EXPECT_EQ(SpecularMesh(make_cylinder(0.3, 1, 8, Caps::none), all_materials).faces(), 8u);
 }
 
-TEST(SpecularMesh, NothingFromNothing) {
+TEST(SpecularMesh, AnEmptyMeshHasNoEcho) {
   EXPECT_TRUE(on_mesh({}, {1, 2, 3}).empty());
   EXPECT_TRUE(on_mesh(make_sphere(0.5, 32), {1000, 0, 0}).empty());  // beyond the requested range
 }

@@ -105,7 +105,7 @@ TEST_F(UtmGrid, TheZoneComesFromThePrjFile) {
   for (const std::uint32_t code : {0u, 4326u, 32600u, 32661u, 32767u, 23033u, 26733u}) EXPECT_FALSE(utm_of_epsg(code)) << code;
 }
 
-TEST_F(UtmGrid, WithoutAnOriginItKeepsItsCoordinatesAndSaysSo) {
+TEST_F(UtmGrid, AGridWithoutAnOriginKeepsItsCoordinatesWithANote) {
   const auto grid = read({.utm = UtmZone{33, false}});
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_FALSE(grid->origin || grid->zone);
@@ -119,7 +119,7 @@ TEST_F(UtmGrid, WithoutAnOriginItKeepsItsCoordinatesAndSaysSo) {
             notes_of({.world_origin = origin}));
 }
 
-TEST_F(UtmGrid, TheWorldsOriginPlacesItUnlessItHasItsOwn) {
+TEST_F(UtmGrid, TheWorldsOriginPlacesAGridWithoutAnOrigin) {
   const auto grid = read({.utm = UtmZone{33, false}, .world_origin = origin});
   ASSERT_TRUE(grid) << grid.error().text;
   EXPECT_EQ(grid->origin, origin);
@@ -162,7 +162,7 @@ TEST_F(UtmGrid, WrongZonesAndOriginsAreRefused) {
   EXPECT_THAT(notes_of({.geographic = true, .utm = UtmZone{33, false}}), HasSubstr("utm is for coordinates in metres"));
 }
 
-TEST_F(UtmGrid, InAScene) {
+TEST_F(UtmGrid, AGridIsReadInAScene) {
   files.write("g.asc", text);
   const auto scene_of = [&](const std::string& keys, const std::optional<Geodetic>& world_origin) {
     return load_scene(

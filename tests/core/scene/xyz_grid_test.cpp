@@ -14,7 +14,7 @@ namespace {
 using ::testing::HasSubstr;
 using tests::TemporaryFiles;
 
-TEST(XyzGrid, PointsOfAnEvenGridInAnyOrder) {
+TEST(XyzGrid, PointsMayHaveAnyOrder) {
   TemporaryFiles files;
   const auto read = [&](const std::string& text) { return read_xyz_heights(files.write("g.xyz", text), {}); };
   const auto grid = read(

@@ -158,7 +158,7 @@ TEST(Detections, TargetsApartAreNoFloor) {
   EXPECT_EQ(s.points().size(), 4u);
 }
 
-TEST(Detections, ATargetOverAFloorTakesTheDirectionThatItIsIn) {
+TEST(Detections, ATargetOverAFloorIsThePointOfItsDirection) {
   Sounding s(0.024);
   s.add_floor([](double azimuth) { return 7 / std::cos(azimuth); });
   s.add({rad_from_deg(12.5), 5, 10});
@@ -171,12 +171,12 @@ TEST(Detections, ATargetOverAFloorTakesTheDirectionThatItIsIn) {
       EXPECT_NEAR(p.range_m * std::cos(p.azimuth_rad), 7, 0.1) << deg_from_rad(p.azimuth_rad);
 }
 
-TEST(Detections, FewBeamsGiveNone) {
+TEST(Detections, FewBeamsGiveNoPoint) {
   Ping ping;
   EXPECT_TRUE(detect_points(ping, directions, above_db, width_rad).empty());
 }
 
-TEST(Detections, NoiseAloneGivesNone) { EXPECT_TRUE(Sounding(0.024).points().empty()); }
+TEST(Detections, NoiseAloneGivesNoPoint) { EXPECT_TRUE(Sounding(0.024).points().empty()); }
 
 }  // namespace
 }  // namespace sonar::test

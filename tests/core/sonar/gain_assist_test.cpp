@@ -23,7 +23,7 @@ Ping picture(double loud_share, std::uint32_t loud_code, int bits = 8, std::uint
   return ping;
 }
 
-TEST(GainAssist, PercentileOfEverySampleSize) {
+TEST(GainAssist, PercentileIsFoundForEverySampleSize) {
   EXPECT_NEAR(percentile_of_full_scale(picture(0.02, 127)), 0.5, 1e-6);
   EXPECT_NEAR(percentile_of_full_scale(picture(0.005, 127)), 3.0 / 254, 1e-6);
   EXPECT_NEAR(percentile_of_full_scale(picture(0.02, 32768, 16, 65535)), 0.5, 1e-4);

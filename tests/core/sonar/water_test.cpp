@@ -122,7 +122,7 @@ TEST(Water, DensityCheckValues) {
   EXPECT_NEAR(density_kg_per_m3(25, 35), 1023.34306, 1e-4);
 }
 
-TEST(Water, PressureAndTrueSoundSpeed) {
+TEST(Water, PressureAndTrueSoundSpeedFollowTheDepth) {
   Water sea{.temperature_c = 5, .salinity_psu = 35, .ph = 8};
   EXPECT_DOUBLE_EQ(absolute_pressure_bar(sea, -3), 1.013);
   EXPECT_NEAR(absolute_pressure_bar(sea, 10), 1.013 + 0.0981 * 10 * 1.02767547, 1e-6);

@@ -65,7 +65,7 @@ TEST(Arguments, ChoicesAreNamed) {
   EXPECT_THAT(complaint({"look", "x", "--colour", "voilet"}), HasSubstr("unknown value \"voilet\"; did you mean \"violet\"?"));
 }
 
-TEST(Arguments, WhatIsMissingOrTooMuchIsNamed) {
+TEST(Arguments, MissingAndUnexpectedArgumentsAreNamed) {
   EXPECT_EQ(complaint({}), "a command is required: look (tool --help)");
   EXPECT_EQ(complaint({"look"}), "FILE is required: what to look at (tool look --help)");
   EXPECT_EQ(complaint({"look", "x", "y"}), "unexpected argument \"y\" (tool look --help)");
@@ -90,11 +90,11 @@ TEST(Arguments, UnknownWordsComeFirstAndSuggestTheNearest) {
   EXPECT_THAT(complaint({"look", "--", "--tread"}), IsEmpty());
 }
 
-TEST(Arguments, OneLineWhateverWasTyped) {
+TEST(Arguments, ErrorsAreOneLineForAnyInput) {
   EXPECT_THAT(complaint({"look", "x", "--mode", "a\nb\x1b[2J"}), HasSubstr("\"a?b?[2J\" is not one of"));
 }
 
-TEST(Arguments, OfAValueFromTheEnvironmentTheVariableIsNamed) {
+TEST(Arguments, TheErrorNamesTheEnvironmentVariableOfAWrongValue) {
   ::setenv("TOOL_THREADS", "many", 1);
   EXPECT_THAT(complaint({"look", "x"}), HasSubstr("TOOL_THREADS (environment): \"many\" is not a whole number"));
   EXPECT_THAT(complaint({"look", "x", "--threads", "few"}), HasSubstr("--threads: \"few\" is not a whole number"));

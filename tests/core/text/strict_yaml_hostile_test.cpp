@@ -28,7 +28,7 @@ std::string refusal(std::string_view text, const YamlLimits& limits = {}) {
   return d ? "accepted" : d.error().text;
 }
 
-TEST(StrictYamlHostile, Refusals) {
+TEST(StrictYamlHostile, WrongYamlIsRefused) {
   EXPECT_EQ(refusal("a: 1\nb: 2\na: 3"), "f.yaml:3:1: a: key given twice; keep one");
   EXPECT_EQ(refusal("x:\n  - {k: 1, k: 2}"), "f.yaml:2:12: x[0].k: key given twice; keep one");
   EXPECT_THAT(refusal("a: &x 1\nb: *x"), HasSubstr("a: anchors are not read here"));

@@ -123,7 +123,7 @@ TEST(StrictYaml, RangesAreCheckedAndSaid) {
   EXPECT_THAT(read_number(".nan", open), HasSubstr("must be a finite decimal number"));
 }
 
-TEST(StrictYaml, WholeNumbers) {
+TEST(StrictYaml, WholeNumbersHaveLimits) {
   const auto whole = [](std::string_view s) {
     return read("a: " + std::string(s), [](Map m) { m.required("a").integer(-5, 100); });
   };
@@ -237,7 +237,7 @@ TEST(StrictYaml, MapsThatWereNotOpenedAreNotSearched) {
   EXPECT_EQ(read("a: {b: 1}", [](Map m) { m.optional("a"); }), "ok");
 }
 
-TEST(StrictYaml, LocationAndPath) {
+TEST(StrictYaml, ErrorsHaveLocationAndPath) {
   const Document d = parsed("a:\n  - b: {c: 1}\n");
   Map m = d.root();
   const Node c = m.required("a").items()[0].map().required("b").map().required("c");
@@ -269,7 +269,7 @@ TEST(StrictYaml, ErrorsCarryTheKindAskedFor) {
   EXPECT_EQ(error->kind, ErrorKind::bad_data);
 }
 
-TEST(Decimal, TheWholeTextOrNothing) {
+TEST(Decimal, TheWholeTextMustBeANumber) {
   EXPECT_EQ(parse_decimal("1.25"), 1.25);
   EXPECT_EQ(parse_decimal(""), std::nullopt);
   EXPECT_EQ(parse_decimal("1 "), std::nullopt);

@@ -75,7 +75,7 @@ class Controller {
   aris::FrameAssembler assembler_;
 };
 
-TEST(ReplayOfAris, FramesComeInOrderAndPaceOnceTheControllerWantsThem) {
+TEST(ReplayOfAris, FramesComeInOrderAndPaceAfterSettings) {
   ReplayOptions options;
   options.speed = 2;
   Replay replay(aris_file(5, milliseconds(200)), options);
@@ -97,7 +97,7 @@ TEST(ReplayOfAris, FramesComeInOrderAndPaceOnceTheControllerWantsThem) {
   EXPECT_EQ(replay.figures().messages, 5u);
 }
 
-TEST(ReplayOfAris, CountsOnWhenItBeginsAgainAndFromOneForTheNextController) {
+TEST(ReplayOfAris, FrameNumbersContinueInALoopAndRestartForTheNextController) {
   ReplayOptions options;
   options.loop = true;
   Replay replay(aris_file(2, milliseconds(1)), options);

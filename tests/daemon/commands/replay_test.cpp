@@ -35,7 +35,7 @@ Bytes file_of(MakeWriter make, const std::vector<RecordedMessage>& messages) {
   return file;
 }
 
-TEST(Replay, EveryByteOfEveryFormat) {
+TEST(Replay, SendsEveryByteOfEveryFormat) {
   const std::vector<RecordedMessage> messages = messages_of(40, milliseconds(5));
   const MakeWriter pcap = [](std::unique_ptr<recording::Sink> sink) { return recording::write_pcap(std::move(sink), {}); };
   for (const MakeWriter make : {MakeWriter{recording::write_oculus_log}, raw_dump, pcap}) {
@@ -48,7 +48,7 @@ TEST(Replay, EveryByteOfEveryFormat) {
   }
 }
 
-TEST(Replay, WhatAClientSaysChangesNothing) {
+TEST(Replay, MessagesOfAClientChangeNothing) {
   const std::vector<RecordedMessage> messages = messages_of(20, milliseconds(10));
   Replay replay(file_of(&recording::write_oculus_log, messages), {});
   Driver driver(replay);
@@ -85,7 +85,7 @@ TEST(Replay, LoopsUntilStopped) {
   EXPECT_TRUE(replay.ends());
 }
 
-TEST(Replay, TheNextClientGetsItFromTheFront) {
+TEST(Replay, TheNextClientGetsTheRecordingFromItsStart) {
   const std::vector<RecordedMessage> messages = messages_of(50, milliseconds(20));
   Replay replay(file_of(&recording::write_oculus_log, messages), {});
   {

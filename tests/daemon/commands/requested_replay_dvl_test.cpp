@@ -100,7 +100,7 @@ Bytes mcap_file(const std::string& profile, std::initializer_list<std::string> l
 }
 
 /// The conversations of the device report a position five times a second; the recording lasts longer.
-TEST_F(ReplayOfDvl, ItSendsNoPositionsBesideTheRecordedOnes) {
+TEST_F(ReplayOfDvl, OnlyRecordedPositionsAreSent) {
   const auto lines = {velocity, velocity, velocity, position};
   for (const Bytes& file : {dump(lines), mcap_file("dvl-a50", lines), mcap_file("dvl-a125", lines)}) {
     Replay replay(file, 5.0);
@@ -109,7 +109,7 @@ TEST_F(ReplayOfDvl, ItSendsNoPositionsBesideTheRecordedOnes) {
   }
 }
 
-TEST_F(ReplayOfDvl, ItIsTheProductThatTheRecordingStates) {
+TEST_F(ReplayOfDvl, TheProductIsThatOfTheRecording) {
   for (const auto& [profile, name] : {std::pair{"dvl-a50", "DVL A50"}, std::pair{"dvl-a125", "DVL A125"}}) {
     std::promise<void> goes_on_now;
     Replay replay(mcap_file(profile, {velocity}), 1000, goes_on_now.get_future().share());

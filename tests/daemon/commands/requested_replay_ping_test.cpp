@@ -104,7 +104,7 @@ std::vector<Bytes> played(const std::vector<Bytes>& messages, const recording::C
   return richest;
 }
 
-TEST(ReplayOfPing1D, TheRichestMessageOfAPingStandsForIt) {
+TEST(ReplayOfPing1D, TheMessageWithTheMostContentIsUsed) {
   const recording::Codec of = ping::ping1d::codec();
   const auto simple = ping1d_simple, distance = ping1d_distance, profile = ping1d_profile;
   EXPECT_THAT(played({simple(1), profile(1), simple(2), profile(2)}, of), ElementsAre(profile(1), profile(2)));
@@ -117,7 +117,7 @@ TEST(ReplayOfPing1D, TheRichestMessageOfAPingStandsForIt) {
       << "a ping has one message of each kind";
 }
 
-TEST(ReplayOfS500, TheRichestMessageOfAPingStandsForIt) {
+TEST(ReplayOfS500, TheMessageWithTheMostContentIsUsed) {
   ping::Profile6 profile;
   profile.depth_m = 2.5f;
   profile.smooth_depth_m = 2.25f;

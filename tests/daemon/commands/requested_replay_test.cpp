@@ -39,7 +39,7 @@ const recording::Codec codec{.ping_part = part_of};
 
 int second_of(const PlayedPing& ping) { return static_cast<int>(seconds(ping.at.time_since_epoch())); }
 
-TEST(PlayedPings, OfAScanTheNearestLineIsTheNextInTime) {
+TEST(PlayedPings, TheNearestLineOfAScanIsTheNextInTime) {
   Messages reader = recorded({{0, 10}, {99, 0}, {0, 20}, {0, 30}, {0, 20}, {0, 10}});
   PlayedPings pings(reader, codec);
   ASSERT_TRUE(pings.open("f"));
@@ -130,7 +130,7 @@ Bytes ping360_line(std::uint16_t angle, bool of_a_scan) {
 }
 
 /// The recording is of a scan. A request of a single line gets the message with which the device answers such a request.
-TEST(ReplayOfPing360, ARequestGetsTheLineOfItsAngleInTheMessageThatAnswersIt) {
+TEST(ReplayOfPing360, ARequestGetsTheRecordedLineOfItsAngle) {
   Replay replay(file_of(ping_log, {ping360_line(10, true), ping360_line(20, true), ping360_line(30, true)}));
   Udp host(12345);
   for (const std::uint16_t angle : std::array<std::uint16_t, 3>{20, 10, 28}) {

@@ -32,7 +32,7 @@ TEST(ConfigMavlink, ByDefaultThereIsNoLink) {
   EXPECT_TRUE(parse("{mavlink: off}")->poses.mavlink.empty());
 }
 
-TEST(ConfigMavlink, OneEndpoint) {
+TEST(ConfigMavlink, OneEndpointIsEnough) {
   const auto c = parse("{mavlink: 'udpin:127.0.0.1:14551'}");
   ASSERT_TRUE(c) << c.error().text;
   const MavlinkConfig& link = c->poses.mavlink.at(0);
@@ -46,7 +46,7 @@ TEST(ConfigMavlink, OneEndpoint) {
   EXPECT_TRUE(parse("{mavlink: 'udpout:192.168.2.2:14660'}")->poses.mavlink.at(0).dials) << "dialling needs no allow_from";
 }
 
-TEST(ConfigMavlink, AListOfLinks) {
+TEST(ConfigMavlink, AListHasSeveralLinks) {
   const auto c = parse(
       "{allow_from: [10.0.0.0/8], mavlink: [{endpoint: 'udpin:0.0.0.0:14551', vehicle: boat, system_id: 2, component_id: 1, "
       "request_rates: true, rate_hz: 20}, {endpoint: 'udpout:127.0.0.1:14552', vehicle: rov}]}",

@@ -37,7 +37,7 @@ const std::string world = "world: {scene: scene.yaml}\n";
 const std::string vehicles = "vehicles: [{name: rov}]\n";
 const std::string sonar = "sonars:\n  - name: front\n    profile: oculus-m1200d\n    bind_ip: 127.0.0.2\n";
 
-TEST(ConfigMistakes, NamesTheNearestSceneToOneThatIsNot) {
+TEST(ConfigMistakes, NamesTheNearestSceneForAnUnknownName) {
   std::ofstream(directory() + "/harbour.yaml") << "objects: []\n";
   std::ofstream(directory() + "/harbours.yaml") << "world: {scene: harbour.yaml}\nobjects: []\nsonars: []\n";  // no scene
   const auto refusal = [&](const std::string& scene) { return why("world: {scene: " + scene + "}\n" + vehicles + sonar); };
@@ -47,12 +47,12 @@ TEST(ConfigMistakes, NamesTheNearestSceneToOneThatIsNot) {
   EXPECT_THAT(refusal("scenes/demo.yml"), HasSubstr("did you mean \"demo.yaml\"?"));
 }
 
-TEST(ConfigMistakes, SaysWhatASceneFileIsThatCannotBeRead) {
+TEST(ConfigMistakes, NamesTheKindOfAnUnreadableSceneFile) {
   ASSERT_EQ(mkfifo((directory() + "/fifo.yaml").c_str(), 0600), 0);
   EXPECT_THAT(why("world: {scene: fifo.yaml}\n" + vehicles + sonar), HasSubstr("fifo.yaml: is a FIFO, not a regular file"));
 }
 
-TEST(ConfigMistakes, SaysWhyAFileThatIsThereCannotBeRead) {
+TEST(ConfigMistakes, SaysWhyAnExistingFileCannotBeRead) {
   namespace fs = std::filesystem;
   const fs::path folder = directory();
   fs::create_directory(folder / "maps.yaml");
@@ -128,7 +128,7 @@ TEST(ConfigMistakes, AnotherProductAloneLeavesTheExampleValid) {
     }
 }
 
-TEST(ConfigMistakes, OptionsOfAnotherVendorAreTold) {
+TEST(ConfigMistakes, OptionsOfAnotherVendorAreReported) {
   EXPECT_THAT(notes_of_config(*example_with("oculus-m750d")), ::testing::IsEmpty());
   EXPECT_THAT(
       notes_of_config(*example_with("blueview-p900-90")),
@@ -186,7 +186,7 @@ TEST(ConfigMistakes, PointsADataSetsJobToItsCommand) {
   EXPECT_THAT(config.error().text, HasSubstr("this is a data set's job, not a configuration: sonard dataset "));
 }
 
-TEST(ConfigMistakes, KnowsAScene) {
+TEST(ConfigMistakes, AScenePassedAsConfigurationIsNamed) {
   const auto config = load_config(std::filesystem::path(SONARD_SOURCE_DIR) / "scenes/tank-rod.yaml");
   ASSERT_FALSE(config);
   EXPECT_EQ(config.error().kind, ErrorKind::config);

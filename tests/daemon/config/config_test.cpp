@@ -66,7 +66,7 @@ constexpr const char* least =
     "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\n"
     "sonars: [{name: a, profile: oculus-m1200d, bind_ip: 127.0.0.2}]\nengine: ";
 
-TEST(Config, EveryPartOfTheModelIsSwitchedByItsNameAndNothingElse) {
+TEST(Config, EveryPartOfTheModelIsSwitchedByItsName) {
   for (const NamedSwitch& part : named_switches)
     for (const bool on : {true, false}) {
       const auto c = parse(std::string(least) + "{" + part.name + (on ? ": on}" : ": off}"));
@@ -245,7 +245,7 @@ TEST(Config, OptionsReachTheModel) {
               StartsWith("sonard.yaml:7:32: sonars[0].options.lf_aperture_deg: "));
 }
 
-TEST(Config, EveryRefusalSaysWhatAndWhere) {
+TEST(Config, EveryErrorHasTheMistakeAndTheLine) {
   const auto with = [&](const std::string& more) { return why(world + vehicles + sonar + more); };
   EXPECT_THAT(why("world: {scene: nowhere.yaml}\n" + vehicles + sonar),
               HasSubstr("sonard.yaml:1:16: world.scene: no such file: \"nowhere.yaml\"; looked in "));
@@ -375,7 +375,7 @@ TEST(Config, TheShippedExampleIsValid) {
   EXPECT_EQ(text_of(demo->sonars.at(0).bind_ip), "127.0.0.2");
 }
 
-TEST(FindConfig, TakesTheFileItIsGivenUnlessTheDemoIsAskedFor) {
+TEST(FindConfig, UsesTheGivenFileUnlessTheDemoIsRequested) {
   const std::string file = std::string(SONARD_SOURCE_DIR) + "/scenes/sonard.yaml";
   const auto given = find_config(file, false);
   ASSERT_TRUE(given) << given.error().text;
@@ -413,7 +413,7 @@ std::string two_sonars(const std::string& first, const std::string& second_ip) {
          (second_ip == "0.0.0.0" ? ", advertise_ip: 10.0.0.9}\n" : "}\n");
 }
 
-TEST(Rebind, WhatIsDerivedFromTheAddressFollowsIt) {
+TEST(Rebind, DerivedAddressesFollow) {
   auto config = parse(two_sonars("", "192.168.2.5"));
   ASSERT_TRUE(config) << config.error().text;
   EXPECT_EQ(text_of(config->sonars[0].status_to.at(0).ip), "192.168.2.255");
@@ -430,7 +430,7 @@ TEST(Rebind, WhatIsDerivedFromTheAddressFollowsIt) {
   EXPECT_EQ(text_of(moved.status_to.at(0).ip), "10.1.2.255");
 }
 
-TEST(Rebind, WhatTheFileSaysStays) {
+TEST(Rebind, GivenValuesStay) {
   auto config = parse(two_sonars(", netmask: 255.255.0.0, status_to: [192.168.2.7]", "192.168.2.5"));
   ASSERT_TRUE(config) << config.error().text;
   ASSERT_TRUE(rebind(*config, "10.1.2.3"));

@@ -25,14 +25,14 @@ std::string why(const std::string& plan) {
   return config ? std::string() : config.error().text;
 }
 
-TEST(FaultPlan, ThatHoldsIsAccepted) {
+TEST(FaultPlan, AValidPlanIsAccepted) {
   EXPECT_EQ(why("  - {do: L05, at: {ping: 20}}\n"
                 "  - {do: overheating, sonar: front, for: {seconds: 900}}\n"
                 "  - {do: D16, sonar: rear}\n"),
             "");
 }
 
-TEST(FaultPlan, ThatCannotHoldIsRefusedInItsPlace) {
+TEST(FaultPlan, APlanWithAMistakeIsRefusedWithItsLine) {
   struct Case {
     const char* plan;
     std::vector<const char*> said;

@@ -98,7 +98,7 @@ TEST(SceneFile, OnlyTheConfigurationsFolderAndTheShippedScenesMayBeQuoted) {
   EXPECT_FALSE(may_be_quoted({elsewhere.path / "secret.yaml"}, "/")) << "a service's working directory";
 }
 
-TEST(SceneFile, NamesOfScenesAreNames) {
+TEST(SceneFile, NamesOfScenesEndInYamlOrYml) {
   for (const char* name : {"demo.yaml", "/a/b.yml", "../c.yaml"}) EXPECT_TRUE(has_scene_name(name)) << name;
   for (const char* name : {"", "/etc/passwd", "token", ".yaml", "a.yaml/b", "a.yaml.txt"})
     EXPECT_FALSE(has_scene_name(name)) << name;

@@ -50,7 +50,7 @@ std::string why(const std::string& trajectory, const std::string& more = {}) {
   return config ? "accepted" : config.error().text;
 }
 
-TEST(TrajectoryConfig, WordsAndFiles) {
+TEST(TrajectoryConfig, NoneOrbitAndFilesAreRead) {
   EXPECT_FALSE(vehicle("none").plan || vehicle("none").orbits);
   EXPECT_TRUE(vehicle("orbit").orbits);
   const motion::Plan plan = vehicle("missions/dive.tum").plan;
@@ -86,7 +86,7 @@ TEST(TrajectoryConfig, AnotherOriginThanTheWorldsIsANote) {
     EXPECT_THAT(notes(other, world), ::testing::IsEmpty()) << other;
 }
 
-TEST(TrajectoryConfig, EveryKey) {
+TEST(TrajectoryConfig, EveryKeyIsRead) {
   const motion::Plan plan =
       vehicle("{file: missions/no-frame.tum, format: tum, frame: NED_FRD, speed: 2.5, loop: true, start_s: -1.5}").plan;
   ASSERT_TRUE(plan);
@@ -98,7 +98,7 @@ TEST(TrajectoryConfig, EveryKey) {
   EXPECT_EQ(vehicle("{file: kitti.txt, frame: ENU_FLU, rate_hz: 4}").plan.trajectory->duration(), milliseconds(250));
 }
 
-TEST(TrajectoryConfig, BodiesOfOneFile) {
+TEST(TrajectoryConfig, BodiesOfOneFileAreFoundByName) {
   EXPECT_EQ(vehicle("fleet.csv").plan.trajectory->points().poses.at(0).position_m.x, 1) << "by the vehicle's own name";
   EXPECT_EQ(vehicle("{file: fleet.csv, body: auv}").plan.trajectory->points().poses.at(0).position_m.x, 2);
   const auto config = parse("fleet.csv", "objects:\n  - {name: auv, trajectory: fleet.csv}\n");
@@ -123,7 +123,7 @@ TEST(TrajectoryConfig, TheManualsExampleIsAConfiguration) {
   EXPECT_EQ(config->objects.at(0).plan.trajectory->points().poses.at(0).position_m.x, 5) << "east";
 }
 
-TEST(TrajectoryConfig, MistakesAreToldWithTheirPlace) {
+TEST(TrajectoryConfig, MistakesAreReportedWithTheirLine) {
   EXPECT_THAT(why("orbti"), AllOf(StartsWith("sonard.yaml:4:17: vehicles[0].trajectory: "), HasSubstr("\"orbit\"")));
   EXPECT_THAT(why("dive.tum"), AllOf(StartsWith("sonard.yaml:4:17: vehicles[0].trajectory: "),
                                      HasSubstr("no such file: \"dive.tum\"; looked in /")));

@@ -39,7 +39,7 @@ bool sees_range(Client& client, double range_m) {
   return sees(client, [=](const oculus::DecodedPing& p) { return p.head.fixed.fire.range == range_m; });
 }
 
-TEST(Status, SaysWhatThereIsAndWhatItDoes) {
+TEST(Status, HasModelAddressAndState) {
   DaemonSetup setup;
   setup.moving_object = true;
   Daemon daemon(setup);
@@ -108,7 +108,7 @@ TEST(SetSonar, IsSeenInTheNextPingAndEchoedAsAFireMessage) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("client=\"control test\""));
 }
 
-TEST(SetSonar, TheLastWhoAsksWins) {
+TEST(SetSonar, TheLastRequestWins) {
   Daemon daemon;
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40, 3));
@@ -120,7 +120,7 @@ TEST(SetSonar, TheLastWhoAsksWins) {
   for (int i = 0; i < 5; ++i) EXPECT_EQ(client.next_ping()->head.fixed.fire.range, 3);
 }
 
-TEST(SetSonar, SilentWhateverClientsAskUntilItMayTransmitAgain) {
+TEST(SetSonar, TransmitFalseOverridesClients) {
   Daemon daemon;
   ASSERT_EQ(daemon.ask(set_transmit(false)).code, Code::done);
   Client client(daemon.address());
@@ -136,7 +136,7 @@ TEST(SetSonar, SilentWhateverClientsAskUntilItMayTransmitAgain) {
   EXPECT_FALSE(daemon.requests().back().blank);
 }
 
-TEST(SetSonar, MovesItOnItsVehicle) {
+TEST(SetSonar, MovesTheSonarOnItsVehicle) {
   Daemon daemon;
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
@@ -156,7 +156,7 @@ TEST(SetSonar, MovesItOnItsVehicle) {
   EXPECT_NEAR(rpy_from_quat(daemon.requests().back().sonar_in_world.orientation).pitch_rad, rad_from_deg(30), 1e-12);
 }
 
-TEST(SetSonar, WhatCannotBeIsRefusedWithWhatCanAndNothingChanges) {
+TEST(SetSonar, WrongValuesAreRefusedWithThePermittedOnesAndChangeNothing) {
   Daemon daemon;
   const auto before = daemon.status().sonars(0);
   control::SetSonar wrong = set_range(300);

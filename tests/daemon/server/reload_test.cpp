@@ -317,7 +317,7 @@ TEST(Reload, WaterMountsVehiclesAndSeedAreTakenOver) {
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
 }
 
-TEST(Reload, WhatControlChangedIsAsTheFileSaysAgain) {
+TEST(Reload, ChangesByControlAreUndone) {
   DaemonSetup setup = with_file();
   Daemon daemon(setup);
   control::SetSonar tilt;
@@ -342,7 +342,7 @@ TEST(Reload, TheSameSceneIsNotBuiltAgain) {
   ASSERT_TRUE(reload(daemon, "reloaded: front untouched"));
 }
 
-TEST(Reload, WhatNeedsARestartIsNamedInOneWarning) {
+TEST(Reload, KeysThatNeedARestartAreNamedInOneWarning) {
   DaemonSetup setup = with_file();
   Daemon daemon(setup);
   setup.more += "clock: stepped\nengine: {threads: 7}\nlog: {level: error}\n";
@@ -378,7 +378,7 @@ TEST(Reload, ManyInARowLeaveNothingBehind) {
   EXPECT_THAT(daemon.log_text(), Not(HasSubstr("internal fault")));
 }
 
-TEST(KeepWhatNeedsARestart, NamesKeysThatDifferAndPutsThemBack) {
+TEST(KeepWhatNeedsARestart, NamesAndRestoresChangedKeys) {
   const Config now = *demo_config();
   Config next = *demo_config();
   EXPECT_THAT(keep_restart_keys(now, next), IsEmpty());

@@ -121,7 +121,7 @@ TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
 }
 
 /// Making an engine delays pings. A client that changes the scene continuously must not reduce the ping rate of others.
-TEST(SceneChange, WhileADriverIsServedEnginesAreMadeSoOften) {
+TEST(SceneChange, TheRateOfNewEnginesIsLimitedWhileADriverIsServed) {
   Daemon daemon;
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
@@ -197,7 +197,7 @@ TEST(SceneChange, ChangesQueueInOrder) {
   EXPECT_EQ(objects[2].position().x(), 7);
 }
 
-TEST(SceneChange, WhoIsAnsweredMayAskAgainAtOnce) {
+TEST(SceneChange, AnAnsweredClientMayRequestAgainAtOnce) {
   Daemon daemon;
   std::vector<OperationResult::Code> answers;  // on the I/O thread
   daemon.on_io_thread([&] {
@@ -243,7 +243,7 @@ TEST(SceneChange, AFailureChangesNothing) {
   for (const ScenePointer& scene : daemon.scenes()) EXPECT_EQ(scene->objects.size(), 2u);
 }
 
-TEST(SceneChange, WordsOfFilesElsewhereStayHere) {
+TEST(SceneChange, ErrorsOfForeignFilesAreOnlyInTheLog) {
   const std::string file = ::testing::TempDir() + "secret" + std::to_string(::getpid()) + ".yaml";
   std::ofstream(file) << "password\n";
   DaemonSetup setup;

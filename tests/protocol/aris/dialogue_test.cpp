@@ -159,7 +159,7 @@ TEST(ArisDialogue, AHostThatAsksForTheSettingsOfEachProductIsNotComplainedAbout)
   }
 }
 
-TEST(ArisDialogue, SalinityFocusClockAndLens) {
+TEST(ArisDialogue, SalinityFocusClockAndLensCanBeSet) {
   Talk talk("aris-1800");
   talk.say(tests::set_acoustics({1, 12, 1000, 1360, 5720, 4, 6, 3, true, Frequency::high, true, 18}));
   const float salt = talk.settings.device_sound_speed_mps;
@@ -189,7 +189,7 @@ TEST(ArisDialogue, SalinityFocusClockAndLens) {
   EXPECT_EQ(tests::at_s(10) + talk.held().clock_offset, Time(std::chrono::seconds(1391212695)));
 }
 
-TEST(ArisDialogue, DatesThatAreNone) {
+TEST(ArisDialogue, WrongDatesAreRefused) {
   EXPECT_EQ(parse_date_time("1970-Jan-01 00:00:01"), Time(std::chrono::seconds(1)));
   for (const char* bad : {"", "2014-01-31 23:58:15", "2014-anF-31 23:58:15", "2014-Feb-30 00:00:00", "2014-Jan-31 24:00:00"})
     EXPECT_FALSE(parse_date_time(bad)) << bad;
@@ -210,7 +210,7 @@ TEST(ArisDialogue, JunkIsReportedAndALyingLengthEndsIt) {
   EXPECT_THAT(talk.closed, HasSubstr("longer than 4096"));
 }
 
-TEST(ArisDialogue, OptionsOfReceiversAndSilence) {
+TEST(ArisDialogue, OptionsLimitReceiversAndSilence) {
   Talk talk("aris-3000", {{"receivers", "controller"}, {"silence_s", "5"}});
   talk.say(tests::set_receiver(5, "10.0.0.8"));
   EXPECT_TRUE(talk.receivers.empty());

@@ -7,7 +7,7 @@
 namespace sonar::aris {
 namespace {
 
-TEST(ArisOrder, ChannelsOfTheFirstPing) {
+TEST(ArisOrder, ChannelsOfTheFirstPingAreInTheOrderOfTheDigitiser) {
   // One sample of 48 beams, three pings: channel 0 of ping 0 is beam 30, channel 5 is beam 0.
   Bytes picture(48);
   for (std::size_t beam = 0; beam < 48; ++beam) picture[beam] = static_cast<std::byte>(beam);
@@ -131,7 +131,7 @@ TEST(ArisFrame, LacksAPart) {
   EXPECT_FALSE(assembler.add({}));
 }
 
-TEST(ArisFrame, FieldsAndRegionsOfTheFirstPart) {
+TEST(ArisFrame, TheFirstPartHasFieldsAndRegions) {
   const auto state = tests::device();
   Settings s = initial_settings(state);
   apply(s, tests::acoustics(), state);
@@ -173,7 +173,7 @@ TEST(ArisFrame, OlderFirmwareAndLongerDatagramsAreOptions) {
   EXPECT_EQ(frame->header.go_time_us, 0u) << "older firmware lacks this field";
 }
 
-TEST(ArisFrame, OfATelephotoLens) {
+TEST(ArisFrame, TheHeaderStatesTheTelephotoLens) {
   const auto state = tests::device("aris-1800");
   Settings s = initial_settings(state);
   s.telephoto = true;

@@ -66,7 +66,7 @@ TEST(ArisCommands, LengthsThatLieAndCutMessages) {
   EXPECT_EQ(command.type, CommandType::ping);
 }
 
-TEST(ArisBeacon, SaysItsZeros) {
+TEST(ArisBeacon, IncludesZeroFields) {
   protocol::DeviceState state = tests::device("aris-1800");
   const Bytes free = make_beacon(state);
   EXPECT_LE(free.size(), 256u);

@@ -5,7 +5,7 @@
 namespace sonar::aris {
 namespace {
 
-TEST(ArisModels, ModesOfEachProduct) {
+TEST(ArisModels, EachProductHasItsModes) {
   for (const auto& [profile, modes] :
        {std::pair{"aris-1200", std::size_t{4}}, {"aris-1800", std::size_t{8}}, {"aris-3000", std::size_t{4}}}) {
     const auto model = protocol::find_profile(profile)->model;

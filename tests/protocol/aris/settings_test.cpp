@@ -11,7 +11,7 @@ using ::testing::HasSubstr;
 
 const Product& product(const std::string& profile) { return product_of(*protocol::find_profile(profile)->model); }
 
-TEST(ArisSettings, HighestFrameRatesOfTheVendorsOwnTable) {
+TEST(ArisSettings, HighestFrameRatesAreThoseOfTheVendorsTable) {
   struct Row {
     const char* profile;
     std::uint32_t period, samples, mode;
@@ -39,7 +39,7 @@ TEST(ArisSettings, SettingsOfTheVendorsSampleProgramAreValidAsTheyAre) {
   }
 }
 
-TEST(ArisSettings, WhatIsOutOfRangeIsRefusedByName) {
+TEST(ArisSettings, ValuesOutOfRangeAreRefusedByName) {
   const auto why = [](auto change, const char* profile = "aris-3000") {
     Acoustics a = tests::acoustics();
     change(a);
@@ -83,7 +83,7 @@ TEST(ArisSettings, PulseAndRateAreConstrained) {
   EXPECT_NEAR(verdict.used.frame_rate_hz, 6.7, 0.05);
 }
 
-TEST(ArisSettings, CookiesOfEachKind) {
+TEST(ArisSettings, CookiesTellAppliedConstrainedAndInvalidSettings) {
   const auto state = tests::device();
   Settings s = initial_settings(state);
   apply(s, tests::acoustics(3), state);

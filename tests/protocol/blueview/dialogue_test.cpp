@@ -72,7 +72,7 @@ TEST(BlueViewDialogue, AnotherVersionIsRefusedAndClosed) {
   EXPECT_TRUE(closes(r));
 }
 
-TEST(BlueViewDialogue, NothingBeforeHelloAndNoUnknownTypes) {
+TEST(BlueViewDialogue, RequestsBeforeHelloAndUnknownTypesAreRefused) {
   auto device = test::device();
   Host host(device);
   EXPECT_EQ(test::error_code_of(test::reply_from(host.say(test::ping(5)).replies.at(0))), 14004);
@@ -191,7 +191,7 @@ TEST(BlueViewDialogue, ATriggerWithoutPingTimesOut) {
   EXPECT_TRUE(host.ready(1.6).prefixes.empty());
 }
 
-TEST(BlueViewDialogue, SubscriptionsPingByThemselves) {
+TEST(BlueViewDialogue, SubscriptionsMakePingsWithoutRequests) {
   auto device = test::device();
   Host host(device);
   host.say(test::hello());
@@ -206,7 +206,7 @@ TEST(BlueViewDialogue, SubscriptionsPingByThemselves) {
   EXPECT_EQ(pings_asked(host.tick(1.5)), 0);
 }
 
-TEST(BlueViewDialogue, SilenceIsFilled) {
+TEST(BlueViewDialogue, KeepAliveIsSentInSilence) {
   auto device = test::device();
   Host host(device);
   host.say(test::hello());

@@ -55,7 +55,7 @@ Bytes pose_bytes(unsigned frame, const Bytes& position, const Bytes& orientation
 }
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(Control, APoseWithoutAnIdIsKnownByItsOutline) {
+TEST(Control, APoseWithoutAnIdIsDetectedByItsFields) {
   EXPECT_TRUE(is_unasked_pose(encode_request({0, PoseSample{}})));
   EXPECT_FALSE(is_unasked_pose(encode_request({1, PoseSample{}})));
   EXPECT_FALSE(is_unasked_pose(encode_request({300, PoseSample{}})));
@@ -97,7 +97,7 @@ TEST(Control, DecodesHandAssembledEnuPoseWithTimeAndTwist) {
   EXPECT_EQ(s->fields, "time position orientation velocity angular_velocity");
 }
 
-TEST(Control, RefusesWithASentence) {
+TEST(Control, RefusalsHaveAReason) {
   const auto why = [](const Bytes& b) {
     const auto s = decode_pose_datagram(b);
     return s ? std::string("accepted") : s.error().text;

@@ -91,7 +91,7 @@ TEST(JsonPose, EveryTruncationIsRefusedQuietly) {
   EXPECT_EQ(why(line), "accepted");
 }
 
-TEST(JsonPose, WhatIsNoObjectIsKnownFromItsFirstSign) {
+TEST(JsonPose, OnlyWholeObjectsAreAccepted) {
   EXPECT_TRUE(is_json_object("{}") && is_json_object(R"( {"frame":"NWU"})"));
   for (const std::string line : {"", "[]", "3", "{", "{\"a\":}", "POST / HTTP/1.1", "{} {}"})
     EXPECT_FALSE(is_json_object(line)) << line;

@@ -57,7 +57,7 @@ TEST(ControlJson, ReadsEveryRequestLikeItsBytes) {
   EXPECT_TRUE(request_from_json("object", R"({"object":"a",)" + at.substr(6)));
 }
 
-TEST(ControlJson, RefusesWithASentence) {
+TEST(ControlJson, RefusalsHaveAReason) {
   EXPECT_THAT(refusal_of("sonar", R"({"rang_m":5})"), HasSubstr("\"rang_m\": unknown key"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":"NaN"})"), HasSubstr("sonar.range_m is NaN"));
   EXPECT_THAT(refusal_of("sonar", R"({"range_m":1e999})"), HasSubstr("not JSON"));
@@ -110,7 +110,7 @@ TEST(ControlJson, NamesTheMistake) {
   for (const auto& mistake : mistakes) EXPECT_THAT(refusal_of(mistake.op, mistake.text), testing::StartsWith(mistake.why));
 }
 
-TEST(ControlJson, TheNameMayBeSaidElsewhere) {
+TEST(ControlJson, TheNameMayBeInThePath) {
   const auto sonar = request_from_json("sonar", R"({"range_m":5})", "front");
   ASSERT_TRUE(sonar) << sonar.error().text;
   EXPECT_EQ(std::get<SetSonar>(sonar->op).sonar, "front");

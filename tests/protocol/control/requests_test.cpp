@@ -35,7 +35,7 @@ void expect_near(const Pose& a, const Pose& b) {
   EXPECT_NEAR(std::abs((conjugate(a.orientation) * b.orientation).w), 1, 1e-12);
 }
 
-TEST(ControlRequests, SettingsOfASonarArriveAsAskedFor) {
+TEST(ControlRequests, SettingsOfASonarArriveUnchanged) {
   const Request sent = every_request()[4];
   const Request got = round_trip(sent);
   const auto &a = std::get<SetSonar>(sent.op), &b = std::get<SetSonar>(got.op);
@@ -57,7 +57,7 @@ TEST(ControlRequests, SettingsOfASonarArriveAsAskedFor) {
   EXPECT_FALSE(none.range_m || none.rate_hz || none.gain_percent || none.mode || none.beams || none.transmit || none.mount);
 }
 
-TEST(ControlRequests, TheOthersArriveAsAskedFor) {
+TEST(ControlRequests, OtherRequestsArriveUnchanged) {
   const auto all = every_request();
   const auto hello = std::get<Hello>(round_trip(all[0]).op);
   EXPECT_EQ(hello.name, "test");
@@ -88,7 +88,7 @@ TEST(ControlRequests, TheOthersArriveAsAskedFor) {
 }
 
 /// Request{id 3, sonar: SetSonar{range_m: 5, transmit: false}}, by hand: wrappers are messages of their own.
-TEST(ControlRequests, HandAssembledBytes) {
+TEST(ControlRequests, HandAssembledBytesAreDecoded) {
   Bytes bytes;
   for (const unsigned b : {0x08u, 0x03u, 0x2au, 0x0du, 0x12u, 0x09u, 0x09u, 0u, 0u, 0u, 0u, 0u, 0u, 0x14u, 0x40u, 0x3au, 0x00u})
     bytes.push_back(static_cast<std::byte>(b));
@@ -99,7 +99,7 @@ TEST(ControlRequests, HandAssembledBytes) {
   EXPECT_EQ(std::get<SetSonar>(request->op).transmit, false);
 }
 
-TEST(ControlRequests, RefusedWithASentenceThatNamesTheKey) {
+TEST(ControlRequests, RefusalsNameTheKey) {
   SetSonar sonar;
   sonar.range_m = nan;
   EXPECT_EQ(refusal_of(sonar), "sonar.range_m is NaN or infinite");

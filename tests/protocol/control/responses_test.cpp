@@ -76,7 +76,7 @@ TEST(ControlResponses, TextsThatAreNoUtf8AreRepairedNotLost) {
   EXPECT_EQ((*got)->status().text(), "caf? \xf0\x9f\x90\x9f ???");
 }
 
-TEST(ControlResponses, NumbersThatAreNoneAreRefusedByTheClient) {
+TEST(ControlResponses, TheClientRefusesInvalidNumbers) {
   v1::DaemonStatus status = full_status();
   status.mutable_sonars(0)->mutable_position()->set_y(std::numeric_limits<double>::quiet_NaN());
   const auto unreal = decode_response(encode_response(response_with(1, status)));

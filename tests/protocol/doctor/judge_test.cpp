@@ -66,7 +66,7 @@ TEST(Judge, AllIsWellWithADriverThatReads) {
   for (const Finding& f : findings) EXPECT_THAT(f.cure, IsEmpty());
 }
 
-TEST(Judge, NoDriverConnected) {
+TEST(Judge, MissingDriversAreReported) {
   const Finding f = trouble(with(""), "driver");
   EXPECT_EQ(f.level, Level::warn);
   EXPECT_THAT(f.text, StartsWith("No driver is connected to front"));
@@ -88,19 +88,19 @@ TEST(Judge, ADriverByUdpIsPointedAtItsPort) {
   EXPECT_EQ(f.cure, "point a driver at 127.0.0.3, UDP port 12345");
 }
 
-TEST(Judge, OneThatSearchedButDidNotConnect) {
+TEST(Judge, ADriverThatSearchedWithoutConnectingIsNamed) {
   const auto texts = troubles(judge(with(R"(searched { address: "10.0.0.7:1" utc_ns: 3723000000000 ago_s: 5 })"), nullptr));
   ASSERT_EQ(texts.size(), 2u);
   EXPECT_THAT(texts[1], AllOf(HasSubstr("10.0.0.7:1 searched"), HasSubstr("has not connected")));
 }
 
-TEST(Judge, OneThatAsksAtThePortOfObservers) {
+TEST(Judge, ADriverAtThePortOfObserversIsNamed) {
   const auto texts = troubles(judge(with(R"(asking_observer: "10.0.0.7:1")"), nullptr));
   ASSERT_EQ(texts.size(), 2u);
   EXPECT_THAT(texts[0], AllOf(HasSubstr("10.0.0.7:1 sends requests"), HasSubstr("observers")));
 }
 
-TEST(Judge, OneOnAWrongAddress) {
+TEST(Judge, ADriverOnAWrongAddressIsNamed) {
   const auto texts_of = [](const Elsewhere& elsewhere) { return troubles(judge(with(""), nullptr, elsewhere)); };
   const SocketLine tries{"10.0.0.5", "192.168.2.3", 40122, 52100, syn_sent, 0};
   const SocketLine held{"127.0.0.1", "127.0.0.9", 40122, 52100, established, 0};
@@ -118,14 +118,14 @@ TEST(Judge, OneOnAWrongAddress) {
   EXPECT_THAT(refused_by_fault, testing::Not(testing::Contains(HasSubstr("connections of programs"))));
 }
 
-TEST(SocketTable, FailedAttempts) {
+TEST(SocketTable, FailedAttemptsAreCounted) {
   EXPECT_EQ(failed_attempts("Ip: A B\nIp: 1 2\nTcp: RtoMin AttemptFails EstabResets\nTcp: 200 20077 3\nUdp: C\nUdp: 1\n"),
             20077u);
   for (const char* text : {"", "Tcp:", "Tcp: AttemptFails\n", "Tcp: AttemptFails\nTcp: many\n"})
     EXPECT_EQ(failed_attempts(text), 0u);
 }
 
-TEST(Judge, ConnectedAndNeverFired) {
+TEST(Judge, ADriverThatNeverFiredIsNamed) {
   const Finding f = trouble(with(silent + "}"), "driver");
   EXPECT_EQ(f.level, Level::fail);
   EXPECT_EQ(f.text, "127.0.0.1:40122 is connected to front and has not asked for pings: it has sent nothing");
@@ -154,7 +154,7 @@ TEST(Judge, StandbyAndNoiseOnlyNameWhoAsked) {
   EXPECT_THAT(trouble(silenced, "transmit").text, HasSubstr("noise only; turned off by http 192.0.2.8"));
 }
 
-TEST(Judge, OneThatDoesNotRead) {
+TEST(Judge, ADriverThatDoesNotReadIsNamed) {
   v1::DaemonStatus now =
       with(pinging + silent + "requests: 1 pings_dropped: 28 unread_s: 8 taking: 12896 unsent_bytes: 300000 }");
   EXPECT_EQ(trouble(now, "read").text, "127.0.0.1:40122 has not read for 8 s: 28 pings dropped, 300 kB on the way");
@@ -166,7 +166,7 @@ TEST(Judge, OneThatDoesNotRead) {
               HasSubstr("reads too slowly: 8 pings dropped in the last 2 s, 28 since"));
 }
 
-TEST(Judge, OneThatWasTurnedAwayOrWaits) {
+TEST(Judge, ARefusedOrWaitingDriverIsNamed) {
   const std::string away = R"(turned_away { address: "10.0.0.7:1" why: "no slot is free" utc_ns: 3723000000000 ago_s: )";
   const Finding f = trouble(with(pinging + driver + away + "5 }"), "places");
   EXPECT_EQ(f.level, Level::fail);
@@ -176,7 +176,7 @@ TEST(Judge, OneThatWasTurnedAwayOrWaits) {
   EXPECT_THAT(trouble(with(pinging + driver + "waiting: 1"), "places").text, HasSubstr("1 client of front waits for a slot"));
 }
 
-TEST(Judge, OneThatWasDisconnected) {
+TEST(Judge, ADisconnectedDriverIsNamed) {
   const std::string gone = R"(gone { address: "10.0.0.7:1" why: "read no byte for 10000 ms" utc_ns: 3723000000000 ago_s: 5 })";
   EXPECT_THAT(trouble(with(pinging + driver + gone), "driver").text,
               HasSubstr("ended at 01:02:03 UTC: read no byte for 10000 ms"));
@@ -184,7 +184,7 @@ TEST(Judge, OneThatWasDisconnected) {
   EXPECT_FALSE(any_fails(with(gone)));
 }
 
-TEST(Judge, OneThatWasDisconnectedBeforeItsFirstPing) {
+TEST(Judge, ADriverDisconnectedBeforeItsFirstPingIsNamed) {
   const auto left = [](const std::string& why, const std::string& ago_s) {
     const std::string by_itself = why == "closed by the client" ? " by_itself: true" : "";
     return "gone { address: \"10.0.0.7:1\" why: \"" + why + "\" utc_ns: 3723000000000 without_ping: true ago_s: " + ago_s +
@@ -202,7 +202,7 @@ TEST(Judge, OneThatWasDisconnectedBeforeItsFirstPing) {
   }
 }
 
-TEST(Judge, OneThatWasDisconnectedAndIsBack) {
+TEST(Judge, AReconnectedDriverIsOnlyAWarning) {
   const auto left = [](const std::string& address, const std::string& connected_s) {
     return R"(gone { address: ")" + address + R"(" why: "is no link" utc_ns: 3723000000000 without_ping: true ago_s: 2 )" +
            "connected_s: " + connected_s + " }";
@@ -217,13 +217,13 @@ TEST(Judge, OneThatWasDisconnectedAndIsBack) {
   EXPECT_TRUE(any_fails(with(pinging + silent + "pings_written: 3 }" + left("127.0.0.9:1", "5")))) << "another driver";
 }
 
-TEST(Judge, OneThatAnotherClientReplaced) {
+TEST(Judge, ADriverThatAnotherClientReplacedIsNamed) {
   const std::string gone = R"(gone { address: "10.0.0.7:1" why: "another client took over" without_ping: true ago_s: 2 })";
   EXPECT_EQ(trouble(with(pinging + driver + gone), "driver").level, Level::warn);
 }
 
 /// The driver reacted correctly; the fault itself is reported as long as it is active.
-TEST(Judge, OneThatAFaultDisconnected) {
+TEST(Judge, ADriverThatAFaultDisconnectedIsNamed) {
   const Finding f =
       trouble(with(pinging + driver + R"(gone { address: "10.0.0.7:1" why: "a fault" without_ping: true ago_s: 5 })"), "driver");
   EXPECT_EQ(f.level, Level::warn);
@@ -256,7 +256,7 @@ TEST(Judge, AnEngineThatIsTooSlow) {
   EXPECT_EQ(trouble(judge(now, &before), "rate").text, "The engine refused 3 pings of front");
 }
 
-TEST(Judge, WhatTimeWaitsFor) {
+TEST(Judge, TheReasonWhyTimeStandsStillIsNamed) {
   const std::string slow = pinging + silent + "requests: 1 unread_s: 8 taking: 12896 }";
   EXPECT_EQ(trouble(with(slow, "", "stepped"), "clock").text,
             "Time stands still at 41.600 s: it moves when 127.0.0.1:40122 has taken ping 12896; it has not read for 8 s");

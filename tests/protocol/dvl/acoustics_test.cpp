@@ -88,7 +88,7 @@ TEST(DvlAcoustics, StarboardIsStarboard) {
   EXPECT_LT(m.beams[3].distance_m, m.beams[2].distance_m - 0.5);
 }
 
-TEST(DvlAcoustics, HasNoVelocityWhereItHearsNoGround) {
+TEST(DvlAcoustics, HasNoVelocityWithoutAnEchoOfTheGround) {
   for (const double altitude_m : {80.0, 0.02}) {
     Dvl dvl(bed(-altitude_m));
     int valid = 0;

@@ -102,7 +102,7 @@ TEST(DvlVelocity, IsMeasuredOnceForAllItsLines) {
   EXPECT_NE(said(), looked_for_now);
 }
 
-TEST(DvlVelocity, AWrongSpeedOfSoundScalesIt) {
+TEST(DvlVelocity, AWrongSpeedOfSoundScalesTheVelocity) {
   const protocol::DeviceState state = device();
   Settings s;
   s.mode = 1;
@@ -265,7 +265,7 @@ TEST(DvlCommands, TheConfigurationIsReadAndSet) {
   EXPECT_EQ(read["range_mode"], "=1");
 }
 
-TEST(DvlCommands, NothingOfASetWithAMistakeIsSet) {
+TEST(DvlCommands, ASetCommandWithAMistakeChangesNothing) {
   Client client;
   for (const char* wrong :
        {R"({"speed_of_sound":1490,"mounting_rotation_offset":361})", R"({"speed_of_sound":999})", R"({"acoustic_enabled":1})",
@@ -326,7 +326,7 @@ TEST(DvlCommands, DeadReckoningIsReportedFiveTimesASecondAndReset) {
   EXPECT_EQ(client.answers.at(0)["x"], 0.0);
 }
 
-TEST(DvlCommands, VersionAndTime) {
+TEST(DvlCommands, VersionAndTimeAreAnswered) {
   Client client;
   const Json info = client.ask(R"({"command":"get_version_info"})")["result"];
   EXPECT_EQ(info["product_name"], "DVL A50");

@@ -112,7 +112,7 @@ TEST(DvlSerial, CommandsAreAnswered) {
   EXPECT_THAT(line.ask("wcT,5\nwcm,1700000000000000\n"), ElementsAre("wrT,y", "wrn")) << "its clock is synchronised";
 }
 
-TEST(DvlSerial, WhatIsWrongIsToldApart) {
+TEST(DvlSerial, MalformedUnknownAndRefusedCommandsDiffer) {
   Line line;
   for (const char* malformed : {"hello", "wrv", "wc", "wcvv", "wcq", "wcv,1", "wcs,1,2", "wcs,1,2,y,y,auto,y,y", "wcs,fast,,,",
                                 "wcs,,,yes,", "wcp", "wcT,soon", "wcm"})

@@ -27,7 +27,7 @@ Bytes bytes_of(std::string_view hex) {
   return bytes;
 }
 
-TEST(FoxgloveFrames, WhatViewersGet) {
+TEST(FoxgloveFrames, FramesForViewersHaveTheirBytes) {
   EXPECT_EQ(hex(message_head(7, Time(milliseconds(1500)))), "0107000000002f685900000000");
   EXPECT_EQ(hex(time_frame(Time(milliseconds(41600)))), "0200a08daf09000000");
   EXPECT_EQ(hex(service_answer({5, 9, "json", "{}"})), "030500000009000000040000006a736f6e7b7d");
@@ -38,7 +38,7 @@ TEST(FoxgloveFrames, WhatViewersGet) {
             "0e000000");
 }
 
-TEST(FoxgloveFrames, WhatViewersSend) {
+TEST(FoxgloveFrames, FramesOfViewersAreRead) {
   const auto call = frame_of_viewer(bytes_of("020500000009000000040000006a736f6e7b7d"));
   ASSERT_TRUE(call);
   const auto& asked = std::get<ServiceCall>(*call);
@@ -56,7 +56,7 @@ TEST(FoxgloveFrames, WhatViewersSend) {
   EXPECT_EQ(playback.request, "aaaaaaa");
 }
 
-TEST(FoxgloveFrames, TooShortOrUnknown) {
+TEST(FoxgloveFrames, ShortAndUnknownFramesAreRefused) {
   const auto refusal = [](std::string_view hex) {
     const auto read = frame_of_viewer(bytes_of(hex));
     return read ? std::string("taken") : read.error().text;

@@ -58,7 +58,7 @@ std::shared_ptr<Ping> ping_of(int bits) {
 
 json read_image(int bits) { return read_back("foxglove.RawImage", raw_image(at, "front", image_of(ping_of(bits)))); }
 
-TEST(FoxgloveMessages, Images) {
+TEST(FoxgloveMessages, ImagesHaveTheirFields) {
   const json image = read_image(8);
   EXPECT_EQ(image["timestamp"], "1970-01-01T00:00:01.500Z");
   EXPECT_EQ(image["width"], 3);
@@ -86,7 +86,7 @@ TEST(FoxgloveMessages, SamplesAreNotCopied) {
   EXPECT_EQ(image_of(ping).samples.get(), &ping->samples);
 }
 
-TEST(FoxgloveMessages, PlacesAndLines) {
+TEST(FoxgloveMessages, TransformsAndLinesHaveTheirFields) {
   const std::vector<Transform> frames{{at, "world", "rov", {{1, 2, 3}, {0, 1, 0, 0}}}};
   const json frame = read_back("foxglove.FrameTransforms", transforms(frames))["transforms"][0];
   EXPECT_EQ(frame["translation"], R"({"x": 1.0, "y": 2.0, "z": 3.0})"_json);
@@ -113,7 +113,7 @@ TEST(FoxgloveMessages, ScenesOneAfterTheOtherAreOne) {
   EXPECT_EQ(scene["deletions"][0]["id"], "wreck");
 }
 
-TEST(FoxgloveMessages, CloudsAndGeometry) {
+TEST(FoxgloveMessages, CloudsAndGeometryHaveTheirFields) {
   const json points = read_back("foxglove.PointCloud", cloud(at, "front", std::vector<CloudPoint>{{1, 2, 0, 200}}));
   EXPECT_EQ(points["point_stride"], 16);
   EXPECT_EQ(points["fields"][3], R"({"name": "intensity", "offset": 12, "type": "UINT8"})"_json);
@@ -127,7 +127,7 @@ TEST(FoxgloveMessages, CloudsAndGeometry) {
   EXPECT_EQ(shape["azimuth_rad"], R"([0.5, 0.0, -0.5])"_json);
 }
 
-TEST(FoxgloveMessages, TheTruthOfEachBeam) {
+TEST(FoxgloveMessages, TruthHasTheHitOfEachBeam) {
   const auto ping = ping_of(8);
   ping->request.fired_at = at;
   ping->request.number = PingNumber{7};
@@ -181,7 +181,7 @@ TEST(FoxgloveMessages, StatusIsDescribedToo) {
   EXPECT_EQ(protobuf_schema("sonar.v1.Nothing").text, "");
 }
 
-TEST(Glb, ATriangleLyingOnTheGround) {
+TEST(Glb, HasTheBytesOfATriangle) {
   const std::vector<Vec3> vertices{{0, 0, 1}, {2, 0, 1}, {0, 3, 1}};
   const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}};
   const Bytes file = glb(vertices, triangles, {0.5, 0.25, 1});
@@ -210,7 +210,7 @@ TEST(Glb, ATriangleLyingOnTheGround) {
   EXPECT_EQ(indices[2], 2u);
 }
 
-TEST(RosCdr, FifteenNumbersBehindFourBytes) {
+TEST(RosCdr, HasFifteenNumbersAfterFourBytes) {
   std::array<double, figure_names.size()> values{};
   values[1] = 2;
   const Bytes message = figures(values);

@@ -13,7 +13,7 @@ using nlohmann::json;
 using nlohmann::literals::operator""_json;
 using ::testing::HasSubstr;
 
-TEST(FoxgloveWords, WhatViewersGet) {
+TEST(FoxgloveWords, MessagesForViewersAreWritten) {
   ServerInfo info{"sonard 0.2.0", {"parameters", "time"}, {{"sonard.clock", "stepped"}}, "17-1", std::nullopt};
   EXPECT_EQ(json::parse(text_of(info)), R"({"op": "serverInfo", "name": "sonard 0.2.0", "capabilities": ["parameters", "time"],
     "supportedEncodings": ["json"], "metadata": {"sonard.clock": "stepped"}, "sessionId": "17-1"})"_json);
@@ -39,7 +39,7 @@ TEST(FoxgloveWords, WhatViewersGet) {
   EXPECT_EQ(services["services"][0]["request"]["encoding"], "json");
 }
 
-TEST(FoxgloveWords, WhatViewersSay) {
+TEST(FoxgloveWords, MessagesOfViewersAreRead) {
   const auto subscribe =
       word_of_viewer(R"({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 10}, {"id": 4294967295, "channelId": 2}]})");
   ASSERT_TRUE(subscribe);
@@ -74,7 +74,7 @@ TEST(FoxgloveWords, StrayFieldsAreNamed) {
   EXPECT_EQ(stray(R"({"op": "unsubscribe", "subscriptionIds": [1], "why": 0})"), "why");
 }
 
-TEST(FoxgloveWords, WhatIsRefused) {
+TEST(FoxgloveWords, WrongMessagesAreRefused) {
   const auto refusal = [](std::string_view text) {
     const auto word = word_of_viewer(text);
     return word ? std::string("taken") : word.error().text;

@@ -89,7 +89,7 @@ TEST_F(MavlinkCommands, OurSystemIsThatOfTheVehicle) {
   EXPECT_EQ(result_of(command), 0);
 }
 
-TEST_F(MavlinkCommands, WithoutAHandlerTheyAreUnsupported) {
+TEST_F(MavlinkCommands, CommandsWithoutAHandlerAreUnsupported) {
   MavlinkPoses plain({});
   const auto replies = plain.on_datagram(ground(failure(7, 1, 0)), at_s(1)).replies;
   ASSERT_EQ(replies.size(), 1u);

@@ -127,7 +127,7 @@ struct MavlinkDistanceCommands : ::testing::Test {
   }
 };
 
-TEST_F(MavlinkDistanceCommands, OneIsSentOnRequest) {
+TEST_F(MavlinkDistanceCommands, OneMessageIsSentOnRequest) {
   EXPECT_FALSE(poses.distance_message(at_ms(0)));
   EXPECT_EQ(result_of(512, 132), 0);
   EXPECT_TRUE(poses.wants_distances());
@@ -147,7 +147,7 @@ TEST_F(MavlinkDistanceCommands, TheIntervalIsSetAndEnded) {
   EXPECT_FALSE(poses.distance_message(at_ms(20)));
 }
 
-TEST_F(MavlinkDistanceCommands, WithoutARangeFinderTheyAreUnsupported) {
+TEST_F(MavlinkDistanceCommands, CommandsWithoutARangeFinderAreUnsupported) {
   has_range_finder = false;
   EXPECT_EQ(result_of(511, 132, 0), 3);
   EXPECT_EQ(result_of(512, 132), 3);

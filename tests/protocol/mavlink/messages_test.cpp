@@ -82,7 +82,7 @@ TEST(MavlinkMessages, CrcExtraAndLengthsFollowFromTheFields) {
   expect_by_the_rule<Odometry>(230, 233);
 }
 
-TEST(MavlinkMessages, TheTableHasThemByNumber) {
+TEST(MavlinkMessages, TheTableHasNumbersAndChecksums) {
   const std::vector<std::pair<std::uint32_t, int>> wanted{{0, 50},   {2, 137},   {30, 39}, {31, 246}, {32, 185},
                                                           {33, 104}, {49, 39},   {74, 20}, {76, 152}, {102, 158},
                                                           {108, 32}, {138, 109}, {331, 91}};

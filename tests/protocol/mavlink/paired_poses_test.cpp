@@ -68,7 +68,7 @@ TEST(MavlinkPairs, PlacesWaitForTheNextAttitudeInOrder) {
   EXPECT_FALSE(pairs.next(all));
 }
 
-TEST(MavlinkPairs, OnlySoManyPlacesWait) {
+TEST(MavlinkPairs, TheNumberOfWaitingPlacesIsLimited) {
   Attitudes all;
   PairedPlaces<PlaceReading> pairs;
   for (int i = 0; i < 1000; ++i) pairs.put(place(1000 + 10 * i));

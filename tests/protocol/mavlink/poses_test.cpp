@@ -91,7 +91,7 @@ TEST(MavlinkPoses, DepthAndAttitudeAreEnough) {
             "system 1 LOCAL_POSITION_NED and attitude");
 }
 
-TEST(MavlinkPoses, OfASubmarineThePilotsDisplayGivesTheDepth) {
+TEST(MavlinkPoses, VfrHudGivesTheDepthOfASubmarine) {
   VfrHud hud;
   hud.altitude_m = -7;
   for (const bool submarine : {true, false}) {
@@ -157,7 +157,7 @@ TEST(MavlinkPoses, APlaceWithoutAnOriginIsADepthOnlyOfASubmarine) {
             "system 1 GLOBAL_POSITION_INT and attitude");
 }
 
-TEST(MavlinkPoses, TheQuaternionSilencesTheAngles) {
+TEST(MavlinkPoses, TheQuaternionHasPriorityOverTheAngles) {
   Sender v;
   Link link;
   AttitudeQuaternion q;
@@ -335,7 +335,7 @@ TEST(MavlinkPoses, SystemAndComponentCanBeNamed) {
   EXPECT_EQ(r.poses[0].sample.name, "rov");
 }
 
-TEST(MavlinkPoses, OfTwoComponentsThatSendTheSameOneCounts) {
+TEST(MavlinkPoses, OnlyOneOfTwoComponentsWithTheSameMessageCounts) {
   Sender autopilot{{1, 1, 0}}, companion{{1, 191, 0}};
   Link link;
   EXPECT_EQ(link(autopilot(odometry(1'000'000, 0)), 1).poses.size(), 1u);

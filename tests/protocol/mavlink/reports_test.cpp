@@ -46,7 +46,7 @@ std::string report_of(Settings settings, const Bytes& datagram) {
   return notices.size() == 1 ? notices[0] : "";
 }
 
-TEST(MavlinkReports, AHeartbeatASecondAsAnOnboardComputerOfTheSystem) {
+TEST(MavlinkReports, SendsOneHeartbeatPerSecondAsOnboardComputer) {
   MavlinkPoses poses({});
   int beats = 0;
   for (int i = 0; i < 40; ++i) beats += static_cast<int>(poses.on_tick(at_s(100 + 0.25 * i)).replies.size());
@@ -217,7 +217,7 @@ TEST(MavlinkReports, ALinkOnWhichTheRightOneNeverSpeaksIsReported) {
               ElementsAre(Pair(5, HasSubstr("system 255, component 190 sends messages, but neither"))));
 }
 
-TEST(MavlinkReports, WhoIsIgnoredBesideTheVehicleIsNamedOnce) {
+TEST(MavlinkReports, IgnoredSendersAreNamedOnce) {
   Settings settings;
   settings.vehicle = "rov";
   MavlinkPoses poses(settings);
@@ -244,7 +244,7 @@ TEST(MavlinkReports, WhoIsIgnoredBesideTheVehicleIsNamedOnce) {
   }
 }
 
-TEST(MavlinkReports, WhoIsExcludedBySettingsIsNotNamed) {
+TEST(MavlinkReports, ExcludedSendersAreNotNamed) {
   Sender one{{7, 1, 0}}, companion{{7, 191, 0}}, two{{8, 1, 0}}, its_companion{{8, 191, 0}};
   const auto notices = [&](std::uint8_t system, std::uint8_t component, const Bytes& other) {
     Settings settings;

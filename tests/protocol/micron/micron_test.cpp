@@ -184,7 +184,7 @@ TEST(Micron, FourBitBinsAreAWindowAndTwoInAByte) {
   EXPECT_EQ(unpacked(hex("12 30")), hex("01 02 03 00"));
 }
 
-TEST(Micron, WhatIsNotValidIsIgnored) {
+TEST(Micron, InvalidMessagesAreIgnored) {
   const auto with = [](auto change) {
     HeadCommand c = sector();
     change(c);

@@ -71,7 +71,7 @@ TEST_F(Packets, AnEchoToPortHasANegativeAngleAndItsRange) {
   EXPECT_EQ(found, 1);
 }
 
-TEST_F(Packets, TheWaterColumnHasItAtTheSamePlace) {
+TEST_F(Packets, TheWaterColumnHasTheEchoAtTheSamePlace) {
   const auto beams = at<std::uint32_t>(column, 32), rows = at<std::uint32_t>(column, 36);
   EXPECT_EQ(beams, 128u);
   EXPECT_NEAR(rows, 256, 64);
@@ -89,7 +89,7 @@ TEST_F(Packets, TheWaterColumnHasItAtTheSamePlace) {
   EXPECT_NEAR(std::fmod(78125, static_cast<double>(at<float>(column, 28))) / 78125, 0, 1e-3) << "a whole fraction";
 }
 
-TEST_F(Packets, CutOffOrDamagedAreNone) {
+TEST_F(Packets, TruncatedAndDamagedPacketsAreRefused) {
   EXPECT_TRUE(read_bathymetry(bathymetry));
   EXPECT_TRUE(read_column(column));
   EXPECT_FALSE(read_column(bathymetry));

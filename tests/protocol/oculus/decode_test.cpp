@@ -106,7 +106,7 @@ TEST(Decoder, Reads24Bit) {
   EXPECT_EQ(ping->sample(0, 1), 0xFFFFFFu);
 }
 
-TEST(Decoder, StreamInAnyPieces) {
+TEST(Decoder, AStreamMayComeInAnyPieces) {
   const Bytes ping = sound_ping();
   const Bytes dummy = hex("53 4F 59 1B 00 00 FF 00 00 00 00 00 00 00 00 00");
   const Bytes stream = joined({dummy, ping, hex("53 00 4F"), ping, dummy});
@@ -161,7 +161,7 @@ TEST(Echo, EveryDifferenceHasItsSentence) {
   EXPECT_THAT(echo_violations(gains_fire, ping, "verbatim"), Contains(HasSubstr("echoed gain is 70, expected 50")));
 }
 
-TEST(Sequence, WatchesIdsAndDevice) {
+TEST(Sequence, ReportsChangesOfIdsAndDevice) {
   const auto state = device();
   PingSequence sequence;
   EXPECT_THAT(sequence.add(answer(state, gains_fire, 1)), IsEmpty());
@@ -174,7 +174,7 @@ TEST(Sequence, WatchesIdsAndDevice) {
   EXPECT_THAT(sequence.add(answer(other, gains_fire, 6)), Contains("src_device_id is 9 but that of the ping before is 7001"));
 }
 
-TEST(Status, BrokenOnesHaveTheirSentences) {
+TEST(Status, BrokenStatusMessagesAreReported) {
   const Bytes beacon = protocol::vendors().front()->beacon(device(), at(0));
   const auto after = [&](std::size_t offset, const char* bytes) {
     Bytes changed = beacon;

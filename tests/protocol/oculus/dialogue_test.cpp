@@ -112,7 +112,7 @@ TEST(Dialogue, AnIdenticalRepeatMeansTheSame) {
   EXPECT_EQ(first[0].summary, again[0].summary);
 }
 
-TEST(Dialogue, NetworkTriggerAsksForOnePingPerMessage) {
+TEST(Dialogue, WithNetworkTriggerEachMessageRequestsOnePing) {
   Conversation talk;
   const Bytes message = make_fire(fire(0, 1, PingRate::hz10, 0xC9, 5, 50));
   const auto reaction = talk.say(joined({message, message, message}));
@@ -164,7 +164,7 @@ struct Asking : Conversation {
 };
 
 // ENS stores standby as its rate when a dummy arrives, and requests it when it connects again.
-TEST(Dialogue, NoDummyComesWhileARateIsAsked) {
+TEST(Dialogue, NoDummyComesWhilePingsAreRequested) {
   Asking talk;
   EXPECT_EQ(talk.dummies(0, 3.05), 3u) << "dummies come before the first fire message";
   EXPECT_EQ(talk.fire_at(3.5, PingRate::hz10), 0u);
@@ -181,7 +181,7 @@ TEST(Dialogue, NoDummyComesWhileARateIsAsked) {
   EXPECT_GE(talk.dummies(120, 121.05), 1u);
 }
 
-TEST(Dialogue, WithNetworkTriggerDummiesFillWhatTheClientLeavesOpen) {
+TEST(Dialogue, WithNetworkTriggerDummiesAreSentBetweenRequests) {
   Asking talk;
   EXPECT_EQ(talk.fire_at(0.5, PingRate::hz10, 0xC9), 0u);
   EXPECT_EQ(talk.dummies(0.5, 20), 0u) << "the ping is under way";
@@ -214,7 +214,7 @@ TEST(Dialogue, OutOfRangeMayBeIgnored) {
   EXPECT_THAT(events_of<Notice>(reaction), SizeIs(1));
 }
 
-TEST(Dialogue, SummarySaysWhatWasAsked) {
+TEST(Dialogue, SummaryHasTheRequestedSettings) {
   const auto summary = [](FireRequest request, double sound_speed_mps, std::uint32_t extended) {
     request.settings.gamma = 127;
     request.settings.sound_speed_mps = sound_speed_mps;
@@ -264,7 +264,7 @@ TEST(Dialogue, UserConfigIsReadAndWritten) {
   EXPECT_THAT(Conversation("user_config_write", "reply").say(write).replies, SizeIs(1));
 }
 
-TEST(Dialogue, BootTextGreetsWhenAsked) {
+TEST(Dialogue, BootTextIsSentAtOnceIfConfigured) {
   Conversation talk("boot_text", "on");
   EXPECT_EQ(talk.dialogue->next_tick(), at(0));
   const auto reaction = talk.dialogue->on_tick(at(0), false);
@@ -282,7 +282,7 @@ bool greets_at(Conversation& talk, double when_s) {
 }
 
 // A client may wait for the text before it fires; clients that do not wait must never receive it.
-TEST(Dialogue, BootTextGreetsTheSilentOnceByDefault) {
+TEST(Dialogue, BootTextIsSentOnceToASilentClient) {
   Conversation waits;
   EXPECT_FALSE(greets_at(waits, 1)) << "a dummy";
   EXPECT_EQ(waits.dialogue->next_tick(), at(2));

@@ -71,7 +71,7 @@ void expect_pair(const std::string& name) {
   EXPECT_EQ(encoded, Bytes(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(encoded.size()))) << name;
 }
 
-TEST(Golden, FixedParts) {
+TEST(Golden, FixedPartsHaveTheGoldenBytes) {
   expect_pair<FireMessageV1>("fire_v0");
   expect_pair<FireMessageV2>("fire_v2");
   expect_pair<StatusMessage>("status");
@@ -82,7 +82,7 @@ TEST(Golden, FixedParts) {
   expect_pair<UserConfigMessage>("user_config");
 }
 
-TEST(Golden, WholePings) {
+TEST(Golden, WholePingsHaveTheGoldenBytes) {
   for (const std::string name : {"ping_v0", "ping_v1", "ping_v2"}) {
     const Json blocks = json_of_file(name)["blocks"];
     const Bytes bytes = bytes_of_file(name);

@@ -14,7 +14,7 @@ struct Expected {
   double centre_hz, max_range_m, aperture_deg, azimuth_deg, elevation_deg, min_range_m;
 };
 
-TEST(Models, FamiliesAsInTheTable) {
+TEST(Models, HaveTheValuesOfTheTable) {
   const Expected table[] = {
       {"oculus-m370s", 1041, 0, 370e3, 200, 130, 2.0, 20, 0.2},    {"oculus-c550d", 4713, 0, 550e3, 100, 120, 1.0, 20, 0.2},
       {"oculus-c550d", 4713, 1, 820e3, 30, 90, 0.7, 20, 0.2},      {"oculus-m750d", 1032, 0, 750e3, 120, 130, 1.0, 20, 0.1},
@@ -87,7 +87,7 @@ TEST(Tuning, EveryFigureReachesItsMode) {
   EXPECT_NEAR(deg_from_rad(shared.horizontal_aperture_rad), 120, 1e-4) << "other sonars of the product keep their aperture";
 }
 
-TEST(Tuning, WhatCannotBeIsRefused) {
+TEST(Tuning, ImpossibleValuesAreRefused) {
   const auto& vendor = *protocol::vendors().front();
   EXPECT_EQ(protocol::check_options(vendor, {{"hf_aperture_deg", "180"}}).error().text,
             "option hf_aperture_deg must be a number from 5 to 170, not '180'");

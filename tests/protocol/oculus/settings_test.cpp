@@ -60,7 +60,7 @@ TEST(Laws, RatesAreTheTables) {
   EXPECT_EQ(table_rate_hz(PingRate{195}), 10);
 }
 
-TEST(Laws, GammaByte) {
+TEST(Laws, GammaFollowsTheByte) {
   EXPECT_EQ(gamma_from_byte(0), 1);
   EXPECT_EQ(gamma_from_byte(255), 1);
   EXPECT_NEAR(gamma_from_byte(127), 0.5, 0.003);
@@ -78,7 +78,7 @@ TEST(Laws, GainEcho) {
   EXPECT_DOUBLE_EQ(echo(1, 0x1D, 50, "mapped"), 50);
 }
 
-TEST(Settle, ModesAndRanges) {
+TEST(Settle, ModesAndRangesAreApplied) {
   const auto state = device();
   const PingSettings high = settings_of(fire(0, 2, PingRate::hz40, 0x49, 5, 50), state);
   EXPECT_EQ(high.mode, 1);
@@ -176,7 +176,7 @@ TEST(Settle, DeviceComputesItsSoundSpeed) {
   EXPECT_EQ(settings_of(request, state).device_sound_speed_mps, 1480);
 }
 
-TEST(Settle, SampleFormats) {
+TEST(Settle, SampleFormatsFollowTheFlags) {
   const auto state = device();
   const SampleFormat eight = settings_of(fire(0, 1, PingRate::hz10, 0x49, 5, 50), state).format;
   EXPECT_EQ(eight.bits, 8);
@@ -189,7 +189,7 @@ TEST(Settle, SampleFormats) {
 }
 
 // liboculus issue 13: analogue and digital TVG are off, and a gain of 0 to 100 % is 0 to 96 dB.
-TEST(Settle, ScientificData) {
+TEST(Settle, ScientificDataHas32Bits) {
   const auto state = device();
   FireRequest request = fire(2, 2, PingRate::hz10, 0x4F, 4, 50);
   request.extension.flags = 0x200;
@@ -211,7 +211,7 @@ TEST(Settle, RateLeavesTimeForTheLastEcho) {
   EXPECT_EQ(settings_of(request, state).rate_hz, 0);
 }
 
-TEST(Settle, NetworkSpeedOnlyWhenHonoured) {
+TEST(Settle, NetworkSpeedAppliesOnlyIfConfigured) {
   FireRequest request = fire(0, 2, PingRate::hz40, 0x49, 2, 50);
   request.settings.network_speed = 10;
   EXPECT_EQ(settings_of(request, device()).rate_hz, 40);
@@ -283,7 +283,7 @@ TEST(Settle, TheEndsOfRowRatesAreUsable) {
   }
 }
 
-TEST(Settle, NetworkTrigger) { EXPECT_TRUE(settings_of(fire(0, 1, PingRate::hz10, 0xC9, 5, 50), device()).triggered); }
+TEST(Settle, NetworkTriggerIsApplied) { EXPECT_TRUE(settings_of(fire(0, 1, PingRate::hz10, 0xC9, 5, 50), device()).triggered); }
 
 }  // namespace
 }  // namespace sonar::oculus::tests

@@ -64,7 +64,7 @@ std::shared_ptr<const Scene> ball_at(Vec3d at) { return SceneMaker().add(sphere(
 
 TEST(Ping360Acoustics, AWallIsWhereTheHostsSoundSpeedPutsIt) { EXPECT_NEAR(half_maximum(Scanner(wall_at(1.5)).at(0)), 908, 5); }
 
-TEST(Ping360Acoustics, AnotherSoundSpeedMovesIt) {
+TEST(Ping360Acoustics, AnotherSoundSpeedMovesTheWall) {
   EXPECT_NEAR(half_maximum(Scanner(wall_at(1.5), 1450).at(0)), 1.5 / (88 * 25e-9 * 1450 / 2) - 1, 5);
 }
 
@@ -141,7 +141,7 @@ TEST(OmniscanAcoustics, ABallIsAtItsRangeAndWithinTheNarrowBeam) {
   }
 }
 
-TEST(OmniscanAcoustics, WideAcrossTheTrack) {
+TEST(OmniscanAcoustics, TheBeamIsWideAcrossTheTrack) {
   const auto at = [](double down_deg) {
     const double a = rad_from_deg(down_deg);
     return loudest(SideScan(SceneMaker().add_point({0, -4 * std::cos(a), -4 * std::sin(a)}, -30).make()).ping());
@@ -267,7 +267,7 @@ TEST(SurveyorAcoustics, RollIsInTheUpVectorAndInThePoints) {
     EXPECT_NEAR(points.y[i] * static_cast<double>(up[1]) + points.z[i] * static_cast<double>(up[2]), -5, 0.05);
 }
 
-TEST(SurveyorAcoustics, NoBottomNoPoints) {
+TEST(SurveyorAcoustics, WithoutABottomThereAreNoPoints) {
   Sounder sounder(SceneMaker().add_point({0, 0, 50}, -40).make());
   EXPECT_EQ(message_in<AtofPointData>(sounder.ping(1)[1]).points, 0);
 }

@@ -11,7 +11,7 @@ namespace {
 
 using namespace tests;
 
-TEST(PingFrames, ArePublishedBytes) {
+TEST(PingFrames, HaveThePublishedBytes) {
   EXPECT_EQ(general(Id::protocol_version), hex("42 52 02 00 06 00 00 00 05 00 A1 00"));
   EXPECT_EQ(framed_message(Id::protocol_version, 0, ProtocolVersion{1, 2, 3, 0}),
             hex("42 52 04 00 05 00 00 00 01 02 03 00 A3 00"));

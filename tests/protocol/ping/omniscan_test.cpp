@@ -46,7 +46,7 @@ TEST(Omniscan, BothSizesOfSettingsAndBothNumbersOfTheSpeedOfSoundAreKnown) {
   EXPECT_TRUE(talk.take().empty());
 }
 
-TEST(Omniscan, AProfileSaysHowItWasMade) {
+TEST(Omniscan, AProfileHasTheSettingsOfThePing) {
   Talk talk("omniscan-450");
   talk.state.powered_up_at = at_s(0);
   talk.say(pings({.start_mm = 500, .length_mm = 5000, .gain = 3, .results = 700, .enable = 1}));
@@ -109,14 +109,14 @@ TEST(Omniscan, TheLowestAndHighestPowerOfAPingAreItsScale) {
   EXPECT_NEAR(static_cast<double>(profile.highest_db), -80 + 40000 * step_db, 1e-4);
 }
 
-TEST(Omniscan, APingOfOnePowerHasItAsItsScale) {
+TEST(Omniscan, APingOfOnePowerHasThisPowerAsScale) {
   const auto [profile, powers] = profile_of_samples(std::vector<std::uint16_t>(200, 65535));
   EXPECT_EQ(profile.lowest_db, 80);
   EXPECT_EQ(profile.highest_db, 80);
   EXPECT_EQ(powers, std::vector<std::uint16_t>(200, 0));
 }
 
-TEST(Omniscan, AProfileThatIsAskedForIsTheNextOne) {
+TEST(Omniscan, ARequestIsAnsweredWithTheNextProfile) {
   Talk talk("omniscan-450");
   talk.say(general(Id::os_mono_profile));
   EXPECT_EQ(talk.take().at(0).header.id, Id::nack) << "no pings are enabled";
@@ -125,7 +125,7 @@ TEST(Omniscan, AProfileThatIsAskedForIsTheNextOne) {
   EXPECT_TRUE(talk.take().empty());
 }
 
-TEST(Omniscan, RefusesWhatItCannotDo) {
+TEST(Omniscan, RefusesWrongRequests) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (const OsPingParams& p :
        {OsPingParams{.length_mm = 0}, OsPingParams{.start_mm = 4294967295u, .length_mm = 4294967295u}, OsPingParams{.gain = 8},

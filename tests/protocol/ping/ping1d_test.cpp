@@ -135,7 +135,7 @@ TEST(Ping1D, APingThatIsLostIsRequestedAgain) {
   EXPECT_FALSE(talk.dialogue->on_ping(late.get(), 0, at_s(4)).prefixes.empty()) << "it is sent when it comes";
 }
 
-TEST(Ping1D, NothingIsMeasuredWhilePingsAreDisabled) {
+TEST(Ping1D, NoMeasurementIsMadeWhilePingsAreDisabled) {
   Talk talk("ping1d");
   talk.say(setting(Id::ping1d_continuous_start, Id::ping1d_profile));
   talk.say(setting<std::uint8_t>(Id::ping1d_set_enable, 0));
@@ -148,7 +148,7 @@ TEST(Ping1D, NothingIsMeasuredWhilePingsAreDisabled) {
   EXPECT_EQ(talk.dialogue->next_tick(), at_s(3)) << "the stream goes on";
 }
 
-TEST(Ping1D, RefusesWhatItCannotDo) {
+TEST(Ping1D, RefusesWrongRequests) {
   for (const Bytes& wrong :
        {framed_message(Id::ping1d_set_range, 0, ScanRange{0, 999}),
         framed_message(Id::ping1d_set_range, 0, ScanRange{50000, 50001}),
@@ -184,7 +184,7 @@ TEST(Ping1D, AnOverrideIsWhatAHostWouldSet) {
       talk.vendor.apply_override({.range_m = 101, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = {}}, talk.state));
 }
 
-TEST(Ping1DDetector, AnEchoIsWhereItBegins) {
+TEST(Ping1DDetector, TheDistanceIsTheBeginningOfTheEcho) {
   Parameters p;
   p.range = {1000, 10000};  // 50 mm for each point
   const Echo echo = find_echo(profile_with(p, 100, 200));
@@ -268,7 +268,7 @@ TEST(Ping1D, TheEchoIsLookedForOnce) {
   EXPECT_NE(said(), looked_for_now);
 }
 
-TEST(Ping1D, AProfileSaysHowItWasMade) {
+TEST(Ping1D, AProfileHasTheSettingsOfThePing) {
   Talk talk("ping1d");
   Parameters p;
   p.range = {500, 20000};

@@ -34,7 +34,7 @@ std::string text_in(const Frame& frame) {
   return text;
 }
 
-TEST(Ping360, SaysWhatItIs) {
+TEST(Ping360, AnswersRequestsForDeviceAndVersion) {
   Talk talk("ping360");
   talk.say(general(Id::device_information));
   talk.say(general(Id::protocol_version));
@@ -81,7 +81,7 @@ TEST(Ping360, TheHeadTurnsToStarboard) {
   EXPECT_NEAR(talk.aim.head_rad, -pi / 2, 1e-12);
 }
 
-TEST(Ping360, WithoutTransmittingItTurnsAndAnswers) {
+TEST(Ping360, TurnsAndAnswersWithoutTransmitting) {
   Talk talk("ping360");
   Transducer t{1, 2, 0, 10, 80, 800, 300, 0, 0};
   talk.say(ping_at(10, t));
@@ -148,7 +148,7 @@ TEST(Ping360, AnyNewRequestEndsAScan) {
   }
 }
 
-TEST(Ping360, RefusesWhatItCannotDoByNumber) {
+TEST(Ping360, RefusesWrongRequestsWithTheirMessageId) {
   for (const Bytes& wrong :
        {ping_at(401), ping_at(0, {1, 3, 0, 10, 80, 750, 200, 1, 0}), ping_at(0, {1, 0, 0, 10, 79, 750, 200, 1, 0}),
         ping_at(0, {1, 0, 0, 10, 80, 750, 1201, 1, 0}), scan(0, 400), scan(400, 10), scan(0, 10, 11), request(Id{2222}),
@@ -206,7 +206,7 @@ TEST(Ping360, FramesOfADatagramAreAnsweredByOneThatIsLittleLonger) {
   EXPECT_LT(answers.front().size(), flood.size() + 256);
 }
 
-TEST(Ping360, ItsNumberMayBeSet) {
+TEST(Ping360, TheIdOfTheDeviceCanBeSet) {
   Talk talk("ping360");
   talk.say(request(Id::set_device_id, hex("09")));
   talk.say(ping_at(0), 1);

@@ -65,7 +65,7 @@ TEST(S500, AStreamIsOfTheReportThatIsRequested) {
   EXPECT_EQ(talk.dialogue->next_tick(), Time::max());
 }
 
-TEST(S500, ASinglePingIsOne) {
+TEST(S500, ASinglePingIsSentOnce) {
   Talk talk("s500");
   talk.say(params({.report = Id::s500_profile6}));
   talk.run_to(5, 0.05);
@@ -104,7 +104,7 @@ TEST(S500, ValuesAreReadBack) {
   EXPECT_EQ(answer(Id::ping1d_voltage_5).header.id, Id::nack) << "a Ping1D has it";
 }
 
-TEST(S500, RefusesWhatItCannotDo) {
+TEST(S500, RefusesWrongRequests) {
   for (const SetPingParams& wrong :
        {SetPingParams{.length_mm = 999, .report = Id::s500_profile6}, SetPingParams{.length_mm = 142001},
         SetPingParams{.start_mm = 4294967295u, .length_mm = 4294967295u}, SetPingParams{.gain = 14}, SetPingParams{.gain = -2},
@@ -137,7 +137,7 @@ TEST(S500, TheEchoIsLookedForOnce) {
   EXPECT_NE(said(), looked_for_now);
 }
 
-TEST(S500, AProfileSaysHowItWasMade) {
+TEST(S500, AProfileHasTheSettingsOfThePing) {
   Talk talk("s500");
   talk.state.powered_up_at = at_s(0);
   Settings s;
@@ -190,7 +190,7 @@ TEST(S500, DistancesAreAveragedOverTwentyPings) {
   EXPECT_EQ(s.earlier.size(), 20u);
 }
 
-TEST(S500, OnlyWhatIsAutomaticFollowsAPing) {
+TEST(S500, OnlyAutomaticSettingsFollowAPing) {
   const auto next = [](const SetPingParams& asked, int row, double echo_db) {
     Settings s;
     s.parameters.reach = {10000, 5};

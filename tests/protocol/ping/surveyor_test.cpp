@@ -173,7 +173,7 @@ TEST(Surveyor, ItsHostReadsThePointsOfAPingOnceFromEitherMessage) {
   EXPECT_EQ(read(both).size(), 1u);
 }
 
-TEST(Surveyor, RefusesWhatItCannotDo) {
+TEST(Surveyor, RefusesWrongRequests) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (const PingParameters& p :
        {PingParameters{.end_mm = -1}, PingParameters{.end_mm = 300000}, PingParameters{.start_mm = 6000, .end_mm = 5000},

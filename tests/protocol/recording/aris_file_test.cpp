@@ -127,7 +127,7 @@ TEST(ArisFile, CutOrDamagedSaysWhere) {
 }
 
 /// The vendor's own sample, six frames of an ARIS 1200 (SONARD_CAPTURES).
-TEST(ArisFile, RealOne) {
+TEST(ArisFile, ReadsARealFile) {
   const char* const folder = std::getenv("SONARD_CAPTURES");
   auto opened = open_recording(std::filesystem::path(folder == nullptr ? "" : folder) / "aris" / "sample.aris");
   if (folder == nullptr || !opened) GTEST_SKIP() << "SONARD_CAPTURES names no folder with aris/sample.aris";

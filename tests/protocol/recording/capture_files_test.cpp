@@ -98,7 +98,7 @@ const Bytes both_pings = ping_message(1) + ping_message(2);
 
 // ---- tests
 
-TEST(CaptureFiles, EveryLinkType) {
+TEST(CaptureFiles, EveryLinkTypeIsRead) {
   const auto big = wire::Endian::big;
   const Bytes mac = numbers(big, {{4, 1}, {4, 2}, {4, 3}});
   const std::vector<std::pair<std::uint32_t, Bytes>> links{
@@ -122,7 +122,7 @@ TEST(CaptureFiles, EveryLinkType) {
   EXPECT_THAT(read(pcap_of(raw_frames(two_pings()), 147)).damage, HasSubstr("packets of link type 147 are not read"));
 }
 
-TEST(CaptureFiles, ByteOrdersAndUnits) {
+TEST(CaptureFiles, BothByteOrdersAndTimeUnitsAreRead) {
   for (const auto endian : {wire::Endian::little, wire::Endian::big})
     for (const std::uint32_t magic : {0xA1B2C3D4u, 0xA1B23C4Du}) {
       auto opened = open_bytes(pcap_of(raw_frames(two_pings()), 101, endian, magic));
@@ -134,7 +134,7 @@ TEST(CaptureFiles, ByteOrdersAndUnits) {
     }
 }
 
-TEST(CaptureFiles, RetransmittedAndOutOfOrder) {
+TEST(CaptureFiles, RetransmittedAndReorderedSegmentsAreRead) {
   std::vector<Sent> sent = two_pings();
   std::swap(sent[2], sent[4]);
   std::swap(sent[8], sent[9]);
@@ -166,7 +166,7 @@ TEST(CaptureFiles, SegmentsCutByTheSnapLengthAreLost) {
   EXPECT_THAT(told.damage, HasSubstr("the capture lacks 80 bytes"));
 }
 
-TEST(CaptureFiles, BegunInTheMiddle) {
+TEST(CaptureFiles, ACaptureMayBeginInTheMiddle) {
   std::vector<Sent> sent = two_pings();
   sent.erase(sent.begin(), sent.begin() + 2);
   const std::vector<Bytes> frames = raw_frames(sent);
@@ -176,7 +176,7 @@ TEST(CaptureFiles, BegunInTheMiddle) {
   EXPECT_THAT(told.damage, HasSubstr("begins within a message"));
 }
 
-TEST(CaptureFiles, OneClientAfterTheOther) {
+TEST(CaptureFiles, ClientsMayFollowEachOther) {
   std::vector<Sent> sent{{{}, 99, true, tcp_flag::syn | tcp_flag::ack}};
   for (const Sent& each : two_pings(100)) sent.push_back(each);
   sent.push_back({{}, 5000, true, tcp_flag::syn | tcp_flag::ack});  // the same ports again
@@ -198,7 +198,7 @@ TEST(CaptureFiles, TheSonarIsKnownByItsPortOrItsMessages) {
   EXPECT_EQ(read(pcap_of(raw_frames(web), 101)).stream, both_pings);
 }
 
-TEST(CaptureFiles, OneOfSeveralSonars) {
+TEST(CaptureFiles, OneOfSeveralSonarsCanBeSelected) {
   std::vector<Bytes> frames = raw_frames(two_pings());
   Bytes second = ip_packet({dummy_message(), 1});
   second[15] = std::byte{9};  // 10.0.0.9
@@ -285,7 +285,7 @@ Bytes block(std::uint32_t type, Bytes body) {
   return numbers(wire::Endian::little, {{4, type}, {4, size}}) + body + numbers(wire::Endian::little, {{4, size}});
 }
 
-TEST(CaptureFiles, Pcapng) {
+TEST(CaptureFiles, PcapngIsRead) {
   const auto little = wire::Endian::little;
   Bytes file = block(0x0A0D0D0A, numbers(little, {{4, 0x1A2B3C4D}, {2, 1}, {2, 0}, {4, 0xFFFFFFFF}, {4, 0xFFFFFFFF}}));
   file = file + block(1, numbers(little, {{2, 1}, {2, 0}, {4, 0}}));                                    // Ethernet, unused
@@ -349,7 +349,7 @@ TEST(CaptureFiles, ConnectionsShareTheLimitOfWaitingBytes) {
   EXPECT_THAT(told, HasSubstr("; 19 more such places"));
 }
 
-TEST(TcpStream, WhatWaitsTooLongIsGivenWithItsGap) {
+TEST(TcpStream, BytesThatWaitTooLongAreGivenWithTheirGap) {
   TcpStream stream;
   const Bytes block_of(1 << 16, std::byte{1});
   stream.add(start, 0, {}, true);
@@ -365,7 +365,7 @@ TEST(TcpStream, WhatWaitsTooLongIsGivenWithItsGap) {
   EXPECT_EQ(missing, 65536u);
 }
 
-TEST(WrittenCaptures, SegmentsAndSequenceNumbers) {
+TEST(WrittenCaptures, HaveSegmentsAndSequenceNumbers) {
   Bytes file;
   PcapConversation conversation_of;
   conversation_of.first_device_sequence = 0xFFFFF000u;  // wraps within the first message

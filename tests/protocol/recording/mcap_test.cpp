@@ -68,7 +68,7 @@ Bytes image_of(Time at, const std::string& frame, std::size_t beams, std::size_t
   return foxglove::raw_image(at, frame, foxglove::image_of(beams, rows, bits, full, std::make_shared<const Bytes>(codes)));
 }
 
-TEST(Mcap, ChannelsForViewers) {
+TEST(Mcap, ViewersFindTheirChannels) {
   auto found = by_topic(session(conversation()));
   EXPECT_THAT(topics_of(found), ElementsAre("/front/client", "/front/device", "/front/image", "/front/pose", "/front/status",
                                             "/front/truth", "/tf"));
@@ -111,7 +111,7 @@ TEST(Mcap, NamesInTruthAreEscapedAndBadUtf8IsReplaced) {
   EXPECT_EQ(objects.at(1).at("name"), "a\uFFFD");
 }
 
-TEST(Mcap, ImagesOfWiderSamples) {
+TEST(Mcap, WiderSamplesHaveImages) {
   for (const int bits : {16, 32}) {
     const Bytes message = ping_message(1, 2, 1, static_cast<unsigned>(bits));
     Bytes samples;
@@ -176,7 +176,7 @@ TEST(Mcap, TheStatedProfileNamesTheModelWhereNoMessageDoes) {
   }
 }
 
-TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {
+TEST(Mcap, AFileWithoutItsEndLacksOnlyTheLastChunk) {
   auto opened = open_bytes(session(conversation(), false));  // chunks of 2 s: the last one never reached the file
   ASSERT_TRUE(opened);
   std::vector<RecordedMessage> expected = conversation();
@@ -185,7 +185,7 @@ TEST(Mcap, WithoutItsEndEverythingButTheLastChunkIsThere) {
   EXPECT_THAT(opened->reader->damage()->text, HasSubstr("it was not closed"));
 }
 
-TEST(Mcap, WhatFollowsTheEndIsReported) {
+TEST(Mcap, BytesAfterTheEndAreReported) {
   const Bytes whole = session(conversation());
   for (const Bytes& more : {whole, bytes_of("x")}) {
     Bytes joined = whole;
@@ -204,7 +204,7 @@ TEST(Mcap, WhatFollowsTheEndIsReported) {
   EXPECT_FALSE(cut->reader->damage()) << "its data are whole";
 }
 
-TEST(Mcap, WhatIsWholeInACutChunkIsRead) {
+TEST(Mcap, CompleteRecordsOfATruncatedChunkAreRead) {
   std::vector<RecordedMessage> messages = conversation();
   messages.resize(6);
   const Bytes whole = session(messages);
@@ -311,7 +311,7 @@ TEST(Mcap, DescriptionsAreKeptWithinBounds) {
   EXPECT_THAT(reader->damage()->text, HasSubstr("; 5 more such places"));  // channels
 }
 
-TEST(Mcap, OneOfSeveralSonars) {
+TEST(Mcap, OneOfSeveralSonarsCanBeSelected) {
   Bytes file;
   mcap::Writer writer(sink_into(file));
   std::vector<std::uint16_t> channels;

@@ -50,7 +50,7 @@ Bytes compressed(const Bytes& plain) {
   return bytes;
 }
 
-TEST(OculusLog, Layout) {
+TEST(OculusLog, HasTheVendorsLayout) {
   const Bytes file = recorded(Format::oculus_log, conversation());
   EXPECT_EQ(value_at<std::uint32_t>(file, 0), 0x11223344u);
   EXPECT_EQ(value_at<std::uint32_t>(file, 4), 48u);

@@ -9,7 +9,7 @@
 namespace sonar::recording::ping_log_test {
 namespace {
 
-TEST(PingLog, HoldsTheFramesBehindOneThatDescribesThem) {
+TEST(PingLog, HasADescriptionBeforeTheFrames) {
   Bytes file;
   const auto writer = write_ping_log(sink_into(file));
   const Bytes sent = ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{12, 1.5f});

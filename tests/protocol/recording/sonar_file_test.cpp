@@ -47,7 +47,7 @@ ReadBack read_back(Bytes file) {
   return read;
 }
 
-TEST(SonarFile, IsItsDatagramsWithTheTimesInThem) {
+TEST(SonarFile, HasTheDatagramsWithTheirTimes) {
   const Bytes other = waterlinked::rip_packet(Bytes(5, std::byte{0xFF}));  // a message of an unknown kind
   const Bytes file = joined({images(1), other, images(2)});
   const ReadBack read = read_back(file);
@@ -85,7 +85,7 @@ TEST(SonarFile, DamagedSaysWhereAndGoesOn) {
 }
 
 /// The recording of a real unit (SONARD_CAPTURES).
-TEST(SonarFile, RealOne) {
+TEST(SonarFile, ReadsARealFile) {
   const char* const folder = std::getenv("SONARD_CAPTURES");
   auto opened = open_recording(std::filesystem::path(folder == nullptr ? "" : folder) / "sonar3d15" / "ship_short.sonar");
   if (folder == nullptr || !opened) GTEST_SKIP() << "SONARD_CAPTURES names no folder with sonar3d15/ship_short.sonar";

@@ -130,7 +130,7 @@ TEST(WaterLinkedHttp, SpeedOfSoundIsOfTheWaterOrAsPosted) {
   EXPECT_FLOAT_EQ(unit.settings.device_sound_speed_mps, 1491);
 }
 
-TEST(WaterLinkedHttp, ClockBeforeNtp) {
+TEST(WaterLinkedHttp, TheClockMayRunWithoutNtp) {
   Unit unit(protocol::OptionValues{{"clock", "since_boot"}});
   EXPECT_EQ(unit.get("/time/status")["system_time"], "1970-01-01T00:01:40.000Z");
   EXPECT_TRUE(unit.get("/time/status")["ntp_seconds_since_last_sync"].is_null());

@@ -195,7 +195,7 @@ TEST(WaterLinkedLikeness, RangesHaveTheTracesOfTheFilters) {
   }
 }
 
-TEST(WaterLinkedLikeness, WithoutWhatIsFittedTheyHaveNone) {
+TEST(WaterLinkedLikeness, WithoutTheFiltersThereAreNoTraces) {
   const Image image = emulated(0.1, false);
   EXPECT_LT(image.equal_across(), 0.26);
   EXPECT_LT(image.equal_in_blocks() / image.equal_between_blocks(), 2);

@@ -31,7 +31,7 @@ Decoded read(const Bytes& datagram) {
   return content ? decode(*content) : Decoded{};
 }
 
-TEST(WaterLinkedShot, TwoImagesOfOneTimeAndMask) {
+TEST(WaterLinkedShot, TheTwoImagesHaveTheSameTimeAndMask) {
   Unit unit;
   unit.post("/acoustics/speed_of_sound", "1491");
   const std::vector<Bytes> datagrams = shot(unit);

@@ -35,7 +35,7 @@ TEST(Vary, APingIsAFunctionOfSeedNumberAttemptAndName) {
   EXPECT_NE(ping.words.at("a"), draw(all, Seed{1}, 7000, 1).words.at("a"));
 }
 
-TEST(Vary, DistributionsAreWhatTheySay) {
+TEST(Vary, DistributionsHaveTheirParameters) {
   const auto all = variations(
       "vary: {u: {uniform: [2, 4]}, n: {normal: [10, 3]}, i: {integer: [-1, 1]}, c: {choice: [mud, sand]}, l: {list: [5, 6, "
       "7]}}");
@@ -63,7 +63,7 @@ TEST(Vary, PutsWordsWhereTheirNamesAre) {
   EXPECT_EQ(put_words("a: $x, b: $(x + 1), c: $xy, d: $", {{"x", "3"}}), "a: 3, b: $(x + 1), c: $xy, d: $");
 }
 
-TEST(Vary, RefusesWhatIsNoDistribution) {
+TEST(Vary, RefusesUnknownDistributions) {
   EXPECT_THAT(complaint("x: {uniform: [2, 1]}"), HasSubstr("must go from low to high"));
   EXPECT_THAT(complaint("x: {unifrom: [1, 2]}"), HasSubstr("needs one of uniform"));
   EXPECT_THAT(complaint("x: {}"), HasSubstr("needs one of uniform"));

@@ -47,7 +47,7 @@ int usage_error(const std::vector<std::string>& words) {
   return leave == nullptr ? 0 : leave->exit_code;
 }
 
-TEST(CommandLine, ItsClockIsJudgedInPlaceOfTheFiles) {
+TEST(CommandLine, TheClockOfTheOptionReplacesThatOfTheFile) {
   EXPECT_TRUE(deaf_with("realtime", {"run", "x.yaml"}));
   EXPECT_THAT(deaf_with("realtime", {"run", "x.yaml", "--clock", "lockstep"}).error().text,
               ::testing::StartsWith("--clock: lockstep advances time"));
@@ -72,7 +72,7 @@ TEST(CommandLine, SwitchesOfTheModelReachTheEngine) {
   EXPECT_EQ(given, expected);
 }
 
-TEST(CommandLine, EveryNamedPartIsSwitchedByItsNameAndNothingElse) {
+TEST(CommandLine, EveryPartOfTheModelIsSwitchedByItsName) {
   for (const NamedSwitch& part : named_switches)
     for (const bool on : {true, false}) {
       SCOPED_TRACE(part.name);
@@ -92,7 +92,7 @@ TEST(CommandLine, TheDemoTakesNoConfiguration) {
 
 const RunCommand* run_of(const Command& command) { return std::get_if<RunCommand>(&command); }
 
-TEST(CommandLine, TheDemoHasTheSonarThatIsAskedFor) {
+TEST(CommandLine, TheDemoHasTheRequestedSonar) {
   const auto sonar_of = [](const std::vector<std::string>& words) -> std::string {
     const Command command = parse(words);
     auto config = demo_config();
@@ -120,7 +120,7 @@ TEST(CommandLine, TheDemoHasTheSonarThatIsAskedFor) {
   EXPECT_EQ(sonar_of({"--profile", "oculus-m1300d"}), "refused");
 }
 
-TEST(CommandLine, TheDemosSonarIsChosenOnceAndNotForAConfiguration) {
+TEST(CommandLine, TheSonarIsChosenOnlyForTheDemo) {
   EXPECT_EQ(usage_error({"--demo", "bluview"}), 64);
   EXPECT_EQ(usage_error({"--demo", "blueview", "my.yaml"}), 64);
   EXPECT_EQ(usage_error({"--demo", "blueview", "--profile", "oculus-m370s"}), 64);
@@ -221,7 +221,7 @@ TEST(CommandLine, AnOffsetLeavesTheAddressThatWasGivenWithIt) {
   EXPECT_EQ(text_of(c.sonars.at(1).bind_ip), "127.0.1.3");
 }
 
-TEST(CommandLine, WhatAnOffsetCannotMoveIsSaid) {
+TEST(CommandLine, AnOffsetThatCannotApplyIsRefused) {
   const auto why = [](const std::string& offset, const std::string& bind_ip, const std::string& poses) {
     const auto config = moved({"run", "x.yaml", "--offset", offset}, bind_ip, poses);
     return config ? std::string("moved") : config.error().text;

@@ -25,7 +25,7 @@ TEST(LoadProgress, AShortLoadIsSilent) {
   EXPECT_EQ(lines, 0);
 }
 
-TEST(LoadProgress, ALongOneTellsItsStepItsPartAndTheSeconds) {
+TEST(LoadProgress, ALongLoadReportsStepPartAndSeconds) {
   std::mutex mutex;
   std::condition_variable said;
   std::vector<std::string> lines;
@@ -50,7 +50,7 @@ TEST(LoadProgress, ALongOneTellsItsStepItsPartAndTheSeconds) {
   EXPECT_THAT(wait_for_a_line(), StartsWith("loading the scene: building, "));
 }
 
-TEST(LoadProgress, AShortStepAfterALongOneIsSilent) {
+TEST(LoadProgress, AShortStepAfterALongStepIsSilent) {
   begin_load_step("reading wreck.ply", 1'000'000);
   EXPECT_EQ(load_step().what, "reading wreck.ply");
   begin_load_step("a crate, which is small", 12);

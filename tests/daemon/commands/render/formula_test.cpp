@@ -21,7 +21,7 @@ std::string refusal(std::string_view formula, const Values& values = {}) {
   return value ? "accepted" : value.error().text;
 }
 
-TEST(Formula, BindsAsUsual) {
+TEST(Formula, OperatorsHaveTheUsualPrecedence) {
   EXPECT_DOUBLE_EQ(value_of("1 + 2*3"), 7);
   EXPECT_DOUBLE_EQ(value_of("10 - 4 - 3"), 3);
   EXPECT_DOUBLE_EQ(value_of("-2^2"), -4);

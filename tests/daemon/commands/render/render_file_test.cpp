@@ -99,7 +99,7 @@ sonar:
   EXPECT_FALSE(job.config.engine.switches.noise);
 }
 
-TEST(RenderFile, WhatChannelsShareReachesTheReceiver) {
+TEST(RenderFile, SharedNoiseReachesTheReceiver) {
   const auto with = [](const std::string& noise) {
     return point + "sonar: {model: {receiver: {leak_is_shared: true, shared_noise: {" + noise + "}}}}\n";
   };
@@ -214,7 +214,7 @@ TEST(RenderFile, RefusesWithAPlace) {
   EXPECT_THAT(refusal(point + "let: {a: 1/0}\n"), HasSubstr("finite"));
 }
 
-TEST(RenderFile, WhatIsWrongWithASceneIsBadDataWhereverItStands) {
+TEST(RenderFile, ErrorsInASceneAreBadDataInAnyFile) {
   const auto kind = [](const std::string& text) {
     const auto input = parse_render_file(text, "r.yaml", ".");
     return input ? ErrorKind::bug : input.error().kind;
@@ -355,7 +355,7 @@ TEST(Coverage, TakesTheEnergyOfThePulseInUse) {
   }
 }
 
-TEST(Coverage, KnowsWhatItCannotCompare) {
+TEST(Coverage, RefusesPingsThatItCannotCompare) {
   RenderJob job = shipped_sonars_over_a_bed().front();
   Ping ping;
   ping.request = make_request(job, world_of(job), PingNumber{1}, Time{});

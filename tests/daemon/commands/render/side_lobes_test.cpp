@@ -60,7 +60,7 @@ double mean_power(const RenderJob& job, const Ping& ping, double from_m, double 
   return sum / n;
 }
 
-TEST(SideLobesOfProducts, AreOnUnlessAFileSwitchesThemOff) {
+TEST(SideLobesOfProducts, AreOnByDefault) {
   const auto are_on = [](const std::string& rest) { return job_of(point + rest).config.engine.switches.side_lobes; };
   EXPECT_TRUE(are_on(m1200d));
   EXPECT_TRUE(are_on("engine: {noise: off}\n" + m1200d));

@@ -36,7 +36,7 @@ TEST(RecentRate, IsThatOfTheLastSecondsAndZeroOnceThePingsHaveStopped) {
   EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::seconds(70)), 0.05) << "pings rarely";
 }
 
-TEST(Histogram, ATimeOnABoundBelongsBelowIt) {
+TEST(Histogram, ATimeOnABoundIsInTheLowerBin) {
   Histogram h;
   h.add(0.001);
   h.add(0.0011);

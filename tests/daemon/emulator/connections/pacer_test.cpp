@@ -146,7 +146,7 @@ TEST(Pacer, SameRhythmDoesNotRestartTheGrid) {
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(100));
 }
 
-TEST(Pacer, ANewRhythmStartsAtOnceButNotBeforeTheLastPingIsHome) {
+TEST(Pacer, ANewRhythmStartsAtOnceAfterTheLastPingEnds) {
   Pacer pacer;
   pacer.configure(settings(10), t0);
   ASSERT_TRUE(pacer.fire(t0, false));

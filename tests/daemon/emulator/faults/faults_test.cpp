@@ -148,11 +148,11 @@ TEST(FaultRecords, AreRefusedWithWhatIsWrongAndWhatIsPossible) {
   EXPECT_EQ(text(r), "accepted");
 }
 
-TEST(FaultRecords, WithoutANameHaveTheOneTheyWereAskedForBy) {
+TEST(FaultRecords, RecordsWithoutANameAreNamedAsRequested) {
   for (const char* asked : {"L05", "silent-open"}) EXPECT_EQ(check_fault(record(asked), true)->front().name, asked);
 }
 
-TEST(FaultRecords, ThatNeverActAreRefused) {
+TEST(FaultRecords, RecordsWithoutEffectAreRefused) {
   const auto text = [](const FaultRecord& r) {
     const auto faults = check_fault(r, true);
     return faults ? std::string("accepted") : faults.error().text;
@@ -350,7 +350,7 @@ TEST(Faults, AnOverheatingDeviceSlowsDownThenStopsThenPingsAgain) {
   EXPECT_EQ(run.time.sonar("front").faults().active_count(), 0u);
 }
 
-TEST(Faults, APowerCycleForgetsWhatADeviceForgets) {
+TEST(Faults, APowerCycleResetsTheStateThatADeviceLoses) {
   FaultRecord fault = at_ping("power-cycle", 8, {});
   fault.what = "L10";
   fault.with = {{"boot-s", "2"}, {"gap-s", "1"}};

@@ -128,7 +128,7 @@ TEST(ArisFaults, NumbersJumpBeginAgainAndStand) {
   EXPECT_THAT(during("D09", {}), ElementsAre(1014, 1015, 1016));
 }
 
-TEST(ArisFaults, OfATroubleOnlyKindsWithEffectAreTaken) {
+TEST(ArisFaults, ATroubleUsesOnlyKindsWithEffect) {
   Talk talk;
   const auto why = [&](const std::string& what) {
     FaultRecord record;

@@ -85,7 +85,7 @@ TEST(Sonar3d15InVirtualTime, ItsReceiverIsOneOfItsSettings) {
   EXPECT_EQ(imager.pings(seconds(1)).size(), 5u);
 }
 
-TEST(Sonar3d15InVirtualTime, AHundredImuSamplesASecondAtAnyRate) {
+TEST(Sonar3d15InVirtualTime, SendsAHundredImuSamplesPerSecondAtAnyRate) {
   Imager imager;
   imager.post("/output/imu-batch/enabled", "true");
   imager.pings(seconds(1));
@@ -213,7 +213,7 @@ TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
 // ---- hosts of any make
 
 /// Its port is closed, and the request of the next host arrives before the dialogue has ended.
-TEST(HostByDatagrams, HasLeftAtOnceAndLeavesNothing) {
+TEST(HostByDatagrams, DoesNotGetTheSettingsOfThePreviousHost) {
   for (const protocol::Vendor* const vendor : protocol::vendors()) {
     const protocol::Port* const port = vendor->port(protocol::Port::Kind::udp_dialogue);
     if (port == nullptr) continue;
@@ -323,7 +323,7 @@ TEST(Ping1DInVirtualTime, PingsComeAtTheIntervalUntilTheStreamIsStopped) {
 }
 
 /// Pings of virtual time hold zeros.
-TEST(Ping1DInVirtualTime, WithoutAnEchoItsAutomaticModeSearches) {
+TEST(Ping1DInVirtualTime, AutomaticModeSearchesWithoutAnEcho) {
   Altimeter altimeter;
   altimeter.send(ping::Id::ping1d_continuous_start, ping::Id::ping1d_profile);
   const auto seen = altimeter.profiles(seconds(2));

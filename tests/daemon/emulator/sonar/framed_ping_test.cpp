@@ -61,7 +61,7 @@ TEST_F(FramedPingAtTwoPorts, WithoutAFrameThePartsMakeUpTheWhole) {
   EXPECT_THAT(vendor.asked, ElementsAre(1, 2));
 }
 
-TEST_F(FramedPingAtTwoPorts, OfARecordingEachPortHasItsParts) {
+TEST_F(FramedPingAtTwoPorts, EachPortHasItsPartsOfARecording) {
   const PartsByPort recorded{{2, bytes_of('y')}, {1, bytes_of('x')}};
   FramedPing framed(vendor, state, ping, &recorded);
   EXPECT_EQ(*framed.bytes_at(first), bytes_of('x'));
@@ -74,7 +74,7 @@ TEST_F(FramedPingAtTwoPorts, OfARecordingEachPortHasItsParts) {
   EXPECT_THAT(vendor.asked, IsEmpty());
 }
 
-TEST(FramedPing, OfARecordingAtAnyPort) {
+TEST(FramedPing, ARecordedPingIsFramedAtAnyPort) {
   const protocol::Vendor& vendor = testing_daemon::made_up_vendor();
   const protocol::DeviceState state;
   const Ping ping;

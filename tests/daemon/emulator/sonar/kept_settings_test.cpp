@@ -14,7 +14,7 @@ std::string one(std::string_view profile) {
   return yaml_of("  - name: front\n    profile: " + std::string(profile) + "\n    bind_ip: 127.0.0.2\n");
 }
 
-TEST(KeptSettings, OutlastTheLastClientOfAMakeThatKeepsThemAndOfNoOther) {
+TEST(KeptSettings, StayAfterTheLastClientOnlyForMakesThatKeepThem) {
   std::set<std::string_view> keepers;
   for (const protocol::Vendor* vendor : protocol::vendors()) {
     SCOPED_TRACE(vendor->name());

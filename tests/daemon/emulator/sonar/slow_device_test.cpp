@@ -124,7 +124,7 @@ TEST_F(SlowDevice, AStopCountsItsUnsentReports) {
 }
 
 /// The end of a fault does not release what its device has not sent yet.
-TEST_F(SlowDevice, AFaultDelaysItFurther) {
+TEST_F(SlowDevice, AFaultDelaysAReportFurther) {
   VirtualTime time(dvl("report_delay_ms: 150"));
   const ConnectionId client = time.connect("down");
   time.run(seconds(1));

@@ -16,7 +16,7 @@ using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-TEST(SonarInVirtualTime, TwoSonarsThreeClientsASlowReaderAReloadAndAThousandPings) {
+TEST(SonarInVirtualTime, TwoSonarsServeThreeClientsOverAReload) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 2}\n") + head));
   const ConnectionId quick = time.connect("front"), slow = time.connect("front"), host = time.connect("head");
   time.clients[slow].reads = false;

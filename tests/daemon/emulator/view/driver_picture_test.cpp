@@ -45,7 +45,7 @@ protocol::DeviceState state_of(const protocol::Make& make) {
   return state;
 }
 
-TEST_P(DriverPictures, OfOnePingAreMadeOnlyWhenTheyAreDrawn) {
+TEST_P(DriverPictures, PicturesOfOnePingAreMadeOnlyWhenDrawn) {
   const protocol::Make& make = GetParam();
   if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall) GTEST_SKIP() << "adds up pings";
   const protocol::DeviceState state = state_of(make);

@@ -44,7 +44,7 @@ Story story_of(bool with_preview) {
   return story;
 }
 
-TEST(Preview, TheFirstDriverGetsWhatItWouldHaveGotWithoutIt) {
+TEST(Preview, TheFirstDriverGetsTheSameBytesAsWithoutAPreview) {
   const Story with = story_of(true), without = story_of(false);
   EXPECT_EQ(with.shown.size(), 25u) << "5 a second, and none beside a driver";
   EXPECT_TRUE(without.shown.empty());

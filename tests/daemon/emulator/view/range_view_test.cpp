@@ -47,7 +47,7 @@ TEST(RangeView, FromAboveAPixelIsAtItsBearingAndHorizontalRange) {
   EXPECT_EQ(image.samples[at], image.full_scale);
 }
 
-TEST(RangeView, OnePointForEachReturn) {
+TEST(RangeView, HasOnePointForEachReturn) {
   const auto size = [](const Ping& ping) { return cloud_payload("front", ping, 0)->pieces.front().bytes->size(); };
   Ping none = ping_with(0, 0);
   std::fill(none.samples.begin(), none.samples.end(), std::byte{0});

@@ -112,7 +112,7 @@ TEST_F(OneViewer, WrongSubscriptionsAreReported) {
   EXPECT_EQ(next_word()["level"], 2);
 }
 
-TEST_F(OneViewer, WordsThenLastValuesThenPictures) {
+TEST_F(OneViewer, TextsAreSentBeforeValuesAndPictures) {
   for (const std::uint32_t channel : {1u, 2u, 3u}) subscribe(channel);
   offer(1, 'p');
   offer(3, 'e');
@@ -122,7 +122,7 @@ TEST_F(OneViewer, WordsThenLastValuesThenPictures) {
   EXPECT_EQ(rest().front(), 'g');
 }
 
-TEST_F(OneViewer, NewestPicturesWinAndItIsSaid) {
+TEST_F(OneViewer, TheNewestPicturesAreSentAndLossesReported) {
   subscribe(1);
   subscribe(3);
   offer(1, 'a');
@@ -142,7 +142,7 @@ TEST_F(OneViewer, NewestPicturesWinAndItIsSaid) {
   EXPECT_EQ(next_word()["op"], "removeStatus");
 }
 
-TEST_F(OneViewer, ARateIsNoSlowness) {
+TEST_F(OneViewer, PicturesWithheldForARateAreNotCountedAsLost) {
   subscribe(4);
   for (const char c : {'a', 'b', 'c'}) {
     offer(4, c);
@@ -177,7 +177,7 @@ TEST_F(OneViewer, SetsParametersAndGetsTheValuesThatHold) {
   EXPECT_EQ(next_word()["op"], "removeStatus");
 }
 
-TEST_F(OneViewer, WhoMayOnlyLookSteersNothing) {
+TEST_F(OneViewer, AReadOnlyViewerCannotSteer) {
   Viewer looker(host, {false, 0}, "127.0.0.1");
   looker.on_text(R"({"op": "setParameters", "parameters": [{"name": "/front/range_m", "value": 5}]})", now);
   EXPECT_EQ(host.values["/front/range_m"], foxglove::Value(10.0));
@@ -188,7 +188,7 @@ TEST_F(OneViewer, WhoMayOnlyLookSteersNothing) {
   EXPECT_THAT(text_of(*looker.next(now)), testing::HasSubstr("serviceCallFailure"));
 }
 
-TEST_F(OneViewer, RefusalsOfALookerStayFew) {
+TEST_F(OneViewer, RefusalsForAReadOnlyViewerStayFew) {
   Viewer looker(host, {false, 0}, "127.0.0.1");
   const std::string long_name(1000, 'x');
   for (int i = 0; i < 100; ++i) {
@@ -229,7 +229,7 @@ TEST_F(OneViewer, CallsServicesFourAtATime) {
   EXPECT_EQ(host.calls.size(), 5u);
 }
 
-TEST_F(OneViewer, HearsOfTheParametersItWatches) {
+TEST_F(OneViewer, GetsChangesOfSubscribedParameters) {
   const std::vector<foxglove::Parameter> changed{{"/front/range_m", 7.0}};
   viewer.on_parameters(changed);
   EXPECT_EQ(next_word(), json());
@@ -241,7 +241,7 @@ TEST_F(OneViewer, HearsOfTheParametersItWatches) {
   EXPECT_EQ(next_word(), json());
 }
 
-TEST_F(OneViewer, TimeAtMostThirtyTimesASecondAndTheLastAlways) {
+TEST_F(OneViewer, TimeIsSentAtMostThirtyTimesPerSecondAndTheLastAlways) {
   viewer.set_time(Time(milliseconds(1)));
   EXPECT_EQ(viewer.next(now)->head, foxglove::time_frame(Time(milliseconds(1))));
   viewer.set_time(Time(milliseconds(1)));
@@ -261,7 +261,7 @@ TEST_F(OneViewer, StrayFieldsAndOperationsAreIgnoredWithOneWarning) {
   EXPECT_EQ(next_word(), json());
 }
 
-TEST_F(OneViewer, OnlyWhoLooksAtATrajectoryPlaysIt) {
+TEST_F(OneViewer, OnlyAViewerOfATrajectoryCanPlayIt) {
   const foxglove::PlaybackControl asked{.pause = true, .speed = 2, .seeks = false, .to = {}, .request = "1"};
   viewer.on_binary(foxglove::encode(asked), now);
   EXPECT_THAT(next_word()["message"].get<std::string>(), testing::HasSubstr("playbackControl"));
@@ -287,7 +287,7 @@ TEST_F(OneViewer, SubscriptionsAndParametersAreCounted) {
   EXPECT_EQ(viewer.close_code(), Viewer::CloseCode::none);
 }
 
-TEST_F(OneViewer, NoiseEndsTheConnection) {
+TEST_F(OneViewer, ManyWrongMessagesEndTheConnection) {
   for (int i = 0; i < 9; ++i) say("nonsense");
   EXPECT_EQ(viewer.close_code(), Viewer::CloseCode::none);
   say("nonsense");

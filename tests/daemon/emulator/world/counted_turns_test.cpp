@@ -40,7 +40,7 @@ std::vector<std::string> notes(const std::string& lines) {
   return texts;
 }
 
-TEST(CountedTurns, OfATrajectoryAreNoDegrees) {
+TEST(CountedTurns, TurnsCountedInATrajectoryAreNotTakenForDegrees) {
   EXPECT_THAT(notes(spiral(0)), IsEmpty());
   EXPECT_THAT(notes(spiral(4.7)), IsEmpty()) << "the sender counts from 0";
   EXPECT_THAT(notes(spiral(-150, 0, 1, 8000)), IsEmpty()) << "the file begins after many turns";
@@ -74,7 +74,7 @@ TEST(CountedTurns, HideNoOtherNoteOnTheAttitude) {
   EXPECT_THAT(notes(line_of(0, 270, 170)), ElementsAre(HasSubstr("an angle of 270 rad"))) << "the roll has degrees too";
 }
 
-TEST(CountedTurns, OfASenderAreNoDegrees) {
+TEST(CountedTurns, TurnsCountedByASenderAreNotTakenForDegrees) {
   const auto config = parse_config(
       "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: front, profile: "
       "oculus-m1200d, bind_ip: 127.0.0.2}]\n",

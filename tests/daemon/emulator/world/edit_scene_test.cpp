@@ -33,7 +33,7 @@ TEST(EditScene, AnObjectIsAddedAtTheEndAndTheOthersKeepTheirPlaces) {
   EXPECT_EQ(scene->objects.size(), 3u) << "the old one is as it was";
 }
 
-TEST(EditScene, OfAnotherMaterial) {
+TEST(EditScene, ACopyMayHaveAnotherMaterial) {
   control::AddObject asked = added("buoy");
   asked.material = "steel";
   const auto more = with_object(*small_scene(), asked);

@@ -67,7 +67,7 @@ std::vector<std::string> at(const std::string& initial_pose) {
   return notes(config_with(", initial_pose: {frame: ENU_FLU, " + initial_pose + "}"));
 }
 
-TEST(Plausibility, WhatIsMeantHasNoNotes) {
+TEST(Plausibility, IntendedConfigurationsHaveNoNotes) {
   EXPECT_THAT(at("xyz_m: [-7, 0, -3], rpy_deg: [0, 20, 270]"), IsEmpty());
   EXPECT_THAT(at("xyz_m: [-7, 0, 0]"), IsEmpty()) << "at the surface";
   EXPECT_THAT(at("xyz_m: [-50, 0, -3]"), IsEmpty()) << "30 m outside, within the range of 40 m";
@@ -77,7 +77,7 @@ TEST(Plausibility, WhatIsMeantHasNoNotes) {
       << "on its side, down";
 }
 
-TEST(Plausibility, AVehicleAboveTheWater) {
+TEST(Plausibility, AVehicleAboveTheWaterIsNoted) {
   EXPECT_THAT(at("xyz_m: [-7, 0, 3]"),
               ElementsAre(AllOf(HasSubstr("the sonar of rov is 3.0 m above the water's surface (z = 0); "),
                                 HasSubstr("was NED taken for ENU, or the reverse?"))));
@@ -89,7 +89,7 @@ TEST(Plausibility, AVehicleAboveTheWater) {
   EXPECT_THAT(at("xyz_m: [-7, 0, 0.0009]"), IsEmpty()) << "as near as pings take it for the surface";
 }
 
-TEST(Plausibility, APlaceThatWasNotGivenIsNotJudged) {
+TEST(Plausibility, ADefaultPlaceIsNotJudged) {
   const std::string up = "{frame: FLU, xyz_m: [0, 0, 0.2]}";
   EXPECT_THAT(notes(config_with("", up)), IsEmpty());
   EXPECT_THAT(notes(config_with(", trajectory: orbit", up)), ElementsAre(HasSubstr("is 0.2 m above")));
@@ -111,7 +111,7 @@ TEST(Plausibility, TheSeaSurfaceIsNeitherGroundNorSomethingToSee) {
                   HasSubstr("is 3.0 m below the lowest point of the ground (z = 1.0)")));
 }
 
-TEST(Plausibility, NedTakenForEnuBelowTheBedAndFarAway) {
+TEST(Plausibility, NedReadAsEnuBelowTheBedOrFarAwayIsNoted) {
   EXPECT_THAT(at("xyz_m: [3, 0, -9]"), ElementsAre(AllOf(HasSubstr("is 4.0 m below the lowest point of the ground (z = -5.0)"),
                                                          HasSubstr("the origin that depths are counted from"))));
   Scene strip = bed_scene();
@@ -136,7 +136,7 @@ TEST(Plausibility, ASceneFarFromTheOriginOfLatitudesIsToldBeforeTheFirstPose) {
   EXPECT_THAT(notes(config, far), IsEmpty()) << "a drive away";
 }
 
-TEST(Plausibility, OnlyGroundIsWhatASonarCanBeBelow) {
+TEST(Plausibility, OnlyASonarBelowGroundIsNoted) {
   const auto below = [](double z_m, std::vector<Object> things) {
     Scene scene = bed_scene(std::move(things));
     scene.objects.erase(scene.objects.begin());  // no bed
@@ -162,14 +162,14 @@ TEST(Plausibility, ASceneThatLiesAboveTheWaterIsTheMistakeItself) {
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry), IsEmpty()) << "a tank on its floor";
 }
 
-TEST(Plausibility, AnUpsideDownMount) {
+TEST(Plausibility, AnUpsideDownMountIsNoted) {
   for (const char* mount :
        {"{frame: FLU, rpy_deg: [180, 0, 0]}", "{frame: FRD, rpy_deg: [-170, 10, 0]}", "{frame: FLU, rpy_deg: [0, 165, 0]}"})
     EXPECT_THAT(notes(config_with("", mount)),
                 ElementsAre(HasSubstr("sonar front is mounted upside down on rov; rpy_deg is [roll, pitch, yaw]")));
 }
 
-TEST(Plausibility, AMeshInMillimetres) {
+TEST(Plausibility, AMeshInMillimetresIsNoted) {
   const Config config = config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [-7, 0, -3]}");
   EXPECT_THAT(notes(config, bed_scene({box("wreck", {1200, 300, 250}, {0, 0, -5})})),
               ElementsAre(HasSubstr("wreck is 1200 m long, but no sonar has a range above 40 m; if the file is in centimetres or "
@@ -213,7 +213,7 @@ std::string turning(bool w_first, const char* frame, double z_m, const char* com
   return lines;
 }
 
-TEST(Plausibility, ATrajectoryWithWAtTheWrongEnd) {
+TEST(Plausibility, AQuaternionWithWAtTheWrongEndIsNoted) {
   for (const char* frame : {"ENU_FLU", "NED_FRD"}) {
     const double z_m = std::string(frame) == "ENU_FLU" ? -3 : 3;
     EXPECT_THAT(notes(playing(turning(false, frame, z_m))), IsEmpty());
@@ -241,7 +241,7 @@ std::string looking_around(Quatd body_in_flu, bool w_first, const char* comma = 
   return lines;
 }
 
-TEST(Plausibility, ATrajectoryOfACamera) {
+TEST(Plausibility, ATrajectoryOfACameraIsNoted) {
   const Quatd picture{0.5, -0.5, 0.5, -0.5}, imu{0, std::sqrt(0.5), 0, std::sqrt(0.5)};
   ASSERT_NEAR(rotate(picture, Vec3d{0, 0, 1}).x, 1, 1e-9);
   ASSERT_NEAR(rotate(picture, Vec3d{1, 0, 0}).y, -1, 1e-9);
@@ -269,7 +269,7 @@ TEST(Plausibility, ATrajectoryOfACamera) {
   }
 }
 
-TEST(Plausibility, ATrajectoryAboveTheWaterOrUpsideDown) {
+TEST(Plausibility, ATrajectoryAboveTheWaterOrUpsideDownIsNoted) {
   EXPECT_THAT(notes(playing("# frame: ENU_FLU\n0 0 0 -1 0 0 0 1\n1 0 0 2 0 0 0 1\n2 0 0 3 0 0 0 1\n")),
               ElementsAre(HasSubstr("is 2.0 m above the water's surface (z = 0), in 2 of 3 poses of dive.tum; was NED")));
   EXPECT_THAT(notes(playing("# frame: ENU_FLU\nt,x,y,z,roll_deg,pitch_deg\n0,0,0,-3,170,40\n", "dive.csv")),
@@ -288,7 +288,7 @@ std::string circling(const char* frame, double z_m, double unit_per_rad, double 
   return lines;
 }
 
-TEST(Plausibility, ATrajectoryWithRadiansInColumnsOfDegrees) {
+TEST(Plausibility, RadiansInColumnsOfDegreesAreNoted) {
   for (const char* frame : {"ENU_FLU", "NED_FRD"}) {
     const double z_m = std::string(frame) == "ENU_FLU" ? -3 : 3;
     for (const double radius_m : {0.0, 5.0}) {
@@ -302,7 +302,7 @@ TEST(Plausibility, ATrajectoryWithRadiansInColumnsOfDegrees) {
   }
 }
 
-TEST(Plausibility, ATrajectoryWithDegreesInColumnsOfRadians) {
+TEST(Plausibility, DegreesInColumnsOfRadiansAreNoted) {
   const auto with = [](const std::string& columns, const std::string& values) {
     return playing("# frame: ENU_FLU\nt_s,x_m,y_m,z_m," + columns + "\n0,0,0,-3,0,0,0\n1,0,0,-3," + values + "\n", "dive.csv");
   };
@@ -329,7 +329,7 @@ TEST(Plausibility, AVehicleThatHoldsItsHeadingHasDegrees) {
   EXPECT_THAT(notes(playing(ferry, "dive.csv")), Not(testing::Contains(HasSubstr("radians"))));
 }
 
-TEST(Plausibility, OfALongTrajectorySomePosesAreLookedAt) {
+TEST(Plausibility, SomePosesOfALongTrajectoryAreChecked) {
   std::string lines = "# frame: ENU_FLU\n";
   for (int i = 0; i < 25000; ++i) lines += std::to_string(i) + " 0 0 2 0 0 0 1\n";
   EXPECT_THAT(notes(playing(lines)), ElementsAre(HasSubstr("in 8334 of 8334 checked poses of dive.tum")));
@@ -406,7 +406,7 @@ TEST_F(RunningNotes, APoseAboveTheWaterIsLoggedOnceAndInTheStatusWhileItHolds) {
   EXPECT_EQ(daemon.status().notes_size(), 1);
 }
 
-TEST_F(RunningNotes, DegreesSentAsRadians) {
+TEST_F(RunningNotes, DegreesSentAsRadiansAreNoted) {
   send(R"({"position":[0,0,3],"attitude":[0,0,7.1]})");  // a heading of more than a whole turn
   EXPECT_THAT(daemon.status().notes(), IsEmpty());
   send(R"({"position":[0,0,3],"attitude":[0,-10,-90]})");
@@ -418,7 +418,7 @@ TEST_F(RunningNotes, DegreesSentAsRadians) {
   EXPECT_THAT(texts_of(daemon.status().notes()), ElementsAre(HasSubstr("rov is upside down, 180 deg from upright")));
 }
 
-TEST(StartNotes, OfTheConfigurationAreLoggedAtTheStartAndGiveWayToPoses) {
+TEST(StartNotes, NotesOnTheConfigurationEndWithTheFirstPose) {
   DaemonSetup setup;
   setup.sonar_lines = "    mount: {frame: FLU, xyz_m: [0, 0, 4], rpy_deg: [180, 0, 0]}\n";
   Daemon daemon(setup);
@@ -429,7 +429,7 @@ TEST(StartNotes, OfTheConfigurationAreLoggedAtTheStartAndGiveWayToPoses) {
   EXPECT_TRUE(eventually([&] { return daemon.status().notes_size() == 1; })) << "the start is no longer judged";
 }
 
-TEST(MavlinkNotes, ALinkWithoutUsablePosesIsInTheStatusUntilTheyCome) {
+TEST(MavlinkNotes, ALinkIsInTheStatusUntilUsablePosesCome) {
   DaemonSetup setup;
   setup.more = "poses: {protobuf: off, json: off, mavlink: 'udpin:" + setup.address + ":0'}\n";
   Daemon daemon(setup);

@@ -116,7 +116,7 @@ TEST(PoseHistory, StaysBoundedAtAnyRate) {
   EXPECT_LE(h.size(), PoseHistory::most_samples);
 }
 
-TEST(PoseHistory, MotionIsThatOfThePoseItTells) {
+TEST(PoseHistory, MotionBelongsToTheReturnedPose) {
   PoseHistory h;
   h.put({t0, pose(0, 0), {}, {}});
   h.put({t0 + milliseconds(100), pose(1, 10), {}, {}});

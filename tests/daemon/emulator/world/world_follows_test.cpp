@@ -33,7 +33,7 @@ struct Follows : ::testing::Test {
   Time now{};
 };
 
-TEST_F(Follows, NothingBeforeTheFirstPose) {
+TEST_F(Follows, TimeDoesNotPassBeforeTheFirstPose) {
   EXPECT_FALSE(world.followed_until());
   EXPECT_EQ(take("crate", seconds(5), 0, PoseSample::Of::object), PoseVerdict::accepted);
   EXPECT_FALSE(world.followed_until()) << "objects do not make time pass";

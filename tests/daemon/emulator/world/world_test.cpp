@@ -235,7 +235,7 @@ TEST(World, PosesBeyondOneKilohertzReplaceTheNewestAndAreCounted) {
   EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 0.5, 1e-3) << "the kept poses are still interpolated";
 }
 
-TEST(World, OneKilohertzAndClumpsAreKeptWhole) {
+TEST(World, PosesAtOneKilohertzAreAllKept) {
   World w = one_rov();
   for (int i = 0; i < 1000; ++i) w.accept(stamped(i, ClockDomain::sim, milliseconds(i)), json, t0 + milliseconds(i));
   for (int i = 1000; i < 1060; ++i)  // held back for 60 ms
@@ -372,7 +372,7 @@ TEST(World, ObjectsOfAnotherSceneKeepTheirPosesAndStayHidden) {
   EXPECT_EQ(w.object_at(1, t0).position_m.x, 3);
 }
 
-TEST(World, WhatWasHiddenForNowIsShownAgainAndWhatItsPosesHideIsNot) {
+TEST(World, ObjectsHiddenByControlAreShownAgainButNotThoseHiddenByPoses) {
   World w(PoseRules{}, {{"rov", {}, false}}, {{"crate", {}, false}, {"whale", {}, false}, {"seal", {}, false}}, t0);
   PoseSample s = at_x(3);
   s.of = PoseSample::Of::object;

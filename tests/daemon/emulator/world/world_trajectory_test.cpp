@@ -93,7 +93,7 @@ TEST(WorldTrajectory, RefusesWithASentence) {
   EXPECT_FALSE(still.vehicle_plays(0));
 }
 
-TEST(WorldTrajectory, GoesOnOverAConfigurationThatDoesNotTouchIt) {
+TEST(WorldTrajectory, ContinuesAfterAReloadThatDoesNotChangeIt) {
   World w = with_rov();
   w.steer(asked({}, {}, 2), t0 + seconds(1));
   w.use_vehicles({{"buoy", {}, false}, rov()}, t0 + seconds(2));  // read again: the same points at another address
@@ -107,7 +107,7 @@ TEST(WorldTrajectory, GoesOnOverAConfigurationThatDoesNotTouchIt) {
   EXPECT_EQ(w.source_of(0), "initial pose");
 }
 
-TEST(WorldTrajectory, ObjectsFollowThemToo) {
+TEST(WorldTrajectory, ObjectsFollowTrajectoriesToo) {
   World w({}, {{"rov", {}, false}}, {{"crate", {}, false, {}}, {"buoy", {}, false, east()}}, t0);
   EXPECT_EQ(w.objects_at(t0 + seconds(4)).at(1).position_m.x, 4);
   EXPECT_EQ(w.steer({PoseSample::Of::object, "buoy", true, 7, {}}, t0 + seconds(5)), "");

@@ -49,7 +49,7 @@ TEST(ConnectionSlots, EvictOneOfTheOwnerWithMost) {
   EXPECT_FALSE(alone->closed);
 }
 
-TEST(ConnectionSlots, OneThatAskedForNothingYetGoesFirstHoweverNewItIs) {
+TEST(ConnectionSlots, AConnectionWithoutARequestIsReplacedFirst) {
   ConnectionSlots<Visitor> slots(2);
   const Pointer idle = visitor("x", 60), begins = visitor("x", 0);
   begins->proved = false;
@@ -60,7 +60,7 @@ TEST(ConnectionSlots, OneThatAskedForNothingYetGoesFirstHoweverNewItIs) {
   EXPECT_FALSE(idle->closed);
 }
 
-TEST(ConnectionSlots, AnAddressWithFewerIsNotKeptOutByBusyOnes) {
+TEST(ConnectionSlots, AnAddressWithFewerConnectionsIsNotKeptOutByBusyOnes) {
   ConnectionSlots<Visitor> slots(3, std::chrono::seconds(1), [](const Visitor& v) { return v.owner; });
   for (int i = 0; i < 3; ++i) slots.add(visitor("crowd", -3600));
   EXPECT_FALSE(slots.make_room("crowd", [](const Visitor&) { FAIL(); }));

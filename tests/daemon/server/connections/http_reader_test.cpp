@@ -113,7 +113,7 @@ TEST(HttpReader, LimitsHaveTheirOwnStatus) {
   EXPECT_EQ(take(chunks, 16384).refused, 413u);
 }
 
-TEST(HttpReader, WhatIsNoHttpIsRefused) {
+TEST(HttpReader, OtherProtocolsAreRefused) {
   for (const char* bad :
        {"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", "hello\r\n\r\n", "GET /\r\n\r\n", "GET / HTTP/1.1\r\nbroken line\r\n\r\n",
         "GET / HTTP/1.1\r\nHost : a\r\n\r\n", "POST / HTTP/1.1\r\nContent-Length: -1\r\n\r\n",

@@ -74,7 +74,7 @@ TEST(SharedRate, HoldsTheRateAndOnlyThoseAboveTheirShareWait) {
   EXPECT_GT(twenty_seconds(9, 500).waited, std::chrono::seconds(1)) << "five times its share";
 }
 
-TEST(SharedRate, OneAloneHasAllOfItAndThoseWhoLeftCountNoMore) {
+TEST(SharedRate, ASingleClientHasTheWholeRate) {
   SharedRate rate(10000);
   auto now = Steady::time_point(std::chrono::hours(5));
   auto part = rate.join(10000);

@@ -219,7 +219,7 @@ TEST(Limits, TheLastDescriptorsAreNotForPosesAndHalfOfThemForControl) {
   EXPECT_EQ(count(said, "file descriptors run out"), 1u);
 }
 
-TEST(Threads, ThatComputeAreNiceAndSoAreThoseTheyStart) {
+TEST(Threads, ComputingThreadsAndTheirChildrenAreNice) {
   int own = 0, started = 0;
   const auto niceness = [] { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); };
   const int here = niceness();

@@ -40,7 +40,7 @@ TEST_F(TokenFile, IsTrimmedAndMatchesWhole) {
   EXPECT_EQ(warning, "");
 }
 
-TEST_F(TokenFile, ThatHoldsNoSecretIsRefusedWithoutShowingIt) {
+TEST_F(TokenFile, AFileWithoutASecretIsRefusedWithoutShowingItsText) {
   EXPECT_THAT(refusal(""), HasSubstr("at least 16"));
   EXPECT_THAT(refusal("    \n"), HasSubstr("at least 16"));
   const std::string text = refusal("tooshort");
@@ -65,7 +65,7 @@ TEST_F(TokenFile, ThatHoldsNoSecretIsRefusedWithoutShowingIt) {
   EXPECT_THAT(circle.error().text, HasSubstr("its links lead round in a circle"));
 }
 
-TEST_F(TokenFile, ThatEverybodyReadsIsWarnedAbout) {
+TEST_F(TokenFile, AFileThatEveryoneCanReadGivesAWarning) {
   ASSERT_TRUE(read("0123456789abcdef"));
   std::filesystem::permissions(file, std::filesystem::perms::others_read, std::filesystem::perm_options::add);
   ASSERT_TRUE(Token::read(file, warning));

@@ -27,7 +27,7 @@ std::size_t done_in_5_s(std::size_t cost) {
   return done;
 }
 
-TEST(WorkRate, WhatCostsTimeBesideItsBytesIsCounted) {
+TEST(WorkRate, WorkBesideBytesIsCounted) {
   EXPECT_LT(done_in_5_s(work::of_request + 60 + 300), 7300u) << "small requests: 70,000 without the count";
   EXPECT_LT(done_in_5_s(work::of_request + 60 + 5000), 1200u) << "status";
   EXPECT_LT(done_in_5_s(work::of_request + 60 + 177000), 40u) << "the page";
@@ -53,7 +53,7 @@ TEST(WorkRate, ThoseWhoWaitTakeTurns) {
   EXPECT_EQ(std::chrono::round<milliseconds>(second), milliseconds(200));
 }
 
-TEST(WorkRate, RemembersSoManyAddresses) {
+TEST(WorkRate, TheNumberOfAddressesIsLimited) {
   WorkRate rate;
   auto now = Steady::time_point(std::chrono::hours(5));
   rate.pause_after("flood", 10 * per_s, per_s, now);

@@ -181,7 +181,7 @@ TEST(ControlHttp, BodiesAndHeadersAreBounded) {
   }
 }
 
-TEST(ControlHttp, StrangeHostsAndPagesAreStopped) {
+TEST(ControlHttp, ForeignHostsAndOriginsAreRefused) {
   ControlBench bench;
   HttpClient client(bench);
   client.tcp.send("GET /api/v1/status HTTP/1.1\r\nHost: evil.example\r\n\r\n");
@@ -212,7 +212,7 @@ TEST(ControlHttp, WithATokenOnlyHealthIsOpen) {
   EXPECT_EQ(bench.log_text().find("suppressed"), std::string::npos) << "no line was suppressed";
 }
 
-TEST(ControlHttp, OldClientsAndThoseWhoAskToContinue) {
+TEST(ControlHttp, Http10AndExpectContinueAreServed) {
   ControlBench bench;
   {
     HttpClient client(bench);
@@ -246,7 +246,7 @@ TEST(ControlHttp, OldClientsAndThoseWhoAskToContinue) {
   EXPECT_EQ(client.next().status, 200);
 }
 
-TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
+TEST(ControlHttp, ConnectionsBeyondTheLimitGet503AndSilentOnesAreReplaced) {
   LimitConfig limits;
   limits.control_clients = 2;
   ControlBench bench({}, limits);
@@ -265,7 +265,7 @@ TEST(ControlHttp, TooManyAreToldSoAndTheSilentGiveWay) {
 }
 
 /// As many clients as there are slots send requests that never end, a byte from time to time.
-TEST(ControlHttp, SlowSendersTakeNobodysPlace) {
+TEST(ControlHttp, SlowSendersReplaceNoOtherClient) {
   ControlBench bench;
   std::list<Client> slow;
   const std::string request = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nX-Slow: " + std::string(200, 'x');
@@ -326,7 +326,7 @@ TEST(ControlHttp, UntrustedClientsEvictNoTrustedOne) {
   EXPECT_FALSE(events.until("\r\n").empty()) << "it keeps its place";
 }
 
-TEST(ControlHttp, ThoseTurnedAwayReadWhyWhateverTheyHaveSent) {
+TEST(ControlHttp, RefusedClientsReadTheReason) {
   LimitConfig limits;
   limits.control_clients = 1;
   ControlBench bench({}, limits);

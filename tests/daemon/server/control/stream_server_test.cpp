@@ -43,7 +43,7 @@ struct StreamClient {
   }
 };
 
-TEST(ControlStream, AnswersByIdWhenTheyAreReady) {
+TEST(ControlStream, AnswersComeWithTheirIdWhenReady) {
   ControlBench bench;
   StreamClient client(bench);
   client.greet();
@@ -74,7 +74,7 @@ TEST(ControlStream, AnswersByIdWhenTheyAreReady) {
   EXPECT_THAT(malformed->status().text(), HasSubstr("object is missing"));
 }
 
-TEST(ControlStream, PosesWithoutAnIdAreTakenInSilence) {
+TEST(ControlStream, PosesWithoutAnIdAreNotAnswered) {
   ControlBench bench;
   StreamClient client(bench);
   client.greet();
@@ -353,7 +353,7 @@ TEST(ControlStream, UntrustedClientsEvictNoTrustedOne) {
   for (StreamClient& s : subscribers) EXPECT_TRUE(s.next()) << "they keep their slots";
 }
 
-TEST(ControlStream, WithoutAPlaceTheTokenIsAnsweredThatItIsFull) {
+TEST(ControlStream, AClientWithATokenIsToldThatAllSlotsAreInUse) {
   const TokenFile file;
   ControlConfig config;
   config.token_file = file.path;

@@ -47,7 +47,7 @@ class ChangedScene : public ::testing::Test {
   ScenePointer scene_;
 };
 
-TEST_F(ChangedScene, WhatIsAddedOutOfSightChangesNoBit) {
+TEST_F(ChangedScene, AnObjectAddedOutOfSightChangesNoBit) {
   const auto before = ping(scene_);
   EXPECT_EQ(ping(with("astern", {-60, 3, -2}, false)), before);
   EXPECT_EQ(ping(with("astern", {-60, 3, -2}, true)), before) << "a moving one neither";
@@ -55,7 +55,7 @@ TEST_F(ChangedScene, WhatIsAddedOutOfSightChangesNoBit) {
   EXPECT_EQ(ping(gone), before);
 }
 
-TEST_F(ChangedScene, WhatIsAddedInSightDoes) {
+TEST_F(ChangedScene, AnObjectAddedInSightChangesThePing) {
   const auto before = ping(scene_);
   const ScenePointer more = with("ahead", {-4, 0, -3.6}, false);
   EXPECT_NE(ping(more), before);

@@ -34,7 +34,7 @@ TEST(FairTurns, AQuickOneThatHadMoreWaits) {
   EXPECT_FALSE(turns.goes_first(quick, slow, 0.005)) << "0.2 s against 0.105 s";
 }
 
-TEST(FairTurns, SilenceSavesNothing) {
+TEST(FairTurns, IdleTimeGivesNoCredit) {
   FairTurns turns;
   turns.ask(slow), turns.ask(quick);
   for (int i = 0; i < 50; ++i) turns.begin(slow), turns.end(slow, 0.1);

@@ -36,7 +36,7 @@ TEST(StartEngine, HandsOverWhatWasMade) {
   EXPECT_EQ((*engine)->description(), "idle");
 }
 
-TEST(StartEngine, WhatTheMachineCannotDoIs69AndSaysWhy) {
+TEST(StartEngine, AMachineWithoutTheNeededDeviceGivesExitCode69) {
   const auto processor = start_engine(throwing(std::runtime_error("cannot start on this processor")), harbour());
   ASSERT_FALSE(processor);
   EXPECT_EQ(exit_code(processor.error().kind), 69);

@@ -48,7 +48,7 @@ struct Door : testing::Test {
   ViewSecrets::Steady::time_point now{};
 };
 
-TEST_F(Door, WhoMayLookAndSteer) {
+TEST_F(Door, OriginAndKeyDecideWhoMayReadAndSteer) {
   EXPECT_EQ(outcome(), "steers") << "a program: no Origin";
   EXPECT_EQ(outcome_from("http://127.0.0.1:8088"), "steers");
   EXPECT_EQ(outcome_from("http://sonar-lab"), "steers");
@@ -73,7 +73,7 @@ TEST_F(Door, TheKeyOpensForAnyOrigin) {
   EXPECT_EQ(outcome_from("null"), "403");
 }
 
-TEST_F(Door, WithATokenEveryViewerShowsIt) {
+TEST_F(Door, WithATokenFileEveryViewerMustSendTheToken) {
   for (const char* origin : {"http://127.0.0.1", "https://look.example", "https://steer.example", "null"})
     EXPECT_EQ(outcome_from(origin, lab_token), "401") << origin;
   request.has_origin = false;
@@ -101,7 +101,7 @@ TEST_F(Door, TicketsAreGoodOnceAndForHalfAMinute) {
   EXPECT_EQ(outcome(lab_token), "401") << "too old";
 }
 
-TEST_F(Door, RefusalsSayWhatWouldAllowIt) {
+TEST_F(Door, RefusalsNameTheLineThatWouldAdmitTheViewer) {
   request.has_origin = true;
   request.origin = "https://evil.example";
   const auto opened = open();
@@ -110,7 +110,7 @@ TEST_F(Door, RefusalsSayWhatWouldAllowIt) {
   EXPECT_THAT(answer.body, testing::Not(HasSubstr("view_origins")));
 }
 
-TEST_F(Door, TheHandshake) {
+TEST_F(Door, TheHandshakeIsChecked) {
   const auto status = [this] { return outcome(); };
   request.socket_protocols = "other, foxglove.websocket.v1 ,foxglove.sdk.v1";
   EXPECT_EQ(std::get<ViewWelcome>(open()).protocol, "foxglove.websocket.v1") << "the first that the client names";

@@ -99,7 +99,7 @@ TEST(HttpRouter, UnknownHostsAndOriginsAreRejectedFirst) {
   EXPECT_TRUE(std::holds_alternative<OperationAction>(routed(page).action));
 }
 
-TEST(HttpRouter, WithATokenRequestsWithoutItAreRejected) {
+TEST(HttpRouter, RequestsWithoutTheRequiredTokenAreRejected) {
   for (const char* target : {"/", "/metrics", "/api/v1/status", "/nothing", "/api/v1/events"}) {
     HttpRequest r = request_for("GET", target);
     EXPECT_EQ(answer_to(r, lab_token).status, 401u) << target;

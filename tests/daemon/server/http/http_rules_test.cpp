@@ -46,7 +46,7 @@ TEST(HttpRules, OriginsThatMayAsk) {
 
 Route route(const char* target, const char* method = "GET") { return route_of(*parse_target(target), method); }
 
-TEST(HttpRules, Routes) {
+TEST(HttpRules, PathsLeadToOperations) {
   EXPECT_EQ(route("/").kind, Kind::help);
   EXPECT_EQ(route("/healthz").kind, Kind::health);
   EXPECT_EQ(route("/metrics").kind, Kind::metrics);
@@ -68,7 +68,7 @@ TEST(HttpRules, Routes) {
     EXPECT_EQ(route(none).kind, Kind::unknown) << none;
 }
 
-TEST(HttpRules, RoutesOfFaults) {
+TEST(HttpRules, PathsOfFaultsLeadToOperations) {
   EXPECT_EQ(route("/api/v1/faults").kind, Kind::faults);
   EXPECT_EQ(route("/api/v1/faults", "POST").op, "add_fault");
   for (const char* list : {"kinds", "journal"}) {
@@ -104,7 +104,7 @@ TEST(HttpRules, ARequestIsDetectedHoweverItIsSplit) {
   }
 }
 
-TEST(HttpRules, Subscriptions) {
+TEST(HttpRules, QueriesSelectEvents) {
   const auto of = [](const char* target) { return subscription_of(*parse_target(target)); };
   EXPECT_TRUE(of("/e")->pings && of("/e")->clients && of("/e")->poses && of("/e")->scene) << "nothing said: everything";
   const auto some = of("/e?pings=1&scene=true&poses=0");
@@ -115,7 +115,7 @@ TEST(HttpRules, Subscriptions) {
   EXPECT_THAT(of("/e?pings=0").error().text, HasSubstr("no events requested"));
 }
 
-TEST(HttpRules, OnlyJsonIsJson) {
+TEST(HttpRules, OnlyJsonTypesAreAccepted) {
   for (const char* good : {"application/json", "Application/JSON; charset=utf-8", "application/json ;x"})
     EXPECT_TRUE(is_json(good)) << good;
   for (const char* bad :

@@ -76,7 +76,7 @@ TEST(Page, TellsClientsWithoutGzip) {
   }
 }
 
-TEST(Page, OfThisBuildFitsItsBudget) {
+TEST(Page, FitsTheBudgetOfBytes) {
   std::size_t bytes = 0;
   for (const PageFile& file : page_files()) {
     bytes += file.bytes.size();

@@ -268,7 +268,7 @@ TEST_F(Mavlink, NonsenseIsCountedAndChangesNothing) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("wrong checksum"));
 }
 
-TEST_F(Mavlink, OnlyThoseWhomTheConfigurationNamesAreHeard) {
+TEST_F(Mavlink, OnlyConfiguredSendersAreAccepted) {
   DaemonSetup setup = with_link("udpin:HERE:0");
   setup.more.insert(setup.more.find("protobuf"), "allow_from: [10.0.0.0/8], ");
   Daemon daemon(setup);

@@ -51,7 +51,7 @@ struct PoseLimits : ::testing::Test {
   std::uint16_t port = 0;
 };
 
-TEST_F(PoseLimits, OneThatSendsTooMuchIsReadSlowly) {
+TEST_F(PoseLimits, ASenderOfTooManyBytesIsReadSlowly) {
   begin("input_bytes_per_s: 16384");
   Client sender(daemon->address(), port);
   const auto started = Steady::now();
@@ -96,7 +96,7 @@ TEST_F(PoseLimits, FloodsThatHaveEndedSteerNothingAndHoldNoPlace) {
 }
 
 /// The sender's kernel stores megabytes after the close and sends them only as fast as this end reads.
-TEST_F(PoseLimits, WhatTheSendersKernelHoldsAfterItsEndIsDropped) {
+TEST_F(PoseLimits, BytesInTheKernelAfterTheEndAreDropped) {
   begin("input_bytes_per_s: 1048576");
   constexpr std::size_t sent = 16 << 20;
   Client(daemon->address(), port).send(lines(sent) + line_at_x(77));  // and gone

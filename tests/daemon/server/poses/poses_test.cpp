@@ -50,7 +50,7 @@ struct Poses : ::testing::Test {
   std::uint16_t protobuf_port = 0, stream_port = 0, json_port = 0;
 };
 
-TEST(PoseSenders, WithoutRangesOnlyThisComputerIsHeard) {
+TEST(PoseSenders, OnlyThisComputerIsAcceptedByDefault) {
   const auto from = [](const char* text) { return asio::ip::make_address(text); };
   EXPECT_TRUE(is_admitted({}, from("127.0.0.1")) && is_admitted({}, from("127.9.8.7")));
   EXPECT_FALSE(is_admitted({}, from("192.168.2.2"))) << "the ranges of a listener for others may be gone after a reload";
@@ -59,20 +59,20 @@ TEST(PoseSenders, WithoutRangesOnlyThisComputerIsHeard) {
   EXPECT_FALSE(is_admitted(lab, from("192.168.3.2")) || is_admitted(lab, from("127.0.0.1")) || is_admitted(lab, from("::1")));
 }
 
-TEST_F(Poses, ProtobufDatagram) {
+TEST_F(Poses, AProtobufDatagramIsAccepted) {
   send_udp(daemon.address(), protobuf_port, control::encode_pose_datagram(at_x(11)));
   EXPECT_TRUE(asked_from(11));
   EXPECT_THAT(daemon.log_text(), HasSubstr("pose source of rov changed: initial pose -> protobuf 127."));
 }
 
-TEST_F(Poses, JsonDatagramAsFromAShell) {
+TEST_F(Poses, AJsonDatagramFromAShellIsAccepted) {
   send_udp(daemon.address(), json_port,
            bytes_of(R"({"timestamp":1.0,"position":[0,12,3],"attitude":[0,0.1,0.5],"velocity":[0,0,0]})"));
   EXPECT_TRUE(asked_from(12));
   EXPECT_THAT(daemon.log_text(), HasSubstr("fields: timestamp position attitude velocity (NED/FRD)"));
 }
 
-TEST_F(Poses, JsonLinesOverTcp) {
+TEST_F(Poses, JsonLinesOverTcpAreAccepted) {
   Client sender(daemon.address(), json_port);
   sender.send(std::string("{\"position\":[0,13,3],\"att"));
   sender.send(std::string("itude\":[0,0,0]}\n"));
@@ -269,7 +269,7 @@ TEST(PoseRules, StopMeansNoPingsWithoutPoses) {
   }));
 }
 
-TEST(PoseRules, OnlyAllowedAddressesAreHeard) {
+TEST(PoseRules, OnlyAllowedAddressesAreAccepted) {
   DaemonSetup setup;
   setup.more = "poses: {protobuf: off, json: '" + setup.address + ":0', allow_from: [10.0.0.0/8]}\n";
   Daemon daemon(setup);

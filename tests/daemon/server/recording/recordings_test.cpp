@@ -289,7 +289,7 @@ TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
   EXPECT_TRUE(q.recordings->idle());
 }
 
-TEST(Recordings, LabelsOnlyWhereSamplesHaveThem) {
+TEST(Recordings, LabelsAreRecordedOnlyForSonarsThatHaveThem) {
   Queue q(1 << 20);
   const auto answer = [&](const std::string& name, const char* vendor) {
     std::string text = "not answered";
@@ -320,7 +320,7 @@ DaemonSetup recording_setup(const Folder& folder) {
   return setup;
 }
 
-TEST(RecordedDaemon, ClientsGetTheSameBytesAndTheFileHasThemToo) {
+TEST(RecordedDaemon, ClientsAndFileHaveTheSameBytes) {
   std::vector<std::string> digests;
   for (const bool recorded : {false, true}) {
     const Folder folder;

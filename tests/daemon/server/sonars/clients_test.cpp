@@ -30,7 +30,7 @@ bool is_served(Daemon& daemon) {
   return client.next_ping().has_value();  // the stream ends at once when the client is refused
 }
 
-TEST(Clients, ASlowOneLosesWholePingsAndTheHealthyOneNothing) {
+TEST(Clients, ASlowClientLosesWholePingsAndAHealthyClientNone) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 2}\n    outbox: {depth: 3}\n";
   setup.more = "limits: {stall_s: 600, dead_peer_s: 600}\n";
@@ -81,7 +81,7 @@ std::vector<PingRequest> overloaded(const std::string& sonar_lines) {
   return daemon.requests();
 }
 
-TEST(Clients, SeeAnOverloadInThePingNumbersWhereThatIsAskedFor) {
+TEST(Clients, PingNumbersShowAnOverloadIfConfigured) {
   std::vector<PingRequest> slow = overloaded(""), counted = overloaded("    overload: count\n");
   ASSERT_GE(slow.size(), 12u);
   ASSERT_GE(counted.size(), 12u);
@@ -93,7 +93,7 @@ TEST(Clients, SeeAnOverloadInThePingNumbersWhereThatIsAskedFor) {
   EXPECT_GT(static_cast<std::uint32_t>(counted[11].number), 24u);
 }
 
-TEST(Clients, OneThatTakesNothingIsReset) {
+TEST(Clients, AClientThatReadsNothingIsReset) {
   DaemonSetup setup;
   setup.more = "limits: {stall_s: 0.3}\n";
   Daemon daemon(setup);
@@ -108,7 +108,7 @@ TEST(Clients, OneThatTakesNothingIsReset) {
 }
 
 /// The connection ends when dummies stay unacknowledged for dead_peer_s. The kernel's own limit is a quarter of an hour.
-TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
+TEST(Clients, AClientOnADeadComputerFreesItsSlotInStandby) {
   DaemonSetup setup;
   setup.more = "limits: {dead_peer_s: 3}\n";
   setup.sonar_lines = "    options: {dummy_period_ms: 200}\n";
@@ -125,7 +125,7 @@ TEST(Clients, OneWhoseComputerDiedInStandbyFreesItsPlace) {
 }
 
 /// The client gets no bytes, because dummies are rare, so only the kernel's probes can detect that it is dead.
-TEST(Clients, OneWhoseComputerDiedInSilenceFreesItsPlace) {
+TEST(Clients, AClientOnADeadComputerFreesItsSlot) {
   DaemonSetup setup;
   setup.more = "limits: {dead_peer_s: 3}\n";
   setup.sonar_lines = "    options: {dummy_period_ms: 60000}\n";
@@ -137,7 +137,7 @@ TEST(Clients, OneWhoseComputerDiedInSilenceFreesItsPlace) {
   EXPECT_NE(daemon.log_text().find("stopped reading and answering"), std::string::npos) << daemon.log_text();
 }
 
-TEST(Clients, DeadOnesFreeTheirPlace) {
+TEST(Clients, DeadClientsFreeTheirSlots) {
   Daemon daemon;
   for (int i = 0; i < 10; ++i) {
     Client client(daemon.address());
@@ -202,7 +202,7 @@ TEST(Clients, APingUnderWayIsNotForTheNextClient) {
   expect_only_its_own_pings(daemon, second, *setup.gate);
 }
 
-TEST(Admission, TakingOverWhileAPingIsUnderWayDoesNotInheritIt) {
+TEST(Admission, ATakeOverDuringAPingDoesNotGetThatPing) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 1, when_full: take_over}\n    options: {dummy_period_ms: 600}\n";
   setup.gate = std::make_shared<PingGate>();
@@ -296,7 +296,7 @@ TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
   EXPECT_TRUE(second.next_ping()) << "the waiting client's fire message was kept";
 }
 
-TEST(Admission, WhoHangsUpWhileWaitingLosesThePlaceInTheQueue) {
+TEST(Admission, AClientThatLeavesWhileWaitingLosesItsPlaceInTheQueue) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
   Daemon daemon(setup);
@@ -373,14 +373,14 @@ TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("did not receive its last message in time"));
 }
 
-TEST(GracefulStop, WithoutClientsItIsImmediate) {
+TEST(GracefulStop, WithoutClientsTheStopIsImmediate) {
   Daemon daemon;
   const auto begin = Steady::now();
   EXPECT_EQ(daemon.stop(), 0);
   EXPECT_LT(Steady::now() - begin, patience);
 }
 
-TEST(GracefulStop, ClientsThatCloseOnFinDoNotHoldItUp) {
+TEST(GracefulStop, ClientsThatCloseOnFinDoNotDelayTheStop) {
   Daemon daemon;
   auto client = std::make_unique<Client>(daemon.address());
   client->fire(fire_at(PingRate::hz40));

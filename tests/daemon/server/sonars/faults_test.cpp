@@ -67,7 +67,7 @@ struct PoseFaults : ::testing::Test {
 
 const std::string pose_line = "{\"position\":[0,1,3],\"attitude\":[0,0,0]}\n";
 
-TEST_F(PoseFaults, OfOneDatagramLeaveTheListenerListening) {
+TEST_F(PoseFaults, AFaultInADatagramDoesNotStopTheListener) {
   send_udp(address(), server->json().port, bytes_of(pose_line));
   send_udp(address(), server->json().port, bytes_of(pose_line));
   io.run_for(patience);
@@ -75,7 +75,7 @@ TEST_F(PoseFaults, OfOneDatagramLeaveTheListenerListening) {
   EXPECT_THAT(log_text, HasSubstr("internal fault: no such luck"));
 }
 
-TEST_F(PoseFaults, OfOneConnectionCloseItAndNoOther) {
+TEST_F(PoseFaults, AFaultClosesOnlyItsConnection) {
   Client unlucky(address(), server->json().port);
   unlucky.send(pose_line);
   io.run_for(milliseconds(50));

@@ -84,7 +84,7 @@ TEST(Transports, ARequestOfHttpEndsAClientsConnection) {
   EXPECT_EQ(ask(driver, "range 6"), "ok\n");
 }
 
-TEST(Transports, AReceiverWhosePortIsClosedGetsNothingUntilItOpens) {
+TEST(Transports, AReceiverWithAClosedPortGetsNothingUntilThePortOpens) {
   Daemon daemon(made_up());
   std::uint16_t port = 0;
   {

@@ -82,7 +82,7 @@ TEST_F(InjectedFaults, AClosedPortRefusesAndOpensAgain) {
   EXPECT_TRUE(eventually([&] { return accepts(daemon.address()); })) << "within 100 ms on a quiet machine";
 }
 
-TEST_F(InjectedFaults, SilenceEndsWhenItIsCleared) {
+TEST_F(InjectedFaults, SilenceEndsWhenTheFaultIsCleared) {
   ASSERT_TRUE(done(daemon.ask(fault("silent-open", {}, 600))));
   while (client.next_ping(milliseconds(200))) {
   }
@@ -92,7 +92,7 @@ TEST_F(InjectedFaults, SilenceEndsWhenItIsCleared) {
   EXPECT_EQ(daemon.ask(control::EndFaults{"L05"}).code, OperationResult::Code::refused);
 }
 
-TEST_F(InjectedFaults, APauseInsideAPingEndsWhenItIsCleared) {
+TEST_F(InjectedFaults, APauseInsideAPingEndsWhenTheFaultIsCleared) {
   ASSERT_TRUE(done(daemon.ask(fault("pause-inside", {{"seconds", "100"}}))));
   EXPECT_TRUE(eventually([&] { return !client.next_ping(milliseconds(200)) && client.decoder.buffered_bytes() > 0; }))
       << "half a ping has arrived";

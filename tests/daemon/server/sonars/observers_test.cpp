@@ -73,7 +73,7 @@ TEST(Observers, ADriverThatComesWhileOneLooksOnIsTheDriver) {
   EXPECT_TRUE(eventually([&] { return !daemon.status().sonars().at(0).pinging(); }));
 }
 
-TEST(Observers, HaveSoManyPlacesOrNone) {
+TEST(Observers, HaveALimitedNumberOfSlots) {
   DaemonSetup setup;
   setup.sonar_lines = "    observers: {max: 1}\n";
   {

@@ -234,7 +234,7 @@ TEST(Transports, TheStatusTellsHowLongAHostByDatagramsIsSilent) {
   EXPECT_GE(client().connected_s(), 0.2);
 }
 
-TEST(Transports, AHostByDatagramsThatIsSilentIsGivenUpUnlessItsComputerAnswersForIt) {
+TEST(Transports, ASilentUdpHostIsGivenUpUnlessItsComputerAnswers) {
   Daemon daemon(made_up());
   UdpSocket host;
   host.send("silence 1\n", daemon.address(), data_port);

@@ -55,7 +55,7 @@ TEST(VisitLog, ManyAreSummedUpAndNoneIsForgotten) {
   bench.visits.end();
 }
 
-TEST(VisitLog, TheEndSaysWhatIsUnsaid) {
+TEST(VisitLog, TheEndReportsTheRemainingVisits) {
   Bench bench;
   bench.come_and_go(10);
   bench.visits.end();

@@ -31,7 +31,7 @@ struct Loop {
   }
 };
 
-TEST(KeepRunning, BeginsAgainAfterFaultsUntilItEndsByItself) {
+TEST(KeepRunning, RestartsTheLoopAfterFaultsUntilItEnds) {
   Loop loop;
   loop.faults = 2;
   loop.keep_running(5);

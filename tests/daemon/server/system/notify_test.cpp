@@ -153,7 +153,7 @@ TEST(Notify, AManagerThatIsNotThereIsMentionedOnceAndHurtsNothing) {
   EXPECT_EQ(text.find("cannot notify the service manager", first + 1), std::string::npos);
 }
 
-TEST(Notify, SocketNamesThatAreNoneAreRefusedInWords) {
+TEST(Notify, WrongSocketNamesAreRefused) {
   for (const std::string& name : {std::string("relative/path"), std::string(200, '/')}) {
     std::string said;
     asio::io_context io;

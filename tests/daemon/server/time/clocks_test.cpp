@@ -283,7 +283,7 @@ TEST(Follow, AVehicleThatJoinsFromBehindDelaysNoOther) {
   ASSERT_EQ(behind.wait_for(patience), std::future_status::ready);
 }
 
-TEST(Follow, WhoWaitsForTheAnswerGetsEveryPingHoweverFarApartThePosesAre) {
+TEST(Follow, ASenderThatWaitsForAnswersGetsEveryPing) {
   Pinging p(with_clock("follow", "poses: {protobuf: '127.0.0.1:0', json: off, stale_after_s: 5}\n"));
   p.pose(0, milliseconds(0));
   p.pose(3, std::chrono::seconds(3));
