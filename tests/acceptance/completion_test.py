@@ -25,7 +25,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
 
 
 class Completion(unittest.TestCase):
-    def test_files_say_what_help_says(self):
+    def test_the_files_agree_with_the_help(self):
         result = run(sys.executable, "-B", FOLDER / "make_completion.py", BUILD, "--check")
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 

@@ -90,7 +90,7 @@ class Page(unittest.TestCase):
         else:
             self.assertTrue(text.strip())
 
-    def test_there_is_one_of_every_path(self):
+    def test_every_path_has_an_example(self):
         paths = " ".join(parse(e)[2] for e in examples())
         rules = (ROOT / "daemon/server/http/http_rules.cpp").read_text(encoding="utf-8")
         operations = re.findall(r'"(\w+)"', re.search(r" operations = \{(.*?)\};", rules, re.S)[1])
@@ -98,7 +98,7 @@ class Page(unittest.TestCase):
         for name in [*operations, "status", "events", "sonars", "objects", "faults", "faults/kinds", "faults/journal", "faults/reset"]:
             self.assertIn("/api/v1/" + name, paths)
 
-    def test_examples_by_our_own_client(self):
+    def test_our_own_client_runs_the_examples(self):
         def run_one(example, host):
             method, _, path, headers, body = parse(example)
             if "/events" in path:
@@ -107,7 +107,7 @@ class Page(unittest.TestCase):
         self.run_examples(run_one)
 
     @unittest.skipUnless(CURL, "curl is not installed")
-    def test_examples_by_curl(self):
+    def test_curl_runs_the_examples(self):
         def run_one(example, _):
             events = "/events" in example
             words = [CURL, "--max-time", "2" if events else "200", *shlex.split(example)[1:]]
@@ -119,7 +119,7 @@ class Page(unittest.TestCase):
 
 
 class Running(unittest.TestCase):
-    def test_what_is_set_is_what_the_status_says(self):
+    def test_the_status_has_the_settings(self):
         with Sonard() as daemon:
             host = f"{daemon.address}:8088"
             self.assertEqual(post(host, "/api/v1/sonars/front", {"range_m": 4})[0], 200)
@@ -132,7 +132,7 @@ class Running(unittest.TestCase):
             self.assertIn(code, (400, 409))
             self.assertIn("no-such-scene.yaml", answer["text"])
 
-    def test_events_tell_of_a_client_and_its_pings(self):
+    def test_events_report_a_client_and_its_pings(self):
         with Sonard() as daemon:
             with socket.create_connection((daemon.address, 8088), timeout=100) as events:
                 events.sendall(f"GET /api/v1/events?pings=1&clients=1 HTTP/1.0\r\nHost: {daemon.address}\r\n\r\n".encode())
@@ -159,7 +159,7 @@ class Running(unittest.TestCase):
                 self.assertEqual(ask(host, "GET", "/metrics", {"Authorization": "Bearer a-secret-of-the-lab"})[0], 200)
                 self.assertNotIn("a-secret", daemon.log())
 
-    def test_pages_that_point_a_name_here_get_nothing(self):
+    def test_pages_with_dns_rebinding_get_nothing(self):
         with Sonard(control=", hosts: [sonar-lab]") as daemon:
             host = f"{daemon.address}:8088"
             self.assertEqual(ask(host, "GET", "/api/v1/status", {"Host": "evil.example"})[0], 403)

@@ -152,7 +152,7 @@ class Preview(unittest.TestCase):
             eventually(lambda: "preview ends" in daemon.log())
             self.assertNotIn("viewer connected", daemon.log())
 
-    def test_a_host_that_has_left_is_no_trouble(self):
+    def test_a_host_that_has_left_is_no_error(self):
         payload = struct.pack("<BBHHHHHBB", 1, 1, 0, 100, 88, 740, 1200, 1, 0)  # a scan line
         request = b"BR" + struct.pack("<HHBB", len(payload), 2601, 0, 0) + payload
         request += struct.pack("<H", sum(request) & 0xFFFF)
@@ -247,7 +247,7 @@ class Pages(PageChecks, unittest.TestCase):
     def setUpClass(cls):
         cls.browser = cls.enterClassContext(Browser())
 
-    def test_only_the_settings_that_a_sonar_has(self):
+    def test_the_page_shows_only_settings_that_the_sonar_has(self):
         all_of = {"oculus": (["mode", "beams", "transmit"], {"low frequency", "high frequency"}), "ping360": (["transmit"], set()),
                   "dvl": (["transmit"], set()),
                   "aris": (["mode", "transmit"], {"64 LF", "64 HF", "128 LF", "128 HF"}),
@@ -335,7 +335,7 @@ class Pages(PageChecks, unittest.TestCase):
                 page.wait(LABELS_INSIDE + " === 'none'")  # the first words may be of a smaller picture
                 page.close()
 
-    def test_a_setting_by_keys_and_a_refusal_beside_it(self):
+    def test_a_setting_by_keys_shows_its_refusal(self):
         for width, height in ((1600, 1000), (390, 844)):
             with self.subTest(width=width), demo("oculus"):
                 page = self.opened(self.browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800))

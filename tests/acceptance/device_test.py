@@ -46,14 +46,14 @@ class Device(unittest.TestCase):
         self.assertIn("cuda, host loops", json.dumps(side))
         self.samples("sound")
 
-    def test_a_device_that_fails_is_one_line_and_the_cpu_goes_on(self):
+    def test_after_a_failed_device_the_cpu_continues_with_one_line(self):
         self.assertEqual(self.render("cpu", "cpu").returncode, 0)
         result = self.render("lost", "auto", lasts=30)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(result.stderr, f"sonard: {LOST}; from here on the CPU computes\n")
         self.assertEqual(self.samples("lost"), self.samples("cpu"))
 
-    def test_files_say_by_what_they_were_made(self):
+    def test_files_name_the_engine(self):
         for out, engine in (("cpu", "cpu"), ("device", "cuda")):
             self.assertEqual(self.render(out, engine, batch=3).returncode, 0)
         made = {"cpu, after a failure": self.samples("cpu"), "cuda, host loops": self.samples("device")}
@@ -71,7 +71,7 @@ class Device(unittest.TestCase):
                     found.add(by[0])
         self.assertEqual(len(found), 2, "the device was never lost between two pings")
 
-    def test_a_device_that_fails_where_it_alone_was_wanted_is_exit_code_69(self):
+    def test_a_failed_device_without_a_fallback_is_exit_code_69(self):
         result = self.render("lost", "cuda", lasts=30)
         self.assertEqual(result.returncode, 69, result.stderr)
         self.assertEqual(result.stderr, f"sonard: {LOST}; use --engine cpu or auto\n")

@@ -117,7 +117,7 @@ class Velocity(unittest.TestCase):
                     self.assertAlmostEqual(beam["velocity"], starboard * 0.2706 * report["vy"], delta=0.03)
         self.assertLess(reports[0]["time_of_validity"], reports[0]["time_of_transmission"])
 
-    def test_a_mounting_rotation_turns_them(self):
+    def test_a_mounting_rotation_turns_velocities(self):
         self.driver.set(mounting_rotation_offset=90)
         report = self.driver.next("velocity", lambda r: r["velocity_valid"] and abs(r["vx"]) > 0.3)
         self.assertAlmostEqual(report["vx"], -ORBIT_MPS, delta=0.04)
@@ -144,7 +144,7 @@ class Velocity(unittest.TestCase):
             self.driver.next("velocity")
         self.assertFalse(self.driver.command("get_config")["result"]["acoustic_enabled"])
 
-    def test_a_serial_line_has_the_same_through_a_pseudo_terminal(self):
+    def test_a_pseudo_terminal_has_the_same_sentences(self):
         with PseudoTerminal(self.daemon.address, SERIAL_PORT, PATIENCE_S) as line:
             driver = SerialDriver(line)
             self.assertEqual(driver.ask("wcw", "wrw")[0], "dvl-a50")

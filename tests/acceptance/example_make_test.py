@@ -19,7 +19,7 @@ class ExampleMake(unittest.TestCase):
         self.assertEqual(result.returncode, code, result.stdout + result.stderr)
         return result.stdout
 
-    def test_it_is_listened_to_seen_and_examined(self):
+    def test_sonarctl_listens_views_and_examines(self):
         with Sonard(scene="l-targets.yaml", profile="example-64", arguments=CHEAP[2:]) as daemon:
             device, control = f"{daemon.address}:{PORT}", ("--control", f"{daemon.address}:14770")
             lines = self.ctl("listen", device, "--json", "--pings", PINGS, "--range", 9, "--rate", 5, *PATIENCE).splitlines()
@@ -35,7 +35,7 @@ class ExampleMake(unittest.TestCase):
                 text = eventually(lambda: "no valid message of settings among them" in (said := run(SONARCTL, *examine).stdout) and said)
             self.assertIn("send settings (type 1) with a rate above 0", text)
 
-    def test_it_is_recorded_and_replayed(self):
+    def test_the_make_is_recorded_and_replayed(self):
         with Sonard(scene="l-targets.yaml", profile="example-64", arguments=CHEAP) as daemon:
             folder = pathlib.Path(daemon.folder.name)
             files = {kind: folder / f"run.{kind}" for kind in ("mcap", "pcap", "exs", "raw")}
@@ -63,7 +63,7 @@ class ExampleMake(unittest.TestCase):
             self.assertEqual(kinds["B01"], "only the BlueView link has it")
             self.assertEqual(kinds["G01"], "sends no datagrams of pings")
 
-    def test_the_demo_has_it(self):
+    def test_the_demo_emulates_the_make(self):
         self.assertIn("example", run(SONARD, "--help").stdout)
         refused = run(SONARD, "--demo", "none").stderr
         self.assertIn("ping1d, s500, dvl, m3, micron, norbit, example, and --profile NAME", refused)

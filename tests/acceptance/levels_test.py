@@ -41,7 +41,7 @@ class Levels(unittest.TestCase):
         self.assertAlmostEqual(median, MEDIAN, delta=0.15 * MEDIAN)
         self.assertAlmostEqual(loud, LOUD, delta=5)
 
-    def test_without_it_the_per_cent_counts(self):
+    def test_without_gain_assist_the_per_cent_counts(self):
         self.assertLess(self.percentiles(UNASSISTED, 1, echoed=70)[1], LOUD / 2)
 
 

@@ -112,7 +112,7 @@ def worked_s(daemon):
 
 
 class Stop(unittest.TestCase):
-    def test_terminate_gives_readers_their_message_whole_and_resets_the_deaf(self):
+    def test_terminate_completes_messages_and_resets_clients_that_do_not_read(self):
         with Sonard(mount=FOUR_CLIENTS) as daemon:
             readers = [Reader(daemon.address, rate_hz=40) for _ in range(2)]
             for reader in readers:
@@ -135,7 +135,7 @@ class Stop(unittest.TestCase):
             deaf.close()
             self.assertIn("did not receive its last message in time", daemon.log())
 
-    def test_terminate_with_119_descriptors_open(self):
+    def test_terminate_is_quick_with_119_open_descriptors(self):
         """9 drivers, 8 viewers, 20 event streams, 64 other control and pose connections, a recording."""
         more = "recording: {folder: .}\nlimits: {control_clients: 64}"
         with Sonard(mount=FOUR_CLIENTS.replace("4", "9"), more=more) as daemon, contextlib.ExitStack() as stack:
@@ -169,7 +169,7 @@ class Stop(unittest.TestCase):
             self.assertLess(seconds, 2 * ROOM)
             self.assertIn("run.oculus", daemon.log())
 
-    def test_terminate_while_a_viewer_searches_a_recording(self):
+    def test_terminate_is_quick_while_a_viewer_searches_a_recording(self):
         """After the last ping the file has zeros, as after a power cut. They are more than the player can read in time."""
         with tempfile.TemporaryDirectory() as folder, Sonard(more=f"recording: {{folder: {folder}}}") as daemon:
             file = pathlib.Path(folder, "cut.oculus")
@@ -202,7 +202,7 @@ class Stop(unittest.TestCase):
             self.assertEqual(daemon.process.wait(2 * ROOM), 128 + signal.SIGTERM)
             deaf.close()
 
-    def test_killed_and_started_again_it_serves_on_the_same_address(self):
+    def test_after_a_kill_and_a_restart_sonard_serves_on_the_same_address(self):
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         reader = Reader(daemon.address)
         reader.wait_for(2)
@@ -246,7 +246,7 @@ class Undisturbed(unittest.TestCase):
             record(item, f"{reader.lost()} of {len(reader.pings)} pings lost", "no ping lost", good, COMMAND)
         self.assertEqual((reader.lost(), ending, code), (0, "FIN", 0))
 
-    def test_a_full_disk_under_the_log(self):
+    def test_a_full_disk_of_the_log_costs_no_ping(self):
         with open("/dev/full", "wb") as full:
             daemon = Started(self, stdout=full, stderr=full)
         reader = self.stream(daemon)
@@ -263,7 +263,7 @@ class Undisturbed(unittest.TestCase):
         reader.join(100)
         self.judge(reader, "closed-output", code)
 
-    def test_a_reader_of_the_log_that_goes_away(self):
+    def test_a_reader_of_the_log_that_ends_costs_no_ping(self):
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         daemon.process.stderr.readline()  # as head -1
         daemon.process.stderr.close()
@@ -272,7 +272,7 @@ class Undisturbed(unittest.TestCase):
         reader.join(100)
         self.judge(reader, code=code)
 
-    def test_a_reader_of_the_log_that_stays_and_does_not_read(self):
+    def test_a_log_that_nobody_reads_costs_no_ping(self):
         ours, theirs = os.pipe()
         fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page of memory, which the banner fills
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=theirs)
@@ -337,7 +337,7 @@ class Frozen(unittest.TestCase):
 class ExitCodes(unittest.TestCase):
     """Kind of mistake, command, and the words that the sentence must contain."""
 
-    def test_every_class(self):
+    def test_every_class_of_errors_has_its_exit_code(self):
         with tempfile.TemporaryDirectory() as folder:
             here = pathlib.Path(folder)
             (here / "bad.yaml").write_text("world: {scene: demo.yaml, seeed: 1}\nvehicles: [{name: rov}]\n"

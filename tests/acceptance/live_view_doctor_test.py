@@ -39,7 +39,7 @@ class Doctor(unittest.TestCase):
     def name_of(client):
         return "%s:%d" % client.socket.getsockname()
 
-    def test_connected_and_never_fires(self):
+    def test_a_driver_that_never_fires_is_reported(self):
         with self.daemon_and_viewer() as (daemon, viewer):
             self.assertIn(f"point a driver at {daemon.address}, TCP port 52100", viewer.first_of("/doctor")["findings"][0]["cure"])
             with Client(daemon.address) as client:
@@ -54,7 +54,7 @@ class Doctor(unittest.TestCase):
                                         for f in viewer.decode("/doctor", value[2])["findings"]))
             self.named(viewer, "driver", "No driver is connected to front", "left at")
 
-    def test_on_a_wrong_address(self):
+    def test_a_driver_on_a_wrong_address_is_reported(self):
         with self.daemon_and_viewer() as (daemon, viewer):
             for port in (52100, 52101):
                 with contextlib.suppress(ConnectionRefusedError):
@@ -64,12 +64,12 @@ class Doctor(unittest.TestCase):
             with socket.create_server(("127.99.0.1", 52100)) as other, socket.create_connection(other.getsockname()):
                 self.named(viewer, "address", "is connected to 127.99.0.1:52100, which is not a sonar")
 
-    def test_does_not_read(self):
+    def test_a_driver_that_does_not_read_is_reported(self):
         with self.daemon_and_viewer() as (daemon, viewer), Client(daemon.address) as client:
             client.send(fire_message())
             self.named(viewer, "read", self.name_of(client), "has not read for")
 
-    def test_turned_away(self):
+    def test_a_refused_driver_is_reported(self):
         with self.daemon_and_viewer() as (daemon, viewer), Client(daemon.address) as client:
             client.send(fire_message())
             with reading(client), Client(daemon.address) as other:
@@ -77,14 +77,14 @@ class Doctor(unittest.TestCase):
                 finding = self.named(viewer, "places", self.name_of(other), "was refused", self.name_of(client))
                 self.assertIn("clients.max", finding["cure"])
 
-    def test_standby_and_faults(self):
+    def test_standby_and_faults_are_reported(self):
         with self.daemon_and_viewer(arguments=["--faults"]) as (daemon, viewer), Client(daemon.address) as client:
             client.send(fire_message(rate_hz=0))
             self.named(viewer, "standby", "set by " + self.name_of(client))
             self.assertGreater(viewer.set("/faults/power_cycle", 20), 19)
             self.named(viewer, "fault", "power-cycle")
 
-    def test_stepped_time_waits(self):
+    def test_the_reason_why_stepped_time_waits_is_reported(self):
         with self.daemon_and_viewer(arguments=["--clock", "stepped"]) as (daemon, viewer), Client(daemon.address) as client:
             client.send(fire_message())
             self.named(viewer, "clock", "Time stands still at", f"it moves when {self.name_of(client)} has taken ping", "has not read for")

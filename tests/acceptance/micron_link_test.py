@@ -119,7 +119,7 @@ class MicronLink(unittest.TestCase):
             driver.write(frame(16))
             self.assertEqual(driver.next(ALIVE)[-1], 0x5D)
 
-    def test_the_same_through_a_pseudo_terminal(self):
+    def test_a_pseudo_terminal_has_the_same_messages(self):
         with sonar() as daemon, PseudoTerminal(daemon.address, PORT, PATIENCE_S) as line:
             driver = Driver(line.read, line.write)
             driver.write(command(-30, 30))

@@ -73,13 +73,13 @@ class Mirror(unittest.TestCase):
             mirrored = (place[0], -place[1])
             self.assertGreater(mean_around(ping, place, 0.15, 1), 3 * mean_around(ping, mirrored, 0.15, 1))
 
-    def test_level_in_both_modes_and_widths(self):
+    def test_level_sonars_are_not_mirrored_in_both_modes_and_widths(self):
         self.pose("--xyz", "0,0,0", "--rpy", LEVEL)
         for settings in ({"mode": 2}, {"mode": 1}, {"mode": 2, "version": 2}):
             with self.subTest(**settings):
                 self.expect_level_l(self.ping(**settings))
 
-    def test_down_is_down_whoever_says_it(self):
+    def test_down_is_down_for_every_sender(self):
         self.pose("--xyz", "0,0,0", "--rpy", LEVEL)
         level = mean_around(self.ping(), BELOW)
         self.pose("--xyz", "0,0,0", "--rpy", BOW_DOWN)

@@ -302,7 +302,7 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.querySelector('#refusal').offsetWidth > 0")
             self.assertIn("recording: {folder: DIR}", page.text("#refusal"))
 
-    def test_everything_at_once(self):
+    def test_all_parts_work_at_once(self):
         """Two drivers, one of them slow, a trajectory and a fault: so that all panels have content."""
         trajectory = f"{{file: {self.circle()}, loop: true}}"
         with Sonard(mount=MOUNT, trajectory=trajectory, arguments=["--faults", "--clients", "2"]) as daemon, \
@@ -339,7 +339,7 @@ class Live(PageChecks, unittest.TestCase):
         self.addCleanup(folder.cleanup)
         return pathlib.Path(folder.name)
 
-    def test_no_sideways_scrolling(self):
+    def test_the_page_does_not_scroll_sideways(self):
         with Sonard(mount=MOUNT, trajectory="orbit", arguments=["--faults"]) as daemon, Driver(daemon.address):
             for width, height in ((320, 640), (390, 844), (768, 1024), (1440, 900), (2560, 1440)):
                 with self.subTest(width=width):

@@ -167,7 +167,7 @@ class Page(PageChecks, unittest.TestCase):
                 self.compare(self.drawn(page, "copper"), self.reference(self.raw[name], "copper", 600), most_mean=4, most_p99=45, most_above=0.2)
             page.close()
 
-    def test_nothing_outside_and_no_error(self):
+    def test_the_page_loads_only_its_own_files_without_errors(self):
         page = self.open()
         shown(page)
         for key in "c+fgst120?":
@@ -182,7 +182,7 @@ class Page(PageChecks, unittest.TestCase):
         sizes = [int(line.split()[0]) for line in (PAGE / "sizes.txt").read_text().splitlines()]
         self.assertLessEqual(sum(sizes), BUDGET_BYTES)
 
-    def test_states(self):
+    def test_all_states_are_shown(self):
         page = self.open(1100, 760)
         shown(page)
         for state, (kind, text, button) in STATES.items():
@@ -193,7 +193,7 @@ class Page(PageChecks, unittest.TestCase):
                     self.assertEqual(page.text("#notice-button"), button)
                 self.picture(page, state.replace(" ", "-"), 1.5)
 
-    def test_buttons_of_states(self):
+    def test_states_have_their_buttons(self):
         page = self.open()
         shown(page)
         for state, call in {"standby": ("/front/rate_hz", 10), "no client": ("/front/preview", True),
@@ -204,7 +204,7 @@ class Page(PageChecks, unittest.TestCase):
                 page.click("#notice-button")
                 self.patiently(lambda: call in self.mock.set_calls)
 
-    def test_looking_only_steers_nothing(self):
+    def test_a_read_only_viewer_steers_nothing(self):
         self.mock.state("look only")
         page = self.open()
         page.wait("document.querySelector('#troubles button')?.disabled")
@@ -264,7 +264,7 @@ class Page(PageChecks, unittest.TestCase):
         page.touch("#clear-faults")
         page.wait("document.querySelector('#tab-faults').hidden")
 
-    def test_lost_and_found_again(self):
+    def test_the_page_reconnects(self):
         page = self.open(1100, 760)
         shown(page)
         self.mock.state("lost")
@@ -297,7 +297,7 @@ class Page(PageChecks, unittest.TestCase):
                 got = page.run(f"(({LOG_AFTER})({json.dumps(connections)}))")
                 self.assertEqual(got, expected)
 
-    def test_token(self):
+    def test_the_page_requires_the_token(self):
         self.mock.token = "secret"
         page = self.open(1100, 760)
         page.wait("document.querySelector('#token').offsetWidth > 0")
@@ -305,7 +305,7 @@ class Page(PageChecks, unittest.TestCase):
         page.run("document.querySelector('#token').value = 'secret', document.querySelector('#token-form').requestSubmit()")
         shown(page)
 
-    def test_without_webgl(self):
+    def test_the_page_works_without_webgl(self):
         page = self.open(1100, 760, script=WITHOUT_WEBGL)
         shown(page)
         self.assertTrue(page.run("document.querySelector('#fan').offsetWidth"))
@@ -398,7 +398,7 @@ class Page(PageChecks, unittest.TestCase):
         page.press("?")
         self.assertTrue(page.run("document.querySelector('#help').open"))
 
-    def test_no_sideways_scrolling(self):
+    def test_the_page_does_not_scroll_sideways(self):
         for width, height in ((320, 640), (390, 844), (768, 1024), (1440, 900), (2560, 1440)):
             with self.subTest(width=width):
                 page = self.open(width, height, touch=width < 800)
@@ -408,7 +408,7 @@ class Page(PageChecks, unittest.TestCase):
                 self.assert_fits(page, width)
                 page.close()
 
-    def test_can_be_read_and_reached(self):
+    def test_texts_have_contrast_and_controls_have_names(self):
         """Checks the contrast of words, the names of controls and the size of targets on touch screens, in dark and light."""
         for theme in ("dark", "light"):
             for touch in (False, True):
@@ -423,7 +423,7 @@ class Page(PageChecks, unittest.TestCase):
                     self.picture(page, f"{theme}{'-phone' if touch else ''}")
                     page.close()
 
-    def test_settings_are_asked_for_and_refusals_shown(self):
+    def test_settings_are_requested_and_refusals_shown(self):
         page = self.open()
         page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
         change = "(v) => {{ const f = document.querySelector('[name=\"/front/range_m\"]'); f.value = v; f.dispatchEvent(new Event('change')); }}"

@@ -100,7 +100,7 @@ class Files(unittest.TestCase):
 
 
 class Recorded(Files):
-    def test_a_run_in_every_kind_of_file(self):
+    def test_a_run_is_recorded_in_every_kind_of_file(self):
         with Sonard(scene="tank-rod.yaml") as daemon:
             done = daemon.ctl("record", "--pings", 6, "--range", 1, "--beams", 256, "--control", f"{daemon.address}:14770",
                               "--status-on", daemon.address,
@@ -224,7 +224,7 @@ class Inside(Files):
             self.assertIn(done.returncode, (0, 65), done.stderr)
             self.assertGreater(len(split(self.read("raw"))), 3)
 
-    def test_labels_of_the_samples_on_request(self):
+    def test_labels_are_recorded_on_request(self):
         with Sonard(mount="{frame: FRD, rpy_deg: [0, -15, 0]}", more="recording: {folder: .}\n") as self.daemon:
             self.assertEqual(self.steer("recording", "start", "run.raw", "--labels").returncode, 65)
             self.assertEqual(self.steer("recording", "start", "run.mcap", "--labels").returncode, 0)
@@ -255,7 +255,7 @@ class Inside(Files):
             met = {index + 1 for index in truth["object"] if index >= 0}
             self.assertTrue(met & set(label), "what beams meet first is heard")
 
-    def test_only_where_the_configuration_says(self):
+    def test_recordings_are_made_only_in_the_configured_folder(self):
         with Sonard(scene="tank-rod.yaml") as self.daemon:
             done = self.steer("recording", "start", "run.mcap")
             self.assertEqual(done.returncode, 65)
@@ -280,7 +280,7 @@ class OneIntoAnother(Files):
     def convert(self, source, *arguments, **options):
         return run(SONARCTL, "record", "--from", source, *arguments, **options)
 
-    def test_every_kind_into_every_kind(self):
+    def test_every_kind_is_converted_into_every_kind(self):
         self.path("raw").write_bytes(self.made())
         self.assertEqual(self.convert(self.path("raw"), *self.outputs(["pcap", "mcap", "oculus"])).returncode, 0)
         for kind in KINDS:
@@ -290,7 +290,7 @@ class OneIntoAnother(Files):
         self.assertEqual(oculus_log_messages(self.read("oculus")), split(self.made()))
         mcap_checker.check(self.read("mcap"))
 
-    def test_mcap_with_pictures_in_json_as_written_before(self):
+    def test_mcap_files_with_json_pictures_are_read(self):
         kept = SEEDS / "mcap/with_truth.mcap"
         sent = [data for topic, _, data in mcap_checker.check(kept.read_bytes()).messages if topic == "/s/device"]
         done = self.convert(kept, "--raw", self.path("raw"), "--mcap", self.path("mcap"))
@@ -299,7 +299,7 @@ class OneIntoAnother(Files):
                     for path, topic in ((kept, "/s/image"), (self.path("mcap"), "/sonar/image")))
         self.assertEqual(base64.b64decode(old["data"]), new["data"])
 
-    def test_a_damaged_file_gives_what_it_has(self):
+    def test_a_damaged_file_gives_its_readable_part(self):
         self.path("raw").write_bytes(self.made()[:-100])
         done = self.convert(self.path("raw"), "--oculus", self.path("oculus"))
         self.assertEqual(done.returncode, 65)
@@ -340,7 +340,7 @@ class OneIntoAnother(Files):
             self.assertTrue(kept and self.read("raw").startswith(kept), kind)
         mcap_checker.check(self.read("mcap"))  # its end could be written
 
-    def test_captured_pings(self):
+    def test_captured_pings_are_converted(self):
         folder = pathlib.Path(os.environ.get("SONARD_CAPTURES", self.folder))
         found = [p for p in (folder / "three_pings_8bit.raw", folder / "oculus/three_pings_8bit.raw") if p.exists()]
         if not found:
@@ -362,7 +362,7 @@ class OneIntoAnother(Files):
             eventually(lambda: run(SONARCTL, "record", "--from", source, "--raw", self.folder / "pipe").returncode == 0)
             self.assertEqual(reader.communicate()[0], source.read_bytes())
 
-    def test_junk_in_a_raw_dump_is_told(self):
+    def test_junk_in_a_raw_dump_is_reported(self):
         sound = self.made()
         junk = self.folder / "junk.raw"
         junk.write_bytes(sound + b"what is this?" + sound)
@@ -383,7 +383,7 @@ class OneIntoAnother(Files):
             done = run(SONARCTL, *words)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (65, 1), done.stderr)
 
-    def test_refusals(self):
+    def test_wrong_commands_are_refused(self):
         self.path("raw").write_bytes(b"nothing of the kind")
         for code, words in [(64, ["record", "127.0.0.2"]), (66, ["record", "--from", self.folder / "none", "--raw", "x"]),
                             (65, ["record", "--from", self.path("raw"), "--oculus", self.path("oculus")]),
@@ -406,7 +406,7 @@ class OneIntoAnother(Files):
 
 
 class Checker(unittest.TestCase):
-    def test_no_wrong_byte_escapes_it(self):
+    def test_the_checker_finds_every_wrong_byte(self):
         for name in ("conversation", "with_truth"):
             sound = (SEEDS / f"mcap/{name}.mcap").read_bytes()
             mcap_checker.check(sound)

@@ -119,7 +119,7 @@ class Recordings(PageChecks, unittest.TestCase):
             done = run(SONARCTL, "listen", f"{replay.address}:51200", "--wait", "100", "--quiet", "--pings", 2)
             self.assertIn("pings 2", done.stdout, done.stderr)
 
-    def test_only_files_of_the_folder(self):
+    def test_only_files_of_the_folder_are_played(self):
         pathlib.Path("sonard-recordings").mkdir()
         pathlib.Path("sonard-recordings/broken.mcap").write_bytes(b"nothing")
         pathlib.Path("secret.mcap").write_bytes(b"nothing")
@@ -133,7 +133,7 @@ class Recordings(PageChecks, unittest.TestCase):
             self.assertIn("broken.mcap  0.0 MB, of an earlier run", run(SONARCTL, "status").stdout)
 
     @unittest.skipIf(WHY_NOT, WHY_NOT)
-    def test_page(self):
+    def test_the_page_plays_a_recording(self):
         with demo("oculus"), Browser() as browser:
             path = record("oculus", 20)
             for width, height, theme in ((1600, 1000, "dark"), (390, 844, "light")):
@@ -166,7 +166,7 @@ class Recordings(PageChecks, unittest.TestCase):
                     page.close()
 
     @unittest.skipIf(WHY_NOT, WHY_NOT)
-    def test_playing_requests_nothing_that_a_recording_refuses(self):
+    def test_the_player_sends_no_refused_request(self):
         with demo("3d15"), Browser() as browser:
             path = record("3d15", 5)
             page = self.opened(browser.open(f"http://{HTTP}:8088/?recording={path.name}", 1600, 1000))

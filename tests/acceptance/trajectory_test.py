@@ -100,7 +100,7 @@ class Steered(unittest.TestCase):
             self.assertLess(time.monotonic(), deadline, self.daemon.log())
             time.sleep(0.02)
 
-    def test_by_request_and_over_a_reload(self):
+    def test_trajectories_are_steered_by_requests_and_over_a_reload(self):
         with daemon_with("dive.tum", dive(), "{file: dive.tum, loop: true, speed: 0.001}") as self.daemon:
             vehicle = self.plays()
             self.assertEqual(vehicle["source"], "trajectory dive.tum")
@@ -160,7 +160,7 @@ sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
         for s in done.sidecars:
             self.assertAlmostEqual(s["vehicle_in_world"]["xyz_m"][2], -depth_m(s["time_s"]), places=5)
 
-    def test_render_of_a_file_without_times_is_told_its_rate(self):
+    def test_render_needs_a_rate_for_a_file_without_times(self):
         words = ["render", "--poses", "FOLDER/way.kitti", "--pose-frame", "ENU_FLU", "--out", "FOLDER/out", "--format", "raw"]
         done = self.with_files("none", "rod", *words, "--pose-rate", "4")
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -169,7 +169,7 @@ sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
         self.assertEqual((without.returncode, without.stderr.count("\n")), (65, 1), without.stderr)
         self.assertIn("rate", without.stderr)
 
-    def test_says_what_is_followed_and_what_cannot_be(self):
+    def test_check_lists_followed_files_and_mistakes(self):
         good = self.check("{file: dive.tum, speed: 2}")
         self.assertEqual(good.returncode, 0, good.stderr)
         self.assertIn("vehicle rov follows dive.tum: tum, ENU_FLU, 6 poses, 4.000 s, from 0 s at 2 x\n", good.stdout)

@@ -95,7 +95,7 @@ class View(unittest.TestCase):
             listener.stdout.close()
             self.assertEqual(listener.wait(200), 0, listener.stderr.read())
 
-    def test_beside_a_driver_it_looks_on(self):
+    def test_beside_a_driver_view_is_an_observer(self):
         control = ("--control", f"{self.daemon.address}:14770")
         with tempfile.TemporaryDirectory() as folder, Client(self.daemon.address) as driver:
             driver.send(fire_message(range_=3.0))
@@ -154,7 +154,7 @@ class View(unittest.TestCase):
         except (OSError, EOFError, AssertionError):
             pass
 
-    def test_a_wait_for_the_first_ping_is_told(self):
+    def test_a_wait_for_the_first_ping_is_reported(self):
         with Sonard(arguments=["--clock", "lockstep"]) as daemon, tempfile.TemporaryDirectory() as folder:
             for command in (("listen",), ("listen", "--json"), ("view", "--live", "--png", f"{folder}/a.png"), ("view", "--png", f"{folder}/b.png"),
                             ("record", "--raw", f"{folder}/c")):

@@ -32,7 +32,7 @@ class Planted(unittest.TestCase):
         self.assertTrue(found[0].startswith(f"{name}:{place}: "), found)
         self.assertIn(words, found[0])
 
-    def test_upward_and_sideways_includes(self):
+    def test_upward_and_sideways_includes_are_found(self):
         for name, header in [
                 ("core/base/a.hpp", "core/sonar/ping.hpp"), ("core/sonar/a.hpp", "core/scene/scene.hpp"),
                 ("core/scene/a.cpp", "core/pipeline/cpu/simulate.hpp"), ("core/pipeline/a.cpp", "protocol/vendor.hpp"),
@@ -44,7 +44,7 @@ class Planted(unittest.TestCase):
             with self.subTest(name=name, header=header):
                 self.expect(name, f'\n#include "{header}"\n', 2, "must not include")
 
-    def test_programs_make_room_for_their_stacks(self):
+    def test_programs_without_room_for_stacks_are_found(self):
         self.expect("clients/a/main.cpp", "\nint main(int argc, char** argv) { return run(argc, argv); }\n", 2, "make_room_for_stacks()")
         room = "int main() { if (!make_room_for_stacks()) return 1; }\n"
         bare = "int main() { return 0; }\n"
@@ -75,7 +75,7 @@ class Planted(unittest.TestCase):
                 self.assertEqual({f.split(":")[0] for f in found}, {f"{first}.cpp", f"{second}.hpp"}, found)
                 self.assertIn(f"the {parts} ", found[0])
 
-    def test_the_list_of_makes_closes_no_circle(self):
+    def test_the_list_of_makes_is_not_part_of_a_cycle(self):
         tree = {"protocol/makes.cpp": '#include "protocol/oculus/a.hpp"\n',
                 "protocol/oculus/a.hpp": '#pragma once\n#include "protocol/vendor.hpp"\n'}
         self.assertEqual(found_in(tree), [])
@@ -96,7 +96,7 @@ class Planted(unittest.TestCase):
             with self.subTest(name=name, header=header):
                 self.expect(name, f"#include <{header}>\n", 1, "may")
 
-    def test_forbidden_words(self):
+    def test_forbidden_words_are_found(self):
         for name, line, rule in [
                 ("protocol/wire/a.hpp", "auto p = reinterpret_cast<Header*>(bytes);", "cast"),
                 ("protocol/oculus/a.hpp", "#pragma pack(push, 1)", "packing"),
@@ -175,7 +175,7 @@ class Planted(unittest.TestCase):
         self.expect("daemon/commands/replay/replay_device.cpp", "int x;\n", 1, "take it out of NAME_MAKES")
         self.expect("protocol/makes.cpp", '#include "protocol/host.hpp"\n#include "protocol/eleventh/host.hpp"\n', 2, "add it")
 
-    def test_headers_and_sizes(self):
+    def test_missing_headers_and_large_files_are_found(self):
         found = found_in({"core/base/a.hpp": "int x;\n"})
         self.assertEqual(found, ["core/base/a.hpp:1: header without #pragma once"])
         self.expect("core/base/a.cpp", "int x;\n" * 401, 400, "split it")

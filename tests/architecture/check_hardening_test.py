@@ -34,10 +34,10 @@ class Hardening(unittest.TestCase):
             subprocess.run(["c++", "-w", "-x", "c++", "-", "-o", program, *flags], input=SOURCE, text=True, check=True)
             return missing(str(program))
 
-    def test_all_guards(self):
+    def test_a_program_with_all_guards_passes(self):
         self.assertEqual(self.check(GUARDS), [])
 
-    def test_each_guard_left_out(self):
+    def test_each_missing_guard_is_found(self):
         for name, flags in WITHOUT.items():
             with self.subTest(name):
                 lines = self.check(GUARDS + flags)

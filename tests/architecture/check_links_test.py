@@ -37,7 +37,7 @@ class Planted(unittest.TestCase):
         self.assertTrue(found[0].startswith(f"{PAGE}:4: "), found)
         self.assertIn(words, found[0])
 
-    def test_files_pictures_and_folders(self):
+    def test_dead_links_to_files_pictures_and_folders_are_found(self):
         for target in ("nowhere.txt", "../docs/nowhere/", "deep/../nowhere.txt", "../../outside.txt", "/docs/picture.png"):
             for line in (f"see [it]({target})", f"![a picture]({target})", f"[![both]({target})](picture.png)", f"[it]: {target}",
                          f'[it]({target} "title")', f"[it](<{target}>)", f'<img alt="x" src="{target}" height="9">',
@@ -46,28 +46,28 @@ class Planted(unittest.TestCase):
                     with self.subTest(line=line, installed=installed):
                         self.expect(line, f"link: {target}: does not exist", installed)
 
-    def test_what_lies_outside_is_dead_though_it_exists(self):
+    def test_links_out_of_the_tree_are_dead(self):
         self.expect("[it](../../../)", "does not exist")
 
-    def test_headings(self):
+    def test_dead_links_to_headings_are_found(self):
         name = OTHER.split("/", 1)[1]
         for target in ("#nowhere", f"{name}#nowhere", f"{name}#twice-2", f"{name}#Big-title", "#big-title"):
             with self.subTest(target=target):
                 self.expect(f"[it]({target})", "has no heading of that name")
 
-    def test_tables_that_an_empty_line_cuts(self):
+    def test_tables_with_an_empty_line_are_found(self):
         head = "| a | b |\n|---|:-:|\n| 1 | 2 |\n"
         self.expect("| 3 | 4 |", "table: has no head")
         found = found_in({PAGE: head + "\n| 3 | 4 |\n| 5 | 6 |\n", OTHER: head + "\n" + head + "```\n| 3 | 4 |\n```\n"})
         self.assertEqual([f.partition(": ")[0] for f in found], [f"{PAGE}:5"])
 
-    def test_files_in_backticks(self):
+    def test_missing_files_in_backticks_are_found(self):
         for named in ("core/base/nowhere.hpp", "core/nowhere/", "core/base/nowhere", "daemon/main.hpp:12", "core/base/u*.h",
                       "core/base/units.{hpp,h}", "./daemon/run.sh --fast"):
             with self.subTest(named=named):
                 self.expect(f"read `{named}` first", "file: ")
 
-    def test_what_git_ignores_is_dead(self):
+    def test_links_to_ignored_files_are_dead(self):
         with tempfile.TemporaryDirectory() as folder:
             root = pathlib.Path(folder)
             (root / PAGE).parent.mkdir()
@@ -79,14 +79,14 @@ class Planted(unittest.TestCase):
                 self.skipTest("git is not here")
             self.assertEqual(check_links.dead_links(root), [f"{PAGE}:1: link: made.txt: does not exist"])
 
-    def test_a_symbolic_link_that_leads_nowhere_or_outside(self):
+    def test_dead_symbolic_links_are_found(self):
         for to in ("nowhere", "/etc"):
             found = found_in({"doc/a" + DOT + "md": "[it](scenes/)\n"}, True, [("doc/scenes", to)])
             self.assertEqual(len(found), 1, to)
 
 
 class Innocent(unittest.TestCase):
-    def test_what_leads_somewhere_is_not_reported(self):
+    def test_good_links_are_not_reported(self):
         name = OTHER.split("/", 1)[1]
         for line in ("[it](picture.png) ![it](./picture.png) [it](../LICENSE) [it](deep/) [it](../daemon)", "[it](#here)",
                      f"[it]({name}#big-title) [it]({name}#twice) [it]({name}#twice-1) [it]({name}#own)",
@@ -100,7 +100,7 @@ class Innocent(unittest.TestCase):
     def test_an_installation_names_sources_that_it_does_not_hold(self):
         self.assertEqual(found_in({PAGE: "`docs/nowhere.cpp`\n"}, True), [])
 
-    def test_a_symbolic_link_within_the_tree(self):
+    def test_a_symbolic_link_within_the_tree_is_not_reported(self):
         files = {"share/scenes/a.yaml": "", "doc/a" + DOT + "md": "[it](scenes/a.yaml)\n"}
         self.assertEqual(found_in(files, True, [("doc/scenes", "../share/scenes")]), [])
 

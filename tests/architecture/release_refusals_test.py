@@ -42,17 +42,17 @@ class Refusals(unittest.TestCase):
         self.assertIn("M CMakeLists.txt", said)
         self.assertFalse((self.tree / "out").exists())
 
-    def test_a_tag_of_another_version(self):
+    def test_a_tag_of_another_version_is_refused(self):
         self.git("tag", "v1.2.4")
         code, said = self.release("sums")
         self.assertEqual((code, "tag v1.2.4" in said, "1.2.3" in said), (65, True, True))
 
-    def test_an_unknown_step_before_anything_is_made(self):
+    def test_an_unknown_step_is_refused_before_the_build(self):
         code, said = self.release("sums", "debain12")
         self.assertEqual((code, "usage:" in said), (64, True))
         self.assertFalse((self.tree / "out").exists())
 
-    def test_a_clean_tree_with_the_right_tag_is_taken(self):
+    def test_a_clean_tree_with_the_right_tag_is_accepted(self):
         self.git("tag", "v1.2.3")
         (self.tree / "out/release").mkdir(parents=True)
         (self.tree / "out/release/a.tar.gz").write_bytes(b"a")

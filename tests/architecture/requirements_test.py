@@ -22,7 +22,7 @@ def configure(*options, before="", folders=None):
 
 
 class Requirements(unittest.TestCase):
-    def test_goes_on_where_all_is_here(self):
+    def test_configuration_succeeds_with_all_packages(self):
         text, status = configure("-DBUILD_TESTING=ON")
         self.assertIn("all is here", text)
         self.assertEqual(status, 0)

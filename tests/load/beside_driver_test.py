@@ -68,7 +68,7 @@ def reads(viewer, over):
 
 
 class BesideADriver(unittest.TestCase):
-    def test_eight_viewers_of_everything(self):
+    def test_eight_viewers_of_all_channels_cost_no_ping(self):
         over = threading.Event()
         with Sonard(trajectory="orbit") as daemon, Client(daemon.address) as client, contextlib.ExitStack() as stack:
             client.send(fire_message(rate_hz=RATE_HZ))
@@ -83,7 +83,7 @@ class BesideADriver(unittest.TestCase):
         keep("viewers", f"{lost} of {len(numbers) + lost}", "0", lost == 0)
         self.assertEqual(lost, 0)
 
-    def test_faults_that_come_and_go(self):
+    def test_faults_that_begin_and_end_cost_no_ping(self):
         """The faults act on the connection of another client; the driver's own connection stays."""
         with tempfile.TemporaryDirectory() as folder:
             journal = pathlib.Path(folder) / "journal.jsonl"
@@ -111,7 +111,7 @@ class BesideADriver(unittest.TestCase):
         self.assertEqual(lost, 0)
         self.assertTrue(whole, (len(written), entries[-1]["seq"], lost_entries))
 
-    def test_hosts_of_datagrams(self):
+    def test_udp_hosts_lose_no_ping(self):
         def asks(port, begin, message):
             def host_of(daemon):
                 host = Host(daemon.address, port)

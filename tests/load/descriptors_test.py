@@ -94,11 +94,11 @@ class Descriptors(unittest.TestCase):
             self.assertEqual(code, 0, daemon.log())
         return neighbour.pings, sent_away
 
-    def test_the_last_ones_are_kept_back(self):
+    def test_the_last_descriptors_are_reserved(self):
         pings, _ = self.flood(spare=24, limit=64)
         self.assertGreater(pings, 0)
 
-    def test_even_when_none_are_left_at_all(self):
+    def test_drivers_are_served_without_a_free_descriptor(self):
         pings, sent_away = self.flood(spare=0, limit=52)
         if not QUICK:
             record("descriptors", f"0 of {pings}, {sent_away} newcomers sent away", "0", True,

@@ -72,7 +72,7 @@ def scheduling(process):
 
 
 class Threads(unittest.TestCase):
-    def test_all_but_the_one_with_the_sockets_are_nice(self):
+    def test_all_threads_except_the_io_thread_are_nice(self):
         with Sonard(trajectory="orbit", more="engine: {threads: 4}") as daemon, Client(daemon.address) as client:
             client.send(fire_message())
             next_ping(client)
@@ -82,7 +82,7 @@ class Threads(unittest.TestCase):
         # scenes.
         self.assertEqual(set(others), {(min(first[0] + nice_by, 19), 0) for nice_by in (1, 5, 10)})
 
-    def test_real_time_by_wish(self):
+    def test_real_time_priority_is_used_if_configured(self):
         with Sonard(more="engine: {io_priority: 5}") as daemon, Client(daemon.address) as client:
             client.send(fire_message())
             next_ping(client)

@@ -312,7 +312,7 @@ class Strangers(unittest.TestCase):
         time.sleep(SECONDS)
         return driver.between(begin, time.monotonic())
 
-    def test_one_connection_of_each_kind(self):
+    def test_one_hostile_connection_of_each_kind_costs_no_ping(self):
         with tempfile.TemporaryDirectory() as folder:
             token = pathlib.Path(folder, "token")
             token.write_text(TOKEN + "\n", encoding="ascii")
@@ -348,7 +348,7 @@ class Strangers(unittest.TestCase):
             for s in slow:
                 s.close()
 
-    def test_a_request_that_is_not_whole_in_time_is_ended(self):
+    def test_a_request_that_is_incomplete_for_too_long_is_ended(self):
         """Single bytes from time to time do not extend the time limit of a head, a body or the stream's Hello."""
         with Sonard() as daemon:
             begins = {"head": (8088, f"GET /healthz HTTP/1.1\r\nHost: {daemon.address}\r\nX: ".encode()),
@@ -374,7 +374,7 @@ class Strangers(unittest.TestCase):
             self.assertEqual(list(slow), [], "still open")
             self.assertGreater(time.monotonic() - begin, REQUEST_S / 2, "ended for another reason")
 
-    def test_floods_of_poses_that_have_closed_steer_nothing(self):
+    def test_poses_of_closed_connections_have_no_effect(self):
         with Sonard() as daemon:
             line = b'{"position":[0,500,3],"attitude":[0,0,0]}\n' * 1000
             floods, stop = [], threading.Event()

@@ -22,7 +22,7 @@ def record(oracle, what="level", expected=0.0, measured=0.1, tolerance=0.3, kind
 
 
 class OracleTableTest(unittest.TestCase):
-    def test_the_worst_of_many_stands_for_all(self):
+    def test_the_worst_value_of_an_oracle_is_shown(self):
         records = [record(8, measured=m) for m in (0.1, -0.25, 0.2)]
         records += [record(32, "share", 0.99, m, 0, "at_least") for m in (0.999, 0.992, 1.0)]
         records += [record(18, "error", 1e-4, m, 0, "below") for m in (2e-6, 5e-5)]
@@ -32,7 +32,7 @@ class OracleTableTest(unittest.TestCase):
         self.assertEqual(rows[32, "share"]["worst"]["measured"], 0.992)
         self.assertEqual(rows[18, "error"]["worst"]["measured"], 5e-5)
 
-    def test_not_a_number_is_worse_than_anything(self):
+    def test_not_a_number_is_the_worst_value(self):
         rows = dict(oracle_table.rows_of([record(8, measured=9), record(8, measured=float("nan"), passed=False)]))
         self.assertNotEqual(rows[8, "level"]["worst"]["measured"], 9)
         self.assertFalse(rows[8, "level"]["pass"])
@@ -49,7 +49,7 @@ class OracleTableTest(unittest.TestCase):
         table = oracle_table.table_of([record(0, "thin pole"), record(21), record(3)])
         self.assertEqual([row[0] for row in table], ["3", "13", "20", "21", "+"])
 
-    def test_the_command(self):
+    def test_the_command_prints_the_table(self):
         with tempfile.TemporaryDirectory() as folder:
             def run(*more):
                 return subprocess.run([sys.executable, str(HERE / "oracle_table.py"), folder, *more],

@@ -34,7 +34,7 @@ def possible():
 
 class OwnNetwork(unittest.TestCase):
     @unittest.skipUnless(possible(), "no network namespaces here")
-    def test_two_hold_the_same_ports_at_the_same_time(self):
+    def test_two_programs_use_the_same_ports_at_the_same_time(self):
         with start(HOLD) as one, start(HOLD) as other:
             for process in (one, other):
                 self.assertEqual(process.stdout.readline(), "bound b'beacon'\n")
@@ -43,7 +43,7 @@ class OwnNetwork(unittest.TestCase):
                 self.assertEqual(process.returncode, 0)
 
     @unittest.skipUnless(possible(), "no network namespaces here")
-    def test_children_share_the_network_and_nothing_else_changes(self):
+    def test_children_share_the_network(self):
         with socket.create_server(("127.0.0.1", 0)) as outside:
             port = outside.getsockname()[1]
             seen = start(f"""
@@ -55,7 +55,7 @@ print(os.getuid(), os.getgid(), *{CAPABILITIES})
 """).communicate(timeout=60)
         self.assertEqual(seen, (f"met\n{os.getuid()} {os.getgid()} {eval(CAPABILITIES)[0]}\n", ""))
 
-    def test_without_namespaces_the_second_waits_for_the_first(self):
+    def test_without_namespaces_the_second_program_waits_for_the_first(self):
         shared = {"SONARD_SHARED_NETWORK": "1"}
         script = "import sys; print('here', flush=True); print(sys.stdin.read(), flush=True)"
         with start(script, **shared) as one:

@@ -27,7 +27,7 @@ class Table(unittest.TestCase):
         os.environ["SONARD_RELIABILITY"] = self.folder.name
         self.addCleanup(os.environ.pop, "SONARD_RELIABILITY")
 
-    def test_what_is_missing_was_not_run(self):
+    def test_missing_items_are_listed_as_not_run(self):
         code, page, said = table(self.folder.name)
         self.assertEqual(code, 0)
         rows = [line for line in page.splitlines() if "| not run |" in line]
@@ -38,7 +38,7 @@ class Table(unittest.TestCase):
         self.assertIn("load-dropped", said)
         self.assertEqual(table(self.folder.name, "--strict")[0], 1)
 
-    def test_nothing_is_missing_when_all_is_recorded(self):
+    def test_no_item_is_missing_when_all_are_recorded(self):
         for rows in reliability_table.items().values():
             for key, _, bound in rows:
                 if key not in reliability_table.read_records(reliability_table.BY_HAND):
@@ -65,7 +65,7 @@ class Table(unittest.TestCase):
             recorded |= items
         self.assertEqual(recorded, listed)
 
-    def test_what_was_measured_is_shown_with_its_machine(self):
+    def test_measured_values_are_shown_with_the_machine(self):
         self.assertTrue(record("load-dropped", "0.02 % of 57,600 | 3", "at most 0.5 %", True, "build/x --only load"))
         code, page, _ = table(self.folder.name)
         self.assertEqual(code, 0)
@@ -112,7 +112,7 @@ class Table(unittest.TestCase):
             for key, what, _ in items:
                 self.assertIn(reliability_table.cell(what), rows, key)
 
-    def test_without_a_folder_nothing_is_written(self):
+    def test_without_a_folder_no_file_is_written(self):
         del os.environ["SONARD_RELIABILITY"]
         self.assertFalse(record("load-dropped", "1.2 %", "at most 0.5 %", False, "x"))
         self.assertEqual(list(pathlib.Path(self.folder.name).iterdir()), [])

@@ -25,7 +25,7 @@ class LeftOut(unittest.TestCase):
         done = subprocess.run([ROOT / ".ci/run", "--left-out", *files], capture_output=True, text=True, check=True)
         return set(done.stdout.split())
 
-    def test_is_what_the_changed_files_cannot_touch(self):
+    def test_checks_that_the_changed_files_cannot_affect_are_omitted(self):
         self.assertEqual(self.left_out("docs/faults.md"), HEAVY)
         self.assertEqual(self.left_out("clients/sonarctl/listen.cpp", "docs/faults.md"), HEAVY)
         self.assertEqual(self.left_out("core/pipeline/cpu/simulate.cpp"), {"package", "page"})
@@ -38,7 +38,7 @@ class LeftOut(unittest.TestCase):
             with self.subTest(file=file):
                 self.assertNotIn("sanitizers", self.left_out(file))
 
-    def test_is_nothing_when_the_build_or_the_checks_change(self):
+    def test_no_check_is_omitted_when_the_build_or_the_checks_change(self):
         for file in ("CMakeLists.txt", "CMakePresets.json", ".ci/run", "test.sh", "tests/tools/setup.sh", "tests/CMakeLists.txt", ""):
             with self.subTest(file=file):
                 self.assertEqual(self.left_out("docs/faults.md", file) if file else self.left_out(), set())
@@ -66,16 +66,16 @@ class Configure(unittest.TestCase):
         self.stub("clang++", clang)
         return self.setup('configure() { echo "$*"; }; configure_sanitized asan')
 
-    def test_sanitized_programs_with_clang_and_its_warnings_as_errors(self):
+    def test_sanitized_programs_use_clang_with_warnings_as_errors(self):
         done = self.configured("exit 0")
         self.assertEqual((done.stdout, done.stderr), ("needs clang libclang-rt-dev lld\nasan -DSONAR_WERROR=ON\n", ""))
 
-    def test_sanitized_programs_with_the_default_compiler_where_clang_links_none(self):
+    def test_sanitized_programs_use_the_default_compiler_if_clang_cannot_link(self):
         done = self.configured("exit 1")
         self.assertIn("\nasan -DCMAKE_C_COMPILER=cc -DCMAKE_CXX_COMPILER=c++ -DCMAKE_EXE_LINKER_FLAGS= -DSONAR_WERROR=OFF\n", done.stdout)
         self.assertIn("no clang that links sanitized programs", done.stderr)
 
-    def test_anew_when_the_compiler_changed(self):
+    def test_a_changed_compiler_causes_a_new_configuration(self):
         self.stub("cmake", 'echo run >>ran; [ ! -f build/asan/CMakeCache.txt ] || '
                            'echo "You have changed variables that require your cache to be deleted."')
         cache = self.folder / "build/asan/CMakeCache.txt"
@@ -86,18 +86,18 @@ class Configure(unittest.TestCase):
             self.assertFalse(cache.exists())
             self.assertEqual(len((self.folder / "ran").read_text().split()), runs)
 
-    def test_that_fails_tells_why(self):
+    def test_a_failed_configuration_prints_the_reason(self):
         self.stub("cmake", "echo no compiler; exit 1")
         done = self.setup("configure asan")
         self.assertEqual((done.returncode, done.stderr), (1, "no compiler\nconfiguring preset asan failed: see above\n"))
 
 
-    def test_work_aside_yields_to_all_else_and_tells_how_it_ended(self):
+    def test_background_work_yields_and_reports_its_end(self):
         os.mkfifo(self.folder / "nice")
         done = self.setup('begin_aside log sh -c "nice >nice; echo ended; exit 3"; cat nice; end_aside')
         self.assertEqual((done.returncode, done.stdout, (self.folder / "log").read_text()), (3, "19\n", "ended\n"))
 
-    def test_work_aside_ends_with_the_shell(self):
+    def test_background_work_ends_with_the_shell(self):
         held = self.folder / "held"
         os.mkfifo(held)
         reader = os.open(held, os.O_RDONLY | os.O_NONBLOCK)
@@ -129,13 +129,13 @@ class Programs(unittest.TestCase):
         return subprocess.run([sys.executable, TOOLS / "run_programs.py", self.build, *arguments], capture_output=True, text=True,
                               env=environment, check=False)
 
-    def test_are_listed_by_kind(self):
+    def test_programs_are_listed_by_kind(self):
         self.program("one", "GTEST,LEVELS", "")
         self.program("two", "GTEST,LEVELS,FIGURES", "")
         self.program("three", "SANITIZED", "")
         self.assertEqual(self.run_programs("--list", "LEVELS", "SANITIZED", "--without", "FIGURES").stdout.split(), ["one", "three"])
 
-    def test_run_in_parts_before_those_without_and_pass(self):
+    def test_programs_in_parts_run_first(self):
         self.program("short", "SANITIZED", "")
         self.program("long", "GTEST", "")
         done = self.run_programs("short", "long", SONARD_TEST_JOBS="1")
@@ -144,14 +144,14 @@ class Programs(unittest.TestCase):
         self.assertEqual(ran, ["part 0 of 2", "part 1 of 2", "part  of "])
         self.assertFalse(self.failed.exists())
 
-    def test_parts_of_programs_come_in_turns(self):
+    def test_parts_of_programs_alternate(self):
         for name in ("waits", "computes"):
             self.program(name, "GTEST", "")
         self.assertEqual(self.run_programs("waits", "computes", SONARD_TEST_JOBS="1").returncode, 0)
         ran = [line.partition(" ")[2] for line in (self.build / "ran").read_text().splitlines()]
         self.assertEqual(ran, ["part 0 of 2", "part 0 of 2", "part 1 of 2", "part 1 of 2"])
 
-    def test_that_fail_are_named_with_their_cases(self):
+    def test_failed_programs_are_named_with_their_cases(self):
         self.program("asserts", "GTEST", 'echo "[  FAILED  ] Suite.Asserts (3 ms)"; exit 1')
         self.program("crashes", "GTEST", "kill -SEGV $$")
         self.program("fuzz", "SANITIZED", "exit 3")
@@ -161,19 +161,19 @@ class Programs(unittest.TestCase):
         self.assertEqual(sorted(self.failed.read_text().splitlines()),
                          ["asserts: Suite.Asserts", "crashes: Suite.Ended", "fuzz: Suite.Ended"])
 
-    def test_that_hang_are_ended_and_named(self):
+    def test_programs_that_hang_are_ended_and_named(self):
         self.program("hangs", "SANITIZED", "exec sleep 600")
         done = self.run_programs("hangs", SONARD_TEST_SECONDS="1")
         self.assertEqual(done.returncode, 1)
         self.assertIn("hangs FAILED: it took more than 1 s", done.stdout)
         self.assertRegex(self.failed.read_text(), "^hangs")
 
-    def test_that_are_unknown_are_refused(self):
+    def test_unknown_programs_are_refused(self):
         self.program("one", "GTEST", "")
         done = self.run_programs("other")
         self.assertEqual((done.returncode, done.stderr), (1, "no such test program: other; there are one\n"))
 
-    def test_that_are_not_built_fail(self):
+    def test_programs_that_are_not_built_fail(self):
         self.program("one", "SANITIZED", "")
         (self.build / "one").unlink()
         done = self.run_programs("one")
@@ -183,7 +183,7 @@ class Programs(unittest.TestCase):
 
 
 class Arm64(unittest.TestCase):
-    def test_leaves_out_cases_that_there_are(self):
+    def test_the_omitted_cases_exist(self):
         left_out = re.search(r"GTEST_FILTER=-(\S+)", (TOOLS / "arm64.sh").read_text())[1].split(":")
         sources = "".join(path.read_text() for path in (ROOT / "tests/core").rglob("*_test.cpp"))
         for case in left_out:
@@ -192,7 +192,7 @@ class Arm64(unittest.TestCase):
 
 
 class Times(unittest.TestCase):
-    def test_of_the_slowest_and_names_of_the_failed(self):
+    def test_the_slowest_and_the_failed_cases_are_listed(self):
         with tempfile.TemporaryDirectory() as folder:
             results = pathlib.Path(folder) / "tests.xml"
             cases = "".join(f'<testcase name="Suite.Case{n}" time="{n}" status="{"fail" if n in (2, 7) else "run"}"/>' for n in range(1, 13))

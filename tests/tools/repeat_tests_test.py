@@ -30,7 +30,7 @@ class Repeated(unittest.TestCase):
         said = self.lines(100, "[ $n != 37 ] && [ $n != 71 ]", 1)
         self.assertEqual(said[100:], [f"FAILED in 2 of 100 runs: now and then ({self.folder}/repeat/run-37.log)"])
 
-    def test_no_failure_is_said_to_be_none(self):
+    def test_a_run_without_failures_says_so(self):
         self.assertEqual(self.lines(2, "true", 0, busy_loops=1)[2:], ["no test failed in 2 runs"])
 
 

@@ -15,7 +15,7 @@ def picture(seed, amid=60):
 
 
 class Statistics(unittest.TestCase):
-    def test_of_white_noise(self):
+    def test_white_noise_has_its_statistics(self):
         figures = comparison.statistics([picture(1), picture(2)])
         self.assertAlmostEqual(figures["percentile 50"], 60, delta=1)
         self.assertAlmostEqual(figures["mean"], 59.5, delta=0.3)
@@ -24,13 +24,13 @@ class Statistics(unittest.TestCase):
             self.assertAlmostEqual(figures[name], 0, delta=0.02, msg=name)
         self.assertAlmostEqual(figures["difference of pings, rows 20-119, sd"], 15 * 2 ** 0.5, delta=0.5)
 
-    def test_a_still_picture_is_like_itself(self):
+    def test_a_still_picture_correlates_with_itself(self):
         one = picture(1)
         figures = comparison.statistics([one, one])
         self.assertAlmostEqual(figures["ping to ping, correlation"], 1)
         self.assertEqual(figures["difference of pings, rows 20-119, sd"], 0)
 
-    def test_what_is_farther_off_gets_its_reason_or_is_told(self):
+    def test_larger_differences_have_a_reason_or_are_reported(self):
         real = {"mean": 10.0, "rows 350-399, mean": 4.0, "other": 1.0}
         ours = {"mean": 11.0, "rows 350-399, mean": 5.0, "other": 2.0}
         text, within = comparison.table(real, ours)

@@ -29,7 +29,7 @@ def pings(seed, smooth=False, rows=slice(None)):
 
 
 class Skipping(unittest.TestCase):
-    def test_says_what_is_missing(self):
+    def test_the_missing_captures_are_named(self):
         with mock.patch.dict(os.environ):
             os.environ.pop("SONARD_CAPTURES", None)
             self.assertIn("SONARD_CAPTURES", tell_apart.missing())
@@ -49,26 +49,26 @@ class Scenes(unittest.TestCase):
 
 @unittest.skipIf(numpy is None, "no python3-sklearn")
 class Classifier(unittest.TestCase):
-    def test_local_means(self):
+    def test_local_means_are_computed(self):
         image = numpy.array([[random.Random(i * 9 + j).random() for j in range(9)] for i in range(9)])
         self.assertAlmostEqual(tell_apart.box_mean(image, 4)[4, 4], image.mean())
         self.assertAlmostEqual(tell_apart.box_mean(image, 1)[0, 0], (4 * image[0, 0] + 2 * image[0, 1] + 2 * image[1, 0] +
                                                                     image[1, 1]) / 9)
 
-    def test_shifts(self):
+    def test_shifts_are_computed(self):
         patch = numpy.arange(16).reshape(4, 4)
         for down, right, step in ((0, 1, 1), (1, 0, 4), (1, 1, 5), (1, -1, 3)):
             a, b = tell_apart.shifted(patch, down, right)
             self.assertTrue((b - a == step).all(), (down, right))
 
-    def test_texture_does_not_see_brightness(self):
+    def test_texture_features_do_not_depend_on_brightness(self):
         patch = numpy.random.default_rng(1).rayleigh(1, (32, 32))
         at, twice = (tell_apart.texture_features(scale * patch / (scale * patch).mean()) for scale in (1, 2))
         for name, value in at.items():
             self.assertAlmostEqual(value, twice[name], places=9, msg=name)
             self.assertNotRegex(name, r"\b1 (beams|rows)")
 
-    def test_tells_what_differs_and_no_more(self):
+    def test_only_different_patches_are_distinguished(self):
         with mock.patch.object(tell_apart, "TREES", 20):
             rows, best, bands = tell_apart.results(pings(1, smooth=True), pings(2), pings(3), pings(4, smooth=True))
         shares = {name: (low, high) for name, _, low, high in rows}

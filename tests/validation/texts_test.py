@@ -38,7 +38,7 @@ class Texts(unittest.TestCase):
         self.assertIn("  seed: [1, 2, 3, 1, 2, 3]\nseed: $seed\n", text)
         self.assertTrue(text.endswith("scene: x\n"))
 
-    def test_one_step_of_a_sweep(self):
+    def test_a_sweep_is_read_step_by_step(self):
         self.assertIn("  mode: [1]\n  yaw: [15]\n", with_step(SWEPT, 1))
         self.assertEqual(with_step("name: b\nscene: x\n", 0), "name: b\nscene: x\n")
 
@@ -47,7 +47,7 @@ class Texts(unittest.TestCase):
         self.assertEqual(chapters_of(text), {"tank": "## Tank\n\n", "cost": "cost\n"})
         self.assertEqual(chapters_of(""), {})
 
-    def test_tables(self):
+    def test_tables_are_written_and_read(self):
         text = table(["a", "b"], [[1, "2 dB"]])
         self.assertEqual(text, "| a | b |\n|---|---|\n| 1 | 2 dB |\n")
         self.assertEqual(tables_of(f"x\n\n{text}\nbetween\n\n| c | |\n|---|---|\n| \\|d\\| |  |\n"),
@@ -64,7 +64,7 @@ class Oracles(unittest.TestCase):
                              "tolerance": 0.1, "unit": "dB", "pass": holds}) for n in numbers]
         pathlib.Path(self.folder.name, "a.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
-    def test_no_run_no_chapter(self):
+    def test_without_a_run_there_is_no_chapter(self):
         self.assertIsNone(oracles.chapter(None))
         self.assertIsNone(oracles.chapter(self.folder.name))
 
@@ -74,7 +74,7 @@ class Oracles(unittest.TestCase):
             oracles.chapter(self.folder.name)
         self.assertIn("2 of 46", oracles.chapter(self.folder.name, partial=True))
 
-    def test_a_whole_run_is_taken_and_one_with_a_miss_is_not(self):
+    def test_a_whole_run_is_accepted_unless_an_oracle_failed(self):
         self.record(range(1, 47))
         text = oracles.chapter(self.folder.name)
         self.assertNotIn("Not a whole run", text)
@@ -210,7 +210,7 @@ class Summary(unittest.TestCase):
         self.assertEqual(len(grouped), len(set(grouped)))
         self.assertEqual(set(grouped) | set(oracle_table.NOT_BUILT), set(oracle_table.ORACLES))
 
-    def test_shares_of_tolerances(self):
+    def test_shares_of_tolerances_are_computed(self):
         for expected, measured, tolerance, share in (
                 ("141.6 dB", "141.9", "±0.3", 1), ("-50 dB/decade", "-50.15", "±0.3", 0.5), ("0", "0", "exact", 0), ("0", "1", "exact", 1e9),
                 ("below 1.000e-04", "5.000e-05", "", 0.5), ("below -30 dB", "-60", "", 0.5), ("below -100 dB", "-inf", "", 0),

@@ -29,7 +29,7 @@ class Checks:
         noise = bytes(JUNK.randrange(256) for _ in range(size))
         return b"".join(part for piece in (*self.junk_pieces, b"") for part in (noise, piece))
 
-    def test_samples(self):
+    def test_samples_are_compared(self):
         (ping, *_) = self.found(*self.messages[0])
         for samples in self.samples:
             self.assertIn(zlib.crc32(samples), ping.crcs)
@@ -79,7 +79,7 @@ class DatagramChecks(Checks):
     def reader(self):
         return self.make.datagrams()
 
-    def test_datagrams_that_lack_bytes(self):
+    def test_datagrams_that_lack_bytes_are_no_pings(self):
         first, second = self.messages
         for place, datagram in enumerate(first):
             for cut in range(1, len(datagram), self.step):

@@ -174,7 +174,7 @@ class Requests(unittest.TestCase):
             self.control.load_scene("demo.yaml")
         self.assertEqual((caught.exception.status, caught.exception.code), (502, ""))
 
-    def test_requests(self):
+    def test_requests_have_their_bytes(self):
         at = {"frame": "NED_FRD", "position": {"x": 1, "y": 2, "z": 3}, "orientation": {"w": 1, "x": 0, "y": 0, "z": 0}}
         placed = dict(position=(1, 2, 3), frame="NED_FRD")
         for call, path, body in (
@@ -221,7 +221,7 @@ class Requests(unittest.TestCase):
     def test_package_is_of_this_checkout(self):
         self.assertIn(str(PACKAGE), sys.modules[Control.__module__].__file__)
 
-    def test_closed_port(self):
+    def test_a_closed_port_raises_an_error(self):
         with socket.socket() as unused:
             unused.bind(("127.0.0.1", 0))
             port = unused.getsockname()[1]

@@ -19,7 +19,7 @@ HERE = Geodetic(*made.ORIGIN)
 
 
 class Geodesy(unittest.TestCase):
-    def test_known_points_of_the_ellipsoid(self):
+    def test_known_points_lie_on_the_ellipsoid(self):
         for place, there in (((0, 0, 0), (6378137, 0, 0)), ((0, 90, 10), (0, 6378147, 0)), ((90, 0, 0), (0, 0, 6356752.3142))):
             for got, wanted in zip(ecef(Geodetic(*place)), there):
                 self.assertAlmostEqual(got, wanted, delta=1e-4)
@@ -31,18 +31,18 @@ class Geodesy(unittest.TestCase):
             for got, value in zip(plane.ned(Geodetic(*made.degrees_at(*wanted))), wanted):
                 self.assertAlmostEqual(got, value, delta=2e-3)
 
-    def test_conversion_between_origins(self):
+    def test_positions_are_converted_between_origins(self):
         other = LocalPlane(Geodetic(*made.degrees_at(100, 50, -20)))
         for got, value in zip(LocalPlane(HERE).ned_from(other, (1, 2, 3)), (101, 52, -17)):
             self.assertAlmostEqual(got, value, delta=5e-3)
 
-    def test_parsing_of_origins(self):
+    def test_origins_are_parsed(self):
         self.assertEqual(parse_origin("47.6,-122.33"), Geodetic(47.6, -122.33, 0))
         for bad in ("47.6", "a,b", "91,0,0", "1,2,3,4", "nan,0,0", ""):
             with self.subTest(bad), self.assertRaises(ValueError):
                 parse_origin(bad)
 
-    def test_half_way_between_two_rotations(self):
+    def test_rotations_are_interpolated(self):
         a, b = quaternion_from_rpy(0, 0, 0.2), quaternion_from_rpy(0, 0, 1.0)
         for second in (b, tuple(-v for v in b)):
             for got, wanted in zip(between(a, second, 0.25), quaternion_from_rpy(0, 0, 0.4)):
@@ -51,7 +51,7 @@ class Geodesy(unittest.TestCase):
 
 
 class Nmea(WithFolder):
-    def test_a_pose_at_every_fix(self):
+    def test_every_fix_gives_a_pose(self):
         track = self.convert(made.nmea_log(), origin=HERE, assumed=self.assumed(bottom_m=20))
         self.assertEqual(self.warned, [])
         self.assert_track(track, range(20), t0=43200, radians=1e-6)
@@ -87,7 +87,7 @@ class Nmea(WithFolder):
         self.convert(made.sentence("GPVTG,1,T,,M,2.0,N") + made.nmea_log() + made.sentence("YXXDR,A,1,D,PITCH"))
         self.assertEqual(self.warned[0], "sentences that are not read: VTG, XDR")
 
-    def test_comments_in_utf8(self):
+    def test_comments_may_have_utf8(self):
         self.assertEqual(format_of(self.file("# Küste\n" + made.nmea_log())), "nmea")
         with self.assertRaisesRegex(ConvertError, "AIS messages, without attitudes"):
             self.convert("!AIVDM,1,1,,A,13HOI:0P0000VOHLCnHQKwvL05Ip,0*23\r\n")
@@ -109,21 +109,21 @@ class Corrupted(WithFolder):
         except ConvertError as error:
             self.assertIn(str(self.folder / "log"), str(error))
 
-    def test_truncated_anywhere(self):
+    def test_truncated_files_give_their_readable_part(self):
         for kind, log in self.LOGS.items():
             self.assertEqual(format_of(self.file(log)), kind)
             for length in range(0, len(log), 1 + len(log) // 150):
                 with self.subTest(kind, length=length):
                     self.outcome(kind, log[:length])
 
-    def test_chunks_within_chunks(self):
+    def test_chunks_within_chunks_are_refused(self):
         nested = b""
         for _ in range(2000):
             size = ("size", len(nested).to_bytes(4, "little"))
             nested = made.bag_record([("op", b"\x05"), ("compression", b"none"), size], nested)
         self.outcome("rosbag", b"#ROSBAG V2.0\n" + nested)
 
-    def test_changed_bytes(self):
+    def test_changed_bytes_cause_no_crash(self):
         draw = random.Random(1)
         for kind, log in self.LOGS.items():
             for number in range(150):
@@ -133,7 +133,7 @@ class Corrupted(WithFolder):
                 with self.subTest(kind, number=number):
                     self.outcome(kind, bytes(data))
 
-    def test_other_files(self):
+    def test_other_files_are_named(self):
         for data, said in ((b"", "is empty"), (b"\x7fELF" + bytes(100), "none of dataflash"),
                            (b"time,x,y\n1,2,3\n", "name the file in `traj"),
                            (b"# frame: ENU_FLU\n1.5 0 0 0 0 0 0 1\n", "sonard plays TUM"), (b"\x1f\x8b\x08", "gunzip -k .*log"),
@@ -148,13 +148,13 @@ class Corrupted(WithFolder):
             with self.subTest(data[:8]), self.assertRaisesRegex(ConvertError, said):
                 format_of(self.file(data))
 
-    def test_frames_without_times(self):
+    def test_frames_without_times_are_refused(self):
         frames = b"".join(made.mavlink_frame("ATTITUDE", (100 * i, 0, 0, 0, 0, 0, 0)) for i in range(3))
         for name in ("raw.mavlink", "raw.tlog"):
             with self.assertRaisesRegex(ConvertError, "MAVLink frames without times; give the telemetry log"):
                 format_of(self.file(frames, name))
 
-    def test_results_of_a_download_that_went_wrong(self):
+    def test_failed_downloads_are_named(self):
         for name, content, says in (("a.tlog", b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
                                     ("a.db3", b"<!DOCTYPE html><html>", "a web page"),
                                     ("a.gpx", b" <html><head>", "a web page"),
@@ -164,7 +164,7 @@ class Corrupted(WithFolder):
             with self.assertRaisesRegex(ConvertError, says):
                 format_of(self.file(content, name))
 
-    def test_a_database_changed_anywhere(self):
+    def test_a_changed_database_causes_no_crash(self):
         whole = made.db3(self.folder / "whole", made.ROS2_TOPICS).read_bytes()
         draw = random.Random(2)
         for number in range(60):
@@ -176,14 +176,14 @@ class Corrupted(WithFolder):
 
 
 class Command(WithFolder):
-    def test_place_of_a_log_without_one(self):
+    def test_a_log_without_positions_gets_a_place(self):
         log = self.file(made.telemetry_without_place(("ATTITUDE", "GLOBAL_POSITION_INT")), "rov.tlog")
         code, text, said = self.run_main(log, "-o", "-", "--at=-1.5,2")
         self.assertEqual(code, 0, said)
         self.assertIn("north and east are held at -1.5, 2", said)
         self.assertEqual(text.splitlines()[-1].split(",")[1:3], ["-1.500000", "2.000000"])
 
-    def test_dead_reckoning_is_done_when_asked(self):
+    def test_dead_reckoning_is_done_on_request(self):
         """The vehicle moves along its heading at the given speed."""
         log = self.file(made.telemetry_without_place(("ATTITUDE", "GLOBAL_POSITION_INT")), "rov.tlog")
         code, text, said = self.run_main(log, "-o", "-", "--at=10,20", "--dead-reckon", "0.5")
@@ -208,7 +208,7 @@ class Command(WithFolder):
             code = main([str(w) for w in words])
         return code, out.getvalue(), error.getvalue()
 
-    def test_output_file(self):
+    def test_the_output_file_is_written(self):
         log, target = self.file(made.dataflash_log(("SIM",), 3), "flight.bin"), self.folder / "way.csv"
         code, _, text = self.run_main(log, "-o", target, "--origin", "47.6,-122.33,10", "--body", "rov")
         self.assertEqual(code, 0, text)
@@ -220,13 +220,13 @@ class Command(WithFolder):
         self.assertTrue(all(line.endswith(",rov") for line in lines[5:]))
         self.assertEqual(list(self.folder.glob("*.part")), [])
 
-    def test_keep_time(self):
+    def test_times_are_kept_on_request(self):
         log = self.file(made.telemetry_log(("SIM_STATE",), 3), "flight.tlog")
         code, text, _ = self.run_main(log, "-o", "-", "--keep-time")
         self.assertEqual(code, 0)
         self.assertEqual(text.splitlines()[-3].split(",")[0], "1700000000.000000000")
 
-    def test_frame_option(self):
+    def test_the_option_sets_the_frame(self):
         log = self.file(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", [(i, made.odometry(i)) for i in range(3)])]))
         self.assertTrue(self.run_main(log, "-o", "-", "--frame", "NED_FRD")[1].startswith("# frame: NED_FRD"))
         self.assertEqual(self.run_main(self.file(made.dataflash_log()), "-o", "-", "--frame", "ENU_FLU")[0], 64)
@@ -256,7 +256,7 @@ class Command(WithFolder):
         log = made.dataflash_log(("SIM",), 3) + late
         self.assertIn("no pose for 8.8 s after second 0.2", self.run_main(self.file(log), "-o", "-")[2])
 
-    def test_exit_codes(self):
+    def test_exit_codes_are_those_of_the_manual(self):
         log = self.file(made.dataflash_log(("SIM",), 3))
         self.assertEqual(self.run_main(self.folder / "none.bin", "-o", "-")[0], 66)
         self.assertEqual(self.run_main(log, "-o", self.folder / "no" / "folder.csv")[0], 66)

@@ -15,7 +15,7 @@ from sonard_client.convert.rosbag2 import files_of
 
 
 class RecordingsOfRos2(WithFolder):
-    def test_a_file(self):
+    def test_a_file_is_read(self):
         path = made.db3(self.folder / "odom #1 50%.db3", made.ROS2_TOPICS)
         self.assertEqual(format_of(path), "db3")
         track = convert(path, warn=self.warned.append)
@@ -55,7 +55,7 @@ class RecordingsOfRos2(WithFolder):
                                               "".join(f"    - {name}\n" for name in names))
         return folder
 
-    def test_a_folder_of_several_files(self):
+    def test_a_folder_of_several_files_is_read(self):
         for kind in ("db3", "mcap"):
             with self.subTest(kind):
                 folder = self.folder_of(f"r_10.{kind}", f"r_9.{kind}")  # in this order, independent of their names
@@ -73,7 +73,7 @@ class RecordingsOfRos2(WithFolder):
                     self.assert_track(track, range(6), t0=100, metres=1e-9, radians=1e-6)
                 shutil.rmtree(folder)
 
-    def test_folders_without_files(self):
+    def test_folders_without_files_are_refused(self):
         folder = self.folder_of()
         with self.assertRaisesRegex(ConvertError, "a folder without .db3 and .mcap files"):
             format_of(folder)
@@ -95,14 +95,14 @@ class RecordingsOfRos2(WithFolder):
         convert(folder, warn=self.warned.append)
         self.assertEqual(len([text for text in self.warned if "parts of the recording" in text]), 2)
 
-    def test_metadata_of_blank_lines(self):
+    def test_metadata_of_blank_lines_take_little_time(self):
         folder = self.folder_of()
         made.db3(folder / "r_0.db3", made.ROS2_TOPICS)
         for text in ("\n" * (1 << 20), " " * (1 << 20), "- " + " " * (1 << 20), "- a.db3" * (1 << 17) + " x", "- \n" * (1 << 18)):
             (folder / "metadata.yaml").write_text(text)
             self.assertEqual(len(files_of(folder)), 1)  # a quadratic search would take hours
 
-    def test_messages_that_are_not_merged_yet(self):
+    def test_messages_that_are_not_merged_yet_are_read(self):
         path, copy = self.folder / "live.db3", self.folder / "copy.db3"
         made.db3(path, [("/odom", "nav_msgs/msg/Odometry", [(100, made.odometry(0))])])
         with contextlib.closing(sqlite3.connect(path)) as base:
@@ -114,7 +114,7 @@ class RecordingsOfRos2(WithFolder):
         self.assertEqual(len(convert(copy).rows), 2)
         self.assertGreater((self.folder / "copy.db3-wal").stat().st_size, 0)
 
-    def test_changes_that_were_not_finished(self):
+    def test_unfinished_changes_are_ignored(self):
         path, copy = self.folder / "live.db3", self.folder / "copy.db3"
         made.db3(path, made.ROS2_TOPICS)
         with contextlib.closing(sqlite3.connect(path)) as base:
@@ -174,7 +174,7 @@ class RecordingsOfRos2(WithFolder):
         path.write_bytes(data)
         return path
 
-    def test_tables_that_list_more_than_the_file_holds(self):
+    def test_tables_longer_than_the_file_are_refused(self):
         for topic_id, steps in ((1, rosbag2.STEPS_PER_BYTE), (2, 0.05)):  # its messages are read or skipped
             path = self.repeating(topic_id)
             with self.subTest(topic_id), mock.patch.object(rosbag2, "STEPS_PER_BYTE", steps), \
@@ -183,7 +183,7 @@ class RecordingsOfRos2(WithFolder):
                 convert(path)
             path.unlink()
 
-    def test_messages_compressed_one_by_one(self):
+    def test_messages_compressed_one_by_one_need_their_module(self):
         messages = [(100 + i, compression.ZSTD_MAGIC + made.odometry(i)) for i in range(5)]
         path = made.db3(self.folder / "log", [("/odom", "nav_msgs/msg/Odometry", messages)])
         with mock.patch.object(compression, "_module", lambda *names: None), \
@@ -227,7 +227,7 @@ class RecordingsOfRos2(WithFolder):
         with self.assertRaisesRegex(ConvertError, "state.tlog: a log of Gazebo, which is not read; play it .*gazebo_bridge"):
             convert(path)
 
-    def test_another_database(self):
+    def test_another_database_is_refused(self):
         path = self.folder / "log"
         with contextlib.closing(sqlite3.connect(path)) as base, base:
             base.execute("CREATE TABLE notes(a)")

@@ -56,7 +56,7 @@ class Dataflash(WithFolder):
         self.assertEqual(track.comments, ["origin: 47.60000000,-122.33000000,8.000 (the first fix)"])
         self.assert_track(track, range(49), origin_down=2)
 
-    def test_truncated_log(self):
+    def test_a_truncated_log_is_read(self):
         log = made.dataflash_log(("SIM",))
         track = self.convert(log[:-20])
         self.assertEqual(len(track.rows), 49)
@@ -74,7 +74,7 @@ class Dataflash(WithFolder):
             self.convert(log)
         self.assertIn("SIM is inconsistent", self.warned[0])
 
-    def test_old_logs_in_milliseconds(self):
+    def test_old_logs_have_milliseconds(self):
         old = {"SIM": (13, "IccCfLL", "TimeMS,Roll,Pitch,Yaw,Alt,Lat,Lng", "IhhHfii")}
         with mock.patch.dict(made.DATAFLASH, old):
             log = made.dataflash_format("SIM") + b"".join(
@@ -102,7 +102,7 @@ class WithoutHorizontalPosition(WithFolder):
                       self.warned[0])
         self.assertIn("--dead-reckon M/S moves the vehicle ahead", self.warned[0])
 
-    def test_telemetry(self):
+    def test_telemetry_gives_depths(self):
         for kinds in (("HEARTBEAT", "ATTITUDE", "GLOBAL_POSITION_INT", "VFR_HUD"), ("ATTITUDE", "GLOBAL_POSITION_INT"),
                       ("HEARTBEAT", "ATTITUDE", "VFR_HUD")):
             with self.subTest(kinds):
@@ -115,7 +115,7 @@ class WithoutHorizontalPosition(WithFolder):
         with self.assertRaisesRegex(ConvertError, "lacks attitudes"):
             self.convert(made.telemetry_without_place(("GLOBAL_POSITION_INT",)))
 
-    def test_a_pressure_sensor_in_the_water(self):
+    def test_a_pressure_sensor_in_the_water_gives_the_depth(self):
         def log(message, hpa_of):
             out = bytearray()
             for step in range(20):
@@ -132,7 +132,7 @@ class WithoutHorizontalPosition(WithFolder):
         with self.assertRaisesRegex(ConvertError, "lacks positions and depths"):
             self.convert(log("SCALED_PRESSURE2", lambda down: 1012.0))  # never in the water
 
-    def test_depths_before_the_vehicles_clock_is_known(self):
+    def test_depths_are_kept_before_the_vehicles_clock_is_known(self):
         """VFR_HUD has no time; the time of receipt would be decades after the vehicle's start."""
         first = (1_699_999_999_000_000).to_bytes(8, "big") + made.mavlink_frame("VFR_HUD", (0, 0, -1, 0, 0, 0))
         self.assert_held(self.convert(first + made.telemetry_without_place(("HEARTBEAT", "ATTITUDE", "VFR_HUD"))), range(20), t0=25)
@@ -153,7 +153,7 @@ class WithoutHorizontalPosition(WithFolder):
             log += b"".join(made.dataflash_message(name, round(1e6 * t), *v) for v in values(down, angles))
         return log
 
-    def test_dataflash(self):
+    def test_dataflash_logs_give_depths(self):
         layouts = {"CTUN": (40, "Qff", "TimeUS,ThI,Alt", "Qff"), "BARO": (41, "QBf", "TimeUS,I,Alt", "QBf")}
         cases = {"CTUN": lambda down, _: [(0, -down)],
                  "BARO": lambda down, _: [(0, 99), (1, -down)],
@@ -164,7 +164,7 @@ class WithoutHorizontalPosition(WithFolder):
                 self.assertEqual(track.source, "ATT+depth")
                 self.assert_held(track, range(20))
 
-    def test_px4(self):
+    def test_px4_logs_give_depths(self):
         track = self.convert(made.ulog(has_place=False))
         self.assertEqual(track.source, "vehicle_attitude+depth")
         self.assert_held(track, range(1, 50))  # the first depth is not valid
@@ -192,7 +192,7 @@ class WithoutHorizontalPosition(WithFolder):
 
 
 class Px4(WithFolder):
-    def test_estimates(self):
+    def test_estimates_are_read(self):
         track = self.convert(made.ulog())
         self.assertEqual((track.source, track.frame, self.warned), ("vehicle_attitude+vehicle_local_position", "NED_FRD", []))
         self.assert_track(track, range(1, 50), metres=1e-5, radians=1e-5)  # the first position is not valid
@@ -258,7 +258,7 @@ class Px4(WithFolder):
         self.assertEqual(self.warned[0],
                          "messages of vehicle_local_position omitted because they are shorter than their format: 1")
 
-    def test_truncated(self):
+    def test_a_truncated_file_is_read(self):
         log = made.ulog()
         self.assertEqual(len(self.convert(log[:-10]).rows), 48)
         self.assertRegex(self.warned[0], "ends within a message, at byte [0-9]+")

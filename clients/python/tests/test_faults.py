@@ -94,7 +94,7 @@ class Faults(unittest.TestCase):
             self.control.end_fault("nothing")
         self.assertEqual(self.acting(), [])
 
-    def test_the_catalogue(self):
+    def test_the_catalogue_has_every_kind(self):
         catalogue = self.control.fault_kinds()
         self.assertEqual(len(catalogue["troubles"]), 12)
         self.assertIn("L05", [kind["code"] for kind in catalogue["kinds"]])
@@ -103,13 +103,13 @@ class Faults(unittest.TestCase):
 PYTEST = '''
 import pytest
 
-def test_demo(sonard):
+def test_the_demo_has_armed_faults(sonard):
     assert sonard.address.startswith("127.0.") and list(sonard.addresses) == ["front"]
     with sonard.control.fault("L05", seconds=6) as fault:
         assert fault.status()[0]["state"] == "active"
 
 @pytest.mark.sonard("CONFIG")
-def test_own_configuration(sonard):
+def test_a_configuration_can_be_given(sonard):
     assert list(sonard.addresses) == ["bow"]
 '''
 

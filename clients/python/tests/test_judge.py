@@ -52,13 +52,13 @@ class Verdicts(unittest.TestCase):
     def words(self, *arguments, **more):
         return verdict(observed(*arguments, **more)).words()
 
-    def test_nothing_happens(self):
+    def test_an_undisturbed_run_is_clean(self):
         found = verdict(observed())
         self.assertEqual(found.words(), ("CLEAN", "NONE NEEDED"))
         self.assertTrue(found.must_holds and found.should_holds)
         self.assertEqual(colour(found), "good")
 
-    def test_an_outage_and_its_length(self):
+    def test_an_outage_has_its_length(self):
         kept = [(t, n) for t, n in TICKS if not 2 <= t < 4.5]
         found = verdict(observed(kept, kept, connections=[(0.0, 4.0, "device FIN"), (4.4, None, "")]))
         self.assertEqual(found.words(), ("CLEAN", "0.5 s"))
@@ -82,7 +82,7 @@ class Verdicts(unittest.TestCase):
         self.assertEqual(self.words(kept, true_pings=optional, delivered=optional)[0], "LOST 1")
         self.assertEqual(self.words(true_pings=optional, delivered=optional)[0], "CLEAN")
 
-    def test_what_the_fault_touched(self):
+    def test_pings_that_the_fault_changed_are_known(self):
         journal = [{"event": "began", "mono_ns": 1}, {"event": "injected", "ping": 90, "mono_ns": 2_410_000_000}]
         self.assertEqual(run_case.touched_pings(journal, true(*TICKS), True), [90])
         self.assertEqual(run_case.touched_pings(journal, true(*TICKS), False), [24])
@@ -121,7 +121,7 @@ class Verdicts(unittest.TestCase):
         self.assertEqual([len(part) for part in sort_published(shown, true(*TICKS) + again)], [28, 0, 0])
         self.assertEqual([len(part) for part in sort_published([*shown, shown[3]], true(*TICKS) + again)], [28, 1, 0])
 
-    def test_ends(self):
+    def test_ends_of_the_driver_are_judged(self):
         before = [(t, n) for t, n in TICKS if t < 2]
         self.assertEqual(self.words(before, exit_code=-6, exit_time=2.1)[1], "CRASH")
         self.assertEqual(self.words(before, exit_code=1, exit_time=2.1)[1], "CRASH")
@@ -146,7 +146,7 @@ class Verdicts(unittest.TestCase):
         found = verdict(observed(samples=samples), should={"rss_mib": None})
         self.assertNotIn("memory", str(found.should))
 
-    def test_noticing(self):
+    def test_noticing_is_judged(self):
         kept = [(t, n) for t, n in TICKS if not 2 <= t < 4]
         for more, holds in (({}, False), ({"log_times": [3.5]}, True), ({"state_times": [1.0, 4.5]}, False),
                             ({"connections": [(0.0, 3.9, "driver FIN")]}, True),
@@ -163,7 +163,7 @@ class Verdicts(unittest.TestCase):
 
 
 class Tap(unittest.TestCase):
-    def test_lines(self):
+    def test_lines_of_the_tap_are_read(self):
         self.assertEqual(driver.tap_line(b'{"id": 8, "crc32": "0a1b2c3d"}', 1.0),
                          driver.Published(1.0, 8, 0x0A1B2C3D, None, None))
         self.assertEqual(driver.tap_line(b'{"crc32": 5, "rows": 3, "beams": 4, "x": []}', 1.0),
@@ -172,7 +172,7 @@ class Tap(unittest.TestCase):
         for line in (b"", b"hello", b"{", b'{"id": 8}', b'{"id": 8, "crc32": "xyz"}', b'{"id": 8, "crc32": null}', b"{\xff}"):
             self.assertIsNone(driver.tap_line(line, 1.0))
 
-    def test_command_line(self):
+    def test_the_command_line_is_expanded(self):
         self.assertEqual(driver.expand("a --x='{ip}:{port}' {id} {other}", "127.0.0.2", 52100, 7),
                          ["a", "--x=127.0.0.2:52100", "7", "{other}"])
 
@@ -203,7 +203,7 @@ class Tap(unittest.TestCase):
         judge.options.profile = "blueview-p900-90"
         self.assertNotIn("has none", judge_main.Judge.not_run(judge, case))
 
-    def test_a_drivers_output_and_end(self):
+    def test_output_and_end_of_the_driver_are_read(self):
         program = ("import os, sys, time\nprint('{\"id\": 1, \"crc32\": 2}')\nprint('words')\n"
                    "for i in range(50): print(i, file=sys.stderr)\nwhile not os.path.exists(sys.argv[1]): time.sleep(0.01)\n"
                    "sys.exit(3)")
@@ -225,7 +225,7 @@ class Tap(unittest.TestCase):
 
 
 class Table(unittest.TestCase):
-    def test_numbers_names_and_records(self):
+    def test_numbers_names_and_records_agree(self):
         found = [c.number for c in cases.CASES]
         self.assertEqual(len(found), len(set(found)))
         for case in cases.CASES:
@@ -252,7 +252,7 @@ class Table(unittest.TestCase):
         self.assertEqual({n.partition(".")[0] for n in measured}, set(
             "N00 S01 L01 L02 L04 L05 L10 F01 F06 F05 F20 F10 F14 U03 U04 U02 D19 D08".split()))
 
-    def test_selection(self):
+    def test_cases_are_selected(self):
         def chosen(*words):
             return [c.number for c in cases.select(words)]
         self.assertEqual(chosen("L05.2"), ["L05.2"])
@@ -263,7 +263,7 @@ class Table(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "L99"):
             chosen("L99")
 
-    def test_torture(self):
+    def test_torture_has_its_cases(self):
         whole = cases.torture(1)
         self.assertEqual(len(whole), len({c.number for c in whole}))
         self.assertEqual({c.kind for c in whole}, {"L03", "L04", "S06"})
@@ -273,7 +273,7 @@ class Table(unittest.TestCase):
 
 
 class TimeLeft(unittest.TestCase):
-    def test_is_what_the_rest_is_expected_to_take_at_the_speed_so_far(self):
+    def test_the_time_left_follows_from_the_speed_so_far(self):
         three = [case for case in CASES if case.family == "L" and case.until() == {"count": 1} and not case.tail_s][:3]
         usual = judge_main.TimeLeft.expected_s(three[0])
         left = judge_main.TimeLeft(three, 1)
@@ -318,12 +318,12 @@ class Waiting(unittest.TestCase):
             done = Scene.wait(scene, lambda: moves() >= most, timeout_s, moves)
         return done, clock.now - began
 
-    def test_goes_on_while_something_happens(self):
+    def test_waiting_continues_while_something_happens(self):
         done, seconds = self.waited([0.1 * n for n in range(1, 9)], 0.3)
         self.assertTrue(done)
         self.assertGreaterEqual(seconds, 0.8)
 
-    def test_goes_on_after_a_stall_in_which_something_happened(self):
+    def test_waiting_continues_after_a_stall_with_an_event(self):
         done, seconds = self.waited([0.1, 0.2, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4], 0.3, stalls={4: 0.6})
         self.assertTrue(done)
         self.assertGreaterEqual(seconds, 1.4)
@@ -331,13 +331,13 @@ class Waiting(unittest.TestCase):
     def test_looks_at_the_condition_after_a_stall(self):
         self.assertTrue(self.waited([0.1 * n for n in range(1, 9)], 0.3, stalls={1: 100})[0])
 
-    def test_ends_when_nothing_happens(self):
+    def test_waiting_ends_when_nothing_happens(self):
         done, seconds = self.waited([0.1, 0.2, 0.25], 0.3)
         self.assertFalse(done)
         self.assertGreaterEqual(seconds, 0.55 - 1e-9)
         self.assertLess(seconds, 0.75)
 
-    def test_ends_at_last(self):
+    def test_waiting_has_a_limit(self):
         done, seconds = self.waited([0.1 * n for n in range(1, 100)], 0.3, most=50)
         self.assertFalse(done)
         self.assertGreaterEqual(seconds, 1.8 - 1e-9)
@@ -345,7 +345,7 @@ class Waiting(unittest.TestCase):
 
 
 class Options(unittest.TestCase):
-    def test_of_the_sonar(self):
+    def test_options_of_the_sonar_are_passed(self):
         words = ["--driver", "x {ip}", "--profile", "waterlinked-3d15", "--option", "rip=1", "--option", "a=b=c", "--sonard", "true"]
         spec = judge_main.Judge(judge_main._parser().parse_args(words), pathlib.Path("out")).spec(None, 1)
         config = json.loads(run_case.config_of(spec, None, "127.0.0.2", pathlib.Path("journal")))
@@ -358,13 +358,13 @@ class CommandLine(unittest.TestCase):
             code = judge_main.main(list(arguments))
         return code, out.getvalue() + err.getvalue()
 
-    def test_list(self):
+    def test_the_cases_are_listed(self):
         code, text = self.said("--list", "--case", "silent-open", "--case", "N")
         self.assertEqual(code, 0)
         self.assertIn("5 cases of 2 kinds", text)
         self.assertIn("L05.2", text)
 
-    def test_wrong_use(self):
+    def test_wrong_use_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             right = ["--driver", "x {ip}", "--out", folder + "/new"]
             for arguments, word in ((["--out", folder], "--driver"), (["--driver", "x {ip}"], "--out"),
@@ -378,7 +378,7 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(self.said(*right, "--sonard", "/nowhere/sonard"),
                              (69, "judge: /nowhere/sonard: not found; --sonard names the program\n"))
 
-    def test_lines_of_ros_messages(self):
+    def test_lines_of_ros_messages_are_read(self):
         rows = [b"abcd", b"efgh"]
         plain = {"id": 7, "crc32": f"{zlib.crc32(b''.join(rows)):08x}"}
         ping = types.SimpleNamespace(ping_id=7, step=4, has_gains=False, ping_data=array.array("B", b"".join(rows)))
@@ -393,7 +393,7 @@ class CommandLine(unittest.TestCase):
         echo = types.SimpleNamespace(intensities=array.array("B", b"abcdefgh"), number_of_samples=8)  # ping360_sonar_msgs/SonarEcho
         self.assertEqual(json.loads(ros_tap.line_of(echo)), {**plain, "id": None})
 
-    def test_name_of_a_driver(self):
+    def test_the_driver_has_a_name(self):
         for words, name in ((["/usr/bin/mydriver", "{ip}"], "mydriver"), (["python3", "-u", "a/drv.py", "{ip}"], "drv.py"),
                             (["ros2", "launch"], "launch"), (["sh"], "sh"), (["{ip}"], "driver")):
             self.assertEqual(judge_main.driver_name(words), name)

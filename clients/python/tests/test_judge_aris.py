@@ -52,7 +52,7 @@ class Reader(judge_makes.DatagramChecks, unittest.TestCase):
     messages = [parts(7, raw_of(PICTURES[0])), parts(8, raw_of(PICTURES[1]))]
     samples = [PICTURES[0], raw_of(PICTURES[0])]
 
-    def test_in_the_order_of_the_picture(self):
+    def test_samples_may_be_in_the_order_of_the_picture(self):
         (ping,) = self.found(*parts(7, PICTURES[0], reordered=1))
         self.assertEqual(ping.crcs, {zlib.crc32(PICTURES[0])})
 
@@ -60,7 +60,7 @@ class Reader(judge_makes.DatagramChecks, unittest.TestCase):
         (ping,) = self.found(*parts(7, raw_of(PICTURES[0]), header_bytes=128))
         self.assertEqual(ping.crcs, {zlib.crc32(raw_of(PICTURES[0]))})
 
-    def test_parts_twice_and_out_of_order(self):
+    def test_repeated_and_reordered_parts_are_read(self):
         first, second, *rest = self.messages[0]
         for order in ([first, first, second, *rest, *rest], [second, first, *rest], [*rest, second, second, first]):
             self.assertEqual([(ping.number, ping.needed) for ping in self.found(*order)], [(7, True)])
@@ -79,7 +79,7 @@ class Reader(judge_makes.DatagramChecks, unittest.TestCase):
             self.assertEqual([(ping.number, ping.needed) for ping in pings][-1], (7, True))
             self.assertTrue(self.shows(pings, again))
 
-    def test_what_is_pushed(self):
+    def test_frames_are_pushed_and_beacons_are_not(self):
         self.assertIs(make_of("aris-explorer-3000"), aris.ARIS)
         beacon = number(1, 7) + number(2, 1) + block(3, number(1, 2)) + number(4, 0) + block(5, b"") + number(7, 1)
         self.assertTrue(all(aris.ARIS.is_pushed(part) for part in self.messages[0]))

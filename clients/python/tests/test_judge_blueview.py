@@ -35,12 +35,12 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
     samples = [packed(values(1000)), packed([1000 + beam * BINS + bin for bin in range(BINS) for beam in range(BEAMS)])]
     junk_pieces = (b"BVE1", b"BVE1" + b"\xff" * 12, b"BVE1\4\x80\0\0" + bytes(4) + b"\0\0\1\0", frame(0x8001, bytes(60)))
 
-    def test_compressed(self):
+    def test_compressed_samples_are_read(self):
         (found,) = self.found(ping(7, packed(values(1000)), deflated=True))
         self.assertIn(zlib.crc32(self.samples[0]), found.crcs)
         self.assertEqual(len(self.found(ping(7, packed(values(1000)), navigation=0))), 1)
 
-    def test_lies_about_sizes(self):
+    def test_stated_sizes_may_be_wrong_but_samples_must_be_complete(self):
         samples = packed(values(1000))
         for lie in (ping(7, samples, size=5), ping(7, samples, deflated=True, size=5)):
             self.assertEqual(len(self.found(lie)), 1)
@@ -51,7 +51,7 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
         broken[-12] ^= 0xFF
         self.assertEqual(self.found(bytes(broken)), [])
 
-    def test_requests(self):
+    def test_requests_are_read(self):
         self.assertIs(make_of("blueview-p900-90"), blueview.BLUEVIEW)
         self.assertEqual([blueview.BLUEVIEW.is_request(frame(kind, b"")) for kind in (4, 5, 6)], [True, True, False])
 

@@ -19,14 +19,14 @@ def products():
 
 
 class EveryMake(unittest.TestCase):
-    def test_has_a_reader(self):
+    def test_every_make_has_a_reader(self):
         for title, names in products().items():
             with self.subTest(title):
                 unread = [name for name in names if makes.make_of(name) is None]
                 self.assertEqual(unread, [], f"the judge does not read the pings of {title}: add {READERS}/<make>.py, and its row to MAKES "
                                              "in __init__.py there")
 
-    def test_is_judged_with_a_small_driver(self):
+    def test_every_make_is_judged_with_a_small_driver(self):
         for title, names in products().items():
             with self.subTest(title):
                 self.assertTrue(JUDGED & set(names), f"no test judges a driver of {title}: add a function to {DRIVERS}, and a product to "

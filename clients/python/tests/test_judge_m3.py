@@ -34,7 +34,7 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
             changed[len(whole) - 44:len(whole) - 44 + len(foot)] = foot
             self.assertEqual(len(self.found(bytes(changed))), count)
 
-    def test_make(self):
+    def test_the_make_is_read(self):
         self.assertIs(make_of("m3"), m3.M3)
         self.assertFalse(m3.M3.needs_request)
 

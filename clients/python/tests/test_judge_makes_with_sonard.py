@@ -47,25 +47,25 @@ class Makes(unittest.TestCase):
             found = {make: pool.submit(judged, make, *arguments) for make in PROFILES}
         return {make: future.result() for make, future in found.items()}
 
-    def test_right_drivers(self):
+    def test_right_drivers_pass(self):
         for make, (code, case) in self.all_judged().items():
             with self.subTest(make):
                 self.assertIn(case["data"], {"CLEAN", "LOST"} if make in DATAGRAMS else {"CLEAN"})
                 self.assertEqual(code, 0)
 
-    def test_pings_that_are_turned_around(self):
+    def test_mirrored_pings_are_false(self):
         for make, (code, case) in self.all_judged("mirrors").items():
             with self.subTest(make):
                 self.assertEqual((case["data"], code), ("FALSE", 1))
 
     @unittest.skipUnless(os.environ.get("SONARD_JUDGE_CASES"), "set SONARD_JUDGE_CASES")
-    def test_pings_that_are_left_out(self):
+    def test_omitted_pings_are_lost(self):
         for make, (_, case) in self.all_judged("drops").items():
             with self.subTest(make):
                 self.assertEqual(case["data"], "LOST")
 
     @unittest.skipUnless(os.environ.get("SONARD_JUDGE_CASES"), "set SONARD_JUDGE_CASES")
-    def test_by_the_wire_alone(self):
+    def test_without_a_tap_the_wire_is_judged(self):
         for make, (code, case) in self.all_judged("", "wire").items():
             with self.subTest(make):
                 self.assertEqual((case["data"], case["result"], code), ("UNSEEN", "PASS (wire)", 0))

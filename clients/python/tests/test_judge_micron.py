@@ -26,11 +26,11 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
     samples = [line(BINS[0]), BINS[0]]
     junk_pieces = (b"@", b"@0FFF\xff\x0f", frame(4, bytes(8)))
 
-    def test_bins_of_4_bits(self):
+    def test_bins_of_4_bits_are_read(self):
         (ping,) = self.found(frame(2, line(BINS[0], control=0)))
         self.assertEqual(ping.rows, 240)
 
-    def test_lines_without_bins_and_other_messages(self):
+    def test_lines_without_bins_and_other_messages_are_no_pings(self):
         for message in (frame(2, b""), frame(2, line(b"")), frame(4, line(BINS[0])), frame(2, line(bytes(4096)))):
             self.assertEqual(self.found(message), [])
 
@@ -43,7 +43,7 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
                 changed[at] ^= 1
             self.assertEqual([ping.needed for ping in self.found(bytes(changed))], found, changes)
 
-    def test_requests(self):
+    def test_requests_are_read(self):
         self.assertIs(make_of("micron"), micron.MICRON)
         self.assertEqual([micron.MICRON.is_request(frame(number, bytes(4))) for number in (25, 19, 23)], [True, True, False])
 

@@ -32,7 +32,7 @@ class Oculus(unittest.TestCase):
         for size in (1, 7, 16, 701, len(stream)):
             self.assertEqual(numbers(*(stream[at:at + size] for at in range(0, len(stream), size))), [7, 8])
 
-    def test_samples_and_place(self):
+    def test_samples_and_their_place_are_read(self):
         for gains in (None, [5] * 3):
             for version in (0, 2):
                 message = made_ping(version=version, gains=gains)
@@ -60,7 +60,7 @@ class Oculus(unittest.TestCase):
             short = set_in(short, at, form, value)
         self.assertEqual(numbers(self.a, short, self.c), [7, 8, 9])
 
-    def test_garbage_and_false_headers(self):
+    def test_garbage_and_false_headers_are_skipped(self):
         for garbage in (b"\0", b"S", b"SO", b"SO" + b"\xff" * 14, b"SO" * 500):
             self.assertEqual(numbers(self.a, garbage, self.b), [7, 8])
 
@@ -75,7 +75,7 @@ class Reader(judge_makes.StreamChecks, unittest.TestCase):
     samples = [bytes([5]) * 192]
     junk_pieces = (b"SO", b"SO" + b"\xff" * 14)
 
-    def test_requests(self):
+    def test_requests_are_read(self):
         self.assertIs(make_of("oculus-m1200d"), OCULUS)
         self.assertTrue(OCULUS.is_request(b"SO" + bytes(4) + b"\x15\0" + bytes(45)))
         self.assertFalse(OCULUS.is_request(b"SO" + bytes(4) + b"\x55\0"))

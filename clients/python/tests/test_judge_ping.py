@@ -29,7 +29,7 @@ class Stream(judge_makes.StreamChecks, unittest.TestCase):
             damaged[at] ^= 1
             self.assertFalse(self.shows(self.found(bytes(damaged), bytes(300)), [message]), at)
 
-    def test_makes_and_requests(self):
+    def test_makes_and_requests_are_read(self):
         for name in ("ping1d", "s500"):
             self.assertIs(make_of(name), ping.NUMBERED, name)
         self.assertIs(make_of("surveyor-240"), ping.SURVEYOR)
@@ -45,7 +45,7 @@ class Sectors(judge_makes.StreamChecks, unittest.TestCase):
     samples = [bytes(14) + bytes(range(200)), bytes(range(200))]
     junk_pieces = (b"B",)
 
-    def test_the_data_of_a_sector_scan(self):
+    def test_the_data_of_a_sector_scan_are_read(self):
         found, = ping.PingReader().pings(frame(2301, bytes([1]) * 20 + bytes(range(200))), 0)
         self.assertIn(zlib.crc32(bytes(range(200))), found.crcs)
 

@@ -81,7 +81,7 @@ class Reports(unittest.TestCase):
         report.write(out, [column_of(rows, name)], False)
         return out
 
-    def test_results(self):
+    def test_results_follow_from_verdicts(self):
         self.assertEqual(row_of("L05.1", GOOD)["result"], "PASS")
         self.assertEqual(row_of("L05.1", SLOW)["result"], "PASS")
         self.assertEqual(row_of("L05.1", SLOW, strict=True)["result"], "FAIL")
@@ -96,7 +96,7 @@ class Reports(unittest.TestCase):
         self.assertEqual(row_of("L05.1", GOOD, GOOD)["result"], "PASS")
         self.assertFalse(report.passed(column_of([row])))
 
-    def test_summary(self):
+    def test_the_summary_groups_results(self):
         rows = [row_of("L05.1", GOOD), row_of("L05.2", SLOW), row_of("L05.3", DEAD), row_of("L05.4", GOOD, DEAD),
                 row_of("L06.1", NOT_RUN), row_of("M02.1", DEAD, expectation="INFO")]
         self.assertEqual(report.summary(column_of(rows)), "mine: 2 of 4 MUST, 1 of 4 SHOULD, 1 flaky, 1 not run")
@@ -125,7 +125,7 @@ class Reports(unittest.TestCase):
             self.assertIn(f'id="{number}"', page)
         self.assertIn('href="#L07.1"', page)
 
-    def test_junit(self):
+    def test_junit_has_all_cases(self):
         rows = [row_of("L05.1", GOOD), row_of("L05.2", SLOW), row_of("L05.3", DEAD), row_of("L06.1", NOT_RUN)]
         suite = xml.etree.ElementTree.fromstring(report.junit([column_of(rows)], False)).find("testsuite")
         self.assertEqual((suite.get("tests"), suite.get("failures"), suite.get("skipped")), ("4", "1", "1"))
@@ -149,7 +149,7 @@ class Reports(unittest.TestCase):
         self.assertEqual(len(links), 3)
         self.assertTrue(all((out / link).is_file() for link in links))
 
-    def test_merge(self):
+    def test_reports_are_merged(self):
         a = self.written([row_of("L05.1", GOOD), row_of("L05.3", GOOD)], place="a")
         b = self.written([row_of("L05.1", DEAD), row_of("F01.1", GOOD)], place="b")
         with contextlib.redirect_stdout(io.StringIO()) as said:
@@ -168,7 +168,7 @@ class Reports(unittest.TestCase):
         self.assertRegex(page, r"\n\| L05.1 Sentence & L05.1. \| CLEAN, .* \| \*\*.*\*\*")
         self.assertNotIn("L05.3 ", page, "it holds")
 
-    def test_without_wall_clock(self):
+    def test_wall_clock_keys_can_be_removed(self):
         index = json.loads((self.written([row_of("L05.1", GOOD)]) / "index.json").read_text())
         self.assertEqual((index["schema"], index["version"]), ("sonard-judge", 1))
         self.assertNotIn("watched_s", json.dumps(report.without_wall_clock(index)))

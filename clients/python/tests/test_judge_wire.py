@@ -20,7 +20,7 @@ class Packets(unittest.TestCase):
     def send(self, at, data):
         self.connection.from_device(1.0, (1000 + at) % (1 << 32), wire._ACK, data)
 
-    def test_order_and_repetition(self):
+    def test_order_and_repetition_are_repaired(self):
         stream = made_ping(number=1) + made_ping(number=2)
         half = len(stream) // 2
         self.send(half, stream[half:])
@@ -31,13 +31,13 @@ class Packets(unittest.TestCase):
         self.assertEqual(bytes(self.connection.stream), stream)
         self.assertEqual([s.ping.number for s in self.connection.pings], [1, 2])
 
-    def test_what_was_acknowledged(self):
+    def test_acknowledged_bytes_are_counted(self):
         self.send(0, bytes(500))
         for ack, acked in ((1000, 0), (1300, 300), (1200, 300), (9999, 500)):
             self.connection.from_driver(1.0, 1, ack, wire._ACK, 100, b"")
             self.assertEqual(self.connection.acked, acked)
 
-    def test_settings_ends_and_zero_windows(self):
+    def test_settings_ends_and_zero_windows_are_found(self):
         fire = b"SO" + bytes(4) + b"\x15\0" + bytes(45)
         self.connection.from_driver(1.0, 5, 1000, wire._ACK, 100, fire)
         self.connection.from_driver(1.1, 5, 1000, wire._ACK, 100, fire)  # a retransmission by TCP, not by the driver
@@ -47,7 +47,7 @@ class Packets(unittest.TestCase):
         self.assertEqual((len(self.connection.fires), self.connection.zero_windows), (1, 1))
         self.assertEqual((self.connection.ended, self.connection.ended_by), (1.3, "driver FIN"))
 
-    def test_pcapng(self):
+    def test_pcapng_is_written(self):
         written = wire.pcapng([(1_700_000_000_123_456_789, b"\1" * 61)], "a case")
         kinds, at = [], 0
         while at < len(written):
@@ -57,7 +57,7 @@ class Packets(unittest.TestCase):
             at += size
         self.assertEqual(kinds, [0x0A0D0D0A, 1, 6])
 
-    def test_hex(self):
+    def test_hex_dumps_mark_the_byte(self):
         lines = wire.hex_around(bytes(range(256)), 100)
         self.assertEqual([line[0] for line in lines].count(">"), 1)
         self.assertIn("00000060", next(line for line in lines if line[0] == ">"))
@@ -72,7 +72,7 @@ class Streams(unittest.TestCase):
         segment = struct.pack(">HHIIBBHHH", *ports, sequence, ack, 0x50, flags, 1000, 0, 0) + payload
         return bytes(12) + b"\x08\x00" + struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(segment), 5, 0, 64, 6, 0) + source + destination + segment
 
-    def test_connections_to_further_ports(self):
+    def test_connections_to_further_ports_are_read(self):
         make = Make((), stream=Whole, is_request=lambda sent: sent == b"go")
         with mock.patch("socket.socket"):
             capture = wire.Capture("lo", "127.0.0.2", 2210, make, [2209, 2210])
@@ -115,7 +115,7 @@ class Datagrams(unittest.TestCase):
             yield bytes(12) + b"\x08\x00" + struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(part), 5, place, 64, 17, 0) + \
                 source + destination + part
 
-    def test_whole_and_in_fragments(self):
+    def test_datagrams_are_read_whole_and_in_fragments(self):
         def frame(message, payload):
             body = b"BR" + struct.pack("<HHBB", len(payload), message, 1, 0) + payload
             return body + struct.pack("<H", sum(body) & 0xFFFF)
@@ -132,7 +132,7 @@ class Datagrams(unittest.TestCase):
         self.assertEqual([s.ping.number for s in capture.delivered()], [7, 8])
         self.assertEqual([(c.peer, len(c.fires)) for c in capture.connections], [("127.0.0.1:4000", 1)])
 
-    def test_flows_that_the_sonar_begins(self):
+    def test_flows_that_the_sonar_begins_are_read(self):
         make = Make((), datagrams=Whole, is_pushed=lambda datagram: datagram[0] < 100)
         capture = self.capture(make,
                                *self.packets(self.DEVICE, self.DRIVER, (5555, 4000), b"\1part"),
@@ -143,7 +143,7 @@ class Datagrams(unittest.TestCase):
         self.assertEqual([(c.peer, [s.ping.number for s in c.pings]) for c in capture.connections],
                          [("127.0.0.1:4000", [1, 4]), ("224.0.0.96:4747", [2])])
 
-    def test_a_make_that_is_not_known(self):
+    def test_an_unknown_make_has_no_pings(self):
         capture = self.capture(None, *self.packets(self.DRIVER, self.DEVICE, (4000, 9090), b"?"),
                                *self.packets(self.DEVICE, self.DRIVER, (9090, 4000), b"!"))
         self.assertEqual([(c.acked, c.pings) for c in capture.connections], [(1, [])])

@@ -75,7 +75,7 @@ class Few(Judging):
         found = {r["data"] for r in index["drivers"][0]["cases"]}
         self.assertLessEqual(found, {"CLEAN", "LOST"}, "LOST: a busy computer may drop datagrams")
 
-    def test_a_driver_that_ignores_the_end_of_the_stream_does_not(self):
+    def test_a_driver_that_ignores_the_end_of_the_stream_fails(self):
         index = self.judged("planted_driver.py {ip} --plant ignores-fin", *FEW, code=1)
         self.assertIn("L02.1", self.failures(index, "must"))
 
@@ -116,7 +116,7 @@ class InTheLaboratory(Judging):
     """Faults of the network do not need sonard's faults."""
     CHOSEN = ("--case", "N00.1", "--case", "L06.1", "--case", "L17.2")
 
-    def test_right_and_wrong_drivers(self):
+    def test_right_drivers_pass_and_wrong_drivers_fail(self):
         index = self.judged("right_driver.py {ip}", "--strict", *self.CHOSEN, code=0)
         self.assertEqual({r["result"] for r in index["drivers"][0]["cases"]}, {"PASS"})
         for plant, recovery, data in (("never-times-out", "OPERATOR", "CLEAN"), ("repeats-last-ping", "BACK", "STALE")):

@@ -12,13 +12,13 @@ from sonard_client import lab
 
 
 class Requests(unittest.TestCase):
-    def test_codes_names_and_parameters(self):
+    def test_codes_names_and_parameters_are_read(self):
         self.assertEqual(lab.read_request("L06:seconds=5"), ("L06", {"seconds": "5", "after": "5"}))
         self.assertEqual(lab.read_request("mtu-hole seconds=2 bytes=600"),
                          ("L16", {"seconds": "2", "after": "5", "bytes": "600"}))
         self.assertEqual(lab.read_request("l17:side=host,after=1")[1]["side"], "host")
 
-    def test_wrong_ones_are_refused_with_what_is_known(self):
+    def test_wrong_requests_are_refused_with_the_known_ones(self):
         for text, known in (("L05", "L06 vanished-peer"), ("L06:second=5", "seconds"), ("L17:side=left", "device or host"),
                             ("L06:seconds=-1", "between 0"), ("L06:seconds=soon", "soon")):
             with self.subTest(text), self.assertRaisesRegex(ValueError, known):

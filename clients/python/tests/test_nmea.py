@@ -26,7 +26,7 @@ class Sentences(unittest.TestCase):
         self.assertEqual(parse_sentence("$PHTRO,0.03,P,0.22,T*56"), Sentence("PHTRO", ("0.03", "P", "0.22", "T")))
         self.assertEqual(parse_sentence("12:00:00.123 $HEHDT,4.55,T*1B").fields, ("4.55", "T"))
 
-    def test_invalid_sentences(self):
+    def test_invalid_sentences_are_refused(self):
         for line, why in (("HEHDT,4.55,T*1B", "\\$ is missing"), ("$HEHDT,4.56,T*1B", "checksum is '1B', expected 18"),
                           ("$HEHDT,4.55,T", "checksum is missing"), ("$HEHDT,4.55,T*1", "checksum"),
                           ("$HEHDT,4.55,T*xx", "checksum"), ("$HEHDT,4.55,T*1B7", "checksum"),
@@ -37,7 +37,7 @@ class Sentences(unittest.TestCase):
         with self.assertRaisesRegex(NmeaError, "checksum"):
             parse_sentence("$HEHDT,4.56,T*1B", without_checksum=True)
 
-    def test_times_of_the_day(self):
+    def test_times_of_the_day_are_read(self):
         self.assertAlmostEqual(time_of_day_s("235959.50"), 86399.5)
         for bad in ("", "12", "1x0000", "120061.5", "12000a"):
             with self.subTest(bad):
@@ -65,7 +65,7 @@ class Signs(unittest.TestCase):
         for other in ("PASHR,123519.00,123.40,T,,-02.00", "PASHR,POS,0,08,123519", "PASHR,1,2"):
             self.assertEqual((self.after(other).pitch_deg, self.after(other).received), (None, set()), other)
 
-    def test_sentences_that_are_not_read(self):
+    def test_other_sentences_are_ignored(self):
         now = self.after("YXXDR,A,1.5,D,PITCH", "HEHDT,10.0,T", "PIXSE,ATITUD,-1.6,-0.4", "YXXDR,A,1.5,D,PITCH")
         self.assertEqual(now.unread, {"XDR", "PIXSE"})
 
@@ -74,7 +74,7 @@ class Signs(unittest.TestCase):
         self.assertEqual(self.after("PRDID,0,0,50.0", "HEHDT,10.0,T").heading_deg, 10)
         self.assertEqual(self.after("HEHDT,10.0,T", "PASHR,1,50.0,T,0,0").heading_deg, 10)
 
-    def test_other_headings(self):
+    def test_other_headings_are_read(self):
         self.assertEqual(self.after("GPTHS,77.5,A").heading_deg, 77.5)
         self.assertIsNone(self.after("GPTHS,77.5,V").heading_deg)
         for fields, heading in (("98.3,1.0,E,12.6,W", 86.7), ("98.3,,,12.6,E", 110.9), ("5.0,1.0,W,10.0,W", 354), ("98.3,,,,", None),
@@ -86,13 +86,13 @@ class Signs(unittest.TestCase):
             for bodies in ((better, "HCHDG,98.3,,,1.0,E"), ("HCHDG,98.3,,,1.0,E", better)):
                 self.assertEqual(self.after(*bodies).heading_deg, 10, bodies)
 
-    def test_hemispheres(self):
+    def test_hemispheres_have_their_sign(self):
         for halves, latitude, longitude in (("NE", 48.1173, 11.516666667), ("SW", -48.1173, -11.516666667)):
             place = self.after(f"GPGLL,4807.038,{halves[0]},01131.000,{halves[1]},123519,A").place
             self.assertAlmostEqual(place.latitude_deg, latitude)
             self.assertAlmostEqual(place.longitude_deg, longitude)
 
-    def test_sentences_without_a_fix(self):
+    def test_sentences_without_a_fix_are_ignored(self):
         for body in ("GPGGA,123519,4807.038,N,01131.000,E,0,00,,,M,,M,,", "GPRMC,123519,V,4807.038,N,01131.000,E,,,,,",
                      "GPGLL,4807.038,N,01131.000,E,123519,V", "GPGGA,123519,,,,,1,08,0.9,,M,,M,,", "GPGGA",
                      "GPGLL,4867.0,N,01131.0,E", "GPGLL,9907.038,N,01131.000,E,123519,A",
@@ -100,7 +100,7 @@ class Signs(unittest.TestCase):
             with self.subTest(body):
                 self.assertIsNone(self.after(body).place)
 
-    def test_preferred_kind_of_fix(self):
+    def test_gga_is_preferred(self):
         gga, rmc = "GPGGA,120000,4800.00,N,01100.00,E,1", "GPRMC,120000,A,4900.00,N,01100.00,E"
         self.assertEqual(self.after(gga, rmc).place.latitude_deg, 48)
         self.assertEqual(self.after(rmc, gga).place.latitude_deg, 48)
@@ -210,7 +210,7 @@ class Command(unittest.TestCase):
             process.wait()
             process.stderr.close()
 
-    def test_exit_codes(self):
+    def test_exit_codes_are_those_of_the_manual(self):
         self.log.write_text(made.nmea_log(3, kinds=("HDT",)), encoding="ascii")
         code, text = self.run_main(self.log, "--fast")
         self.assertEqual(code, 65)

@@ -26,7 +26,7 @@ def listed(values):
 
 
 class Decoding(unittest.TestCase):
-    def test_golden_pings(self):
+    def test_golden_pings_are_decoded(self):
         for version in (0, 1, 2):
             with self.subTest(version=version):
                 ping = decoded((GOLDEN / f"ping_v{version}.bin").read_bytes())
@@ -46,7 +46,7 @@ class Decoding(unittest.TestCase):
                 if version == 2:
                     self.assertEqual(ping.settings.extended, (4, 1, 2, 3, 5, 6, 7, 8, 9))
 
-    def test_every_version_and_width(self):
+    def test_every_version_and_width_is_decoded(self):
         for version in (0, 1, 2):
             for width in (1, 2, 3, 4):
                 for gains in (None, [1, 4, 100]):
@@ -109,7 +109,7 @@ class Requests(unittest.TestCase):
             with self.subTest(name), self.assertRaisesRegex(ValueError, name):
                 settings_of(**dict(good, **{name: value}))
 
-    def test_addresses(self):
+    def test_addresses_are_parsed(self):
         self.assertEqual(endpoint("127.0.0.2", 5), ("127.0.0.2", 5))
         self.assertEqual(endpoint("sonar:99", 5), ("sonar", 99))
         with self.assertRaisesRegex(ValueError, "port"):
@@ -117,7 +117,7 @@ class Requests(unittest.TestCase):
 
 
 class Status(unittest.TestCase):
-    def test_golden_status(self):
+    def test_the_golden_status_is_decoded(self):
         data = (GOLDEN / "status.bin").read_bytes()
         sonar = read_status(data, "10.0.0.9")
         self.assertEqual((sonar.address, sonar.netmask, sonar.connected), ("192.168.1.2", "255.255.255.0", "10.0.0.7"))

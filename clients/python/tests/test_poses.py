@@ -55,7 +55,7 @@ class Rotations(unittest.TestCase):
             for found, expected in zip(quaternion_from_rpy(*rpy), q):
                 self.assertAlmostEqual(found, expected)
 
-    def test_world_to_body(self):
+    def test_vectors_are_turned_from_world_to_body(self):
         port_turn = quaternion_from_rpy(0, 0, math.pi / 2)  # bow to +y
         for found, expected in zip(to_body(port_turn, (1, 2, 3)), (2, -1, 3)):
             self.assertAlmostEqual(found, expected)
@@ -68,7 +68,7 @@ class Messages(unittest.TestCase):
                        2.5, "wall", 300, 7)
 
     @unittest.skipUnless(PROTOC, "protoc is not installed")
-    def test_protobuf_fields(self):
+    def test_protobuf_messages_have_their_fields(self):
         fields = decoded_by_protoc(pose_update(self.pose))
         self.assertEqual((fields["frame"], fields["seq"], fields["reset_counter"]), ("NED_FRD", "300", "7"))
         self.assertEqual((fields["time.domain"], fields["time.ns"]), ("WALL", "2500000000"))
@@ -85,7 +85,7 @@ class Messages(unittest.TestCase):
         self.assertNotIn("time.ns", fields)
         self.assertNotIn("twist.linear.x", fields)
 
-    def test_json(self):
+    def test_json_lines_have_their_keys(self):
         line = json_line(self.pose)
         self.assertTrue(line.endswith(b"\n"))
         fields = json.loads(line)
@@ -107,7 +107,7 @@ class Messages(unittest.TestCase):
 
 
 class Refusals(unittest.TestCase):
-    def test_values_that_sonard_refuses(self):
+    def test_values_that_sonard_refuses_raise_errors(self):
         with Receiver() as there, PoseSender(there.address) as poses:
             for bad in (dict(position=(1, 2)), dict(position=(1, 2, float("nan"))), dict(quaternion=(2, 0, 0, 0)),
                         dict(quaternion=(1, 0, 0)), dict(frame="NED"), dict(quaternion=(1, 0, 0, 0), rpy=(0, 0, 0)),
@@ -117,7 +117,7 @@ class Refusals(unittest.TestCase):
             poses.send((0, 0, 7))
             self.assertEqual(json.loads(there.socket.recv(4096))["position"], [0, 0, 7])  # the others were not sent
 
-    def test_invalid_senders(self):
+    def test_invalid_senders_are_refused(self):
         for bad in (dict(encoding="xml"), dict(transport="sctp"), dict(encoding="protobuf", transport="tcp"), dict(clock="wall"),
                     dict(clock="arrival")):
             with self.subTest(**bad), self.assertRaises(ValueError):

@@ -83,7 +83,7 @@ class Axes(unittest.TestCase):
     def turned(self, q, v):
         return functools.reduce(self.product, (q, (0, *v), (q[0], -q[1], -q[2], -q[3])))[1:]
 
-    def test_the_table(self):
+    def test_the_table_of_axes_is_right(self):
         quarter = (HALF, 0, 0, HALF)
         rows = {  # name: place, quaternion; and ahead, port, up of a body in its own axes there
             "glTF": (lambda x, y, z: (x, -z, y), lambda w, x, y, z: self.product((w, x, -z, y), quarter),

@@ -44,18 +44,18 @@ class Decompression(unittest.TestCase):
             with self.subTest(kind, packed=packed[-10:]), self.assertRaises(compression.Unreadable):
                 compression.unpack(kind, packed, 1000)
 
-    def test_bz2(self):
+    def test_bz2_is_decompressed(self):
         self.complete_truncated_or_too_short("bz2", bz2.compress)
         self.refused("bz2", bz2.compress(self.BOMB))
 
-    def test_lz4(self):
+    def test_lz4_is_decompressed(self):
         lz4 = compression._module("lz4.frame")
         if lz4 is None:
             self.skipTest("python3-lz4 is not installed")
         self.complete_truncated_or_too_short("lz4", lz4.compress)
         self.refused("lz4", lz4.compress(self.BOMB))
 
-    def test_zstd(self):
+    def test_zstd_is_decompressed(self):
         zstd = compression._module("compression.zstd", "zstandard")
         if zstd is None:
             self.skipTest("python3-zstandard is not installed")
@@ -88,7 +88,7 @@ class Recordings(WithFolder):
     def channel(self, maker, schema, topic="/odom", encoding="cdr", steps=30, **how):
         return topic, encoding, schema, [(5000 + made.STEP_S * i, maker(i, **how)) for i in range(steps)]
 
-    def test_names_of_frames_with_ned(self):
+    def test_frames_with_ned_in_their_name_are_ned(self):
         def in_ned(step, frame):
             t, north, east, down, *angles = made.moment(step)
             w, x, y, z = made.quaternion(*angles)
@@ -116,7 +116,7 @@ class Recordings(WithFolder):
                 with self.assertRaisesRegex(ValueError, "frame is 'up': it must be one of"):
                     self.convert(recording, kind=kind, frame="up")
 
-    def test_every_ros_message_with_a_pose(self):
+    def test_every_ros_message_with_a_pose_is_read(self):
         for maker, schema, topic in ((made.odometry, "nav_msgs/msg/Odometry", "/odom"),
                                      (made.pose_stamped, "geometry_msgs/msg/PoseStamped", "/odom"),
                                      (made.transforms, "tf2_msgs/msg/TFMessage", "/odom odom->base_link")):
@@ -144,7 +144,7 @@ class Recordings(WithFolder):
         with self.assertRaisesRegex(ConvertError, "no poses found: expected"):
             self.convert(made.mcap([self.channel(made.odometry, "sensor_msgs/msg/Imu")]))
 
-    def test_json_poses(self):
+    def test_json_poses_are_read(self):
         def line(step):
             t, north, east, down, roll, pitch, yaw = made.moment(step)
             return json.dumps({"timestamp": t, "position": [north, east, down], "attitude": [roll, pitch, yaw]}).encode()
@@ -161,7 +161,7 @@ class Recordings(WithFolder):
         self.assertEqual(track.frame, "ENU_FLU")
         self.assert_track(track, range(30), t0=100, radians=1e-6)
 
-    def test_a_recording_of_sonard_itself(self):
+    def test_a_recording_of_sonard_is_read(self):
         """Images, poses and frames in protobuf, as in docs/recording.md, and in JSON, as before."""
         def pose(step):
             t, (x, y, z), (a, b, c, d) = made.enu_moment(step)
@@ -177,7 +177,7 @@ class Recordings(WithFolder):
                 self.assertEqual((track.source, track.frame, self.warned), ("/front/pose", "ENU_FLU", []))
                 self.assert_track(track, range(steps), t0=100, radians=1e-6)
 
-    def test_poses_of_the_foxglove_schemas(self):
+    def test_poses_of_the_foxglove_schemas_are_read(self):
         def transform(step):
             _, position, xyzw = made.enu_moment(step)
             return part(2, b"map") + part(3, b"rov") + part(4, doubles(position)) + part(5, doubles(xyzw))
@@ -188,7 +188,7 @@ class Recordings(WithFolder):
         self.assertEqual(track.source, "/odom map->rov")
         self.assert_track(track, range(30), t0=5000, radians=1e-6)
 
-    def test_unclosed_and_truncated_recordings(self):
+    def test_unclosed_and_truncated_recordings_are_read(self):
         data = made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], closed=False)
         self.assertEqual(len(self.convert(data).rows), 30)
         self.assertIn("was not closed", self.warned[0])
@@ -219,7 +219,7 @@ class Recordings(WithFolder):
         with self.assertRaisesRegex(ConvertError, "compressed by 'rar', which is not supported"):
             self.convert(made.mcap([self.channel(made.odometry, "nav_msgs/msg/Odometry")], compress=("rar", lambda d: d)))
 
-    def test_bags(self):
+    def test_bags_are_read(self):
         logged = [(5000 + made.STEP_S * i, made.odometry(i, ros1=True)) for i in range(30)]
         for kind, pack in (("none", lambda d: d), ("bz2", bz2.compress)):
             with self.subTest(kind):

@@ -24,19 +24,19 @@ class Frames(unittest.TestCase):
         for a, b in zip(got, wanted):
             self.assertAlmostEqual(a, b, places=12)
 
-    def test_order_of_quaternions(self):
+    def test_quaternions_are_reordered(self):
         self.assert_close(c.wxyz((0.1, 0.2, 0.3, math.sqrt(0.86))), (math.sqrt(0.86), 0.1, 0.2, 0.3))
         self.assert_close(c.xyzw(c.wxyz((0, 0, HALF, HALF))), (0, 0, HALF, HALF))
         for bad in ((0, 0, 0, 0), (0, 0, 0, 2), (math.nan, 0, 0, 1)):
             with self.subTest(bad), self.assertRaises(c.Unusable):
                 c.wxyz(bad)
 
-    def test_a_vector_of_the_body_in_the_world(self):
+    def test_vectors_are_turned_from_body_to_world(self):
         bow_north = (HALF, 0, 0, HALF)  # ENU: yaw 90 degrees
         self.assert_close(c.rotate(bow_north, (1, 0, 0)), (0, 1, 0))
         self.assert_close(c.rotate(bow_north, (0, 1, 0)), (-1, 0, 0))  # port is west
 
-    def test_aircraft_axes(self):
+    def test_aircraft_axes_are_converted(self):
         self.assert_close(c.enu_from_ned((1, 2, 3)), (2, 1, -3))
         self.assert_close(c.flu_from_frd((1, 2, 3)), (1, -2, -3))
         for rpy in ((0, 0, 0), (0.1, -0.2, 0.3), (-1, 0.5, 2.5)):
@@ -64,7 +64,7 @@ class Frames(unittest.TestCase):
 
 
 class Scans(unittest.TestCase):
-    def test_even_angles_from_starboard_to_port(self):
+    def test_angles_are_even_from_starboard_to_port(self):
         scan = c.scan_of([0.6, 0.1, 0.0, -0.6], [6, 0, 5, 4])
         self.assertAlmostEqual(scan.first_rad, -0.6)
         self.assertAlmostEqual(scan.step_rad, 0.4)
@@ -73,14 +73,14 @@ class Scans(unittest.TestCase):
             with self.assertRaises(c.Unusable):
                 c.scan_of(azimuths, ranges)
 
-    def test_names_in_topics(self):
+    def test_names_are_made_valid_for_topics(self):
         self.assertEqual([c.name_in_topic(name) for name in ("front", "3d-15", "bug über")], ["front", "_3d_15", "bug__ber"])
 
 
 class ViewMessages(unittest.TestCase):
     """The bytes follow protobuf's encoding: field number times 8 plus type, then the value."""
 
-    def test_a_transform(self):
+    def test_transforms_are_read(self):
         turn = bytes([0x11]) + struct.pack("<d", -0.5) + bytes([0x21]) + struct.pack("<d", 0.5)  # y, w; x and z are 0
         body = (b"\x0a\x05\x08\x03\x10\xac\x02" + b"\x12\x03rov" + b"\x1a\x05front" +
                 b"\x22\x09\x19" + struct.pack("<d", 2.5) + bytes([0x2a, len(turn)]) + turn)
@@ -90,21 +90,21 @@ class ViewMessages(unittest.TestCase):
             with self.subTest(end=end), self.assertRaises(ValueError):
                 v.transforms(bytes([0x0a, len(body)]) + body[:end])
 
-    def test_a_cloud(self):
+    def test_clouds_are_read(self):
         field = b"\x0a\x01x" + b"\x15\x04\x00\x00\x00" + b"\x18\x07"
         cloud = v.cloud(b"\x12\x05front" + b"\x25\x10\x00\x00\x00" + bytes([0x2a, len(field)]) + field + b"\x32\x02ab")
         self.assertEqual(cloud, v.Cloud(0, "front", 16, [("x", 4, 7)], b"ab"))
         with self.assertRaises(ValueError):
             v.cloud(b"")
 
-    def test_truth(self):
+    def test_truth_is_read(self):
         floats = struct.pack("<2f", 0.5, -0.5)
         truth = v.truth(b"\x1a\x08" + floats + b"\x22\x08" + floats + b"\x31" + struct.pack("<d", 7.5))
         self.assertEqual(truth, v.Truth(0, [0.5, -0.5], [0.5, -0.5], 0, 7.5))
 
 
 class Lines(unittest.TestCase):
-    def test_a_pose_with_its_velocity(self):
+    def test_a_line_has_pose_and_velocity(self):
         line = json.loads(c.json_line((1, 2, -3), (HALF, 0, 0, HALF), 12.5, "rov", (1, 0, 0)))
         self.assertEqual((line["frame"], line["position"]), ("ENU_FLU", [1, 2, -3]))
         self.assertEqual((line["timestamp"], line["vehicle"]), (12.5, "rov"))
@@ -117,18 +117,18 @@ class Lines(unittest.TestCase):
             with self.subTest(position, stamp=stamp), self.assertRaises(c.Unusable):
                 c.json_line(position, (1, 0, 0, 0), stamp)
 
-    def test_stamps(self):
+    def test_stamps_are_written(self):
         self.assertIsNone(c.stamp_s(0, 0))
         self.assertEqual(c.stamp_s(3, 500_000_000), 3.5)
 
-    def test_endpoints(self):
+    def test_endpoints_are_parsed(self):
         self.assertEqual(c.endpoint("10.0.0.1", 7), ("10.0.0.1", 7))
         self.assertEqual(c.endpoint("10.0.0.1:9", 7), ("10.0.0.1", 9))
         for wrong in ("10.0.0.1:x", "10.0.0.1:", "10.0.0.1:0", "10.0.0.1:65536", ":9", "", "10.0.0.1:²"):
             with self.subTest(wrong), self.assertRaises(ValueError):
                 c.endpoint(wrong, 7)
 
-    def test_a_vehicle_in_the_status(self):
+    def test_the_vehicle_is_found_in_the_status(self):
         status = {"vehicles": [{"name": "rov", "position": {"x": 1, "z": -3}, "orientation": {"w": 1}}, {"name": "buoy"}]}
         self.assertEqual(c.vehicle_in(status, "rov"), ((1, 0, -3), (1, 0, 0, 0)))
         for name in ("", "buoy", "none"):

@@ -106,7 +106,7 @@ class WithNode(unittest.TestCase):
 
 
 class Poses(WithNode):
-    def test_frames_named_ned(self):
+    def test_frames_named_ned_are_ned(self):
         ros = self.bridge(odometry="/odom")
         (_, call), = ros.subscribed.items()
         for frame, axes in (("world_ned", "NED_FRD"), ("odom/NED", "NED_FRD"), ("planned", "ENU_FLU"), ("", "ENU_FLU")):
@@ -157,7 +157,7 @@ class Poses(WithNode):
             wait_for(lambda: any("no status of sonard" in text for text in ros.logged))
             wait_for(lambda: server.requests >= 3)
 
-    def test_a_closed_port_is_said(self):
+    def test_a_closed_port_is_reported(self):
         ros = self.bridge(odometry="/odom", sonard="127.0.0.1:9")
         def refused():
             ros.subscribed["/odom"](odometry())
@@ -202,7 +202,7 @@ class Helpers(WithNode):
             self.addCleanup(patch.stop)
         return made
 
-    def test_a_status_after_a_publisher_that_fails(self):
+    def test_the_status_is_read_after_a_publisher_fails(self):
         server = self.server(may_answer=False)
         ros = self.bridge(http=server.at, truth_rate_hz=100, truth="/truth")
         ros.node.truth.publish = Fails(ros.published["/truth"])
@@ -211,7 +211,7 @@ class Helpers(WithNode):
         self.assertEqual([text for text in ros.logged if "invalid" in text],
                          ["""not published: RuntimeError("publisher's handle is invalid")"""])
 
-    def test_a_message_of_the_view_after_a_publisher_that_fails(self):
+    def test_messages_of_the_view_are_read_after_a_publisher_fails(self):
         server_info = json.dumps({"op": "serverInfo", "metadata": {"sonard.clock": "stepped"}}).encode()
         made = self.connections([(live_view.TEXT, server_info),
                                  *((live_view.BINARY, struct.pack("<BQ", 2, ns)) for ns in (1, 2))])
@@ -223,7 +223,7 @@ class Helpers(WithNode):
         self.assertEqual(len([text for text in ros.logged if text.startswith("not published: ")]), 1)
         self.assertEqual(len(made), 1)
 
-    def test_a_view_after_a_message_of_another_shape(self):
+    def test_the_view_is_read_after_a_malformed_message(self):
         self.connections([(live_view.TEXT, b"[]")], [(live_view.BINARY, struct.pack("<BQ", 2, 7))])
         troubles, times = [], []
         view = live_view.LiveView(("127.0.0.1", 1), "", lambda topic: True, lambda topic, ns, payload: times.append(ns),
@@ -249,7 +249,7 @@ class Transforms(WithNode):
             tick()
         self.assertEqual([self.line()["timestamp"] for _ in range(2)], [5.000000001, 5.000000002])
 
-    def test_a_static_one_is_kept_fresh(self):
+    def test_a_static_transform_is_sent_each_time(self):
         ros = self.bridge(tf_parent="map", tf_child="base_link")
         (_, tick), = ros.timers
         ros.transform = lambda: transform(0, 0)
@@ -270,7 +270,7 @@ class Mounts(WithNode):
         with mock.patch("sonard_bridge.live_view.LiveView.run"):
             return super().bridge(tf_static=True, **parameters)
 
-    def test_they_are_sent_once_and_again_when_one_changes(self):
+    def test_mounts_are_sent_once_and_after_a_change(self):
         ros = self.bridge()
         world = Transform(0, "world", "rov", (9.0, 9.0, 9.0), (1.0, 0.0, 0.0, 0.0))
         for x in (0.3, 0.3 + 1e-9, 0.3):
@@ -308,7 +308,7 @@ class Mounts(WithNode):
         self.assertEqual([{m.child_frame_id: m.header.frame_id for m in message} for message in ros.static],
                          [{"front": "rov", "mast": "boat"}, {"front": "rov"}, {"front": "base_link"}])
 
-    def test_their_parent(self):
+    def test_mounts_have_the_right_parent(self):
         both = [self.mount(), self.mount("mast", "boat")]
         for parameters, wanted in (({"base_frame": "base_link"}, {"front": "rov", "mast": "boat"}),
                                    ({"base_frame": "base_link", "vehicle": "rov"}, {"front": "base_link"}),
@@ -320,7 +320,7 @@ class Mounts(WithNode):
 
 
 class TheClock(WithNode):
-    def test_stamps_of_messages_do_not_turn_it_back(self):
+    def test_stamps_of_messages_do_not_set_the_clock_back(self):
         with mock.patch("sonard_bridge.live_view.LiveView.run"):
             ros = self.bridge(clock=True)
         ros.node.view.clock = "stepped"
@@ -334,7 +334,7 @@ class TheClock(WithNode):
 
 
 class Token(WithNode):
-    def test_it_is_shown(self):
+    def test_the_token_is_sent(self):
         server = self.server()
         server.token = "0123456789abcdef"
         with tempfile.TemporaryDirectory() as folder:
@@ -343,7 +343,7 @@ class Token(WithNode):
             ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at, token_file=str(file))
         wait_for(lambda: ros.published["~/vehicle_pose"])
 
-    def test_that_one_is_missing_is_said(self):
+    def test_a_missing_token_is_reported(self):
         server = self.server()
         server.token = "0123456789abcdef"
         ros = self.bridge(odometry="/odom", truth_rate_hz=100.0, http=server.at)
@@ -355,13 +355,13 @@ class Parameters(unittest.TestCase):
     def given(**parameters):
         return {**{p.name: p.default for p in PARAMETERS}, **parameters}
 
-    def test_values_that_yaml_typed(self):
+    def test_values_with_types_of_yaml_are_accepted(self):
         values = checked(self.given(odometry="/odom", vehicle=1, tf_rate_hz=50, truth_rate_hz="1e1", http="10.0.0.1"))
         self.assertEqual((values["vehicle"], values["tf_rate_hz"], values["truth_rate_hz"]), ("1", 50.0, 10.0))
         self.assertEqual((values["sonard"], values["http"]), (("127.0.0.1", 14771), ("10.0.0.1", 8088)))
         self.assertTrue(checked(self.given(tf_static=True)))  # no source is needed for frames of sonard
 
-    def test_wrong_ones_are_named(self):
+    def test_wrong_parameters_are_named(self):
         for name, parameters in (("odometry", {}), ("pose", {"odometry": "/a", "pose": "/b"}), ("tf_child", {"tf_parent": "map"}),
                                  ("tf_parent", {"tf_child": "base_link"}), ("vehicle", {"vehicle": True}),
                                  ("vehicle", {"vehicle": 1e3}),
@@ -376,7 +376,7 @@ class Parameters(unittest.TestCase):
                 checked(full)
             self.assertEqual(raised.exception.name, name)
 
-    def test_the_readme_has_a_line_for_each(self):
+    def test_the_readme_has_a_line_for_each_parameter(self):
         text = (BRIDGE / "README.md").read_text(encoding="utf-8")
         self.assertEqual([p.name for p in PARAMETERS if f"`{p.name}`" not in text], [])
 
@@ -393,13 +393,13 @@ class TheEnd(unittest.TestCase):
         self.assertEqual(ros.shut_down, 1)
         return code, errors.getvalue()
 
-    def test_signals_end_it_without_a_word(self):
+    def test_signals_end_the_node_silently(self):
         def interrupt(node):
             raise KeyboardInterrupt
         for spin in (None, interrupt):
             self.assertEqual(self.end(spin, odometry="/odom"), (0, ""))
 
-    def test_a_wake_that_came_too_early_is_made_good_by_a_steady_clock(self):
+    def test_an_early_wake_is_corrected_with_a_steady_clock(self):
         ros = Ros(odometry="/odom", use_sim_time=True)
 
         def spin(node):
@@ -410,7 +410,7 @@ class TheEnd(unittest.TestCase):
         with ros.module() as module:
             self.assertEqual(module.main(), 0)
 
-    def test_errors_of_rclpy_after_the_end_are_none(self):
+    def test_errors_of_rclpy_after_the_end_are_ignored(self):
         for is_ok in (False, True):
             ros = Ros(odometry="/odom")
 
@@ -497,7 +497,7 @@ class Launch(unittest.TestCase):
         self.assertEqual(driver.named["cmd"], ["ros2", "launch", "my driver", "x.py"])
         self.assertEqual(hear["on_stderr"](Message(text=b"ready in 1 s.")), [])  # once
 
-    def test_the_demo_without_a_driver(self):
+    def test_the_demo_starts_without_a_driver(self):
         handler, sonard = self.started()
         self.assertEqual(sonard.named["cmd"], ["sonard", "run", "--demo"])
         self.assertEqual(len(handler.arguments[0].named["on_stdout"](Message(text=b"ready in 1 s."))), 1)

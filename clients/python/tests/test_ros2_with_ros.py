@@ -103,7 +103,7 @@ class WithRos(unittest.TestCase):
             self.assertIn(f"sonard_bridge: parameter {name}: ", said())
             self.assertNotIn("Traceback", said())
 
-    def test_topics_of_sonard(self):
+    def test_topics_of_sonard_are_published(self):
         from geometry_msgs.msg import PoseStamped
         from rclpy.qos import DurabilityPolicy, QoSProfile
         from rosgraph_msgs.msg import Clock
@@ -155,7 +155,7 @@ class WithRos(unittest.TestCase):
                 return [point for point in points if math.dist(point, (3.76, 1.37, -0.2)) < 0.2]
             self.spin_until(at_the_target)
 
-    def test_launch_files(self):
+    def test_launch_files_start_and_end_all_programs(self):
         for file in ("bridge.launch.py", "sonard.launch.py"):
             ran = subprocess.run([sys.executable, "-B", "-c", ARGUMENTS, str(BRIDGE / "launch" / file)], env=ENVIRONMENT,
                                  capture_output=True, text=True, timeout=PATIENCE_S, check=False)

@@ -65,7 +65,7 @@ class WithSonard(unittest.TestCase):
 
 
 class ATargetToPort(WithSonard):
-    def test_the_static_transform_of_the_image_frame(self):
+    def test_the_static_transform_of_the_image_frame_is_right(self):
         daemon = self.start(config())
         with OculusClient(daemon.address) as sonar:
             sonar.fire(range_m=5, rate_hz=10)
@@ -99,7 +99,7 @@ class ATargetToPort(WithSonard):
         self.assertLess(scan.range_min, 1)
         self.assertAlmostEqual(scan.range_max, 10, delta=0.2)
 
-    def test_clouds_of_range_images(self):
+    def test_range_images_have_clouds(self):
         daemon = self.start(RANGE_IMAGES)
         ros = self.bridge(daemon, clouds=True, cloud_threshold=0)
         cloud = wait_for(lambda: [m for m in ros.published.get("~/front/cloud", []) if m.width])[0]
@@ -116,7 +116,7 @@ class ATargetToPort(WithSonard):
 
 
 class ASurveyor(WithSonard):
-    def test_its_cloud_lies_where_the_truth_is(self):
+    def test_the_cloud_agrees_with_the_truth(self):
         daemon = self.start(LOOKING_DOWN)
         ros = self.bridge(daemon, clouds=True, scans=True, tf_static=True)
         host = subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "surveyor240", *WAIT], stdin=subprocess.DEVNULL,
@@ -184,7 +184,7 @@ class OneBeamAtATime(WithSonard):
         off = sorted(abs(y - 3) for _, y in seen)
         self.assertLess(off[len(off) // 2], 0.3, off)
 
-    def test_the_cloud_of_a_dvl(self):
+    def test_a_dvl_has_a_cloud(self):
         daemon = self.start(LOOKING_DOWN.replace("surveyor-240", "dvl-a50"))
         ros = self.bridge(daemon, clouds=True)
         self.listen(daemon, "dvl")
@@ -194,7 +194,7 @@ class OneBeamAtATime(WithSonard):
 
 
 class Mounts(WithSonard):
-    def test_they_follow_the_daemon(self):
+    def test_mounts_follow_the_daemon(self):
         daemon = self.start(config())
         ros = self.bridge(daemon, tf_static=True, base_frame="base_link")
         mount = wait_for(lambda: ros.static)[0][0]
@@ -212,7 +212,7 @@ class Mounts(WithSonard):
 
 
 class TheClock(WithSonard):
-    def test_it_is_that_of_the_steps(self):
+    def test_the_clock_follows_the_steps(self):
         daemon = self.start(config(), "--clock", "lockstep")
         ros = self.bridge(daemon, clock=True, truth_rate_hz=50.0)
         control = Control(daemon.address)
@@ -223,7 +223,7 @@ class TheClock(WithSonard):
         self.assertEqual((last.clock.sec, last.clock.nanosec), (0, 350_000_000))
         wait_for(lambda: any(pose.header.stamp.nanosec == 350_000_000 for pose in ros.published["~/vehicle_pose"]))
 
-    def test_real_time_needs_none(self):
+    def test_real_time_needs_no_clock(self):
         daemon = self.start(config())
         ros = self.bridge(daemon, clock=True)
         wait_for(lambda: any("sonard's clock is realtime" in text for text in ros.logged))
@@ -231,7 +231,7 @@ class TheClock(WithSonard):
 
 
 class Token(WithSonard):
-    def test_the_live_view_takes_it(self):
+    def test_the_live_view_accepts_the_token(self):
         with tempfile.TemporaryDirectory() as folder:
             token = pathlib.Path(folder) / "token"
             token.write_text("0123456789abcdef\n", encoding="utf-8")

@@ -33,7 +33,7 @@ class Splits(unittest.TestCase):
             self.assertEqual([m.data for m in messages], whole, at)
             self.assertEqual(reader.skipped_bytes, 0)
 
-    def test_byte_by_byte(self):
+    def test_messages_are_read_byte_by_byte(self):
         stream = made_ping(2) + DUMMY_BYTES
         _, messages = read(*(stream[i:i + 1] for i in range(len(stream))))
         self.assertEqual([m.type for m in messages], [PING, DUMMY])
@@ -101,7 +101,7 @@ class Junk(unittest.TestCase):
 
 @unittest.skipUnless(CAPTURES, "no recordings: SONARD_CAPTURES is not set")
 class Captures(unittest.TestCase):
-    def test_three_pings_of_a_real_device(self):
+    def test_three_pings_of_a_real_device_are_read(self):
         below = pathlib.Path(CAPTURES, "oculus/three_pings_8bit.raw")
         reader, messages = read((below if below.exists() else pathlib.Path(CAPTURES, "three_pings_8bit.raw")).read_bytes())
         pings = [ping_from(m) for m in messages]

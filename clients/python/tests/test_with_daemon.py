@@ -49,7 +49,7 @@ class Running(unittest.TestCase):
     def vehicle(self):
         return Control(self.address).status()["vehicles"][0]
 
-    def test_every_version_and_width(self):
+    def test_pings_of_every_version_and_width_arrive(self):
         with OculusClient(self.address) as sonar:
             for chosen in (dict(version=0, beams=256), dict(version=1, bits=16, gains=True), dict(version=2, bits=32),
                          dict(mode=1, gains=True)):
@@ -82,7 +82,7 @@ class Running(unittest.TestCase):
                     nearest = min(math.hypot(there[0] - x, there[1] - y) for x, y in turned)
                     self.assertLess(nearest, 0.25, f"{there} is none of {turned}")
 
-    def test_poses_by_every_transport(self):
+    def test_poses_arrive_over_every_transport(self):
         sent = dict(position=(1, -2, -3), rpy=(0.1, -0.2, 0.3))
         expected = {"w": 0.98186, "x": 0.06407, "y": -0.09116, "z": 0.15344}
         for number, (encoding, transport) in enumerate((("json", "udp"), ("protobuf", "udp"), ("json", "tcp"))):
@@ -102,17 +102,17 @@ class Running(unittest.TestCase):
             self.assertAlmostEqual(vehicle["position"]["z"], -1)
             self.assertAlmostEqual(abs(vehicle["orientation"]["w"]), 1)
 
-    def test_protobuf_with_unix_time_and_angular_velocity(self):
+    def test_protobuf_poses_have_unix_time_and_angular_velocity(self):
         with PoseSender(self.address, "protobuf", clock="wall", vehicle="rov") as poses:
             poses.send((0, 0, -9), angular_velocity=(0, 0, 0.1), timestamp=time.time())
             self.eventually(lambda: self.vehicle()["position"]["z"] == -9)
             self.eventually(lambda: self.vehicle()["orientation"]["z"] > 0.004)  # 0.1 rad/s for some of 0.2 s
 
-    def test_discovery(self):
+    def test_discovery_finds_the_sonar(self):
         (sonar,) = discover(60, listen=self.address, enough=1)
         self.assertEqual((sonar.address, sonar.sender, sonar.part_number), (self.address, self.address, 1042))
 
-    def test_control(self):
+    def test_control_changes_the_daemon(self):
         control = Control(self.address)
         self.assertEqual(control.health(), "ok")
         with control.events(scene=True, timeout=60) as events:
@@ -159,7 +159,7 @@ class Running(unittest.TestCase):
             code = main(list(words))
         return code, out.getvalue()
 
-    def test_commands(self):
+    def test_commands_print_their_results(self):
         code, text = self.run_main("listen", self.address, "--count", "2", "--range", "5", "--timeout", "100")
         self.assertEqual((code, text.count("\nping") + text.startswith("ping")), (0, 2), text)
         self.assertEqual(self.run_main("pose", "-1", "2", "-4", "--rpy", "0", "10", "0", "--to", self.address)[0], 0)
@@ -192,7 +192,7 @@ class Lockstep(unittest.TestCase):
 
 
 class Token(unittest.TestCase):
-    def test_token(self):
+    def test_the_token_is_required(self):
         with tempfile.TemporaryDirectory() as folder:
             token = pathlib.Path(folder, "token")
             token.write_text("0123456789abcdef0123\n", encoding="utf-8")

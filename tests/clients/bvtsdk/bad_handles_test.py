@@ -85,7 +85,7 @@ class BadHandles(unittest.TestCase):
                     self.assertEqual(call.untouched(), [])
         self.assertGreater(calls, 150)
 
-    def test_null_stale_and_foreign(self):
+    def test_null_stale_and_foreign_handles_are_refused(self):
         def handles(library):
             library.BVTNavData_Create.restype = ctypes.c_void_p
             stale = library.BVTNavData_Create()
@@ -95,7 +95,7 @@ class BadHandles(unittest.TestCase):
         for abi in (3, 4):
             self.check(abi, handles, lambda *_: False)
 
-    def test_of_another_kind(self):
+    def test_handles_of_another_kind_are_refused(self):
         def handles(library):
             library.BVTSonar_Create.restype = library.BVTNavData_Create.restype = ctypes.c_void_p
             return [library.BVTSonar_Create(), library.BVTNavData_Create()]

@@ -29,7 +29,7 @@ class Truncation(unittest.TestCase):
         self.assertEqual(sdk.BVTHead_GetPing(-1, -1, ctypes.byref(ping)), 7)
         sdk.BVTSonar_Destroy(sonar)
 
-    def test_both_interfaces(self):
+    def test_truncated_handles_work_in_both_interfaces(self):
         with l_targets() as daemon:
             three = ctypes.CDLL(prefix(3) / "lib/libbvtsdk.so.3")
             self.check(three, daemon, three.BVTPing_GetImage, three.BVTMagImage_GetHeight)

@@ -37,7 +37,7 @@ class Discovery(unittest.TestCase):
             wanted = {first.address, second.address}
             self.assertLessEqual(wanted, self.found(wanted, 20))
 
-    def test_a_sonar_that_hears_no_broadcasts_is_found_by_its_name(self):
+    def test_a_sonar_without_broadcasts_is_found_by_its_name(self):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sonar:
             address = "127.0.0.9"
             sonar.bind((address, DISCOVERY_PORT))

@@ -32,7 +32,7 @@ class FiveMinutes(unittest.TestCase):
         self.assertIn(f"LD_LIBRARY_PATH={BUILD}/bvt4/lib", text)
         self.assertIn(f"sonarctl view {self.address} --png ping.png", text)
 
-    def test_an_option_of_an_oculus_is_told_to_do_nothing(self):
+    def test_an_oculus_option_without_effect_is_reported(self):
         note = "sonar front: options.before_first_fire is for Oculus sonars: without effect on BlueView P900-90"
         self.assertIn(f"info  {note}", self.daemon.log())
         self.daemon.process.send_signal(signal.SIGHUP)
@@ -41,7 +41,7 @@ class FiveMinutes(unittest.TestCase):
             time.sleep(0.05)
         self.assertIn(f"info  reload: {note}", self.daemon.log())
 
-    def test_the_first_look(self):
+    def test_the_first_commands_of_the_page_work(self):
         result = run(SONARCTL, "view", self.address, "--wait", "100", "--png", self.at / "ping.png", "--width", "600")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stdout, r"ping.png: 600 x \d+ pixels, 315 rows x 512 beams, 10.00 m")
@@ -53,7 +53,7 @@ class FiveMinutes(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("window.correlation_of_adjacent_beams", result.stdout)
 
-    def test_doctor_is_content(self):
+    def test_doctor_finds_no_error(self):
         for control in (14770, 1):  # also without a control stream
             result = run(SONARCTL, "doctor", self.address, "--control", f"{self.address}:{control}", "--http",
                          f"{self.address}:8088", "--within", "60", "--status-on", self.address)
@@ -65,7 +65,7 @@ class FiveMinutes(unittest.TestCase):
                 self.assertNotRegex(result.stdout, r"(?m)^fail")
             self.assertNotIn("52102", result.stdout, "heads send no status")
 
-    def test_the_printed_program(self):
+    def test_the_program_of_the_page_works(self):
         page = (ROOT / "docs/bvtsdk.md").read_text(encoding="utf-8")
         program = re.search(r"```c\n(.*?)```.*?```\n(.*?)```", page, re.S)
         (self.at / "first.c").write_text(program[1].replace("127.0.0.2", self.address), encoding="utf-8")

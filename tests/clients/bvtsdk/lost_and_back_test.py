@@ -44,7 +44,7 @@ class Host:
 
 
 class LostAndBack(unittest.TestCase):
-    def test_killed_and_started_again(self):
+    def test_a_host_continues_after_a_kill_and_a_restart(self):
         with l_targets() as daemon:
             host = Host(daemon.address)
             self.assertEqual(host.open(), SUCCESS)
@@ -62,7 +62,7 @@ class LostAndBack(unittest.TestCase):
             self.assertEqual(host.connected(), 1)
             host.destroy()
 
-    def test_frozen(self):
+    def test_a_host_notices_a_frozen_sonar(self):
         with l_targets() as daemon:
             host, late = Host(daemon.address), Host(daemon.address)
             self.assertEqual(host.open(), SUCCESS)
