@@ -29,7 +29,7 @@ TEST(Doctor, LeavesABusySonarAlone) {
   EXPECT_FALSE(any_failed(run_checks(facts)));
 }
 
-TEST(Doctor, SaysWhereSomethingDoesListen) {
+TEST(Doctor, NamesAnAddressThatListens) {
   Facts facts;
   facts.sonars.push_back({});
   facts.sonars[0].at = {"127.0.0.2", 52100};
@@ -66,7 +66,7 @@ TEST(Doctor, NamesWhoElseHasThePort) {
          "another program has the port");
 }
 
-TEST(Doctor, KnowsWhyNoPingComes) {
+TEST(Doctor, NamesTheReasonWithoutPings) {
   Facts facts = healthy();
   SonarFacts& sonar = facts.sonars[0];
   sonar.stream = {};
@@ -119,7 +119,7 @@ TEST(Doctor, CountsOneBeamAsOne) {
   EXPECT_THAT(line(facts, "ping").text, HasSubstr(": 1 beam x 437 ranges, 8 bit"));
 }
 
-TEST(Doctor, SaysWhatComputingAllows) {
+TEST(Doctor, ReportsTheRateThatComputingAllows) {
   Facts facts = healthy();
   SonarFacts& sonar = facts.sonars[0];
   sonar.stream.computing_ms = 12;
@@ -148,7 +148,7 @@ TEST(Doctor, SaysWhatComputingAllows) {
          "fewer beams");
 }
 
-TEST(Doctor, ASonarByHttpThatSendsNothingIsAnErrorWhenAHostSetItUp) {
+TEST(Doctor, AnHttpSonarThatSendsNothingToItsHostIsAnError) {
   Facts facts = healthy();
   SonarFacts& sonar = facts.sonars[0];
   sonar.make = find_make("waterlinked");
@@ -196,7 +196,7 @@ TEST(Doctor, LooksAtAHeadAsItsHostsDo) {
   expect(line(facts, "rate"), Level::warn, "rate 6.0 Hz (at most 15)", "engine.threads");
 }
 
-TEST(Doctor, SaysWhatIsWrongWithAHead) {
+TEST(Doctor, ReportsFaultsOfAHead) {
   Facts facts = healthy_head();
   StreamFacts& s = facts.sonars[0].stream;
   s = {};
@@ -263,7 +263,7 @@ TEST(Doctor, FailsWhileAnotherDriverGetsNoPing) {
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("8 checks, 0 errors"));
 }
 
-TEST(Doctor, DoesNotTellADriverThatNeedsNoRequestToAsk) {
+TEST(Doctor, ProposesARequestOnlyToDriversThatNeedOne) {
   Facts facts = healthy();
   facts.sonars[0].stream = {};
   facts.sonars[0].clients = {"127.0.0.1:40122"};
@@ -293,7 +293,7 @@ TEST(Doctor, OnlyWarnsOfAClientTurnedAwayFromPlacesThatAreUsedWell) {
   expect(line(facts, "places"), Level::fail, "10.0.0.7:1 was refused", "clients.max");
 }
 
-TEST(Doctor, WaitsForTheFirstPingAsLongAsItTakes) {
+TEST(Doctor, WaitsForASlowFirstPing) {
   Facts facts = healthy();
   facts.sonars[0].stream = {};
   facts.sonars[0].clients = {"127.0.0.1:40122"};
@@ -308,7 +308,7 @@ TEST(Doctor, WaitsForTheFirstPingAsLongAsItTakes) {
   expect(line(facts, "driver"), Level::fail, "127.0.0.1:40122 is connected and gets no ping", "sonarctl status");
 }
 
-TEST(Doctor, KnowsTheLatencyAlsoAfterTheClockWasSet) {
+TEST(Doctor, MeasuresTheLatencyAfterTheClockWasSet) {
   for (const double wall_ahead_s : {0.0, 7200.0, -10800.0}) {
     ControlFacts clocks;
     const auto status = std::make_shared<v1::DaemonStatus>();

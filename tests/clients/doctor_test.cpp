@@ -21,7 +21,7 @@ TEST(Doctor, ColoursLevelsForATerminal) {
   EXPECT_THAT(text_from(found), testing::Not(HasSubstr("\x1b")));
 }
 
-TEST(Doctor, PraisesWhatIsWell) {
+TEST(Doctor, ReportsPassedChecks) {
   EXPECT_EQ(
       text_from(run_checks(healthy())),
       "ok    status broadcast received back on udp 52102 from 127.0.0.2\n"
@@ -85,7 +85,7 @@ TEST(Doctor, NamesWhatOtherNetworksDoNotPass) {
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("another network")));
 }
 
-TEST(Doctor, KnowsMachinesWhoseNetworkIsTheirOwn) {
+TEST(Doctor, RecognisesMachinesWithTheirOwnNetwork) {
   Facts facts = facts_of("oculus", "172.17.0.2");
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("may not pass")));
   facts.machine = Machine::wsl2;
@@ -97,7 +97,7 @@ TEST(Doctor, KnowsMachinesWhoseNetworkIsTheirOwn) {
   EXPECT_THAT(text_from(run_checks(facts)), Not(HasSubstr("may not pass")));
 }
 
-TEST(Doctor, KnowsWhyNoStatusComes) {
+TEST(Doctor, NamesTheReasonWithoutStatus) {
   Facts facts = healthy();
   facts.status.received.clear();
   expect(line(facts, "status"), Level::fail, "no status from 127.0.0.2 on udp 52102 within 2.5 s",
@@ -113,7 +113,7 @@ TEST(Doctor, KnowsWhyNoStatusComes) {
   expect(line(facts, "status"), Level::warn, "by a program of another user", "stop that program");
 }
 
-TEST(Doctor, SaysWhatDriversWouldObjectToInTheStatus) {
+TEST(Doctor, ReportsAStatusThatDriversRefuse) {
   Facts facts = healthy();
   facts.status.received[0].complaints = {"datagram length 140 is not a status message's 142"};
   expect(line(facts, "status"), Level::fail, "datagram length 140", "is it a sonar?");
@@ -145,7 +145,7 @@ TEST(Doctor, ExpectsControlWhereADaemonIs) {
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("warn  that sonard does not serve 127.0.0.2"));
 }
 
-TEST(Doctor, KnowsThatARecordingHasItsOwnRateAndNoControl) {
+TEST(Doctor, ExpectsNoRateAndNoControlFromARecording) {
   Facts facts = healthy();
   facts.control.status.reset();
   facts.control.error = "no answer";
@@ -155,7 +155,7 @@ TEST(Doctor, KnowsThatARecordingHasItsOwnRateAndNoControl) {
   EXPECT_THAT(text_from(run_checks(facts)), AllOf(HasSubstr(", as in the recording\n"), Not(HasSubstr("no answer"))));
 }
 
-TEST(Doctor, SaysWhatTheDaemonNotedAndNotThatAllIsWellWithThoseVehicles) {
+TEST(Doctor, PrintsNotesInsteadOfAPassedCheck) {
   Facts facts = healthy();
   daemon_in(facts).MergeFrom(control::message_from<v1::DaemonStatus>(
       R"(vehicles { name: "boat" source: "initial pose" }
@@ -194,7 +194,7 @@ TEST(Doctor, LooksAtPosesHttpAndClocks) {
   expect(line(facts, "clock"), Level::ok, "0.01 s ahead of this one", "");
 }
 
-TEST(Doctor, ChecksEverySonarAndTellsThemApart) {
+TEST(Doctor, ChecksEverySonarAndNamesItInFindings) {
   Facts facts = healthy();
   facts.sonars.push_back(healthy_sonar("127.0.0.3"));
   facts.sonars[0].name = "front";

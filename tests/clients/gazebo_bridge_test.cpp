@@ -60,7 +60,7 @@ Poses message_at(std::int64_t s, std::int32_t ns = 0) {
           {{"ground", {}, {}}, {"rov", {{1, -2, -3}}, {bow_north}}, {"rov", {{9, 9, 9}}, {}}, {"buoy", {{4, 5, 0}}, {}}}};
 }
 
-TEST(GazeboBridge, SaysWhatAModelDoesAsSonardReadsIt) {
+TEST(GazeboBridge, WritesPosesThatSonardReads) {
   std::vector<FollowedModel> followed{parse_followed("rov").value()};
   const auto lines = lines_from(message_at(12, 500'000'000), followed);
   ASSERT_THAT(lines, SizeIs(1));

@@ -96,7 +96,7 @@ ListenOptions quiet(const Endpoint& device, std::uint64_t pings) {
   return options;
 }
 
-TEST(Listen, IsSatisfiedByASoundDeviceAndDrawsIt) {
+TEST(Listen, AcceptsAGoodDeviceAndDrawsAPing) {
   FakeDevice device(5, [](std::uint32_t i, const oculus::FireSettings& echo) { return ping_bytes(i + 1, echo); });
   ListenOptions options = quiet(device.endpoint(), 5);
   options.png = std::filesystem::path(testing::TempDir()) / "listen_test.png";
@@ -217,7 +217,7 @@ TEST(Listen, CountsTimeFromTheConnection) {
   EXPECT_GE(opened->connected_at - begin, std::chrono::milliseconds(500));
 }
 
-TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
+TEST(Listen, ReportsASilentOrMissingDevice) {
   FakeDevice silent(0, [](std::uint32_t, const oculus::FireSettings&) { return wire::Bytes{}; });
   ListenOptions options = quiet(silent.endpoint(), 1);
   options.source.silence_limit_s = 1;
@@ -235,7 +235,7 @@ TEST(Listen, SaysWhenTheDeviceIsSilentOrAbsent) {
   EXPECT_THAT(absent.error().text, HasSubstr("Is sonard running there?"));
 }
 
-TEST(Listen, SaysWhenTheDeviceFallsSilent) {
+TEST(Listen, ReportsThatTheDeviceFellSilent) {
   FakeDevice device(1, [](std::uint32_t, const oculus::FireSettings& echo) { return ping_bytes(1, echo); });
   ListenOptions options = quiet(device.endpoint(), 2);
   options.source.silence_limit_s = 1;
@@ -244,7 +244,7 @@ TEST(Listen, SaysWhenTheDeviceFallsSilent) {
   EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 1 s: drivers give up"));
 }
 
-TEST(Listen, SaysWhichOfItsSettingsAskedForSilence) {
+TEST(Listen, NamesTheSettingThatStopsPings) {
   for (const auto& [rate_hz, why] :
        {std::pair(0.0, "within 1 s: --rate standby requested that"),
         std::pair(0.5, "within 1 s: --rate 0.5 requested less than one ping in that time; --wait makes it longer")})
@@ -257,7 +257,7 @@ TEST(Listen, SaysWhichOfItsSettingsAskedForSilence) {
     }
 }
 
-TEST(View, PrintsWhatTheDeviceSaysBesidePings) {
+TEST(View, PrintsMessagesBesidePings) {
   for (const bool live : {false, true}) {
     SCOPED_TRACE(live);
     FakeDevice device(1, [](std::uint32_t, const oculus::FireSettings& echo) {
@@ -296,7 +296,7 @@ TEST(Record, RefusedSettingsReplaceNoFile) {
   std::filesystem::remove(options.raw);
 }
 
-TEST(View, TellsAnotherServiceFromASonarInStandby) {
+TEST(View, DistinguishesAnotherServiceFromASonarInStandby) {
   ViewOptions options;
   options.source.make = find_make("oculus");
   options.terminal = true;

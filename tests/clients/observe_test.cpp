@@ -134,7 +134,7 @@ TEST(Observe, WaitsWithoutPingsAsLongAsSonardAnswers) {
   }
 }
 
-TEST(Observe, ASinglePictureTellsHowLongItWaits) {
+TEST(Observe, ASinglePictureReportsTheTimeOfWaiting) {
   const Server observers(send_a_dummy);
   const Control control(observers.at(), 1, "127.0.0.2:52100");
   ViewOptions options;

@@ -47,7 +47,7 @@ TEST(PingLog, ReportsWhenSettingsTookEffectAndWhetherTheyStayed) {
   EXPECT_THAT(complaints(log.summary(std::nullopt), true), ElementsAre(HasSubstr("lost again in 1 pings")));
 }
 
-TEST(PingLog, TellsWhatTheSonarLimited) {
+TEST(PingLog, ReportsSettingsThatTheSonarLimited) {
   PingLog log;
   HostPing limited = ping(1);
   limited.limited = {"range 40.00 m, not 1000 m", "256 beams, not 512"};
@@ -99,7 +99,7 @@ TEST(PingLog, PrintsTextAndJson) {
   EXPECT_THAT(json_from(log.summary(std::nullopt), false), HasSubstr("\"missing_ids\":null")) << "of a wire that does not number";
 }
 
-TEST(PingLog, TellsTheRateInTheUnitOfTheMake) {
+TEST(PingLog, ReportsTheRateInTheUnitOfTheMake) {
   PingLog log;
   for (std::uint32_t i = 0; i < 11; ++i) log.add(ping(i), 0.1 * i);
   EXPECT_THAT(text_from(log.summary(std::nullopt), false, "lines/s"), HasSubstr("rate 10.00 lines/s, interval p50 100.0 ms"));

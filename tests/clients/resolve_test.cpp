@@ -26,7 +26,7 @@ TEST(Resolve, AnAddressNeedsNoLookup) {
   EXPECT_EQ(ntohs(found->sin_port), 9);
 }
 
-TEST(Resolve, ANameIsLookedUpOrSaidToHaveNoAddress) {
+TEST(Resolve, ANameIsLookedUpOrReportedWithoutAnAddress) {
   const auto found = resolve({"localhost", 9});
   ASSERT_TRUE(found) << found.error().text;
   EXPECT_EQ(ntohl(found->sin_addr.s_addr), 0x7F000001u);

@@ -21,7 +21,7 @@ TerminalColours colours_with(bool is_terminal, std::map<std::string, std::string
                          }});
 }
 
-TEST(Terminal, ShowsWhatItCan) {
+TEST(Terminal, DetectsTheColoursOfTheTerminal) {
   using enum TerminalColours;
   EXPECT_EQ(colours_with(true, {{"TERM", "xterm"}, {"LANG", "en_GB.UTF-8"}}), palette_256);
   EXPECT_EQ(colours_with(true, {{"TERM", "xterm"}, {"COLORTERM", "truecolor"}, {"LC_ALL", "C.utf8"}}), true_colour);
@@ -41,7 +41,7 @@ protocol::HostPing ping(std::uint32_t id) {
   return ping;
 }
 
-TEST(ViewCaption, TellRateAndGaps) {
+TEST(ViewCaption, HasRateAndGaps) {
   const auto missing = [](std::uint64_t pings) { return protocol::Host::Counts{0, 0, 0, pings}; };
   ViewCaption figures("Hz");
   figures.add(ping(7), missing(0), 100.0);
@@ -133,7 +133,7 @@ TEST(StatusText, CountsNoPingsOfAConnectionForCommands) {
   EXPECT_THAT(text, HasSubstr("10.0.0.7:1  commands only, 0.0 MB, 90 s\n"));
 }
 
-TEST(StatusText, TellsHowLongAHostWithoutAConnectionIsSilent) {
+TEST(StatusText, PrintsHowLongAHostWithoutAConnectionIsSilent) {
   const auto text_of = [](const std::string& silent) {
     return text_from(control::message_from<v1::DaemonStatus>(R"(sonars { profile: "ping360" clients { address: "10.0.0.7:1" )" +
                                                              silent + " connected_s: 90 } }"));

@@ -18,7 +18,7 @@ HostPing ping_of(std::size_t lines, std::size_t whole) {
   return ping;
 }
 
-TEST(PictureProgress, TellsTheLinesAtOnceAndThenEveryTwoSecondsWithTheTimeThatIsLeft) {
+TEST(PictureProgress, ReportsLinesAtOnceAndEveryTwoSecondsWithTheRemainingTime) {
   PictureProgress progress(30);
   const PictureProgress::Clock::time_point begin{seconds(1000)};
   EXPECT_THAT(
@@ -32,7 +32,7 @@ TEST(PictureProgress, TellsTheLinesAtOnceAndThenEveryTwoSecondsWithTheTimeThatIs
   EXPECT_TRUE(progress.is_over(begin + seconds(30)));
 }
 
-TEST(PictureProgress, WithoutALimitThePictureIsTakenAsItIs) {
+TEST(PictureProgress, WithoutALimitThePictureIsUsedAtOnce) {
   EXPECT_TRUE(PictureProgress(0).is_over(PictureProgress::Clock::time_point{seconds(5)}));
 }
 

@@ -65,7 +65,7 @@ Agreement compare(const Tracers& t, Vec3d middle, double spread, unsigned seed) 
   return a;
 }
 
-TEST(DeviceRays, MeetARoughBedWhereEmbreesDo) {
+TEST(DeviceRays, HitARoughBedWhereEmbreeDoes) {
   SceneMaker maker;
   maker.add(test::height_field(-10, 10, -10, 10, 0.2, test::rough_relief(0.3, 20)), -20, {3, 4, -6});
   maker.add(test::sphere(0.7, 4), -20, {4, 3, -5});
@@ -78,7 +78,7 @@ TEST(DeviceRays, MeetARoughBedWhereEmbreesDo) {
   RecordProperty("other_object", a.other_object);
 }
 
-TEST(DeviceRays, MeetBodiesWhereverTheyAre) {
+TEST(DeviceRays, HitBodiesAtAnyPlace) {
   SceneMaker maker;
   maker.add(test::height_field(-8, 8, -8, 8, 0.5, [](double, double) { return 0.0; }), -20, {0, 0, -3});
   for (int i = 0; i < 7; ++i) maker.add_body(test::sphere(0.6, 3), -20, {{i - 3.0, 1, -1}, {}});
@@ -123,14 +123,14 @@ TEST(DeviceRays, NeverSlipThroughAnEdge) {
   EXPECT_EQ(misses, 0);
 }
 
-TEST(DeviceRays, MeetNothingInAnEmptyScene) {
+TEST(DeviceRays, HitNothingInAnEmptyScene) {
   const Scene empty;
   const FlatScene flat(empty);
   const BodyPlaces places = flat.place({});
   EXPECT_EQ(trace_ray(host_view(flat, places), ray_to({0, 0, 0}, {1, 0, 0}), 10).object, no_object);
 }
 
-TEST(DeviceRays, MeetOneTriangleAndManyInOnePlace) {
+TEST(DeviceRays, HitOneOrManyTrianglesInOnePlace) {
   SceneMaker maker;
   Mesh fan;
   fan.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

@@ -96,7 +96,7 @@ TEST(Expectations, AreMetWhenTrueAndNotWhenWrong) {
   EXPECT_TRUE(met("{measure: peak_level_db, range_m: [3.9, 4.1], less: {range_m: [4.5, 5]}, at_least: 100}"));
 }
 
-TEST(Expectations, TellFileQuantityMeasuredAndExpected) {
+TEST(Expectations, NameFileQuantityMeasuredAndExpected) {
   EXPECT_THAT(
       judged("{measure: peak_range_m, value: 5, within: 0.01, what: a point}").at(0).sentence(),
       AllOf(HasSubstr("r.yaml:6"), HasSubstr("a point"), HasSubstr("peak_range_m 4"), HasSubstr("expected 5 within 0.01")));
@@ -122,7 +122,7 @@ TEST(Expectations, RefusalsNameWhatIsMissing) {
   EXPECT_THAT(refusal(""), HasSubstr("expect"));
 }
 
-TEST(Expectations, OfTheExampleInTheManualAreMet) {
+TEST(Expectations, OfTheManualsExampleAreMet) {
   const std::string manual = text_of(SONARD_SOURCE_DIR "/docs/render.md");
   const std::string begin = "```yaml\n";
   const std::size_t from = manual.find(begin) + begin.size();

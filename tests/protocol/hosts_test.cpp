@@ -18,7 +18,7 @@ using testing::HasSubstr;
 INSTANTIATE_TEST_SUITE_P(OfEveryMake, Hosts, testing::ValuesIn(makes().begin(), makes().end()),
                          [](const auto& of) { return std::string(of.param.name()); });
 
-TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
+TEST_P(Hosts, SendSettingsAndGetPings) {
   const Make& make = GetParam();
   const Wanted wanted = all_that_is_known(make, range_m);
   Talk talk(make, wanted, 0, model_of(make));
@@ -57,7 +57,7 @@ TEST_P(Hosts, SetWhatIsWantedAndGetPings) {
   EXPECT_EQ(raster->height, picture_height(*drawing, style));
 }
 
-TEST_P(Hosts, TellTheRangeWhichTheSonarHasInsteadOfThatWhichItEchoes) {
+TEST_P(Hosts, ReportTheTrueRangeInsteadOfTheEchoedOne) {
   Wanted wanted;
   wanted.settings.range_m = 900;  // beyond the range of every sonar
   if (!GetParam().host(wanted)) return;
@@ -76,7 +76,7 @@ TEST_P(Hosts, TellTheRangeWhichTheSonarHasInsteadOfThatWhichItEchoes) {
 }
 
 /// Users type metres, and do not know the fields of messages.
-TEST_P(Hosts, TellInMetresWhyARangeIsRefused) {
+TEST_P(Hosts, RefuseARangeWithTheLimitsInMetres) {
   const auto& model = *GetParam().device->models()[model_of(GetParam())];
   for (const double wanted_m : {900.0, 0.001, static_cast<double>(model.modes.front().max_range_m)}) {
     Wanted wanted;
@@ -95,7 +95,7 @@ TEST_P(Hosts, TellInMetresWhyARangeIsRefused) {
 }
 
 /// A host that gets no pings says why, for every model and at the ends of what a user can type.
-TEST_P(Hosts, SayWhyThereAreNoPings) {
+TEST_P(Hosts, NameTheReasonForMissingPings) {
   std::vector<Wanted> all;
   const auto add = [&all](auto setting, auto... values) { ((all.emplace_back().settings.*setting = values), ...); };
   add(&SettingsOverride::range_m, 0.0, 1e-3, 0.5, 1.0, 15.0, 21.0, 60.0, 99.0, 120.0, 250.0, 600.0, 1e5);
@@ -181,7 +181,7 @@ TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
 }
 
 /// Sends the device's bytes, cut or damaged at any place, to a host that has received all bytes before them.
-TEST_P(Hosts, SurviveWhatIsCutOffOrDamaged) {
+TEST_P(Hosts, SurviveTruncatedAndDamagedMessages) {
   Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
   talk.run(6);
   const auto [port, last] = talk.sent.back();
@@ -222,7 +222,7 @@ TEST_P(Hosts, SurviveJunk) {
   EXPECT_THAT(talk.pings, testing::IsEmpty());
 }
 
-TEST_P(Hosts, RefuseWhatTheyDoNotHave) {
+TEST_P(Hosts, RefuseSettingsThatTheMakeDoesNotHave) {
   Wanted wanted;
   wanted.more["no-such-setting"] = "1";
   const auto host = GetParam().host(wanted);
@@ -239,7 +239,7 @@ TEST_P(Hosts, RefuseWhatTheyDoNotHave) {
   }
 }
 
-TEST_P(Hosts, PutTheSonarInStandbyOrSayThatItHasNone) {
+TEST_P(Hosts, PutTheSonarInStandbyOrReportThatItHasNone) {
   Wanted standby;
   standby.settings.rate_hz = 0;
   const auto host = GetParam().host(standby);
@@ -253,7 +253,7 @@ TEST_P(Hosts, PutTheSonarInStandbyOrSayThatItHasNone) {
   EXPECT_THAT(talk.pings, testing::IsEmpty());
 }
 
-TEST_P(Hosts, AskForSlowPingsWhenTheRateIsLessThanTheWireCanSay) {
+TEST_P(Hosts, RequestSlowPingsForRatesBelowTheLowestOnTheWire) {
   for (const double rate_hz : {1e-300, 1e-6}) {
     Wanted slow;
     slow.settings.rate_hz = rate_hz;

@@ -120,7 +120,7 @@ TEST(Wire, KeepsTheFirstFailureAndReadsNothingMore) {
   }
 }
 
-TEST(Wire, SaysWhatWasMissing) {
+TEST(Wire, NamesTheMissingField) {
   Outer outer;
   sonar::wire::Reader reader(BytesView(little).first(15));
   fields(reader, outer);

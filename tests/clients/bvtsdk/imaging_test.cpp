@@ -47,7 +47,7 @@ double mean_of(const MagImage& image) {
   return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) / static_cast<double>(image.pixels.size());
 }
 
-TEST(XyImage, ShowsATargetWhereItIsAndNotMirrored) {
+TEST(XyImage, ShowsATargetAtItsPlaceAndNotMirrored) {
   for (const double bearing : {-40.0, -12.5, 0.0, 30.0})
     for (const double range : {2.0, 6.0, 10.5}) {
       const MagImage image = image_of(make_ping_with_target(range, bearing), ImageType::xy);
@@ -104,7 +104,7 @@ TEST(XyImage, PutsPixelsWhereTheVendorsLibraryPutThem) {
   EXPECT_NEAR(image.pixel_bearing_deg(12, 360), 16.855444, 1e-5);
 }
 
-TEST(XyImage, ReachesToTheSonarWhenTheEnvironmentSaysSo) {
+TEST(XyImage, ReachesToTheSonarIfConfigured) {
   const PolarPing ping = make_ping_with_target(4, 0);
   for (const bool sonar : {false, true}) {
     ASSERT_EQ(setenv("BVE_XY", sonar ? "sonar" : "sector", 1), 0);

@@ -138,7 +138,7 @@ TEST(Link, GreetsAndLearnsWhatTheSonarIs) {
   EXPECT_EQ(sonar.heads[0].max_range_m, 60);
 }
 
-TEST(Link, RepliesFindWhoAskedInAnyOrder) {
+TEST(Link, RepliesAreMatchedToRequestsInAnyOrder) {
   FakeSonar fake([](Peer& peer) {
     peer.greet();
     Bytes first, second;
@@ -272,7 +272,7 @@ TEST(Link, BytesThatAreNotAFrameEndTheLink) {
   }
 }
 
-TEST(Link, ClosingTellsWhoWaits) {
+TEST(Link, ClosingEndsWaitingCalls) {
   std::promise<void> asked;
   FakeSonar fake([&asked](Peer& peer) {
     peer.greet();
@@ -340,7 +340,7 @@ TEST(LinkOpen, ReportsWhyNoSonarIsReached) {
   EXPECT_EQ(link, nullptr);
 }
 
-TEST(LinkOpen, ASonarThatHangsUpOrSaysNothingHasNotBeenReached) {
+TEST(LinkOpen, ASonarThatClosesOrIsSilentIsNotReached) {
   std::unique_ptr<Link> link;
   FakeSonar gone([](Peer&) {});
   EXPECT_EQ(gone.open(link), connection_timed_out);

@@ -224,7 +224,7 @@ TEST_F(Recording, HoldsPackedSamples) {
   EXPECT_EQ(ping.samples, quiet.samples);
 }
 
-TEST_F(Recording, OfVersion1IsRead) {
+TEST_F(Recording, Version1IsRead) {
   std::string file("BVER\1\0\0\0", 8);
   put_frame(file, FrameType::hello_ok, hello);
   for (const int n : {0, 1}) put_frame(file, FrameType::ping_data, encode_ping(ping_number(n)));

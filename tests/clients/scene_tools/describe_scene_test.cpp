@@ -161,7 +161,7 @@ TEST_F(DescribeScene, HasTheErrorsOfTheLoader) {
   EXPECT_EQ(describe_scene(files.path("none.yaml")).error().kind, ErrorKind::missing_file);
 }
 
-TEST_F(DescribeScene, KnowsAConfiguration) {
+TEST_F(DescribeScene, RecognisesAConfiguration) {
   const auto config = files.write("sonard.yaml", "world: {scene: s.yaml}\nvehicles: [{name: rov}]\nsonars: []\n");
   const auto scene = describe_scene(config);
   ASSERT_FALSE(scene);

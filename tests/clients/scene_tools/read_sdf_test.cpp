@@ -160,7 +160,7 @@ TEST(ReadSdf, EveryShapeIsUnderstood) {
   EXPECT_THAT(r.findings.left_out(), ElementsAre());
 }
 
-TEST(ReadSdf, MissingLengthsAreTheDefaultsOfSdfAndAreTold) {
+TEST(ReadSdf, MissingLengthsAreTheDefaultsOfSdfAndAreReported) {
   Reading r;
   const auto part = [](const std::string& geometry) {
     return std::string("<visual name='v'><geometry>") + geometry + "</geometry></visual>\n";
@@ -211,7 +211,7 @@ TEST(ReadSdf, UnsupportedElementsAreNamedOnceWithTheirLine) {
                           "w.sdf:5: geometry polyline: scenes have no such shape", "model:/cam:2: sensor \"eye\""));
 }
 
-TEST(ReadSdf, ThePlaceOfAWorldIsGivenAsTheKeyThatTakesIt) {
+TEST(ReadSdf, ThePlaceOfAWorldIsGivenAsAKey) {
   Reading r;
   ASSERT_TRUE(
       r.read(sdf("<spherical_coordinates><latitude_deg>56.71</latitude_deg><longitude_deg>-3.5</longitude_deg>"
@@ -221,7 +221,7 @@ TEST(ReadSdf, ThePlaceOfAWorldIsGivenAsTheKeyThatTakesIt) {
               ElementsAre("w.sdf:3: spherical_coordinates: in the configuration, world.origin: {lat: 56.71, lon: -3.5}"));
 }
 
-TEST(ReadSdf, MistakesAreToldWithFileAndLine) {
+TEST(ReadSdf, MistakesAreReportedWithFileAndLine) {
   Reading r;
   EXPECT_THAT(r.error(sdf(model("m", link("base", "<pose relative_to='bse'/>")))),
               ::testing::AllOf(StartsWith("w.sdf:3: no frame \"bse\" in model \"m\""), HasSubstr("did you mean \"base\"?")));

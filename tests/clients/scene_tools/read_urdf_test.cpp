@@ -47,7 +47,7 @@ TEST(ReadUrdf, MeshesAndTheRest) {
   EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: gazebo", "w.sdf:3: transmission \"t\""));
 }
 
-TEST(ReadUrdf, MistakesAreToldWithFileAndLine) {
+TEST(ReadUrdf, MistakesAreReportedWithFileAndLine) {
   Reading r;
   EXPECT_THAT(r.error(robot(part("a") + joint("j", "a", "b"))), ::testing::StartsWith("w.sdf:3: joint \"j\": no link \"b\""));
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "b", "a"))), HasSubstr("form a circle"));

@@ -44,7 +44,7 @@ TEST(Geodesy, EveryPlaceLiesOnTheEllipsoid) {
     }
 }
 
-TEST(Geodesy, ItsAxesAreEastNorthAndUp) {
+TEST(Geodesy, LocalAxesAreEastNorthAndUp) {
   const Pose here = enu_in_ecef(at_deg(0, 0));
   expect_near(rotate(here.orientation, {1, 0, 0}), {0, 1, 0}, 1e-12);
   expect_near(rotate(here.orientation, {0, 1, 0}), {0, 0, 1}, 1e-12);

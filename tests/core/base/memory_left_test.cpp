@@ -25,7 +25,7 @@ struct MemoryLeft : testing::Test {
   const std::filesystem::path root = std::filesystem::path(testing::TempDir()) / ("memory-left-" + std::to_string(getpid()));
 };
 
-TEST_F(MemoryLeft, IsUnknownWhereNothingSaysIt) {
+TEST_F(MemoryLeft, IsUnknownWithoutASource) {
   EXPECT_FALSE(memory_left_bytes());
   EXPECT_TRUE(check_memory_for("a scene", ~std::uint64_t{0}));
   memory_root() = "/";

@@ -67,7 +67,7 @@ TEST(Fan, PutsPortLeftStarboardRightAndFarUp) {
   EXPECT_GT(n.y, p.y) << "nearer is lower";
 }
 
-TEST(Fan, PlacesASampleWhereItsRangeAndBearingSay) {
+TEST(Fan, PlacesASampleByItsRangeAndBearing) {
   PolarImage image = black_fan(200, 121, 60);  // a beam each degree
   const std::size_t beam = 60 - 30;            // 30 degrees to port
   image.samples[100 * 121 + beam] = 255;       // range 5.025 m
@@ -175,7 +175,7 @@ TEST(ColourMap, RunsFromItsFirstToItsLastAnchorAndNeverBeyond) {
   EXPECT_THAT(find_colour_map("grey").error().text, testing::HasSubstr("gray, copper"));
 }
 
-TEST(Png, IsWrittenWholeOrRefusedWithASentence) {
+TEST(Png, IsWrittenCompletelyOrRefused) {
   const auto folder = std::filesystem::path(testing::TempDir()) / "fan_image_test";
   const auto file = folder / "deep" / "fan.png";
   ASSERT_TRUE(write_png(*draw_fan(black_fan(10, 16, 60), plain_gray(64)), file));

@@ -57,7 +57,7 @@ TEST(TrajectoryFile, AnEqualStampReplacesThePose) {
   EXPECT_EQ(parsed("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n").replaced, 0u);
 }
 
-TEST(TrajectoryFile, AFirstStampBeyondSecondsTellsTheUnit) {
+TEST(TrajectoryFile, AFirstStampBeyondSecondsDeterminesTheUnit) {
   const auto of = [](const std::string& first, const std::string& second) {
     return parsed(first + " 0 0 -3 0 0 0 1\n" + second + " 1 0 -3 0 0 0 1\n");
   };
@@ -74,7 +74,7 @@ TEST(TrajectoryFile, AFirstStampBeyondSecondsTellsTheUnit) {
   EXPECT_THAT(refusal("t_s,x,y,z\n1305031102175,1,2,3\n"), HasSubstr("\"1305031102175\" is not a time in seconds"));
 }
 
-TEST(TrajectoryFile, StepsTellTheUnitOfStampsThatBeginAtZero) {
+TEST(TrajectoryFile, StepsDetermineTheUnitOfStampsFromZero) {
   /// Lines of a body at `m_s`, `steps_s` apart, with stamps in units of `unit_s`.
   const auto lines = [](double step_s, double unit_s, double m_s, bool euroc = false) {
     std::ostringstream out;
@@ -131,7 +131,7 @@ TEST(TrajectoryFile, FilesOfOtherProgramsAreRead) {
   EXPECT_EQ(parsed("0,0,0,0,1,0,0,0\n5000000,0,0,0,1,0,0,0\n").duration, milliseconds(5));
 }
 
-TEST(TrajectoryFile, EveryFormatSaysTheSame) {
+TEST(TrajectoryFile, EveryFormatGivesTheSamePoses) {
   const struct {
     Format format;
     std::string text;
@@ -176,7 +176,7 @@ TEST(TrajectoryFile, MatricesOfAllTurnsBecomeQuaternions) {
   }
 }
 
-TEST(TrajectoryFile, TakesTheFrameFromTheFileOrFromWhoAsks) {
+TEST(TrajectoryFile, TakesTheFrameFromTheFileOrTheCaller) {
   const std::string line = "t,x,y,z,yaw_deg\n0,10,20,3,90\n";  // 10 m north, 20 m east, 3 m deep, heading east
   for (const TrajectoryFile& file :
        {parsed("# frame: NED_FRD\n" + line, {}), parsed(line + "# and the frame: ned_frd", {}),
@@ -223,7 +223,7 @@ TEST(TrajectoryFile, HoldsSeveralBodiesOnOneClock) {
   EXPECT_THAT(refusal("body,t,x,y,z\n,1,0,0,0\n"), "p.csv:2: a body's name must have 1 to 64 printable characters");
 }
 
-TEST(TrajectoryFile, TellsMistakesWithTheirLine) {
+TEST(TrajectoryFile, ReportsMistakesWithTheirLine) {
   const struct {
     const char *text, *says;
   } mistakes[] = {

@@ -47,7 +47,7 @@ Seen look(const RayScene& rays, Vec3d direction) {
   return {rays.scene().objects[p.object[3]].name, p.far[3], std::abs(dot(normal, direction)) / (length(normal) * size)};
 }
 
-TEST(AnalyticRays, MeetShapesWhereTheyAre) {
+TEST(AnalyticRays, HitShapesAtTheirPlace) {
   RayScene rays(scene_of(shapes_yaml), 1);
   EXPECT_EQ(RayScene::version(), "analytic rays") << "linked with another tracer";
   const Seen crate = look(rays, {1, 0, 0}), ball = look(rays, {3, 0.9, 0}), pile = look(rays, {3, -0.9, 0}),

@@ -15,7 +15,7 @@ std::shared_ptr<const Scene> box_before_half_a_wall() {
   return SceneMaker().add(box({0.5, 0.5, 3}), -20, {4.5, 1.5, 0}).add(wall(10, 10), -20, {6, 10, 0}).make();
 }
 
-TEST(Truth, EveryBeamTellsWhatItMeetsFirst) {
+TEST(Truth, EveryBeamHasItsFirstHit) {
   for (const int fan : {0, 100}) {
     Sounding s(box_before_half_a_wall(), p900(), native_rows(10, 0.0254));
     s.request.switches.keep_truth = true;
@@ -34,7 +34,7 @@ TEST(Truth, EveryBeamTellsWhatItMeetsFirst) {
   }
 }
 
-TEST(Truth, IsLeftOutUnlessAskedFor) {
+TEST(Truth, IsOmittedWithoutARequest) {
   Sounding s(box_before_half_a_wall(), p900(), native_rows(8, 0.0254));
   const Ping& ping = s.ping();
   EXPECT_TRUE(ping.truth.empty());

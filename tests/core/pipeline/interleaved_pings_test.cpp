@@ -48,7 +48,7 @@ double correlation_with_next(const Ping& ping, int of) {
   return std::abs(sum) / power;
 }
 
-TEST(InterleavedPings, EachBeamIsAsItsOwnPingFoundIt) {
+TEST(InterleavedPings, EachBeamEqualsThatOfItsOwnPing) {
   Sounding s = over_bed(pings), one = over_bed(1);
   s.request.switches.noise = one.request.switches.noise = true;
   s.request.sonar_moves = one.request.sonar_moves = {{0.8, 0.4, 0}, {0, 0, 0.3}};
@@ -109,7 +109,7 @@ Sounding of_eight_pings(int threads) {
   return s;
 }
 
-TEST(InterleavedPings, LeaveOutWhatTheirBeamsDoNotHear) {
+TEST(InterleavedPings, OmitColumnsThatTheirBeamsDoNotUse) {
   Sounding all = of_eight_pings(2);
   all.request.switches.keep_labels = true;  // labels belong to whole pings
   all.ping();

@@ -76,7 +76,7 @@ TEST(PointOracles, Oracle02_SoundSpeedMismatchScalesRange) {
   }
 }
 
-TEST(PointOracles, BearingsFollowTheDevicesSoundSpeedWhereAsked) {
+TEST(PointOracles, BearingsFollowTheDevicesSoundSpeedIfConfigured) {
   for (const FrequencyMode& mode : {p900(), oculus_high()})
     for (const double c : {1412.0, 1500.0, 1549.0})
       for (const double deg : {25.0, -12.0, 0.0})

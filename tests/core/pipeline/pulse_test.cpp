@@ -160,7 +160,7 @@ TEST(Pulse, AMeasuredPulseIsWhatItsSamplesWereTakenOf) {
   EXPECT_FALSE(p.is_real());
 }
 
-TEST(Pulse, WaveformsThatCannotBeUsedAreRefusedWithASentence) {
+TEST(Pulse, UnusableWaveformsAreRefused) {
   const double step_s = 3e-5;
   const Waveform good = waveform_of(Shape::measured);
   if (!spectral::have_transform) {

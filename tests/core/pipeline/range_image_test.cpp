@@ -84,7 +84,7 @@ TEST(RangeImage, BelievedSoundSpeedScalesRanges) {
   EXPECT_NEAR(s.range_m(127, 32) / right, 1450.0 / 1500, 1e-3);
 }
 
-TEST(RangeImage, AnglesFollowTheBelievedSoundSpeedWhereAsked) {
+TEST(RangeImage, AnglesFollowTheDevicesSoundSpeedIfConfigured) {
   const double c = 1412, azimuth = rad_from_deg(25), elevation = rad_from_deg(-12);
   const Vec3d there{6 * std::cos(elevation) * std::cos(azimuth), 6 * std::cos(elevation) * std::sin(azimuth),
                     6 * std::sin(elevation)};
@@ -205,7 +205,7 @@ TEST(RangeImage, FiltersAndSpeckleLeaveAPlaneWhereItIs) {
     EXPECT_NEAR(std::remainder(s.range_m(column, 31), 0.005), 0, s.wanted->range_unit_m) << column;
 }
 
-TEST(RangeImage, BeamsThatHearTheSameScattererReportItsRange) {
+TEST(RangeImage, BeamsWithTheSameScattererReportTheSameRange) {
   RangeImageSounding s(plane_ahead(5));
   s.wanted->chosen_as_heard = true;
   const auto equal = [&s] {  // share of ranges that are equal to that of the neighbour
@@ -289,7 +289,7 @@ TEST(RangeImage, AStrongerEchoOutsideTheRangesHidesNone) {
   EXPECT_NEAR(s.range_m(127, 31), 5.0, 0.02);
 }
 
-TEST(RangeImage, KeepsPressureAndTruthWhereAsked) {
+TEST(RangeImage, KeepsPressureAndTruthOnRequest) {
   RangeImageSounding s(plane_ahead(5));
   s.request().switches.expected_power = s.request().switches.keep_pressure = s.request().switches.keep_truth = true;
   const Ping& ping = s.ping();

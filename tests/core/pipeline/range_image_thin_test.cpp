@@ -41,7 +41,7 @@ double power_of(const Pole& pole, const PingRequest& request) {
 
 /// Compares the power that all beams receive from the pole with Lambert's law summed over its surface, for 64 positions of the
 /// sonar within one cell of the beam grid (16 if the pole is thick).
-TEST(ThinRangeImage, HearsThinPolesWhereverTheyAre) {
+TEST(ThinRangeImage, ReportsThinPolesAtAnyPlace) {
   // The sum of the weights of the beams around a point. Each beam is at -3 dB at 0.75 degrees off its axis.
   const auto weights = [](double step_rad) {
     double sum = 0;

@@ -84,7 +84,7 @@ TEST(RangeWindow, HasTheNoiseOfItsRows) {
   EXPECT_NEAR(window / mean(), 1, 0.03);
 }
 
-TEST(RangeWindow, BeginsAtItsRangeAndHearsTailsFromBefore) {
+TEST(RangeWindow, BeginsAtItsRangeWithTailsOfEarlierEchoes) {
   const PingSettings settings = from_start(default_rows(4, 200));
   const auto range_of = [&](double rows) { return settings.range_start_m + rows * settings.range_bin_m; };
   const auto loudest_at = [&](double rows_beyond_start) {
@@ -101,7 +101,7 @@ TEST(RangeWindow, BeginsAtItsRangeAndHearsTailsFromBefore) {
   EXPECT_EQ(*std::max_element(before.begin(), before.end()), 0);
 }
 
-TEST(RangeWindow, CostsWhatItShows) {
+TEST(RangeWindow, TakesTimeInProportionToItsRows) {
   const auto flat = [](double, double) { return -3.0; };
   PingSettings settings = native_rows(32, 0.05), far = settings;
   settings.beam_count = far.beam_count = 64;

@@ -21,7 +21,7 @@ double two_way_db(const FrequencyMode& mode, double psi_rad) {
   return 40 * std::log10(std::abs(std::sin(pi * x) / (pi * x)));
 }
 
-TEST(SideLobes, PointsAreHeardAllAround) {
+TEST(SideLobes, PointsEchoAllAround) {
   for (const FrequencyMode& mode : {p900(), oculus_high()}) {
     double loudest = 0;
     for (const double deg : {0.01, 10.0, 14.0, 20.0, 25.0, 35.0, 50.0, -20.0, -50.0, 75.0, -78.0}) {
@@ -177,7 +177,7 @@ TEST(SideLobes, AnObstacleBelowTheFanIsThere) {
   record_oracle(no_number, "sphere in a side lobe, two-way pattern", two_way_db(p900(), rad_from_deg(-50)),
                 db(heard(-50, true) / heard(0, true)), 1, "dB");
 }
-TEST(SideLobes, SwitchedOffNothingIsHeardThere) { expect_bed(p900(), false, false); }
+TEST(SideLobes, WithoutTheSwitchThereAreNoEchoes) { expect_bed(p900(), false, false); }
 
 }  // namespace
 }  // namespace sonar::test::side_lobes_test

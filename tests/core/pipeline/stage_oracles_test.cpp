@@ -314,7 +314,7 @@ TEST(StageOracles, Oracle44_AwkwardHitsGiveFiniteEchoes) {
   record_oracle(44, "echoes that are not finite, of NaN, infinite, zero-range and grazing hits", 0, bad, 0, "");
 }
 
-TEST(StageOracles, Oracle44_AwkwardSettingsAreRefusedWithASentence) {
+TEST(StageOracles, Oracle44_AwkwardSettingsAreRefused) {
   Sounding s(SceneMaker().make(), p900(), default_rows(10, 394));
   EXPECT_EQ(why_invalid(s.request), "");
   const auto refused = [&](auto&& change) {
@@ -346,7 +346,7 @@ TEST(StageOracles, Oracle44_AwkwardSettingsAreRefusedWithASentence) {
 }
 
 // Requests for more memory than any machine has are also refused. Requests that are only large are accepted.
-TEST(StageOracles, Oracle44_PicturesBeyondAllMemoryAreRefusedWithASentence) {
+TEST(StageOracles, Oracle44_PicturesBeyondAllMemoryAreRefused) {
   Sounding s(SceneMaker().make(), p900(), default_rows(10, 394));
   const auto why = [&](auto&& change, bool exact = false) {
     PingRequest r = s.request;

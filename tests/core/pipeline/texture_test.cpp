@@ -50,7 +50,7 @@ Moments pairs(const Texture& texture, Vec3d along, double apart_m) {
   return m;
 }
 
-TEST(Texture, AValueDoesNotDependOnWhatWasAskedBefore) {
+TEST(Texture, AValueDoesNotDependOnEarlierCalls) {
   const TextureField field({1, 0.5f}, 5, Seed{11});
   TexturePatch patch(field, 2);
   for (int n = 0; n < 2000; ++n) {

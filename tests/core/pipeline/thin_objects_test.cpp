@@ -88,7 +88,7 @@ double pole_echo_per_m2(double radius_m, double half_height_m, double x, double 
   return sum;
 }
 
-TEST(ThinObjects, SpheresFromOneCentimetreEchoAsLambertSays) {
+TEST(ThinObjects, SpheresFromOneCentimetreFollowLambertsLaw) {
   for (const Look& look : looks())
     for (const double a : {0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.4, 1.0}) {
       double worst = 0;
@@ -104,7 +104,7 @@ TEST(ThinObjects, SpheresFromOneCentimetreEchoAsLambertSays) {
 }
 
 // For the pulses of long ranges, cells are coarser than the first cubes of a small body.
-TEST(ThinObjects, SpheresAreHeardInSpeckleWithLongPulses) {
+TEST(ThinObjects, SpheresEchoInSpeckleWithLongPulses) {
   for (const double range : {64.0, 120.0, 200.0}) {
     const Look look{"long", oculus_low(), 30, 0.9 * range / 437};
     for (const bool aside : {false, true}) {
@@ -130,7 +130,7 @@ TEST(ThinObjects, SpheresAreHeardInSpeckleWithLongPulses) {
   }
 }
 
-TEST(ThinObjects, PolesFromOneCentimetreEchoAsLambertSays) {
+TEST(ThinObjects, PolesFromOneCentimetreFollowLambertsLaw) {
   constexpr double half_height = 0.5;
   for (const Look& look : looks())
     for (const double a : {0.01, 0.02, 0.05, 0.2, 1.0}) {
@@ -180,7 +180,7 @@ TEST(ThinObjects, OpenMeshesEchoFromBothSides) {
   EXPECT_GT(db(echo_per_m2(s)), level[0] - 0.3) << "no side of the muddled box is lost";
 }
 
-TEST(ThinObjects, AClosedRoomIsSeenFromWithin) {
+TEST(ThinObjects, AClosedRoomEchoesFromWithin) {
   // Normals point outwards. Seen from inside, all of them point away.
   Sounding closed = looking_at(SceneMaker().add(box({4, 3, 2}), lambert_db, {1, 0.5, 0}).make(), looks()[0]);
   Mesh open = box({4, 3, 2});
@@ -229,7 +229,7 @@ double heard_behind_screen_db(const Look& look, double yaw, double gap_m, int ap
   return db(heard(true) / heard(false));
 }
 
-TEST(ThinObjects, APlateBehindAnOpaqueScreenIsNotHeard) {
+TEST(ThinObjects, APlateBehindAnOpaqueScreenHasNoEcho) {
   for (const Look& look : looks())
     for (const double yaw : {0.0, 0.5})  // the screen faces the sonar exactly or almost
       for (const double gap : {0.005, 0.01, 0.03, 0.04, 0.2})
@@ -238,7 +238,7 @@ TEST(ThinObjects, APlateBehindAnOpaqueScreenIsNotHeard) {
 }
 
 // Numbers whose last bits are equal.
-TEST(ThinObjects, ObjectsOfLargeScenesAreToldApart) {
+TEST(ThinObjects, ObjectsOfLargeScenesAreDistinguished) {
   for (const SimdLevel level : {SimdLevel::portable, SimdLevel::avx2, SimdLevel::avx512})
     for (const double yaw : {0.0, 0.5})
       for (const int apart : {63, 64, 1024})

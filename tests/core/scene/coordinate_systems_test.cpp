@@ -260,7 +260,7 @@ TEST_F(UnknownSystem, EastingsMayBeginWithTheirZone) {
   EXPECT_THAT(said("", options, "33400000"), HasSubstr("not eastings and northings of UTM"));
 }
 
-TEST(UnnamedSystem, ANoteTellsOfMetresThatCouldBeDegrees) {
+TEST(UnnamedSystem, ANoteNamesMetresThatCouldBeDegrees) {
   TemporaryFiles files;
   const auto notes = [&](const std::string& corner, const std::string& cell, const HeightOptions& options = {},
                          const std::string& heights = "-30 -30.1 -30.2 -30.1\n-30 -30.1 -30 -30\n") {

@@ -37,7 +37,7 @@ TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
   EXPECT_FLOAT_EQ(read_esri_heights(files.write("g.asc", small_grid), {.z_scale = -1})->z_m[6], -1);
 }
 
-TEST(EsriGrid, HeadersOfOtherProgramsSayTheSame) {
+TEST(EsriGrid, HeadersOfOtherProgramsAreRead) {
   TemporaryFiles files;
   const std::string heights = "-1 -2 -3\n-4 -5 -9999\n";
   for (const char* header : {"ncols = 3\nnrows = 2\nxllcorner = 100\nyllcorner = 200\ncellsize = 10\nNODATA_value = -9999\n",
@@ -95,7 +95,7 @@ std::string grid_of(const std::string& header, const std::string& odd, int edge 
   return text;
 }
 
-TEST(EsriGrid, KnowsNoDataInEveryForm) {
+TEST(EsriGrid, NoDataIsRecognisedInEveryForm) {
   TemporaryFiles files;
   const std::string at = "xllcorner 0\nyllcorner 0\n", metre = at + "cellsize 1";
   const auto holes_in = [&](const std::string& text, bool with_note) {

@@ -154,7 +154,7 @@ std::string answer_of(Work&& work) {
   return !answer ? "none" : *answer ? "a mesh" : answer->error().text;
 }
 
-TEST(ImportLimits, MemoryThatIsNotThereEndsTheImportWithASentence) {
+TEST(ImportLimits, TooLittleMemoryEndsTheImportWithAnError) {
   if (!memory_is_limited()) GTEST_SKIP() << "the system keeps no such limit";
   const std::string text = answer_of([] { std::vector<char>().reserve(std::size_t{2} << 30); });
   EXPECT_THAT(text,
@@ -171,7 +171,7 @@ TEST(ImportLimits, MemoryIsGivenFreeForWhatComesAfterTheImport) {
             "none");
 }
 
-TEST(ImportLimits, TimeThatIsUsedUpEndsTheImportWithASentence) {
+TEST(ImportLimits, TheTimeLimitEndsTheImportWithAnError) {
   for (const int signal : {SIGXCPU, SIGALRM})
     EXPECT_EQ(answer_of([&] { ::raise(signal); }),
               "m.ply: is not read within 50 s of processor time; simplify it, or join its objects");

@@ -66,7 +66,7 @@ TEST(ShippedScenes, DemoStaysSmallAndHasTheListedObjects) {
   EXPECT_EQ(names, (std::set<std::string>{"steel", "wood"}));
 }
 
-TEST(ShippedScenes, LTargetsStandWhereTheTableSays) {
+TEST(ShippedScenes, LTargetsAreAtThePlacesOfTheTable) {
   const RayScene rays(shipped("l-targets"), 1);
   const auto expect = [&](double azimuth, double elevation, const char* name, double range) {
     const auto [object, distance] =

@@ -35,7 +35,7 @@ TEST(Noise, IsSmoothBoundedAndDrawnFromItsSeed) {
   EXPECT_LT(step, 1e-3);
 }
 
-TEST(Seabed, HasTheSizeSpacingAndReliefAskedFor) {
+TEST(Seabed, HasTheRequestedSizeSpacingAndRelief) {
   SeabedShape shape{.size_x_m = 30, .size_y_m = 20, .fine_x_m = 30, .fine_y_m = 20, .spacing_x_m = 0.25, .spacing_y_m = 0.5};
   shape.relief_m = 0.2;
   const HeightGrid grid = make_seabed(shape);

@@ -135,7 +135,7 @@ TEST_F(UtmGrid, TheWorldsOriginPlacesAGridWithoutAnOrigin) {
   EXPECT_THAT(notes_of({.geographic = true, .origin = near, .world_origin = origin}), HasSubstr("10 km from world.origin"));
 }
 
-TEST_F(UtmGrid, AnOriginAboveTheSeaLeavesHeightsAsTheyAreAndSaysSo) {
+TEST_F(UtmGrid, AnOriginAboveTheSeaDoesNotChangeHeights) {
   const Geodetic lake{origin.latitude_rad, origin.longitude_rad, 3812};
   const HeightOptions options{.utm = UtmZone{33, false}, .world_origin = lake};
   EXPECT_THAT(notes_of(options), HasSubstr("z = 0, which is 3812 m above mean sea level by world.origin; if they are above mean "

@@ -93,7 +93,7 @@ TEST(XyzGrid, NamesOfColumnsMayStandInAComment) {
   EXPECT_EQ(first_x("# lat lon z\nx y z\n"), 1) << "a line of names counts more";
 }
 
-TEST(XyzGrid, NamesInACommentAlsoTellTheHeightAndDepths) {
+TEST(XyzGrid, NamesInACommentSelectHeightAndDepths) {
   TemporaryFiles files;
   for (const char* begin : {"", "# "}) {
     const auto read = [&](const std::string& names, const std::string& points) {

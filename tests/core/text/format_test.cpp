@@ -17,7 +17,7 @@ TEST(Format, IsOfAnyLength) {
   EXPECT_EQ(format("a %s b", name.c_str()), "a " + name + " b");
 }
 
-TEST(Format, FrequenciesAreSaidInTheirUnit) {
+TEST(Format, FrequenciesAreWrittenWithTheirUnit) {
   EXPECT_EQ(frequency_text(2.1e6), "2.1 MHz");
   EXPECT_EQ(frequency_text(1e6), "1 MHz");
   EXPECT_EQ(frequency_text(750e3), "750 kHz");

@@ -52,7 +52,7 @@ TEST(StrictYamlHostile, WrongYamlIsRefused) {
   EXPECT_TRUE(parse_yaml("\xef\xbb\xbf# \xe2\x82\xac\na: r\xc3\xb6v", "f.yaml"));
 }
 
-TEST(StrictYamlHostile, ARootThatIsNotAMapIsSaid) {
+TEST(StrictYamlHostile, ARootThatIsNotAMapIsReported) {
   for (const char* text : {"[1]", "word", "- a"}) {
     auto d = parse_yaml(text, "f.yaml");
     ASSERT_TRUE(d);
@@ -109,7 +109,7 @@ void read_all(const Node& n, int depth = 0) {
   }
 }
 
-TEST(StrictYamlHostile, EveryTruncationAndManyMutationsEndInAValueOrASentence) {
+TEST(StrictYamlHostile, TruncationsAndMutationsGiveAValueOrAnError) {
   const std::string good =
       "name: \"t\\u00e9st\"\nlist: [1, 2.5, {x: y, z: ~}]\nblock: |\n  text\n  more\n"
       "deep:\n  - a: 'q'\n    b: >-\n      folded\n  - !x b\n? c\n: d\n# end\n";

@@ -107,7 +107,7 @@ TEST(StrictYaml, NumbersAreDecimalOnly) {
   EXPECT_EQ(read_number("{b: 1}"), "f.yaml:1:4: a: must be a number, found a map");
 }
 
-TEST(StrictYaml, RangesAreCheckedAndSaid) {
+TEST(StrictYaml, RangesAreCheckedAndReported) {
   EXPECT_EQ(read_number("50", Range::between(1, 40)), "f.yaml:1:4: a: must be between 1 and 40, found 50");
   EXPECT_EQ(read_number("-1", Range::at_least(0)), "f.yaml:1:4: a: must be at least 0, found -1");
   EXPECT_EQ(read_number("0", Range::above(0)), "f.yaml:1:4: a: must be above 0, found 0");
@@ -193,7 +193,7 @@ TEST(StrictYaml, UnknownKeyNamesTheNearest) {
   EXPECT_EQ(read("sonars: []\ncolour: red", reader), "f.yaml:2:1: colour: unknown key; valid keys: sonars");
 }
 
-TEST(StrictYaml, MissingKeyIsSaidUnlessASlipExplainsIt) {
+TEST(StrictYaml, AMissingKeyIsReportedUnlessATypingErrorExplainsIt) {
   EXPECT_EQ(read("b: 1", [](Map m) { m.optional("b").number(), m.required("scene").text(); }),
             "f.yaml:1:1: scene: required key is missing");
   EXPECT_EQ(read("b: {}", [](Map m) { m.optional("b").map().required("scene").text(); }),
@@ -256,7 +256,7 @@ TEST(StrictYaml, FilesThatCannotBeRead) {
   EXPECT_THAT(folder.error().text, HasSubstr("is a folder, not a regular file"));
 }
 
-TEST(StrictYaml, ErrorsCarryTheKindAskedFor) {
+TEST(StrictYaml, ErrorsHaveTheRequestedKind) {
   const auto bad = parse_yaml("a: [", "s.yaml", {.error_kind = ErrorKind::bad_data});
   ASSERT_FALSE(bad);
   EXPECT_EQ(bad.error().kind, ErrorKind::bad_data);

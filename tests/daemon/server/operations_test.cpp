@@ -86,7 +86,7 @@ TEST(Status, HasModelAddressAndState) {
   EXPECT_EQ(s.environment().temperature_c().value(), 12);
 }
 
-TEST(SetSonar, IsSeenInTheNextPingAndEchoedAsAFireMessage) {
+TEST(SetSonar, AffectsTheNextPingAndIsEchoedAsAFireMessage) {
   Daemon daemon;
   Client client(daemon.address());
   oculus::FireRequest fire = fire_at(PingRate::hz40, 3);

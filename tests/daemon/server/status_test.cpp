@@ -86,7 +86,7 @@ TEST(Status, ComesOnceASecond) {
   EXPECT_LT(took, patience);
 }
 
-TEST(Status, AdvertisesAnotherAddressWhenTold) {
+TEST(Status, AdvertisesTheConfiguredAddress) {
   Listener listener;
   DaemonSetup setup;
   setup.sonar_lines = "    advertise_ip: 127.9.9.9\n    status_to: ['127.0.0.1:" + std::to_string(listener.port) + "']\n";

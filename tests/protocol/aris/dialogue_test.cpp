@@ -82,7 +82,7 @@ Command set_salinity(std::uint32_t psu) {
   return command;
 }
 
-TEST(ArisDialogue, CommandsAddUpWhileAFaultHoldsThemBack) {
+TEST(ArisDialogue, CommandsAddUpWhileAFaultDelaysThem) {
   Talk talk;
   talk.late = true;
   talk.say(tests::set_receiver(56444));
@@ -142,7 +142,7 @@ TEST(ArisDialogue, RefusedSettingsChangeNothingButTheCookie) {
   EXPECT_THAT(talk.notices.at(0), HasSubstr("ping mode 1"));
 }
 
-TEST(ArisDialogue, AHostThatAsksForTheSettingsOfEachProductIsNotComplainedAbout) {
+TEST(ArisDialogue, SettingsOfEachProductCauseNoWarning) {
   for (const auto& model : vendor().models()) {
     Talk talk(model->profile.c_str());
     const auto host = make_host({});
@@ -195,7 +195,7 @@ TEST(ArisDialogue, WrongDatesAreRefused) {
     EXPECT_FALSE(parse_date_time(bad)) << bad;
 }
 
-TEST(ArisDialogue, JunkIsReportedAndALyingLengthEndsIt) {
+TEST(ArisDialogue, JunkIsReportedAndAWrongLengthEndsTheConnection) {
   Talk talk;
   talk.say(tests::hex("00000002 FF FF 00000005 08 0E 82 01 00"));
   EXPECT_EQ(talk.notices.size(), 1u);

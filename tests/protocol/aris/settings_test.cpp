@@ -155,7 +155,7 @@ TEST(ArisOverride, IsWhatAControllerWouldHaveSet) {
   EXPECT_THAT(why({{}, {}, {}, 9u, {}}), HasSubstr("4 mode(s)"));
 }
 
-TEST(ArisOverride, RefusalNamesOnlyTheBeamsOfTheWantedMode) {
+TEST(ArisOverride, RefusalNamesOnlyTheBeamsOfTheRequestedMode) {
   const auto state = tests::device();
   for (const std::uint32_t mode : {0u, 1u, 2u, 3u}) {
     const auto in_mode = vendor().apply_override({{}, {}, {}, mode, {}}, state);

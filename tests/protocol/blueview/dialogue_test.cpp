@@ -37,7 +37,7 @@ bool closes(const Reaction& r) {
 }
 std::uint32_t id_of(const wire::Bytes& header) { return test::reply_from(header).header.request_id; }
 
-TEST(BlueViewDialogue, HelloTellsWhatTheSonarIs) {
+TEST(BlueViewDialogue, HelloIsAnsweredWithTheSonarsDescription) {
   auto device = test::device("blueview-m900-2250-130");
   Host host(device);
   const Reaction r = host.say(test::hello());
@@ -106,7 +106,7 @@ TEST(BlueViewDialogue, SeveralSetsInOneReadAllHold) {
   EXPECT_EQ(now.heads[0].tvg_db_per_m, 0.5f);
 }
 
-TEST(BlueViewDialogue, APingGoesToThoseWhoAskedAndOnlyOnce) {
+TEST(BlueViewDialogue, APingGoesOnceToHostsThatRequestedIt) {
   auto device = test::device();
   Host one(device), two(device), quiet(device);
   for (Host* h : {&one, &two, &quiet}) h->say(test::hello());
@@ -124,7 +124,7 @@ TEST(BlueViewDialogue, APingGoesToThoseWhoAskedAndOnlyOnce) {
   EXPECT_TRUE(one.ready().prefixes.empty()) << "answered already";
 }
 
-TEST(BlueViewDialogue, APingFiredWithOlderSettingsIsNotTheOneAskedFor) {
+TEST(BlueViewDialogue, APingWithOlderSettingsDoesNotAnswerARequest) {
   auto device = test::device();
   Host host(device);
   host.say(test::hello());

@@ -61,7 +61,7 @@ TEST(BlueViewFrames, ValuesComeBack) {
   EXPECT_FALSE(read_value(reader, Key::gain));
 }
 
-TEST(BlueViewDiscovery, AnswersItsOwnQuestionOnly) {
+TEST(BlueViewDiscovery, AnswersOnlyItsOwnQuery) {
   const auto device = test::device();
   wire::Bytes question;
   for (const char c : {'B', 'V', 'E', '?'}) question.push_back(static_cast<std::byte>(c));

@@ -107,7 +107,7 @@ TEST(HeadSettings, NoSettingsAreTheInitialOnes) {
   EXPECT_TRUE(settings_from(nullptr, device).equals(initial_sonar_settings(device)));
 }
 
-TEST(HeadSettings, AreEqualWhenNoHostSeesADifference) {
+TEST(HeadSettings, AreEqualIfNoHostGetsADifference) {
   const SonarSettings initial = initial_sonar_settings(test::device());
   SonarSettings other = initial;
   EXPECT_TRUE(other.equals(initial));

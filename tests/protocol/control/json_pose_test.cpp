@@ -58,7 +58,7 @@ TEST(JsonPose, KeepsTheAnglesThatWereSent) {
   EXPECT_EQ(largest(R"("quaternion":[1,0,0,0])"), 0);
 }
 
-TEST(JsonPose, RefusesWithASentence) {
+TEST(JsonPose, RefusalsHaveAReason) {
   EXPECT_EQ(why("nonsense"), "line is not JSON");
   EXPECT_EQ(why(""), "line is not JSON");
   EXPECT_EQ(why("[1,2,3]"), "line is not a JSON object");
@@ -139,7 +139,7 @@ TEST(LineParser, AfterAGapTheNextWholeLineIsTaken) {
   EXPECT_EQ(swallows.next().value().text, "{}");
 }
 
-TEST(LineParser, ARequestLineIsKnownBeforeItEnds) {
+TEST(LineParser, ARequestLineIsDetectedBeforeItsEnd) {
   LineParser parser;
   EXPECT_TRUE(parser.may_become_object());
   parser.feed(bytes("{\"position\":[0,0,0]}\n  \r\n {\"pos"));
@@ -168,7 +168,7 @@ TEST(LineParser, AByteOrderMarkAtTheStartIsSkipped) {
   }
 }
 
-TEST(LineParser, TellsWhatBeginsAsAnObject) {
+TEST(LineParser, DetectsLinesThatBeginLikeAnObject) {
   const auto begins = [](const std::string& line) {
     LineParser parser;
     parser.feed(bytes(line));

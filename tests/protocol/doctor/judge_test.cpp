@@ -146,7 +146,7 @@ TEST(Judge, AConnectionForCommandsNeedsNoPings) {
   EXPECT_THAT(trouble(with(commands + "}"), "driver").text, HasSubstr("has not asked for pings")) << "nobody gets pings yet";
 }
 
-TEST(Judge, StandbyAndNoiseOnlyNameWhoAsked) {
+TEST(Judge, StandbyAndNoiseNameTheirClient) {
   EXPECT_EQ(trouble(with(driver + R"(asked_by: "192.0.2.7:4000")"), "standby").text,
             "front is in standby: its rate is 0, set by 192.0.2.7:4000");
   v1::DaemonStatus silenced = with(pinging + driver + R"(silenced_by: "http 192.0.2.8")");

@@ -131,7 +131,7 @@ TEST(DvlSerial, AChecksumIsOptionalAndIfGivenRight) {
     EXPECT_THAT(line.ask(wrong + std::string("\n")), ElementsAre("wr!")) << wrong;
 }
 
-TEST(DvlSerial, ASentenceMayComeInPiecesButNotSlowly) {
+TEST(DvlSerial, ASentenceMayComeInPiecesWithinATimeLimit) {
   Line line;
   for (const char* piece : {"w", "c", "v"}) {
     EXPECT_THAT(line.ask(piece), IsEmpty());

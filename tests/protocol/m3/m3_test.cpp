@@ -61,7 +61,7 @@ float float_at(BytesView bytes, std::size_t at) {
 }
 std::string text_at(BytesView bytes, std::size_t at) { return reinterpret_cast<const char*>(bytes.data() + at); }
 
-TEST(M3Packets, HaveTheirFieldsWhereTheTablesSay) {
+TEST(M3Packets, HaveFieldsAtTheOffsetsOfTheTables) {
   const protocol::DeviceState state = device();
   const Bytes packet = encode_packet(ping_of(state), state);
   constexpr std::size_t body = 8512 + 8 * 128 * 1372, data = 56;
@@ -250,7 +250,7 @@ TEST(M3Host, TakesNoPacketThatContradictsItself) {
   EXPECT_FALSE(pings[0].picture());
 }
 
-TEST(M3Host, SaysThatDriversSetNothing) {
+TEST(M3Host, RefusesAllSettings) {
   protocol::Wanted wanted;
   wanted.settings.range_m = 5;
   const auto host = make_host(wanted);

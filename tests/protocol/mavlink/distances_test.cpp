@@ -90,7 +90,7 @@ TEST(DistanceSensorMessage, TheOrientationIsThatOfTheMount) {
   EXPECT_NEAR(wxyz[2], -0.38268, 1e-5);
 }
 
-TEST(MavlinkDistances, AllAreSentWhenTheSettingsSaySo) {
+TEST(MavlinkDistances, AllAreSentIfConfigured) {
   DistanceRequests none(false), all(true);
   EXPECT_FALSE(none.wanted());
   EXPECT_FALSE(none.is_due(at_ms(0)));

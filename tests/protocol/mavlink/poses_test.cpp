@@ -186,7 +186,7 @@ TEST(MavlinkPoses, TheBestSourceThatIsAliveCounts) {
       << "ODOMETRY is silent for 1.1 s";
 }
 
-TEST(MavlinkPoses, WhereTimeIsWhatPosesSayThoseWithoutAreNoSource) {
+TEST(MavlinkPoses, MessagesWithoutATimeAreNoSourceIfPosesSetTheTime) {
   Sender v;
   Settings settings = with_origin();
   settings.needs_time = true;
@@ -362,14 +362,14 @@ TEST(MavlinkPoses, TheAutopilotTakesOverFromAComponentThatSendsFirst) {
   EXPECT_NEAR(heading_rad(r.poses[0].sample.pose.orientation), 0.5, 1e-6);
 }
 
-TEST(MavlinkPoses, OurOwnWordsComeBackUnheard) {
+TEST(MavlinkPoses, OurOwnMessagesAreIgnored) {
   Sender us{{1, MavlinkPoses::own_component, 0}};
   Link link;
   EXPECT_THAT(link(us(odometry(1, 0)), 1).poses, IsEmpty());
   EXPECT_FALSE(link.poses.system());
 }
 
-TEST(MavlinkPoses, JunkIsRefusedWithOneSentenceADatagram) {
+TEST(MavlinkPoses, JunkIsRefusedWithOneLinePerDatagram) {
   Link link;
   EXPECT_THAT(link(Bytes(100, std::byte{7}), 1).refusals, ::testing::ElementsAre(HasSubstr("100 bytes are not MAVLink")));
   EXPECT_THAT(link(Bytes(MavlinkPoses::largest_datagram + 1), 1).refusals, ::testing::ElementsAre(HasSubstr("longer than")));

@@ -63,7 +63,7 @@ TEST(MavlinkReports, SendsOneHeartbeatPerSecondAsOnboardComputer) {
   EXPECT_EQ(beat.mavlink_version, 3);
 }
 
-TEST(MavlinkReports, RatesAreRequestedOnlyWhenWantedAndUntilPosesCome) {
+TEST(MavlinkReports, RatesAreRequestedIfConfiguredUntilPosesCome) {
   Sender v;
   MavlinkPoses quiet({});
   quiet.on_datagram(v(autopilot_heartbeat()), at_s(1));
@@ -90,14 +90,14 @@ TEST(MavlinkReports, RatesAreRequestedOnlyWhenWantedAndUntilPosesCome) {
             (Pairs{{331, 50000}, {31, 50000}, {32, 50000}, {33, 50000}, {108, 50000}, {49, 1000000}}));
 }
 
-TEST(MavlinkReports, TheFirstSentenceNamesSystemMessagesAndSource) {
+TEST(MavlinkReports, TheFirstLineNamesSystemMessagesAndSource) {
   Sender v;
   EXPECT_EQ(report_of({}, v(autopilot_heartbeat()) + v(attitude(1, 0)) + v(local(1, 0, 0, 0))),
             "system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE, LOCAL_POSITION_NED; poses from LOCAL_POSITION_NED and attitude");
   EXPECT_EQ(report_of({}, Sender{{3, 1, 0}}(odometry(1, 0))), "system 3 sends ODOMETRY; poses from ODOMETRY");
 }
 
-TEST(MavlinkReports, TheFirstSentenceSaysWhatIsMissing) {
+TEST(MavlinkReports, TheFirstLineNamesMissingMessages) {
   Sender v;
   const Bytes beat = v(autopilot_heartbeat());
   GlobalPositionInt global;

@@ -52,7 +52,7 @@ TEST(Micron, RepliesHaveTheirSizes) {
   EXPECT_EQ(replies[3].size(), 28u);
 }
 
-TEST(Micron, SignsOfLifeSayWhereItStands) {
+TEST(Micron, AliveMessagesHaveTheStateOfTheHead) {
   Talk talk;
   talk.run_to(2.5);
   EXPECT_THAT(talk.head_infos(), ElementsAre(0x4A, 0x4A));

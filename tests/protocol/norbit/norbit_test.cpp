@@ -173,7 +173,7 @@ struct Hosts : Packets {
   std::string shown, said;  // shown: pings with "p" for points, "c" for a water column
 };
 
-TEST_F(Hosts, ShowAPingWhenItIsWhole) {
+TEST_F(Hosts, ShowCompletePings) {
   for (std::uint32_t number = 1; number <= 9; ++number) hear(0, number, 0.1 * number);
   EXPECT_EQ(take(), "") << "the other connection is slower";
   hear(1, 1, 1);
@@ -213,7 +213,7 @@ TEST_F(Hosts, WaitWhileBytesOfAPacketCome) {
   EXPECT_EQ(take(), "7pc ");
 }
 
-TEST_F(Hosts, ShowWhatThereIsWhenAPortIsSilent) {
+TEST_F(Hosts, ShowPingsOfOnePortIfTheOtherIsSilent) {
   hear(0, 1, 0);
   hear(1, 1, 0);
   take();
@@ -245,7 +245,7 @@ TEST_F(Hosts, ShowPingsOfOnePortAtOnceWhenTheOtherHasSentNothing) {
   EXPECT_EQ(take(), "4c ");
 }
 
-TEST_F(Hosts, WaitForBothPortsAfterAPauseOfTheReader) {
+TEST_F(Hosts, WaitForBothPortsAfterAPause) {
   hear(0, 1, 0);
   hear(1, 1, 0);
   hear(0, 2, 0.1);
@@ -258,7 +258,7 @@ TEST_F(Hosts, WaitForBothPortsAfterAPauseOfTheReader) {
   EXPECT_EQ(take(), "2pc 3pc ");
 }
 
-TEST_F(Hosts, BoundWhatWaits) {
+TEST_F(Hosts, LimitWaitingMessages) {
   for (std::uint32_t number = 1; number <= 1100; ++number) hear(0, number, 0.001 * number);
   EXPECT_THAT(take(), StartsWith("1p 2p ")) << "the oldest";
 }

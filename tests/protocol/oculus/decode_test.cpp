@@ -25,7 +25,7 @@ std::vector<std::string> violations_after(std::size_t offset, const char* bytes,
 }
 
 // Offsets of versions 1 and 2, typed from the published layouts.
-TEST(Identities, EveryBrokenOneHasItsSentence) {
+TEST(Identities, EveryBrokenIdentityIsReported) {
   ASSERT_THAT(violations_after(0, "53 4F"), IsEmpty());
   ASSERT_THAT(violations_after(0, "53 4F", 2), IsEmpty());
   EXPECT_THAT(violations_after(0, "00"), Contains(HasSubstr("oculus_id is")));
@@ -53,7 +53,7 @@ TEST(Identities, EveryBrokenOneHasItsSentence) {
   EXPECT_THAT(violations_after(190, "FF FF FF FF", 2), Contains("the image does not lie inside the message"));
 }
 
-TEST(Decoder, TrailingBytesAreSeen) {
+TEST(Decoder, TrailingBytesAreReported) {
   const auto decoded = decode_ping(joined({sound_ping(), Bytes(1)}));
   ASSERT_TRUE(decoded.has_value());
   EXPECT_THAT(decoded->violations, SizeIs(2));
@@ -134,7 +134,7 @@ TEST(Decoder, HugeLengthsAreJunk) {
   EXPECT_LT(decoder.buffered_bytes(), 16u);
 }
 
-TEST(Decoder, UnreadableMessagesSayWhy) {
+TEST(Decoder, UnreadableMessagesHaveAReason) {
   const auto shorty = decode_message(hex("53 4F 01 00 00 00 23 00 00 00 01 00 00 00 00 00  07"));
   ASSERT_TRUE(std::holds_alternative<OtherMessage>(shorty));
   EXPECT_EQ(std::get<OtherMessage>(shorty).why, "a ping result shorter than its fixed part");
@@ -143,7 +143,7 @@ TEST(Decoder, UnreadableMessagesSayWhy) {
   EXPECT_THAT(std::get<OtherMessage>(config).why, HasSubstr("'ipAddr' at byte 16"));
 }
 
-TEST(Echo, EveryDifferenceHasItsSentence) {
+TEST(Echo, EveryDifferenceIsReported) {
   const DecodedPing ping = answer(device(), gains_fire);
   EXPECT_THAT(echo_violations(gains_fire, ping), IsEmpty());
   const auto differs = [&](auto change) {

@@ -102,7 +102,7 @@ TEST(EncodePing, GainEchoFollowsTheOption) {
   EXPECT_DOUBLE_EQ(gain("mapped", blu), 70);
 }
 
-TEST(EncodePing, SoundSpeedIsEchoedAsUsedOnlyWhenTheDeviceComputedIt) {
+TEST(EncodePing, AComputedSoundSpeedIsEchoedAsUsed) {
   FireRequest request = fire(0, 1, PingRate::hz10, 0x49, 5, 50);
   const DecodedPing computed = answer(device(), request);
   EXPECT_EQ(computed.head.fixed.fire.sound_speed_mps, computed.head.fixed.sound_speed_mps) << "identical, as in the capture";

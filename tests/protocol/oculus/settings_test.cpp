@@ -99,7 +99,7 @@ TEST(Settle, GainIsDecibelsPerEffectivePerCent) {
   EXPECT_FLOAT_EQ(settings_of(fire(0, 2, PingRate::hz10, 0x59, 5, 50), state).gain_db, 48);
 }
 
-TEST(Settle, ClampsWhatIsOutOfRangeAndSaysSo) {
+TEST(Settle, ClampsValuesOutOfRangeWithANotice) {
   const auto state = device();
   const ResolvedSettings far = resolve(fire(0, 2, PingRate::hz10, 0x49, 20, 150), state);
   EXPECT_EQ(far.settings.range_m, 10);

@@ -70,7 +70,7 @@ TEST(PingFrames, AnyBytesSplitAnywhereLeaveTheNextFrameReadable) {
   }
 }
 
-TEST(PingFrames, SaysWhereAFrameIs) {
+TEST(PingFrames, ReturnsThePlaceOfAFrame) {
   const Bytes good = general(Id::device_information);
   Framer framer(65535);
   std::uint64_t at = 0;

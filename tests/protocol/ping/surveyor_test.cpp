@@ -54,7 +54,7 @@ TEST(Surveyor, RequestsForMessagesOfEachPingAreAnsweredByTheNextPing) {
   EXPECT_TRUE(answered(Id::atof_point_data)) << "refused: it is not enabled";
 }
 
-TEST(Surveyor, ItsClockIsSetByTheHost) {
+TEST(Surveyor, TheHostSetsTheClock) {
   Talk talk("surveyor-240");
   talk.say(pings());
   talk.run_to(0);
@@ -74,7 +74,7 @@ TEST(Surveyor, ItsClockIsSetByTheHost) {
 }
 
 /// If the device asked in the packet of an answer, a host that reads one message of each packet would get the answer late.
-TEST(Surveyor, AHostIsAskedForTheTimeOnceItEnablesPings) {
+TEST(Surveyor, TheDeviceRequestsTheTimeAfterEnable) {
   Talk talk("surveyor-240");
   const auto times_asked = [&] {
     const auto said = talk.take();
@@ -148,7 +148,7 @@ Bytes one_point(Id id, std::uint32_t ping) {
   return framed(id, 0, payload);
 }
 
-TEST(Surveyor, ItsHostReadsThePointsOfAPingOnceFromEitherMessage) {
+TEST(Surveyor, TheHostReadsThePointsOfAPingOnceFromEitherMessage) {
   const auto host = *make_host({.as_it_is = true, .settings = {}});
   const auto read = [&](const Bytes& bytes) {
     std::vector<protocol::HostPing> pings;

@@ -103,7 +103,7 @@ TEST(ArisFile, IsReadAsTheDatagramsOfItsFrames) {
   }
 }
 
-TEST(ArisFile, CutOrDamagedSaysWhere) {
+TEST(ArisFile, ErrorsOfDamagedFilesHaveTheOffset) {
   const Bytes whole = three_frames();
   const std::size_t record = 1024 + 48 * 200;
   Bytes file(whole.begin(), whole.end() - 100);

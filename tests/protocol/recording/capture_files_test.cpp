@@ -261,7 +261,7 @@ TEST(CaptureFiles, DatagramsInFragmentsAreCounted) {
   EXPECT_THAT(read(pcap_of(frames, 101)).damage, HasSubstr("; 2 datagrams are in IP fragments, which are not read"));
 }
 
-TEST(CaptureFiles, SaysWherePacketsEnd) {
+TEST(CaptureFiles, ErrorsHaveTheOffset) {
   Bytes huge = pcap_of(raw_frames(two_pings()), 101);
   const std::size_t last = huge.size() - ping_message(2).size() - 40 - 8;
   huge[last + 3] = std::byte{0x7F};

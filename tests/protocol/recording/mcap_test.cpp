@@ -257,7 +257,7 @@ TEST(Mcap, RecordsThatNoFileHasAreReported) {
   EXPECT_THAT(damage_with(Bytes(20), false), HasSubstr("the record at byte 8 has the opcode 0, which no record has"));
 }
 
-TEST(Mcap, SaysThatItReadsNoCompression) {
+TEST(Mcap, CompressionIsRefusedWithAReason) {
   Bytes file;
   const auto sink = sink_into(file);
   mcap::RecordWriter record(file);

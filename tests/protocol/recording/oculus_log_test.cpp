@@ -85,7 +85,7 @@ TEST(OculusLog, ReadsWhatOthersWrite) {
   EXPECT_FALSE(opened->reader->damage());
 }
 
-TEST(OculusLog, SaysWhichItemsItCannotRead) {
+TEST(OculusLog, ReportsItemsThatItCannotRead) {
   Bytes wrong_length = ping_message(1), broken = compressed(ping_message(1));
   wrong_length.pop_back();
   broken[20] ^= std::byte{0xFF};
@@ -123,7 +123,7 @@ TEST(OculusLog, AnImpossibleSizeCostsItsItemOnly) {
   EXPECT_THAT(cut->reader->damage()->text, HasSubstr("an item of 16 bytes at byte 48 is cut short by the end of the file"));
 }
 
-TEST(OculusLog, RefusesWhatItCannotRead) {
+TEST(OculusLog, OtherVersionsAreRefused) {
   Bytes newer = log_of({}), secret = log_of({});
   newer[24] = std::byte{2};
   secret[26] = std::byte{1};

@@ -71,7 +71,7 @@ TEST(PingLog, IsReadAsFramesWithTimesSincePowerUp) {
   }
 }
 
-TEST(PingLog, CutOrDamagedSaysWhere) {
+TEST(PingLog, ErrorsOfDamagedFilesHaveTheOffset) {
   const Bytes whole = log_of(3);
   const std::size_t text = whole.size() - 3 * 64;
   const auto bytes = [](std::size_t from, std::size_t to) {

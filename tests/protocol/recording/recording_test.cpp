@@ -123,7 +123,7 @@ TEST(Recording, AFileThatIsBeingWrittenIsRefusedAndKept) {
   EXPECT_EQ(std::filesystem::file_size(file.path()), 0u);
 }
 
-TEST(Recording, AFileThatOthersRemoveOrCutIsTold) {
+TEST(Recording, ARemovedOrTruncatedFileIsReported) {
   const TemporaryFile file("lost.bin");
   const auto close_after = [&](auto&& change) {
     auto sink = create_sink(file.path());
@@ -207,7 +207,7 @@ TEST(Recording, BytesBetweenMessagesAreKept) {
   }
 }
 
-TEST(Recording, EachRunOfJunkIsToldOnce) {
+TEST(Recording, EachRunOfJunkIsReportedOnce) {
   const auto junk = [](int ms, const char* text) {
     return RecordedMessage{after_ms(ms), Origin::device, Carrier::stream, bytes_of(text)};
   };
@@ -247,7 +247,7 @@ class ShrunkenSource final : public Source {
   std::uint64_t readable_;
 };
 
-TEST(Recording, JunkBeforeAReadErrorIsTold) {
+TEST(Recording, JunkBeforeAReadErrorIsReported) {
   Bytes file = ping_message(1);
   const std::string after_one = std::to_string(file.size());
   const Bytes junk = bytes_of("what is this? SO");  // the last two bytes might begin a message

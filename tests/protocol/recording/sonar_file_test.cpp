@@ -62,7 +62,7 @@ TEST(SonarFile, HasTheDatagramsWithTheirTimes) {
   EXPECT_EQ(joined(bytes), file);
 }
 
-TEST(SonarFile, DamagedSaysWhereAndGoesOn) {
+TEST(SonarFile, DamageIsReportedWithTheOffsetAndSkipped) {
   const std::vector<Bytes> shots{images(1), images(2), images(3)};
   const Bytes whole = joined(shots);
   const std::string second = std::to_string(shots[0].size()), size = std::to_string(whole.size() - 1);

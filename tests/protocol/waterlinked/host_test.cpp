@@ -49,7 +49,7 @@ TEST(WaterlinkedHost, DrawsAReturnAtItsColumnAndHorizontalRange) {
   EXPECT_THAT(ping->facts.note, HasSubstr("1 returns from 10.00 to 10.00 m"));
 }
 
-TEST(WaterlinkedHost, DrawsRangesWithoutTheirStrengthsAndSaysSo) {
+TEST(WaterlinkedHost, DrawsRangesWithoutStrengthsWithANote) {
   auto ranges = nothing_there();
   EXPECT_THAT(ping_from(ranges, nullptr)->facts.note, HasSubstr("no returns; no strengths given"));
   ranges.pixels[columns + 2] = 10;

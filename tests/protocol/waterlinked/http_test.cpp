@@ -32,7 +32,7 @@ TEST(WaterLinkedHttp, TemperatureHasADecimalPoint) {
   EXPECT_EQ(unit.request("GET", "/temperature").body, "20.0");
 }
 
-TEST(WaterLinkedHttp, WhatIsPostedIsReadBack) {
+TEST(WaterLinkedHttp, PostedValuesAreReadBack) {
   Unit unit;
   const std::pair<const char*, const char*> values[] = {
       {"/acoustics/enabled", "true"},

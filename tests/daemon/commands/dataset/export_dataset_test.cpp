@@ -207,7 +207,7 @@ TEST_F(ExportDataset, CardsBeginWithAHeadInYaml) {
   EXPECT_THAT(contents("set/coco/README.md"), HasSubstr("license: other\nlicense_name: \"Our own, \\\"of 2026\\\"\"\n"));
 }
 
-TEST_F(ExportDataset, SaysWhatIsWrong) {
+TEST_F(ExportDataset, RefusalsHaveAReason) {
   ASSERT_TRUE(make("set"));
   EXPECT_THAT(parse_split("80,20", "").error().text, HasSubstr("three shares"));
   EXPECT_FALSE(parse_split("80,-10,30", ""));

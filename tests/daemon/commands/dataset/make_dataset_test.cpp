@@ -110,7 +110,7 @@ TEST_F(MakeDataset, ThreadsAndPartsMakeTheSameBytes) {
   EXPECT_EQ(contents("one/manifest.json"), contents("parts/manifest.json"));
 }
 
-TEST_F(MakeDataset, GoesOnWhereItStopped) {
+TEST_F(MakeDataset, ContinuesAfterAnInterruption) {
   ASSERT_TRUE(make("a"));
   const std::string manifest = contents("a/manifest.json");
   std::filesystem::remove(folder_ / "a/shard-000001.tar");         // as if it had never been written
@@ -263,7 +263,7 @@ TEST_F(MakeDataset, RefusesAShardThatDiffers) {
   EXPECT_THAT(other.error().text, HasSubstr("holds shards of another job"));
 }
 
-TEST_F(MakeDataset, SaysWhatIsWrongWithAJob) {
+TEST_F(MakeDataset, ErrorsInAJobHaveAReason) {
   EXPECT_THAT(complaint(with("shard: 4", "shrad: 4")), HasSubstr("shrad"));
   EXPECT_THAT(complaint(with("in_view: [ball]", "in_view: [bull]")),
               HasSubstr("no object or label \"bull\"; did you mean \"ball\""));

@@ -215,7 +215,7 @@ TEST(CommandLine, AnOffsetMovesWhatTwoDaemonsWouldShare) {
             places_of(*moved({"run", "x.yaml"}, "192.168.2.42", poses)));
 }
 
-TEST(CommandLine, AnOffsetLeavesTheAddressThatWasGivenWithIt) {
+TEST(CommandLine, AnOffsetDoesNotMoveAGivenAddress) {
   const Config c = *moved({"run", "x.yaml", "--offset", "1", "--bind", "192.168.2.42"}, "127.0.0.2", "{}");
   EXPECT_EQ(text_of(c.sonars.at(0).bind_ip), "192.168.2.42");
   EXPECT_EQ(text_of(c.sonars.at(1).bind_ip), "127.0.1.3");

@@ -31,14 +31,14 @@ TEST(Formula, OperatorsHaveTheUsualPrecedence) {
   EXPECT_DOUBLE_EQ(value_of("1.5e3 + .5"), 1500.5);
 }
 
-TEST(Formula, KnowsNamesAndFunctions) {
+TEST(Formula, NamesAndFunctionsAreEvaluated) {
   EXPECT_DOUBLE_EQ(value_of("SL - 40*log10(r)", {{"SL", 210}, {"r", 10}}), 170);
   EXPECT_DOUBLE_EQ(value_of("deg(asin(sin(rad(30))))"), 30);
   EXPECT_DOUBLE_EQ(value_of("sqrt(abs(0 - 9))"), 3);
   EXPECT_DOUBLE_EQ(value_of("cos(pi)"), -1);
 }
 
-TEST(Formula, SaysWhatIsWrong) {
+TEST(Formula, ErrorsHaveAReason) {
   EXPECT_THAT(refusal("2*"), HasSubstr("ends where a value is expected"));
   EXPECT_THAT(refusal(""), HasSubstr("ends where a value is expected"));
   EXPECT_THAT(refusal("(1 + 2"), HasSubstr("a ) is missing"));
@@ -58,7 +58,7 @@ TEST(Substitute, ReplacesNamesAndFormulasOnly) {
   EXPECT_EQ(*text, "[1.25, 3.5, 3$, $5, $1.25]\n");
 }
 
-TEST(Substitute, TellsFileAndLine) {
+TEST(Substitute, ErrorsHaveFileAndLine) {
   const auto text = substitute("a\nb: $(r\n", {{"r", 1}}, "f.yaml");
   ASSERT_FALSE(text);
   EXPECT_THAT(text.error().text, HasSubstr("f.yaml:2: "));

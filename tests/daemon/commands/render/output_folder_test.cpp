@@ -100,7 +100,7 @@ TEST_F(OutputFolders, HoldsAPingWhenAllItsFilesAreThereOfTheseInputs) {
   EXPECT_FALSE(folder->holds(7));
 }
 
-TEST_F(OutputFolders, TellsWhatWasDecidedAboutTheInputs) {
+TEST_F(OutputFolders, ReportsDecisionsAboutTheInputs) {
   ASSERT_TRUE(claim("a"));
   EXPECT_THAT(about(), testing::Not(HasSubstr("notes")));
   notes_ = {"the poses are snapshots"};

@@ -254,7 +254,7 @@ TEST(RenderFile, ARangeThatTheProductDoesNotHaveGetsANote) {
   EXPECT_EQ(note("ping: {range_m: 0.01}"), "");
 }
 
-TEST(Npy, HeadersAreAlignedAndTellTypeAndShape) {
+TEST(Npy, HeadersAreAlignedAndHaveTypeAndShape) {
   const std::string header = npy_header("<f4", {437, 512});
   EXPECT_EQ(header.size() % 64, 0u);
   EXPECT_EQ(header.substr(1, 5), "NUMPY");
@@ -369,7 +369,7 @@ TEST(Coverage, RefusesPingsThatItCannotCompare) {
   EXPECT_THAT(measure_coverage(job, ping).error().text, HasSubstr("conical"));
 }
 
-TEST(Sidecar, TellsTheSwitchesThatTookEffect) {
+TEST(Sidecar, HasTheSwitchesThatTookEffect) {
   RenderInput input = parsed(point + "sonar: {ping: {range_m: 6, beams: 65}}\n");
   RenderJob& job = input.jobs.at(0);
   Parallel pool(1);

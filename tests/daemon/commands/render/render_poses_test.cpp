@@ -33,7 +33,7 @@ void expect_near(Vec3d a, Vec3d b, double tolerance = 1e-9) {
   EXPECT_NEAR(a.z, b.z, tolerance);
 }
 
-TEST(RenderPoses, GoesOnBetweenTheLinesAndTellsItsMotion) {
+TEST(RenderPoses, InterpolatesBetweenLinesAndHasTheirMotion) {
   const RenderJob job = job_of("t,x,y,z,yaw\n0,0,0,0,0\n2,1,0,0,90\n3,1,0,0,90\n");
   expect_near(vehicle_at(job, at(1)).position_m, {0.5, 0, 0});
   expect_near(ahead(vehicle_at(job, at(1))), {std::sqrt(0.5), std::sqrt(0.5), 0});
@@ -104,7 +104,7 @@ TEST(RenderPoses, AMissionWithAFewJumpsIsNoRowOfSnapshots) {
               HasSubstr("1 of 2 steps"));
 }
 
-TEST(RenderPoses, AFileThatTellsVelocitiesIsTakenAtItsWord) {
+TEST(RenderPoses, VelocitiesOfAFileAreUsed) {
   EXPECT_FALSE(snapshots("t,x,y,z,vx,vy,vz\n0,0,0,0,20,0,0\n1,20,0,0,20,0,0\n2,40,0,0,20,0,0\n"));
   EXPECT_TRUE(snapshots("t,x,y,z\n0,0,0,0\n1,20,0,0\n2,40,0,0\n"));
 }

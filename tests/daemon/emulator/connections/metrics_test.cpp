@@ -110,7 +110,7 @@ DaemonFigures two_sonars() {
   return f;
 }
 
-TEST(Prometheus, TellsEverySonarApart) {
+TEST(Prometheus, LabelsEverySonar) {
   const std::string text = metrics_text(two_sonars());
   EXPECT_THAT(text, HasSubstr("sonard_pings_total{sonar=\"front\"} 7\nsonard_pings_total{sonar=\"side\"} 0\n"));
   EXPECT_THAT(text, HasSubstr("sonard_pings_dropped_total{sonar=\"side\",reason=\"gone\"} 4\n"));

@@ -42,7 +42,7 @@ TEST(Outbox, HeldPingsMayPassTheDepthButNotTheirOwnLimit) {
   EXPECT_EQ(box.pings_waiting(), 10u);
 }
 
-TEST(Outbox, DropsTheNewestWhenToldTo) {
+TEST(Outbox, DropsTheNewestIfConfigured) {
   Outbox box({2, WhenFull::drop_newest});
   for (int i = 1; i <= 5; ++i) push(box, i);
   EXPECT_EQ(box.pings_dropped(), 3u);
@@ -139,7 +139,7 @@ TEST(Outbox, AReplyThatIsCutIsNoDroppedPing) {
   EXPECT_EQ(box.pings_dropped(), 1u);
 }
 
-TEST(Outbox, AMessageKnowsWhenItsPingWasFired) {
+TEST(Outbox, AMessageHasTheTransmitTimeOfItsPing) {
   Outbox box({1, WhenFull::replace_oldest});
   const Time fired = Time(std::chrono::seconds(7));
   box.push_ping(std::make_shared<const Outbox::Bytes>(10), 1, {}, fired);

@@ -80,7 +80,7 @@ TEST(FaultKinds, HaveOneCodeAndOneNameEach) {
   for (const Trouble& trouble : troubles()) EXPECT_TRUE(trouble.parts.front().code.size() == 3 && !trouble.sentence.empty());
 }
 
-TEST(FaultKinds, TheirDefaultsAndTheTroublesAreValid) {
+TEST(FaultKinds, DefaultsAndTroublesAreValid) {
   for (const FaultKind& kind : fault_kinds()) {
     const auto faults = check_fault(record(std::string(kind.code)), true);
     ASSERT_TRUE(faults) << faults.error().text;
@@ -96,7 +96,7 @@ TEST(FaultKinds, TheirDefaultsAndTheTroublesAreValid) {
     }
 }
 
-TEST(FaultKinds, TakeEffectOrSayWhyNot) {
+TEST(FaultKinds, TakeEffectOrGiveTheReason) {
   const std::string table = support_table();
   std::cout << table;
   EXPECT_THAT(table, HasSubstr("| L05 | silent-open | 1 | takes effect | takes effect |"));

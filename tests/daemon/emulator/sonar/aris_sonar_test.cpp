@@ -89,7 +89,7 @@ TEST(ArisInVirtualTime, FramesThatAFaultDropsAreCounted) {
   EXPECT_EQ(f.offered, frames + f.dropped);
 }
 
-TEST(ArisInVirtualTime, TheControllerIsSaidToHaveGotTheFramesOfItsReceiver) {
+TEST(ArisInVirtualTime, FramesOfTheReceiverCountForTheController) {
   Talk talk;
   std::size_t bytes = 0;
   const auto frames = talk.frames(milliseconds(350));
@@ -174,7 +174,7 @@ TEST(ArisFaults, TheFocusMotorIsStalled) {
   EXPECT_EQ(Talk::part_of(frame.front()).header->data()[560], std::byte{1});
 }
 
-TEST(ArisFaults, BeaconsSayBusyAnotherSonarOrTooHot) {
+TEST(ArisFaults, BeaconsStateBusyAnotherSonarOrTooHot) {
   Talk talk;
   talk.time.close(talk.client);
   EXPECT_EQ(talk.beacons().at(0).busy, 0u);

@@ -68,7 +68,7 @@ struct Imager : Talk {
 };
 constexpr Endpoint group{{224, 0, 0, 96}, 4747}, host{{10, 0, 0, 5}, 4747};
 
-TEST(Sonar3d15InVirtualTime, ItsReceiverIsOneOfItsSettings) {
+TEST(Sonar3d15InVirtualTime, TheReceiverIsASetting) {
   Imager imager;
   imager.send_to("10.0.0.5");
   EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(host));
@@ -172,7 +172,7 @@ TEST(SurveyorInVirtualTime, FieldsOfItsDatagramsFailWithTheRightSum) {
 }
 
 /// ping-python reads one message of each packet: several in one packet would accumulate in the host.
-TEST(SurveyorInVirtualTime, ItsMessagesAreWrittenOneByOneByTcp) {
+TEST(SurveyorInVirtualTime, MessagesAreWrittenOneByOneOverTcp) {
   Sounder sounder(protocol::Port::Kind::tcp_stream);
   const Outbox::Message message = sounder.ping_by_tcp();
   ASSERT_TRUE(message.shape);
@@ -200,7 +200,7 @@ TEST(SurveyorInVirtualTime, ItsMessagesAreWrittenOneByOneByTcp) {
   EXPECT_FALSE(longer.shape);
 }
 
-TEST(SurveyorInVirtualTime, TellsTheTimeThatItWasToldWhateverItSkipped) {
+TEST(SurveyorInVirtualTime, HasTheTimeOfTheHostAfterSkippedTime) {
   constexpr std::uint64_t utc_ms = 1'700'000'000'000;
   Sounder sounder;
   EXPECT_EQ(sounder.atof().utc_ms, 0u);

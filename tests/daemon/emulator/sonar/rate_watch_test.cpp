@@ -26,14 +26,14 @@ struct Sonar {
   }
 };
 
-TEST(RateWatch, SaysOnceWhatComputingAllows) {
+TEST(RateWatch, ReportsOnceTheRateThatComputingAllows) {
   Sonar slow{40, 0.052, 0};
   slow.ping(200);
   EXPECT_THAT(slow.said, StartsWith("computing takes 52 ms a ping: 19 Hz at most here, 40 Hz are requested"));
   EXPECT_EQ(std::count(slow.said.begin(), slow.said.end(), '\n'), 1);
 }
 
-TEST(RateWatch, SaysNothingOfASonarThatKeepsUp) {
+TEST(RateWatch, IsSilentAboutASonarThatKeepsUp) {
   Sonar quick{40, 0.024, 0};
   quick.ping(500);
   EXPECT_EQ(quick.said, "");
@@ -47,7 +47,7 @@ TEST(RateWatch, TheFirstPingsProveNothing) {
   EXPECT_EQ(cold.said, "");
 }
 
-TEST(RateWatch, KnowsThatOthersComputeToo) {
+TEST(RateWatch, AccountsForOtherSonars) {
   Sonar one_of_three{20, 0.03, 0.06};
   one_of_three.ping(200);
   EXPECT_THAT(one_of_three.said, HasSubstr("30 ms a ping, and other sonars are computed in between: 10 Hz at most here"));

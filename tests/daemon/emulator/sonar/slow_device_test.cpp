@@ -79,7 +79,7 @@ TEST_F(SlowDevice, AClientThatDoesNotReadLosesTheOldestReports) {
 }
 
 /// While reports for the previous client wait, a new client connects; it gets only pings fired after it connected.
-TEST_F(SlowDevice, ItsUnsentReportsAreLostWithTheLastClient) {
+TEST_F(SlowDevice, UnsentReportsAreLostWithTheLastClient) {
   VirtualTime time(dvl("report_delay_ms: 800"));
   const Sonar& sonar = time.sonar("down");
   const ConnectionId first = time.connect("down"), other = time.connect("down");
@@ -100,7 +100,7 @@ TEST_F(SlowDevice, ItsUnsentReportsAreLostWithTheLastClient) {
   EXPECT_EQ(sonar.figures().unwanted, lost);
 }
 
-TEST_F(SlowDevice, ItsUnsentReportsAreLostInATakeOver) {
+TEST_F(SlowDevice, UnsentReportsAreLostInATakeOver) {
   VirtualTime time(dvl("report_delay_ms: 800}, clients: {max: 1, when_full: take_over"));
   time.connect("down");
   time.run(seconds(3));

@@ -14,7 +14,7 @@ using Status = foxglove::PlaybackStatus;
 
 constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
 
-TEST(PlaybackWatch, TellsWhatChangesBySteps) {
+TEST(PlaybackWatch, ReportsStepsOfPlayback) {
   Playback playback(seconds(100), {}, start);
   Time now = start + seconds(5);
   PlaybackWatch watch(playback, now);

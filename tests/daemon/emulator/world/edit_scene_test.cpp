@@ -120,7 +120,7 @@ TEST(EditScene, MistakesAreNamedWithWhatThereIs) {
   EXPECT_THAT(why(with_object(*scene, added("x", "nothing"))), HasSubstr("no object \"nothing\""));
 }
 
-TEST(EditScene, SameScenesAreSeenToBeSame) {
+TEST(EditScene, EqualScenesAreRecognised) {
   const auto scene = small_scene(true);
   EXPECT_TRUE(is_same(*scene, *small_scene(true)));
   EXPECT_FALSE(is_same(*scene, *small_scene(false)));

@@ -122,7 +122,7 @@ TEST(Plausibility, NedReadAsEnuBelowTheBedOrFarAwayIsNoted) {
   EXPECT_THAT(at("xyz_m: [3000, 0, -3]"), ElementsAre(HasSubstr("positions are metres from the world's 0, 0, 0")));
 }
 
-TEST(Plausibility, ASceneFarFromTheOriginOfLatitudesIsToldBeforeTheFirstPose) {
+TEST(Plausibility, ASceneFarFromTheOriginIsNotedBeforeTheFirstPose) {
   Config config = config_with("");
   Scene far = bed_scene();
   far.objects[0].in_world.position_m = {500'000, 6'651'411, -5};

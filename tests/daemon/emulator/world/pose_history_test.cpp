@@ -67,7 +67,7 @@ TEST(PoseHistory, OneSampleHoldsAndSoDoesTheTimeBeforeTheFirst) {
   EXPECT_EQ(h.at(t0 + milliseconds(150), limit).position_m.x, 7);
 }
 
-TEST(PoseHistory, SamplesMicrosecondsApartSayNothingAboutSpeed) {
+TEST(PoseHistory, SamplesMicrosecondsApartGiveNoSpeed) {
   PoseHistory h;
   h.put({t0, pose(0), {}, {}});
   h.put({t0 + std::chrono::microseconds(3), pose(0.01), {}, {}});

@@ -40,7 +40,7 @@ TEST(WorldTrajectory, IsFollowedWithItsMotion) {
   EXPECT_EQ(speed_at(w, 60), 0) << "the vehicle rests at the end";
 }
 
-TEST(WorldTrajectory, MovesAsFastAsItIsPlayed) {
+TEST(WorldTrajectory, HasTheVelocityOfItsSpeed) {
   const World w = with_rov({*motion::Speed::from(4), true, seconds(2)});
   EXPECT_EQ(x_at(w, 1), 6);
   EXPECT_DOUBLE_EQ(speed_at(w, 1), 4);
@@ -76,7 +76,7 @@ TEST(WorldTrajectory, IsSteered) {
   EXPECT_FALSE(played->playback.paused() || played->playback.rules().loop);
 }
 
-TEST(WorldTrajectory, RefusesWithASentence) {
+TEST(WorldTrajectory, RefusalsHaveAReason) {
   World w = with_rov();
   EXPECT_THAT(w.steer(asked({}), t0), HasSubstr("give at least one of"));
   EXPECT_THAT(w.steer(asked({}, 10.5), t0), HasSubstr("from 0 to 10"));

@@ -143,7 +143,7 @@ TEST(HttpReader, BodiesAreBoundedAsConfigured) {
   EXPECT_EQ(next.error().status, 413u);
 }
 
-TEST(HttpReader, WaitingClientsAreToldToGoOnOnce) {
+TEST(HttpReader, ExpectContinueIsAnsweredOnce) {
   HttpReader reader;
   EXPECT_FALSE(reader.begun());
   reader.feed(bytes_of("POST / HTTP/1.1\r\nHost: a\r\nExpect: 100-continue\r\nContent-Length: 2\r\n\r\n"));

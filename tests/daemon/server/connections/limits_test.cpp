@@ -245,7 +245,7 @@ TEST(Threads, GetTheNicenessOfTheFirstAtTheEnd) {
   });
 }
 
-TEST(Threads, RealTimeIsTakenOrTheRefusalSaysWhatToDo) {
+TEST(Threads, RealTimeIsUsedOrTheWarningHasARemedy) {
   std::thread([] {  // a separate thread, so that the test's own is not changed
     const std::string why = schedule_in_real_time(1);
     if (why.empty()) {

@@ -149,7 +149,7 @@ TEST(AnalyticDaemon, PingsWhileControlChangesTheSceneAndTheConfigurationIsReadAg
   EXPECT_EQ(f.offered, f.sent + f.dropped);
 }
 
-TEST(AnalyticDaemon, TellsOnceThatASonarIsAboveTheSeaSurface) {
+TEST(AnalyticDaemon, LogsOnceThatASonarIsAboveTheSeaSurface) {
   RealDaemon daemon(wall_below_the_surface());
   Client client(daemon.address());
   client.fire(fire_at(oculus::PingRate::hz40));

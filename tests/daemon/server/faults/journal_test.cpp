@@ -95,7 +95,7 @@ TEST(JournalFile, AFifoIsNotWaitedFor) {
   }
 }
 
-TEST(JournalFile, CheckSaysWhatOpenWouldAndMakesNothing) {
+TEST(JournalFile, CheckGivesTheErrorsOfOpenWithoutAFile) {
   const Folder folder;
   EXPECT_TRUE(JournalFile::check(folder.path + "/new"));
   EXPECT_FALSE(std::filesystem::exists(folder.path + "/new"));
@@ -161,7 +161,7 @@ TEST(FaultJournal, NeverHoldsPingsUpAndCountsWhatAReaderIsTooSlowFor) {
   EXPECT_EQ(it.daemon->stop(), 0);
 }
 
-TEST(FaultJournal, SaysThatADiskIsFull) {
+TEST(FaultJournal, ReportsAFullDisk) {
   Journalled it("/dev/full");
   ASSERT_TRUE(it.loses());
   EXPECT_THAT(it.daemon->status().notes(0).text(), HasSubstr("are lost: No space left on device"));

@@ -85,14 +85,14 @@ TEST(HttpRules, PathsOfFaultsLeadToOperations) {
   EXPECT_EQ(one.name, "slow net");
 }
 
-TEST(HttpRules, ARequestIsKnownByItsFirstBytes) {
+TEST(HttpRules, ARequestIsDetectedByItsFirstBytes) {
   for (const char* begins : {"GET / HT", "POST /", "OPTIONS ", "PUT *", "HEAD /x"})
     EXPECT_TRUE(begins_http_request(begins)) << begins;
   for (const char* other : {"", "GET", "GETX /", "OPTIONS", "\x08\x12\x06", "get / HT"})
     EXPECT_FALSE(begins_http_request(other)) << other;
 }
 
-TEST(HttpRules, ARequestIsDetectedHoweverItIsSplit) {
+TEST(HttpRules, ARequestIsDetectedInAnyPieces) {
   const auto detects = [](std::string_view stream, std::size_t first) {
     HttpDetector detector;
     const auto bytes = std::as_bytes(std::span(stream));

@@ -45,7 +45,7 @@ TEST(Page, GivesHashedFilesForEver) {
   EXPECT_FALSE(page_answer({"/healthz", browser, "gzip", ""}, files));
 }
 
-TEST(Page, LetsTheBrowserRunAndFetchOnlyWhatIsOurs) {
+TEST(Page, AllowsTheBrowserOnlyOurFiles) {
   const auto page = page_answer({"/", browser, "gzip", ""}, files);
   EXPECT_EQ(header(*page, "Content-Security-Policy"),
             "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
@@ -55,7 +55,7 @@ TEST(Page, LetsTheBrowserRunAndFetchOnlyWhatIsOurs) {
   EXPECT_EQ(header(*page, "Cross-Origin-Resource-Policy"), "same-origin");
 }
 
-TEST(Page, IsNotSentAgainWhenTheBrowserHasIt) {
+TEST(Page, IsNotSentToABrowserThatHasItsHash) {
   for (const char* known : {"\"aa\"", "\"x\", W/\"aa\"", "*"}) {
     const auto page = page_answer({"/", browser, "gzip", known}, files);
     ASSERT_TRUE(page);
@@ -67,7 +67,7 @@ TEST(Page, IsNotSentAgainWhenTheBrowserHasIt) {
   EXPECT_EQ(page_answer({"/", browser, "gzip", "\"old\""}, files)->status, 200u);
 }
 
-TEST(Page, TellsClientsWithoutGzip) {
+TEST(Page, ClientsWithoutGzipGetAnError) {
   for (const char* encoding : {"", "identity", "gzip;q=0", "br"}) {
     const auto page = page_answer({"/", browser, encoding, ""}, files);
     ASSERT_TRUE(page);

@@ -278,7 +278,7 @@ TEST_F(Mavlink, OnlyConfiguredSendersAreAccepted) {
   EXPECT_EQ(daemon.status().poses().accepted(), 0u);
 }
 
-TEST_F(Mavlink, AnEndpointThatIsTakenIsOneSentence) {
+TEST_F(Mavlink, AnEndpointInUseIsOneErrorLine) {
   const std::string here = "127.0.0.3";
   Vehicle first(here);
   try {

@@ -46,7 +46,7 @@ std::uint64_t messages_in(const std::filesystem::path& file) {
 
 // ---- names and files
 
-TEST(RecordingName, SaysTheKindAndNoFolder) {
+TEST(RecordingName, HasAKnownExtensionAndNoFolder) {
   EXPECT_EQ(*RecordingFile::kind_of("run-1.mcap", "oculus"), &RecordingFile::mcap);
   EXPECT_EQ(*RecordingFile::kind_of("Run_2.a.pcap", "oculus"), &RecordingFile::pcap);
   EXPECT_EQ((*RecordingFile::kind_of("r.oculus", "oculus"))->ending, ".oculus");
@@ -118,7 +118,7 @@ TEST(RecordingFile, KeepsAStatusASecondAndTheTruthOfEveryPing) {
               HasSubstr(R"("range_m":[2.5,0.0],"object":[1,-1],"objects":[{"index":1,"name":"box"}],"bodies":[{"name":"crate")"));
 }
 
-TEST(RecordingFile, KeepsLabelsWhenAsked) {
+TEST(RecordingFile, KeepsLabelsOnRequest) {
   for (const bool asked : {false, true}) {
     const RecordedPing plain = ping_at(0);
     auto ping = std::make_shared<Ping>(*plain.ping);
@@ -205,7 +205,7 @@ struct Queue {
   std::optional<Recordings> recordings;
 };
 
-TEST(Recordings, ADiskThatDoesNotKeepUpEndsTheRecordingAndSaysSoOnce) {
+TEST(Recordings, ASlowDiskEndsTheRecordingWithOneLine) {
   Queue q(1);
   Result<void> begun = failure(ErrorKind::bug, "not answered");
   q.recordings->start({"slow.mcap"}, {"front", "oculus", {}}, "test", [&](const Result<void>& r) { begun = r; });
@@ -250,7 +250,7 @@ TEST(Recordings, TheOneThatLetsMostWaitEndsFirst) {
   EXPECT_EQ(messages_in(q.recordings->status().at(1).file()), 2u);
 }
 
-TEST(Recordings, FewAtATimeAndOnlyWhereTheConfigurationSays) {
+TEST(Recordings, AreLimitedToAFewInTheConfiguredFolder) {
   Queue q(1 << 20);
   std::vector<std::string> answers;
   const auto start = [&](const std::string& name) {

@@ -17,7 +17,7 @@ struct ThrowingParent final : QuietParent {
   void on_fault(const std::string& what) override { fault = what; }
 };
 
-TEST(Faults, EndTheSessionTheyHappenIn) {
+TEST(Faults, EndOnlyTheirSession) {
   asio::io_context io;
   tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.2"), 0});
   Client client(acceptor.local_endpoint().address().to_string(), acceptor.local_endpoint().port());

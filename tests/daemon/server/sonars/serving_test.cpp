@@ -157,7 +157,7 @@ TEST(Serving, LateSimulationSkipsTicksAndNeverQueues) {
     EXPECT_GE(requests[i].fired_at - requests[i - 1].fired_at, 6 * milliseconds(25)) << "an older tick waited";
 }
 
-TEST(Serving, VersionTwoAsksAreAnsweredInVersionTwoWithAttitude) {
+TEST(Serving, Version2RequestsGetVersion2PingsWithAttitude) {
   Daemon daemon;
   Client client(daemon.address());
   auto fire = fire_at(PingRate::hz10);
@@ -210,7 +210,7 @@ TEST(Serving, AnEngineWhoseDeviceIsLostEndsTheDaemonWithExitCode69) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("the ping engine failed: the device is lost; use --engine cpu"));
 }
 
-TEST(Serving, APingTheEngineRefusesIsDroppedCountedAndSaid) {
+TEST(Serving, APingThatTheEngineRefusesIsDroppedCountedAndLogged) {
   DaemonSetup setup;
   setup.gate = std::make_shared<PingGate>();
   setup.engine_before = [](std::uint32_t ping) {
@@ -268,7 +268,7 @@ std::string why_not(DaemonSetup setup) {
   return "opened";
 }
 
-TEST(Serving, BusyAndForeignAddressesSayWhatToDo) {
+TEST(Serving, ErrorsOfAddressesHaveARemedy) {
   Daemon first;
   DaemonSetup same;
   same.address = first.address();

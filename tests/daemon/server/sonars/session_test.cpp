@@ -140,7 +140,7 @@ TEST_F(SessionShapes, ResetComesAfterTheLastByte) {
   EXPECT_FALSE(parent.client_left);
 }
 
-TEST_F(SessionShapes, SaysThatTheClientLeft) {
+TEST_F(SessionShapes, ReportsThatTheClientLeft) {
   start({});
   client.close();
   io.restart();
@@ -149,7 +149,7 @@ TEST_F(SessionShapes, SaysThatTheClientLeft) {
   EXPECT_TRUE(parent.client_left);
 }
 
-TEST_F(SessionShapes, SaysThatTheClientLeftWhileAMessageIsWritten) {
+TEST_F(SessionShapes, ReportsThatTheClientLeftDuringAMessage) {
   start({shaped(std::string(16u << 20, 'x'), {})});  // more than the kernels hold
   session->read_from_client(false);
   client.send(std::string("x"));  // the reader keeps it back, so only the writer can detect the end

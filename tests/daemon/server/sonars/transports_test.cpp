@@ -143,7 +143,7 @@ TEST(Transports, APortThatIsSearchedIsSharedWithHostsOfThisComputer) {
   EXPECT_EQ(host.sender, daemon.address() + ":" + std::to_string(udp_port));
 }
 
-TEST(Transports, ADialogueByDatagramsBelongsToTheHostThatAskedLast) {
+TEST(Transports, AUdpDialogueBelongsToTheHostOfTheLastRequest) {
   Daemon daemon(made_up());
   UdpSocket stranger, one, other;
   stranger.send("junk", daemon.address(), data_port);
@@ -196,7 +196,7 @@ TEST(Transports, AHostByDatagramsWhosePortIsClosedIsGivenUpAndAnotherLosesNothin
   EXPECT_EQ(daemon.status().sonars(0).clients_size(), 1);
 }
 
-TEST(Transports, TheBeaconSaysAtOnceThatAClientCameOrWent) {
+TEST(Transports, TheBeaconReportsClientsAtOnce) {
   Daemon daemon(made_up());
   UdpSocket host("127.0.0.1", beacon_port);
   auto client = std::make_unique<Client>(daemon.address(), command_port);
@@ -209,7 +209,7 @@ TEST(Transports, TheBeaconSaysAtOnceThatAClientCameOrWent) {
   EXPECT_EQ(host.next(at_once), "front free");
 }
 
-TEST(Transports, AMulticastGroupReceivesWithoutAskingForIt) {
+TEST(Transports, AMulticastGroupReceivesWithoutARequest) {
   UdpSocket member("0.0.0.0", group_port);
   const std::string interface = "127.0.0.2";
   if (!member.join(text::format_ipv4(group_ip), interface)) GTEST_SKIP() << "no multicast on the loopback interface here";
@@ -224,7 +224,7 @@ TEST(Transports, AMulticastGroupReceivesWithoutAskingForIt) {
   EXPECT_EQ(std::stoul(member.next()), std::stoul(first) + 1);
 }
 
-TEST(Transports, TheStatusTellsHowLongAHostByDatagramsIsSilent) {
+TEST(Transports, TheStatusHasTheSilenceOfAUdpHost) {
   Daemon daemon(made_up());
   UdpSocket host;
   host.send("silence 600\n", daemon.address(), data_port);

@@ -26,7 +26,7 @@ struct Bench {
   }
 };
 
-TEST(VisitLog, FewVisitsAreToldOneByOne) {
+TEST(VisitLog, FewVisitsAreLoggedOneByOne) {
   Bench bench;
   bench.come_and_go(4);
   bench.io.run();  // the series of visits ends
@@ -65,7 +65,7 @@ TEST(VisitLog, TheEndReportsTheRemainingVisits) {
   EXPECT_EQ(bench.io.run(), 1u) << "nothing but the cancelled timer is left";
 }
 
-TEST(VisitLog, AClientThatReconnectsIsSeenToGo) {
+TEST(VisitLog, AReconnectingClientIsLoggedAsGone) {
   Daemon daemon;
   for (int i = 0; i < 12; ++i) {
     const auto clients = [&] { return daemon.status().sonars().at(0).clients().size(); };

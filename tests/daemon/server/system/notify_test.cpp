@@ -68,7 +68,7 @@ std::string own_name(char first) {
 
 class NotifyAt : public ::testing::TestWithParam<char> {};
 
-TEST_P(NotifyAt, TellsOfReadinessWhenTheListenersAreOpenAndOfTheEnd) {
+TEST_P(NotifyAt, ReportsReadinessAfterOpeningListenersAndTheEnd) {
   const std::string name = own_name(GetParam());
   Manager manager(name);
   DaemonSetup setup;
@@ -97,7 +97,7 @@ TEST(Notify, SignsOfLifeComeWithoutClientsAndWhilePingsAreQuick) {
   EXPECT_THAT(manager.next_but_life(), StartsWith("STOPPING=1"));
 }
 
-TEST(Notify, APingThatNeverEndsSilencesTheSignsOfLifeUntilItDoes) {
+TEST(Notify, APingThatDoesNotEndStopsTheWatchdogMessages) {
   const std::string name = own_name('@');
   Manager manager(name);
   std::atomic<bool> held{true};
@@ -139,7 +139,7 @@ TEST(Notify, AReloadIsAnnouncedAndEndsWithReadiness) {
   EXPECT_EQ(manager.next(), "") << "said once";
 }
 
-TEST(Notify, AManagerThatIsNotThereIsMentionedOnceAndHurtsNothing) {
+TEST(Notify, AMissingManagerIsReportedOnceAndHasNoEffect) {
   DaemonSetup setup;
   setup.options.service_manager = {own_name('@'), milliseconds(20)};
   Daemon daemon(setup);

@@ -214,7 +214,7 @@ TEST(Lockstep, ADaemonThatStopsAnswersNoStep) {
   EXPECT_EQ(p.stop(), 0);
 }
 
-TEST(Follow, TimeIsThePosesAndPingsLieBetweenThem) {
+TEST(Follow, TimeComesFromPosesAndPingsLieBetweenTwoPoses) {
   Pinging p(with_clock("follow"));
   std::this_thread::sleep_for(milliseconds(50));
   EXPECT_TRUE(p.daemon.requests().empty()) << "no pose, no time";
@@ -291,7 +291,7 @@ TEST(Follow, ASenderThatWaitsForAnswersGetsEveryPing) {
   EXPECT_EQ(p.daemon.status().sonars().at(0).figures().skipped_ticks(), 0u);
 }
 
-TEST(Follow, StampsThatDoNotGoOnAreToldOf) {
+TEST(Follow, StampsThatJumpAreLogged) {
   Pinging p(with_clock("follow"));
   p.pose(0, std::chrono::seconds(100));
   p.pose(0, std::chrono::seconds(100) + milliseconds(50));

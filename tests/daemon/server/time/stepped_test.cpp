@@ -77,7 +77,7 @@ TEST(Stepped, WaitsForEveryClient) {
   daemon.stop();
 }
 
-TEST(Stepped, GainAssistFollowsThePicturesAndTellsItsGain) {
+TEST(Stepped, GainAssistFollowsThePicturesAndStatesItsGain) {
   DaemonSetup setup;
   setup.more = "clock: stepped\n";
   setup.sonar_lines = "    options: {gain_echo: used}\n";
