@@ -275,7 +275,7 @@ TEST(Doctor, ProposesARequestOnlyToDriversThatNeedOne) {
                     Not(HasSubstr("send nothing"))));
 }
 
-TEST(Doctor, OnlyWarnsOfAClientTurnedAwayFromPlacesThatAreUsedWell) {
+TEST(Doctor, WarnsOfAClientThatWasRefusedWhileAllSlotsWereInUse) {
   Facts facts = healthy();
   facts.sonars[0].stream = {};
   facts.sonars[0].clients = {"127.0.0.1:40122"};

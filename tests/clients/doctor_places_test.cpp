@@ -75,7 +75,7 @@ TEST(DoctorPlaces, AUdpAddressThatDoesNotAnswerIsNoMatterOfTcp) {
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("a firewall on this computer may drop udp "));
 }
 
-TEST(DoctorPlaces, AHostThatBeganAtTheSameTimeIsNamedAndTheComputerNotBlamed) {
+TEST(DoctorPlaces, AHostThatBeganAtTheSameTimeIsNamed) {
   Facts facts = facts_by_udp("127.0.0.2", Outcome::no_ping);
   serve(facts, there);
   facts.sonars[0].stream.own = "127.0.0.1:50001";

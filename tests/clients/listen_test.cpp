@@ -319,7 +319,7 @@ TEST(View, DistinguishesAnotherServiceFromASonarInStandby) {
   EXPECT_THAT(done.error().text, HasSubstr("no ping arrived within 1 s: is the sonar in standby?"));
 }
 
-TEST(Endpoints, TakeWhatIsMissingFromTheDefault) {
+TEST(Endpoints, UseTheDefaultForMissingParts) {
   const Endpoint fallback{"127.0.0.2", 52100};
   EXPECT_EQ(text_from(*parse_endpoint("", fallback)), "127.0.0.2:52100");
   EXPECT_EQ(text_from(*parse_endpoint("10.0.0.7", fallback)), "10.0.0.7:52100");

@@ -147,7 +147,7 @@ TEST_F(LostDevice, IsTheEndWhereNothingMayTakeItsPlace) {
   }
 }
 
-TEST_F(LostDevice, GoesOnAfterAFaultOfTheProgram) {
+TEST_F(LostDevice, ContinuesAfterAnErrorOfTheProgram) {
   const auto sound = engine(never, true);
   const int first = calls_;
   const std::vector<Ping> there = sound->run(requests_);

@@ -38,7 +38,7 @@ void stop(LoadDaemon& daemon, Readers& readers) {
   }
 }
 
-TEST(Load, EightSonarsFourClients) {
+TEST(Load, EightSonarsServeFourClientsEach) {
   const int sonars = quick ? 3 : 8, clients = quick ? 2 : 4;
   const auto lasts = quick ? seconds(3) : seconds(45), warm = quick ? seconds(1) : seconds(10);
   LoadDaemon daemon({sonars, "    clients: {max: 4}\n    outbox: {depth: 3}\n" + dummies, ""});
@@ -80,7 +80,7 @@ TEST(Load, EightSonarsFourClients) {
   keep("load-memory", format("%+.2f MiB", grown_mib), "at most 1 MiB", grown_mib <= 1);
 }
 
-TEST(Load, OneThatNeverReads) {
+TEST(Load, AClientThatNeverReadsCostsNoPing) {
   const double stall_s = quick ? 1 : 10;
   LoadDaemon daemon({1, "    clients: {max: 4}\n    outbox: {depth: 3}\n" + dummies, format("limits: {stall_s: %g}\n", stall_s)});
   Readers readers;
@@ -170,7 +170,7 @@ class Junk {
   std::uint64_t bytes_ = 0;
 };
 
-TEST(Load, JunkBesideAStream) {
+TEST(Load, JunkCostsNoPing) {
   const auto lasts = quick ? seconds(3) : seconds(30);
   LoadDaemon daemon({2, "    clients: {max: 4}\n    outbox: {depth: 3}\n" + dummies, ""});
   Readers readers;

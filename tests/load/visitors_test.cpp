@@ -44,7 +44,7 @@ void leave(Socket& socket, int way) {
   }
 }
 
-TEST(Load, ConnectCommandDisconnect) {
+TEST(Load, ShortConnectionsLeaveNoDescriptors) {
   const int cycles = quick ? 400 : 10000;
   LoadDaemon daemon({1, "    clients: {max: 16}\n", "limits: {input_bytes_per_s: 1073741824}\n"});
   const auto cycle = [&](int i) {
@@ -93,7 +93,7 @@ TEST(Load, ConnectCommandDisconnect) {
 }
 
 /// Clients connect, request a ping, read it, and disconnect without a further message, as drivers do.
-TEST(Load, ReconnectsOfADriver) {
+TEST(Load, ADriverReconnectsManyTimes) {
   const int times = quick ? 60 : 1000;
   LoadDaemon daemon({1, "", "limits: {input_bytes_per_s: 1073741824}\n"});  // one slot, like the product
   int served = 0, attempts = 0;
@@ -128,7 +128,7 @@ TEST(Load, ReconnectsOfADriver) {
 }
 
 /// One client is in the middle of a stream, one is in standby.
-TEST(Load, DeadPeers) {
+TEST(Load, DeadPeersFreeTheirSlots) {
   const double promised_s = quick ? 4 : 15;
   LoadDaemon daemon({2, "", quick ? "limits: {dead_peer_s: 4, stall_s: 3}\n" : ""});
   std::vector<std::unique_ptr<Socket>> clients;

@@ -63,7 +63,7 @@ TEST(Playback, StartsInTheMiddleOrLater) {
   EXPECT_EQ(shown(beyond, 0), seconds(10));
 }
 
-TEST(Playback, PausesAndGoesOnWhereItStood) {
+TEST(Playback, PausesAndContinuesAtTheSamePlace) {
   Playback p(seconds(10), looped(), at(0));
   p.pause(at(13));
   EXPECT_TRUE(p.paused());

@@ -137,7 +137,7 @@ TEST(Leak, RingsByItsTable) {
   EXPECT_EQ(s.ping().pressure_upa, first) << "in expected power interference is its mean, whatever the seed";
 }
 
-TEST(Leak, GoesOnBehindANullOfItsTable) {
+TEST(Leak, ContinuesAfterANullOfItsTable) {
   ReceiverModel law = leaking();
   law.leak_ring_db = {0, -300, -5, -30};
   law.leak_ring_step_m = 0.1f;

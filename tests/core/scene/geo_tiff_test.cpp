@@ -325,7 +325,7 @@ TEST_F(GeoTiff, EveryKindOfNumberIsRead) {
   EXPECT_FLOAT_EQ(grid->z_m[0], -1);
 }
 
-TEST_F(GeoTiff, NumbersThatAreNotWholeBytes) {
+TEST_F(GeoTiff, NumbersWithoutWholeBytesAreRead) {
   using Rows = std::vector<std::uint8_t>;
   const auto tiff = [](std::uint16_t bits, const Rows& bytes, std::uint16_t columns, std::uint16_t fill_order = 1) {
     TiffFile f = TiffFile::of(columns, 2, bytes).at(0, 100, 10, 10).without(258);

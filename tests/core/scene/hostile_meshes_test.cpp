@@ -59,7 +59,7 @@ class HostileMeshes : public ::testing::Test {
   tests::TemporaryFiles files_;
 };
 
-TEST_F(HostileMeshes, AreRefusedAndTheProgramGoesOn) {
+TEST_F(HostileMeshes, AreRefusedAndTheProgramContinues) {
   for (const auto& mesh : tests::hostile_meshes()) {
     if (mesh.words == "MiB of memory" && !memory_is_limited()) continue;  // the sanitizer itself ends the importer
     const std::string text = refusal(mesh.name, mesh.bytes);

@@ -331,7 +331,7 @@ TEST(LoadScene, TheExampleOfTheDocumentationLoads) {
   EXPECT_EQ(scene->objects.size(), 6u);
 }
 
-TEST(LoadScene, OtherSonarsHaveAPlaceALevelAndARhythm) {
+TEST(LoadScene, OtherSonarsHavePlaceLevelAndRate) {
   const auto scene = parsed(
       "objects: []\nother_sonars:\n  - {name: rov, xyz_m: [9, 2, -3], level_db: 120, rate_hz: 12, pulse_ms: 0.4}\n"
       "  - {xyz_m: [0, 0, 0], level_db: 60}\n");

@@ -124,7 +124,7 @@ TEST(Micron, ASectorIsScannedToAndFro) {
   EXPECT_EQ(sweep_code(c, 32), 2);
 }
 
-TEST(Micron, AFullTurnGoesOn) {
+TEST(Micron, AFullTurnContinues) {
   Talk talk;
   HeadCommand c = sector();
   c.control |= control::continuous;
@@ -146,7 +146,7 @@ TEST(Micron, AnInvertedHeadTurnsTheOtherWay) {
   EXPECT_NEAR(head_rad(s), pi / 2, 1e-12);
 }
 
-TEST(Micron, TheHeadTakesItsTimeAndSoDoesItsLink) {
+TEST(Micron, TheHeadAndTheLinkTakeTime) {
   Talk talk("link_rate", "115200");
   HeadCommand c = sector();
   c.step = 32;

@@ -47,7 +47,7 @@ TEST(Pacer, LateTicksAreSkippedAndCountedNeverQueued) {
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(500));
 }
 
-TEST(Pacer, AHurriedGridRestartsAtOnce) {
+TEST(Pacer, HurryRestartsTheGridAtOnce) {
   Pacer pacer;
   pacer.hurry(t0);
   EXPECT_FALSE(pacer.next_tick()) << "standby";

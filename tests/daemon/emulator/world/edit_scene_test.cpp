@@ -20,7 +20,7 @@ std::vector<std::string> names_of(const Scene& scene) {
   return names;
 }
 
-TEST(EditScene, AnObjectIsAddedAtTheEndAndTheOthersKeepTheirPlaces) {
+TEST(EditScene, AnObjectIsAddedAtTheEnd) {
   const auto scene = small_scene(true);
   const auto more = with_object(*scene, added("buoy"));
   ASSERT_TRUE(more) << more.error().text;
@@ -46,7 +46,7 @@ TEST(EditScene, ACopyMayHaveAnotherMaterial) {
   EXPECT_THAT(unknown.error().text, HasSubstr("no material \"steal\"; did you mean \"steel\"?"));
 }
 
-TEST(EditScene, ARemovedObjectLeavesAPlaceThatTheNextOneTakes) {
+TEST(EditScene, TheNextObjectGetsTheSlotOfARemovedObject) {
   const auto less = without_object(*small_scene(true), "box");
   ASSERT_TRUE(less);
   EXPECT_THAT(names_of(**less), ElementsAre("floor", "", "crate"));
@@ -58,7 +58,7 @@ TEST(EditScene, ARemovedObjectLeavesAPlaceThatTheNextOneTakes) {
   EXPECT_TRUE((*more)->objects[1].visible);
 }
 
-TEST(EditScene, AFullSceneTakesAnObjectInThePlaceOfARemovedOne) {
+TEST(EditScene, AFullSceneAcceptsAnObjectAfterARemoval) {
   const auto scene = small_scene(true);
   scene->objects.resize(20000, Object{.name = "stone", .mesh = small_mesh(), .in_world = {}});
   const auto full = with_object(*scene, added("buoy"));

@@ -21,7 +21,7 @@ std::size_t count(const std::string& text, const std::string& what) {
   return found;
 }
 
-TEST(Limits, PlacesOfTheWholeDaemonCountThoseWhoWaitToo) {
+TEST(Limits, SlotsOfTheDaemonIncludeWaitingClients) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
   setup.more = "limits: {clients: 2}\n";

@@ -35,7 +35,7 @@ struct Listeners : ::testing::Test {
   std::unique_ptr<ControlServer> server;
 };
 
-TEST_F(Listeners, TakenDefaultsAreAWarningAndTheRestGoesOn) {
+TEST_F(Listeners, DefaultAddressesInUseAreAWarning) {
   tcp::acceptor other(io, {asio::ip::make_address(text_of(config.http.at.ip)), 0});
   config.http.at.port = other.local_endpoint().port();
   ASSERT_TRUE(open());
@@ -46,7 +46,7 @@ TEST_F(Listeners, TakenDefaultsAreAWarningAndTheRestGoesOn) {
   server->stop();
 }
 
-TEST_F(Listeners, TakenAddressesOfTheFileAreAnError) {
+TEST_F(Listeners, AddressesInUseThatTheFileGivesAreAnError) {
   tcp::acceptor other(io, {asio::ip::make_address(text_of(config.http.at.ip)), 0});
   config.http.at.port = other.local_endpoint().port();
   config.http_given = true;

@@ -148,7 +148,7 @@ TEST(Clients, DeadClientsFreeTheirSlots) {
   }
 }
 
-TEST(Clients, PingIdsGoOnAcrossClientsAndSettingsDoNot) {
+TEST(Clients, PingIdsContinueAcrossClientsAndSettingsDoNot) {
   DaemonSetup setup;
   setup.sonar_lines = "    options: {dummy_period_ms: 30}\n";
   Daemon daemon(setup);
@@ -260,7 +260,7 @@ TEST(Admission, TakeOverEndsTheOldOneAtAMessageBoundary) {
 }
 
 /// Its port never has pings.
-TEST(Admission, AConnectionForCommandsIsNotBlamedForGettingNoPings) {
+TEST(Admission, AConnectionForCommandsWithoutPingsIsNoError) {
   DaemonSetup setup;
   setup.profile = "norbit-wbms";
   Daemon daemon(setup);
@@ -336,7 +336,7 @@ TEST(Admission, TheLastFireWinsAmongSeveral) {
   EXPECT_TRUE(eventually([&] { return b.next_ping()->head.fixed.fire.range == 2; }));
 }
 
-TEST(Clients, AReconnectStormLeavesNothingBehind) {
+TEST(Clients, ManyReconnectsLeaveNoState) {
   const auto begin = Steady::now();
   Daemon daemon;
   for (int i = 0; i < 100; ++i) {

@@ -89,7 +89,7 @@ TEST(Observers, HaveALimitedNumberOfSlots) {
   EXPECT_EQ(daemon.status().sonars().at(0).observers(), "");
 }
 
-TEST(Observers, TakeNoPlaceOfAClient) {
+TEST(Observers, UseNoSlotOfAClient) {
   DaemonSetup setup;
   setup.more = "limits: {clients: 1}\n";
   Daemon daemon(setup);
