@@ -26,7 +26,7 @@ class WithFolder(unittest.TestCase):
         self.warned = []
         return convert(self.file(data), warn=self.warned.append, **how)
 
-    def assert_track(self, track, steps, every=1, t0=0.0, metres=0.01, radians=2e-4, origin_down=0.0):
+    def assert_track(self, track, steps, t0=0.0, metres=0.01, radians=2e-4, origin_down=0.0):
         """Compares track with made_logs.moment(), in the frame of the track. By default, angles may differ by 2e-4 rad."""
         self.assertEqual(len(track.rows), len(steps), track.rows[:2])
         for row, step in zip(track.rows, steps):
