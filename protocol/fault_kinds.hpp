@@ -105,7 +105,7 @@ struct FaultParameter {
   std::string_view name;
   std::string_view value;          // default
   double lowest = 0, highest = 0;  // limits of a number, inclusive
-  std::string_view words = {};     // "a b c": one of these words instead of a number
+  std::string_view words = {};     // "a b c": the value is one of these words, not a number
   bool whole = false;              // the number has no fraction
 };
 
@@ -114,14 +114,14 @@ struct FaultKind {
   int tier = 1;
   FaultStage stage{};
   FaultEffect effect{};
-  std::string_view sentence;     // what the sonar does
-  std::string_view good_driver;  // what a correct driver does in response
+  std::string_view sentence;     // the behaviour of the sonar
+  std::string_view good_driver;  // the response of a correct driver
   double default_s = 0;          // default duration; 0 = per ping
   std::optional<protocol::FieldName> field = {};
-  std::array<FaultParameter, 4> parameters = {};  // unused ones have no name
-  std::string_view touches = {};  // the part of a message or device that it changes; two faults with the same part conflict
+  std::array<FaultParameter, 4> parameters = {};  // unused parameters have no name
+  std::string_view touches = {};  // the changed part of a message or device; two faults that change the same part conflict
 
-  /// True: it acts on single pings; false: during a time.
+  /// True if the fault acts on single pings, false if it acts during a time.
   bool per_ping() const { return default_s == 0; }
   std::span<const FaultParameter> given() const;
 };
@@ -135,11 +135,11 @@ struct Trouble {
   struct Part {
     std::string_view code;
     std::array<std::string_view, 3> with;  // for each severity: "seconds=0.5 bytes=16"
-    double after = 0;                      // begins after this fraction of the duration
+    double after = 0;                      // the part begins after this fraction of the trouble's duration
   };
   std::string_view name, sentence;
   double default_s = 10;
-  std::array<Part, 4> parts = {};  // unused ones have no code
+  std::array<Part, 4> parts = {};  // unused parts have no code
 };
 std::span<const Trouble> troubles();
 

@@ -29,8 +29,8 @@ int report_error(const Error& error, bool json) {
   return exit_code(error.kind);
 }
 
-/// Called for an exception that no caller can catch, in a thread of a library, and for a running thread without owner. Embree
-/// leaves one behind if a limit on memory or threads does not let it start all of its threads.
+/// Called for an exception in a thread of a library, which no caller can catch, and for a running thread without owner. Embree
+/// leaves such a thread if a limit on memory or threads prevents the start of the others.
 [[noreturn]] void end_at_once() {
   constexpr rlim_t few_threads = 1024;
   rlimit memory{RLIM_INFINITY, RLIM_INFINITY}, threads{RLIM_INFINITY, RLIM_INFINITY};
@@ -62,7 +62,7 @@ Result<int> code_of(const Result<void>& done) {
 
 /// Returns the exit code. Sets `json` if the caller must write errors as JSON, thrown exceptions included.
 Result<int> run_command(const Command& command, std::chrono::steady_clock::time_point begin, bool& json) {
-  if (const auto* leave = std::get_if<Leave>(&command)) return leave->exit_code;  // --help, --version or a reported error
+  if (const auto* leave = std::get_if<Leave>(&command)) return leave->exit_code;  // after --help, --version or a reported error
   if (const auto* check = std::get_if<CheckCommand>(&command)) return code_of(run_check(*check));
   if (const auto* render = std::get_if<RenderCommand>(&command)) return code_of(render::run_render(*render));
   if (const auto* dataset = std::get_if<DatasetCommand>(&command)) return dataset::run_dataset(*dataset);

@@ -12,7 +12,7 @@ namespace sonar {
 using protocol::Endpoint;
 using protocol::Ipv4;
 
-struct AddressRange {  // 10.0.0.0/8
+struct AddressRange {  // such as 10.0.0.0/8
   Ipv4 ip{};
   int prefix_bits = 32;
   bool contains(Ipv4 address) const;
@@ -20,9 +20,9 @@ struct AddressRange {  // 10.0.0.0/8
 std::string text_of(Ipv4 ip);
 std::string text_of(Endpoint endpoint);
 bool is_loopback(Ipv4 ip);
-/// The reason why no computer can have this address: it is a multicast, broadcast or reserved address. Empty for others.
+/// Returns an error if no computer can have this address, because it is multicast, broadcast or reserved; else empty.
 std::string why_not_of_a_computer(Ipv4 ip);
-/// Error config: a sentence that shows a valid address.
+/// Parses an address. Error config: a sentence that shows a valid address.
 Result<Ipv4> parse_ipv4(std::string_view text);
 
 }  // namespace sonar

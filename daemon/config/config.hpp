@@ -25,20 +25,20 @@
 
 namespace sonar {
 
-// Enums, each with the names of its values in a configuration (core/base/enum_names.hpp).
+// Enums, and the names of their values in a configuration (core/base/enum_names.hpp).
 enum class WhenClientsFull { close_new, take_over, queue };
 inline constexpr std::array<std::string_view, 3> when_clients_full_names = {"close_new", "take_over", "queue"};
 enum class OnStale { hold, blank, stop };
 inline constexpr std::array<std::string_view, 3> on_stale_names = {"hold", "blank", "stop"};
-enum class Overload { slow, count };  // ticks without a ping: a lower rate, or gaps in the ping numbers
+enum class Overload { slow, count };  // what ticks without a ping cause: a lower rate, or gaps in the ping numbers
 inline constexpr std::array<std::string_view, 2> overload_names = {"slow", "count"};
 
 struct VehicleConfig {
   std::string name;
   Pose initial_pose;  // pose in the world
   bool orbits = false;
-  motion::Plan plan{};            // its trajectory, if it does not orbit
-  bool has_initial_pose = false;  // true: the file states it
+  motion::Plan plan{};            // trajectory, if the vehicle does not orbit
+  bool has_initial_pose = false;  // true: the file states the initial pose
 };
 /// A moving object of the scene that follows a trajectory.
 struct ObjectConfig {
@@ -50,10 +50,10 @@ struct SonarConfig {
   std::string name;
   protocol::Profile profile;
   std::size_t vehicle = 0;  // index into Config::vehicles
-  Pose mount;               // sonar in vehicle, FLU
+  Pose mount;               // pose of the sonar in the vehicle, FLU
   Ipv4 bind_ip{}, advertise_ip{}, netmask{};
-  std::vector<Endpoint> status_to;                          // port 0 = the vendor's own
-  bool has_own_netmask = false, has_own_status_to = false;  // true: the file states it; false: derived from advertise_ip
+  std::vector<Endpoint> status_to;                          // port 0 = the port of the vendor
+  bool has_own_netmask = false, has_own_status_to = false;  // true: the file states the value; false: derived from advertise_ip
   std::uint16_t device_id = 0;
   std::vector<Ipv4> groups;  // broadcast and multicast addresses that clients may name as receivers
   int max_clients = 1;
@@ -72,13 +72,13 @@ struct PoseListener {
 };
 /// A MAVLink link for poses (docs/poses.md, "MAVLink").
 struct MavlinkConfig {
-  bool dials = false;  // udpout: we send first, and accept only that address
+  bool dials = false;  // true (udpout): sonard sends first, and accepts only that address
   Endpoint at;
   std::string vehicle;
-  std::uint8_t system_id = 0, component_id = 0;  // 0 = that of the first message
-  bool request_rates = false;                    // ask the autopilot for its messages, rate_hz each
+  std::uint8_t system_id = 0, component_id = 0;  // 0 = the ids of the first message
+  bool request_rates = false;                    // true: requests messages from the autopilot, at rate_hz
   double rate_hz = 50;
-  bool distance_sensor = false;  // send the distances of the vehicle's range finders
+  bool distance_sensor = false;  // true: sends the distances of the vehicle's range finders
   bool operator==(const MavlinkConfig&) const = default;
 };
 struct PoseConfig {
@@ -93,7 +93,7 @@ struct PoseConfig {
 /// A site whose pages may open the live view (docs/live-view.md), as in the Origin header: "https://example.com".
 struct ViewOrigin {
   std::string origin;
-  bool steer = false;  // false: its pages cannot change anything
+  bool steer = false;  // false: pages of this origin cannot change anything
   bool operator==(const ViewOrigin&) const = default;
 };
 /// The control interfaces (docs/control.md).
@@ -101,9 +101,9 @@ struct ControlConfig {
   PoseListener stream{true, {{127, 0, 0, 1}, 14770}};  // TCP: the control stream
   PoseListener http{true, {{127, 0, 0, 1}, 8088}};
   bool stream_given = false,
-       http_given = false;           // true: the file states it; then an address in use is an error, for a default only a warning
+       http_given = false;           // true: the file states the address; only then is an address in use an error
   std::filesystem::path token_file;  // empty = none; required if a listener is not on loopback
-  std::vector<std::string> hosts;    // allowed names in HTTP's Host and Origin, besides addresses and localhost
+  std::vector<std::string> hosts;    // names that Host and Origin of HTTP may have, besides addresses and localhost
   std::vector<ViewOrigin> view_origins;
   bool operator==(const ControlConfig&) const = default;
 };
@@ -129,17 +129,17 @@ struct RecordingConfig {
 struct FaultConfig {
   bool armed = false;             // false: every request for a fault is refused
   std::filesystem::path journal;  // JSON lines are appended to it; empty = none
-  std::vector<FaultRecord> plan;  // checked
+  std::vector<FaultRecord> plan;  // faults that are already checked
   std::string plan_place;         // "file:line:col: faults.plan", for errors that are found with the command line
   bool operator==(const FaultConfig&) const = default;
 };
-inline constexpr int most_fixed_rays = 100000;  // a column
+inline constexpr int most_fixed_rays = 100000;  // per column
 /// Engines of pings (docs/cuda.md).
 enum class EngineDevice { cpu, cuda, automatic };
 inline constexpr std::array<std::string_view, 3> engine_device_names = {"cpu", "cuda", "auto"};
 
-/// The switches of products: the canonical model with the side lobes of the elevation pattern. A sonar without a profile has
-/// the defaults of Switches, for which closed forms of the main lobe hold.
+/// The switches of products: the canonical model with the side lobes of the elevation pattern. A sonar without a profile has the
+/// defaults of Switches, with which the closed forms of the main lobe are valid.
 inline constexpr Switches product_switches = [] {
   Switches s;
   s.side_lobes = true;
@@ -148,15 +148,15 @@ inline constexpr Switches product_switches = [] {
 
 struct EngineConfig {
   int threads = 0;      // 0 = all cores
-  int io_priority = 0;  // 1 to 99: the I/O thread is scheduled in real time (SCHED_FIFO); 0 = as usual
+  int io_priority = 0;  // 1 to 99: the I/O thread is scheduled in real time (SCHED_FIFO); 0 = normally
   EngineDevice device = EngineDevice::cpu;
   SimdLevel simd = SimdLevel::automatic;
   Switches switches = product_switches;
 };
 
 struct Config {
-  std::string source;  // the file, or "demo"
-  SceneFile scene;     // as find_scene() resolved it
+  std::string source;  // name of the file, or "demo"
+  SceneFile scene;     // result of find_scene()
   std::uint64_t seed = 1;
   std::optional<Geodetic> origin;  // origin of latitudes and longitudes
   Water water;
@@ -176,14 +176,14 @@ struct Config {
   LogOptions log;
 };
 
-/// Names of the vehicle's sonars that measure a distance with each ping.
+/// Returns the names of the vehicle's sonars that measure a distance with each ping.
 std::vector<std::string> range_finders_of(const Config& config, const std::string& vehicle);
 
 /// Fills netmask and status_to from advertise_ip, unless the file gives them.
 void derive_addresses(SonarConfig& sonar);
-/// The address to which drivers connect.
+/// Returns the address to which drivers connect.
 inline Ipv4 address_for_drivers(const SonarConfig& sonar) { return sonar.bind_ip == Ipv4{} ? sonar.advertise_ip : sonar.bind_ip; }
-/// Moves the first sonar to another address, and changes all derived values. Errors are sentences for the command line.
+/// Moves the first sonar to another address, and changes all derived values. Errors are sentences about the option.
 Result<void> rebind(Config& config, std::string_view address);
 
 }  // namespace sonar

@@ -54,7 +54,7 @@ FaultRecord read_record(const Node& node) {
   return record;
 }
 
-/// The reason if no sonar can have the fault; empty if at least one can.
+/// Returns the reason if no sonar can have the fault; empty if at least one can.
 std::string why_not(const std::vector<Fault>& faults, const std::vector<SonarConfig>& sonars) {
   const std::string& name = faults.front().sonar;
   std::vector<std::string_view> names;

@@ -41,7 +41,7 @@ void read_control_listener(const Node& node, bool has_token, PoseListener& liste
     node.fail("can be reached from other computers: that needs control.token_file, the file of a secret that clients must show");
 }
 
-/// Forms: the origin as a text, or a map with `origin` and `steer`.
+/// Reads an origin: a text, or a map with `origin` and `steer`.
 ViewOrigin read_view_origin(const Node& node) {
   ViewOrigin allowed;
   Node origin = node;
@@ -60,7 +60,7 @@ ViewOrigin read_view_origin(const Node& node) {
 
 }  // namespace
 
-/// token_file is read first, because listeners that are not on loopback require it.
+/// Reads token_file first, because listeners that are not on loopback require it.
 ControlConfig read_control(const Node& node, const std::filesystem::path& directory) {
   ControlConfig control;
   if (!node.present()) return control;

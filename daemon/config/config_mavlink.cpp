@@ -11,7 +11,7 @@ using text::Map;
 using text::Node;
 using text::Range;
 
-/// "udpin:127.0.0.1:14551"
+/// Reads an endpoint such as "udpin:127.0.0.1:14551".
 void read_link(const Node& node, bool has_ranges, MavlinkConfig& link) {
   const std::string given = node.text(64);
   const std::size_t first = given.find(':'), last = given.rfind(':');
@@ -29,9 +29,9 @@ void read_link(const Node& node, bool has_ranges, MavlinkConfig& link) {
   if (link.dials && link.at.ip == Ipv4{}) node.fail("udpout needs the address of the other end");
 }
 
-/// Each link belongs to one vehicle. The vehicle's name may be left out if there is only one vehicle.
+/// Reads the vehicle to which a link belongs. The name may be left out if there is only one vehicle.
 std::string read_vehicle(Map& map, const std::vector<VehicleConfig>& vehicles) {
-  if (vehicles.empty()) return {};  // already reported
+  if (vehicles.empty()) return {};  // the error is reported already
   const Node node = vehicles.size() > 1 ? map.required("vehicle") : map.optional("vehicle");
   if (!node.present()) return vehicles.front().name;
   std::vector<std::string_view> names;
@@ -59,7 +59,7 @@ std::optional<Geodetic> read_origin(const Node& node) {
                   place.optional("alt").number_or(0, Range::between(-12000, 10000))};
 }
 
-/// Forms: `off`, one endpoint as a text, or a list of links.
+/// Reads `off`, one endpoint as a text, or a list of links.
 std::vector<MavlinkConfig> read_mavlink(const Node& node, bool has_ranges, const Config& config) {
   const std::vector<VehicleConfig>& vehicles = config.vehicles;
   std::vector<MavlinkConfig> links;

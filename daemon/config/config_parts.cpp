@@ -14,7 +14,7 @@ using text::Node;
 using text::Range;
 
 constexpr Range finite_place{.min = -1e7, .max = 1e7};
-/// An option's value; errors state its position in the file.
+/// Reads the value of an option; errors state the position in the file.
 std::string read_option(const Node& value, const protocol::Option& option) {
   if (option.allowed.empty()) {
     const std::string text = value.text(64);
@@ -136,7 +136,7 @@ EngineConfig read_engine(const Node& node, const Switches& defaults) {
     bool& is_on = engine.switches.*part.is_on;
     const Node given = map.optional(part.name);
     is_on = given.choice_or<bool>(is_on, {{"on", true}, {"off", false}});
-    // A switch is refused if it has no effect because of another switch, the mode or fixed_fan, which are read before it.
+    // A switch is refused if another switch, the mode or fixed_fan (which are read before it) makes it ineffective.
     const std::string why = why_without_effect(engine.switches, part);
     if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave out one of them");
   }

@@ -1,5 +1,5 @@
-// Determines which parts of the model take effect: the comparison modes and the fixed fan leave out some parts even if their
-// switches are on (docs/acoustics.md, section 8).
+// Determines which parts of the model take effect. The comparison modes and the fixed fan leave out some parts even if the
+// switches of these parts are on (docs/acoustics.md, section 8).
 #pragma once
 
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace sonar {
 
-/// Switches off the parts that take no effect; the pings are the same.
+/// Switches off the parts that have no effect; this does not change the pings.
 Switches effective_switches(Switches switches);
 
-/// The reason why a part has no effect although its switch is on; empty if it has an effect.
+/// Returns the reason why a part has no effect although its switch is on; empty if it has an effect.
 std::string why_without_effect(const Switches& switches, const NamedSwitch& part);
 
-/// One sentence that names the parts that are switched on but have no effect; empty if there are none.
+/// Returns one sentence that names the parts that are switched on but have no effect; empty if there are none.
 std::string note_of_parts_left_out(const Switches& switches);
 
 }  // namespace sonar

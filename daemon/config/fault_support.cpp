@@ -12,8 +12,8 @@ namespace {
 using E = FaultEffect;
 using S = FaultStage;
 
-/// True if a kind acts on a sonar that sends pings only as datagrams: it changes the first datagram, or does not change pings.
-/// In a dialogue by datagrams it may also hold pings back.
+/// True if a kind acts on a sonar that sends pings only as datagrams: the kind changes the first datagram, or does not change
+/// pings. In a dialogue over UDP it may also withhold pings.
 bool acts_without_stream(const FaultKind& kind, bool dialogue) {
   if (kind.stage == S::stream) return false;
   if (kind.stage == S::framing)
@@ -56,7 +56,7 @@ bool accepts(const protocol::Vendor& vendor, std::optional<T> protocol::Settings
   return false;
 }
 
-/// The reason if Vendor::apply_override refuses every value of the setting `what`, a parameter of the kind.
+/// Returns the reason if Vendor::apply_override refuses every value of the setting `what`, a parameter of the kind.
 std::string why_without_setting(std::string_view what, const protocol::Vendor& vendor) {
   using Wanted = protocol::SettingsOverride;
   const auto has_modes = [](const auto& model) { return model->modes.size() > 1; };

@@ -7,10 +7,10 @@
 
 namespace sonar {
 
-/// The reason why the kind has no effect on sonars of this vendor; empty if it has.
+/// Returns the reason why the kind has no effect on sonars of this vendor; empty if it has an effect.
 std::string why_without_effect(const FaultKind& kind, const protocol::Vendor& vendor);
 
-/// The table of kinds and vendors, as text: "takes effect" or the reason why not.
+/// Returns the table of kinds and vendors, whose cells are "takes effect" or the reason why not.
 std::string support_table();
 
 }  // namespace sonar

@@ -17,10 +17,11 @@ namespace {
 
 using nlohmann::json;
 
-/// A JSON string is a YAML string in double quotes.
+/// Returns a YAML string in double quotes, which has the syntax of a JSON string.
 std::string quoted(const std::string& text) { return json(text).dump(-1, ' ', false, json::error_handler_t::replace); }
 
-/// The licence in the card's metadata. A licence without an identifier of the Hugging Face hub is `other`, with a `license_name`.
+/// Returns the licence for the card's metadata. A licence without an identifier of the Hugging Face hub is `other`, with a
+/// `license_name`.
 std::string license_lines(const std::string& license) {
   constexpr std::array<std::string_view, 14> known{
       "cc0-1.0",    "cc-by-4.0",    "cc-by-sa-4.0", "cc-by-nc-4.0", "cc-by-nd-4.0", "cc-by-nc-sa-4.0", "cc-by-nc-nd-4.0", "mit",
@@ -86,7 +87,7 @@ void count_instances(const json& part, Instances& instances) {
     for (const json& a : image["annotations"]) ++instances[a["class"].get<std::string>()];
 }
 
-/// Reads the notes twice, once for each array, so that one shard at a time is in memory.
+/// Reads the notes twice, once for each array, so that only one shard at a time is in memory.
 Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set, const CocoFile& coco) {
   auto file = DurableFile::open(coco.file);
   if (!file) return tl::make_unexpected(file.error());
@@ -96,7 +97,7 @@ Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set,
     id_of.emplace(name, id_of.size() + 1);
     categories.push_back({{"id", id_of.size()}, {"name", name}, {"supercategory", "thing"}});
   }
-  // An array of the entries that `add` makes from the notes of each ping.
+  // Writes an array of the entries that `add` makes from the notes of each ping.
   const auto write_array = [&](const std::string& begin, const auto& add) -> Result<void> {
     std::string text = begin;
     bool is_first = true;

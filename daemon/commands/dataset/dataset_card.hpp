@@ -1,4 +1,4 @@
-// README.md of a data set and of its exports. The head is YAML that the Hugging Face hub reads.
+// Makes README.md of a data set and of its exports. The head is YAML that the Hugging Face hub reads.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,7 @@ struct Statistics {
 };
 std::string dataset_card(const DatasetJob& job, const Statistics& statistics, const std::string& instruction_set);
 
-// Writes annotations in COCO's format (cocodataset.org, "Data format": object detection), without holding all in memory.
+// Writes annotations in COCO's format (cocodataset.org, "Data format": object detection), with one shard at a time in memory.
 
 /// Number of visible things by class.
 using Instances = std::map<std::string, std::uint64_t>;
@@ -41,9 +41,9 @@ struct CocoFile {
   std::filesystem::path file;
   const Instances& instances;  // instances of the whole set, so that categories have the same numbers in every split
   std::function<std::string(std::uint64_t ping)> name_of;
-  std::function<bool(const nlohmann::json& image)> is_in;  // selects images of the parts
+  std::function<bool(const nlohmann::json& image)> is_in;  // true for images that belong in the file
 };
-/// Writes the annotations from the notes of the shards, which are read twice, one at a time.
+/// Writes the annotations from the notes of the shards. The notes are read twice, one shard at a time.
 Result<void> write_coco(const DatasetJob& job, const std::filesystem::path& set, const CocoFile& coco);
 
 }  // namespace sonar::dataset

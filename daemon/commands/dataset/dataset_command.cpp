@@ -43,7 +43,7 @@ int say_stopped(const DatasetProgress& p) {
                "stopped: %llu of %llu pings are made and kept, in %llu finished shards%s; run the command again to continue\n",
                static_cast<unsigned long long>(p.pings), static_cast<unsigned long long>(p.all_pings),
                static_cast<unsigned long long>(p.shards), p.set_aside > 0 ? " and one begun" : "");
-  constexpr int by_signal = 128 + SIGINT;  // as shells report it
+  constexpr int by_signal = 128 + SIGINT;  // the exit code that shells report
   return by_signal;
 }
 

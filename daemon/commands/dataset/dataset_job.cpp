@@ -23,7 +23,7 @@ void read_constraints(const text::Node& node, Constraints& c) {
   if (!c.above_bed.empty() && c.bed.empty()) above.fail("needs bed: the name of the object that is the bed");
 }
 
-/// The position of the keys of a root in flow style ({a: 1, ..}); nothing if the root is in block style.
+/// Returns the position of the keys of a root in flow style ({a: 1, ..}); nullopt if the root is in block style.
 std::optional<std::size_t> flow_root(std::string_view text) {
   std::size_t at = text.find_first_not_of(" \t\r\n\xEF\xBB\xBF");
   while (at < text.size() && (text[at] == '#' || text[at] == '%' || text.substr(at).starts_with("---")))
@@ -32,7 +32,7 @@ std::optional<std::size_t> flow_root(std::string_view text) {
   return at + 1;
 }
 
-/// The lines of the key `scene` of YAML in block style; empty when they cannot be found.
+/// Returns the lines of the key `scene` of YAML in block style; empty if they cannot be found.
 std::string_view scene_lines(std::string_view text) {
   if (flow_root(text)) return {};
   std::size_t from = text.starts_with("scene:") ? 0 : text.find("\nscene:");
@@ -45,7 +45,7 @@ std::string_view scene_lines(std::string_view text) {
   return text.substr(from, end == std::string_view::npos ? std::string_view::npos : end + 1 - from);
 }
 
-/// The numbers of the draws as a sweep of one step: formulas and `let` use them as in a render file.
+/// Returns the numbers of the draws as a sweep of one step, so that formulas and `let` use them as in a render file.
 std::string sweep_of(const Draws& draws) {
   std::string sweep;
   for (const auto& [name, value] : draws.numbers)
@@ -53,7 +53,7 @@ std::string sweep_of(const Draws& draws) {
   return sweep.empty() ? "" : "sweep: {" + sweep + "}";
 }
 
-/// The text of a ping's scene with all its numbers, which is equal for equal scenes. Each ping has a text of its own if the
+/// Returns the text of a ping's scene with all its numbers. It is equal for equal scenes. Each ping gets a different text if the
 /// numbers cannot be computed (the reader of the file reports that) or the lines of the scene are not known.
 std::string scene_key_of(const DatasetJob& job, const Draws& draws, const std::string& lines, std::uint64_t number) {
   render::Values values = draws.numbers;
@@ -69,8 +69,8 @@ std::string with_sweep(std::string text, const std::string& sweep) {
   return text + "\n" + sweep + "\n";
 }
 
-/// Hides the objects that the counts leave out, or all targets in a negative. Draws select the hidden objects; the others keep
-/// their numbers.
+/// Hides the objects that the counts leave out, or all targets in a negative ping. Draws select the hidden objects; the visible
+/// ones keep their numbers.
 Result<std::shared_ptr<const Scene>> with_counts(const DatasetJob& job, const text::Document& filled, const DrawnPing& ping,
                                                  std::uint64_t number) {
   auto changed = std::make_shared<Scene>(*ping.job.scene);
@@ -150,7 +150,7 @@ Result<DatasetJob> parse_job(std::string text, const std::string& name, const st
   for (const auto& [name_of, formula] : root.optional("let").map().entries())
     job.formulas.emplace_back(name_of, formula.text(1000));
   read_constraints(root.optional("constraints"), job.constraints);
-  // The render file's own keys are read when a ping is drawn.
+  // The keys of a render file are read when a ping is drawn.
   for (const char* key : {"name", "scene", "water", "sonar", "poses", "engine", "seed", "counts"}) root.optional(key);
   if (root.has("sweep")) root.optional("sweep").fail("is for render files; a data set has vary:");
   if (root.has("expect")) root.optional("expect").fail("is for render files");

@@ -22,7 +22,7 @@ inline constexpr std::uint64_t most_pings = 100'000'000, most_shard_pings = 100'
 
 struct DatasetJob {
   std::string source, text;
-  std::filesystem::path folder;  // start of its relative paths
+  std::filesystem::path folder;  // relative paths begin here
   std::string name, about, license;
   Seed seed{};
   std::uint64_t pings = 0, shard_pings = 1024;
@@ -46,7 +46,7 @@ struct NamedFile {
   std::filesystem::path file;  // path, relative to the file that names it
   std::string digest;          // SHA-256; "unreadable"
 };
-/// All files that a ping may use, and those that YAML files among them name (every word of their text that is a file).
+/// Returns all files that a ping may use, and the files that YAML files among them name (every word of the text that is a file).
 std::vector<NamedFile> named_files(const DatasetJob& job);
 
 /// A ping that met the constraints.
@@ -59,8 +59,8 @@ struct DrawnPing {
   std::shared_ptr<const Scene> whole_scene;  // with the objects that counts and negatives hide
 };
 
-/// Draws until the constraints are met. Errors: config if they never are, or if the filled file is wrong. `known`: the last
-/// scene, which is reused if it is equal, and all shapes read so far.
+/// Draws until the constraints are met. Errors: config if no draw meets them, or if the filled file is wrong. `known`: the last
+/// scene, which is reused if the new one is equal, and all shapes read so far.
 struct KnownScene {
   std::string key = {};
   std::shared_ptr<const Scene> scene = {};

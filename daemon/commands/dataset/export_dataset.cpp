@@ -37,7 +37,7 @@ std::string order_key(const std::string& text) {
   return hash.hex();
 }
 
-/// Writes one export, beside its name until it is complete.
+/// Writes one export, under a temporary name until it is complete.
 class Export {
  public:
   Export(const DatasetJob& job, const path& set, ExportForm form, const Split& split)
@@ -134,7 +134,7 @@ class Export {
     return {};
   }
 
-  /// `ending`: "labels.png", "json".
+  /// Writes one file of a ping; `ending` is such as "labels.png" or "json".
   Result<void> put(std::uint64_t ping, const std::string& ending, std::span<const std::byte> contents) {
     const path split = folder_of(split_of_[ping - 1]);
     if (form_ == ExportForm::coco)
@@ -221,7 +221,7 @@ class Export {
   const Split& split_;
   const path folder_, unfinished_;
   Instances instances_;
-  std::vector<std::size_t> split_of_;  // by ping
+  std::vector<std::size_t> split_of_;  // the split of each ping
   std::set<path> made_;
   Exported exported_;
 };

@@ -34,7 +34,7 @@ Rgb colour_of(const std::vector<std::string>& classes, const std::string& name) 
 
 std::vector<std::string> classes_of_things(const Scene& scene) {
   std::vector<std::string> classes;
-  for (std::size_t i = 0; i < instance_count(scene); ++i)  // hidden ones too: a class has one colour in all pings
+  for (std::size_t i = 0; i < instance_count(scene); ++i)  // hidden objects too, so that a class has one colour in all pings
     if (i >= scene.objects.size() || !scene.objects[i].label.empty()) classes.push_back(instance_class(scene, i));
   std::ranges::sort(classes);
   classes.erase(std::unique(classes.begin(), classes.end()), classes.end());
@@ -79,7 +79,8 @@ Result<std::optional<Raster>> contact_cell(const Ping& ping, const Scene& scene,
   const FanStyle style{.width_px = sheet_width_px, .colours = *copper, .rings = false};
   PolarImage polar = polar_image_of(ping);
   const SampleFormat& format = ping.request.settings.format;
-  if (format.bits > 8 && format.scale == SampleFormat::Scale::linear)  // pressure: the root shows a wall and the bed before it
+  // Samples are pressures: with the square root, a wall and the weaker bed before it are both visible.
+  if (format.bits > 8 && format.scale == SampleFormat::Scale::linear)
     for (float& sample : polar.samples) sample = std::sqrt(sample * polar.full_scale);
   const auto picture = draw_fan(polar, style);
   if (!picture) return tl::make_unexpected(picture.error());
@@ -132,7 +133,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t cell_cache_bytes = 96u << 20;  // each thread has an engine
+constexpr std::size_t cell_cache_bytes = 96u << 20;  // small, because each thread has an engine
 
 std::vector<std::byte> bytes_of_text(const std::string& text) {
   const auto bytes = std::as_bytes(std::span(text));
@@ -145,7 +146,7 @@ std::string visible_of(const Scene& scene) {
   return flags;
 }
 
-/// Pixels per class. Pixels without an instance are in a shadow or show no object.
+/// Counts the pixels of each class. Pixels without an instance are in a shadow or show no object.
 json pixels_of(const PingLabels& labels, const Scene& scene) {
   std::vector<std::uint64_t> by_instance(labels.visible.size() + 1);
   std::uint64_t shadow = 0;
@@ -157,7 +158,7 @@ json pixels_of(const PingLabels& labels, const Scene& scene) {
   return by_class;
 }
 
-/// Numbers the first hit of each beam as the labels do: 0 for none.
+/// Replaces the object of the first hit of each beam by its number in the labels; 0 if there is no hit.
 void number_as_instances(json& truth) {
   json instance = json::array();
   for (const json& object : truth["object"]) instance.push_back(object.is_null() ? 0U : object.get<std::uint32_t>() + 1);

@@ -25,14 +25,15 @@ namespace sonar::dataset {
 
 // The contact sheet of a data set: pings as an operator sees them, each beside its labels.
 
-/// Numbers of the pings that the sheet shows, spread over the set.
+/// Returns the numbers of the pings that the sheet shows, spread over the set.
 std::vector<std::uint64_t> pings_on_sheet(std::uint64_t pings);
 
-/// The fan, and beside it the same fan dimmed, with things in a colour of their class, shadows in blue, and a box around each
-/// thing. `annotations` as render::annotations_of(). nullopt for a ping of one beam. Needs the ping's labels.
+/// Draws the fan, and beside it the same fan dimmed, with things in a colour of their class, shadows in blue, and a box around
+/// each thing. `annotations`: made by render::annotations_of(). The ping must have labels. Returns nullopt for a ping of one
+/// beam.
 Result<std::optional<Raster>> contact_cell(const Ping& ping, const Scene& scene, const nlohmann::json& annotations);
 
-/// `cells` must not be empty.
+/// Joins the cells to one picture; `cells` must not be empty.
 Raster contact_sheet(const std::vector<Raster>& cells);
 
 struct LabelledPing {
@@ -42,14 +43,14 @@ struct LabelledPing {
   int width = 0, height = 0;                                          // beams, rows
   bool negative = false;
   std::string scene;           // digest of scene_key
-  nlohmann::json draws;        // words
+  nlohmann::json draws;        // names and words of the draws
   std::optional<Raster> cell;  // picture of a ping on the contact sheet
 };
 
 /// Makes pings in sequence on one thread; reuses the engine while the scene is the same.
 class PingMaker {
  public:
-  /// `simd` replaces that of the job.
+  /// `simd`, if set, replaces the instruction set of the job.
   PingMaker(const DatasetJob& job, std::string inputs, std::optional<SimdLevel> simd)
       : job_(job), inputs_(std::move(inputs)), simd_(simd) {}
   Result<LabelledPing> make(std::uint64_t number);

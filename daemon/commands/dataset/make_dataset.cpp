@@ -25,7 +25,7 @@ constexpr std::uint64_t pings_a_thread = 4;  // pings of a batch, which wait in 
 
 constexpr std::array<std::string_view, 5> own_names{"job.json", "README.md", "manifest.json", "coco.json", "contact.png"};
 
-/// Pings of a shard that is not complete, and the notes on them.
+/// The file for the pings of an incomplete shard, and for the notes on them.
 path aside_file(const path& out, std::uint64_t shard) { return out / path(shard_name(shard)).replace_extension(".aside"); }
 path aside_note(const path& out, std::uint64_t shard) { return aside_file(out, shard).string() + ".json"; }
 
@@ -156,7 +156,7 @@ class Folder final : public DatasetFolder {
     return {};
   }
 
-  /// Called when no shard is missing, neither of this part nor of another. The labels of one shard at a time are in memory.
+  /// Called when no shard of any part is missing. Only the labels of one shard at a time are in memory.
   Result<DatasetProgress> conclude() override {
     json shards = json::array(), pixels = json::object();
     std::uint64_t negatives = 0;
@@ -208,7 +208,7 @@ class Folder final : public DatasetFolder {
   std::uint64_t first_of(std::uint64_t shard) const { return shard * job_.shard_pings + 1; }
   std::uint64_t end_of(std::uint64_t shard) const { return std::min((shard + 1) * job_.shard_pings, job_.pings) + 1; }
 
-  /// The first file in the folder, except job.json, that has a name of a data set file; empty if there is none.
+  /// Returns the first file in the folder, except job.json, that has a name of a data set file; empty if there is none.
   static std::string own_file_in(const path& folder) {
     std::error_code ec;
     std::string first;
@@ -221,7 +221,7 @@ class Folder final : public DatasetFolder {
     return first;
   }
 
-  /// A shard of this part; without parts, everything that a data set consists of.
+  /// True for a shard of this part; without parts, for every file of a data set.
   bool is_own(const std::string& name) const {
     unsigned long long shard = 0;
     if (std::sscanf(name.c_str(), "shard-%llu.", &shard) == 1) return shard % o_.parts == o_.part;
@@ -230,7 +230,7 @@ class Folder final : public DatasetFolder {
 
   bool is_stopped() const { return o_.stop != nullptr && *o_.stop; }
 
-  /// The archive of the shard. It and `part` contain the pings that an interrupted run set aside.
+  /// Opens the archive of the shard. The archive and `part` then contain the pings that an interrupted run set aside.
   Result<ShardWriter> begin(std::uint64_t shard, json& part) {
     auto tar = ShardWriter::open(o_.out / shard_name(shard));
     if (!tar) return tar;
@@ -297,7 +297,7 @@ class Folder final : public DatasetFolder {
   const OnProgress on_progress_;
   Parallel pool_;
   std::string inputs_, instruction_set_;
-  std::vector<std::unique_ptr<PingMaker>> makers_;  // one a thread
+  std::vector<std::unique_ptr<PingMaker>> makers_;  // one per thread
   std::map<std::uint64_t, Raster> cells_;           // cells of the contact sheet that this run has made so far
   DatasetProgress progress_;
   bool differs_ = false;

@@ -21,8 +21,8 @@ namespace sonar::dataset {
 struct DatasetOptions {
   std::filesystem::path out;
   std::uint64_t part = 0, parts = 1;   // the part has the shards whose number modulo `parts` is `part`
-  int threads = 1;                     // pings in parallel
-  std::optional<SimdLevel> simd = {};  // instead of the job's
+  int threads = 1;                     // pings computed in parallel
+  std::optional<SimdLevel> simd = {};  // replaces the instruction set of the job
   // When it becomes true, the pings being made are finished, and those of the incomplete shard are kept for the next run.
   const std::atomic<bool>* stop = nullptr;
 };
@@ -62,7 +62,7 @@ Result<std::unique_ptr<DatasetFolder>> open_dataset(const DatasetJob& job, const
 /// Makes all missing shards of this part, and the manifest if no shard is missing.
 Result<DatasetProgress> make_dataset(const DatasetJob& job, const DatasetOptions& options, OnProgress on_progress);
 
-// Exports a data set for training programs without WebDataset: as folders of pictures, or as COCO. The shards stay.
+// Exports a data set for training programs without WebDataset: as folders of pictures, or in COCO's format. The shards are kept.
 
 enum class ExportForm { folder, coco };
 inline constexpr std::array<std::string_view, 2> export_form_names{"folder", "coco"};
@@ -70,13 +70,13 @@ inline constexpr std::array<std::string_view, 2> export_form_names{"folder", "co
 inline constexpr std::array<std::string_view, 3> split_names{"train", "val", "test"};
 
 struct Split {
-  std::array<double, 3> shares{80, 10, 10};  // shares of the scenes, in the order of split_names; with any sum
-  std::vector<std::string> by;               // draws by whose values scenes are split; empty: by the scene itself
+  std::array<double, 3> shares{80, 10, 10};  // shares of the scenes, in the order of split_names; the sum may be any number
+  std::vector<std::string> by;  // names of draws: pings with equal values are in one split; empty: pings of equal scenes are
 };
-/// "80,10,10" and "bed_seed,coat". Error usage: the mistake in them.
+/// Parses texts such as "80,10,10" and "bed_seed,coat". Error usage: a mistake in one of them.
 Result<Split> parse_split(const std::string& shares, const std::string& by);
 
-/// Returns the split of each scene, by its name. Every split with a share gets a scene if there are enough.
+/// Returns the split of each scene, which depends on its name. Every split with a share gets a scene if there are enough scenes.
 std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const std::array<double, 3>& shares);
 
 struct Exported {

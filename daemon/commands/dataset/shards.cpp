@@ -26,7 +26,7 @@ constexpr std::size_t tar_block = 512;
 
 constexpr std::string_view unfinished_mark = ".tmp";
 
-/// A name that no other process of any machine chooses.
+/// Returns a name that no other process on any machine uses.
 std::string unfinished_name(const path& file) {
   std::array<char, 256> host{};
   ::gethostname(host.data(), host.size() - 1);
@@ -38,7 +38,7 @@ tl::unexpected<Error> cannot_write(const path& file, int why) {
                                     "; make room or choose another --out: finished shards are kept, run the same command again");
 }
 
-/// Header by POSIX.1-1988 (ustar): a regular file, readable by all, of 1970.
+/// Makes a header (POSIX.1-1988, ustar) of a regular file that all may read, with a time in 1970.
 std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) {
   std::array<char, tar_block> h{};
   const auto put = [&](std::size_t at, std::string_view text) { std::memcpy(h.data() + at, text.data(), text.size()); };
@@ -48,7 +48,7 @@ std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) 
   put(116, "0000000");
   put(124, text::format("%011zo", size));
   put(136, "00000000000");
-  put(148, "        ");  // the checksum counts as blanks
+  put(148, "        ");  // in the sum, the checksum field counts as blanks
   put(156, "0");
   put(257, std::string_view("ustar\00000", 8));
   unsigned sum = 0;
@@ -233,7 +233,7 @@ Result<void> read_archive(const path& file, const ArchiveSink& take) {
   while (left >= tar_block) {
     if (std::fread(block.data(), 1, tar_block, in->get()) != tar_block) return damaged();
     left -= tar_block;
-    if (header.front() == '\0') return {};  // the archive's end
+    if (header.front() == '\0') return {};  // the end of the archive
     const std::string name(header.substr(0, std::min<std::size_t>(header.find('\0'), 99)));
     const auto size = size_in(header);
     // The header is made again from the name and size, and must have the same bytes. This checks all fields, the checksum

@@ -18,12 +18,12 @@
 
 namespace sonar::dataset {
 
-/// "shard-000123.tar".
+/// Returns a name such as "shard-000123.tar".
 std::string shard_name(std::uint64_t shard);
 
-/// A file that gets its final name when it is complete. Until then it is NAME.tmp.HOST.PID in the same folder, a name that no
-/// other process uses. It stays locked until then, so that remove_unfinished() can distinguish it from a file that a killed run
-/// left. The destructor removes a file that was not committed.
+/// A file that gets its final name when it is complete. Until then its name is NAME.tmp.HOST.PID, which no other process uses, in
+/// the same folder, and it is locked, so that remove_unfinished() can distinguish it from a file that a killed run left. The
+/// destructor removes a file that was not committed.
 class DurableFile {
  public:
   static Result<DurableFile> open(const std::filesystem::path& file);
@@ -34,7 +34,7 @@ class DurableFile {
   /// Fails with ErrorKind::io, for example when the disk is full.
   Result<void> write(std::span<const std::byte> bytes);
   Result<void> write(std::string_view text) { return write(std::as_bytes(std::span(text))); }
-  /// fsync and rename; an existing file is replaced.
+  /// Calls fsync and rename; an existing file is replaced.
   Result<void> commit();
   /// Like commit(), but keeps an existing file and then returns false.
   Result<bool> commit_new();
@@ -65,9 +65,9 @@ class ShardWriter {
   Result<bool> go_on(const std::filesystem::path& aside, const std::string& digest);
   /// Stores the incomplete archive under another name. Returns the digest.
   Result<std::string> set_aside(const std::filesystem::path& aside);
-  /// Writes the end of the archive and gives it its name, then writes `file`.sha256 as sha256sum reads it. Returns the digest. If
-  /// another worker has committed an archive of that name, that one is kept. If its bytes differ, the error is
-  /// ErrorKind::bad_data.
+  /// Writes the end of the archive and gives it its final name, then writes `file`.sha256 in the format of sha256sum. Returns the
+  /// digest. If another worker has committed an archive of that name, the other archive is kept. If its bytes differ, the error
+  /// is ErrorKind::bad_data.
   Result<std::string> commit();
   std::uint64_t bytes() const { return hash_.size(); }
 
@@ -82,23 +82,23 @@ class ShardWriter {
 /// Receives the name and the contents of a file of an archive.
 using ArchiveSink = std::function<Result<void>(const std::string&, std::span<const std::byte>)>;
 /// Reads the files of an archive that ShardWriter wrote, in order. Fails with ErrorKind::bad_data if the archive is damaged, and
-/// with the error that the sink returns.
+/// with any error of the sink.
 Result<void> read_archive(const std::filesystem::path& file, const ArchiveSink& take);
 
 /// Writes a small file in one step.
 Result<void> write_durably(const std::filesystem::path& file, std::string_view text);
 
-/// Digest of a whole file, in hexadecimal.
+/// Returns the digest of a whole file, in hexadecimal.
 Result<std::string> digest_of_file(const std::filesystem::path& file);
 
 // The notes beside each shard, shard-NNNNNN.json: facts of its pings for the manifest, the COCO file and the exports.
 
-/// "0000000123", the name of a ping in its shard.
+/// Returns the name of a ping in its shard, such as "0000000123".
 std::string ping_key(std::uint64_t number);
 std::filesystem::path part_file(const std::filesystem::path& set, std::uint64_t shard);
 
-/// `pixels`: samples by class; `images`: by ping `id`, `width`, `height`, `negative`, `scene` (equal for equal scenes), `draws`
-/// and `annotations`. Errors: bad_data if it cannot be read.
+/// Reads the notes. `pixels`: samples by class; `images`: for each ping `id`, `width`, `height`, `negative`, `scene` (equal for
+/// equal scenes), `draws` and `annotations`. Errors: bad_data if the file cannot be read.
 Result<nlohmann::json> read_part(const std::filesystem::path& set, std::uint64_t shard);
 
 nlohmann::json read_json(const std::filesystem::path& file);

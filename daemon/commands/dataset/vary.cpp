@@ -16,7 +16,7 @@
 namespace sonar::dataset {
 namespace {
 
-constexpr auto draws_domain = static_cast<Domain>(0x76617279u);  // differs from the domains of a ping
+constexpr auto draws_domain = static_cast<Domain>(0x76617279u);  // differs from the domains that a ping uses
 constexpr std::size_t most_words = 10000;
 
 std::uint64_t hash_of(std::string_view name) {  // FNV-1a
@@ -25,15 +25,15 @@ std::uint64_t hash_of(std::string_view name) {  // FNV-1a
   return hash;
 }
 
-/// Two numbers in (0, 1) with 53 bits each.
+/// Returns two random numbers in (0, 1), with 53 bits each.
 std::array<double, 2> uniforms(Seed seed, std::uint64_t ping, std::uint32_t attempt, std::string_view name) {
-  // The numbers depend on seed, name, ping and attempt only, so pings can be drawn in any order and on any machine.
+  // The numbers depend only on seed, name, ping and attempt, so pings can be drawn in any order and on any machine.
   const std::uint64_t hash = hash_of(name);
   RandomKey key = key_of(seed, draws_domain);
   key.domain ^= static_cast<std::uint32_t>(hash >> 32);
   key.high ^= static_cast<std::uint32_t>(ping >> 32);
   const Random4 r = philox(static_cast<std::uint32_t>(ping), attempt, static_cast<std::uint32_t>(hash), key);
-  // The added half keeps out 0, whose logarithm the normal distribution would need, and 1.
+  // The added half excludes 1, and also 0, whose logarithm the normal distribution would need.
   const auto open = [](std::uint32_t high, std::uint32_t low) {
     return (static_cast<double>((std::uint64_t{high >> 6} << 26) | (low >> 6)) + 0.5) / 4503599627370496.0;
   };
@@ -46,7 +46,7 @@ bool is_name(std::string_view name) {
          std::all_of(name.begin(), name.end(), letter);
 }
 
-/// Exactly one kind is allowed, so all keys are read before they are counted.
+/// Exactly one kind of draw is allowed, so all keys are read before they are counted.
 Variation read_one(const std::string& name, const text::Node& node) {
   Variation v;
   v.name = name;
@@ -82,7 +82,8 @@ Variation read_one(const std::string& name, const text::Node& node) {
   return v;
 }
 
-/// The number is written with nine digits, and formulas read it back from this text: file and formulas agree.
+/// Returns the word of a draw. A number has nine digits, and formulas read it back from this text, so that file and formulas
+/// agree.
 std::string word_of(const Variation& v, Seed seed, std::uint64_t ping, std::uint32_t attempt) {
   const auto [u, w] = uniforms(seed, ping, attempt, v.name);
   switch (v.kind) {
@@ -132,7 +133,7 @@ std::string put_words(std::string_view text, const std::map<std::string, std::st
     std::size_t end = dollar + 1;
     while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) != 0 || text[end] == '_')) ++end;
     const auto word = words.find(std::string(text.substr(dollar + 1, end - dollar - 1)));
-    // A $name that is not a word of a draw stays as it is, because the formulas replace it later.
+    // A $name that is not the name of a draw is kept, because the formulas replace it later.
     out += word != words.end() ? word->second : std::string(text.substr(dollar, end - dollar));
     at = end;
   }
@@ -141,10 +142,10 @@ std::string put_words(std::string_view text, const std::map<std::string, std::st
 
 namespace {
 
-/// The name without the index of an instance: "rock[3]" gives "rock".
+/// Returns the name without the index of an instance: "rock[3]" gives "rock".
 std::string shared_name(const std::string& name) { return name.substr(0, name.find('[')); }
 
-/// Visible objects of that name, with their poses.
+/// Returns the visible objects with that name or label, and their poses.
 std::vector<std::pair<const Object*, Pose>> placed(const std::string& name, const PingRequest& request, const Scene& scene) {
   std::vector<std::pair<const Object*, Pose>> found;
   for (const Object& o : scene.objects)
@@ -164,7 +165,7 @@ bool is_in_fan(Vec3d in_world, const PingRequest& r) {
          std::abs(std::atan2(p.z, std::hypot(p.x, p.y))) <= static_cast<double>(mode.pattern.elevation_width_rad) / 2;
 }
 
-/// The largest height of an object's surface over a place, in the axes of the object.
+/// Returns the largest height of an object's surface at (x, y), in the axes of the object.
 std::optional<double> height_at(const Mesh& mesh, double x, double y) {
   std::optional<double> highest;
   for (const auto& corners : mesh.triangles) {
@@ -172,7 +173,7 @@ std::optional<double> height_at(const Mesh& mesh, double x, double y) {
                 c = to_double(mesh.vertices[corners[2]]);
     const double area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
     if (area == 0) continue;
-    // Barycentric coordinates of the place in the triangle as seen from above.
+    // Barycentric coordinates of (x, y) in the triangle as seen from above.
     const double v = ((x - a.x) * (c.y - a.y) - (c.x - a.x) * (y - a.y)) / area;
     const double w = ((b.x - a.x) * (y - a.y) - (x - a.x) * (b.y - a.y)) / area;
     if (v < 0 || w < 0 || v + w > 1) continue;
@@ -188,7 +189,7 @@ bool is_above(Vec3d place, const Object& bed, const Pose& bed_in_world) {
   return z && p.z > *z;
 }
 
-/// The box along the world axes around the turned box of the object.
+/// Returns the box along the world axes around the rotated box of the object.
 Extent box_of(const Object& object, const Pose& in_world) {
   const Extent own = extent_of(*object.mesh);
   Extent box;
@@ -199,8 +200,7 @@ Extent box_of(const Object& object, const Pose& in_world) {
   return box;
 }
 
-/// The boxes are along the axes of the world. A rotated object has a larger box, so the test may refuse two objects that do not
-/// touch.
+/// True if the boxes overlap. A rotated object has a larger box, so two objects that do not touch may overlap here.
 bool overlap(const Extent& a, const Extent& b) {
   return a.low_m.x < b.high_m.x && b.low_m.x < a.high_m.x && a.low_m.y < b.high_m.y && b.low_m.y < a.high_m.y &&
          a.low_m.z < b.high_m.z && b.low_m.z < a.high_m.z;

@@ -25,33 +25,33 @@ struct Variation {
   std::vector<std::string> words;  // choice, list: as written
 };
 
-/// The draws of one ping: as words for the file and, if they are numbers, as values for formulas.
+/// The draws of one ping: words for the file and, if they are numbers, values for formulas.
 struct Draws {
   std::map<std::string, std::string> words;
   render::Values numbers;
 };
 
-/// Reads `vary:` of a job; the finish() of the document returns its errors.
+/// Reads `vary:` of a job; finish() of the document returns the errors.
 std::vector<Variation> read_variations(const text::Node& node);
 
-/// The draws of a ping, counted from 1; attempts count from 0.
+/// Returns the draws of a ping. Pings are counted from 1, attempts from 0.
 Draws draw(const std::vector<Variation>& variations, Seed seed, std::uint64_t ping, std::uint32_t attempt);
-/// A value in (0, 1) for a named decision, a function of the same arguments.
+/// Returns a random value in (0, 1) for a named decision; it depends only on the arguments.
 double draw_uniform(Seed seed, std::uint64_t ping, std::uint32_t attempt, std::string_view name);
 
-/// Replaces every $name of a draw by its word; formulas handle other references.
+/// Replaces every $name of a draw with the draw's word; formulas handle other references.
 std::string put_words(std::string_view text, const std::map<std::string, std::string>& words);
 
 // Conditions for a drawn ping. They use only geometry and trace no rays, so occlusion is visible only in the labels.
 
 struct Constraints {
-  // Names or labels of objects; above_bed also takes "sonar".
+  // Names or labels of objects; above_bed may also contain "sonar".
   std::vector<std::string> in_view, above_bed, no_overlap;
-  std::string bed;  // the bed of above_bed
+  std::string bed;  // the object that is the bed for above_bed
   std::uint32_t tries = 100;
 };
 
-/// Compares the name, the name that instances share, and the label.
+/// True if `name` is the object's name, the name that instances share, or the label.
 bool is_named(const Object& object, const std::string& name);
 /// Returns all names that is_named() accepts in a scene.
 std::set<std::string> names_of(const Scene& scene);
@@ -64,9 +64,9 @@ struct Unmet {
   std::string sentence() const;
 };
 
-/// in_view: for each name, the box of some visible object has its middle in the fan. above_bed: the middles of all visible
-/// objects with the names, and the sonar, are above the bed. no_overlap: the boxes of these objects, along the world's axes, do
-/// not overlap. Hidden objects satisfy every constraint.
+/// Returns whether the ping meets all constraints. in_view: for each name, the centre of a visible object's box is in the fan.
+/// above_bed: the centres of all visible objects with the names, and the sonar if it is named, are above the bed. no_overlap: the
+/// boxes of these objects, along the world's axes, do not overlap. Hidden objects satisfy every constraint.
 bool meets(const Constraints& constraints, const PingRequest& request, const Scene& scene, Unmet& unmet);
 
 }  // namespace sonar::dataset

@@ -33,7 +33,8 @@ Result<std::unique_ptr<dataset::DatasetFolder>> open_folder(const dataset::Datas
   return dataset::open_dataset(job, options, [](const dataset::DatasetProgress&) {});
 }
 
-/// The order makes a repeated submission safe: files, record, consumer, then the missing shards; the mark "stopped" goes last.
+/// Sends files, record, consumer, then the missing shards, and last removes the mark "stopped". This order makes a repeated
+/// submission safe.
 Result<int> submit(const FarmCommand& c) {
   auto job = dataset::load_job(c.job);
   if (!job) return tl::make_unexpected(job.error());
@@ -89,7 +90,7 @@ Result<int> submit(const FarmCommand& c) {
   return 0;
 }
 
-/// Values of a table, by key; values removed in the meantime are left out.
+/// Returns the values of a table, by key, without those that were removed in the meantime.
 Result<std::map<std::string, std::string>> read_table(Queue& queue, Table table) {
   const auto keys = queue.keys(table);
   if (!keys) return tl::make_unexpected(keys.error());
@@ -102,7 +103,7 @@ Result<std::map<std::string, std::string>> read_table(Queue& queue, Table table)
   return all;
 }
 
-/// Beats and descriptions come from other programs: a value of another type counts as missing.
+/// Returns a text of a beat or a description. Other programs write them, so a value of another type counts as missing.
 std::string text_in(const json& is, const char* key) {
   const auto at = is.find(key);
   return at != is.end() && at->is_string() ? at->get<std::string>() : std::string();
@@ -145,7 +146,7 @@ Result<std::string> describe_farm(Queue& queue) {
       if (!is.is_object() || text_in(is, "job") != id) continue;
       const double rate = number_in(is, "pings_per_s");
       pings_per_s += rate;
-      running += running < waiting->running ? 1 : 0;  // the others wait for another try
+      running += running < waiting->running ? 1 : 0;  // the other shards wait for another try
       workers += text::format("  %s: %s, %.1f pings/s, %.0f shards made\n", text::printable(name).c_str(),
                               text::printable(text_in(is, "shard")).c_str(), rate, number_in(is, "shards"));
     }
@@ -174,9 +175,9 @@ Result<int> status(const FarmCommand& c) {
   if (!queue) return tl::make_unexpected(queue.error());
   while (true) {
     const auto text = describe_farm(**queue);
-    // A watch continues after an error, and shows it, because the server may come back.
+    // With --watch the program shows an error and continues, because the server may come back.
     if (!text && !c.watch) return tl::make_unexpected(text.error());
-    // The escape sequence clears the terminal, so each status replaces the one before.
+    // The escape sequence clears the terminal, so each status replaces the last.
     std::printf("%s%s", c.watch ? "\033[H\033[J" : "", (text ? *text : text.error().text + "\n").c_str());
     std::fflush(stdout);
     if (!c.watch) return 0;
@@ -184,7 +185,7 @@ Result<int> status(const FarmCommand& c) {
   }
 }
 
-/// The job file and the instruction set that job.json in the folder of a job names.
+/// Returns the job file and the instruction set that job.json in the folder of a job names.
 Result<FarmJob> described_in(const path& folder) {
   const auto words = read_regular(folder / "job.json", std::size_t{16} << 20);
   if (!words) return failure(words.error().kind, words.error().text + "; give the folder of a job, which submit printed");
@@ -196,7 +197,7 @@ Result<FarmJob> described_in(const path& folder) {
   return record;
 }
 
-/// Works on the folder alone, without the queue: every shard is compared with its digest.
+/// Compares every shard with its digest, and completes the set. Uses only the folder, not the queue.
 Result<int> collect(const FarmCommand& c) {
   const path out = c.out;
   const auto record = described_in(out);

@@ -23,7 +23,8 @@ constexpr std::size_t piece_bytes = std::size_t{512} << 10;  // less than the 1 
 
 constexpr std::chrono::milliseconds least_patience{100}, most_patience = std::chrono::hours(24);
 
-/// Reads an integer field of a record and checks that it is within its bounds. json::get() would silently convert other values.
+/// Reads an integer field of a record and checks that the value is from `least` to `most`. json::get() would silently convert
+/// other values.
 Result<std::uint64_t> count_in(const json& words, const char* name, std::uint64_t least, std::uint64_t most) {
   const json& value = words.at(name);
   if (value.is_number_unsigned() && value.get<std::uint64_t>() >= least && value.get<std::uint64_t>() <= most)
@@ -161,7 +162,8 @@ Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
                                           "; submit the job again");
 }
 
-/// Files go into the shared folder and, if small in total, also into the queue: workers then need no shared folder.
+/// Copies the files into the shared folder and, if they are small in total, also into the queue, so that workers need no shared
+/// folder.
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const path& files, Queue& queue) {
   std::uint64_t bytes = 0;
   std::error_code ec;
@@ -187,7 +189,7 @@ Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const p
   return {};
 }
 
-/// Files that are there with the right digest are kept. The digest is checked before a file is written.
+/// Fetches the files that are missing or have a wrong digest. The digest is checked before a file is written.
 Result<path> receive_files(const FarmJob& record, const path& files, Queue& queue) {
   for (const FarmFile& f : record.files) {
     if (is_there(files / f.name, f.digest)) continue;

@@ -13,12 +13,12 @@
 namespace sonar::farm {
 
 struct FarmFile {
-  std::string name;  // below the job file's folder
+  std::string name;  // path below the folder of the job file
   std::string digest;
 };
 
 struct FarmJob {
-  std::string id;  // SHA-256 of the canonical JSON of all that the bytes of the shards depend on: the first four
+  std::string id;  // SHA-256 of the canonical JSON of the four first members, on which the bytes of the shards depend
   std::string version, instruction_set;
   std::string file;             // the job file, one of `files`
   std::vector<FarmFile> files;  // by name
@@ -27,27 +27,27 @@ struct FarmJob {
   double submitted_unix_s = 0;
   bool in_bucket = false;  // true: the files are in the queue; false: only in the shared folder
 
-  /// "mines-0123456789ab", the job's folder below the farm's.
+  /// Returns the name of the job's folder in the farm's folder, such as "mines-0123456789ab".
   std::string folder() const;
   std::string to_json() const;
 };
 
-/// Errors: a file that is not below the job file's folder.
+/// Makes the record of a job. Errors: a file is not below the folder of the job file.
 Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& instruction_set);
-/// Reads a record. Error bad_data: it is not a record, its id is another one, its counts are impossible, or its names lead out of
-/// the job's folder.
+/// Reads a record. Error bad_data: the text is not a record, or has another id, impossible counts, or names that lead out of the
+/// job's folder.
 Result<FarmJob> parse_farm_job(const std::string& id, const std::string& json);
 
 /// Copies the job's files to `files`, and into the queue if they are small enough (`in_bucket`).
 Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const std::filesystem::path& files, Queue& queue);
-/// Fetches files from the queue that the folder `files` lacks. Returns the path of the job file. Error missing_file: a file is
-/// in neither.
+/// Fetches the files that the folder `files` lacks from the queue. Returns the path of the job file. Error missing_file: a file
+/// is in neither.
 Result<std::filesystem::path> receive_files(const FarmJob& record, const std::filesystem::path& files, Queue& queue);
 
 /// Reads the job file of receive_files(). Errors: bad_data if its size differs from the record.
 Result<dataset::DatasetJob> load_files(const FarmJob& record, const std::filesystem::path& file);
 
-/// A sentence if this program would make other bytes than the submitting one, else empty.
+/// Returns a sentence if this program would make other bytes than the program that submitted the job; else empty.
 std::string why_unfit(const FarmJob& record);
 
 }  // namespace sonar::farm

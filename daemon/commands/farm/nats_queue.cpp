@@ -26,7 +26,7 @@ using Owned = std::unique_ptr<T, Destroy<destroy>>;
 using Message = Owned<natsMsg, natsMsg_Destroy>;
 using Subscription = Owned<natsSubscription, natsSubscription_Destroy>;
 
-/// The result of a call that creates an object: the object's owner, and the status.
+/// Calls a function that creates an object, gives the object to its owner, and returns the status.
 template <class Owner, class Call>
 natsStatus into(Owner& owner, const Call& call) {
   typename Owner::pointer made = nullptr;
@@ -96,7 +96,7 @@ class NatsQueue final : public Queue {
     return s == NATS_OK ? make_stream() : refused("no JetStream", s);
   }
 
-  // Tables are key-value stores of JetStream; a lifetime is the store's TTL.
+  // Tables are key-value stores of JetStream; the lifetime of a table is the TTL of the store.
   Result<void> put(Table table, const std::string& key, std::string_view value) override {
     kvStore* kv = store(table);
     const natsStatus s =
@@ -147,7 +147,7 @@ class NatsQueue final : public Queue {
     return s == NATS_OK ? Result<void>{} : refused("cannot open job " + job, s, code);
   }
 
-  /// False: the shard is in the queue already.
+  /// Returns false if the shard is in the queue already.
   Result<bool> publish(const std::string& job, std::uint64_t shard) override {
     const std::string number = std::to_string(shard), id = job + "/" + number;
     // The server drops an id that it has seen within two minutes. If that shard has left the queue since then, it must be made
@@ -179,7 +179,7 @@ class NatsQueue final : public Queue {
     return Waiting{info->NumPending, static_cast<std::uint64_t>(info->NumAckPending)};
   }
 
-  /// Null: no shard came within `wait`. After an error the next call subscribes anew.
+  /// Returns null if no shard came within `wait`. After an error the next call subscribes again.
   Result<std::unique_ptr<Task>> take(const std::string& job, milliseconds wait) override {
     if (!subscription_ || subscribed_ != job) {
       jsSubOptions options;
@@ -246,7 +246,7 @@ class NatsQueue final : public Queue {
     return s == NATS_OK ? Result<void>{} : refused("cannot make the stream FARM", s, code);
   }
 
-  /// NATS_TIMEOUT: the end of the list did not come, perhaps because an entry has expired meanwhile; a second listing may
+  /// Lists the keys. NATS_TIMEOUT: the end of the list did not come, perhaps because an entry expired meanwhile; a second try may
   /// succeed.
   natsStatus list(Table table, std::set<std::string>& found) {
     kvStore* kv = store(table);
@@ -290,14 +290,14 @@ class NatsQueue final : public Queue {
   std::string subscribed_;
 };
 
-// The end of a delivery, as JetStream names it: in progress (the time to acknowledge begins again), ack (done), nak (again,
-// perhaps later), term (never again).
+// JetStream's answers to a delivery are: in progress (the time to acknowledge begins again), ack (the shard is done), nak
+// (deliver it again, perhaps later) and term (never deliver it again).
 Result<void> NatsTask::in_progress() {
   const natsStatus s = natsMsg_InProgress(message_.get(), nullptr);
   return s == NATS_OK ? Result<void>{} : queue_.refused("cannot keep a shard", s);
 }
 
-// Waits for the server's confirmation: otherwise a lost acknowledgement would give the finished shard to another worker.
+// Waits for the server's confirmation, because after a lost acknowledgement another worker would get the finished shard.
 Result<void> NatsTask::done() {
   jsErrCode code{};
   jsOptions options;
@@ -314,7 +314,7 @@ Result<void> NatsTask::again(milliseconds later) {
   return s == NATS_OK ? Result<void>{} : queue_.refused("cannot give a shard back", s);
 }
 
-// The table comes before the removal: if the worker dies between them, the shard is delivered again and not lost.
+// The table is written before the removal: if the worker dies between them, the shard is delivered again and not lost.
 Result<void> NatsTask::bury(const std::string& why) {
   const std::string shard = std::to_string(shard_);
   // The reason is stored before the shard leaves the queue. If the worker ends between the two, the shard is delivered again.

@@ -1,6 +1,6 @@
-// The farm's queue: NATS JetStream behind plain functions. The stream FARM (work queue, file store, subjects
-// farm.work.JOB.SHARD) has the shards that are not made yet. Each job has one durable pull consumer. Tables hold keys and
-// values. docs/decisions/0022-nats.md.
+// The farm's queue: plain functions that use NATS JetStream. The stream FARM (work queue, file store, subjects
+// farm.work.JOB.SHARD) has the shards that are not made yet. Each job has one durable pull consumer. Tables hold keys and values
+// (docs/decisions/0022-nats.md).
 #pragma once
 
 #include <chrono>
@@ -22,9 +22,9 @@ struct Table {
   std::chrono::seconds lifetime;  // lifetime of a value
 };
 inline constexpr std::chrono::hours a_month{30 * 24};
-inline constexpr Table job_table{"FARM_JOBS", a_month};    // key JOB: its FarmJob; JOB.stopped: why it was stopped
+inline constexpr Table job_table{"FARM_JOBS", a_month};    // key JOB: a FarmJob; key JOB.stopped: why the job was stopped
 inline constexpr Table file_table{"FARM_FILES", a_month};  // key SHA256.N: a piece of a file
-inline constexpr Table dead_table{"FARM_DEAD", a_month};   // key JOB.SHARD: why it failed
+inline constexpr Table dead_table{"FARM_DEAD", a_month};   // key JOB.SHARD: why the shard failed
 inline constexpr Table beat_table{"FARM_BEATS", std::chrono::seconds(30)};  // key HOST.PID: what that worker does
 
 /// A shard that this worker makes. Within the `patience` of the job the worker must call in_progress(), or one of the functions
@@ -33,7 +33,7 @@ class Task {
  public:
   virtual ~Task() = default;
   virtual std::uint64_t shard() const = 0;
-  virtual int delivery() const = 0;  // from 1
+  virtual int delivery() const = 0;  // number of this delivery, from 1
   virtual Result<void> in_progress() = 0;
   /// Waits until the server confirms that the shard has left the queue.
   virtual Result<void> done() = 0;
@@ -49,8 +49,8 @@ struct Waiting {
   std::uint64_t queued = 0, running = 0;
 };
 
-/// Calls block, for seconds at most. They fail with ErrorKind::unavailable when the server does not answer, refuses, or has no
-/// JetStream. While the server cannot be reached, the client library reconnects in the background, without a limit.
+/// The functions block, for seconds at most. They fail with ErrorKind::unavailable if the server does not answer, refuses, or has
+/// no JetStream. While the server cannot be reached, the client library reconnects in the background, without a limit.
 class Queue {
  public:
   virtual ~Queue() = default;
@@ -59,12 +59,12 @@ class Queue {
   virtual Result<std::vector<std::string>> keys(Table table) = 0;
   virtual Result<void> erase(Table table, const std::string& key) = 0;
 
-  /// If a worker reports nothing about its shard for `patience`, the shard is given to another worker.
+  /// Creates the consumer of a job. If a worker sends no report about its shard for `patience`, another worker gets the shard.
   virtual Result<void> open_job(const std::string& job, std::chrono::milliseconds patience) = 0;
-  /// False: the shard is already in the queue.
+  /// Adds a shard to the queue. Returns false if the queue has the shard already.
   virtual Result<bool> publish(const std::string& job, std::uint64_t shard) = 0;
   virtual Result<Waiting> waiting(const std::string& job) = 0;
-  /// The next task; empty if none came within `wait`. The task must not outlive the queue.
+  /// Returns the next task; null if none came within `wait`. The task must not outlive the queue.
   virtual Result<std::unique_ptr<Task>> take(const std::string& job, std::chrono::milliseconds wait) = 0;
 };
 

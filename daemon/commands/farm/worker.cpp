@@ -80,7 +80,7 @@ class Worker {
     rest_ = std::min(2 * rest_, most_rest);
   }
 
-  /// The job with work that was submitted first; empty if none has work.
+  /// Returns the first submitted job that has work; empty if no job has work.
   Result<std::optional<FarmJob>> next_job() {
     const auto ids = queue_.keys(job_table);
     if (!ids) return tl::make_unexpected(ids.error());
@@ -157,7 +157,7 @@ class Worker {
     return {};
   }
 
-  /// Any program that reaches the queue can put any number into it.
+  /// Removes a shard with an invalid number, because any program that reaches the queue can put one in.
   void drop(const FarmJob& record, Task& task) {
     say("shard " + std::to_string(task.shard()) + " is not one of the " + std::to_string(record.shards) + " of " +
         record.folder() + "; it is removed from the queue");
@@ -179,7 +179,7 @@ class Worker {
 
   /// An error means that this worker cannot do any work.
   Result<void> work(const FarmJob& record, Task& task) {
-    // The last refusal removes a shard from the queue. A further delivery means that its workers ended without a refusal, so the
+    // The last refusal removes a shard from the queue. If it is delivered again, its workers ended without a refusal, so the
     // shard would probably end this worker too.
     if (task.delivery() > most_tries)
       return refuse(
@@ -228,7 +228,7 @@ class Worker {
     return tl::make_unexpected(why);
   }
 
-  /// The shard already has its final name. If the queue loses this message, the shard is found by its name.
+  /// Acknowledges a shard, whose file already has its final name. If the message is lost, the next worker finds the file.
   void acknowledge(Task& task) {
     constexpr int most = 60;
     for (int i = 0; i < most && !stopping; ++i) {
@@ -239,7 +239,7 @@ class Worker {
     }
   }
 
-  /// The worker does not wait for the computing threads, because the files that they write have no final name yet.
+  /// Ends the program. Does not wait for the computing threads, because the files that they write have no final name yet.
   [[noreturn]] void leave(Task& task) {
     task.again({});
     queue_.erase(beat_table, name_);
@@ -263,8 +263,8 @@ class Worker {
   std::string name_;
   milliseconds rest_ = least_rest;
   std::map<std::string, std::string> unfit_;  // jobs that cannot be opened here, and why
-  bool is_unfit_ = false;                     // the last error of next_job() was not an error of the server
-  std::string opened_;                        // the job of the next three members
+  bool is_unfit_ = false;                     // true if the last error of next_job() was not an error of the server
+  std::string opened_;                        // id of the open job, to which the next three members belong
   dataset::DatasetJob job_;
   std::unique_ptr<dataset::DatasetFolder> folder_;
   Clock::time_point begin_;

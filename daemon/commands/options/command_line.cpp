@@ -23,9 +23,9 @@ using text::number;
 using text::one_of;
 using text::whole_number;
 
-constexpr std::uint64_t most_rendered_pings = 999999;  // six digits in the names of the files
+constexpr std::uint64_t most_rendered_pings = 999999;  // names of files have six digits
 
-/// The names that --demo accepts, separated by `between`. `first`: also the name of the default demo.
+/// Returns the names that --demo accepts, separated by `between`. `first`: include the name of the default demo.
 std::string demo_names(std::string_view between, bool first = true) {
   std::string names;
   for (const protocol::Make& make : protocol::makes())
@@ -169,7 +169,7 @@ void add_farm_options(CLI::App& app, FarmCommand& farm) {
   collect.callback([&farm] { farm.what = FarmCommand::What::collect; });
 }
 
-/// The missing or contradictory option; empty = none.
+/// Returns an error about a missing option or contradictory options; empty = none.
 std::string complaint(const RenderCommand& render) {
   const bool writes = render.report.empty();
   if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
@@ -192,7 +192,7 @@ bool is_like_a_file(std::string_view word) {
   return word.find_first_of("./") != std::string_view::npos || std::filesystem::exists(word, ec);
 }
 
-/// The contradictory options; empty = none.
+/// Returns an error about contradictory options; empty = none.
 std::string complaint(const RunCommand& run) {
   const bool known = run.demo_of.empty() || find_demo(run.demo_of) != nullptr;
   const std::string file = !known && is_like_a_file(run.demo_of) ? run.demo_of : run.config;
@@ -206,7 +206,7 @@ std::string complaint(const RunCommand& run) {
   return {};
 }
 
-/// The first word when it is neither an option, a command nor a file name; else empty.
+/// Returns an error if the first word is neither an option, a command nor a file name; else empty.
 std::string unknown_command(std::string_view word) {
   if (word.empty() || word[0] == '-' || is_like_a_file(word)) return {};
   constexpr std::array<std::string_view, 7> commands{"run", "check", "render", "dataset", "worker", "farm", "replay"};
@@ -222,7 +222,7 @@ Command parse_command_line(int argc, char** argv) {
     return complain("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");
 
   CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene", "sonard"};
-  app.set_version_flag("--version", [] {  // the best level of this processor, independent of SONARD_SIMD
+  app.set_version_flag("--version", [] {  // prints the best level of this processor, independent of SONARD_SIMD
     return std::string("sonard " SONARD_VERSION "\nhot loops: ") + simd::kernels_for(SimdLevel::avx512).name;
   });
   RunCommand run;
@@ -232,7 +232,7 @@ Command parse_command_line(int argc, char** argv) {
   WorkerCommand worker;
   FarmCommand farm;
   ReplayCommand replay;
-  // `sonard CONFIG` is `sonard run CONFIG`: the word may be left out.
+  // The word `run` may be left out: `sonard CONFIG` is `sonard run CONFIG`.
   constexpr std::array<std::string_view, 7> words{"run", "check", "render", "dataset", "worker", "farm", "replay"};
   const bool bare = argc < 2 || std::find(words.begin(), words.end(), argv[1]) == words.end();
   if (bare) {
@@ -293,7 +293,7 @@ Command parse_command_line(int argc, char** argv) {
   return run;
 }
 
-/// The order matters: the product comes first, because other options change its sonar; the check for conflicts comes last.
+/// Applies --profile first, because other options change the sonar of the demo, and checks for conflicts last.
 Result<void> override_config(Config& config, const RunCommand& command) {
   if (!command.profile.empty())
     if (const auto r = use_product(config, command.profile); !r) return failure(r.error().kind, "--profile: " + r.error().text);

@@ -1,4 +1,4 @@
-// The user's command line, command by command. CLI11 is included by few .cpp files only: it is slow to compile.
+// The options of each command. Only few .cpp files include CLI11, because it is slow to compile.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 namespace sonar {
 
 struct RunCommand {
-  std::string config;  // empty = search
+  std::string config;  // empty = search the usual places
   bool demo = false;
   std::string demo_of;  // make of the demo's sonar, such as "blueview"; empty = the default
   std::string profile;  // profile of the demo's sonar; empty = the default
@@ -66,14 +66,14 @@ struct FarmCommand {
 struct CheckCommand {
   std::string config;
 };
-struct Leave {  // help, version or a usage error, already printed
+struct Leave {  // after help, version or a usage error, which are already printed
   int exit_code = 0;
 };
 using Command =
     std::variant<RunCommand, CheckCommand, RenderCommand, DatasetCommand, WorkerCommand, FarmCommand, ReplayCommand, Leave>;
 
 Command parse_command_line(int argc, char** argv);
-/// Options of the command line, or of the environment, override the file.
+/// Overrides the values of the file with options of the command line or the environment.
 Result<void> override_config(Config& config, const RunCommand& command);
 
 }  // namespace sonar

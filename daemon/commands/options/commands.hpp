@@ -1,5 +1,5 @@
-// The commands of sonard, each in a file of its own. docs/render.md and docs/datasets.md are the manuals of `render`, `dataset`,
-// `farm` and `worker`. Errors are those of the input, the options and the folders that the user named.
+// The commands of sonard. Each has its own file. docs/render.md and docs/datasets.md are the manuals of `render`, `dataset`,
+// `farm` and `worker`. Errors report the input, the options and the folders that the user named.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@ namespace sonar {
 /// the control token and the scene.
 Result<void> run_check(const CheckCommand& command);
 /// Reads the configuration, loads the scene, builds the engine, and runs the App until stopped. Returns the exit code. `begin`:
-/// start of the program, for the ready line. `json` is set to the format of errors, which is that of the log once that is known.
+/// start of the program, for the ready line. `json` is set if errors must be JSON, as soon as the format of the log is known.
 Result<int> run_daemon(const RunCommand& command, std::chrono::steady_clock::time_point begin, bool& json);
 
 namespace render {
@@ -28,15 +28,16 @@ Result<int> run_dataset(const DatasetCommand& command);
 namespace farm {
 class Queue;
 
-/// `sonarctl farm` runs this: puts jobs into the farm's queue, shows their progress, and makes the data set of finished shards.
-/// Returns the exit code. Errors: also unavailable (the server); bad_data if shards are missing or differ from their digests.
+/// Puts jobs into the farm's queue, shows their progress, and makes the data set of finished shards; `sonarctl farm` calls it.
+/// Returns the exit code. Errors: also unavailable if the server does not answer; bad_data if shards are missing or differ from
+/// their digests.
 Result<int> run_farm(const FarmCommand& command);
 /// Returns lines about the jobs, their dead shards and their workers.
 Result<std::string> describe_farm(Queue& queue);
 
-/// Makes shards of a farm's jobs, one after the other, for as long as it runs. Waits for a server that does not answer yet.
-/// Returns the exit code. Errors: unavailable if the server refuses, or if all jobs are unfit for this program or processor; io
-/// if the folder cannot be written.
+/// Makes shards of a farm's jobs, one after the other, until it is stopped. Waits for a server that does not answer yet. Returns
+/// the exit code. Errors: unavailable if the server refuses, or if all jobs are unfit for this program or processor; io if the
+/// folder cannot be written.
 Result<int> run_worker(const WorkerCommand& command);
 /// Works on a queue until a signal or, if requested, until the queue is empty.
 Result<int> work_on(Queue& queue, const WorkerCommand& command);

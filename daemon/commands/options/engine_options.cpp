@@ -61,8 +61,8 @@ Result<void> override_engine(EngineConfig& engine, std::uint64_t& seed, const En
   if (given.seed) seed = *given.seed;
   engine.device = enum_from<EngineDevice>(given.device, engine_device_names).value_or(engine.device);
   engine.simd = enum_from<SimdLevel>(given.simd, simd_level_names).value_or(engine.simd);
-  // --simd auto must win over SONARD_SIMD, which SimdLevel::automatic would read. So the best level is requested; kernels_for()
-  // falls back to the levels that the processor has.
+  // --simd auto must override SONARD_SIMD, which SimdLevel::automatic would read. So this requests the best level, and
+  // kernels_for() uses the best one that the processor has.
   if (given.simd == "auto") engine.simd = SimdLevel::avx512;
   if (given.expected_power) engine.switches.expected_power = true;
   engine.switches.mode = enum_from<Mode>(given.mode, mode_names).value_or(engine.switches.mode);

@@ -9,8 +9,8 @@
 
 namespace sonar {
 
-/// While it exists, it periodically reports the state of a load: "loading the scene: reading wreck.ply, 45 %, 12 s". It reports
-/// nothing if the load ends before the first report, or the scene is small.
+/// Reports the state of a load periodically: "loading the scene: reading wreck.ply, 45 %, 12 s". Reports nothing if the load ends
+/// before the first report, or the scene is small.
 class LoadProgress {
  public:
   using Say = std::function<void(const std::string& line)>;  // called on a separate thread

@@ -11,8 +11,8 @@ struct QueueOptions {
   std::string url = "nats://127.0.0.1:4222";  // several URLs are separated by commas
   std::filesystem::path credentials;          // a NATS credentials file; empty = none
   std::filesystem::path token_file;
-  /// When no server answers, connect() calls this with the reason, and tries again if it returns true. Empty: connect() tries
-  /// once.
+  /// connect() calls this function with the reason if no server answers, and tries again if it returns true. Empty: connect()
+  /// tries once.
   std::function<bool(const std::string& why)> try_again{};
 };
 

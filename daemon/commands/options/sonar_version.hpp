@@ -1,4 +1,4 @@
-// The program's version, for files that it leaves behind; set by the build.
+// The version of sonard, for the files that it writes; the build sets it.
 #pragma once
 
 namespace sonar::render {

@@ -29,14 +29,14 @@ ResolutionCell cell_of(const RenderJob& job) {
 namespace {
 
 constexpr double least_pattern = 0.1;     // -20 dB
-constexpr double level_tolerance = 1e-6;  // tolerance of a sine or cosine, for the bed and the sonar
+constexpr double level_tolerance = 1e-6;  // tolerance of the sine or cosine with which bed and sonar count as level
 
 struct Bed {
   double height_m = 0;  // height of the sonar above the bed
   const Material* material = nullptr;
 };
 
-/// The nearest level plane below the sonar.
+/// Returns the nearest level plane below the sonar.
 std::optional<Bed> bed_below(const Scene& scene, Vec3d sonar_m) {
   std::optional<Bed> bed;
   for (const Object& o : scene.objects) {
@@ -68,7 +68,7 @@ class ClosedForm {
 
   double true_range_m(double device_range_m) const { return device_range_m * true_over_device_; }
 
-  /// 0 where the bed does not lie at that range, or the beam does not see it.
+  /// Returns the two-way pattern; 0 where the bed does not lie at that range, or is outside the beam.
   double pattern(double range_m, double sine) const {
     const double ahead2 = range_m * range_m * (1 - sine * sine) - bed_.height_m * bed_.height_m;
     if (!(ahead2 > 0)) return 0;
@@ -76,7 +76,7 @@ class ClosedForm {
     if (!has_pattern_) return std::abs(psi) < unit_reach_rad_ ? 1 : 0;
     return std::abs(psi) < pi / 2 ? elevation_two_way(aperture_, psi) : 0;
   }
-  /// Returns whether the beams see the bed in the whole footprint of a bin: the bin, and pulse_m and beam_sine to either side.
+  /// Returns whether the bed fills the whole footprint of a bin: the bin, and pulse_m and beam_sine on either side of it.
   bool holds(double range_m, double sine, double pulse_m, double beam_sine) const {
     for (const double r : {range_m - pulse_m, range_m, range_m + pulse_m})
       for (const double u : {sine - beam_sine, sine, sine + beam_sine})
@@ -110,7 +110,7 @@ RenderJob with_bed_only(RenderJob job) {
   return job;
 }
 
-/// Compares in power, bin by bin, only where the closed form holds in the whole footprint.
+/// Compares the powers of each bin in whose whole footprint the closed form holds.
 Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping) {
   const Pose& sonar = ping.request.sonar_in_world;
   const auto bed = bed_below(*job.scene, sonar.position_m);

@@ -48,7 +48,7 @@ class Parser {
   void skip_blanks() {
     while (at_ < text_.size() && text_[at_] == ' ') ++at_;
   }
-  // Skips blanks, and then the character `c` if it is next. Returns whether it was.
+  // Skips blanks, and then the character `c` if it is next. Returns true if it skipped `c`.
   bool take(char c) {
     skip_blanks();
     if (at_ >= text_.size() || text_[at_] != c) return false;
@@ -86,7 +86,8 @@ class Parser {
     }
   }
   double sign() {
-    // Every recursion of the grammar passes here, so this bounds the stack. A sign binds weaker than a power: -2^2 is -4.
+    // Every recursion of the grammar calls this function, so the limit here bounds the stack. A sign binds weaker than a power:
+    // -2^2 is -4.
     if (++depth_ > deepest) return complain("is nested too deeply"), 0;
     const double value = take('-') ? -sign() : power();
     --depth_;
@@ -155,7 +156,7 @@ class Parser {
   std::string wrong_;
 };
 
-/// The end of the $name or $(formula) that begins at `at`; `at` itself when it is neither.
+/// Returns the end of the $name or $(formula) that begins at `at`; returns `at` if neither begins there.
 std::size_t end_of_reference(std::string_view text, std::size_t at) {
   std::size_t end = at + 1;
   if (end < text.size() && text[end] == '(') {
@@ -190,7 +191,7 @@ Result<std::string> substitute(std::string_view text, const Values& values, cons
     }
     const auto value = evaluate(text.substr(dollar + 1, end - dollar - 1), values);
     if (!value) {
-      // The error names the line of the file. The formula itself is in the text of the error.
+      // The error has the line of the file, and the formula.
       const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(dollar), '\n');
       return failure(ErrorKind::config, name + ":" + std::to_string(line) + ": " + value.error().text);
     }

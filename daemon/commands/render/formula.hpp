@@ -1,5 +1,5 @@
 // Formulas in render files: scene values that depend on a swept value.
-// + - * / ^, parentheses, pi, named values, and log10 ln exp sqrt abs sin cos tan asin acos atan deg rad.
+// A formula has + - * / ^, parentheses, pi, named values, and log10 ln exp sqrt abs sin cos tan asin acos atan deg rad.
 #pragma once
 
 #include <functional>
@@ -13,11 +13,11 @@ namespace sonar::render {
 
 using Values = std::map<std::string, double, std::less<>>;
 
-/// Evaluates a formula; angles are in radians, deg() and rad() convert. Errors: a sentence if it cannot be parsed or is not
+/// Evaluates a formula; angles are in radians, deg() and rad() convert. Errors: the formula cannot be parsed, or its value is not
 /// finite.
 Result<double> evaluate(std::string_view formula, const Values& values);
 
-/// The text with every $name and $(formula) replaced by its number. Errors start with `name`:line.
+/// Returns the text with every $name and $(formula) replaced by its number. Errors start with `name`:line.
 Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name);
 
 }  // namespace sonar::render

@@ -31,7 +31,7 @@ PolarImage shape_of(const Ping& ping) {
   return shape;
 }
 
-/// The corners between beams and rows, as positions in the picture of the fan.
+/// Converts corners between beams and rows to positions in the picture of the fan.
 class Cartesian {
  public:
   explicit Cartesian(const PolarImage& shape)
@@ -39,7 +39,7 @@ class Cartesian {
   const FanLayout& layout() const { return layout_; }
   std::pair<double, double> at(Corner corner) const {
     const auto& azimuth = shape_.azimuth_rad;
-    // Beam k spans [k - 1/2, k + 1/2] of the table; past its ends the spacing is that of the last two.
+    // Beam k spans [k - 1/2, k + 1/2] of the table; beyond an end, the spacing of the last two beams continues.
     const double beam = corner.x - 0.5;
     const auto left = static_cast<std::size_t>(std::clamp(std::floor(beam), 0.0, static_cast<double>(azimuth.size()) - 2));
     const double angle = azimuth[left] + (beam - static_cast<double>(left)) * (azimuth[left + 1] - azimuth[left]);
@@ -54,7 +54,7 @@ class Cartesian {
 
 double tenth(double x) { return std::round(10 * x) / 10; }
 
-/// The box [left, top, width, height] around all polygons, in pixels.
+/// Returns the box [left, top, width, height] around all polygons, in pixels.
 json box_of(const std::vector<json>& polygons) {
   double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
   for (const json& polygon : polygons)
@@ -71,7 +71,7 @@ json polar_polygon(const Outline& outline) {
   return polygon;
 }
 
-/// Edges along an arc are divided, because a straight line would cut the arc.
+/// Converts an outline to a polygon. Edges along an arc are divided, because a straight line would cut the arc.
 json cartesian_polygon(const Outline& outline, const Cartesian& cartesian) {
   json polygon = json::array();
   for (std::size_t i = 0; i < outline.size(); ++i) {

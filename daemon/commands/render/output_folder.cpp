@@ -34,7 +34,7 @@ std::string inputs_of(const path& file) {
   return about.is_object() && about.contains("inputs") && about["inputs"].is_string() ? about["inputs"].get<std::string>() : "";
 }
 
-/// Files such as NNNNNN.json and NNNNNN_pressure.npy, which sonard may remove.
+/// True for names such as NNNNNN.json and NNNNNN_pressure.npy, which sonard may remove.
 bool is_of_a_ping(const path& file) {
   const std::string name = file.filename().string();
   const bool digits =
@@ -61,7 +61,7 @@ Result<std::vector<path>> pings_in(const path& folder) {
   return found;
 }
 
-/// A lock that ends when the process ends, in any way, and leaves no file behind.
+/// Locks the folder until the process ends, in any way; the lock is not a file.
 Result<int> lock(const path& folder) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0 || ::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
@@ -107,7 +107,7 @@ Result<void> make_way(const OutputOptions& o, const std::string& digest) {
 
 }  // namespace
 
-/// The lock comes first: two runs must not both find the folder free.
+/// Locks the folder first, so that two runs cannot both claim it.
 Result<OutputFolder> OutputFolder::claim(const RenderInput& input, const OutputOptions& options, std::string digest) {
   std::error_code ec;
   std::filesystem::create_directories(options.folder, ec);
@@ -137,7 +137,7 @@ OutputFolder::~OutputFolder() {
 
 std::string OutputFolder::stem(std::uint64_t number) const { return (options_.folder / number_text(number)).string(); }
 
-/// The sidecar is written last, so a ping whose sidecar exists is whole.
+/// The sidecar is the last file written, so a ping whose sidecar exists is complete.
 std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   const auto with = [&](const char* end) { return path(stem(number) + end); };
   std::vector<path> files;
@@ -152,7 +152,7 @@ std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   return files;
 }
 
-/// The sidecar is written last, so a ping is complete if its sidecar names these inputs.
+/// The sidecar is the last file written, so a ping is complete if its sidecar names these inputs.
 bool OutputFolder::holds(std::uint64_t number) const {
   std::error_code ec;
   for (const path& file : files_of(number))

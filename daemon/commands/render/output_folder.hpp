@@ -16,24 +16,24 @@ namespace sonar::render {
 struct OutputOptions {
   std::filesystem::path folder;
   bool npy = true, png = true, raw = false, complex = false, labels = false;
-  bool rings = true;                   // in pictures
-  int batch = 1;                       // pings that all threads make before they are written
+  bool rings = true;                   // range rings in pictures
+  int batch = 1;                       // number of pings that all threads make before any is written
   bool overwrite = false;              // pings of other inputs in the folder are removed
   std::uint64_t first = 1;             // number of the first ping to make
-  std::optional<std::uint64_t> pings;  // pings of each job; empty: one, or one for every pose of the file
-  std::optional<double> rate_hz;       // nullopt: the rate of the settings, or one ping at every pose
+  std::optional<std::uint64_t> pings;  // pings of each job; nullopt: one, or one for every pose of the file
+  std::optional<double> rate_hz;       // pings per second; nullopt: the rate of the settings, or one ping at every pose
 };
 
 class OutputFolder {
  public:
-  /// Creates the folder and locks it while this object lives. Errors: io; usage when it has pings of other inputs that may not be
-  /// removed, or another run writes into it.
+  /// Creates the folder and locks it while this object lives. Errors: io; usage if the folder has pings of other inputs that may
+  /// not be removed, or if another run writes into it.
   static Result<OutputFolder> claim(const RenderInput& input, const OutputOptions& options, std::string digest);
   OutputFolder(OutputFolder&& other) noexcept;
   OutputFolder& operator=(OutputFolder&&) = delete;
   ~OutputFolder();
 
-  /// The common start of the names of a ping's files: "folder/000001".
+  /// Returns the common start of the names of a ping's files, such as "folder/000001".
   std::string stem(std::uint64_t number) const;
   /// Returns whether all files of a ping exist and are of these inputs.
   bool holds(std::uint64_t number) const;
@@ -47,7 +47,7 @@ class OutputFolder {
 
   OutputOptions options_;
   std::string digest_;
-  int lock_ = -1;  // an open folder with the lock on it; -1 where the file system has no locks
+  int lock_ = -1;  // descriptor of the locked folder; -1 if the file system has no locks
 };
 
 /// Writes the parts into one file, which is renamed when complete. Errors: io if the disk

@@ -26,12 +26,12 @@ int threads_of(const EngineConfig& engine) {
   return engine.threads > 0 ? engine.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-/// Shows a bar on a terminal, and elsewhere a line per second.
+/// Shows a bar on a terminal; elsewhere prints a line per second.
 class ProgressLine {
  public:
   explicit ProgressLine(bool quiet) : quiet_(quiet) {}
 
-  /// After the last ping: the summary of the whole run.
+  /// Prints the summary of the whole run.
   void conclude(const Progress& p) const {
     if (quiet_ || p.done == p.kept) return;
     const double taken_s = std::max(std::chrono::duration<double>(Clock::now() - begin_).count(), 1e-3);
@@ -89,7 +89,7 @@ Result<RenderInput> input_of(const RenderCommand& command) {
   if (!command.poses.empty()) {
     const auto file = poses_of(command);
     if (!file) return tl::make_unexpected(file.error());
-    for (RenderJob& job : input->jobs) {  // if there are several bodies, the one named like the vehicle, as in the daemon
+    for (RenderJob& job : input->jobs) {  // uses the body with the vehicle's name if there are several, as in the daemon
       const std::string body = file->bodies.size() > 1 ? job.vehicle().name : "";
       if (const auto r = follow(job, *file, command.poses, body); !r) return tl::make_unexpected(r.error());
     }
@@ -191,7 +191,7 @@ Result<void> run_render(const RenderCommand& command) {
   ProgressLine line(command.quiet);
   Parallel pool(threads_of(input->jobs.front().config.engine));
   const auto done = render_pings(*input, output_options(command), pool, [&](const Progress& p) {
-    loading.reset();  // the first ping is there
+    loading.reset();  // the first ping is made
     line.show(p);
   });
   loading.reset();

@@ -20,7 +20,7 @@ using text::Range;
 
 constexpr std::size_t most_steps = 1000;
 
-/// A sonar that is not a product: a wide fan of 1 by 20 degrees at 900 kHz, 16 bit samples.
+/// Returns the model of a sonar without a profile: a wide fan of beams of 1 by 20 degrees, at 900 kHz, with 16-bit samples.
 SonarModel plain_model() {
   FrequencyMode mode;
   mode.name = "plain";
@@ -47,7 +47,7 @@ PingSettings plain_settings(const Water& water, double depth_m, const FrequencyM
   return s;
 }
 
-/// A file of poses replaces `at` and `orbit`.
+/// Reads the poses of the vehicle. A file of poses replaces `at` and `orbit`.
 void read_path(const Node& node, const std::filesystem::path& folder, RenderJob& job) {
   if (!node.present()) return;
   Map keys = node.map();
@@ -61,7 +61,7 @@ void read_path(const Node& node, const std::filesystem::path& folder, RenderJob&
   if (const auto r = follow(job, *named.file, named.name, body); !r) trajectory.file.fail(r.error().text);
 }
 
-/// Needs the water and the vehicle's poses.
+/// Reads the sonar; the job must already have the water and the vehicle's poses.
 void read_sonar(const Node& node, RenderJob& job) {
   Map keys = node.map();
   const Node profile_node = keys.optional("profile"), options = keys.optional("options");
@@ -84,7 +84,7 @@ void read_sonar(const Node& node, RenderJob& job) {
   }
   const int first_mode = profile.vendor ? device_settings(job).mode : 0;
   const int mode = read_mode(ping.map().optional("mode"), *profile.model, first_mode);
-  if (model_node.present()) {  // otherwise the model keeps its identity, for which tables are cached
+  if (model_node.present()) {  // without changes the model stays the same object, for which tables are cached
     SonarModel model = *profile.model;
     read_model(model_node.map(), model.modes[static_cast<std::size_t>(mode)]);
     profile.model = std::make_shared<const SonarModel>(std::move(model));
@@ -102,8 +102,8 @@ void read_sonar(const Node& node, RenderJob& job) {
   read_ping(ping.map(), *profile.model, rows, job.settings);
 }
 
-/// The scene's keys inline, or the name of a file. An error in the scene is bad data, as it is in a scene
-/// file. Everything else must have been read before, because later errors of the document count as errors of the scene.
+/// Reads the scene from inline keys, or from the file that `node` names. An error in the scene is bad data, as in a scene file.
+/// Everything else must be read before, because later errors of the document count as errors of the scene.
 Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::filesystem::path& folder, const std::string& name,
                                                    const text::Document& document, ShapeCache* known) {
   if (node.is_map()) {
@@ -118,7 +118,7 @@ Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::
   return *std::move(scene);
 }
 
-/// The scene is read last, because its errors are of another kind.
+/// Reads the scene last, because its errors are of another kind.
 Result<RenderJob> read_job(const std::string& text, const std::string& name, const std::filesystem::path& folder,
                            const Values& values, ShapeCache* known) {
   const auto document = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
@@ -146,7 +146,7 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   return job;
 }
 
-/// Values that each step of the sweep sets and `let` adds; one step without a sweep.
+/// Returns the values of each step of the sweep, with those of `let`; one step if there is no sweep.
 Result<std::vector<Values>> read_steps(const text::Document& document) {
   Map root = document.root();
   std::vector<Values> steps(1);
@@ -169,7 +169,7 @@ Result<std::vector<Values>> read_steps(const text::Document& document) {
 }
 
 Result<std::string> text_of_file(const std::filesystem::path& file) {
-  auto text = read_regular(file, text::YamlLimits{}.max_bytes);  // if the file is too long, reads enough to refuse it
+  auto text = read_regular(file, text::YamlLimits{}.max_bytes);  // if the file is too long, reads one byte more than the limit
   if (text && text->empty()) return failure(ErrorKind::missing_file, "cannot read " + file.string() + ": it is empty");
   return text;
 }
@@ -195,7 +195,7 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
   job.scene = *scene;
   job.config = *std::move(config);
   job.sonar_index = index;
-  for (VehicleConfig& v : job.config.vehicles) v.plan.rules = {};  // trajectories are in the file's own time
+  for (VehicleConfig& v : job.config.vehicles) v.plan.rules = {};  // trajectories keep the times of the file
   for (ObjectConfig& o : job.config.objects) o.plan.rules = {};
   job.settings = device_settings(job);
   RenderInput input{file.string(), {}, text};
@@ -234,7 +234,8 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
   return input;
 }
 
-/// A key decides the kind of file: `world` a configuration, `objects` a scene, `dataset` a job; else it is a render file.
+/// The kind of file depends on a key: `world` is in a configuration, `objects` in a scene, `dataset` in a job; other files are
+/// render files.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar) {
   const auto text = text_of_file(file);
   if (!text) return tl::make_unexpected(text.error());

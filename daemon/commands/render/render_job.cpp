@@ -24,7 +24,7 @@ PingSettings device_settings(const RenderJob& job) {
 
 namespace {
 
-/// The settings that the device has in the mode of the job; without vendor settings if there is no device.
+/// Returns the settings that the device has in the mode of the job; without vendor settings if the sonar has no profile.
 protocol::ChangeSettings as_the_device_keeps(const RenderJob& job) {
   const protocol::Vendor* const vendor = job.sonar().profile.vendor;
   if (vendor == nullptr) return {};
@@ -90,7 +90,7 @@ PingRequest make_request(const RenderJob& job, const World& world, PingNumber nu
   request.model = sonar.profile.model;
   request.number = number;
   request.settings = job.settings;
-  request.vendor_settings = as_the_device_keeps(job).vendor_settings;  // they determine if the ping is a range image
+  request.vendor_settings = as_the_device_keeps(job).vendor_settings;  // these determine whether the ping is a range image
   request.bearings = sonar.bearings;
   request.sonar_id = static_cast<std::uint32_t>(job.sonar_index);
   return request;
@@ -98,7 +98,7 @@ PingRequest make_request(const RenderJob& job, const World& world, PingNumber nu
 
 namespace {
 
-/// Removes poses that follow another in less than `shortest_step`. The last pose stays if only one other is left.
+/// Removes poses that follow another in less than `shortest_step`. The last pose is kept if only one other is left.
 motion::Trajectory thinned(const motion::Points& all) {
   motion::Points kept;
   for (std::size_t i = 0; i < all.times.size(); ++i) {
@@ -118,7 +118,7 @@ Steps steps_of(const motion::Trajectory& trajectory) {
   const motion::Trajectory way = thinned(trajectory.points());
   const std::vector<motion::Ns>& times = way.points().times;
   for (std::size_t i = 0; i + 1 < times.size(); ++i) {
-    const motion::Motion m = way.at(times[i]).moves;  // the motion on the way to the next pose
+    const motion::Motion m = way.at(times[i]).moves;  // the motion from this pose to the next
     const double mps = length(m.velocity_mps), radps = length(m.angular_velocity_radps);
     ++steps.all;
     if (!(mps <= fastest_vehicle_mps && radps <= fastest_vehicle_radps)) ++steps.too_fast;

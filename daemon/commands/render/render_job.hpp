@@ -34,7 +34,7 @@ struct RenderJob {
   std::size_t sonar_index = 0;  // in config.sonars; the random noise depends on it, as in the daemon
   PingSettings settings;
   Time begins_at{};           // the time stamp at which trajectories begin
-  bool snapshots = false;     // the vehicle's poses are unrelated: the sonar rests within each ping
+  bool snapshots = false;     // true if the poses are unrelated; the sonar then does not move during a ping
   bool wants_motion = false;  // true if the file contains `engine: {motion: on}`
   Values values;              // values of the sweep and of `let`
 
@@ -47,8 +47,8 @@ struct RenderJob {
 };
 
 struct RenderInput {
-  std::string source;                   // the file
-  std::vector<RenderJob> jobs;          // one, or one for every step of the sweep
+  std::string source;                   // name of the file
+  std::vector<RenderJob> jobs;          // one job, or one for every step of the sweep
   std::string text;                     // text of the file and of the scene's file, for the digest of the inputs
   std::vector<std::string> notes = {};  // decisions about the input that users should see; written to render.json
 };
@@ -73,7 +73,7 @@ Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const st
 /// Returns the times of the poses of the vehicle's trajectory; empty if it has none.
 std::vector<Time> pose_times(const RenderJob& job);
 
-/// The vehicles and moving objects of the job, as the daemon has them.
+/// Returns the vehicles and moving objects of the job, as the daemon creates them.
 World world_of(const RenderJob& job);
 /// Returns everything on which a ping of the job depends. `world` = world_of(job).
 PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at);

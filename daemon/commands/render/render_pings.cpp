@@ -40,10 +40,10 @@ struct MadePing {
   PingRequest request;
   Ping ping;
   PingStatistics count;
-  Result<std::uint64_t> written = std::uint64_t{0};  // bytes
+  Result<std::uint64_t> written = std::uint64_t{0};  // bytes written, or the error
 };
 
-/// The sidecar is written last: a ping that has one is complete. Returns the bytes written.
+/// Writes the sidecar last, so that a ping with a sidecar is complete. Returns the bytes written.
 Result<std::uint64_t> write_ping(const RenderJob& job, const MadePing& made, const std::string& engine,
                                  const OutputFolder& folder) {
   const OutputOptions& o = folder.options();
@@ -89,8 +89,8 @@ Result<std::unique_ptr<PingEngine>> engine_for(const RenderJob& job, Parallel& p
   return start_engine(make, job.scene);
 }
 
-/// The pings of one job, in batches. A device computes a batch at once, the CPU one ping after the other with all threads. While
-/// a batch is written, its pings in parallel, the device computes the next one.
+/// Makes the pings of one job in batches. A GPU computes a batch at once; the CPU computes one ping after the other, with all
+/// threads. While the pings of a batch are written in parallel, the device computes the next batch.
 class JobRun {
  public:
   JobRun(const std::string& source, const RenderJob& job, const OutputFolder& folder, Parallel& pool, Progress& progress,
@@ -121,7 +121,7 @@ class JobRun {
   }
 
  private:
-  /// Submits the batch and writes the one before.
+  /// Submits the batch, and writes the previous one.
   Result<void> take_turns() {
     try {
       if (!batch_.empty())
@@ -152,7 +152,7 @@ class JobRun {
       batch_[i].ping = std::move(pings.at(i));
       batch_[i].count = counts.at(i);
     }
-    // One description is valid for all pings, because pings that a failed device had begun are made again.
+    // One description is valid for all pings, because the pings of a failed device are made again on the other device.
     const std::string description = engine_->description();
     pool_.for_each(batch_.size(),
                    [&](std::size_t i, int) { batch_[i].written = write_ping(job_, batch_[i], description, folder_); });
@@ -173,7 +173,7 @@ class JobRun {
   Progress& progress_;
   const std::function<void(const Progress&)>& on_progress_;
   std::unique_ptr<PingEngine> engine_;
-  std::vector<MadePing> batch_, under_way_;  // being filled or written; being computed
+  std::vector<MadePing> batch_, under_way_;  // the batch that is filled or written; the batch that is computed
 };
 
 PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t number, Time at, const OutputOptions& o) {
@@ -186,7 +186,7 @@ PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t n
 
 }  // namespace
 
-/// With poses and no rate there is a ping for each line; otherwise pings have a constant rate, within the time of the poses.
+/// Without --rate, each pose of a file gets a ping; otherwise pings have a constant rate, within the time of the poses.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
   const std::vector<Time> lines = pose_times(job);
   const std::uint64_t before = o.first - 1;
@@ -219,7 +219,7 @@ Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions
   return times;
 }
 
-/// Counts pings in air over all jobs before any is rendered, because poses in the wrong frame are a common mistake.
+/// Counts the pings of all jobs in air before any is rendered, because poses in the wrong frame are a common mistake.
 std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
   std::size_t all = 0, in_air = 0, above = 0;
   for (const RenderJob& job : input.jobs) {
@@ -229,7 +229,7 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
     const World world = world_of(job);
     const SonarConfig& sonar = job.sonar();
     const Extent scene = surroundings_of(job.config, *job.scene).scene;
-    const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // z = 0 of this scene is not a water surface
+    const bool lies_above = !scene.empty() && scene.low_m.z >= 0;  // in such a scene z = 0 is not a water surface
     for (const Time at : *times) {
       const Pose sonar_in_world = compose(world.vehicle_at(sonar.vehicle, at), sonar.mount);
       const bool is_above = sonar_in_world.position_m.z > least_depth_m, gets_noise_only = is_in_air(sonar_in_world, *job.scene);
@@ -250,7 +250,7 @@ std::string note_of_air(const RenderInput& input, const OutputOptions& o) {
       above, all, cure);
 }
 
-/// Times of all jobs are computed first, so that an impossible request is refused before the folder is touched.
+/// Computes the times of all jobs first, so that an impossible request is refused before the folder changes.
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& o, Parallel& pool,
                               const std::function<void(const Progress&)>& on_progress) {
   if (o.first > 1 && input.jobs.size() > 1)

@@ -1,5 +1,5 @@
-// Renders the pings of a job into a folder: arrays, pictures and a sidecar each (docs/render.md). Finished pings
-// are kept, so that an interrupted run continues where it stopped.
+// Renders the pings of a job into a folder, each as arrays, pictures and a sidecar (docs/render.md). Finished pings are kept, so
+// that an interrupted run continues where it stopped.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@ namespace sonar::render {
 
 struct Progress {
   std::uint64_t done = 0, all = 0, kept = 0;
-  std::uint64_t bytes = 0;  // written
+  std::uint64_t bytes = 0;  // bytes written
 };
 
-/// Returns the times of the pings of a job, from the first wanted one. Error usage: there are fewer poses than pings.
+/// Returns the times of the requested pings of a job. Error usage: there are fewer poses than pings.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& options);
 
-/// Returns a sentence if in some pings the sonar is above the sea surface, or above z = 0 in a scene without one. Empty
-/// otherwise, and if the times are refused.
+/// Returns a sentence if in some pings the sonar is above the sea surface, or above z = 0 in a scene without a surface. Returns
+/// an empty text otherwise, and if firing_times() fails.
 std::string note_of_air(const RenderInput& input, const OutputOptions& options);
 
 /// Calls `on_progress` after every ping, in order. Errors: io; requests that the engine rejects.

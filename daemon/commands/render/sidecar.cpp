@@ -23,7 +23,7 @@ json json_of(const Pose& pose) {
   return {{"xyz_m", json_of(pose.position_m)}, {"wxyz", {q.w, q.x, q.y, q.z}}};
 }
 double deg(float rad) { return deg_from_rad(static_cast<double>(rad)); }
-/// JSON has no infinite numbers.
+/// Returns null for an infinite number, because JSON has none.
 json finite(float x) { return std::isfinite(x) ? json(x) : json(nullptr); }
 
 const char* name_of(Taper taper) {
@@ -131,7 +131,7 @@ json json_of(const Water& water) {
           {"sound_speed_mps", water.sound_speed_mps}};
 }
 
-/// Range, index and name of the first object that each beam hit; null if it hit none.
+/// Returns range, index and name of the first object that each beam hit; null for a beam that hit none.
 json truth_of(const Ping& ping, const Scene& scene) {
   json range = json::array(), object = json::array(), name = json::array();
   for (const BeamTruth& t : ping.truth) {
@@ -249,7 +249,7 @@ std::string npy_header(std::string_view type, std::initializer_list<std::size_t>
   for (const std::size_t n : shape) sizes += std::to_string(n) + (shape.size() == 1 ? "," : ", ");
   if (shape.size() > 1) sizes.resize(sizes.size() - 2);
   std::string dictionary = "{'descr': '" + std::string(type) + "', 'fortran_order': False, 'shape': (" + sizes + "), }";
-  constexpr std::size_t before = 10, multiple = 64;  // magic, version and length precede the dictionary
+  constexpr std::size_t before = 10, multiple = 64;  // bytes of magic, version and length, before the dictionary
   const std::size_t whole = (before + dictionary.size() + 1 + multiple - 1) / multiple * multiple;
   dictionary.resize(whole - before - 1, ' ');
   dictionary += '\n';

@@ -1,5 +1,5 @@
-// The JSON file beside a rendered ping: all its parameters and the ground truth; and the digest of the inputs, which identifies
-// files that need not be rendered again.
+// Makes the JSON file beside a rendered ping, which has all parameters and the ground truth, and the digest of the inputs, which
+// identifies files that need not be rendered again.
 #pragma once
 
 #include <cstddef>
@@ -27,17 +27,17 @@ std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictu
 
 // Writes NumPy arrays (.npy, format version 1.0): a short header, then the bytes, little-endian, last index fastest.
 
-/// `type`: "<f4", "<c8", "|u1", "<u2", "<u4". The header's size is a multiple of 64.
+/// Returns the header, whose size is a multiple of 64. `type`: "<f4", "<c8", "|u1", "<u2" or "<u4".
 std::string npy_header(std::string_view type, std::initializer_list<std::size_t> shape);
 
 inline std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text.data(), text.size())); }
 
-// Labels as JSON: the instances of a scene, and the pixels of each in a ping, in COCO's format (docs/datasets.md).
+// Writes labels as JSON in COCO's format: the instances of a scene, and the pixels of each instance in a ping (docs/datasets.md).
 
 inline constexpr int cartesian_width_px = 1000;  // width of the fan to which `cartesian` refers, as in render's pictures
 
-/// For each instance, from 1 on: its name, its class, and true if it is a thing. A thing is an object with a label of its own; it
-/// has boxes and polygons.
+/// Returns for each instance, from 1 on, the name, the class, and true if it is a thing. A thing is an object with its own label;
+/// it has boxes and polygons.
 nlohmann::json instances_of(const Scene& scene);
 
 /// Annotations of every visible thing: `bbox`, `area` and `segmentation` in pixels of the samples (x = beam, y = row), and

@@ -101,7 +101,7 @@ void read_receiver(const Node& node, ReceiverModel& law) {
   law.leak_is_shared = keys.optional("leak_is_shared").boolean_or(law.leak_is_shared);
 }
 
-/// A list of azimuths makes the spacing a listed one.
+/// Reads lists of azimuths and widths, which replace the regular spacing.
 void read_beams(const Node& azimuths, const Node& widths, FrequencyMode& mode) {
   if (azimuths.present()) {
     mode.beam_spacing = BeamSpacing::listed;
@@ -154,14 +154,14 @@ int read_mode(const Node& node, const SonarModel& model, int fallback) {
   if (!node.present()) return fallback;
   if (text::parse_integer(node.text(64))) {
     const int modes = static_cast<int>(model.modes.size());
-    return std::clamp(static_cast<int>(node.integer(1, modes)), 1, modes) - 1;  // a value outside has been reported by then
+    return std::clamp(static_cast<int>(node.integer(1, modes)), 1, modes) - 1;  // integer() has reported a value outside
   }
   std::vector<std::string_view> names;
   for (const FrequencyMode& mode : model.modes) names.push_back(mode.name);
   return static_cast<int>(node.choice_index(std::move(names)));
 }
 
-/// The order matters: mode before range, range before rows, because the default of each key depends on those before it.
+/// Reads mode, range and rows in this order, because the default of each key depends on those before it.
 void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& s) {
   const PingSettings before = s;
   const bool own_grid = rows_of == RowsOf::no_device, range_image = rows_of == RowsOf::range_image;
@@ -181,7 +181,7 @@ void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& 
       keys.optional("device_sound_speed_mps").number_or(static_cast<double>(s.device_sound_speed_mps), Range::between(100, 1e4)));
   set(keys.optional("device_absorption_db_per_m"), Range::between(0, 1000), s.device_absorption_db_per_m);
 
-  // The grid: of rows, their spacing and the pulse, each that is not given follows from the others.
+  // If the rows, their spacing or the pulse are not given, they follow from the others.
   const Node rows = keys.optional("rows"), spacing = keys.optional("row_spacing_m"), pulse = keys.optional("pulse_width_m");
   const Range a_length = Range::between(1e-5, 100);
   if (pulse.present()) s.pulse_width_m = static_cast<float>(pulse.number(a_length));
@@ -195,7 +195,7 @@ void read_ping(Map keys, const SonarModel& model, RowsOf rows_of, PingSettings& 
     s.range_bin_m = c / (2 * native_sample_rate_hz(envelope_parameter_hz(c, static_cast<double>(s.pulse_width_m))));
   else
     s.range_bin_m = before.range_bin_m * s.range_m / before.range_m;
-  if (!(s.range_bin_m > 0)) return;  // reported already
+  if (!(s.range_bin_m > 0)) return;  // the error is reported already
   const double needed = std::max(std::ceil(shown_m / s.range_bin_m - 1e-9), 1.0);
   if (!rows.present() && needed > most_rows) {
     const Node& cause = spacing.present() || !pulse.present() ? spacing : pulse;

@@ -36,7 +36,7 @@ void PlayedPings::rewind() {
   ahead_ = read();
 }
 
-/// The next message that holds a ping or a part of one. A recorder may write packets joined or in pieces.
+/// Returns the next message that holds a ping or a part of one. A recorder may join or divide the packets of the sonar.
 std::optional<PlayedPings::Part> PlayedPings::read() {
   while (true) {
     auto message = splitter_ ? splitter_->next() : std::nullopt;

@@ -1,4 +1,4 @@
-// The pings of a recording for a sonar whose hosts request them: in order or, for a mechanical scan, by direction.
+// Returns the pings of a recording for a sonar whose hosts request pings: in order or, for a mechanical scan, by direction.
 #pragma once
 
 #include <memory>
@@ -23,8 +23,7 @@ class PlayedPings {
 
   /// `codec` must have ping_part. `reader` and `codec` must outlive the object.
   PlayedPings(recording::RecordingReader& reader, const recording::Codec& codec) : reader_(reader), codec_(codec) {}
-  /// Reads the first ping, or all of a scan. Errors: bad_data if there is no ping or a scan is too
-  /// long; they name `file`.
+  /// Reads the first ping, or all lines of a scan. Errors (bad_data) name `file`: it has no ping, or a scan is too long.
   Result<void> open(const std::string& file);
   /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all other recordings.
   bool is_scan() const { return !lines_.empty(); }
@@ -35,8 +34,8 @@ class PlayedPings {
   /// True if next() has returned the last ping.
   bool at_end() const { return !ahead_; }
   void rewind();
-  /// The line whose direction is nearest to `head_rad`; among equally near ones, the next one after the last returned line,
-  /// cyclically.
+  /// Returns the line whose direction is nearest to `head_rad`; among equally near lines, the next one after the last returned
+  /// line, cyclically.
   const PlayedPing& nearest(double head_rad);
 
  private:
@@ -57,7 +56,7 @@ class PlayedPings {
   std::unique_ptr<recording::MessageSplitter> splitter_;  // for a make whose stream delimits messages
   std::optional<Part> ahead_;                             // the first part of the next ping
   std::vector<Line> lines_;
-  std::size_t after_ = 0;  // place of the line after the last one that was returned
+  std::size_t after_ = 0;  // index of the line after the last returned line
 };
 
 }  // namespace sonar

@@ -29,7 +29,7 @@ asio::awaitable<std::optional<recording::RecordedMessage>> ReadAhead::next() {
   co_return message;
 }
 
-/// Runs in `thread_`, while next() waits.
+/// Reads a batch in `thread_`, while next() waits.
 asio::awaitable<void> ReadAhead::read() {
   if (std::exchange(from_the_front_, false)) reader_.rewind();
   const auto until = Steady::now() + longest;

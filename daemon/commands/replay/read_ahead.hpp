@@ -9,16 +9,17 @@
 
 namespace sonar {
 
-/// For one coroutine. The reader must outlive it, and only this object may use it after the first next().
+/// Only one coroutine may call next(). The reader must outlive the object, and only the object may use the reader after the first
+/// next().
 class ReadAhead {
  public:
   explicit ReadAhead(recording::RecordingReader& reader) : reader_(reader) {}
 
-  /// nullopt at the end.
+  /// Returns the next message; nullopt at the end.
   asio::awaitable<std::optional<recording::RecordedMessage>> next();
   /// Starts again at the first message.
   void rewind();
-  /// The reader's damage(); valid after next() has returned nullopt.
+  /// Returns damage() of the reader; valid after next() has returned nullopt.
   std::optional<Error> damage() const { return reader_.damage(); }
   bool knows_times() const { return reader_.knows_times(); }
 

@@ -46,7 +46,7 @@ void add_replay_options(CLI::App& app, ReplayCommand& replay) {
 
 namespace {
 
-/// Port 0 means that no port was given.
+/// Parses IP or IP:PORT; the port is 0 if none is given.
 Result<Endpoint> endpoint_from(const std::string& place, const std::string& option) {
   const std::size_t colon = place.find(':');
   const auto ip = parse_ipv4(place.substr(0, colon));
@@ -58,7 +58,7 @@ Result<Endpoint> endpoint_from(const std::string& place, const std::string& opti
   return Endpoint{*ip, static_cast<std::uint16_t>(*port)};
 }
 
-/// The same for an address of this computer.
+/// Like endpoint_from(), for an address of this computer.
 Result<Endpoint> listener_from(const std::string& place, const std::string& option) {
   const auto at = endpoint_from(place, option);
   const std::string why = at ? why_not_of_a_computer(at->ip) : "";
@@ -78,7 +78,7 @@ Result<std::string> open_page(ReplayPage& page, const std::optional<Endpoint>& a
   return "open      http://" + text_of(page.at()) + "   the recording, in a browser\n";
 }
 
-/// The address of the page; nullopt if it is off.
+/// Returns the address of the page; nullopt if the page is off.
 Result<std::optional<Endpoint>> page_from(const ReplayCommand& command) {
   if (command.http == "off") return std::optional<Endpoint>();
   const auto at = listener_from(command.http, "--http");
@@ -133,7 +133,7 @@ Result<void> run_replay(const ReplayCommand& command) {
   const LimitConfig limits;
   Admission admission(limits, log);
   ReplayPage page(io, limits, admission, log, {command.file, command.sonar, command.rate_hz});
-  // The page keeps the event loop running, so it is stopped with the replay.
+  // The page keeps the event loop running, so the end of the replay stops the page.
   options->on_end = [&page] { page.stop(); };
   const auto serve = [&](auto& server, const std::string& place) -> Result<void> {
     if (!opened->reader->note().empty()) log.info(opened->reader->note());
@@ -154,7 +154,7 @@ Result<void> run_replay(const ReplayCommand& command) {
                  text::counted(done.clients, "client") + "\n");
     return server.outcome();
   };
-  // The sonar's ports are opened first. If one is in use, the command ends; without the page it continues.
+  // The ports of the sonar are opened first. If one is in use, the command ends; if the page cannot open, it continues.
   if (device->by_requests()) {
     RequestedReplay server(io, *opened->reader, *device, *options, log);
     if (auto listening = server.open(command.file); !listening) return listening;

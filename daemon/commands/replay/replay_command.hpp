@@ -24,7 +24,7 @@ struct ReplayCommand {
 
 void add_replay_options(CLI::App& app, ReplayCommand& replay);
 /// Serves until a driver has received the whole recording, or until SIGINT or SIGTERM. With `loop`, and for recordings of scans,
-/// only a signal ends it.
+/// only a signal ends the replay.
 Result<void> run_replay(const ReplayCommand& command);
 
 }  // namespace sonar

@@ -7,22 +7,22 @@
 namespace sonar {
 namespace {
 
-constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // a status comes every second
+constexpr std::uint64_t most_looked_at_bytes = 64u << 20;  // enough to find a status, which comes every second
 
-/// The reason if pings of that make cannot be served to a driver; empty if they can.
+/// Returns the reason if pings of that make cannot be served to a driver; empty if they can.
 std::string why_only_seen(const protocol::Make& make) {
   if (make.codec.ping_part != nullptr) return "";
   if (make.each_ping_requested || make.scans) return "depend on the requests of the driver";
   return make.has_several_streams() ? "are sent over several connections" : "";
 }
 
-/// A sonar that answers its hosts.
+/// Describes a sonar that answers hosts.
 void take(ReplayDevice& device, const recording::SentBy& by) {
   device.make = by.make;
   device.vendor = by.make->device;
   device.state = std::make_shared<protocol::DeviceState>();
   device.state->model = by.sender.model;
-  if (device.http() != nullptr) {  // HTTP resources contain id and power-up time
+  if (device.http() != nullptr) {  // HTTP resources contain the id and the power-up time
     device.state->id = 1;
     device.state->powered_up_at = Clock::system_wall();
   }
@@ -62,7 +62,7 @@ protocol::Bytes ReplayDevice::status_at(Ipv4 ip, Ipv4 mask, Ipv4 client) const {
   return wire::bytes_of(here);
 }
 
-/// Looks for the device id in the stream and for a status datagram, until both are found or the front of the recording is over.
+/// Searches the first 64 MiB of the recording for the device id in the stream and for a status datagram.
 Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, const std::string& file, std::uint16_t part_number) {
   ReplayDevice device;
   std::optional<std::uint16_t> id;
@@ -104,7 +104,7 @@ Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, cons
   }
   if (!id)
     return failure(ErrorKind::bad_data, file + " holds no message of a sonar" + (damage ? ": " + damage->text : std::string()));
-  // Without a recorded status, values that drivers check are made up: id, part number, and an address of the hardware.
+  // Without a recorded status, the values that drivers check are made up: id, part number and hardware address.
   if (!device.recorded_status) {
     device.status.device_id = *id;
     device.status.part_number = device.status.header.part_number = part_number;

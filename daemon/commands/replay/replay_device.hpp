@@ -1,5 +1,5 @@
-// The sonar of a recording: the recorded status datagram, with the local addresses, describes an Oculus; the vendor and the state
-// of the device describe another make.
+// The sonar of a recording. An Oculus is described by the recorded status datagram with local addresses, another make by its
+// vendor and the state of the device.
 #pragma once
 
 #include <memory>
@@ -11,30 +11,32 @@
 
 namespace sonar {
 
-/// An Oculus, which sends by itself, or a sonar that answers its hosts.
+/// An Oculus, which sends without requests, or a sonar that answers hosts.
 struct ReplayDevice {
   oculus::StatusMessage status;
-  bool recorded_status = false;              // if false, it is made from the device id
+  bool recorded_status = false;              // false: the status is made from the device id
   const protocol::Make* make = nullptr;      // null: an Oculus
-  const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null; and its state
+  const protocol::Vendor* vendor = nullptr;  // the vendor of a device that answers requests, else null
   std::shared_ptr<protocol::DeviceState> state;
   std::uint32_t serial = 0;  // serial number of an ARIS
-  std::string is_only_seen;  // reason if no driver can be served; empty = drivers can be served
+  std::string is_only_seen;  // reason why no driver can be served; empty = drivers can be served
 
-  /// Null: it listens by TCP for connections that last.
+  /// Returns the HTTP port; null if the device listens for lasting TCP connections.
   const protocol::Port* http() const { return vendor != nullptr ? vendor->port(protocol::Port::Kind::http) : nullptr; }
   bool by_datagrams() const { return vendor != nullptr && vendor->pings_by() == protocol::PingsBy::datagrams; }
-  /// Its hosts decide which pings they get: RequestedReplay serves it, else ReplayServer.
+  /// True if hosts decide which pings they get; then RequestedReplay serves the device, else ReplayServer.
   bool by_requests() const { return make != nullptr && make->codec.ping_part != nullptr; }
   std::string name() const;
   std::uint16_t tcp_port() const;
-  /// 0: it sends no status.
+  /// Returns 0 if the device sends no status.
   std::uint16_t status_port() const;
-  /// 142 bytes of an Oculus: drivers connect to the address in it, and ignore a device of another id. Else the beacon.
+  /// Returns the status datagram. For an Oculus it has 142 bytes; drivers connect to the address in it, and ignore a device with
+  /// another id. For other makes it is the beacon.
   protocol::Bytes status_at(Ipv4 ip, Ipv4 mask, Ipv4 client) const;
 };
 
-/// Looks through the front of the recording and rewinds it. bad_data when there is no message of a device in it.
+/// Searches the front of the recording for the device, and rewinds the recording. Error bad_data: there is no message of a
+/// device.
 Result<ReplayDevice> find_replay_device(recording::RecordingReader& reader, const std::string& file, std::uint16_t part_number);
 
 }  // namespace sonar

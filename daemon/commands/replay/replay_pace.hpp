@@ -1,5 +1,5 @@
-// Computes when the next message of a recording is due: at the pace of the recording, faster or slower. Pure; the replay server
-// waits.
+// Computes when the next message of a recording is due: at the pace of the recording, faster or slower. The replay server does
+// the waiting.
 #pragma once
 
 #include <algorithm>
@@ -14,10 +14,10 @@ class ReplayPace {
  public:
   using Steady = std::chrono::steady_clock;
   static constexpr std::chrono::seconds longest_gap{5};  // longer pauses are shortened; drivers disconnect after ten seconds
-  static constexpr std::chrono::milliseconds between_loops{100};  // from the last message to the first
+  static constexpr std::chrono::milliseconds between_loops{100};  // from the last message to the first of the next loop
   static constexpr std::chrono::milliseconds lateness{200};  // a longer delay is not caught up, so that slow clients get no burst
 
-  /// `speed` > 0. `interval`: between messages of recordings without times.
+  /// `speed` > 0. `interval`: time between messages of recordings without times.
   ReplayPace(double speed, std::optional<std::chrono::nanoseconds> interval) : speed_(speed), interval_(interval) {}
 
   Steady::time_point due(Time recorded_at, Steady::time_point now) {
@@ -37,7 +37,7 @@ class ReplayPace {
     last_recorded_ = recorded_at;
     return *last_due_;
   }
-  /// The recording begins again.
+  /// Call it when the recording begins again.
   void begin_again() { last_recorded_.reset(); }
 
  private:

@@ -14,7 +14,7 @@ namespace {
 
 constexpr auto goodbye_limit = std::chrono::milliseconds(1500);
 constexpr auto status_period = std::chrono::seconds(1);
-constexpr auto part_gap = std::chrono::microseconds(20);  // between the datagrams of a frame
+constexpr auto part_gap = std::chrono::microseconds(20);  // time between the datagrams of a frame
 
 std::string text_of_bytes(std::uint64_t bytes) { return std::to_string((bytes + 500'000) / 1'000'000) + " MB"; }
 
@@ -78,8 +78,8 @@ void ReplayServer::spawn(auto coroutine) {
   });
 }
 
-// One client at a time. Its serve() plays messages at their times and also writes the replies; listen_to() reads its requests.
-// The replay ends after the recording or stop(), once the client has got FIN or, after goodbye_limit, RST.
+// There is one client at a time. Its serve() sends messages when they are due, and also the replies; its listen_to() reads the
+// requests. The replay ends after the recording or stop(), when the client has received FIN or, after goodbye_limit, RST.
 void ReplayServer::start() {
   if (!device_.is_only_seen.empty()) {
     // Only the page is served, until a signal comes.
@@ -100,12 +100,12 @@ asio::awaitable<void> ReplayServer::watch_signals() {
   co_await signals_.async_wait(into(ec));
   if (ec || over_) co_return;
   stop();
-  if (over_) co_return;  // stop() has ended a replay without a client
+  if (over_) co_return;  // stop() has ended the replay without a client
   co_await signals_.async_wait(into(ec));
   if (!ec && !over_) std::_Exit(EXIT_FAILURE);  // a second signal ends the program at once
 }
 
-/// Ends after the present message. A client that does not receive it within the limit is reset.
+/// Ends the replay after the present message. A client that does not receive the message within the limit is reset.
 void ReplayServer::stop() {
   if (stopping_ || over_) return;
   stopping_ = true;
@@ -119,7 +119,7 @@ void ReplayServer::stop() {
   });
 }
 
-/// Ends all work that would keep io.run() going.
+/// Ends all work that would keep io.run() running.
 void ReplayServer::end() {
   over_ = true;
   error_code ec;
@@ -133,7 +133,7 @@ void ReplayServer::end() {
   if (options_.on_end) options_.on_end();
 }
 
-/// Serves one client; others are refused while it is connected. Two coroutines share a client: serve() writes, listen_to()
+/// Accepts one client, and refuses others while it is connected. Two coroutines share a client: serve() writes, listen_to()
 /// reads.
 asio::awaitable<void> ReplayServer::accept() {
   while (!over_ && !stopping_) {
@@ -141,7 +141,7 @@ asio::awaitable<void> ReplayServer::accept() {
     tcp::socket socket(io_);
     co_await acceptor_.async_accept(socket, into(ec));
     if (over_ || stopping_) co_return;
-    if (ec) {  // for example, no descriptor is free: tries again
+    if (ec) {  // for example, no descriptor is free: try again
       asio::steady_timer pause(io_, std::chrono::milliseconds(100));
       co_await pause.async_wait(into(ec));
       continue;
@@ -174,7 +174,7 @@ asio::awaitable<void> ReplayServer::accept() {
   }
 }
 
-/// Plays the recording once, or again and again with `loop`, and then closes the connection or ends the replay.
+/// Sends the recording once, or repeatedly with `loop`, and then closes the connection or ends the replay.
 asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
   std::optional<std::chrono::nanoseconds> interval;
   if (!reader_.knows_times()) interval = nanoseconds_from(1 / options_.rate_hz);
@@ -201,8 +201,8 @@ asio::awaitable<void> ReplayServer::serve(ClientPointer client) {
   if (stopping_ || played == Played::to_the_end) end();
 }
 
-/// Sends the device's messages in order. Before each it sends waiting replies, waits until the host has requested pings, and
-/// waits for the time at which the message is due.
+/// Sends the device's messages in order. Before each message it sends waiting replies, waits until the host has requested pings,
+/// and waits until the message is due.
 asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, ReplayPace& pace) {
   bool any = false;
   const auto carrier = device_.by_datagrams() ? recording::Carrier::datagram : recording::Carrier::stream;
@@ -240,15 +240,15 @@ asio::awaitable<ReplayServer::Played> ReplayServer::play(ClientPointer client, R
   co_return any ? Played::to_the_end : Played::left;
 }
 
-/// Frames are counted from 1 in each connection, also if some are left out or the recording restarts. False: the datagram belongs
-/// to no frame.
+/// Numbers the frames of each connection from 1, also if some are left out or the recording restarts. Returns false if the
+/// datagram belongs to no frame.
 bool ReplayServer::number_datagram(const Client& client, protocol::Bytes& datagram) const {
   const auto number = [&](auto) { return client.frames - 1; };
   return client.frames > 0 &&
          device_.vendor->change_integer(protocol::Part::ping, protocol::FieldName::ping_id, number, datagram);
 }
 
-/// The list of receivers is copied, because a request of the host may change it while a send waits.
+/// Sends to a copy of the list of receivers, because a request of the host may change the list during a send.
 asio::awaitable<void> ReplayServer::send_datagram(ClientPointer client, const protocol::Bytes& datagram) {
   const std::vector<udp::endpoint> receivers = client->receivers;
   for (const udp::endpoint& to : receivers) {
@@ -279,7 +279,7 @@ asio::awaitable<bool> ReplayServer::write(ClientPointer client, protocol::BytesV
   co_return !ec;
 }
 
-/// A client that reads nothing would keep the only slot. It is reset, as by an emulated sonar.
+/// Resets a client that reads nothing, because it would keep the only slot. An emulated sonar does the same.
 void ReplayServer::watch_stall(const ClientPointer& client) {
   client->stall.expires_after(options_.stall);
   client->stall.async_wait([this, client](const error_code& ec) {
@@ -291,8 +291,8 @@ void ReplayServer::watch_stall(const ClientPointer& client) {
   });
 }
 
-/// Requests of a host determine the receivers of frames and the time of the first frame. A host that does not read the answers is
-/// disconnected, as by an emulated sonar.
+/// Handles requests of a host, which determine the receivers of frames and the time of the first frame. A host that does not read
+/// the answers is disconnected, as an emulated sonar does.
 void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.heard = Steady::now();
   const protocol::Reaction reaction = client.dialogue->on_bytes(bytes, {});
@@ -309,7 +309,7 @@ void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.wake.cancel();
 }
 
-/// Applies the part of a host's request that concerns the replay: if frames are sent, and to which receivers. All other settings
+/// Applies the part of a host's request that concerns the replay: whether frames are sent, and to which receivers. Other settings
 /// have no effect.
 void ReplayServer::apply(Client& client, const protocol::Event& event) {
   const protocol::Port* const stream = device_.vendor->port(protocol::Port::Kind::udp_stream);
@@ -338,7 +338,7 @@ void ReplayServer::apply(Client& client, const protocol::Event& event) {
   }
 }
 
-/// Ends the connection of a silent client, as the device does, if its dialogue has a keep-alive.
+/// Ends the connection of a silent client, as the device does, if the dialogue has a keep-alive.
 void ReplayServer::end_if_silent() {
   if (!client_ || !client_->dialogue) return;
   const auto limit = client_->dialogue->longest_silence();
@@ -346,7 +346,7 @@ void ReplayServer::end_if_silent() {
   if (limit && Steady::now() - client_->heard > *limit) client_->socket.close(ec);
 }
 
-/// Most bytes of a client have no effect; they are read so that the client can continue to send, at the rate of
+/// Reads what a client sends. Most bytes have no effect, but are read so that the client can continue to send, at up to
 /// limits.input_bytes_per_s.
 asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
   std::array<std::byte, 4096> ignored;
@@ -368,7 +368,7 @@ asio::awaitable<void> ReplayServer::listen_to(ClientPointer client) {
   client->wake.cancel();
 }
 
-/// Ends our stream, then waits for the end of the client's stream, so that a reset cannot discard our last bytes.
+/// Ends the stream to the client, then waits for the end of the client's stream, so that a reset cannot discard the last bytes.
 asio::awaitable<void> ReplayServer::close_stream(ClientPointer client) {
   error_code ec;
   client->socket.shutdown(tcp::socket::shutdown_send, ec);

@@ -1,8 +1,8 @@
-// Serves a recording as the recorded sonar would: over TCP, to one client at a time, its messages byte for byte; and status
-// datagrams. A sonar that sends pings on request answers its host, and sends them once the host requests them: an ARIS as
-// datagrams to the receivers that its controller sets; a Sonar 3D-15 in the same way, to the receivers that were set over HTTP.
-// It behaves as if one client stayed connected. It has no scene and no engine. RequestedReplay serves the sonars whose hosts
-// decide which pings they get.
+// Serves a recording as the recorded sonar would: sends the messages byte for byte over TCP, to one client at a time, and status
+// datagrams. A sonar that sends pings on request answers its host, and sends pings once the host requests them: an ARIS as
+// datagrams to the receivers that its controller sets, a Sonar 3D-15 as datagrams to the receivers that were set over HTTP, as if
+// one client stayed connected. There is no scene and no engine. RequestedReplay serves the sonars whose hosts decide which pings
+// they get.
 #pragma once
 
 #include <functional>
@@ -19,12 +19,12 @@
 namespace sonar {
 
 struct ReplayOptions {
-  Endpoint at{{127, 0, 0, 2}, 0};   // port 0: any
-  std::vector<Endpoint> status_to;  // empty = the broadcast address of `at`'s network, the device's port
+  Endpoint at{{127, 0, 0, 2}, 0};   // port 0: any free port
+  std::vector<Endpoint> status_to;  // empty = the broadcast address of the network of `at`, at the device's port
   double speed = 1;                 // multiple of the recorded pace
-  bool stepped = false;             // without a pace: sends a message when the client has read the previous one
+  bool stepped = false;             // true: sends a message as soon as the client has read the previous one
   bool loop = false;                // repeats the recording
-  double rate_hz = 10;              // messages a second of recordings without times
+  double rate_hz = 10;              // messages per second of recordings without times
   std::chrono::milliseconds stall = LimitConfig{}.stall;  // a client that reads no byte for this time is reset
   bool handle_signals = false;
   std::function<void()> on_end = {};  // called when the server has no more work on io
@@ -38,18 +38,18 @@ class ReplayServer {
     std::uint64_t stalled = 0;  // clients that were reset because they read nothing
   };
 
-  /// `reader` must be at its start; it is used in another thread until io.run() has returned. All arguments must outlive it.
+  /// `reader` must be at its start; another thread uses it until io.run() has returned. All arguments must outlive the server.
   ReplayServer(asio::io_context& io, recording::RecordingReader& reader, ReplayDevice device, ReplayOptions options, Log& log);
 
-  /// Listens. Error: unavailable.
+  /// Opens the port. Error: unavailable.
   Result<void> open();
-  /// Serves the recording in io.run(), which returns at its end (not with loop) or after stop().
+  /// Serves the recording in io.run(), which returns at the end of the recording (not with loop) or after stop().
   void start();
   /// Completes the present message and ends the stream; after 1.5 s the connection is closed.
   void stop();
 
   const Figures& figures() const { return figures_; }
-  /// Call it after io.run(). The error is `bug` if an exception in one of its parts ended it.
+  /// Call it after io.run(). The error is `bug` if an exception ended the replay.
   const Result<void>& outcome() const { return outcome_; }
   Endpoint at() const { return at_; }
 
@@ -59,7 +59,7 @@ class ReplayServer {
     Client(tcp::socket s, const LimitConfig& limits)
         : socket(std::move(s)), wake(socket.get_executor()), stall(socket.get_executor()), input(limits.input_bytes_per_s) {}
     tcp::socket socket;
-    asio::steady_timer wake;  // ended early when the client goes
+    asio::steady_timer wake;  // cancelled when the client leaves
     asio::steady_timer stall;
     Ipv4 ip{};
     std::string name;
@@ -102,7 +102,7 @@ class ReplayServer {
   ReplayOptions options_;
   Log& log_;
   Endpoint at_;
-  SonarConfig network_;  // mask and broadcast address as a configured sonar has them
+  SonarConfig network_;  // mask and broadcast address, as those of a configured sonar
   std::vector<udp::endpoint> status_to_;
   tcp::acceptor acceptor_;
   udp::socket status_;
@@ -110,7 +110,7 @@ class ReplayServer {
   asio::signal_set signals_;
   LimitConfig limits_;
   Admission admission_{limits_, log_};
-  std::unique_ptr<SonarHttp> http_;  // for a device with settings over HTTP; then nothing else listens
+  std::unique_ptr<SonarHttp> http_;  // for a device with settings over HTTP; such a device has no other listener
   ClientPointer client_;
   LogLimiter refused_limit_, unsent_limit_, notice_limit_;
   Figures figures_;

@@ -11,7 +11,8 @@
 namespace sonar {
 namespace {
 
-/// A sonar at the origin of an empty world, which looks ahead: the yaw of a ping's sonar is that of its head.
+/// Makes a configuration of a sonar at the origin of an empty world. It points ahead, so the yaw of a ping's sonar is that of its
+/// head.
 Config config_of(const ReplayDevice& device, const ReplayOptions& options) {
   Config config;
   config.vehicles.emplace_back().name = "recording";
@@ -88,7 +89,7 @@ void RequestedReplay::end_when_gone() {
   if (options_.on_end) options_.on_end();
 }
 
-/// Returns whether the last ping was sent, and every client has received its messages.
+/// Stops the replay when the last ping was sent, and every client has received the messages.
 void RequestedReplay::on_change() {
   if (device_ == nullptr) return;
   if (was_last_ && !stopping_ && device_->sonar().settled())
@@ -98,7 +99,7 @@ void RequestedReplay::on_change() {
   end_when_gone();
 }
 
-/// The first client gets the recording from its front.
+/// Rewinds the recording for the first client.
 void RequestedReplay::on_client(const Device& of, const std::string&, bool connected, const std::string&) {
   if (!connected) return;
   ++clients_;
@@ -107,7 +108,7 @@ void RequestedReplay::on_client(const Device& of, const std::string&, bool conne
   was_last_ = false;
 }
 
-/// Runs in `disk_`, for one ping at a time.
+/// Reads one ping at a time in `disk_`.
 asio::awaitable<RequestedReplay::Read> RequestedReplay::read(bool from_the_front) {
   Read found;
   found.begins_again = from_the_front || (pings_.at_end() && options_.loop);
@@ -117,12 +118,12 @@ asio::awaitable<RequestedReplay::Read> RequestedReplay::read(bool from_the_front
   co_return found;
 }
 
-/// The lines of a scan are in memory.
+/// Returns the ping for a request; the lines of a scan are in memory.
 asio::awaitable<PlayedPing> RequestedReplay::ping_for(const PingRequest& request) {
   if (pings_.is_scan()) co_return pings_.nearest(rpy_from_quat(request.sonar_in_world.orientation).yaw_rad);
   Read found = co_await asio::co_spawn(disk_, read(std::exchange(from_the_front_, false)), asio::use_awaitable);
   if (found.begins_again) pace_.begin_again();
-  was_last_ = found.is_last && !from_the_front_;  // the first client may have connected meanwhile
+  was_last_ = found.is_last && !from_the_front_;  // false if the first client has connected meanwhile
   co_return std::move(found.ping);
 }
 

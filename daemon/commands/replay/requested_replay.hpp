@@ -1,7 +1,7 @@
-// Serves a recording of a sonar whose hosts decide which pings they get. It is the whole device with its ports and conversations,
-// and its pings are the recorded ones. A request of a mechanical scan gets the line nearest to the direction in which its head
-// looks; other requests get one ping after another, not faster than they were recorded. Another thread reads them, so that a slow
-// disk delays no conversation.
+// Serves a recording of a sonar whose hosts decide which pings they get. The whole device is emulated, with its ports and
+// dialogues, but its pings are the recorded ones. A request to a scanning head gets the line nearest to the direction of the
+// head; other requests get one ping after another, not faster than recorded. Another thread reads the pings, so that a slow disk
+// does not delay a dialogue.
 #pragma once
 
 #include <memory>
@@ -21,20 +21,21 @@ namespace sonar {
 
 class RequestedReplay final : public DeviceParent {
  public:
-  /// `device` has a make whose codec has ping_part. `options`: the port is that of the make. All outlive io.run().
+  /// The make of `device` must have a codec with ping_part; the port in `options` is that of the make. All arguments must outlive
+  /// io.run().
   RequestedReplay(asio::io_context& io, recording::RecordingReader& reader, const ReplayDevice& device, ReplayOptions options,
                   Log& log);
 
-  /// Opens all ports. Errors: unavailable; bad_data if the recording holds no ping. They name `file`.
+  /// Opens all ports. Errors name `file`: unavailable; bad_data if the recording holds no ping.
   Result<void> open(const std::string& file);
-  /// Serves in io.run(), which returns when all pings were sent (neither with `loop` nor of a scan) or after stop().
+  /// Serves in io.run(), which returns after stop() or when all pings were sent (but not with `loop`, or for a scan).
   void start();
   void stop(const std::string& why = "the replay stops");
 
   /// `messages` counts the recorded pings that were sent; each message of a Surveyor counts as one.
   ReplayServer::Figures figures() const;
   const Result<void>& outcome() const { return outcome_; }
-  /// All its ports: "tcp 127.0.0.2:9090, udp 127.0.0.2:9090"
+  /// Returns the addresses of all ports, such as "tcp 127.0.0.2:9090, udp 127.0.0.2:9090".
   std::string at() const;
 
   void compute(const Device& of, PingRequest request, Simulator::Done done) override;
@@ -57,7 +58,7 @@ class RequestedReplay final : public DeviceParent {
   asio::io_context& io_;
   recording::RecordingReader& reader_;
   const recording::Codec& codec_;
-  PlayedPings pings_;  // after open() used by `disk_` only, except for the lines of a scan
+  PlayedPings pings_;  // after open() only `disk_` uses it, except for the lines of a scan
   ReplayOptions options_;
   Log& log_;
   Config config_;
@@ -75,8 +76,8 @@ class RequestedReplay final : public DeviceParent {
   asio::thread_pool disk_{1};  // destroyed first: its destructor waits for the current read
 };
 
-// The page of `sonard replay`: the recording's pictures, with a time line for each viewer. It does not change what the driver
-// gets.
+// Serves the page of `sonard replay`: the recording's pictures, with a time line for each viewer. The page does not change what
+// the driver gets.
 
 class ReplayPage final : public HttpService {
  public:

@@ -26,18 +26,17 @@ int compute_threads(const EngineConfig& engine) {
 }
 
 Result<FoundConfig> read_config(const RunCommand& command, bool& json) {
-  // `json` is the format of an error at this point: that of the command line while the file is read, and that of the
-  // configuration afterwards.
+  // `json` is the format of errors: the format of the command line while the file is read, then that of the configuration.
   json = command.log_format == "json";
   auto found = find_config(command.config, command.demo);
   if (!found) return found;
-  json = false;  // mistakes in the command line are plain text
+  json = false;  // errors in the command line are plain text
   if (const auto r = override_config(found->config, command); !r) return tl::make_unexpected(r.error());
   json = found->config.log.json;
   return found;
 }
 
-/// The server opens them again. This check finds errors before the scene is loaded.
+/// Opens the files of the server, to find errors before the scene is loaded. The server opens them again.
 Result<void> check_files(const Config& config, std::string& token_warning) {
   if (!config.control.token_file.empty())
     if (const auto token = Token::read(config.control.token_file, token_warning); !token)
@@ -46,7 +45,7 @@ Result<void> check_files(const Config& config, std::string& token_warning) {
   return {};
 }
 
-/// Engines log from their own threads, so each has a log of its own.
+/// Makes engines, each with its own log, because they log from their own threads.
 EngineFactory engine_factory(const Config& config, Parallel& pool) {
   return [&pool, engine = config.engine, log_options = config.log](ScenePointer scene) {
     const auto own_log = std::make_shared<Log>(log_options);
@@ -87,7 +86,7 @@ using text::format;
 
 std::string address_text(const Endpoint& e) { return text_of(e); }
 
-/// The folder of the drop-in SDK library, installed with this program or built beside it; empty if there is none.
+/// Returns the folder of the drop-in SDK library, installed with this program or built beside it; empty if there is none.
 std::filesystem::path sdk_library_folder() {
   std::error_code ec;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ec);
@@ -99,7 +98,7 @@ std::filesystem::path sdk_library_folder() {
   return {};
 }
 
-/// The lines that say how a program connects to a sonar that needs our library in place of an unchanged driver.
+/// Returns lines that explain how a program connects to a sonar that needs our library.
 std::string library_lines(const protocol::Make& make, std::string at, unsigned port) {
   const std::string folder = sdk_library_folder().string();
   if (port != make.ports.front().number) at += format(":%u", port);
@@ -145,7 +144,7 @@ std::string control_line(const App& app) {
   return text + (app.config().control.token_file.empty() ? "\n" : "   token needed\n");
 }
 
-/// The line with the address of the page; empty in builds without the page.
+/// Returns the line with the address of the page; empty in builds without the page.
 std::string page_line(const App& app) {
   const Endpoint http = app.control().http();
   if (http.port == 0 || app.config().limits.viewers == 0 || page_files().empty()) return {};
@@ -154,7 +153,7 @@ std::string page_line(const App& app) {
   return "open      http://" + host + "   the live view, in a browser\n";
 }
 
-/// The address for viewers whose page comes from another server. The key is valid until sonard stops.
+/// Returns the line with the address for viewers whose page comes from another server. The key is valid until sonard stops.
 std::string view_line(const App& app) {
   const Endpoint http = app.control().http();
   const std::string& key = app.view().secrets().key();
@@ -163,7 +162,7 @@ std::string view_line(const App& app) {
          "   Foxglove, Lichtblick: docs/live-view.md\n";
 }
 
-/// Largest resident memory so far [MB]; 0 if the system does not report it.
+/// Returns the largest resident memory so far [MB]; 0 if the system does not report it.
 double peak_memory_mb() {
   std::ifstream status("/proc/self/status");
   std::string word;

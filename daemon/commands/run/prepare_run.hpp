@@ -1,5 +1,5 @@
-// The steps of a run before its first socket is opened. `sonard run` begins with them and `sonard check` does nothing else, so
-// that both report the same errors.
+// The steps of a run before the first socket is opened. `sonard run` begins with these steps and `sonard check` does nothing
+// else, so both commands report the same errors.
 #pragma once
 
 #include <functional>
@@ -24,22 +24,22 @@ struct PreparedRun {
   std::string token_warning;           // warning of Token::read(); empty = the file is safe
 };
 
-/// Loads the configuration, applies the command line, checks token and journal, loads the scene and makes the engine. `json`: the
-/// format of errors from then on. `say_with` returns the function for sentences about a long load.
+/// Loads the configuration, applies the command line, checks token and journal, loads the scene and makes the engine. Sets `json`
+/// if later errors must be JSON. `say_with` returns the function that reports a long load.
 Result<PreparedRun> prepare_run(const RunCommand& command, bool& json,
                                 const std::function<LoadProgress::Say(const Config&)>& say_with);
 
 // Lines that sonard prints on stderr when it is ready and when it ends.
 
 struct BannerFacts {
-  std::string config_line;  // where the configuration came from
+  std::string config_line;  // the source of the configuration
   double scene_ms = 0;      // time to load the scene and build the engine
 };
 std::string banner(const App& app, const BannerFacts& facts);
 std::string ready_line(const App& app, double seconds);
-/// One line per sonar, and the memory: "sonar front  20 pings  0 dropped  0 late ticks ...".
+/// Returns one line per sonar, such as "sonar front  20 pings  0 dropped  0 late ticks ...", and a line about the memory.
 std::string summary(const App& app);
-/// One line per client stream.
+/// Returns one line per client stream.
 std::string digest_lines(const App& app);
 
 }  // namespace sonar

@@ -70,7 +70,7 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
   Log log(found.config.log);
   log_notes(found.config, *prepared->scene, log);
   const auto make_engine_for = [&](ScenePointer s) {
-    if (prepared->engine) return std::move(prepared->engine);  // the first
+    if (prepared->engine) return std::move(prepared->engine);  // the first call gets the engine of prepare_run()
     return prepared->make_engine(std::move(s));
   };
   const AppOptions options = app_options(command, found);
@@ -85,8 +85,8 @@ Result<int> run_daemon(const RunCommand& command, Steady::time_point begin, bool
   let_hangups_through(false);
   log.announce(summary(app));
   std::fputs(digest_lines(app).c_str(), stdout);
-  // All files are written and all clients are gone. The destructors would wait for threads of lower priority, which take seconds
-  // to end beside busy programs, and for a scene or a ping that is no longer needed.
+  // All files are written and all clients are disconnected. The destructors would wait for threads of low priority, which take
+  // seconds to end on a busy computer, and for a scene or a ping that is no longer needed.
   if (__lsan_do_leak_check != nullptr) __lsan_do_leak_check();
   std::fflush(nullptr);
   std::_Exit(code);

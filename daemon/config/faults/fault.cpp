@@ -37,7 +37,7 @@ std::optional<double> number_from(std::string_view text) {
   return text::parse_decimal(text);
 }
 
-/// Checks one record. Errors begin with its name.
+/// Checks one record. Errors begin with the name of the record.
 class Check {
  public:
   Check(const FaultRecord& record, bool manual) : record_(record), manual_(manual) {}
@@ -73,7 +73,7 @@ class Check {
     return nullptr;
   }
 
-  // A trouble becomes one fault for each of its kinds, with the parameters of its severity.
+  // Converts a trouble to one fault for each of its kinds, with the parameters of the severity.
   std::vector<Fault> of_trouble(const Trouble& trouble) {
     auto with = record_.with;
     std::size_t severity = 2;
@@ -95,7 +95,7 @@ class Check {
         given.emplace(pair.substr(0, sign), pair.substr(sign + 1));
       }
       all.push_back(of_kind(*find_fault_kind(part.code), given, trouble.default_s));
-      // `after` is a fraction of the trouble's duration; all parts end together.
+      // `after` is a fraction of the trouble's duration; all parts end at the same time.
       all.back().delay = nanoseconds(static_cast<std::int64_t>(part.after * static_cast<double>(all.back().span.time.count())));
       all.back().span.time -= all.back().delay;
       all.back().name = (record_.name.empty() ? std::string(trouble.name) : record_.name) + "." + std::to_string(all.size());
@@ -172,7 +172,7 @@ class Check {
     fault.on = static_cast<Occasion>(it - occasion_names.begin());
   }
 
-  // Forms: all, newest, oldest, an ordinal, an address, or a prefix.
+  // Reads a choice of clients: all, newest, oldest, an ordinal, an address, or a prefix.
   void read_client(const FaultKind& kind, Fault& fault) {
     const std::string& text = record_.client;
     using Kind = ClientChoice::Kind;
@@ -217,7 +217,7 @@ class Check {
     const double seconds = lasts.seconds.value_or(lasts.pings || kind.per_ping() ? 0 : default_s);
     fault.span.time = nanoseconds(static_cast<std::int64_t>(std::llround(seconds * 1e9)));
     fault.span.pings = lasts.pings.value_or(seconds > 0 ? 0 : 1);
-    // A fault whose trigger can recur has no limit unless a count is given. Any other fault acts once.
+    // A fault whose trigger can recur acts without limit unless a count is given. Any other fault acts once.
     const bool once = !record_.at.every && !record_.at.probability && record_.at.on.empty();
     fault.span.count = lasts.count.value_or(once ? 1 : 0);
     // A record with a count but no trigger acts on that many successive pings.
@@ -255,7 +255,7 @@ std::map<std::string, std::string> Fault::used() const {
 
 Result<std::vector<Fault>> check_fault(const FaultRecord& record, bool manual) { return Check(record, manual).faults(); }
 
-/// Two faults may not write the same part of the same sonar, because the result would depend on their order.
+/// Returns an error if two faults write the same part of the same sonar, because the result would depend on their order.
 std::string conflict_of(const Fault& a, const Fault& b) {
   if (a.kind->touches.empty() || a.kind->touches != b.kind->touches || !overlap(a.sonar, b.sonar)) return {};
   return "fault " + a.name + " (" + std::string(a.kind->code) + ") and fault " + b.name + " (" + std::string(b.kind->code) +

@@ -1,5 +1,5 @@
-// A fault: a way in which an emulated sonar misbehaves on purpose, with its trigger, duration and clients. check_fault() makes
-// it from a user's record, or returns an error.
+// A fault is a way in which an emulated sonar misbehaves on purpose, with a trigger, a duration and clients. check_fault()
+// converts a user's record to faults, or returns an error.
 #pragma once
 
 #include <chrono>
@@ -27,7 +27,7 @@ using control::FaultRecord;
 struct Span {
   std::chrono::nanoseconds time{0};  // 0 = not limited by time
   std::uint64_t pings = 0;           // 0 = not limited by pings
-  std::uint64_t count = 0;           // 0 = at every trigger
+  std::uint64_t count = 0;           // number of occurrences; 0 = one at every trigger
 };
 
 /// Selects clients of a sonar.
@@ -49,11 +49,11 @@ struct Fault {
   FaultRecord::At at;
   std::optional<Occasion> on;
   Span span;
-  std::chrono::nanoseconds delay{0};  // from the trigger to the beginning, for later parts of a trouble
+  std::chrono::nanoseconds delay{0};  // time from the trigger to the beginning, for later parts of a trouble
 
   double number(const std::string& parameter) const;
   const std::string& word(const std::string& parameter) const;
-  /// The parameters as in the journal: "bytes 16, fill zero".
+  /// Returns the parameters that the journal states, such as "bytes 16, fill zero".
   std::map<std::string, std::string> used() const;
 };
 
@@ -61,10 +61,10 @@ inline constexpr std::chrono::seconds longest_manual_fault{600};
 inline constexpr std::size_t most_faults = 256;
 
 /// Converts a record to faults: one, or several for a trouble, named NAME.1, NAME.2, ... (NAME: the record's name, else the
-/// trouble's). Errors (usage) name the record, the wrong part and the possible values. `manual`: requested of a running daemon;
-/// such faults always have an end.
+/// trouble's). Errors (usage) name the record, the wrong part and the possible values. `manual`: the request came to a running
+/// daemon; such faults always have an end.
 Result<std::vector<Fault>> check_fault(const FaultRecord& record, bool manual);
-/// A sentence if both faults would change the same part of a message, else empty.
+/// Returns a sentence if both faults would change the same part of a message, else empty.
 std::string conflict_of(const Fault& a, const Fault& b);
 
 }  // namespace sonar
