@@ -28,7 +28,7 @@ Ipv4 read_ip(const Node& node, Ipv4 fallback = {}) {
   return ip.value_or(fallback);
 }
 
-/// The address of one computer, or 0.0.0.0.
+/// Reads the address of one computer, or 0.0.0.0.
 Ipv4 read_host_ip(const Node& node, Ipv4 fallback = {}) {
   const Ipv4 ip = read_ip(node, fallback);
   if (const std::string why = why_not_of_a_computer(ip); !why.empty()) node.fail(why);
@@ -38,7 +38,7 @@ Ipv4 read_host_ip(const Node& node, Ipv4 fallback = {}) {
 Ipv4 read_netmask(const Node& node) {
   const Ipv4 mask = read_ip(node);
   const std::uint32_t zeros = ~text::number_from_ipv4(mask);
-  if (node.present() && (zeros & (zeros + 1)) != 0)  // not a netmask: a zero precedes a one
+  if (node.present() && (zeros & (zeros + 1)) != 0)  // true if a zero bit precedes a one
     node.fail(text_of(mask) + " is not a netmask: give ones followed by zeros, such as 255.255.255.0");
   return mask;
 }
@@ -133,7 +133,7 @@ void read_addresses(Map& map, SonarConfig& sonar) {
   derive_addresses(sonar);
 }
 
-/// Reading continues after an error, which the document keeps; a value may then be a default.
+/// Reads one sonar. After an error, which the document keeps, reading continues, and a value may be a default.
 SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
   SonarConfig sonar;
   const Node name = map.required("name");
@@ -159,7 +159,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     Map observers = node.map();
     sonar.max_observers = static_cast<int>(observers.optional("max").integer_or(observers_of_product, 0, 16));
     sonar.observer_port = static_cast<std::uint16_t>(observers.optional("port").integer_or(0, 0, 65535));
-    // A product with several clients, or with pings by datagrams, has no port for observers.
+    // A product with several clients, or with pings over UDP, has no port for observers.
     if (observers_of_product == 0) sonar.max_observers = 0;
   }
   if (Node node = map.optional("outbox")) {
@@ -181,7 +181,7 @@ SonarConfig read_sonar(Map map, const Config& config, std::size_t index) {
     // unknown keys.
     options.map().entries();
   }
-  for (const SonarConfig& other : config.sonars) {  // a missing key is reported once, not also as a duplicate
+  for (const SonarConfig& other : config.sonars) {  // present(): a missing key is not reported again as a duplicate
     if (name.present() && other.name == sonar.name) name.fail("\"" + sonar.name + "\" is used twice");
     if (map.has("bind_ip") && other.bind_ip == sonar.bind_ip)
       map.required("bind_ip").fail(text_of(sonar.bind_ip) + " is already used by sonar \"" + other.name +
@@ -252,7 +252,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
                                           ": this looks like a scene, not a configuration, which names its scene: world: "
                                           "{scene: FILE} (docs/configuration.md)");
   read_world(root.required("world").map(), config, directory);
-  // The order matters: sonars and MAVLink links refer to vehicles, faults to sonars.
+  // Vehicles are read first, because sonars and MAVLink links refer to them; faults are read after sonars.
   TrajectoryFiles files(directory);
   read_vehicles(root.required("vehicles"), files, config);
   read_objects(root.optional("objects"), files, config);
@@ -273,7 +273,7 @@ Result<Config> read(const text::Document& document, const std::string& name, con
   return config;
 }
 
-/// The configuration of the demo, with the demo product of the first make.
+/// Returns the configuration of the demo, with the demo product of the first make.
 std::string demo_yaml() {
   std::string yaml = R"(world:
   scene: demo.yaml
@@ -317,7 +317,7 @@ Result<Config> parse_config(std::string_view yaml, const std::string& name, cons
   return read(*document, name, directory);
 }
 
-/// The demo also accepts faults, shows previews, and can record into a folder that it creates.
+/// Unlike other configurations, the demo accepts faults, shows previews, and can record into a folder that it creates.
 Result<Config> demo_config() {
   auto config = parse_config(demo_yaml(), "demo", {});
   if (!config) return config;

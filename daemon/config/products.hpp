@@ -1,4 +1,4 @@
-// Properties of products: defaults, and notes on options without effect. Also applies `sonard --profile`.
+// Finds properties of products: defaults, and notes on options without effect. Also applies `sonard --profile`.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 
 namespace sonar {
 
-/// "Oculus", "BlueView", "ARIS": the first word of the vendor's product names.
+/// Returns the first word of the vendor's product names, such as "Oculus", "BlueView" or "ARIS".
 std::string title_of(const protocol::Vendor& vendor);
 
-/// Default number of observers: 0 for a product that accepts several clients or sends pings only by datagrams.
+/// Returns the default number of observers: 0 for a product that accepts several clients or sends pings only over UDP.
 int default_max_observers(const protocol::Vendor& vendor);
 
-/// A sentence for each option that the configuration gives to a sonar of another vendor, and for each trajectory file whose
-/// origin is not world.origin. Such options have no effect but are allowed, so that a configuration stays valid if only its
-/// `profile` is changed.
+/// Returns a sentence for each option that the configuration gives to a sonar of another vendor, and for each trajectory file
+/// whose origin is not world.origin. Such options have no effect but are allowed, so that a configuration stays valid if only the
+/// `profile` of a sonar is changed.
 std::vector<std::string> notes_of_config(const Config& config);
 
 /// Changes the first sonar to this product, with the product's defaults. Errors list the products.

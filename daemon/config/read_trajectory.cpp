@@ -42,7 +42,7 @@ TrajectoryKeys::TrajectoryKeys(text::Map& map)
 /// Reuses a file that was read before with the same options.
 TrajectoryFiles::Named TrajectoryFiles::read(const Node& file, const motion::ReadOptions& options) {
   const std::string name = file.text(1024);
-  if (name.empty()) return {};  // reported
+  if (name.empty()) return {};  // the error is reported already
   const std::filesystem::path path = folder_ / name;
   for (const Known& k : known_)
     if (k.path == path && k.options == options) return k.named;
@@ -89,7 +89,7 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   return plan;
 }
 
-/// A text with a dot or slash is a file name; any other text must be one of the words.
+/// Reads a text: with a dot or slash it is a file name, else it must be one of the words.
 Plan TrajectoryFiles::read_words(const Node& node, const std::string& body, bool* orbits) {
   const std::string word = node.text(1024);
   if (word.empty() || !is_word(word)) return plan_of(node, read(node, {}), {}, body);
@@ -99,7 +99,7 @@ Plan TrajectoryFiles::read_words(const Node& node, const std::string& body, bool
   return {};
 }
 
-/// Reads all keys before it returns for a missing file, so that errors in the others are reported too.
+/// Reads all keys even if the file is missing, so that errors in other keys are reported too.
 Plan TrajectoryFiles::read_plan(const Node& node, const std::string& body, bool* orbits) {
   if (!node.present()) return {};
   if (!node.is_map()) return read_words(node, body, orbits);

@@ -1,5 +1,5 @@
-// Reads the keys for trajectories in configurations and render files, and the files that they name. It uses strict_yaml
-// cursors; the document's finish() returns all errors, including those of the files.
+// Reads the keys for trajectories in configurations and render files, and the files that they name. finish() of the document
+// (core/text/strict_yaml) returns all errors, including those of the files.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// Requests the keys `file`, `format`, `frame`, `rate_hz` and `body`.
+/// The keys `file`, `format`, `frame`, `rate_hz` and `body`.
 struct TrajectoryKeys {
   explicit TrajectoryKeys(text::Map& map);
   text::Node file, format, frame, rate_hz, body;
@@ -22,11 +22,11 @@ struct TrajectoryKeys {
 /// Reads each file once, even if several bodies use it.
 class TrajectoryFiles {
  public:
-  /// Relative file names start at `folder`.
+  /// Relative file names are relative to `folder`.
   explicit TrajectoryFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   struct Named {
-    std::string name;                                    // for errors
+    std::string name;                                    // name of the file in errors
     std::shared_ptr<const motion::TrajectoryFile> file;  // null after a reported error
   };
   Named read(const text::Node& file, const motion::ReadOptions& options);

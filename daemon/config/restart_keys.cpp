@@ -3,8 +3,8 @@
 namespace sonar {
 namespace {
 
-// Each function lists all members of its struct, so that a new member does not compile until it is listed here, either as kept
-// or as changed by a reload.
+// Each function lists all members of a struct, so that a new member does not compile until it is listed here, either as kept or
+// as changed by a reload.
 class Keeper {
  public:
   explicit Keeper(std::vector<std::string>& changed) : changed_(changed) {}
@@ -17,7 +17,7 @@ class Keeper {
   }
   void control(const ControlConfig& now, ControlConfig& next) {
     const auto& [stream, http, stream_given, http_given, token_file, hosts, view_origins] = now;
-    next.stream_given = stream_given, next.http_given = http_given;  // writing out the default address is not a change
+    next.stream_given = stream_given, next.http_given = http_given;  // a default address that the file now states is not a change
     keep("control", now, next);
   }
   void limits(const LimitConfig& now, LimitConfig& next) {

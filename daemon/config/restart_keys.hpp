@@ -1,4 +1,4 @@
-// Finds the keys of a reloaded configuration that have an effect only after the next restart. Pure; used when App reloads.
+// Finds the keys of a reloaded configuration that have an effect only after the next restart.
 #pragma once
 
 #include <string>

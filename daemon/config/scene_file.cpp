@@ -12,8 +12,9 @@
 namespace sonar {
 namespace {
 
-/// Folders near the program come first, so that an unpacked or moved installation finds its own files. A build folder has links
-/// to the source tree (CMakeLists.txt), because the program does not contain the tree's path.
+/// Returns the folders of shipped scenes. Folders near the program come first, so that an unpacked or moved installation finds
+/// its own files. A build folder has links to the source tree (CMakeLists.txt), because the program does not contain the tree's
+/// path.
 std::vector<std::filesystem::path> make_shipped_folders() {
   std::error_code ec;
   std::vector<std::filesystem::path> folders;
@@ -30,7 +31,7 @@ const std::vector<std::filesystem::path>& shipped_folders() {
   return folders;
 }
 
-/// True if a file is below a folder, after resolving links. The root directory contains everything, so it never counts.
+/// True if a file is below a folder, after resolving links. False for the root directory, which contains all files.
 bool is_below(const std::filesystem::path& file, const std::filesystem::path& folder) {
   std::error_code ec;
   const auto real = std::filesystem::canonical(file, ec);
@@ -42,8 +43,8 @@ bool is_below(const std::filesystem::path& file, const std::filesystem::path& fo
 
 constexpr int most_looked_at = 256;  // limit, because the folder can be a home directory
 
-/// Recognises a scene by its keys at the start of lines, because configurations and material libraries lie beside scenes. Only
-/// the beginning is read: a line may be longer than the memory.
+/// Recognises a scene by keys at the start of lines, because configurations and material libraries lie beside scenes. Only the
+/// beginning of the file is read, because a line may be longer than the memory.
 bool is_like_a_scene(const std::filesystem::path& file) {
   std::string beginning(std::size_t{1} << 18, '\0');
   std::ifstream in(file, std::ios::binary);
@@ -71,7 +72,7 @@ std::vector<std::string> scenes_in(const std::filesystem::path& folder) {
   return names;
 }
 
-/// The nearest of these names, ignoring extensions.
+/// Returns the nearest of these names, ignoring extensions.
 std::string nearest_of(const std::vector<std::string>& names, const std::filesystem::path& given) {
   std::vector<std::string> stems;
   for (const std::string& name : names) stems.push_back(std::filesystem::path(name).stem().string());

@@ -19,7 +19,7 @@ struct SceneFile {
 
 /// Searches `directory`, then the shipped scenes on disk, then the built-in ones.
 std::optional<SceneFile> find_scene(const std::filesystem::path& given, const std::filesystem::path& directory);
-/// The folders that find_scene() searches, for error texts: "., A and B".
+/// Returns the folders that find_scene() searches, for error texts, such as "., A and B".
 std::string scene_folders(const std::filesystem::path& directory);
 
 /// True if the name ends in .yaml or .yml; for names from control clients.
@@ -28,8 +28,8 @@ bool has_scene_name(const std::filesystem::path& given);
 /// the shipped scenes, after resolving links.
 bool may_be_quoted(const SceneFile& file, const std::filesystem::path& directory);
 
-/// `world_origin`: the configuration's origin, for grids with latitudes and longitudes. Inline, so that code without scenes
-/// does not need the scene loader and its libraries.
+/// Loads a scene. `world_origin`: the configuration's origin, for grids with latitudes and longitudes. The function is inline, so
+/// that code without scenes does not need the scene loader and its libraries.
 inline Result<std::shared_ptr<const Scene>> load_scene(const SceneFile& file, const std::optional<Geodetic>& world_origin = {}) {
   return file.built_in ? load_built_in_scene(file.path.string()) : load_scene(file.path, world_origin);
 }

@@ -65,8 +65,8 @@ struct Listening {
   std::string key;
   Endpoint at;
   bool udp, tcp;
-  bool gives_way = false;  // the address is a default, which is not used if its port is in use
-  bool is_shared = false;  // may be shared with other listeners for which this is true
+  bool gives_way = false;  // true: the address is a default, which is not used if the port is in use
+  bool is_shared = false;  // true: other shared listeners may use the same port
 };
 /// True if two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
 bool conflict(const Listening& a, const Listening& b) {
@@ -99,7 +99,7 @@ void add_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
     all.push_back({"observers.port of sonar \"" + sonar.name + "\"", {sonar.bind_ip, sonar.observer_port}, false, true});
 }
 
-/// An offset daemon must not use an address or port of the daemon without an offset.
+/// Checks that an offset daemon uses no address or port of the daemon without an offset.
 Result<void> check_apart(const Config& moved, const Config& unmoved) {
   const std::string instead = " without an offset; give another offset";
   for (const SonarConfig& a : moved.sonars)
@@ -135,7 +135,7 @@ Result<void> check_ports_apart(const Config& config) {
 Result<void> move_addresses(Config& config, int offset, bool first_too) {
   const Config unmoved = config;
   for (SonarConfig& sonar : config.sonars) {
-    // The device id changes too, because drivers distinguish sonars by it.
+    // The device id changes too, because drivers distinguish sonars by the id.
     const int id = sonar.device_id + 100 * offset;
     if (id > 65535)
       return cannot_move("device_id " + std::to_string(sonar.device_id) + " would exceed 65535; give a smaller offset");

@@ -7,12 +7,12 @@
 namespace sonar {
 
 inline constexpr int highest_offset = 99;
-inline constexpr int ports_an_offset = 10;  // a daemon uses adjacent ports: 14770, 14771
+inline constexpr int ports_an_offset = 10;  // ports per offset; a daemon uses adjacent ports such as 14770 and 14771
 
 /// Changes everything that could conflict with another daemon: sonars move from 127.0.0.x to 127.0.N.x (with the same ports,
-/// which drivers expect), device ids increase by 100 N (drivers distinguish sonars by them), and the ports of poses and control
-/// by 10 N. Ports that the system chooses (0) and dialled MAVLink endpoints stay. `first_too`: also moves the first sonar.
-/// Error if a moved address equals one of the unmoved configuration. Errors are sentences for the command line.
+/// which drivers expect), device ids increase by 100 N (drivers distinguish sonars by id), and the ports of poses and control
+/// increase by 10 N. Ports that the system chooses (0) and dialled MAVLink endpoints do not change. `first_too`: also moves the
+/// first sonar. Error: a moved address equals one of the unmoved configuration. Errors are sentences about the option.
 Result<void> move_addresses(Config& config, int offset, bool first_too);
 
 /// Error config if two listeners of the configuration need the same port. Call it after applying the command line.

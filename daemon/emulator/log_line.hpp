@@ -1,4 +1,4 @@
-// A log line as data, so that the code that makes it does not depend on the logger.
+// A log line as data, so that code that reports does not depend on the logger.
 #pragma once
 
 #include <string>

@@ -5,7 +5,7 @@
 namespace sonar {
 namespace {
 
-/// The options of the vendor. A file may also have options of other vendors, which have no effect.
+/// Compares the options of the vendor. A file may also have options of other vendors, which have no effect.
 bool same_options(const SonarConfig& a, const SonarConfig& b) {
   const auto own = a.profile.vendor->options();
   return std::all_of(own.begin(), own.end(), [&](const protocol::Option& option) {

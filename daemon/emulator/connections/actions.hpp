@@ -16,7 +16,7 @@
 
 namespace sonar {
 
-/// Chosen by the caller, unique for the life of a Sonar.
+/// Chosen by the caller; unique during the life of a Sonar.
 using ConnectionId = std::uint64_t;
 
 enum class Role { client, observer, stream };  // stream: the datagrams of a port of kind udp_stream
@@ -25,7 +25,7 @@ enum class Role { client, observer, stream };  // stream: the datagrams of a por
 struct ComputePing {
   PingRequest request;
 };
-/// The connection has a slot: read its bytes and write its outbox.
+/// The connection has a slot: read its bytes, and send the messages of its outbox.
 struct Serve {
   ConnectionId connection = 0;
 };
@@ -33,17 +33,17 @@ struct Serve {
 struct KeepWaiting {
   ConnectionId connection = 0;
 };
-/// Close it without sending a byte. The Sonar has no record of it.
+/// Close the connection without sending a byte. The Sonar has no record of it.
 struct Refuse {
   ConnectionId connection = 0;
-  bool reset = false;  // RST in place of FIN
+  bool reset = false;  // true: send RST, not FIN
 };
-/// True if the ports of kind tcp_stream accept connections, or refuse them as ports without a listener do. They accept from the
-/// start.
+/// Open or close the ports of kind tcp_stream: an open port accepts connections, a closed one refuses them like a port without a
+/// listener. All are open at the start.
 struct Listen {
   bool on = true;
 };
-/// Stop or resume reading from this client. While it is stopped, the client's TCP window fills.
+/// Stop or resume reading from this client. While reading is stopped, the client's TCP window fills.
 struct ReadFrom {
   ConnectionId connection = 0;
   bool on = true;
@@ -70,21 +70,21 @@ struct Reset {
 struct Closed {
   std::string peer;  // name of the peer
   Role role{};
-  bool served = false;  // false: it was waiting for a slot
+  bool served = false;  // false: the connection was waiting for a slot
   std::uint64_t pings_written = 0, pings_dropped = 0;
   std::string why;
-  bool by_client = false;     // the client closed the connection
-  bool for_commands = false;  // its port never has pings
+  bool by_client = false;     // true: the client closed the connection
+  bool for_commands = false;  // true: the port never has pings
 };
-/// The content of the status broadcast has changed: send it now.
+/// The content of the status broadcast has changed: send the broadcast now.
 struct Announce {};
-/// A ping was framed and queued for every client, observer and stream that gets it.
+/// A ping was framed, and queued for every client, observer and stream that gets the ping.
 struct PingQueued {
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;                                // null: not sent over TCP
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // one element for each stream with receivers
   double simulation_s = 0;
-  bool preview = false;                             // only for viewers of the live view
+  bool preview = false;                             // true: the ping is only for viewers of the live view
   std::optional<protocol::Distance> distance = {};  // result of a range finder, unless a fault withholds the ping
 };
 /// A line for the log. The lines of one topic share a rate limit.
@@ -108,7 +108,7 @@ inline void report(const std::string& sonar, Report::Topic topic, LogLevel level
   actions.emplace_back(Report{topic, {level, std::move(phrase), std::move(fields)}});
 }
 
-/// The recorded bytes of a ping, by port number; 0: for every port.
+/// The recorded bytes of a ping, with the number of the port that sends them; 0: every port.
 using PartsByPort = std::vector<std::pair<std::uint16_t, protocol::Bytes>>;
 /// Outcome of a PingRequest.
 struct PingOutcome {
@@ -116,8 +116,8 @@ struct PingOutcome {
   std::string failure = {};
   bool refused = false;                                   // only this ping failed: an invalid request, or too little memory
   ErrorKind kind = ErrorKind::bug;                        // kind of a failure of the engine
-  double seconds = 0;                                     // wall time of its computation, without other sonars' pings in between
-  std::shared_ptr<const PartsByPort> recorded = nullptr;  // sent in place of the vendor's encoding; empty: nothing is sent
+  double seconds = 0;                                     // wall time of the computation, without the pings of other sonars
+  std::shared_ptr<const PartsByPort> recorded = nullptr;  // replaces the vendor's encoding; empty: nothing is sent
 };
 
 }  // namespace sonar

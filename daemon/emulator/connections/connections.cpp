@@ -24,7 +24,7 @@ bool Connection::receives(std::size_t stream) const {
                      [stream](const protocol::SetReceivers& list) { return list.stream == stream && !list.to.empty(); });
 }
 
-// `not_before` limits the rate of ticks, so that a dialogue that is always due cannot keep the sonar busy.
+// `not_before` limits the rate of ticks, because a dialogue that is always due would keep the sonar busy.
 std::optional<Time> Connection::next_tick() const {
   if (finishing || dialogue == nullptr) return std::nullopt;
   return std::max(dialogue->next_tick(), not_before);
@@ -45,14 +45,14 @@ std::size_t Connections::count(Role role, State state) const {
       std::count_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.role == role && c.state == state; }));
 }
 
-/// The list has the connections in the order of their arrival, so the first one that fits is the oldest.
+/// The list is in the order of arrival, so the first served client is the oldest.
 Connection* Connections::oldest_client() {
   const auto it = std::find_if(all_.begin(), all_.end(),
                                [](const Connection& c) { return c.role == Role::client && c.state == State::served; });
   return it == all_.end() ? nullptr : &*it;
 }
 
-// The list is in the order of arrival, so the first one that waits has waited longest.
+// The list is in the order of arrival, so the first waiting connection has waited longest.
 Connection* Connections::longest_waiting() {
   const auto it = std::find_if(all_.begin(), all_.end(), [](const Connection& c) { return c.state == State::waiting; });
   return it == all_.end() ? nullptr : &*it;
@@ -82,13 +82,14 @@ bool Connections::has_audience() const {
                                       [this](const Connection& c) { return c.role == Role::stream && !receivers(c).empty(); });
 }
 
-/// Observers do not count: a slow observer must not delay stepped time.
+/// Ignores observers, because a slow observer must not delay stepped time.
 bool Connections::settled() const {
   return std::all_of(all_.begin(), all_.end(),
                      [](const Connection& c) { return c.role == Role::observer || c.state != State::served || c.outbox.idle(); });
 }
 
-/// If no slot is free, the rule `when_full` decides: take over, queue or refuse. If the queue is full, clients are refused.
+/// If no slot is free, the rule `when_full` determines the verdict: take over, queue or refuse. If the queue is full, clients are
+/// refused.
 Connections::Verdict Connections::verdict(Role role) const {
   if (role == Role::observer)
     return observers() < static_cast<std::size_t>(config_.max_observers) ? Verdict::serve : Verdict::refuse;

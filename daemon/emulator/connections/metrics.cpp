@@ -12,7 +12,7 @@ void Histogram::add(double seconds) {
   sum_s_ += seconds;
 }
 
-// Durations are assumed to be evenly spread within a bin.
+// Assumes that durations are evenly spread within a bin.
 double Histogram::quantile_s(double q) const {
   if (count_ == 0) return 0;
   const double rank = std::clamp(q, 0.0, 1.0) * static_cast<double>(count_);

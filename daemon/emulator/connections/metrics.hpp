@@ -1,4 +1,4 @@
-// Counters and histograms of one sonar. Plain values: the Sonar updates them, prometheus.hpp prints them; no clock, no I/O.
+// Counters and histograms of one sonar. The Sonar updates the values, and prometheus.hpp prints them.
 #pragma once
 
 #include <array>
@@ -10,20 +10,20 @@
 
 namespace sonar {
 
-/// A histogram of durations. The bounds are fixed, so adding needs no memory and runs can be compared.
+/// A histogram of durations. The bounds are fixed, so that add() needs no memory and runs can be compared.
 class Histogram {
  public:
   static constexpr std::array bounds_s{0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02,
                                        0.05,   0.1,    0.2,    0.5,   1.0,   2.0,   5.0,  10.0};
 
-  /// Negative times count as 0.
+  /// Adds a duration; a negative one counts as 0.
   void add(double seconds);
   std::uint64_t count() const { return count_; }
   double sum_s() const { return sum_s_; }
   /// Element i counts durations above bounds_s[i - 1] up to bounds_s[i]; the last element counts those beyond all bounds.
   const std::array<std::uint64_t, bounds_s.size() + 1>& counts() const { return counts_; }
-  /// Estimates a quantile, q in [0, 1], by linear interpolation between two bounds: its error is at most a factor of 2.5.
-  /// Quantiles beyond the last bound return that bound; 0 if empty.
+  /// Estimates a quantile, q in [0, 1], with linear interpolation between two bounds; the error is at most a factor of 2.5.
+  /// Returns the last bound for a quantile beyond it, and 0 for an empty histogram.
   double quantile_s(double q) const;
 
  private:
@@ -37,26 +37,26 @@ class Histogram {
 struct DeviceFigures {
   std::uint64_t ticks = 0;
   std::uint64_t skipped_ticks = 0;  // number of ticks without a ping
-  SkippedTicks skipped;             // by reason
+  SkippedTicks skipped;             // skipped ticks by reason
   std::uint64_t skipped_stale = 0;  // one more reason: the vehicle's poses had stopped (poses.on_stale: stop)
-  std::uint64_t pings = 0;          // simulated
+  std::uint64_t pings = 0;          // simulated pings
   std::uint64_t refused = 0;        // pings that the engine refused
-  std::uint64_t unwanted = 0;       // pings whose clients had gone or had requested other settings
+  std::uint64_t unwanted = 0;       // pings whose clients had left or had requested other settings
   std::uint64_t out_of_water = 0;   // pings of noise only, because the sonar was above the sea surface
-  std::uint64_t served = 0;         // written whole to at least one client
+  std::uint64_t served = 0;         // pings that at least one client received completely
   std::uint64_t offered = 0;        // pings offered to clients, counted once per client
-  std::uint64_t sent = 0;           // written whole to a client
-  std::uint64_t dropped = 0;        // pings that were not written to a client
-  std::array<std::uint64_t, drop_reasons> dropped_by{};  // by DropReason
+  std::uint64_t sent = 0;           // pings that a client received completely, counted once per client
+  std::uint64_t dropped = 0;        // offered pings that a client did not receive completely
+  std::array<std::uint64_t, drop_reasons> dropped_by{};  // dropped pings by DropReason
   std::uint64_t waiting = 0;                             // pings in outboxes now that are not being written yet
-  std::uint64_t clients = 0, refused_clients = 0;        // since the start
+  std::uint64_t clients = 0, refused_clients = 0;        // clients since the start
   std::uint64_t clients_now = 0, clients_queued = 0;
   std::uint64_t bytes_written = 0, bytes_read = 0;
   double simulation_s = 0;  // wall time of all pings
   Histogram simulation;     // time to compute a ping
   Histogram lateness;       // delay from a tick's time to its processing
   Histogram jitter;         // interval of two pings at a client's socket minus the interval of their ticks
-  Histogram latency;        // from a ping's tick until the kernel has its last byte, for each client
+  Histogram latency;        // time from a ping's tick until the kernel has the last byte, for each client
 };
 
 }  // namespace sonar

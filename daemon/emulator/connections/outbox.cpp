@@ -5,7 +5,7 @@
 
 namespace sonar {
 
-/// The limit protects against clients that send requests but do not read the replies.
+/// Limits the replies, because some clients send requests but do not read the replies.
 bool Outbox::push_reply(Bytes reply) {
   if (replies_.size() >= most_replies || reply_bytes_ + reply.size() > most_reply_bytes) return false;
   reply_bytes_ += reply.size();
@@ -20,7 +20,7 @@ std::size_t Outbox::Message::size() const {
   return all;
 }
 
-// A slow client gets the newest pings: the oldest waiting one is dropped (only a fault uses drop_newest). The message that is
+// A slow client gets the newest pings: the oldest waiting ping is dropped (only a fault uses drop_newest). The message that is
 // being written is never dropped, because that would cut the stream.
 void Outbox::push(Message ping, std::size_t most, std::size_t most_bytes) {
   const std::size_t size = ping.size();
@@ -42,7 +42,7 @@ void Outbox::push(Message ping, std::size_t most, std::size_t most_bytes) {
 }
 
 // Replies come before pings, because a client may wait for a reply before it reads more. Only one message is returned at a time:
-// the caller reports its end by written() or not_written().
+// the caller reports the end with written() or not_written().
 Outbox::Message Outbox::take() {
   if (writing_ || (replies_.empty() && pings_.empty())) return {};
   writing_ = true;
@@ -78,7 +78,7 @@ void Outbox::drop_waiting_pings(DropReason why) {
   ping_bytes_ = 0;
 }
 
-// Each offered ping is counted once, including the current one: offered = written + dropped (+ waiting).
+// Each offered ping is counted once, including the one that is being written: offered = written + dropped (+ waiting).
 void Outbox::end(DropReason why) {
   drop_waiting_pings(why);
   // The message being written is incomplete at the client, so its ping counts as dropped.

@@ -1,5 +1,5 @@
-// Messages that wait for one client: the one being written, replies in order, and at most `depth` pings. The Sonar fills it; the
-// session empties it. It contains only whole messages, so messages are never cut or mixed.
+// Messages that wait for one client: the one being written, replies in order, and at most `depth` pings. The Sonar adds messages;
+// the session takes them. All messages are complete, so they are never cut or mixed.
 #pragma once
 
 #include <array>
@@ -18,9 +18,9 @@ namespace sonar {
 
 /// The reason why a client did not receive an offered ping completely.
 enum class DropReason {
-  slow,   // a newer ping replaced it, or the queue was full
+  slow,   // a newer ping replaced the ping, or the queue was full
   gone,   // the connection ended first
-  stop,   // sonard ended the conversation; only the current message is completed
+  stop,   // sonard ended the connection; only the current message is completed
   fault,  // a fault injected by the user
 };
 inline constexpr std::size_t drop_reasons = 4;
@@ -28,12 +28,12 @@ inline constexpr std::size_t drop_reasons = 4;
 class Outbox {
  public:
   using Bytes = std::vector<std::byte>;
-  /// The pauses in the writing of a message, from a fault or the port's gap, and the end of the connection after it. The bytes do
-  /// not change.
+  /// The pauses in the writing of a message, which a fault or the port's gap causes, and the end of the connection after the
+  /// message. The bytes do not change.
   struct Shape {
     struct Pause {
       std::size_t before = 0;             // index of the byte after the pause
-      std::chrono::nanoseconds length{};  // 0: a separate write without a pause
+      std::chrono::nanoseconds length{};  // duration; 0: a separate write without a pause
     };
     std::vector<Pause> pauses;                            // by increasing index
     enum class End { none, fin, reset } end = End::none;  // how the connection ends after the last byte
@@ -41,7 +41,7 @@ class Outbox {
   struct Message {
     std::shared_ptr<const Bytes> bytes;
     std::uint32_t ping = 0;       // number of the ping; 0 = a reply
-    std::vector<Bytes> prefixes;  // a ping is sent once per prefix, after the prefix; none = once, without a prefix
+    std::vector<Bytes> prefixes;  // the ping is sent once after each prefix; none = sent once, without a prefix
     Time fired_at{};              // when the ping was fired
     std::shared_ptr<const std::vector<Bytes>> datagrams = nullptr;  // datagrams of a ping, instead of `bytes`
     std::shared_ptr<const Shape> shape = nullptr;  // shape of a message without prefixes and datagrams; may be empty
@@ -49,7 +49,7 @@ class Outbox {
     std::size_t size() const;  // in bytes, without prefixes
   };
   static constexpr std::size_t most_ping_bytes = 8u << 20;                    // limit for the waiting pings of one client
-  static constexpr std::size_t most_held = 128, most_held_bytes = 64u << 20;  // the same for pings that a fault holds back
+  static constexpr std::size_t most_held = 128, most_held_bytes = 64u << 20;  // limits for pings that a fault holds back
   static constexpr std::size_t most_reply_bytes = 64u << 10;  // limit for clients that send requests but do not read
   static constexpr std::size_t most_replies = 256;
 
@@ -61,9 +61,10 @@ class Outbox {
     push_ping({std::move(bytes), number, std::move(prefixes), fired_at});
   }
   void push_ping(Message ping) { push(std::move(ping), static_cast<std::size_t>(rules_.depth), most_ping_bytes); }
-  /// Adds a ping that a fault held back, even beyond the depth: as many as a fault may hold.
+  /// Adds a ping that a fault held back. The limit is the number that a fault may hold, not the depth.
   void push_held(Message ping) { push(std::move(ping), most_held, most_held_bytes); }
-  /// Returns the next message to write, replies before pings; empty while a message is being written or if none waits.
+  /// Returns the next message to write, replies before pings; returns an empty one while a message is being written or if none
+  /// waits.
   Message take();
   /// Call it when the message that take() returned was written completely.
   void written();
@@ -72,13 +73,13 @@ class Outbox {
   /// Counts a ping as offered and dropped, without queueing it.
   void drop_offered(DropReason why) { ++pings_offered_, count_drop(why); }
   void use(OutboxRules rules) { rules_ = rules; }
-  /// Drops the waiting pings. The current message and the replies, which are small, stay.
+  /// Drops the waiting pings. The current message and the replies, which are small, are kept.
   void drop_waiting_pings(DropReason why = DropReason::stop);
   /// Call it when the connection has ended: drops all messages, including the current one.
   void end(DropReason why);
 
   bool idle() const { return !writing_ && replies_.empty() && pings_.empty(); }
-  /// At any moment: offered = written + dropped + waiting + the one being written.
+  /// At any moment, offered = written + dropped + waiting + 1 if a ping is being written.
   std::uint64_t pings_offered() const { return pings_offered_; }
   std::uint64_t pings_written() const { return pings_written_; }
   std::uint64_t pings_dropped() const;

@@ -7,7 +7,7 @@ namespace sonar {
 
 namespace {
 
-/// Time until the last echo has returned, plus a rest of 2 ms before the next ping.
+/// Returns the time until the last echo has returned, plus a pause of 2 ms before the next ping.
 double travel_s(const PingSettings& s) {
   const double sound_speed_mps = s.device_sound_speed_mps > 0 ? static_cast<double>(s.device_sound_speed_mps) : 1500.0;
   return 2.0 * s.range_m / sound_speed_mps + 0.002;
@@ -23,14 +23,14 @@ std::chrono::nanoseconds ping_period(const PingSettings& s) {
 void Pacer::configure(const PingSettings& settings, Time now) {
   const auto period = ping_period(settings);
   travel_ = nanoseconds_from(travel_s(settings));
-  // With an unchanged period the grid stays; otherwise a driver that repeats its settings for every ping would postpone each
-  // one.
+  // With an unchanged period the grid does not change, because a driver that repeats its settings for every ping would postpone
+  // each ping.
   if (running_ && period == period_ && settings.triggered == triggered_) return;
   // A new grid begins when the last echo has returned and the shorter of both periods has passed.
   const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
   running_ = period.count() > 0;
   forget_tick();
-  // A trigger that waits stays valid only if pings were triggered before and still are.
+  // A waiting trigger stays valid only if the old and the new settings use triggers.
   if (!(running_ && triggered_ && settings.triggered)) forget_trigger();
   triggered_ = settings.triggered;
   if (running_) {
@@ -69,11 +69,11 @@ void Pacer::forget_trigger() {
   if (std::exchange(trigger_waits_, false)) ++skipped_.trigger;
 }
 
-// States of a triggered sonar: idle; or a trigger waits (trigger_waits_) until the previous ping is over (trigger_at_), when
-// fire() fires the ping.
+// A triggered sonar is idle, or a trigger waits (trigger_waits_) until the previous ping is over (trigger_at_); then fire() fires
+// the ping.
 void Pacer::trigger(Time now, bool joins) {
   if (!running_ || !triggered_) return;
-  // At most one ping is due. A trigger joins the one that waits, or is counted as skipped.
+  // At most one trigger waits. A further trigger joins it, or is counted as skipped.
   if (trigger_waits_) {
     if (joins) return;
     ++ticks_;
@@ -92,14 +92,14 @@ std::optional<Time> Pacer::next_tick() const {
   return start_ + index_ * period_;
 }
 
-/// Remembers when the echoes of this ping will have returned: configure() begins no new grid before then.
+/// Stores the time at which the echoes of this ping have returned; configure() begins no new grid earlier.
 void Pacer::note_ping(Time at) {
   last_tick_ = at;
   home_at_ = at + travel_;
   has_fired_ = true;
 }
 
-// Free running: ticks lie at start_ + index_ * period_, so that a late call does not shift the later ones.
+// Free running: tick times are start_ + index_ * period_, so that a late call does not shift later ticks.
 bool Pacer::fire(Time now, bool busy) {
   const auto due = next_tick();
   if (!due || now < *due) return false;
@@ -112,8 +112,8 @@ bool Pacer::fire(Time now, bool busy) {
     note_ping(now);
     return true;
   }
-  // Free running: missed ticks are counted and never repeated. The newest one waits while the simulation is busy: without that,
-  // a ping that takes a little more than a period would cost every second ping.
+  // Free running: missed ticks are counted and never repeated. The newest tick waits while the simulation is busy; otherwise, if
+  // a ping took a little more than a period, every second ping would be lost.
   const std::int64_t reached = (now - start_) / period_;  // index of the newest tick that has passed
   const auto missed = static_cast<std::uint64_t>(reached - index_);
   ticks_ += missed + 1;
@@ -121,7 +121,7 @@ bool Pacer::fire(Time now, bool busy) {
   index_ = reached + 1;
   forget_tick();
   tick_waits_ = busy;
-  // The ping's stamp is its time on the grid, however late the call is.
+  // The stamp of the ping is the time on the grid, even if the call is late.
   if (!busy) note_ping(start_ + reached * period_);
   return !busy;
 }

@@ -1,4 +1,4 @@
-// Measures the rate of a sonar's pings, because no setting states it if the host requests each ping.
+// Measures the rate of a sonar's pings, because no setting states the rate if the host requests each ping.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ class RecentRate {
     fired_.push_back(fired);
     while (fired_.size() > 2 && fired - fired_[1] >= window) fired_.pop_front();
   }
-  /// Pings per second, over the last five seconds or, if the last two are farther apart, over their interval; 0 after pings
-  /// have stopped.
+  /// Returns pings per second, over the last five seconds or, if the last two pings are farther apart, over their interval; 0
+  /// after pings have stopped.
   double hz(Time now) const {
     if (fired_.size() < 2) return 0;
     const double mean_s = sonar::seconds(fired_.back() - fired_.front()) / static_cast<double>(fired_.size() - 1);

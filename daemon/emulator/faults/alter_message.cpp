@@ -55,7 +55,7 @@ std::optional<Field> field_of(const Fault& fault, const Vendor& vendor, Part par
 void write_field(const Fault& fault, Bytes& bytes, const Field& field) {
   if (field.type == Field::Type::number)
     write_number(bytes, field, fault.words.contains("value") ? number_of_word(fault.word("value")) : fault.number("value"));
-  else  // in a field of several words, each gets the value
+  else  // each word of the field gets the value
     for (std::size_t at = 0; at < field.size; at += 4)
       write_integer(bytes, field.offset + at, std::min<std::size_t>(4, field.size - at),
                     static_cast<std::uint64_t>(fault.number("value")));
@@ -89,7 +89,7 @@ std::size_t at_fraction(const Fault& fault, const Bytes& bytes) {
   return static_cast<std::size_t>(std::llround(fault.number("fraction") * static_cast<double>(bytes.size())));
 }
 
-/// The inserted message has a valid header of this make, with another type and random contents.
+/// Inserts a message with a valid header of this make, another type and random contents.
 Touch insert_message(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto header = c.vendor.region(Region::header, bytes);
   const auto type = c.vendor.field(Part::ping, FieldName::message_type, bytes);
@@ -124,7 +124,8 @@ Touch cut_row(const Fault& fault, const MessageContext& c, Bytes& bytes) {
 Touch renumber(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const std::int64_t since = std::int64_t{c.number} - c.first_number;
   const auto other = [&](std::int64_t number) {
-    // D07: numbers approach the overflow of 32 bits. D09: they jump. D10: the first one repeats. D08: they begin again at 0.
+    // D07: numbers approach the overflow of 32 bits. D09: numbers jump. D10: the first number repeats. D08: numbers begin again
+    // at 0.
     const std::string_view code = fault.kind->code;
     if (code == "D07") return (std::int64_t{1} << 32) - static_cast<std::int64_t>(fault.number("before")) + since;
     if (code == "D09") return number + static_cast<std::int64_t>(fault.number("by"));
@@ -147,7 +148,7 @@ Touch flip(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   return {};
 }
 
-/// Bearings are 16-bit numbers.
+/// Changes the bearings, which are 16-bit numbers.
 Touch change_bearings(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto region = c.vendor.region(Region::bearings, bytes);
   if (!region || region->second < 2) return {false};
@@ -172,7 +173,7 @@ Touch slice(MessageEdit& m, std::size_t every, double pause_s) {
   return {true, std::min(every, m.bytes.size())};
 }
 
-/// The pieces last about 20 ms each at the rate of the link.
+/// Divides the message into pieces of about 20 ms at the rate of the link.
 Touch thin(const Fault& fault, MessageEdit& m) {
   const double bytes_per_s = fault.number("mbit-per-s") * 125000;
   const auto piece = std::clamp<std::size_t>(static_cast<std::size_t>(bytes_per_s * 0.02), 64, 65536);
@@ -186,7 +187,7 @@ Touch end_inside(const Fault& fault, MessageEdit& m) {
   return {true, m.bytes.size()};
 }
 
-/// Replaces the end of the image by that of the previous message, as if the device had sent a buffer before filling it.
+/// Replaces the end of the image with that of the previous message, as if the device had sent a buffer before filling it.
 Touch splice(const Fault& fault, const MessageContext& c, Bytes& bytes) {
   const auto image = c.vendor.region(Region::image, bytes);
   if (!image || c.before == nullptr || c.before->size() != bytes.size()) return {false};
@@ -225,8 +226,8 @@ void write_address(Bytes& bytes, const std::optional<Field>& field, const text::
   for (std::size_t i = 0; i < 4; ++i) bytes[field->offset + i] = static_cast<std::byte>(address[i]);
 }
 
-/// The second device differs in everything by which drivers distinguish devices: id, hardware address and, if requested,
-/// network address.
+/// Makes the status of a second device. It differs in all values by which drivers distinguish devices: id, hardware address and,
+/// if requested, network address.
 Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   const auto of = [&](FieldName name) { return vendor.field(Part::beacon, name, bytes); };
   const std::string& address = fault.word("address");
@@ -332,7 +333,7 @@ Touch alter_content(const Fault& fault, const MessageContext& c, MessageEdit& m)
 Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m) {
   using E = FaultEffect;
   const E effect = fault.kind->effect;
-  // These effects change fields, so checksums are corrected. The others damage the message as a link would.
+  // These effects change fields, so checksums are corrected. Other effects damage the message as a link would.
   const bool of_fields = effect == E::set_field || effect == E::add_to_field || effect == E::renumber;
   const Bytes before = of_fields ? m.bytes : Bytes{};
   const Touch touch = alter_content(fault, c, m);
@@ -340,7 +341,7 @@ Touch alter_message(const Fault& fault, const MessageContext& c, MessageEdit& m)
   return touch;
 }
 
-/// Changes the first datagram, removes all, or adds one.
+/// Changes the first datagram, removes all datagrams, or adds one.
 void alter_beacons(const Fault& fault, const Vendor& vendor, const FaultDraws& draws, std::vector<Bytes>& datagrams) {
   if (datagrams.empty()) return;
   Bytes& bytes = datagrams.front();

@@ -1,5 +1,5 @@
 // Effects on the bytes of messages: faults of the stages framing, stream and link change one ping of one client, faults of the
-// stage status change status messages. Pure functions.
+// stage status change status messages.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace sonar {
 
-// Random numbers for faults: functions of the seed, the fault, the sonar, the ping and the client.
+// Random numbers for faults. They depend only on the seed, the fault, the sonar, the ping and the client.
 
 struct FaultDraws {
   Seed seed{};
@@ -42,7 +42,7 @@ struct MessageEdit {
   Outbox::Shape::End end = Outbox::Shape::End::none;
   bool dropped = false;
 };
-/// Other inputs of a fault's effect.
+/// Other inputs of an effect.
 struct MessageContext {
   const protocol::Vendor& vendor;
   FaultDraws draws;
@@ -53,7 +53,7 @@ struct MessageContext {
 
 /// The result of a fault for a message.
 struct Touch {
-  bool acted = true;                      // false: the message stays as it was
+  bool acted = true;                      // false: the message is unchanged
   std::optional<std::size_t> place = {};  // the byte at which the message pauses or ends; nullopt: at the first changed byte
 };
 Touch alter_message(const Fault& fault, const MessageContext& context, MessageEdit& message);
@@ -62,9 +62,10 @@ Touch alter_message(const Fault& fault, const MessageContext& context, MessageEd
 void alter_beacons(const Fault& fault, const protocol::Vendor& vendor, const FaultDraws& draws,
                    std::vector<protocol::Bytes>& datagrams);
 
-// Effects of faults of the stage payload on the samples of a ping. Pure functions.
+// Effects of faults of the stage payload on the samples of a ping.
 
-/// `kept`: the ping that the effect `stuck` repeats, or null. `begun`: number of pings since the fault began, 0 for the first.
+/// Changes the samples. `kept`: the ping that the effect `stuck` repeats, or null. `begun`: number of pings since the fault
+/// began, 0 for the first.
 void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, std::uint64_t begun, Ping& ping);
 
 }  // namespace sonar

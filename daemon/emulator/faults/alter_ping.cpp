@@ -32,7 +32,7 @@ class Image {
     for (std::size_t row = 0; row < rows_; ++row)
       for (std::size_t beam = 0; beam < beams_; ++beam) set(row, beam, code(row, beam));
   }
-  /// Moves the complex beam signals (for messages with phases) like the samples. source(row, beam): their position before; rows
+  /// Moves the complex beam signals (for messages with phases) like the samples. source(row, beam) returns the old position; rows
   /// beyond the last are empty.
   void move_signal(auto source) {
     auto& signal = ping_.beam_signal_upa;
@@ -54,7 +54,7 @@ std::uint32_t scaled(std::uint32_t code, double factor, std::uint32_t most) {
 }
 
 /// Changes levels. A sample of a picture is a level; a sample of a range image has the level in the upper 16 bits and the range
-/// in the lower ones. A pixel without a return stays without one.
+/// in the lower 16. A pixel without a return is not changed.
 class Levels {
  public:
   Levels(const Ping& ping, std::uint32_t full)
@@ -67,7 +67,7 @@ class Levels {
   std::uint32_t full() const { return full_; }
   bool are_of_ranges() const { return of_ranges_ != nullptr; }
 
-  /// The code of a range image's return with its range multiplied by `factor`; 0 (no return) beyond `most_m`.
+  /// Returns the code of a return with the range multiplied by `factor`; 0 (no return) beyond `most_m`.
   std::uint32_t at_range(std::uint32_t code, double factor, double most_m) const {
     const double range = static_cast<double>(code & most_range) * factor;
     if (range < 1 || range > std::min<double>(most_range, most_m / of_ranges_->range_unit_m)) return 0;
@@ -129,7 +129,7 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
   Image image(ping);
   const Levels levels(ping, image.full());
   const double share = fault.number("share");
-  // The beams are drawn per fault, not per ping, so they are the same in every ping.
+  // The beams depend on the fault, not on the ping, so they are the same in every ping.
   FaultDraws of_fault = draws;
   of_fault.ping = 0;
   const auto chosen_beam = [&](std::size_t beam) {

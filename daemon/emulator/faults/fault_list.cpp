@@ -7,9 +7,9 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t most_over = 64;  // ended faults that stay listed
+constexpr std::size_t most_over = 64;  // number of ended faults that stay listed
 
-/// FNV-1a, which is the same in every run, unlike std::hash.
+/// Returns the FNV-1a hash, which is the same in every run, unlike std::hash.
 std::uint32_t key_of_name(const std::string& name) {
   std::uint32_t hash = 2166136261u;
   for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619u;
@@ -20,8 +20,8 @@ std::uint32_t key_of_name(const std::string& name) {
 
 std::optional<FaultRefusal> Faults::why_not(const std::vector<Fault>& faults) const {
   using Code = FaultRefusal::Code;
-  // A trouble consists of several kinds. It is accepted if at least one kind has an effect on this sonar; a conflict of any
-  // kind refuses the whole trouble.
+  // A trouble consists of several kinds. It is accepted if at least one kind has an effect on this sonar and no kind conflicts
+  // with another fault.
   bool any = faults.empty();
   std::string why;
   for (const Fault& fault : faults) {
@@ -59,8 +59,8 @@ void Faults::add(const std::vector<Fault>& faults, bool manual, Time now, Action
 bool Faults::end(const std::string& name, Time now, Actions& actions) {
   bool found = name.empty();
   for (Entry& e : entries_) {
-    // The parts of a trouble are NAME.1, NAME.2, ...; a fault without a name of its own is ended by the code and
-    // by the name of its kind.
+    // The parts of a trouble are NAME.1, NAME.2, ...; the code or the name of a kind ends faults of that kind that the user gave
+    // no name.
     const bool by_word = e.fault.name == e.fault.what && (e.fault.kind->code == name || e.fault.kind->name == name);
     const bool named = name.empty() || e.fault.name == name || by_word || e.fault.name.starts_with(name + ".");
     if (!named || (e.over && !name.empty())) continue;
@@ -74,7 +74,7 @@ bool Faults::end(const std::string& name, Time now, Actions& actions) {
 
 void Faults::add(Fault fault, bool manual, Time now) {
   forget_old();
-  // Entries are in the order of their stages, which is the order of action; within a stage, in the order of addition.
+  // Entries are in the order of their stages, in which they act; entries of one stage are in the order of addition.
   const auto place =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.fault.kind->stage > fault.kind->stage; });
   Entry& entry = *entries_.emplace(place);

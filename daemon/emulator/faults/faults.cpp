@@ -1,4 +1,4 @@
-// Begin and end of faults, and their effects on the device.
+// Begins and ends faults, and applies their effects on the device.
 #include "daemon/emulator/faults/faults.hpp"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr std::size_t most_hits = 64;  // remembered pings; more than an outbox holds
+constexpr std::size_t most_hits = 64;  // number of stored pings; more than an outbox holds
 
 nanoseconds length_of_power_cycle(const Fault& fault) {
   return nanoseconds_from(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));
@@ -51,14 +51,14 @@ bool Faults::fires(const Entry& e, std::uint32_t ping) const {
   if (at.ping) return e.begun == 0 && ping >= *at.ping;
   if (at.every) return ping % *at.every == at.phase % *at.every;
   if (at.probability) return FaultDraws{around_.seed, e.key, around_.index, ping, 0}.uniform(~std::uint32_t{0}) < *at.probability;
-  return !at.time_s && !e.fault.on && e.begun == 0;  // at once
+  return !at.time_s && !e.fault.on && e.begun == 0;  // without a trigger, begins at once
 }
 
-// States of a fault: waiting for its trigger (neither active nor over); delayed, while `begins` is set; active, until its
-// duration or number of pings is used up; then waiting again or, after the last occurrence, over.
+// A fault first waits for its trigger (it is neither active nor over). It is delayed while `begins` is set, then active until its
+// duration or number of pings is used up, then it waits again or, after the last occurrence, is over.
 void Faults::begin(Entry& e, Time now) {
   if (e.active || e.over) return;
-  // With a delay, this call only sets the time at which on_tick() calls again.
+  // With a delay, this call only sets the time at which on_tick() calls begin() again.
   if (!e.begins) e.begins = now + e.fault.delay;
   if (now < *e.begins) return;
   e.begins.reset();
@@ -74,7 +74,8 @@ void Faults::begin(Entry& e, Time now) {
   begin_effect(e, now);
 }
 
-/// A fault with a limited number of occurrences is over after the last one; others wait for their trigger again.
+/// Ends an occurrence. A fault with a limited number of occurrences is over after the last one; others wait for their trigger
+/// again.
 void Faults::end(Entry& e, Time now) {
   if (!e.active) return;
   e.active = false;
@@ -84,7 +85,7 @@ void Faults::end(Entry& e, Time now) {
   if (e.fault.span.count != 0 && e.begun >= e.fault.span.count) e.over = true;
 }
 
-/// Faults that change the device or its connections act here, by orders. Faults of messages and samples act when a message is
+/// Adds the orders of a fault that changes the device or its connections. Faults of messages and samples act when a message is
 /// sent.
 void Faults::begin_effect(Entry& e, Time now) {
   switch (e.fault.kind->effect) {
@@ -97,7 +98,7 @@ void Faults::begin_effect(Entry& e, Time now) {
       orders_.emplace_back(SetListening{false});
       orders_.emplace_back(EndClients{e.fault.word("how") == "reset"});
       orders_.emplace_back(RestartDevice{});
-      // A negative gap means that the ports open before the first status message; step() opens them.
+      // With a negative gap the ports open before the first status message; step() opens them.
       if (const double gap = e.fault.number("gap-s"); gap < 0)
         e.step = now + std::max(nanoseconds(0), nanoseconds_from(e.fault.number("boot-s") + gap));
       return;
@@ -172,7 +173,7 @@ void Faults::end_effect(Entry& e) {
 
 // ---- time
 
-/// Order of events for each fault: begin, step, delayed requests, ends of clients, end, expiry.
+/// Handles the events of each fault in this order: begin, step, delayed requests, ends of clients, end, expiry.
 void Faults::on_tick(Time now) {
   for (Entry& e : entries_) {
     const auto& at = e.fault.at;
@@ -194,7 +195,7 @@ void Faults::on_tick(Time now) {
   }
 }
 
-/// Mirrors on_tick(): the earliest time at which one of its conditions becomes true.
+/// Returns the earliest time at which a condition of on_tick() becomes true.
 std::optional<Time> Faults::next_tick() const {
   Time next = Time::max();
   for (const Entry& e : entries_) {
@@ -214,7 +215,7 @@ void Faults::on(Occasion occasion, Time now) {
     if (e.fault.on == occasion && (e.fault.span.count == 0 || e.begun < e.fault.span.count)) begin(e, now);
 }
 
-/// A step is a change within a fault: the opening of the ports in a power cycle, each up and down of a flapping link.
+/// Makes a change within a fault: opens the ports in a power cycle, or takes a flapping link up or down.
 void Faults::step(Entry& e, Time now) {
   if (e.fault.kind->effect == Effect::power_cycle) {  // opens the TCP ports before the first status message
     orders_.emplace_back(SetListening{true});
@@ -248,7 +249,7 @@ void Faults::begin_ping(std::uint32_t number, Time now) {
 /// Counts a ping for a fault. Faults of status messages count status messages instead (alter_beacons).
 void Faults::count_ping(Entry& e, Time now) {
   if (e.fault.span.pings == 0 || e.fault.kind->stage == FaultStage::status || --e.pings_left > 0) return;
-  // A power cycle ends by time.
+  // A power cycle ends after its duration.
   if (e.fault.kind->effect != Effect::power_cycle) end(e, now);
 }
 
@@ -267,7 +268,7 @@ double Faults::rate_factor() const {
 
 bool Faults::leaves_group() const { return any(Effect::leave_group); }
 
-/// The first fault that holds the ping back decides; delays do not add up.
+/// Returns the delay of the first fault that holds the ping back; delays do not add up.
 Faults::Hold Faults::hold(const Connection& to, std::uint32_t ping, Time now) {
   for (Entry& e : entries_) {
     if (!met(e, ping) || !chosen(e.fault, to)) continue;

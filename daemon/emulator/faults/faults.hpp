@@ -43,7 +43,7 @@ struct ChangePace {};  // rate_factor() has changed
 struct ReadClients {
   bool on = true;
 };
-struct DropNewestPings {  // lets outboxes of slow clients drop the newest pings
+struct DropNewestPings {  // outboxes of slow clients drop the newest pings
   bool on = true;
 };
 struct ReleaseHeld {};
@@ -54,8 +54,8 @@ using FaultOrder = std::variant<SetListening, EndClients, ForgetSettings, Restar
 
 /// The reason why a sonar cannot have faults.
 struct FaultRefusal {
-  /// no_effect: they cannot change anything on this product (another sonar may accept them). conflict: a present fault excludes
-  /// them.
+  /// no_effect: the faults cannot change anything on this product (another sonar may accept them). conflict: a present fault
+  /// excludes them.
   enum class Code { no_effect, conflict } code = Code::conflict;
   std::string text;  // a sentence
 };
@@ -74,10 +74,10 @@ class Faults {
   Faults(Around around, Time now) : around_(around), start_(now) {}
 
   // ---- the list of faults
-  /// The reason why this sonar cannot have these faults; nullopt if it can.
+  /// Returns the reason why this sonar cannot have these faults; nullopt if it can.
   std::optional<FaultRefusal> why_not(const std::vector<Fault>& faults) const;
-  /// Adds those of `faults` that are for this sonar and take effect on it. `manual`: a user added them; they end after
-  /// longest_manual_fault.
+  /// Adds those of `faults` that are for this sonar and have an effect on it. `manual`: a user requested the faults, so they end
+  /// after longest_manual_fault.
   void add(const std::vector<Fault>& faults, bool manual, Time now, Actions& actions);
   /// Ends the faults with this name, or all if `name` is empty. Returns false if there is none.
   bool end(const std::string& name, Time now, Actions& actions);
@@ -101,23 +101,23 @@ class Faults {
   void begin_ping(std::uint32_t number, Time now);
   /// Returns the ping as the device reports it, with changed samples or stamps.
   std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
-  /// True if alter_datagrams() may change this ping. If not, the clients of a port share the datagrams.
+  /// True if alter_datagrams() may change this ping. If not, the receivers of a port share the datagrams.
   bool alters_datagrams(const Connection& stream, std::uint32_t ping) const;
   void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   bool leaves_group() const;
   /// Changes a message before it is sent to a client. Returns false if it must not be sent.
   bool shape(const Connection& to, Outbox::Message& message, Time now);
-  /// Tells whether a ping is held back before it enters a client's outbox, and the time or number of pings for which it is held.
+  /// States whether a ping is held back before it enters a client's outbox, and until which time or for how many pings.
   struct Hold {
     enum class Kind { pass, until, after_next, collect } kind = Kind::pass;
     Time until{};
     std::size_t collect = 0;
   };
   Hold hold(const Connection& to, std::uint32_t ping, Time now);
-  /// True if the sonar sends this ping to no client: a fault withholds or drops it, or the device is off. Faults of links and
-  /// of single clients do not count.
+  /// True if the sonar sends this ping to no client, because a fault withholds or drops it, or the device is off. Faults of links
+  /// and of single clients are ignored.
   bool withholds(std::uint32_t ping, Time now) const;
-  /// The factor by which faults multiply the ping rate; 0 = no pings.
+  /// Returns the factor by which faults multiply the ping rate; 0 = no pings.
   double rate_factor() const;
 
   // ---- clients
@@ -125,8 +125,8 @@ class Faults {
   Admission admission() const;
   void on_served(const Connection& client, Time now);
   enum class RequestVerdict { apply, ignore, end, reset };
-  /// Call it when a client requests settings. It may limit `change`. With the verdict `ignore` the sonar must not apply the
-  /// change now; a delayed change follows as an order.
+  /// Call it when a client requests settings. A fault may limit `change`. If the verdict is `ignore`, the sonar must not apply
+  /// the change now; a delayed change follows as an order.
   RequestVerdict on_request(protocol::ChangeSettings& change, const std::string& who, const protocol::DeviceState& state,
                             Time now);
   /// Call it when a client has sent any bytes.
@@ -145,7 +145,7 @@ class Faults {
     std::optional<Time> begins;  // set while the fault's delay passes
     Time expires = Time::max(), since{}, until = Time::max(), step = Time::max();
     bool down = false;               // state of a port or link that alternates
-    std::deque<std::uint32_t> hits;  // the latest pings on which it acts
+    std::deque<std::uint32_t> hits;  // the latest pings on which the fault acts
     std::optional<std::uint32_t> first_number;
     std::shared_ptr<const Ping> kept;
     std::optional<Time> kept_time;
@@ -180,7 +180,7 @@ class Faults {
 
   Around around_;
   Time start_;
-  std::list<Entry> entries_;  // in the order of stages; within a stage, of addition
+  std::list<Entry> entries_;  // in the order of stages; entries of one stage are in the order of addition
   std::vector<FaultOrder> orders_;
 };
 

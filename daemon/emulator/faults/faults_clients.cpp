@@ -1,4 +1,4 @@
-// Faults of clients: the choice of clients, admission, and outcomes of requests.
+// Faults of clients: selects clients, and determines admission and the outcome of requests.
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {
@@ -26,7 +26,7 @@ bool Faults::chosen(const Fault& fault, const Connection& client) const {
   });
 }
 
-/// The first active fault of admission decides.
+/// Returns the verdict of the first active fault of admission.
 Faults::Admission Faults::admission() const {
   for (const Entry& e : entries_) {
     if (!e.active) continue;
@@ -50,7 +50,7 @@ void Faults::on_served(const Connection& client, Time now) {
 
 Faults::RequestVerdict Faults::on_request(protocol::ChangeSettings& change, const std::string& who,
                                           const protocol::DeviceState& state, Time now) {
-  // The first fault that withholds the request or ends the client decides; limits of several faults combine.
+  // The first fault that withholds the request or ends the client determines the verdict; limits of several faults combine.
   on(Occasion::config, now);
   for (Entry& e : entries_) {
     if (!e.active) continue;
@@ -87,7 +87,7 @@ Faults::RequestVerdict Faults::on_request(protocol::ChangeSettings& change, cons
   return RequestVerdict::apply;
 }
 
-/// Ends a client at its first bytes if a fault demands it.
+/// Ends a client that sends its first bytes, if a fault does so.
 Faults::RequestVerdict Faults::on_bytes(const std::string& who, Time now) {
   for (Entry& e : entries_) {
     if (!e.active || e.fault.kind->effect != Effect::end_on_request || e.fault.word("command") != "any") continue;

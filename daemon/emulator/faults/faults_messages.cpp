@@ -11,8 +11,8 @@ namespace {
 
 using protocol::Bytes;
 
-/// All bytes of a message in the order in which they are sent: each prefix, followed by the shared bytes. Without prefixes: the
-/// shared bytes once.
+/// Returns all bytes of a message in the order in which they are sent: the shared bytes after each prefix, or once if there is no
+/// prefix.
 Bytes whole(const Outbox::Message& message) {
   Bytes all;
   if (message.prefixes.empty()) return *message.bytes;
@@ -23,7 +23,7 @@ Bytes whole(const Outbox::Message& message) {
   return all;
 }
 
-/// The time two seconds before the device's 32-bit counter overflows.
+/// Returns the time two seconds before the device's 32-bit counter overflows.
 Time before_wrap(const std::string& unit, Time powered_up_at) {
   constexpr double counts = 4294967296.0, before_s = 2;
   const double unit_s = unit == "milliseconds" ? 1e-3 : 1e-6;
@@ -32,7 +32,7 @@ Time before_wrap(const std::string& unit, Time powered_up_at) {
 
 }  // namespace
 
-/// A ping is copied only if a fault acts on it. Faults act in the order of their stages.
+/// Copies a ping only if a fault acts on it. Faults act in the order of their stages.
 std::shared_ptr<const Ping> Faults::altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state,
                                             Time now) {
   const auto number = static_cast<std::uint32_t>(ping->request.number);
@@ -77,7 +77,8 @@ bool Faults::withholds(std::uint32_t ping, Time now) const {
   });
 }
 
-/// False: the message must not be sent. Faults that silence the sonar come first, then those that change bytes, pace or end.
+/// Returns false if the message must not be sent. Faults that silence the sonar act first, then faults that change bytes, pace or
+/// end.
 bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (entries_.empty() || to.role == Role::observer) return true;
   for (Entry& e : entries_) {
@@ -107,12 +108,12 @@ bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
         alter_message(e.fault, {around_.vendor, draws, e.first_number.value_or(message.ping), message.ping, &earlier}, *edit);
     if (touch.acted) note_message(e, to, message.ping, before, edit->bytes, now, touch.place);
     if (edit->dropped) return false;
-    if (edit->end != Outbox::Shape::End::none) break;  // nothing is sent after it
+    if (edit->end != Outbox::Shape::End::none) break;  // the connection ends after this message
   }
   if (!edit) return true;
   message.bytes = std::make_shared<const Bytes>(std::move(edit->bytes));
   message.prefixes.clear();
-  message.shape = nullptr;  // its positions refer to the unaltered bytes
+  message.shape = nullptr;  // the positions in it refer to the unaltered bytes
   if (!edit->pauses.empty() || edit->end != Outbox::Shape::End::none) {
     std::sort(edit->pauses.begin(), edit->pauses.end(), [](const auto& a, const auto& b) { return a.before < b.before; });
     message.shape = std::make_shared<const Outbox::Shape>(Outbox::Shape{std::move(edit->pauses), edit->end});
@@ -133,8 +134,8 @@ void Faults::note_message(Entry& e, const Connection& to, std::uint32_t ping, co
   note(e, FaultEntry::What::injected, now, std::move(more));
 }
 
-/// Changes bytes of a ping that is sent as datagrams: in the first datagram with the field or region; a field without a fixed
-/// offset is changed in every datagram.
+/// Changes bytes of a ping that is sent as datagrams: in the first datagram that has the field or region, or in every datagram if
+/// the field has no fixed offset.
 void Faults::alter_bytes_of_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
   using protocol::Part;
   for (Entry& e : entries_) {
@@ -166,14 +167,14 @@ bool Faults::alters_datagrams(const Connection& stream, std::uint32_t ping) cons
     if (!chosen(e.fault, stream)) return false;
     if (e.fault.kind->stage == FaultStage::framing) return frames_datagrams(stream) && met(e, ping);
     if (e.fault.kind->stage != FaultStage::datagrams) return false;
-    // older_part stores the first part of each ping; late_part sends a delayed part even after the fault has ended.
+    // older_part stores the first part of each ping; late_part sends a delayed part even after the end of the fault.
     const bool keeps = e.fault.kind->effect == Effect::older_part && !e.over;
     const bool holds = e.fault.kind->effect == Effect::late_part && !e.before.empty();
     return keeps || holds || met(e, ping);
   });
 }
 
-/// Faults that change bytes come first, then those that lose, repeat or reorder datagrams.
+/// Applies faults that change bytes, then faults that lose, repeat or reorder datagrams.
 void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now) {
   if (frames_datagrams(stream)) alter_bytes_of_datagrams(datagrams, stream, ping, now);
   for (Entry& e : entries_) {
@@ -208,11 +209,11 @@ void Faults::alter_datagrams(std::vector<Bytes>& datagrams, const Connection& st
   }
 }
 
-/// Several faults can change the same status message, one after the other.
+/// Applies all active faults of status messages, one after the other.
 void Faults::alter_beacons(std::vector<Bytes>& beacons, Time now) {
   if (entries_.empty() || beacons.empty()) return;
   on(Occasion::status, now);
-  // A fault whose time is over must not alter this message.
+  // First ends faults whose time is over, so that they do not alter this message.
   on_tick(now);
   const std::size_t size = beacons.front().size();
   for (Entry& e : entries_) {

@@ -1,4 +1,4 @@
-// The journal of faults: each effect as it occurred, with which a driver's reaction is compared.
+// The journal of faults. It records each effect, so that a driver's reaction can be compared with it.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@ struct FaultEntry {
   std::string fault, asked;  // name of the fault; code or trouble as the user wrote it
   const FaultKind* kind = nullptr;
   std::string sonar;
-  std::string client;               // its address; empty = the device itself
-  std::uint64_t client_number = 0;  // counted from 1 over the life of the sonar
-  std::uint32_t ping = 0;           // 0 = none
+  std::string client;               // address of the client; empty = the device itself
+  std::uint64_t client_number = 0;  // number of the client, counted from 1 over the life of the sonar
+  std::uint32_t ping = 0;           // number of the ping; 0 = none
   /// Position in this client's stream of the first changed byte, of the pause or of the end; -1 = none.
   std::int64_t offset = -1;
   std::uint64_t bytes_before = 0, bytes_after = 0;  // size of the message

@@ -6,11 +6,11 @@
 namespace sonar {
 namespace {
 
-constexpr std::size_t most_receivers = 16;  // limit for one list
+constexpr std::size_t most_receivers = 16;  // limit for one list of receivers
 
 bool is_client(const Connection& c) { return c.role == Role::client && c.state == Connection::State::served && !c.finishing; }
 
-/// Drops pings that wait in a stream without receivers, because the next receiver must not get the previous one's pings.
+/// Drops pings that wait in a stream without receivers, because the next receiver must not get the pings of the previous one.
 void drop_unreceived(Connections& connections) {
   for (Connection& c : connections.all())
     if (c.role == Role::stream && connections.receivers(c).empty()) c.outbox.drop_waiting_pings(DropReason::gone);
@@ -25,7 +25,7 @@ Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protoco
                             Actions& actions) {
   using Verdict = Connections::Verdict;
   using Admission = Faults::Admission;
-  // The rules for slots decide first; a fault of clients may then change the verdict.
+  // The rules for slots give a verdict, which a fault of clients may then change.
   Verdict verdict = stopping_ ? Verdict::refuse : connections_.verdict(role);
   const Admission admission = role == Role::client && !stopping_ ? by_fault : Admission::as_configured;
   if (admission == Admission::wait) verdict = Verdict::wait;
@@ -37,7 +37,7 @@ Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protoco
     return nullptr;
   }
   if (verdict == Verdict::take_over) {
-    // The oldest client still gets its current message completely, but counts as gone from now on.
+    // The oldest client still gets the rest of its current message, but no longer counts as a client.
     Connection& oldest = *connections_.oldest_client();
     oldest.state = Connection::State::leaving;
     begin_finish(oldest, "another client took over", actions);
@@ -52,9 +52,9 @@ Connection* Audience::admit(ConnectionId id, Role role, Peer peer, const protoco
 void Audience::serve(Connection& connection, Time now, Actions& actions) {
   connection.state = Connection::State::served;
   connection.dialogue = sonar_.vendor.converse(*connection.port, sonar_.state, sonar_.unskipped(now));
-  // Serve creates the session to which later actions refer, such as the ReadFrom of a fault.
+  // Serve creates the session to which later actions refer, such as ReadFrom because of a fault.
   actions.emplace_back(Serve{connection.id});
-  // Clients are numbered, for faults that act on one of them; observers are not.
+  // Clients are numbered, for faults that act on one client; observers are not.
   if (connection.role != Role::observer) connection.number = ++sonar_.figures.clients;
 }
 
@@ -80,7 +80,7 @@ void Audience::open_stream(ConnectionId id, const protocol::Port& port) {
   if (port.group.port != 0) stream.receivers.front().to.push_back(port.group);
 }
 
-// A client has its own list for each stream; a request over HTTP or by a datagram sets the device's list.
+// A client has its own list for each stream; a request over HTTP or UDP sets the device's list.
 void Audience::set_receivers(Connection* from, protocol::Ipv4 ip, protocol::SetReceivers wanted) {
   Connection* const stream = connections_.stream(wanted.stream);
   if (stream == nullptr) return;
@@ -122,7 +122,7 @@ void Audience::stop(const std::string& why, Actions& actions) {
 }
 
 void Audience::remove(Connection& connection, const std::string& why, bool by_client, Actions& actions) {
-  // Pings that a fault holds back enter the outbox before it drops them, so that the counters add up.
+  // Pings that a fault holds back enter the outbox, which then drops them, so that the counters add up.
   for (Connection::Held& held : connection.held) connection.outbox.push_ping(std::move(held.ping));
   connection.outbox.end(connection.finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection.peer.name, connection.role, connection.state != Connection::State::waiting,
@@ -143,7 +143,7 @@ void Audience::end_by_fault(Connection& connection, Faults::RequestVerdict verdi
 
 void Audience::end_clients(std::optional<ConnectionId> only, bool reset, Actions& actions) {
   using Verdict = Faults::RequestVerdict;
-  // Waiting clients end first, because the end of a served one may give its slot at once to a client that waits.
+  // Waiting clients end first, because a waiting client may get the slot of a served client at once.
   for (const bool waits : {true, false})
     for (Connection& c : all())
       if (c.role == Role::client && (!only || *only == c.id) && waits == (c.state == Connection::State::waiting))

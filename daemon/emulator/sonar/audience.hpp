@@ -1,5 +1,5 @@
 // Manages the connections of an emulated sonar: slots of clients, the queue for slots, take-over, receivers of streams, and the
-// end of a connection. It changes no settings and makes no pings; the Sonar calls has_audience() after each change.
+// end of a connection. The Sonar, which changes settings and makes pings, calls has_audience() after each change.
 #pragma once
 
 #include <exception>
@@ -14,7 +14,7 @@ namespace sonar {
 
 class Audience {
  public:
-  /// `sonar` must outlive it.
+  /// `sonar` must outlive the object.
   explicit Audience(SonarData& sonar) : sonar_(sonar), connections_(sonar.config) {}
   Audience(const Audience&) = delete;
   Audience& operator=(const Audience&) = delete;
@@ -27,13 +27,13 @@ class Audience {
   bool has_audience() const { return connections_.has_audience(); }
   bool stopping() const { return stopping_; }
 
-  /// Decides about a new connection by the free slots, or by a fault of clients (`by_fault`). Returns the connection if it gets
-  /// a slot (the caller must then call serve()); null if it waits or is refused. After a take-over the previous client counts
-  /// as gone.
+  /// Admits a new connection if a slot is free, unless a fault of clients (`by_fault`) changes the verdict. Returns the
+  /// connection if it gets a slot (the caller must then call serve()); null if it waits or is refused. After a take-over the
+  /// previous client no longer counts as a client.
   Connection* admit(ConnectionId id, Role role, Peer peer, const protocol::Port* port, Faults::Admission by_fault,
                     Actions& actions);
   void serve(Connection& connection, Time now, Actions& actions);
-  /// The client that has waited longest for a slot; null if none waits or the sonar is stopping.
+  /// Returns the client that has waited longest for a slot; null if none waits or the sonar is stopping.
   Connection* next_waiting() { return stopping_ ? nullptr : connections_.longest_waiting(); }
   /// Adds the stream of an open port of kind udp_stream.
   void open_stream(ConnectionId id, const protocol::Port& port);
@@ -46,7 +46,7 @@ class Audience {
   /// Call it after a client has connected or left: updates the client in status messages, and drops pings without receivers.
   void on_membership();
 
-  /// Ends a connection: waiting pings are dropped, the current message and replies are still sent.
+  /// Ends a connection: drops waiting pings, but still sends the current message and replies.
   void finish(Connection& connection);
   void begin_finish(Connection& connection, const std::string& why, Actions& actions);
   /// Ends all connections as finish() does, and admits no more.
@@ -72,7 +72,7 @@ class Audience {
     }
   }
 
-  /// The earliest Connection::next_tick or next_request of all served clients, in the daemon's time.
+  /// Returns the earliest Connection::next_tick or next_request of all served clients, in the daemon's time.
   std::optional<Time> earliest(std::optional<Time> (Connection::*of)() const) const;
 
  private:

@@ -12,7 +12,7 @@ std::size_t held_bytes(const Connection& c) {
                          [](std::size_t sum, const Connection::Held& held) { return sum + held.ping.size(); });
 }
 
-/// Pauses before all parts except the first.
+/// Makes a pause before each part except the first.
 std::shared_ptr<const Outbox::Shape> pauses_between(const std::vector<protocol::Bytes>& parts, std::chrono::nanoseconds gap) {
   Outbox::Shape shape;
   std::size_t end = 0;
@@ -40,7 +40,7 @@ FramedPing::FramedPing(const protocol::Vendor& vendor, const protocol::DeviceSta
     bytes_ = std::move(all);
   }
   if (bytes_ != nullptr || !vendor.has_several_streams()) return;
-  // The whole ping is joined from the parts of the ports, so that it is encoded only once.
+  // The bytes of the ping are joined from the parts of the ports, so that the ping is encoded only once.
   auto whole = std::make_shared<Bytes>();
   for (const protocol::Port& port : vendor.ports())
     if (port.kind == protocol::Port::Kind::tcp_stream)
@@ -80,7 +80,7 @@ std::shared_ptr<const Outbox::Shape> FramedPing::pauses(const protocol::Port& po
 // ---- a ping is offered
 
 PingQueued Delivery::queue(const PingOutcome& outcome, Time now, Requests& requests, Actions& actions) {
-  // Faults decide here whether they act on this ping; the calls below use the decisions.
+  // This call decides which faults act on the ping; the calls below use the decisions.
   faults_.begin_ping(static_cast<std::uint32_t>(outcome.ping->request.number), now);
   const auto reported = faults_.altered(outcome.ping, sonar_.state, now);
   FramedPing framed(sonar_.vendor, sonar_.state, *reported, outcome.recorded.get());
@@ -95,18 +95,18 @@ PingQueued Delivery::queue(const PingOutcome& outcome, Time now, Requests& reque
   return queued;
 }
 
-/// Offers a ping to a client. Returns what the client requests next.
+/// Offers a ping to a client. Returns the requests that the client makes next.
 std::vector<protocol::Event> Delivery::offer(Connection& to, FramedPing& framed, PingQueued& queued, Time now, Actions& actions) {
   const bool by_datagrams = to.takes_datagrams();
   if (to.finishing || to.state != Connection::State::served || (!by_datagrams && framed.bytes() == nullptr)) return {};
   const auto bytes = by_datagrams ? nullptr : to.role == Role::observer ? framed.bytes() : framed.bytes_at(*to.port);
   if (to.role == Role::stream && receivers(to.id).empty()) return {};
   const PingRequest& request = queued.ping->request;
-  // A stream has no conversation: its receivers get every ping, without a prefix.
+  // A stream has no dialogue, so its receivers get every ping, without a prefix.
   protocol::Delivery wanted{{protocol::Bytes{}}, {}};
   if (to.dialogue != nullptr)
     wanted = to.dialogue->on_ping(request.vendor_settings.get(), bytes == nullptr ? 0 : bytes->size(), sonar_.unskipped(now));
-  // An observer has requested nothing, but gets what clients have requested.
+  // An observer requests nothing, but gets the pings that clients request.
   if (to.role == Role::observer && wanted.prefixes.empty() && bytes != nullptr && !bytes->empty()) wanted.prefixes.emplace_back();
   if (!wanted.prefixes.empty()) {
     Outbox::Message message{
@@ -127,7 +127,7 @@ std::vector<protocol::Event> Delivery::offer(Connection& to, FramedPing& framed,
   return std::move(wanted.events);
 }
 
-/// Null: there are none to send. If faults removed all, the ping is counted as dropped.
+/// Returns the datagrams for a stream; null if there are none to send. If faults removed all, the ping is counted as dropped.
 FramedPing::Datagrams Delivery::datagrams_for(Connection& to, FramedPing& framed, std::uint32_t ping, Time now) {
   const FramedPing::Datagrams& made = framed.parts(*to.port);
   if (made->empty()) return nullptr;
@@ -144,7 +144,7 @@ void Delivery::deliver(Connection& to, Outbox::Message ping, Time now, Actions& 
   using Kind = Faults::Hold::Kind;
   const Faults::Hold hold = to.role == Role::client ? faults_.hold(to, ping.ping, now) : Faults::Hold{};
   std::deque<Connection::Held>& held = to.held;
-  // A ping that no fault holds is sent at once, followed by one that was held to be swapped with it.
+  // A ping that no fault holds back is sent at once, before a ping that was held to be swapped with it.
   if (hold.kind == Kind::pass && (held.empty() || held.front().after_next)) {
     to.outbox.push_ping(std::move(ping));
     actions.emplace_back(Wake{to.id});
@@ -153,8 +153,7 @@ void Delivery::deliver(Connection& to, Outbox::Message ping, Time now, Actions& 
   }
   if (held.size() >= Outbox::most_held || held_bytes(to) + ping.size() > Outbox::most_held_bytes)
     return to.outbox.drop_offered(DropReason::fault);
-  // A ping that waits for an event (collect, after_next) has no release time: Time::max(). Pings keep their order: no ping
-  // leaves before the previous one.
+  // A ping that waits for an event (collect, after_next) has no release time (Time::max()). Pings keep their order.
   const Time earliest = held.empty() ? now : held.back().until;
   const Time until = hold.kind == Kind::until ? std::max(hold.until, earliest) : hold.kind == Kind::pass ? earliest : Time::max();
   held.push_back({std::move(ping), until, hold.kind == Kind::after_next});
@@ -216,7 +215,7 @@ void Delivery::on_written(ConnectionId id, const Outbox::Message& message, Time 
   if (to == nullptr) return;
   to->outbox.written();
   if (to->role == Role::observer || message.ping == 0) return;
-  // A stream's datagrams count for each client that receives them.
+  // Datagrams of a stream count for each client that receives them.
   for (Connection& c : audience_.all()) {
     if (to->role != Role::stream || c.role != Role::client || !c.receives(to->receivers.front().stream)) continue;
     ++c.streamed_pings;
@@ -224,7 +223,7 @@ void Delivery::on_written(ConnectionId id, const Outbox::Message& message, Time 
   }
   DeviceFigures& figures = sonar_.figures;
   figures.latency.add(seconds(now - message.fired_at));
-  if (message.ping <= last_served_.ping) return;  // a ping counts once for jitter, at its first client
+  if (message.ping <= last_served_.ping) return;  // only the first client of a ping counts for jitter
   if (last_served_.ping != 0)
     figures.jitter.add(std::abs(seconds(now - last_served_.at) - seconds(message.fired_at - last_served_.tick)));
   last_served_ = {message.ping, message.fired_at, now};

@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// The bytes of a ping for each port. They are made when first needed; connections share them.
+/// The bytes of a ping for each port. They are made when first needed, and connections share them.
 class FramedPing {
  public:
   using Bytes = protocol::Bytes;
@@ -23,13 +23,14 @@ class FramedPing {
   FramedPing(const protocol::Vendor& vendor, const protocol::DeviceState& state, const Ping& ping,
              const PartsByPort* recorded = nullptr);
 
-  /// The bytes of the ping over TCP; null if the vendor sends only datagrams.
+  /// Returns the bytes of the ping for TCP; null if the vendor sends only datagrams.
   const std::shared_ptr<const Bytes>& bytes() const { return bytes_; }
-  /// The bytes for clients at a port of kind tcp_stream: bytes(), or only the port's part of them. Null: none.
+  /// Returns the bytes for clients at a port of kind tcp_stream: bytes(), or only the port's part of them; null if there are
+  /// none.
   std::shared_ptr<const Bytes> bytes_at(const protocol::Port& port);
-  /// The parts of the ping at a port: datagrams; for a port of kind tcp_stream with a gap, the bytes between pauses.
+  /// Returns the parts of the ping at a port: datagrams or, for a port of kind tcp_stream with a gap, the bytes between pauses.
   const Datagrams& parts(const protocol::Port& port);
-  /// The pauses between the parts of bytes(). Null: bytes() are written without pauses.
+  /// Returns the pauses between the parts of bytes(); null if there are no pauses.
   std::shared_ptr<const Outbox::Shape> pauses(const protocol::Port& port);
 
  private:
@@ -38,7 +39,7 @@ class FramedPing {
   const Ping& ping_;
   const PartsByPort* recorded_;
   std::shared_ptr<const Bytes> bytes_;
-  bool is_first_ports_ = false;  // with several TCP ports, bytes_ are those of the first
+  bool is_first_ports_ = false;  // true: there are several TCP ports, and bytes_ are for the first
   struct AtPort {
     const protocol::Port* port;
     Datagrams parts;
@@ -54,20 +55,20 @@ class Delivery {
   /// The arguments must outlive the object.
   Delivery(SonarData& sonar, Audience& audience, Faults& faults) : sonar_(sonar), audience_(audience), faults_(faults) {}
 
-  /// Requests that clients make when they get a ping.
+  /// Requests that dialogues make after a ping.
   using Requests = std::vector<std::pair<Connection*, protocol::Event>>;
-  /// Puts the ping into the outbox of every connection that gets it.
+  /// Puts the ping into the outbox of every connection that gets the ping.
   PingQueued queue(const PingOutcome& outcome, Time now, Requests& requests, Actions& actions);
   /// Releases held pings that are due now; with `all`, all held pings.
   void release_held(Time now, bool all, Actions& actions);
-  /// The time at which the next held ping is due.
+  /// Returns the time at which the next held ping is due.
   std::optional<Time> next_release() const;
 
-  /// The present receivers of a stream, or the host of a port of kind udp_dialogue.
+  /// Returns the present receivers of a stream, or the host of a port of kind udp_dialogue.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const;
-  /// The datagrams of a status broadcast.
+  /// Returns the datagrams of a status broadcast.
   std::vector<protocol::Bytes> beacons(Time now);
-  // Sonar describes these.
+  // The comments of Sonar describe the following functions.
   Outbox::Message next_message(ConnectionId id, Time now);
   void on_sent(ConnectionId id, std::size_t bytes);
   void on_not_sent(ConnectionId id);

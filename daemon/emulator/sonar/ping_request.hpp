@@ -6,11 +6,11 @@
 
 namespace sonar {
 
-/// Poses, motion, moving objects, water, seed and switches of a ping fired at `at` by a sonar on this vehicle. The caller sets
-/// model, number, settings and sonar_id.
+/// Fills in poses, motion, moving objects, water, seed and switches for a ping that a sonar on this vehicle fires at `at`. The
+/// caller sets model, number, settings and sonar_id.
 PingRequest ping_request(const Config& config, const World& world, std::size_t vehicle, const Pose& mount, Time at);
 
-/// The state that messages report after power-up at `now`, without settings.
+/// Returns the state that messages report after power-up at `now`, without settings.
 protocol::DeviceState device_state(const SonarConfig& sonar, const Config& config, Time now);
 
 }  // namespace sonar

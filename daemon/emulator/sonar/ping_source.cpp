@@ -36,8 +36,8 @@ void PingSource::use_initial_settings() {
 
 void PingSource::drop_pings() {
   aim_ = {};
-  // The ping that is being computed has the settings of clients that have left: on_ping() drops it. A tick that waits for it was
-  // due for those clients too.
+  // The ping that is being computed has the settings of clients that have left, so on_ping() drops it. A tick that waits for this
+  // ping was due for those clients too.
   busy_unwanted_ = busy_;
   pacer_.forget_tick();
   drop_unsent();
@@ -53,11 +53,11 @@ void PingSource::change_settings(const protocol::ChangeSettings& change, const s
   // may contain a different state of the device.
   const auto before = std::exchange(sonar_.state.settings, change.vendor_settings);
   if (!asked_ || !change.vendor_settings->equals(*before)) {
-    if (!who.empty()) asked_by_ = who;  // empty: the device itself, which may change them with every ping
+    if (!who.empty()) asked_by_ = who;  // empty: the device itself, which may change the settings with every ping
     sonar_.report(Report::Topic::settings, who.empty() ? LogLevel::debug : LogLevel::info, "settings: " + change.summary,
                   {{"client", who.empty() ? "the sonar itself" : who}}, actions);
   }
-  settings_ = change.settings;  // also if they are repeated, because the device's own sound speed depends on its depth
+  settings_ = change.settings;  // also if equal, because the device's sound speed depends on the depth
   asked_ = true;
   if (change.receivers) audience_.set_receivers(nullptr, {}, *change.receivers);
   if (change.receivers || wants_pings()) update_pacer(now);
@@ -69,7 +69,7 @@ void PingSource::use_water(const Water& water, Time now) {
   if (wants_pings()) update_pacer(now);
 }
 
-/// Recomputes the values that the device derives from the client's request and the water at its depth.
+/// Recomputes the values that the device derives from the client's request and the water at the device's depth.
 void PingSource::follow_water() {
   const auto same = sonar_.vendor.apply_override({}, sonar_.state);
   if (same && same->settings.device_sound_speed_mps != settings_.device_sound_speed_mps) settings_ = same->settings;
@@ -84,7 +84,7 @@ void PingSource::forget_settings(Time now) {
 
 void PingSource::restart(bool clock_only, Time now) {
   sonar_.state.powered_up_at = now;
-  pacer_.forget_tick();  // a waiting tick is older than the restart
+  pacer_.forget_tick();  // because a waiting tick is older than the restart
   if (clock_only) return;
   sonar_.state.last_ping = ping_number_ = 0;
   forget_settings(now);
@@ -99,7 +99,7 @@ void PingSource::override_settings(const protocol::SettingsOverride& wanted, Tim
 
 // ---- when pings are due
 
-/// A sonar pings by itself (runs_itself) or for an audience; if the protocol requires a request, only after the first one.
+/// True if the sonar runs by itself (runs_itself) or has an audience that has sent a request, if the protocol requires one.
 bool PingSource::wants_pings() const {
   if (runs_itself()) return true;
   return !audience_.stopping() && audience_.has_audience() && (asked_ || sonar_.vendor.pings_before_first_request(sonar_.state));
@@ -135,7 +135,7 @@ bool PingSource::waits_for_pose(Time at) const {
 }
 
 void PingSource::trigger(const protocol::RequestPing& request, Time now) {
-  // The ping being computed is used only if it was fired with the present settings.
+  // A ping that is being computed also serves if it was fired with the present settings.
   if (request.joins && busy_ && busy_settings_ == sonar_.state.settings) return;
   aim_ = request;
   pacer_.trigger(now, request.joins);
@@ -156,7 +156,7 @@ void PingSource::catch_up(Actions& actions) {
 
 // ---- pings
 
-/// The number of the next ping. With an option, pings that were skipped because of overload are numbered too.
+/// Returns the number of the next ping. With an option, pings that were skipped because of overload are numbered too.
 PingNumber PingSource::next_number() {
   const SkippedTicks& skipped = pacer_.skipped();
   const std::uint64_t lost = skipped.late + skipped.busy;
@@ -165,7 +165,7 @@ PingNumber PingSource::next_number() {
   return PingNumber(sonar_.state.last_ping = ++ping_number_);
 }
 
-/// The request of a ping at a time. The caller sets its number.
+/// Returns the request for a ping at a time. The caller sets the number.
 PingRequest PingSource::request_at(Time at, const protocol::RequestPing& aim) const {
   const Config& config = sonar_.around.config;
   const World& world = sonar_.around.world;
@@ -199,7 +199,7 @@ void PingSource::request_ping(Time at, Actions& actions) {
     ++sonar_.figures.skipped_stale;
     return;
   }
-  // Must come before the request reads the settings, because the device's sound speed depends on its depth.
+  // The depth is set before the request reads the settings, because the device's sound speed depends on the depth.
   sonar_.update_depth(at);
   follow_water();
   PingRequest request = request_at(at, aim_);
@@ -212,16 +212,16 @@ void PingSource::request_ping(Time at, Actions& actions) {
   actions.emplace_back(ComputePing{std::move(request)});
 }
 
-// First updates counters, then applies the device's own changes after the ping, then decides whether clients get it. False: the
-// ping failed, or its audience has left; both are counted.
+// Updates counters, then applies changes that the device makes after a ping, then decides whether clients get the ping. Returns
+// false if the ping failed, or if its audience has left; both cases are counted.
 bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions) {
   DeviceFigures& figures = sonar_.figures;
   busy_ = false;
   ++figures.pings;
   figures.simulation_s += outcome.seconds;
   figures.simulation.add(outcome.seconds);
-  // A recording determines the pace of its pings: the next one is requested now and arrives when it is due. Fewer beams or more
-  // threads would not change that pace.
+  // A recording determines the pace of its pings: the next ping is requested now and arrives when it is due. Fewer beams or more
+  // threads would not change the pace.
   if (outcome.recorded != nullptr && !outcome.recorded->empty()) pacer_.hurry(now);
   if (!settings_.triggered && pacer_.period().count() > 0 && outcome.recorded == nullptr)
     if (const auto slow = rate_watch_.look(pacer_.ticks(), pacer_.skipped().busy, outcome.seconds, 1 / seconds(pacer_.period()),
@@ -229,8 +229,8 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
       sonar_.report(Report::Topic::state, LogLevel::warning, *slow, {}, actions);
   // The next gain depends on this ping, even if no client gets it.
   if (outcome.ping) gain_assist_.look_at(*outcome.ping);
-  // A ping that was made for clients that have left, or that is noise only, must not change the device.
-  // Nor must a recorded one: the settings of the recording are not known.
+  // A ping for clients that have left, a ping of noise only, or a recorded ping (the settings of a recording are unknown) must
+  // not change the device.
   if (outcome.ping && !audience_.stopping() && !busy_unwanted_ && !outcome.ping->request.blank && outcome.recorded == nullptr)
     if (const auto change = sonar_.vendor.after_ping(*outcome.ping, sonar_.state)) change_settings(*change, {}, now, actions);
   if (outcome.ping) note_water(outcome.ping->request, now, actions);
@@ -243,7 +243,7 @@ bool PingSource::on_ping(const PingOutcome& outcome, Time now, Actions& actions)
   } else if (!audience_.stopping() && (audience_.has_audience() || runs_itself_) && !busy_unwanted_) {
     return true;
   } else {
-    ++figures.unwanted;  // its clients left while it was computed
+    ++figures.unwanted;  // the clients left while the ping was computed
   }
   return false;
 }
@@ -267,9 +267,9 @@ std::optional<PingOutcome> PingSource::take_unsent(Time now) {
   return first;
 }
 
-/// Reports that the sonar is above the sea surface or back in the water. Above it the engine computes only noise.
+/// Reports that the sonar is above the sea surface, where the engine computes only noise, or back in the water.
 void PingSource::note_water(const PingRequest& computed, Time now, Actions& actions) {
-  // Pings that were requested as noise only (`busy_blank_`) do not show whether the sonar is in the water.
+  // A ping that was requested as noise only (`busy_blank_`) does not show whether the sonar is in the water.
   const bool was_in_air = std::exchange(in_air_, computed.blank && !busy_blank_);
   if (!in_air_) return;
   ++sonar_.figures.out_of_water;

@@ -1,4 +1,4 @@
-// The settings and the pings of an emulated sonar: the time of each ping, its request to the engine, and the effect of the
+// Manages the settings and pings of an emulated sonar: the time of each ping, the request to the engine, and the effect of the
 // result on the device.
 #pragma once
 
@@ -24,12 +24,12 @@ class PingSource {
   // ---- settings
 
   const PingSettings& settings() const { return settings_; }
-  /// The client that last changed the settings; empty = they are the initial ones.
+  /// Returns the client that last changed the settings; empty if no client did.
   const std::string& asked_by() const { return asked_by_; }
-  /// Prepares for the next client when there is none: pings that were requested are dropped, and the initial settings are
-  /// restored unless the device keeps its settings.
+  /// Call it when the last client has left: drops pings that were requested, and restores the initial settings unless the device
+  /// keeps its settings.
   void forget_clients();
-  /// `who`: the client, for the log and asked_by(); empty = the device itself.
+  /// Applies settings. `who`: the client, for the log and asked_by(); empty = the device itself.
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
   /// Returns whether the value changed.
   bool set_transmit(bool on) { return std::exchange(transmits_, on) != on; }
@@ -41,7 +41,7 @@ class PingSource {
   bool wants_pings() const;
   /// Sets whether the sonar pings without a client, at the rate of its settings.
   void run_itself(bool on, Time now);
-  /// True while it pings without a client.
+  /// True while the sonar pings without a client.
   bool runs_itself() const { return runs_itself_ && !audience_.stopping() && !audience_.has_audience(); }
   /// Starts or stops the pacer: it runs while pings are wanted, at the requested rate times the factor of faults.
   void update_pacer(Time now);
@@ -49,7 +49,7 @@ class PingSource {
   std::optional<Time> next_ping() const;
   /// True if the vehicle's poses are stale and the configuration forbids pings with stale poses.
   bool waits_for_pose(Time at) const;
-  /// Requests one ping now. With `joins`, a ping with these settings that is being computed also serves.
+  /// Requests one ping now. With `joins`, a ping with these settings that is being computed serves this request too.
   void trigger(const protocol::RequestPing& request, Time now);
   Actions tick(Time now);
   void skip(std::chrono::nanoseconds by) { pacer_.skip(by); }
@@ -73,10 +73,10 @@ class PingSource {
   bool on_ping(const PingOutcome& outcome, Time now, Actions& actions);
   /// Requests the ping of a tick that has waited for the last ping. Call it after the delivery of the last ping.
   void catch_up(Actions& actions);
-  /// Keeps a ping that a slow device sends later; false: it leaves now.
+  /// Keeps a ping that a slow device sends later. Returns false if the ping must be sent now.
   bool keep_unsent(PingOutcome& outcome, Time now);
   std::optional<Time> next_unsent() const;
-  /// The next kept ping that is due.
+  /// Returns the next kept ping that is due.
   std::optional<PingOutcome> take_unsent(Time now);
 
  private:
@@ -99,17 +99,17 @@ class PingSource {
   PingSettings settings_;
   protocol::RequestPing aim_;  // the last request
   GainAssist gain_assist_;
-  bool asked_ = false;  // settings were requested since the first client or receiver connected
+  bool asked_ = false;  // true: settings were requested since the first client or receiver connected
   std::string asked_by_;
   bool transmits_ = true, runs_itself_ = false;
 
   // The ping that is being computed.
   bool busy_ = false;
   std::shared_ptr<const VendorSettings> busy_settings_;
-  bool busy_blank_ = false;     // requested as noise only
-  bool busy_unwanted_ = false;  // the clients that requested it have left
+  bool busy_blank_ = false;     // true: the request was for noise only
+  bool busy_unwanted_ = false;  // true: the clients that requested the ping have left
 
-  std::deque<std::pair<Time, PingOutcome>> unsent_;  // by the time at which a slow device sends them
+  std::deque<std::pair<Time, PingOutcome>> unsent_;  // in the order of the times at which a slow device sends them
 
   std::uint32_t ping_number_ = 0;
   std::uint64_t numbered_skips_ = 0;  // ticks lost to overload before the last ping

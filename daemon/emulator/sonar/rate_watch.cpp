@@ -24,7 +24,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
                                            bool has_others) {
   if (warned_ || !(rate_hz > 0)) return std::nullopt;
   if (to_pass_over_ > 0) --to_pass_over_;
-  // The first pings are not judged, and a change of the rate begins a new stretch.
+  // The first pings are ignored, and a change of the rate begins a new group of ticks.
   if (to_pass_over_ > 0 || rate_hz != rate_hz_) {
     begin(ticks, busy, rate_hz);
     return std::nullopt;
@@ -33,7 +33,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
   ping_s_ += ping_s;
   longest_s_ = std::max(longest_s_, ping_s);
   const std::uint64_t passed = ticks - ticks_before_;
-  // Ticks are judged in groups of 40, so that a single slow ping causes no warning.
+  // Ticks are evaluated in groups of 40, so that a single slow ping causes no warning.
   if (passed < ticks_a_stretch) return std::nullopt;
   const double skipped = static_cast<double>(busy - busy_before_) / static_cast<double>(passed);
   const double mean_s = ping_s_ / pings_, made_hz = rate_hz * (1 - skipped), alone_hz = 1 / std::max(mean_s, 1e-9);

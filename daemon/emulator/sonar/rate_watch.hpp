@@ -1,5 +1,5 @@
-// Detects that a sonar does not reach the requested rate because pings take too long to compute, and reports it once. Pure:
-// Sonar passes the figures and gets a sentence.
+// Detects that a sonar does not reach the requested rate because pings take too long to compute. Sonar passes the figures and
+// gets one sentence to report.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class RateWatch {
   void begin(std::uint64_t ticks, std::uint64_t busy, double rate_hz);
 
   bool warned_ = false;
-  int to_pass_over_ = 5;  // the first pings do not count: they take longer, because they fill caches
+  int to_pass_over_ = 5;  // number of first pings to ignore, which take longer because they fill caches
   double rate_hz_ = 0;
   std::uint64_t ticks_before_ = 0, busy_before_ = 0;
   int pings_ = 0;

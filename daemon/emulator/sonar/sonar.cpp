@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-constexpr auto shortest_rhythm = std::chrono::milliseconds(1);  // shortest time between two ticks of one conversation
+constexpr auto shortest_rhythm = std::chrono::milliseconds(1);  // shortest time between two ticks of one dialogue
 
 std::optional<Time> earlier(std::optional<Time> a, std::optional<Time> b) { return a && b ? std::min(*a, *b) : a ? a : b; }
 
@@ -41,7 +41,7 @@ void Sonar::move(const SonarConfig& config, Time now) {
   move_mount(config.mount, now);
 }
 
-/// The figures of connections that have ended are in `data_`; those of the present ones are added here.
+/// Adds the figures of the present connections to `data_`, which has those of ended connections.
 DeviceFigures Sonar::figures() const {
   DeviceFigures f = data_.figures;
   f.ticks = source_.pacer().ticks();
@@ -60,7 +60,8 @@ std::optional<Time> Sonar::next_conversation() const {
   return earlier(source_.next_unsent(), audience_.earliest(&Connection::next_tick));
 }
 
-/// While poses are stale and the rule for them forbids pings, no request is due: stepped time does not wait for it.
+/// Returns nullopt while poses are stale and the rule for stale poses forbids pings, so that stepped time does not wait for a
+/// request.
 std::optional<Time> Sonar::next_request() const {
   const auto next = audience_.earliest(&Connection::next_request);
   return next && source_.waits_for_pose(*next) ? std::nullopt : next;
@@ -76,7 +77,7 @@ std::optional<Time> Sonar::next_tick_of_conversations() const {
 }
 
 Actions Sonar::on_tick(Time now) {
-  // Conversations come first: a ping that one of them requests now is fired in the same tick.
+  // Dialogues are called first, so that a ping that a dialogue requests now is fired in the same tick.
   Actions actions = tick_conversations(now);
   for (Action& action : source_.tick(now)) actions.push_back(std::move(action));
   return actions;
@@ -97,7 +98,7 @@ Actions Sonar::tick_conversations(Time now) {
   return actions;
 }
 
-// Dialogues run on unskipped time, so a jump makes no keep-alive due.
+// Dialogues use unskipped time, so a jump makes no keep-alive due.
 void Sonar::skip(std::chrono::nanoseconds by) {
   data_.state.skipped += by;
   source_.skip(by);
@@ -117,7 +118,7 @@ Actions Sonar::on_ping(PingOutcome outcome, Time now) {
 void Sonar::deliver(const PingOutcome& outcome, Time now, Actions& actions) {
   Delivery::Requests requests;
   PingQueued queued = delivery_.queue(outcome, now, requests, actions);
-  // Requests that follow this ping take effect after all clients were offered it, because they may change the settings.
+  // Requests that follow this ping take effect after all clients were offered the ping, because they may change the settings.
   for (const auto& [from, event] : requests) on_event(source_of(*from), event, now, actions);
   actions.emplace_back(std::move(queued));
   apply_fault_orders(now, actions);
@@ -132,7 +133,7 @@ Actions Sonar::on_connect(ConnectionId id, Role role, Peer peer, Time now, const
   const bool had_audience = audience_.has_audience(), ran_itself = source_.runs_itself();
   Connection* const admitted = audience_.admit(id, role, std::move(peer), port, faults_.admission(), actions);
   if (admitted == nullptr) return actions;
-  // After a take-over without other clients, the new client starts anew, and so does the first client.
+  // The first client, and a client after a take-over without other clients, begin with the initial settings.
   if (had_audience ? !audience_.has_audience() : ran_itself && role == Role::client) source_.forget_clients();
   serve(*admitted, now, actions);
   return actions;
@@ -171,7 +172,7 @@ Actions Sonar::open_stream(ConnectionId id, const protocol::Port& port, Time now
   return {};
 }
 
-/// Counts the connection's traffic before removing it.
+/// Counts the connection's traffic, then removes the connection.
 Actions Sonar::on_closed(ConnectionId id, const std::string& why, Time now, bool by_client) {
   Actions actions;
   Connection* const connection = audience_.connections().find(id);
@@ -203,12 +204,12 @@ void Sonar::on_left(Time now, Actions& actions) {
   const bool kept_waiting = faults_.admission() == Faults::Admission::wait;
   Connection* const next = kept_waiting ? nullptr : audience_.next_waiting();
   if (next == nullptr) return on_membership(now, actions);
-  // Must come before serve(): after it, the next client would count as audience and the settings would stay.
+  // This must be before serve(), because then the next client counts as audience, and the settings would not be restored.
   if (!audience_.has_audience()) source_.forget_clients();
   serve(*next, now, actions);
 }
 
-// Clients still get the current message completely; connections that wait for a slot are reset.
+// Clients still get the rest of the current message; connections that wait for a slot are reset.
 Actions Sonar::stop(const std::string& why) {
   Actions actions;
   source_.stop();
@@ -223,7 +224,7 @@ Actions Sonar::on_bytes(ConnectionId id, protocol::BytesView bytes, Time now) {
   Connection* const from = audience_.connections().find(id);
   if (from == nullptr || from->dialogue == nullptr) return actions;
   from->bytes_read += bytes.size();
-  // The bytes may make the dialogue's next tick due at once.
+  // After the bytes, the next tick of the dialogue may be due at once.
   from->not_before = {};
   if (from->finishing) return actions;
   if (const auto verdict = faults_.on_bytes(from->peer.name, now);
@@ -256,7 +257,7 @@ Sonar::Answers Sonar::on_datagram(const protocol::Port& port, const protocol::En
 Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::ResourceRequest& request, Time now) {
   HttpAnswer answer{{500, "internal fault\n", "text/plain"}, {}};
   try {
-    // Time includes jumps here, like the stamps of pings, because no conversation is involved.
+    // Here the time includes jumps, like the stamps of pings, because no dialogue is involved.
     answer.reply = vendor().on_http(port, request, state(), now);
     const Source from{nullptr, "http " + text::format_ipv4(request.from), request.from};
     for (const protocol::Event& event : answer.reply.events) on_event(from, event, now, answer.actions);
@@ -266,7 +267,7 @@ Sonar::HttpAnswer Sonar::on_http(const protocol::Port& port, const protocol::Res
   return answer;
 }
 
-/// Order: events, replies, then Close, so that a client that is closed still gets the replies.
+/// Handles events, then replies, then Close, so that a client that is closed still gets the replies.
 void Sonar::handle(Connection& from, protocol::Reaction reaction, Time now, Actions& actions) {
   std::string close_why;
   for (const protocol::Event& event : reaction.events) {
@@ -295,7 +296,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   if (notice != nullptr) {
     if (!observer) data_.report(Report::Topic::notice, LogLevel::warning, notice->text, {{"client", from.name}}, actions);
   } else if (observer) {
-    // Only clients may send settings, triggers and addresses. An observer that sends one may use the wrong port.
+    // Only clients may send settings, triggers and addresses. An observer that sends one probably uses the wrong port.
     data_.report(Report::Topic::ignored, LogLevel::info, "request of an observer ignored: only clients can change settings",
                  {{"observer", from.name}}, actions);
   } else if (const auto* change = std::get_if<protocol::ChangeSettings>(&event)) {
@@ -310,7 +311,7 @@ void Sonar::on_event(const Source& from, const protocol::Event& event, Time now,
   }
 }
 
-/// A fault may ignore the request, delay it, or end the connection instead.
+/// Applies requested settings, unless a fault ignores or delays the request or ends the connection.
 void Sonar::change_as_requested(const Source& from, protocol::ChangeSettings change, Time now, Actions& actions) {
   const Faults::RequestVerdict verdict = faults_.on_request(change, from.name, state(), now);
   apply_fault_orders(now, actions);

@@ -1,9 +1,9 @@
-// One emulated sonar without sockets, threads or a clock. It runs the conversations with its clients and connects three parts:
-// the Audience (the connections), the PingSource (settings and pings) and the Delivery (messages to clients).
+// One emulated sonar without sockets, threads or a clock. It calls the dialogues with its clients and connects three parts: the
+// Audience (the connections), the PingSource (settings and pings) and the Delivery (messages to clients).
 //
-// Flow: the caller reports each event (a connection, bytes, a finished ping, a tick) with its time; the sonar changes its state
-// and returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller fetches whole messages. Times
-// are the daemon's; conversations run on unskipped time, which does not include the jumps of stepped time.
+// The caller reports each event (a connection, bytes, a finished ping, a tick) with its time; the sonar changes its state and
+// returns the Actions to carry out. Replies and pings wait in outboxes, from which the caller fetches whole messages. Times are
+// those of the daemon's clock; dialogues use unskipped time, which does not include the jumps of stepped time.
 #pragma once
 
 #include <optional>
@@ -22,28 +22,29 @@ namespace sonar {
 class Sonar {
  public:
   using Surroundings = SonarData::Surroundings;
-  /// `index`: part of the key of its noise. `skipped`: sum of the jumps of stepped time so far.
+  /// `index`: part of the key of random numbers. `skipped`: sum of the jumps of stepped time so far.
   Sonar(Surroundings around, SonarConfig config, std::uint32_t index, Time now, std::chrono::nanoseconds skipped = {});
   Sonar(const Sonar&) = delete;
   Sonar& operator=(const Sonar&) = delete;
 
   // ---- connections
 
-  /// Reports a client or observer at a port of kind tcp_stream (null: the vendor's first), or a host at one of kind
-  /// udp_dialogue. Serve, KeepWaiting or Refuse is among the actions.
+  /// Reports a client or observer at a port of kind tcp_stream (null: the vendor's first), or a host at a port of kind
+  /// udp_dialogue. The actions contain Serve, KeepWaiting or Refuse.
   Actions on_connect(ConnectionId id, Role role, Peer peer, Time now, const protocol::Port* port = nullptr);
-  /// Call it when a port of kind udp_stream is open: next_message() then has messages for its receivers under this id.
+  /// Call it when a port of kind udp_stream is open; next_message() with this id then returns messages for the receivers of the
+  /// port.
   Actions open_stream(ConnectionId id, const protocol::Port& port, Time now);
-  /// The present receivers of a stream, or the host of a port of kind udp_dialogue.
+  /// Returns the present receivers of a stream, or the host of a port of kind udp_dialogue.
   std::vector<protocol::Endpoint> receivers(ConnectionId stream) const { return delivery_.receivers(stream); }
-  /// Another host takes over the dialogue at a port of kind udp_dialogue.
+  /// Transfers the dialogue at a port of kind udp_dialogue to another host.
   void hand_over(ConnectionId id, Peer to) { audience_.hand_over(id, std::move(to)); }
   Actions on_bytes(ConnectionId id, protocol::BytesView bytes, Time now);
-  /// Number of replies and events that bytes of clients have caused since the last call.
+  /// Returns the number of replies and events that bytes of clients have caused since the last call.
   std::size_t take_reactions() { return std::exchange(reactions_, 0); }
-  /// Returns the next message to write; empty if there is none, or while one is being written.
+  /// Returns the next message to write; an empty one if none waits, or while a message is being written.
   Outbox::Message next_message(ConnectionId id, Time now) { return delivery_.next_message(id, now); }
-  /// Reports `bytes` of the message as sent; after the last one on_written() follows.
+  /// Reports that `bytes` more of the message were sent; after the last byte, call on_written().
   void on_sent(ConnectionId id, std::size_t bytes) { delivery_.on_sent(id, bytes); }
   void on_written(ConnectionId id, const Outbox::Message& message, Time now) { delivery_.on_written(id, message, now); }
   /// Reports that a stream's last message had no receiver, or that none of its datagrams could be sent.
@@ -61,7 +62,7 @@ class Sonar {
   // ---- pings and datagrams
 
   Actions on_ping(PingOutcome outcome, Time now);
-  /// The datagrams of a status broadcast, in order; none if the vendor has no beacon.
+  /// Returns the datagrams of a status broadcast, in order; none if the vendor has no beacon.
   std::vector<protocol::Bytes> beacons(Time now) { return delivery_.beacons(now); }
   struct Answers {
     std::vector<protocol::Bytes> datagrams;  // datagrams to send back, in order
@@ -80,16 +81,16 @@ class Sonar {
 
   /// Does everything that is due at this time.
   Actions on_tick(Time now);
-  /// The next time at which on_tick() must be called.
+  /// Returns the next time at which on_tick() must be called.
   std::optional<Time> next_tick() const;
   // The stepped clock advances to the earliest of these times.
   std::optional<Time> next_ping() const { return source_.next_ping(); }
-  /// A tick of a dialogue, or a ping that a slow device sends.
+  /// Returns the time of the next tick of a dialogue, or of the next ping that a slow device sends.
   std::optional<Time> next_conversation() const;
-  /// When a conversation will request a ping by itself.
+  /// Returns the time at which a dialogue will request a ping without input.
   std::optional<Time> next_request() const;
   Actions tick_pacer(Time now) { return source_.tick(now); }
-  /// Does what is due in conversations, faults and held pings.
+  /// Does what is due in dialogues, faults and held pings.
   Actions tick_conversations(Time now);
   std::optional<Time> next_tick_of_conversations() const;
   /// Call it when stepped time jumps ahead.
@@ -101,22 +102,22 @@ class Sonar {
 
   /// Changes settings as a client would. An error states what the product can do; the settings then stay.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
-  /// Lets the sonar ping without a client, for example a range finder whose distances an autopilot gets.
+  /// Sets whether the sonar pings without a client, for example a range finder whose distances an autopilot gets.
   void run_itself(bool on, Time now) { source_.run_itself(on, now); }
   /// Returns whether the setting changed.
   bool set_transmit(bool on) { return source_.set_transmit(on); }
   bool transmits() const { return source_.transmits(); }
-  /// Name of the client that last changed the settings; empty if they are the initial ones.
+  /// Returns the name of the client that last changed the settings; empty if no client did.
   const std::string& asked_by() const { return source_.asked_by(); }
-  Pose pose_at(Time at) const { return data_.pose_at(at); }  // in world
+  Pose pose_at(Time at) const { return data_.pose_at(at); }  // pose in the world
   void move_mount(const Pose& mount, Time now);
   /// Takes vehicle and mount from `config`, which is otherwise equal to the present one.
   void move(const SonarConfig& config, Time now);
   void use_water(const Water& water, Time now) { source_.use_water(water, now); }
 
-  /// The reason why this sonar cannot have these faults; nullopt if it can.
+  /// Returns the reason why this sonar cannot have these faults; nullopt if it can.
   std::optional<FaultRefusal> why_no_faults(const std::vector<Fault>& faults) const { return faults_.why_not(faults); }
-  /// Adds those of `faults` that are for this sonar and take effect on it.
+  /// Adds those of `faults` that are for this sonar and have an effect on it.
   Actions add_faults(const std::vector<Fault>& faults, bool manual, Time now);
   /// Ends the faults with this name, or all if `name` is empty. Returns false if there is none.
   bool end_faults(const std::string& name, Time now, Actions& actions);
@@ -135,8 +136,8 @@ class Sonar {
   /// Number of pings that at least one client received; number of computed pings.
   std::uint64_t served() const { return data_.figures.served; }
   std::uint64_t pings() const { return data_.figures.pings; }
-  /// A request for a ping as a client would get it now, but with its own number and noise. The sonar does not change. nullopt
-  /// if poses are stale and the rule for stale poses forbids pings.
+  /// Returns a request for the ping that a client would get now, but with another number and other noise. The sonar does not
+  /// change. Returns nullopt if poses are stale and the rule for stale poses forbids pings.
   std::optional<PingRequest> preview_request(PingNumber number, Time at) const { return source_.preview_request(number, at); }
 
  private:

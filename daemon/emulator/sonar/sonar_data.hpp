@@ -38,23 +38,23 @@ struct SonarData {
   Surroundings around;
   SonarConfig config;
   const protocol::Vendor& vendor;
-  std::uint32_t index;  // part of the key of its noise
+  std::uint32_t index;  // part of the key of random numbers
   protocol::DeviceState state;
   DeviceFigures figures;
 
-  /// Converts to the time of conversations, which does not include the jumps of stepped time.
+  /// Converts to the time of dialogues, which does not include the jumps of stepped time.
   Time unskipped(Time now) const { return now - state.skipped; }
   /// Converts back to the daemon's time, assuming no further jump.
   Time clock_time(Time unskipped) const {
     return unskipped > Time::max() - state.skipped ? Time::max() : unskipped + state.skipped;
   }
-  Pose pose_at(Time at) const { return compose(around.world.vehicle_at(config.vehicle, at), config.mount); }  // in world
+  Pose pose_at(Time at) const { return compose(around.world.vehicle_at(config.vehicle, at), config.mount); }
   void update_depth(Time now) { state.depth_m = depth_from_z(pose_at(now).position_m.z); }
 
   void report(Report::Topic topic, LogLevel level, std::string phrase, std::vector<LogField> fields, Actions& actions) const {
     sonar::report(config.name, topic, level, std::move(phrase), std::move(fields), actions);
   }
-  /// Reports an exception, which is a mistake in sonard.
+  /// Reports an exception, which is a bug of sonard.
   void report_fault(const std::exception& e, Actions& actions) const {
     report(Report::Topic::fault, LogLevel::error, std::string("internal fault: ") + e.what(), {}, actions);
   }

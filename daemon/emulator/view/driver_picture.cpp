@@ -10,7 +10,7 @@ namespace {
 
 constexpr float dimmed = 0.4f;  // brightness of parts that the messages do not contain
 
-/// The messages of a ping, over TCP or as datagrams.
+/// Returns the messages of a ping, as bytes for TCP or as datagrams.
 std::vector<protocol::Bytes> messages_of(const Ping& ping, const protocol::Vendor& vendor, const protocol::DeviceState& state) {
   if (const auto framed = FramedPing(vendor, state, ping).bytes()) return {*framed};
   for (const auto kind : {protocol::Port::Kind::udp_stream, protocol::Port::Kind::udp_dialogue})
@@ -25,7 +25,7 @@ std::unique_ptr<protocol::Host> host_of(const protocol::Make& make) {
   return host ? *std::move(host) : nullptr;
 }
 
-/// Null: the host shows nothing for this ping.
+/// Returns null if the host shows nothing for this ping.
 DriverPicture::Drawing read_by(protocol::Host& host, const protocol::Make& make, const Ping& ping,
                                const protocol::DeviceState& state) {
   DriverPicture::Drawing drawing;
@@ -52,7 +52,7 @@ DriverPicture::DriverPicture(const protocol::Make& make) : make_(make) {
   if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall) host_ = host_of(make);
 }
 
-/// If a picture combines many pings, the host reads each ping now. Other pings are decoded when the drawing is called.
+/// If a picture combines many pings, the host decodes each ping now; otherwise the drawing decodes the ping when it is called.
 DriverPicture::Drawing DriverPicture::after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state) {
   if (make_.picture == PictureKind::fan)
     return [ping, shades = make_.shades] { return SonarPicture{.image = polar_image_of(*ping, shades)}; };
@@ -73,7 +73,7 @@ std::chrono::nanoseconds Preview::period(const Sonar& sonar) {
   return std::max<std::chrono::nanoseconds>(s.beam_count > 1 ? shortest_period : shortest_of_one_beam, ping_period(s));
 }
 
-/// A sonar in standby shows the picture that it would have if it pinged.
+/// Returns a preview that is due; for a sonar in standby, the ping that it would fire if it were on.
 std::optional<PingRequest> Preview::due(const Sonar& sonar, Time now) {
   if (!on() || busy_) return std::nullopt;
   if (fired_at_ && now < *fired_at_ + period(sonar)) return std::nullopt;
@@ -92,7 +92,7 @@ void Preview::done(bool made) {
 
 void Preview::end() {
   until_.reset();
-  made_ = {};  // so that the pause before the next preview does not count for the rate
+  made_ = {};  // the pause before the next preview must not count for the rate
 }
 
 }  // namespace sonar

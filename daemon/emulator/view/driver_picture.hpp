@@ -1,5 +1,5 @@
-// Makes the picture of a sonar for viewers. The make's host (protocol/host.hpp), which sonarctl also uses, decodes the
-// messages, so viewers see what a driver sees. Pure.
+// Makes the picture of a sonar for viewers. The make's host (protocol/host.hpp), which sonarctl also uses, decodes the messages,
+// so viewers see what a driver sees.
 #pragma once
 
 #include <chrono>
@@ -22,9 +22,9 @@ class DriverPicture {
 
   explicit DriverPicture(const protocol::Make& make);
   PictureKind kind() const { return make_.picture; }
-  /// The drawing after the next ping. Pings must be passed in order; `state` is that of the device that fired them. This call
-  /// is fast. Calling the returned function is slow, because it may encode and decode the ping; any thread may do so, even
-  /// after the end of this object. Null: nothing to show yet.
+  /// Returns a function that makes the picture after the next ping; null if there is nothing to show yet. Pings must be passed in
+  /// order; `state` is that of the device that fired them. The returned function is slow, because it may encode and decode the
+  /// ping; any thread may call it, even after the end of this object.
   Drawing after(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state);
 
  private:
@@ -33,8 +33,7 @@ class DriverPicture {
 };
 
 // Pings for viewers while no driver is connected: at most 5 per second, or 25 with one beam. They have their own numbers and
-// noise, so that they do not affect a driver's pings. Pure: the caller computes the pings that are due, and calls why_over()
-// regularly.
+// noise, so that they do not affect a driver's pings. The caller computes the pings that are due, and calls why_over() regularly.
 
 class Preview {
  public:
@@ -44,14 +43,14 @@ class Preview {
   void begin(Time now) { until_ = now + longest; }
   void end();
   bool on() const { return until_.has_value(); }
-  /// The time between two previews of this sonar.
+  /// Returns the time between two previews of this sonar.
   static std::chrono::nanoseconds period(const Sonar& sonar);
-  /// The reason, for the log, why the preview must end now; empty if it may continue.
+  /// Returns the reason, for the log, why the preview must end now; empty if it may continue.
   std::string why_over(const Sonar& sonar, Time now) const;
-  /// Returns the ping that is due. Call done() when it is computed; until then no other is due.
+  /// Returns the ping that is due. Call done() when the ping is computed; until then no other ping is due.
   std::optional<PingRequest> due(const Sonar& sonar, Time now);
   void done(bool made);
-  /// Previews per second, measured by RecentRate; 0 = none.
+  /// Returns previews per second, which RecentRate measures; 0 = none.
   double hz(Time now) const { return made_.hz(now); }
 
  private:

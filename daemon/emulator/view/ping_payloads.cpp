@@ -22,7 +22,7 @@ ViewPayloadPointer picture(Time at, const std::string& frame, const foxglove::Im
   return std::make_shared<const ViewPayload>(std::move(payload));
 }
 
-/// A range image from above: the strongest pixel of each bearing and range.
+/// Returns a range image seen from above: the strongest pixel of each bearing and range.
 PolarImage plan_of(const Ping& ping, double unit_m) {
   const RangeImageGrid grid(ping.request);
   PolarImage image;
@@ -49,8 +49,8 @@ foxglove::CloudPoint point_of(double range_m, double azimuth_rad, double elevati
           static_cast<float>(range_m * std::sin(elevation_rad)), static_cast<std::uint8_t>(std::lround(255 * part))};
 }
 
-/// Converts the returns of a range image to points in space. Their strengths depend on range and ground, and some makes send
-/// none; so the threshold is a fraction of the strongest.
+/// Converts the returns of a range image to points in space. Strengths depend on range and ground, and some makes send no
+/// strengths, so the threshold is a fraction of the strongest return.
 std::vector<foxglove::CloudPoint> points_of(const Ping& ping, const RangeImageSettings& settings, double threshold) {
   const RangeImageGrid grid(ping.request);
   const std::size_t count = ping.samples.size() / 4, columns = static_cast<std::size_t>(grid.columns);
@@ -85,7 +85,7 @@ PolarImage polar_image_of(const Ping& ping, const Shades& shades) {
     image.samples.push_back(static_cast<float>(sample_code(ping.samples, i, bytes)));
   image.full_scale = static_cast<float>(s.format.max_code);
   if (bytes > 1 && s.format.scale == SampleFormat::Scale::linear)
-    image.shade(shades);  // such samples rarely come near their maximum
+    image.shade(shades);  // because such samples are rarely near the maximum
   return image;
 }
 
@@ -151,7 +151,7 @@ ViewPayloadPointer picture_payload(Time at, const SonarPicture& picture) {
   return view_payload(at, foxglove::picture(picture, time_marks(picture)));
 }
 
-/// Only the brightest samples are kept, in no particular order: a viewer draws them as points.
+/// Keeps only the brightest samples, in any order; a viewer draws them as points.
 ViewPayloadPointer cloud_payload(const std::string& sonar, const Ping& ping, double threshold) {
   if (const RangeImageSettings* const range_image = range_image_of(ping.request))
     return view_payload(ping.request.fired_at,
