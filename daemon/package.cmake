@@ -23,7 +23,7 @@ foreach(page sonard.8 sonarctl.1 sonard.yaml.5)
   endif()
 endforeach()
 
-# ---- documents: the licence in Debian's form, the example configuration, the pages that errors and manuals refer to
+# ---- documents: the licence in Debian's form, the example configuration, and the pages to which errors and manuals refer
 if(SONAR_FFTW)
   set(binaries_licence "GPL-3+")
   set(binaries_comment " These binaries are linked with FFTW, which is under the GPL-2 or later, so they may be passed on only
@@ -52,7 +52,7 @@ install(FILES protocol/micron/README.md DESTINATION ${documents}/protocol/micron
 install(FILES protocol/norbit/README.md DESTINATION ${documents}/protocol/norbit COMPONENT sonard)
 install(FILES protocol/ping/README.md DESTINATION ${documents}/protocol/ping COMPONENT sonard)
 install(FILES protocol/control/control.proto DESTINATION ${CMAKE_INSTALL_DATADIR}/sonard/protocol/control COMPONENT sonard)
-# Other files that pages link to are installed below share/sonard. Symbolic links lead there from their places in the source tree.
+# Other files that pages link to are installed below share/sonard. Symbolic links at their places in the source tree lead there.
 # tests/acceptance/package_test.py follows every link.
 function(sonar_install_link folder name target)
   file(MAKE_DIRECTORY ${made}/links)
@@ -74,7 +74,7 @@ endif()
 install(FILES ${changelogs} DESTINATION ${documents} COMPONENT sonard)
 install(FILES ${changelogs} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/sonard-bvtsdk COMPONENT bvtsdk)
 
-# Target of ./run.sh --package: everything above that has to be built.
+# Target of ./run.sh --package, which builds everything that is installed above.
 add_custom_target(installed)
 add_dependencies(installed sonard sonarctl bvtsdk3 bvtsdk3_colour_maps bvtsdk4 bvtsdk4_colour_maps)
 if(SONAR_GZIP)
@@ -103,7 +103,7 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_SONARD_PACKAGE_NAME sonard)
 set(CPACK_DEBIAN_SONARD_PACKAGE_SECTION net)
-set(CPACK_DEBIAN_SONARD_PACKAGE_RECOMMENDS python3)  # sonarctl judge and lab
+set(CPACK_DEBIAN_SONARD_PACKAGE_RECOMMENDS python3)  # for sonarctl judge and lab
 set(CPACK_DEBIAN_SONARD_PACKAGE_SUGGESTS python3-numpy)
 set(CPACK_DEBIAN_SONARD_PACKAGE_CONTROL_EXTRA
   "${PROJECT_SOURCE_DIR}/daemon/debian/postinst;${PROJECT_SOURCE_DIR}/daemon/debian/prerm;${PROJECT_SOURCE_DIR}/daemon/debian/postrm")

@@ -13,7 +13,7 @@
 namespace sonar {
 namespace {
 
-/// The limit instead of stop_limit while files are being written. It is less than TimeoutStopSec of the systemd unit.
+/// Replaces stop_limit while files are being written. It is less than TimeoutStopSec of the systemd unit.
 constexpr std::chrono::milliseconds files_limit{8000};
 
 }  // namespace
@@ -81,18 +81,18 @@ App::App(Config config, std::shared_ptr<const Scene> scene, const EngineFactory&
   log_new_notes();
 }
 
-/// Logs probable mistakes in configuration and scene. Call after a reload has replaced both.
+/// Logs probable mistakes in configuration and scene. Call it when a reload has replaced both.
 void App::log_new_notes() {
   if (!std::exchange(notes_due_, false)) return;
   for (const Note& note : plausibility_.use(config_, *changes_.scene())) log_.warning(text_of(note));
 }
 
-/// Control opens last, so that no request arrives before all sonars are open.
+/// Opens control last, so that no request arrives before all sonars are open.
 Result<void> App::open() {
-  if (options_.handle_signals) {  // before the message that sonard is ready
+  if (options_.handle_signals) {  // set before sonard reports that it is ready
     signals_.add(SIGINT);
     signals_.add(SIGTERM);
-    signals_.add(SIGHUP);  // its default action would end the process in the middle of messages
+    signals_.add(SIGHUP);  // the default action of SIGHUP would end the process in the middle of messages
   }
   if (!config_.faults.journal.empty())
     if (auto r = fault_log_.open(config_.faults.journal); !r) return r;
@@ -119,7 +119,7 @@ int App::run() {
   return exit_code_;
 }
 
-/// The status line for `systemctl status`.
+/// Returns the line that `systemctl status` shows.
 std::string App::status_line() const {
   std::string line = "Serving";
   for (const Device& d : devices())
@@ -127,7 +127,7 @@ std::string App::status_line() const {
   return line;
 }
 
-/// SIGHUP reloads. The first SIGINT or SIGTERM stops gracefully, the second one ends the process.
+/// Handles signals: SIGHUP reloads, the first SIGINT or SIGTERM stops gracefully, the second one ends the process.
 void App::wait_for_signal() {
   signals_.async_wait([this](const error_code& ec, int signal) {
     if (ec) return;
@@ -147,7 +147,7 @@ void App::request_stop() {
   asio::post(io_, [this] { stop("stop requested"); });
 }
 
-/// Servers are closed first, so that no request arrives while sonars finish their clients.
+/// Closes the servers first, so that no request arrives while sonars finish their connections.
 void App::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
   log_.info("stopping: " + why);
@@ -175,7 +175,7 @@ void App::stop(const std::string& why) {
   on_change();
 }
 
-/// Many changes in one turn of the event loop cause only one look().
+/// Requests a look(); many changes in one turn of the event loop cause only one call.
 void App::on_change() {
   if (std::exchange(look_posted_, true)) return;
   asio::post(io_, [this] {
@@ -188,7 +188,7 @@ bool App::enough_served() const { return options_.exit_after_pings != 0 && fleet
 
 void App::look() {
   if (stopping_) {
-    // These two are the last things that keep run() from returning.
+    // After these two calls nothing prevents run() from returning.
     if (fleet_.gone() && files_are_written()) {
       signals_.cancel();
       stop_timer_.cancel();
@@ -212,9 +212,9 @@ Reload::Steps App::reload_steps() {
 void App::take_over(Config next) {
   const std::vector<std::string> keys = keep_restart_keys(config_, next);
   const bool other_water = !(config_.water == next.water);
-  std::swap(config_, next);  // devices read it through their context
+  std::swap(config_, next);  // devices read config_ through their context
   const Config& before = next;
-  // The World comes before the fleet, because moved and new sonars look up their vehicle in it.
+  // The World is updated before the fleet, because moved and new sonars look up their vehicle in it.
   world_.use_rules(pose_rules(config_));
   world_.use_vehicles(vehicles_of(config_), clock_.now());
   world_.use_objects(bodies_of(scene(), config_), clock_.now());
@@ -236,7 +236,7 @@ void App::take_over(Config next) {
   on_change();
 }
 
-/// Range finders ping by themselves while an autopilot gets their distances.
+/// Lets range finders ping without clients while an autopilot gets their distances.
 void App::run_range_finders() {
   for (Device& d : fleet_.devices())
     if (d.sonar().vendor().measures_distance())

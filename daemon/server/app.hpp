@@ -33,19 +33,19 @@ namespace sonar {
 
 struct AppOptions {
   std::uint64_t exit_after_pings = 0;  // stop after this many served pings of all sonars; 0 = never
-  bool digest = false;                 // SHA-256 of every client's stream
-  bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second one at once; SIGHUP reads the configuration again
-  /// Reads the configuration again and applies the command line's options to it; may be called on any thread. Empty if there is
-  /// no configuration file (the demo).
+  bool digest = false;                 // true: computes the SHA-256 of every client's stream
+  bool handle_signals = false;  // SIGINT and SIGTERM stop gracefully, a second signal at once; SIGHUP reloads the configuration
+  /// Reads the configuration again and applies the options of the command line; any thread may call it. Empty if there is no
+  /// configuration file (the demo).
   std::function<Result<Config>()> read_config;
   LoadScene load_scene;
-  NotifyTarget service_manager;  // is notified that the daemon is ready, stops and, periodically, is alive
+  NotifyTarget service_manager;  // gets a message when the daemon is ready, when it stops and, periodically, while it is alive
 };
 
 class App {
  public:
-  /// run() returns within this time after stop(), even if a ping or a scene is still being computed; only files that are being
-  /// written may take longer. The rest of the documented 2 s is a margin for a busy machine.
+  /// run() returns within this time after stop(), even if a ping or a scene is still being computed; only the writing of files
+  /// may take longer. The rest of the documented 2 s is a margin for a busy machine.
   static constexpr std::chrono::milliseconds stop_limit{1100};
 
   /// `make_engine` is copied, and also makes the engines of later scenes, on another thread. Objects to which it refers must
@@ -54,7 +54,7 @@ class App {
 
   /// Opens every listener; errors name the address and the next step.
   Result<void> open();
-  /// Serves until stopped; returns 0, or an exit code when the engine failed.
+  /// Serves until stopped. Returns 0, or an exit code if the engine failed.
   int run();
   /// May be called from any thread.
   void request_stop();
@@ -64,7 +64,7 @@ class App {
   const Config& config() const { return config_; }
   const Scene& scene() const { return *changes_.scene(); }
   const std::string& engine_description() const { return simulator_.engine_description(); }
-  /// True if all files are written as far as it was requested.
+  /// True if all requested files are written.
   bool files_are_written() const { return recordings_.idle() && writer_.idle(); }
   const PoseServer& poses() const { return pose_server_; }
   const MavlinkServer& mavlink() const { return mavlink_server_; }
@@ -81,7 +81,7 @@ class App {
  private:
   void stop(const std::string& why);
   void on_change();
-  void look();  // called after a change: ends the daemon, or takes the next step of stepped time
+  void look();  // called after a change: ends the daemon, or makes the next step of stepped time
   bool enough_served() const;
   void log_new_notes();
   void run_range_finders();

@@ -114,7 +114,7 @@ using PartsByPort = std::vector<std::pair<std::uint16_t, protocol::Bytes>>;
 struct PingOutcome {
   std::shared_ptr<const Ping> ping = nullptr;  // null on failure
   std::string failure = {};
-  bool refused = false;                                   // only this ping failed: an invalid request, or too little memory
+  bool refused = false;                                   // only this ping failed: invalid request, or no memory left
   ErrorKind kind = ErrorKind::bug;                        // kind of a failure of the engine
   double seconds = 0;                                     // wall time of the computation, without the pings of other sonars
   std::shared_ptr<const PartsByPort> recorded = nullptr;  // replaces the vendor's encoding; empty: nothing is sent

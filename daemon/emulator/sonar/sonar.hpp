@@ -100,7 +100,7 @@ class Sonar {
 
   // ---- control
 
-  /// Changes settings as a client would. An error states what the product can do; the settings then stay.
+  /// Changes settings as a client would. An error states what the product can do; the settings then do not change.
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
   /// Sets whether the sonar pings without a client, for example a range finder whose distances an autopilot gets.
   void run_itself(bool on, Time now) { source_.run_itself(on, now); }
@@ -111,7 +111,7 @@ class Sonar {
   const std::string& asked_by() const { return source_.asked_by(); }
   Pose pose_at(Time at) const { return data_.pose_at(at); }  // pose in the world
   void move_mount(const Pose& mount, Time now);
-  /// Takes vehicle and mount from `config`, which is otherwise equal to the present one.
+  /// Uses vehicle and mount of `config`, which is otherwise equal to the present configuration.
   void move(const SonarConfig& config, Time now);
   void use_water(const Water& water, Time now) { source_.use_water(water, now); }
 

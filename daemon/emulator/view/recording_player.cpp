@@ -5,7 +5,7 @@
 
 namespace sonar {
 
-/// A time that decreases is replaced by that of the previous ping.
+/// Reads a ping. A time that decreases is replaced with the time of the previous ping.
 std::optional<RecordingPlayer::Shown> RecordingPlayer::read() {
   auto found = pings_.next();
   if (!found) return std::nullopt;
@@ -16,7 +16,7 @@ std::optional<RecordingPlayer::Shown> RecordingPlayer::read() {
   return Shown{last_, std::move(found->ping)};
 }
 
-/// Reads to the end once; afterwards the recording is at its start.
+/// Reads to the end once, then rewinds the recording.
 bool RecordingPlayer::measure() {
   if (const auto ping = read()) {
     length_ = ping->at;
@@ -29,7 +29,7 @@ bool RecordingPlayer::measure() {
   return false;
 }
 
-/// Recordings can only be read forwards; for an earlier time reading begins at the start again.
+/// Reads forwards only; for an earlier time, rewinds the recording first.
 bool RecordingPlayer::approach(Ns at) {
   if (shown_ && at < shown_->at) {
     pings_.rewind();
@@ -46,13 +46,13 @@ bool RecordingPlayer::approach(Ns at) {
 
 namespace {
 
-constexpr std::chrono::milliseconds slack{1};  // for the rounding at a change of speed or a pause
+constexpr std::chrono::milliseconds slack{1};  // tolerance for rounding at a change of speed or a pause
 
 }  // namespace
 
 PlaybackWatch::PlaybackWatch(const motion::Playback& of, Time now) : playback_(of), looked_at_(now), sent_(state(now)) {}
 
-/// A position that playing since the last look cannot explain is a seek.
+/// A position that playback since the last call cannot have reached is a seek.
 std::optional<foxglove::PlaybackState> PlaybackWatch::look(const motion::Playback* of, Time now) {
   const double before = playback_.rules().speed.factor();
   if (of != nullptr)

@@ -55,7 +55,7 @@ void Viewer::on_binary(wire::BytesView frame, Moment now) {
   host_.call(*this, *call);
 }
 
-/// A token bucket: a viewer that sends more than 100 messages a second is disconnected.
+/// A token bucket: a viewer that sends more than 100 messages per second is disconnected.
 bool Viewer::has_room_for_message(Moment now) {
   if (allowance_at_) allowance_ = std::min(burst, allowance_ + messages_per_s * sonar::seconds(now - *allowance_at_));
   allowance_at_ = now;
@@ -70,8 +70,8 @@ void Viewer::complain(const std::string& why) {
   if (++complaints_ >= most_complaints) close_ = CloseCode::policy;
 }
 
-// Each subscription has a slot for waiting messages: events in a queue of limited depth; for other channels only the newest
-// message.
+// Each subscription has a slot for waiting messages: a queue of limited length for events; one message, the newest, for other
+// channels.
 void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
   for (const auto& [id, channel] : word.subscriptions) {
     const ViewChannel* const offered = host_.channel(channel);
@@ -85,7 +85,7 @@ void Viewer::on_word(const foxglove::Subscribe& word, Moment) {
     } else {
       const Moment own = offered->kind == ViewChannel::Kind::picture ? interval_of(rights_.most_hz) : Moment{0};
       slots_[id] = {channel, offered->kind, std::max(interval_of(offered->most_hz), own), offered->deepest, {}, {}};
-      dropped_[channel];  // so that the channel is listed with 0
+      dropped_[channel];  // creates the entry 0, so that the channel is listed
       host_.on_subscribed(*this, channel);
     }
   }
@@ -100,7 +100,7 @@ void Viewer::on_word(const foxglove::GetParameters& word, Moment) {
   say(foxglove::parameter_values(host_.parameters(*this, word.names), word.request));
 }
 
-/// The answer has the resulting values.
+/// Sets parameters, and answers with the resulting values.
 void Viewer::on_word(const foxglove::SetParameters& word, Moment now) {
   std::vector<std::string> names;
   for (const foxglove::Parameter& wanted : word.parameters) {
@@ -135,7 +135,7 @@ void Viewer::on_word(const foxglove::UnknownWord& word, Moment) {
   warn_ignored("operations such as \"" + word.op + "\" are ignored");
 }
 
-/// Warns once for each connection.
+/// Warns once per connection.
 void Viewer::warn_ignored(const std::string& what) {
   if (!std::exchange(warned_unknown_, true)) send_status(foxglove::StatusLevel::warning, what);
 }
@@ -145,14 +145,14 @@ void Viewer::warn_ignored(const std::string& what) {
 void Viewer::say(std::string word) { add_word({true, bytes_of(word), {}}); }
 void Viewer::say_frame(wire::Bytes frame) { add_word({false, std::move(frame), {}}); }
 
-/// JSON texts are never dropped. A viewer that is too slow for them is disconnected, and may connect again.
+/// Queues a JSON text. These texts are never dropped; a viewer that is too slow for them is disconnected, and may connect again.
 void Viewer::add_word(ViewMessage word) {
   word_bytes_ += word.head.size();
   words_.push_back(std::move(word));
   if (words_.size() > most_words || word_bytes_ > most_word_bytes) close_ = CloseCode::try_again_later;
 }
 
-/// Shows a status that next() removes after `lasts`. If 64 such statuses exist, the new one is not removed.
+/// Shows a status that next() removes after `lasts`. If 64 such statuses exist already, the new status is not removed.
 void Viewer::show_for_now(const std::string& text, const std::string& id, Moment now, Moment lasts) {
   if (passing_.size() >= most_passing && !passing_.contains(id)) return send_status(foxglove::StatusLevel::error, text);
   send_status(foxglove::StatusLevel::error, text, id);
@@ -167,7 +167,7 @@ void Viewer::forget(std::uint32_t channel) {
   std::erase_if(slots_, [channel](const auto& slot) { return slot.second.channel == channel; });
 }
 
-/// Events queue up to a limit, beyond which the oldest is dropped. For other kinds one payload waits.
+/// Queues a payload. Events queue up to a limit, beyond which the oldest is dropped; of other payloads only one waits.
 void Viewer::offer(std::uint32_t channel, const ViewPayloadPointer& payload, Moment now) {
   for (auto& [id, slot] : slots_) {
     if (slot.channel != channel) continue;
@@ -184,8 +184,8 @@ void Viewer::offer(std::uint32_t channel, const ViewPayloadPointer& payload, Mom
   }
 }
 
-/// Merges a payload into the waiting one, or replaces it. A replaced payload counts as dropped unless it only waited for its
-/// channel's rate.
+/// Merges a payload into the waiting one, or replaces it. A replaced payload counts as dropped unless it waited only because of
+/// the channel's rate.
 void Viewer::merge(Slot& slot, const ViewPayloadPointer& payload, Moment now) {
   ViewPayloadPointer& waiting = slot.waiting.front();
   if (payload->merges) {
@@ -224,7 +224,7 @@ void Viewer::on_parameters(std::span<const foxglove::Parameter> changed) {
 
 // ---- to the socket
 
-/// The waiting slot whose last message was sent longest ago.
+/// Returns the waiting slot whose last message was sent longest ago.
 Viewer::Slot* Viewer::next_slot(bool last_values, Moment now, std::uint32_t& subscription) {
   Slot* best = nullptr;
   for (auto& [id, slot] : slots_) {
@@ -237,7 +237,7 @@ Viewer::Slot* Viewer::next_slot(bool last_values, Moment now, std::uint32_t& sub
   return best;
 }
 
-/// Order: removed statuses, JSON texts, the time, last values, then pictures and events.
+/// Returns messages in this order: removed statuses, JSON texts, the time, last values, then pictures and events.
 std::optional<ViewMessage> Viewer::next(Moment now) {
   if (slow_since_ && now - *slow_since_ >= slow_is_said_for) {
     slow_since_.reset();
@@ -270,7 +270,7 @@ std::optional<ViewMessage> Viewer::next(Moment now) {
   return message;
 }
 
-/// Must consider everything that next() may return later; otherwise a due message would wait for the next event.
+/// Considers everything that next() may return later, because otherwise a due message would wait for the next event.
 std::optional<Viewer::Moment> Viewer::next_due(Moment now) const {
   std::optional<Moment> due;
   const auto consider = [&due](Moment at) { due = due ? std::min(*due, at) : at; };

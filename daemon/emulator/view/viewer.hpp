@@ -1,9 +1,9 @@
-// One viewer of the live view, without its socket. It converts the viewer's messages to requests to its host, and subscriptions
-// to messages to write; if the viewer is slow, newer messages replace older ones. No I/O: bytes and time go in, messages come
-// out.
+// One viewer of the live view, without its socket. It converts the viewer's messages to requests to the host, and subscriptions
+// to messages to write; if the viewer is slow, newer messages replace older ones. It has no I/O: the caller passes bytes and
+// times, and gets messages.
 //
-// Messages are sent in this order: JSON texts and answers, which are never dropped; last values, of which a newer one replaces
-// an older one; pictures and events. Per channel, only the newest picture or the newest 64 events wait.
+// Messages are sent in this order: JSON texts and answers, which are never dropped; last values (a newer value replaces an older
+// one); pictures and events. In a channel of pictures only the newest waits, in a channel of events the newest 64.
 #pragma once
 
 #include <chrono>
@@ -38,12 +38,12 @@ struct ViewChannel {
 /// A message of a channel, in pieces; all viewers share it.
 struct ViewPayload {
   struct Piece {
-    std::string key;  // a later piece with the same key replaces this one
+    std::string key;  // a later piece with the same key replaces this piece
     ViewBytes bytes;
   };
   Time at{};
   std::vector<Piece> pieces;
-  bool merges = false;  // waiting pieces with other keys are kept; all pieces together are one message
+  bool merges = false;  // true: waiting pieces with other keys are kept, and all pieces together are one message
 };
 using ViewPayloadPointer = std::shared_ptr<const ViewPayload>;
 
@@ -55,26 +55,26 @@ struct ViewMessage {
 };
 
 struct ViewerFigures {
-  std::string address;  // "http 127.0.0.1:40123"
+  std::string address;  // such as "http 127.0.0.1:40123"
   bool may_steer = false;
-  std::map<std::string, std::uint64_t> dropped = {};  // by topic: messages replaced before they were written
+  std::map<std::string, std::uint64_t> dropped = {};  // number of replaced messages by topic
 };
 
 class Viewer;
 
-/// The part of the daemon that answers viewers. It must outlive them, and may call the viewer back.
+/// The part of the daemon that answers viewers. It must outlive all viewers, and may call a viewer back.
 class ViewerHost {
  public:
   virtual ~ViewerHost() = default;
-  /// The channel with this id, or null.
+  /// Returns the channel with this id, or null.
   virtual const ViewChannel* channel(std::uint32_t id) const = 0;
   /// Offers the present values of a channel to a new subscriber.
   virtual void on_subscribed(Viewer& viewer, std::uint32_t channel) = 0;
-  /// The parameters with these names, or all if `names` is empty. Unknown names are ignored.
+  /// Returns the parameters with these names, or all if `names` is empty. Ignores unknown names.
   virtual std::vector<foxglove::Parameter> parameters(const Viewer& viewer, const std::vector<std::string>& names) = 0;
   /// Sets a parameter. Returns the reason if it was not set, else an empty text.
   virtual std::string set_parameter(Viewer& viewer, const foxglove::Parameter& wanted) = 0;
-  /// Controls the trajectory and answers with its state. Returns false if the viewer does not watch a trajectory.
+  /// Controls the trajectory and answers with the state of playback. Returns false if the viewer does not watch a trajectory.
   virtual bool steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) = 0;
   /// Performs a call and answers with Viewer::answer() or fail(), now or later.
   virtual void call(Viewer& viewer, const foxglove::ServiceCall& call) = 0;
@@ -98,15 +98,15 @@ class Viewer {
   // ---- from the socket
   void on_text(std::string_view text, Moment now);
   void on_binary(wire::BytesView frame, Moment now);
-  /// The next message to write; nullopt: wait until something is offered, or until next_due().
+  /// Returns the next message to write; nullopt: wait until something is offered, or until next_due().
   std::optional<ViewMessage> next(Moment now);
-  /// The time at which next() must be called again for a message that waits for its rate, or for the end of a warning.
+  /// Returns the time at which next() must be called again, because a message waits for its rate or a warning ends.
   std::optional<Moment> next_due(Moment now) const;
-  /// If it is not `none`, the connection must be ended with this code.
+  /// If the code is not `none`, the connection must be ended with it.
   CloseCode close_code() const { return close_; }
 
   // ---- from the host
-  /// Adds a message of the greeting; the limit of waiting messages does not apply.
+  /// Adds a message of the greeting, without the limit of waiting messages.
   void greet(std::string word) { words_.push_back({true, bytes_of(word), {}}); }
   void say(std::string word);
   void say_frame(wire::Bytes frame);
@@ -126,11 +126,11 @@ class Viewer {
   }
   void answer(const foxglove::ServiceCall& answer);
   void fail(const foxglove::ServiceCall& call, const std::string& why);
-  /// Sends those of the changed parameters that the viewer watches.
+  /// Sends the changed parameters that the viewer watches.
   void on_parameters(std::span<const foxglove::Parameter> changed);
   bool watches_parameters() const { return watches_all_ || !watched_.empty(); }
 
-  /// Sets the vehicle whose trajectory the viewer watches, in the trajectory's time; empty = none.
+  /// Sets the vehicle whose trajectory the viewer watches; times are then those of the trajectory. Empty = none.
   void play(std::string vehicle) { playback_ = std::move(vehicle); }
   const std::string& playback() const { return playback_; }
   /// Sets a parameter of this connection only.
@@ -142,7 +142,7 @@ class Viewer {
 
   bool may_steer() const { return rights_.may_steer; }
   const std::string& who() const { return who_; }
-  /// Messages replaced before they were written, by channel.
+  /// Returns the number of messages that were replaced before they were written, by channel.
   const std::map<std::uint32_t, std::uint64_t>& dropped() const { return dropped_; }
 
  private:
@@ -152,7 +152,7 @@ class Viewer {
     Moment interval{0};
     std::size_t deepest = 1;
     std::optional<Moment> sent_at;
-    std::deque<ViewPayloadPointer> waiting;  // one, except for events
+    std::deque<ViewPayloadPointer> waiting;  // at most one payload, except for events
     bool is_due(Moment now) const { return !sent_at || now - *sent_at >= interval; }
   };
   static wire::Bytes bytes_of(std::string_view text);
@@ -176,11 +176,11 @@ class Viewer {
   std::map<std::string, double> choices_;
   std::deque<ViewMessage> words_;
   std::size_t word_bytes_ = 0;
-  std::map<std::uint32_t, Slot> slots_;  // by subscription
+  std::map<std::uint32_t, Slot> slots_;  // key: subscription
   std::map<std::uint32_t, std::uint64_t> dropped_;
   std::optional<Time> time_, newest_time_;
   std::optional<Moment> time_sent_, slow_since_, allowance_at_;
-  std::map<std::string, Moment> passing_;  // statuses with the time of their removal
+  std::map<std::string, Moment> passing_;  // time at which each temporary status is removed
   std::set<std::string> watched_;
   bool watches_all_ = false, warned_unknown_ = false;
   double allowance_ = 200;  // number of messages that the viewer may send now

@@ -24,7 +24,7 @@ constexpr std::array<OtherAxes, 2> other_axes{
 }  // namespace
 
 const OtherAxes* axes_of(const std::vector<Pose>& poses) {
-  constexpr double leaning = 0.3;  // cameras may look steeply down
+  constexpr double leaning = 0.3;  // small, because cameras may point steeply down
   std::vector<Quatd> lying;
   for (const Pose& p : poses)
     if (upright(p.orientation) < tilted) lying.push_back(p.orientation);
@@ -47,7 +47,7 @@ namespace {
 using Direction = std::complex<double>;
 
 constexpr double largest_as_rad = 2 * pi;       // angles are -pi to pi, or 0 to 2 pi
-constexpr std::size_t least_steps = 20;         // steps of the way; fewer prove nothing
+constexpr std::size_t least_steps = 20;         // steps of the path; fewer prove nothing
 constexpr double least_step_m = 1e-3;           // a shorter step has no direction
 constexpr double agrees = 0.97, differs = 0.7;  // length of the mean of unit vectors: 1 if all are equal, 0 if evenly spread
 constexpr double most_short_of_turn_deg = 0.3;  // a jump from pi to -pi is shorter than a turn by at most this
@@ -75,7 +75,7 @@ bool follows_course_as_radians(const std::vector<Pose>& poses, const std::vector
          length_of_mean(as_radians, steps) > agrees;
 }
 
-/// True if the angles stay within one turn of 2 pi and jump from one end of it to the other.
+/// True if the angles stay within one turn of 2 pi, and jump from one end of that range to the other.
 bool jumps_by_two_pi(const std::vector<double>& turned_deg) {
   std::size_t jumps = 0;
   for (std::size_t i = 1; i < turned_deg.size(); ++i) {
@@ -92,7 +92,7 @@ bool jumps_by_two_pi(const std::vector<double>& turned_deg) {
 
 std::optional<std::string> radians_read_as_degrees(const std::vector<Pose>& poses) {
   if (poses.size() <= least_steps) return std::nullopt;
-  // The heading relative to the first pose, so that the frame of the file does not matter.
+  // Headings are relative to the first pose, so that the frame of the file does not matter.
   std::vector<double> turned_deg;
   for (const Pose& p : poses) {
     turned_deg.push_back(without_turns_deg(heading_deg(p) - heading_deg(poses.front())));

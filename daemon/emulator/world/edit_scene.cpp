@@ -29,7 +29,7 @@ bool is_printable(std::string_view name) {
   return std::all_of(name.begin(), name.end(), [](char c) { return std::isprint(static_cast<unsigned char>(c)) != 0; });
 }
 
-/// The reason why an object cannot have this name; empty if it can.
+/// Returns the reason why an object cannot have this name; empty if it can.
 std::string complaint_about(const Scene& scene, const std::string& name) {
   if (name.empty() || name.size() > longest_name || !is_printable(name))
     return "an object needs a name of 1 to 64 printable characters";
@@ -47,7 +47,7 @@ std::shared_ptr<const Mesh> mesh_of(const Mesh& mesh, std::size_t material) {
 
 bool is_removed(const Object& object) { return object.name.empty() && !object.visible; }
 
-/// Returns the index for a new object: that of a removed object, else a new one at the end.
+/// Returns the index for a new object: the index of a removed object, else a new index at the end.
 std::size_t free_place(Scene& scene) {
   const auto left = std::find_if(scene.objects.begin(), scene.objects.end(), is_removed);
   if (left != scene.objects.end()) return static_cast<std::size_t>(left - scene.objects.begin());
@@ -155,8 +155,8 @@ Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObjec
 }
 
 bool is_same(const Scene& a, const Scene& b) {
-  // This line lists all members, so that it does not compile with a new one, which must then be compared too. Name and notes are
-  // not compared, because they do not change the pings.
+  // This line lists all members, so that it does not compile with a new member, which must then be compared too. Name and notes
+  // are not compared, because they do not change the pings.
   const auto& [name, materials, objects, point_targets, body_names, bodies_in_world, sea_surface, water_column, other_sonars,
                ray_origin, notes] = a;
   return ray_origin_of(a) == ray_origin_of(b) && materials == b.materials && point_targets == b.point_targets &&

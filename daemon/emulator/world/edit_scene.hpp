@@ -1,6 +1,6 @@
-// Makes a scene from another: adds, removes, hides or moves an object. Pure; SceneChanges calls these functions on its own
-// thread. Unchanged objects keep their index in Scene::objects, so their speckle and rays do not change. A removed object is
-// replaced by an invisible object without a name; the next added object gets that index.
+// Makes a scene from another: adds, removes, hides or moves an object. SceneChanges calls these functions on its own thread.
+// Unchanged objects keep their index in Scene::objects, so their speckle and rays do not change. A removed object is replaced by
+// an invisible object without a name; the next added object gets that index.
 #pragma once
 
 #include <memory>
@@ -14,16 +14,16 @@ namespace sonar {
 
 using ScenePointer = std::shared_ptr<const Scene>;
 
-// Each returns the new scene, or an error (usage) that lists what the scene has.
+// Each function returns the new scene, or an error (usage) that lists the objects of the scene.
 
 Result<ScenePointer> with_object(const Scene& scene, const control::AddObject& wanted);
 Result<ScenePointer> without_object(const Scene& scene, std::string_view name);
 /// Hides, shows or moves a static object. A moving object can only be hidden or shown, because the World has its poses.
 Result<ScenePointer> with_object_set(const Scene& scene, const control::SetObject& wanted);
 
-/// The index of the moving body with this name, or -1.
+/// Returns the index of the moving body with this name, or -1.
 int body_named(const Scene& scene, std::string_view name);
-/// The object with this name, or null.
+/// Returns the object with this name, or null.
 const Object* object_named(const Scene& scene, std::string_view name);
 /// Makes the error "there is no object ...; did you mean ...".
 Error no_such_object(const Scene& scene, std::string_view name);

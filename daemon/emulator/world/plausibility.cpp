@@ -17,10 +17,10 @@ namespace {
 using text::format;
 
 constexpr double turned_over = -0.5;           // the z axis points more than 30 deg below the horizon
-constexpr std::size_t most_looked_at = 10000;  // poses of a trajectory, triangles of a mesh
+constexpr std::size_t most_looked_at = 10000;  // limit for the poses of a trajectory and the triangles of a mesh
 constexpr double ground_flatness = 0.05;       // height over width; flatter objects are ground, of any length
-constexpr double least_ground_m = 2;           // width; a flat plate that is narrower is not ground
-constexpr double far_from_origin_m = 1000;     // vehicles may drive this far to the scene
+constexpr double least_ground_m = 2;           // width; a narrower flat plate is not ground
+constexpr double far_from_origin_m = 1000;     // a scene may be this far away, because vehicles may drive to it
 constexpr double long_ranges = 5;              // an object may be this many times as long as the longest range
 
 // Each remedy identifies a kind of note; a kind is reported once.
@@ -52,7 +52,7 @@ struct Doubt {
   const char* cure;
 };
 
-/// The lowest point of all ground above or below a position; nullopt without ground.
+/// Returns the lowest point of all ground above or below a position; nullopt without ground.
 std::optional<double> lowest_ground_m(Vec3d place_m, const Surroundings& around) {
   std::optional<double> lowest;
   for (const Extent& ground : around.ground)
@@ -70,7 +70,7 @@ Location judge_location(Vec3d sonar_m, const Surroundings& around) {
   return !scene.empty() && scene.distance_m(sonar_m) > around.longest_range_m ? Location::far_away : Location::fine;
 }
 
-/// The first implausible position of a carrier's sonar.
+/// Returns the first implausible position of a carrier's sonars.
 std::optional<Vec3d> doubtful_place(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around) {
   for (const Pose& mount : carrier.mounts)
     if (const Vec3d at_m = compose(vehicle_in_world, mount).position_m; judge_location(at_m, around) != Location::fine)
@@ -104,15 +104,15 @@ std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
   return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
 }
 
-/// True if w at the other end of the four numbers makes a body upright in the frame of the file.
+/// True if the body is upright in the frame of the file when w is read from the other end of the four numbers.
 bool is_upright_in_another_order(Quatd q) {
   const auto reordered = [](Quatd r) { return std::array{upright({r.x, r.y, r.z, r.w}), upright({r.z, r.w, r.x, r.y})}; };
   const auto as_enu = reordered(q), as_ned = reordered(enu_flu_from_ned_frd(q));
   return std::max({as_enu[0], as_enu[1], as_ned[0], as_ned[1]}) > tilted;
 }
 
-/// True if w can be at the wrong end. It cannot in CSV (its columns have names) and KITTI (it has matrices). `about` begins with
-/// the format.
+/// True if w can be at the wrong end, which is not possible in CSV (columns have names) and KITTI (poses are matrices). `about`
+/// begins with the format.
 bool has_nameless_quaternions(const motion::Plan& plan) {
   const auto is = [&](motion::Format format) {
     return plan.about.starts_with((plan.file + ": ").append(name_of(format)).append(","));
@@ -131,7 +131,7 @@ bool is_out_of_order(const std::vector<Pose>& poses) {
   return 10 * lying >= poses.size() && 100 * explained >= 99 * lying;
 }
 
-/// All poses, or every second, third, ..., so that there are at most most_looked_at.
+/// Returns all poses, or every second, third and so on, so that there are at most most_looked_at.
 std::vector<Pose> some_poses_of(const motion::Plan& plan) {
   const std::vector<Pose>& all = plan.trajectory->points().poses;
   const std::size_t step = 1 + (all.size() - 1) / most_looked_at;
@@ -140,7 +140,7 @@ std::vector<Pose> some_poses_of(const motion::Plan& plan) {
   return some;
 }
 
-/// A note on the first doubtful pose, with the number of doubtful poses.
+/// Returns a note on the first doubtful pose, with the number of doubtful poses.
 std::optional<Doubt> doubt_of_all(const std::vector<Pose>& poses, const motion::Plan& plan,
                                   const std::function<bool(const Pose&)>& is_doubtful,
                                   const std::function<std::optional<Doubt>(const Pose&)>& doubt_of) {
@@ -190,7 +190,7 @@ bool is_sea_surface(const Scene& scene, const Object& o) {
   return scene.sea_surface.present && o.primitive.kind == Primitive::Kind::plane && o.name == "sea surface";
 }
 
-/// True if poses are judged equally in both.
+/// True if poses get the same notes in both surroundings.
 bool is_same(const Surroundings& a, const Surroundings& b) {
   return a.scene == b.scene && a.longest_range_m == b.longest_range_m && a.ground == b.ground;
 }
@@ -213,7 +213,8 @@ std::vector<Note> notes_on_plans(const Config& config, const Surroundings& aroun
   return notes;
 }
 
-/// Notes on the initial poses of vehicles without trajectories. A vehicle that waits for its first pose has none to check.
+/// Returns notes on the initial poses of vehicles without trajectories. A vehicle that waits for its first pose has no pose to
+/// check.
 std::vector<Note> notes_on_start(const Config& config, const Scene& scene, const Surroundings& around) {
   const std::vector<Carrier> carriers = carriers_of(config);
   std::vector<Note> notes = notes_on_mounts(config);
@@ -275,7 +276,7 @@ std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around)
   const double allowed_m = std::max(huge_mesh_m, long_ranges * around.longest_range_m);
   std::set<const Mesh*> seen;
   for (const Object& o : scene.objects) {
-    // The size of a primitive is in the scene file, in metres. Only mesh files have a unit of their own.
+    // The size of a primitive is in the scene file, in metres. Only mesh files have other units.
     if (!o.visible || o.primitive.kind != Primitive::Kind::none || !seen.insert(o.mesh.get()).second) continue;
     const MeshShape& shape = around.meshes.at(o.mesh);
     const double length_m = shape.own.longest_m();
@@ -315,7 +316,7 @@ std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan
       doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
   if (plan.largest_angle.rad > 0) {
     add(notes, carrier.vehicle, Doubt{plan.file + format(" has an angle of %.4g rad", plan.largest_angle.rad), degrees_cure});
-    // Further doubts would be consequences of a roll or pitch in degrees. A heading turns nothing over.
+    // Further notes would be consequences of a roll or pitch in degrees. A heading in degrees turns nothing over.
     if (plan.largest_angle.is_tilt) return notes;
   } else if (const auto why = radians_read_as_degrees(poses))
     add(notes, carrier.vehicle, Doubt{"the headings of " + plan.file + " " + *why, radians_cure});
@@ -351,7 +352,7 @@ std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
 std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
   Surroundings around = surroundings_of(config, scene, around_.meshes);
   auto played = trajectories_of(config);
-  // Judging trajectories takes longest, so it is repeated only if the trajectories or their surroundings differ.
+  // Checking trajectories takes longest, so it is repeated only if the trajectories or their surroundings differ.
   if (played != played_ || !is_same(around, around_)) of_plans_ = notes_on_plans(config, around);
   around_ = std::move(around);
   played_ = std::move(played);
@@ -359,7 +360,7 @@ std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
   of_setup_ = notes_on_start(config, scene, around_);
   add(of_setup_, of_plans_);
   std::map<std::string, LastPose> before;
-  // The last pose of each vehicle is judged again in the new surroundings; vehicles that are gone are dropped.
+  // The last pose of each vehicle is checked again in the new surroundings; removed vehicles are dropped.
   before.swap(of_poses_);
   for (const Carrier& c : carriers_)
     if (const auto last = before.find(c.vehicle); last != before.end()) judge(c, of_poses_[c.vehicle] = last->second);

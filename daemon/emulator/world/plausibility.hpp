@@ -1,6 +1,6 @@
-// Finds probable mistakes: poses above the water, degrees instead of radians, quaternions in the wrong order,
-// sonars upside down, meshes in millimetres. Pure functions from facts to notes. Used by `sonard check`, by the log (at the
-// start and at the first implausible pose), and by the daemon's status for `sonarctl doctor`.
+// Finds probable mistakes: poses above the water, degrees instead of radians, quaternions in the wrong order, sonars upside down,
+// meshes in millimetres. `sonard check` prints the notes, the daemon logs them (at the start and at the first implausible pose),
+// and its status has them for `sonarctl doctor`.
 #pragma once
 
 #include <map>
@@ -23,13 +23,13 @@ struct Note {
   std::string cure;     // the change to make
 };
 
-/// "the sonar of rov is 3.0 m above the water's surface (z = 0); ENU_FLU counts z upwards ..."
+/// Returns a text such as "the sonar of rov is 3.0 m above the water's surface (z = 0); ENU_FLU counts z upwards ...".
 std::string text_of(const Note& note);
 
 /// Size of a mesh along its own axes.
 struct MeshShape {
   Extent own;
-  bool is_ground = false;  // flat, or every triangle faces up; such a mesh may be long
+  bool is_ground = false;  // true: flat, or every triangle faces up; such a mesh may be long
 };
 using MeshShapes = std::map<std::shared_ptr<const Mesh>, MeshShape>;
 
@@ -38,9 +38,9 @@ struct Surroundings {
   Extent scene;                // extent of all visible objects
   std::vector<Extent> ground;  // extent of each static plane, seabed and height map
   double longest_range_m = 0;  // longest range of any sonar
-  MeshShapes meshes;           // of visible objects
+  MeshShapes meshes;           // shapes of the meshes of visible objects
 };
-/// `known`: shapes of the previous scene, whose meshes are not examined again.
+/// Collects the facts. `known`: shapes of the previous scene, whose meshes are not examined again.
 Surroundings surroundings_of(const Config& config, const Scene& scene, const MeshShapes& known = {});
 
 /// A vehicle's name, and the mounts of its sonars (FLU).
@@ -51,31 +51,31 @@ struct Carrier {
 std::vector<Carrier> carriers_of(const Config& config);
 
 std::vector<Note> notes_on_mounts(const Config& config);
-/// `around`: the surroundings of this scene.
+/// Returns notes on a scene. `around`: the surroundings of this scene.
 std::vector<Note> notes_on_scene(const Scene& scene, const Surroundings& around);
-/// Notes on scenes far from the origin of a world with latitude and longitude.
+/// Returns notes on scenes far from the origin of a world with latitude and longitude.
 std::vector<Note> notes_on_origin(const Surroundings& around);
 /// Returns at most one note on the position and one on the attitude.
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
-/// `largest`: of the angles of its newest pose.
+/// Returns notes on angles. `largest`: the largest implausible angle of the vehicle's newest pose.
 std::vector<Note> notes_on_angles(const std::string& vehicle, const ImplausibleAngle& largest);
-/// Notes on at most about 10,000 poses, evenly spread. A carrier without mounts is a moving object, whose position is not
+/// Returns notes on about 10,000 poses at most, evenly spread. A carrier without mounts is a moving object, whose position is not
 /// checked.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
 
 /// Returns all notes that need no pose.
 std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surroundings& around);
 
-/// The notes of a running daemon: of its configuration and scene, and of the newest pose of each vehicle.
+/// The notes of a running daemon: on configuration and scene, and on the newest pose of each vehicle.
 class Plausibility {
  public:
   /// Call it at the start and after a change of configuration or scene. Returns new notes only. Checks trajectories and poses
   /// again if positions in the scene have changed.
   std::vector<Note> use(const Config& config, const Scene& scene);
   /// Checks an accepted pose of a vehicle; returns only notes that are new for this vehicle.
-  /// `now`: its time if it has no stamp.
+  /// `now`: the time of a pose without a stamp.
   std::vector<Note> use(const control::PoseSample& sample, Time now);
-  /// The present notes. Notes on poses replace those on a vehicle's start or trajectory.
+  /// Returns the present notes. Notes on poses replace those on a vehicle's start or trajectory.
   std::vector<Note> all() const;
 
  private:
@@ -91,9 +91,9 @@ class Plausibility {
   Surroundings around_;
   std::vector<Carrier> carriers_;
   std::vector<std::shared_ptr<const motion::Trajectory>>
-      played_;                                // the trajectories for which of_plans_ was made; a reload reads new ones
+      played_;                                // the trajectories on which of_plans_ are notes; a reload reads new trajectories
   std::vector<Note> of_plans_, of_setup_;     // of_setup_ contains of_plans_
-  std::map<std::string, LastPose> of_poses_;  // by vehicle
+  std::map<std::string, LastPose> of_poses_;  // key: vehicle
   std::set<std::string> reported_;
 };
 

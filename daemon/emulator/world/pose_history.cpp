@@ -5,7 +5,7 @@
 
 namespace sonar {
 namespace {
-// Two samples closer in time than this give no speed, because the difference of their stamps is mostly jitter.
+// Samples that are closer in time give no speed, because the difference of their stamps is mostly jitter.
 constexpr std::chrono::nanoseconds shortest_difference = std::chrono::milliseconds(1);
 }  // namespace
 
@@ -27,8 +27,8 @@ PoseHistory::Motion PoseHistory::between(const Sample& before, const Sample& aft
           per_s * rotation_between(before.pose.orientation, after.pose.orientation)};
 }
 
-/// Velocities from the sender replace the difference of the last two poses. A jump counts as no motion: a vehicle that was
-/// moved elsewhere stays there.
+/// Returns the velocities from the sender, else the difference of the last two poses. After a jump the motion is zero, because a
+/// vehicle that was moved elsewhere stays there.
 PoseHistory::Motion PoseHistory::newest_motion() const {
   const Sample& last = samples_.back();
   Motion motion;
@@ -51,7 +51,7 @@ PoseHistory::Samples::const_iterator PoseHistory::not_before(Time t) const {
   return std::lower_bound(samples_.begin(), samples_.end(), t, [](const Sample& s, Time x) { return s.at < x; });
 }
 
-/// Zero where at() holds a pose, so that pose and motion agree.
+/// Returns zero where at() holds a pose, so that pose and motion agree.
 PoseHistory::Motion PoseHistory::motion_at(Time t, std::chrono::nanoseconds extrapolate_max) const {
   if (t - samples_.back().at > extrapolate_max || t < samples_.front().at) return {};
   const auto after = not_before(t);

@@ -1,5 +1,5 @@
 // The poses of one body in the last two seconds, and its pose at any time: interpolated, extrapolated for a short time, or held.
-// World has one for each vehicle and moving object. Times are the sender's stamps, converted to our time.
+// World has one history for each vehicle and moving object. Times are the sender's stamps, converted to our time.
 #pragma once
 
 #include <deque>
@@ -15,7 +15,7 @@ class PoseHistory {
  public:
   struct Sample {
     Time at{};
-    Pose pose;                                    // body in world
+    Pose pose;                                    // pose of the body in the world
     std::optional<Vec3d> velocity_mps;            // body axes
     std::optional<Vec3d> angular_velocity_radps;  // body axes
   };
@@ -33,19 +33,19 @@ class PoseHistory {
   /// Replaces newest(), for poses above the rate limit. `sample.at` must not be before newest().at; the history must not be
   /// empty.
   void replace_newest(const Sample& sample) { samples_.back() = sample; }
-  /// Between samples the pose is interpolated (lerp, slerp); before the first it is held. After the last it is extrapolated for
-  /// at most `extrapolate_max`, by the sample's velocity or else by the difference of the last two samples unless that is a
-  /// jump; then it is held. The history must not be empty.
+  /// Returns the pose at a time. Between samples it is interpolated (lerp, slerp); before the first sample it is held. After the
+  /// last sample it is extrapolated for at most `extrapolate_max`, with the sample's velocity or else with the difference of the
+  /// last two samples (unless that is a jump), and then held. The history must not be empty.
   Pose at(Time t, std::chrono::nanoseconds extrapolate_max) const;
-  /// The motion of the pose of at(): between samples, their difference per time; after the newest, its velocity; where the pose
-  /// is held, zero.
+  /// Returns the motion of the pose of at(): between samples, their difference per time; after the newest sample, its velocity;
+  /// zero where the pose is held.
   Motion motion_at(Time t, std::chrono::nanoseconds extrapolate_max) const;
 
  private:
   using Samples = std::deque<Sample>;
   static Motion between(const Sample& before, const Sample& after);
   Motion newest_motion() const;
-  /// The first sample not before t.
+  /// Returns the first sample not before t.
   Samples::const_iterator not_before(Time t) const;
   Pose beyond_newest(std::chrono::nanoseconds ahead) const;
   Samples samples_;

@@ -13,11 +13,11 @@ namespace {
 using control::ClockDomain;
 using control::PoseSample;
 
-constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, near enough for exact placement
+constexpr double hidden_height_m = 1e4;  // far beyond any sonar's range, but near enough for exact placement
 constexpr double smallest_orbit_m = 4;
 constexpr double orbit_speed_mps = 0.5;
 constexpr std::chrono::nanoseconds future_allowed = std::chrono::seconds(1);
-constexpr std::chrono::nanoseconds most_out_of_order = std::chrono::seconds(1);  // older: the clock was set back
+constexpr std::chrono::nanoseconds most_out_of_order = std::chrono::seconds(1);  // if older, the clock was set back
 
 std::string joined_names(const std::vector<std::string>& names) {
   std::string all;
@@ -36,7 +36,8 @@ World::World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyS
 void World::use_vehicles(std::vector<BodyStart> vehicles, Time now) { vehicles_ = taken_over(vehicles_, vehicles, now); }
 void World::use_objects(std::vector<BodyStart> objects, Time now) { objects_ = taken_over(objects_, objects, now); }
 
-/// Bodies with a known name keep their poses. A new body begins with a full allowance; a changed trajectory begins now.
+/// Makes the tracks for new bodies. Bodies with a known name keep their poses. A new body begins with a full allowance; a changed
+/// trajectory begins now.
 std::vector<World::Track> World::taken_over(std::vector<Track>& old, std::vector<BodyStart>& bodies, Time now) const {
   std::vector<Track> tracks;
   for (BodyStart& b : bodies) {
@@ -71,11 +72,11 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
   return nullptr;
 }
 
-/// True if a pose continues the body's history: the same sender and kind of time stamp, and no long silence before it.
+/// True if a pose continues the body's history: it has the same sender and kind of time stamp, and follows no long silence.
 bool World::continues(const Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) const {
   const bool known = !track.history.empty() && track.sender_id == sender.id && track.domain == sample.stamp.domain;
   if (!known) return false;
-  // With `clock: follow`, time stops while no stamps arrive, so silence cannot be detected. A stamp far behind the newest one
+  // With `clock: follow`, time stops while no stamps arrive, so silence cannot be detected. A stamp far before the newest one
   // means that the sender's clock was set back, or that the simulator has restarted.
   const Time newest = track.history.newest().at;
   if (rules_.follows) return at >= newest - rules_.stale_after;
@@ -96,7 +97,8 @@ bool World::has_rival(Track& track, const Sender& sender, Time now) const {
   return alternate && !std::exchange(track.rival_reported, true);
 }
 
-/// The sender's clock is mapped by the least delay seen. A delay that grows by more than extrapolate_max is a jump of that clock.
+/// Returns the offset of the sender's clock, from the least delay so far. A delay that grows by more than extrapolate_max is a
+/// jump of that clock.
 World::Ns World::offset_for(const Track& track, Time at, Time now, bool goes_on) {
   if (rules_.follows) return followed_offset_for(track, at, now);
   const Ns offset = now - at;
@@ -104,7 +106,7 @@ World::Ns World::offset_for(const Track& track, Time at, Time now, bool goes_on)
   return keep ? track.offset : offset;
 }
 
-/// Takes one pose from the allowance; true: none was left.
+/// Takes one pose from the allowance. Returns true if none was left.
 bool World::over_rate(Track& track, Time now) const {
   if (rules_.stepped) return false;
   const double refill = rules_.most_per_s * seconds(now - track.allowance_at);
@@ -115,7 +117,7 @@ bool World::over_rate(Track& track, Time now) const {
   return false;
 }
 
-/// Checked before anything is changed, so that a refused pose leaves no trace.
+/// Called before anything is changed, so that a refused pose changes nothing.
 std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) const {
   if (has_shared_clock(sample) && (at > now + future_allowed || at < now - rules_.stale_after - future_allowed))
     return "WALL time stamp is " + std::to_string(seconds(at - now)) +
@@ -143,8 +145,8 @@ bool World::is_next(Track& track, const PoseSample& sample, Time at, PoseOutcome
   return true;
 }
 
-/// The order matters: name, time stamp, continuity, clock offset, then the pose is kept. A pose that is refused, or late,
-/// changes nothing but a counter.
+/// Checks name, time stamp, continuity and clock offset in this order, then keeps the pose. A pose that is refused or late only
+/// changes a counter.
 PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time now) {
   PoseOutcome out;
   Track* const found = find(sample.of, sample.name, out.refusal);
@@ -193,7 +195,7 @@ PoseOutcome World::accept(const PoseSample& sample, const Sender& sender, Time n
   return out;
 }
 
-/// Also ends the state "stale". The body is hidden or shown as the pose requests.
+/// Stores a pose, ends the state "stale", and hides or shows the body as the pose requests.
 void World::keep(Track& track, const PoseSample& sample, const Sender& sender, Time at, Time now) {
   track.source = sender.source;
   track.sender_id = sender.id;
@@ -230,7 +232,7 @@ Time World::last_news(const Track& track) const {
 
 std::vector<World::Stale> World::newly_stale(Time now) {
   std::vector<Stale> sentences;
-  for (Track& t : vehicles_) {  // only vehicles: objects may rest, but a vehicle without poses means a broken link
+  for (Track& t : vehicles_) {  // only vehicles, because objects may rest, but if a vehicle gets no poses, a link is broken
     if (t.stale_reported || !is_stale(t, now)) continue;
     t.stale_reported = true;
     ++counters_.stale;
@@ -241,8 +243,9 @@ std::vector<World::Stale> World::newly_stale(Time now) {
   return sentences;
 }
 
-/// The first of these that applies: hidden far above the scene, received poses, a trajectory, the orbit of the demo, the
-/// initial pose. If no pose has arrived for stale_after, a body returns to its newest received pose, without extrapolation.
+/// Returns the first of these that applies: a place far above the scene (hidden), received poses, a trajectory, the orbit of the
+/// demo, the initial pose. If no pose has arrived for stale_after, a body returns to its newest received pose, without
+/// extrapolation.
 Pose World::pose_at(const Track& track, Time t) const {
   if (track.hidden) return {{0, 0, hidden_height_m}, {}};
   if (!track.history.empty()) {
@@ -258,7 +261,7 @@ Pose World::orbit(const Pose& initial, Time t) const {
   const Vec3d p = initial.position_m;
   const double radius_m = std::max(smallest_orbit_m, std::hypot(p.x, p.y));
   const double angle = std::atan2(p.y, p.x) + orbit_speed_mps / radius_m * seconds(t - start_);
-  const RollPitchYaw inward{0, 0, angle + pi};  // the sonar looks across the middle of the world
+  const RollPitchYaw inward{0, 0, angle + pi};  // the sonar points across the centre of the world
   return {{radius_m * std::cos(angle), radius_m * std::sin(angle), p.z}, quat_from_rpy(inward)};
 }
 

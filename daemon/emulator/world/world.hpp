@@ -1,5 +1,5 @@
-// The poses of vehicles and moving objects. They are accepted from senders by the rules of docs/poses.md, "Time and order", and
-// returned for any moment. Pure: time is passed in; the daemon's I/O thread owns the only one.
+// The poses of vehicles and moving objects. Poses from senders are accepted by the rules of docs/poses.md, "Time and order"; the
+// World then returns a pose for any time. Only the daemon's I/O thread uses it, and passes the time.
 #pragma once
 
 #include <cstdint>
@@ -20,48 +20,48 @@ struct PoseRules {
   std::chrono::nanoseconds extrapolate_max = std::chrono::milliseconds(200);
   std::chrono::nanoseconds stale_after = std::chrono::seconds(1);
   double max_jump_m = 50;
-  bool stepped = false;      // simulated time: WALL stamps then belong to the sender's own clock, and the rate is not limited
+  bool stepped = false;      // simulated time: WALL stamps are of the sender's own clock, and the rate is not limited
   bool follows = false;      // simulated time that follows the stamps of the vehicles (world_sources.cpp)
-  double most_per_s = 1000;  // stored poses of one body per second; faster ones replace the newest
-  double burst = 64;         // poses that may arrive at once, because networks deliver delayed ones together
+  double most_per_s = 1000;  // stored poses of one body per second; further poses replace the newest
+  double burst = 64;         // poses that may arrive at once, because networks deliver delayed packets together
 };
 
 /// A vehicle, or a moving object of the scene.
 struct BodyStart {
   std::string name;
   Pose initial_pose;    // pose in the world
-  bool orbits = false;  // circles about the world's z axis until the first accepted pose
+  bool orbits = false;  // true: circles about the world's z axis until the first accepted pose
   motion::Plan plan{};  // followed until the first accepted pose
 };
 
 /// Sender of a pose. A different `id` starts a new history; a different `source` is logged.
 struct Sender {
-  std::string id;      // "json udp 127.0.0.1:40123"
-  std::string source;  // "json 127.0.0.1"
+  std::string id;      // such as "json udp 127.0.0.1:40123"
+  std::string source;  // such as "json 127.0.0.1"
 };
 
 enum class PoseVerdict { accepted, late, unknown_name, bad_time };
 
 struct PoseOutcome {
   PoseVerdict verdict = PoseVerdict::accepted;
-  std::string refusal;  // one sentence if the pose is not accepted
-  std::string notice;   // for the log: the source changed, or poses arrive again
-  std::string body;     // the body of the notice
+  std::string refusal;  // one sentence if the pose is refused
+  std::string notice;   // text for the log: the source changed, or poses arrive again
+  std::string body;     // the body to which the notice refers
 };
 
 struct PoseCounters {
   std::uint64_t accepted = 0;
-  std::uint64_t refused = 0;    // malformed, unknown name, impossible time
-  std::uint64_t late = 0;       // out of order or repeated
-  std::uint64_t replaced = 0;   // equal stamps
-  std::uint64_t over_rate = 0;  // replaced the newest pose because of the rate limit
-  std::uint64_t jumps = 0;      // beyond max_jump
-  std::uint64_t resets = 0;     // reset counter changed
+  std::uint64_t refused = 0;    // malformed poses, unknown names, impossible times
+  std::uint64_t late = 0;       // poses that are out of order or repeated
+  std::uint64_t replaced = 0;   // poses with equal stamps
+  std::uint64_t over_rate = 0;  // poses that replaced the newest because of the rate limit
+  std::uint64_t jumps = 0;      // jumps farther than max_jump
+  std::uint64_t resets = 0;     // changes of the reset counter
   std::uint64_t histories = 0;  // histories begun by a first pose, another sender, or after silence
-  std::uint64_t stale = 0;      // times that a body's poses stopped
+  std::uint64_t stale = 0;      // how often a body's poses stopped
 };
 
-/// The motion of a sonar mounted on a body, including the velocity of its lever arm by the body's rotation.
+/// Returns the motion of a sonar mounted on a body, including the velocity at the lever arm because of the body's rotation.
 Twist mounted_moves(const PoseHistory::Motion& body_moves, const Pose& body_in_world, const Pose& mount);
 
 class World {
@@ -69,7 +69,7 @@ class World {
   World(PoseRules rules, std::vector<BodyStart> vehicles, std::vector<BodyStart> objects, Time start);
 
   // Call these when the configuration is read again or the scene changes. Bodies with the same name keep their poses, and equal
-  // trajectories continue; others begin at `now`.
+  // trajectories continue; other trajectories begin at `now`.
   void use_rules(const PoseRules& rules) { rules_ = rules; }
   void use_vehicles(std::vector<BodyStart> vehicles, Time now);
   void use_objects(std::vector<BodyStart> objects, Time now);
@@ -89,7 +89,7 @@ class World {
   std::optional<Played> object_plays(std::size_t object) const { return plays(objects_[object]); }
 
   Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
-  /// The motion with which vehicle_at() extrapolates; zero if it is implausibly fast.
+  /// Returns the motion with which vehicle_at() extrapolates; zero if it is implausibly fast.
   PoseHistory::Motion vehicle_moves(std::size_t vehicle, Time t) const;
   std::vector<Pose> objects_at(Time t) const;
   Pose object_at(std::size_t object, Time t) const { return pose_at(objects_[object], t); }
@@ -103,15 +103,15 @@ class World {
   struct Stale {
     std::string vehicle, sentence;
   };
-  /// The vehicles whose poses stopped since the last call.
+  /// Returns the vehicles whose poses stopped since the last call.
   std::vector<Stale> newly_stale(Time now);
 
-  // The following are for rules that follow the vehicles' stamps.
-  /// The time to which time may advance: the minimum of the vehicles' newest stamps, ignoring vehicles that lag by more than
-  /// stale_after. nullopt before the first pose.
+  // The following functions are for time that follows the vehicles' stamps.
+  /// Returns the limit of time: the minimum of the vehicles' newest stamps, ignoring vehicles that lag by more than stale_after;
+  /// nullopt before the first pose.
   std::optional<Time> followed_until() const;
-  /// The time that stamps have skipped since the last call, for example at the first pose. Orbits and trajectories do not
-  /// advance by it.
+  /// Returns the time that stamps have skipped since the last call, for example at the first pose. Orbits and trajectories do not
+  /// advance by this time.
   std::chrono::nanoseconds take_skipped();
 
   std::string_view source_of(std::size_t vehicle) const { return vehicles_[vehicle].source; }
@@ -124,14 +124,14 @@ class World {
     motion::Playback playback{};  // playback of body.plan
     std::string sender_id, source;
     std::string earlier_sender_id;  // the sender before the last change; empty after silence
-    bool rival_reported = false;    // true: it was reported that two senders alternate
+    bool rival_reported = false;    // true: a notice that two senders alternate was made
     std::uint64_t seq = 0;
     std::uint32_t reset_counter = 0;
     control::ClockDomain domain{};
     Time last_arrival{};
     std::chrono::nanoseconds offset{0};  // our time = sender's time + offset
     bool hidden = false, hidden_for_now = false, stale_reported = false;
-    double allowance = 0;  // poses that may be stored now; refilled with time
+    double allowance = 0;  // number of poses that may be stored now; increases with time
     Time allowance_at{};
   };
   using Ns = std::chrono::nanoseconds;
@@ -142,18 +142,18 @@ class World {
   bool has_shared_clock(const control::PoseSample& sample) const {
     return sample.stamp.domain == control::ClockDomain::wall && !rules_.stepped;
   }
-  /// True for SIM stamps, and in stepped time for WALL stamps: they come from the sender's own clock.
+  /// True for stamps of the sender's own clock: SIM stamps and, in stepped time, WALL stamps.
   bool has_own_clock(const control::PoseSample& sample) const {
     return sample.stamp.domain != control::ClockDomain::arrival && !has_shared_clock(sample);
   }
-  /// One sentence if the time stamp cannot be accepted, else empty.
+  /// Returns one sentence if the time stamp cannot be accepted, else empty.
   std::string why_bad_time(const control::PoseSample& sample, Time at, Time now) const;
   bool continues(const Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now) const;
   /// Returns whether the pose continues the history. Refuses late poses, and clears the history at a jump.
   bool is_next(Track& track, const control::PoseSample& sample, Time at, PoseOutcome& out);
   bool has_rival(Track& track, const Sender& sender, Time now) const;
   void keep(Track& track, const control::PoseSample& sample, const Sender& sender, Time at, Time now);
-  /// Our time minus the time of the sender's clock, which stamped a pose with `at`.
+  /// Returns our time minus the time of the sender's clock, which stamped a pose with `at`.
   Ns offset_for(const Track& track, Time at, Time now, bool goes_on);
   Ns followed_offset_for(const Track& track, Time at, Time now);
   bool is_followed(const Track& track, Time newest) const;

@@ -1,4 +1,4 @@
-// Parts of the World, from a configuration and a scene: when the daemon starts, and when either changes.
+// Makes parts of the World from a configuration and a scene, when the daemon starts and when one of them changes.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,8 @@ inline std::vector<BodyStart> vehicles_of(const Config& config) {
   for (const VehicleConfig& v : config.vehicles) vehicles.push_back({v.name, v.initial_pose, v.orbits, v.plan});
   return vehicles;
 }
-/// The order is that of PingRequest::bodies_in_world. Objects that are only in the configuration are left out.
+/// Returns the moving objects in the order of PingRequest::bodies_in_world. Objects that are only in the configuration are left
+/// out.
 inline std::vector<BodyStart> bodies_of(const Scene& scene, const Config& config) {
   std::vector<BodyStart> bodies;
   for (std::size_t i = 0; i < scene.body_names.size(); ++i) {

@@ -1,4 +1,4 @@
-// Trajectories of bodies that the World plays: their poses, and requests to pause, seek and change the speed.
+// Plays the trajectories of bodies: computes their poses, and handles requests to pause, seek and change the speed.
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ motion::Moment World::played(const Track& track, Time t) {
   return moment;
 }
 
-/// Everything is checked before anything changes.
+/// Checks everything before anything changes.
 std::string World::steer(const control::SetTrajectory& asked, Time now) {
   std::string refusal;
   Track* const track = find(asked.of, asked.name, refusal);
@@ -51,10 +51,10 @@ bool World::is_followed(const Track& track, Time newest) const {
   return !track.history.empty() && track.history.newest().at + track.offset >= newest - rules_.stale_after;
 }
 
-/// Offset from the stamps of a sender to sonard's time. The candidates are the vehicle's present offset, 0, and the offsets of
-/// other vehicles; the first one that places the stamp near the newest stamp is used. If none does, this is the first pose, or
-/// the sender's clock has jumped. In this case, if the stamp is ahead and no other vehicle is followed, sonard's time jumps to
-/// the stamp; otherwise the stamp counts as the present time.
+/// Returns the offset from the stamps of a sender to sonard's time. The candidates are the vehicle's present offset, 0, and the
+/// offsets of other vehicles; the first one that places the stamp near the newest stamp is used. If none does, this is the first
+/// pose, or the sender's clock has jumped. In this case, if the stamp is ahead and no other vehicle is followed, sonard's time
+/// jumps to the stamp; otherwise the stamp counts as the present time.
 World::Ns World::followed_offset_for(const Track& track, Time at, Time now) {
   const Time newest = newest_followed_.value_or(now);
   const bool vehicle = std::any_of(vehicles_.begin(), vehicles_.end(), [&](const Track& t) { return &t == &track; });
@@ -94,8 +94,7 @@ std::optional<Time> World::followed_until() const {
 
 World::Ns World::take_skipped() {
   const Ns skipped = std::exchange(skipped_, Ns{0});
-  // Nothing moves during the skipped time: orbits are delayed by it, received poses of objects keep their age, and trajectories
-  // stop.
+  // Nothing moves during the skipped time: orbits are delayed, received poses of objects keep their age, and trajectories stop.
   start_ += skipped;
   for (Track& t : objects_)
     if (!t.history.empty()) t.offset += skipped;

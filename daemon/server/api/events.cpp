@@ -52,7 +52,7 @@ void Events::publish_scene(const std::string& scene, const std::string& text) {
   publish(event);
 }
 
-/// The next event that is queued carries the count of dropped events.
+/// The next queued event states the number of dropped events.
 bool EventQueue::offer(const v1::Event& event) {
   if (!subscribes_to(event)) return false;
   if (waiting_.size() == limit) {

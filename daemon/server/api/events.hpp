@@ -22,10 +22,10 @@ class Events {
   using Listener = std::function<void(const v1::Event&)>;
   using Token = std::shared_ptr<void>;  // the listener is called while its token exists
   [[nodiscard]] Token listen(Listener listener);
-  bool has_listeners() const { return !listeners_.empty(); }  // false: events need not be made
+  bool has_listeners() const { return !listeners_.empty(); }  // if false, events need not be made
 
   void publish(const v1::Event& event);
-  // These make and publish an event, only if there are listeners.
+  // These functions make and publish an event if there are listeners.
   void publish_client(const std::string& sonar, const std::string& client, bool connected, const std::string& why);
   void publish_pose(const std::string& vehicle, bool stale, const std::string& text);
   void publish_scene(const std::string& scene, const std::string& text);

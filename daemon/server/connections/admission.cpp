@@ -11,14 +11,14 @@
 namespace sonar {
 namespace {
 
-constexpr auto accept_pause = std::chrono::milliseconds(100);  // after a failed accept
+constexpr auto accept_pause = std::chrono::milliseconds(100);  // pause after a failed accept
 constexpr auto spell = std::chrono::seconds(60);               // after this time without a refusal, the next refusal is logged
 
 constexpr std::uint64_t most_kept_for_drivers = 64;
 
 int open_reserve() { return ::open("/dev/null", O_RDONLY | O_CLOEXEC); }
 
-/// Reads what has arrived: closing a socket with unread bytes would send RST in place of FIN.
+/// Reads the received bytes first, because closing a socket with unread bytes would send RST, not FIN.
 void close_politely(int descriptor) {
   std::array<char, 4096> dustbin;
   for (int reads = 0; reads < 16 && ::recv(descriptor, dustbin.data(), dustbin.size(), MSG_DONTWAIT) > 0; ++reads) {
@@ -32,12 +32,12 @@ std::uint64_t most_descriptors() {
   return static_cast<std::uint64_t>(limit.rlim_cur);
 }
 
-/// At least half of the descriptors are for clients.
+/// Returns the number of spare descriptors, at most half of all.
 std::uint64_t spare_of(const LimitConfig& limits) {
   return std::min(static_cast<std::uint64_t>(limits.spare_descriptors), most_descriptors() / 2);
 }
 
-/// The first descriptor number that this purpose may not use. The kernel hands out the lowest free number.
+/// Returns the first descriptor number that this purpose may not use. The kernel assigns the lowest free number.
 std::uint64_t first_spare(const LimitConfig& limits, Admission::Purpose purpose) {
   const std::uint64_t most = most_descriptors(), spare = spare_of(limits);
   return most - (purpose == Admission::Purpose::control ? spare / 2 : spare);
@@ -96,13 +96,13 @@ bool Admission::leaves_spare(const tcp::socket& socket, Purpose purpose) {
   return false;
 }
 
-/// The descriptors just below the reserved ones are for drivers.
+/// True for the descriptors just below the reserved ones, which are for drivers.
 bool Admission::is_drivers(const tcp::socket& socket) const {
   const std::uint64_t for_drivers = std::min(most_kept_for_drivers, most_descriptors() / 8);
   return number_of(socket) >= first_spare(limits_, Purpose::client) - for_drivers;
 }
 
-/// The slot counts while a copy of it exists, even after the end of this object.
+/// Returns a slot, which is in use while a copy of it exists, even after the end of this object.
 Admission::Place Admission::enter(const tcp::socket& socket) {
   if (!leaves_spare(socket, Purpose::client)) return {};
   if (*count_ >= static_cast<std::uint64_t>(limits_.clients)) {
@@ -136,8 +136,8 @@ asio::awaitable<std::optional<tcp::socket>> Admission::next_visitor(tcp::accepto
 
 bool Admission::send_away(tcp::acceptor& acceptor, const error_code& why) {
   if (why.value() != EMFILE && why.value() != ENFILE) return false;
-  // Without a free descriptor accept() fails and the client waits in the backlog: the reserve is given up for a moment to accept
-  // and close its connection.
+  // Without a free descriptor accept() fails and the client waits in the backlog. So the reserved descriptor is closed for a
+  // moment, to accept and close the connection of the client.
   if (reserve_ >= 0) ::close(reserve_);
   const int visitor = ::accept4(acceptor.native_handle(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
   if (visitor >= 0) {

@@ -1,11 +1,11 @@
-// Limits the number of connected clients of all sonars, and handles a shortage of file descriptors. App owns it; every listener
-// calls it for each socket that it accepts. I/O thread only.
+// Limits the number of connected clients of all sonars, and handles a shortage of file descriptors. App owns the only Admission;
+// every listener calls it for each accepted socket, in the I/O thread.
 //
-// The highest descriptor numbers of the process are not used for clients of sonars, so that the daemon can always open a log or
-// a scene; half of them are only for control, so that users can query the cause. Some numbers below these are for drivers: pose
-// senders and control get one only if one of their own connections is closed for it. If descriptors run out nevertheless, a
-// reserved one is used to accept and close connections, which would otherwise stay in the listener's queue and wake it again
-// and again.
+// The highest descriptor numbers of the process are not used for clients of sonars, so that the daemon can always open a log or a
+// scene; half of these numbers are only for control, so that users can query the cause. Some lower numbers are for drivers: pose
+// senders and control get such a number only if one of their own connections is closed. If descriptors run out nevertheless, a
+// reserved one is used to accept and close connections, which would otherwise stay in the listener's queue and wake the listener
+// repeatedly.
 #pragma once
 
 #include <chrono>
@@ -20,13 +20,13 @@
 
 namespace sonar {
 
-/// Raises the soft limit of open file descriptors to the hard one.
+/// Raises the soft limit of open file descriptors to the hard limit.
 void raise_descriptor_limit();
 
 class Admission {
  public:
-  /// The slot of a client. The owner of the socket holds it; the slot becomes free when the last copy is destroyed. Empty if none
-  /// is free.
+  /// The slot of a client. The owner of the socket holds it; the slot becomes free when the last copy is destroyed. Empty if no
+  /// slot is free.
   using Place = std::shared_ptr<const void>;
 
   Admission(const LimitConfig& limits, Log& log);
@@ -39,18 +39,19 @@ class Admission {
   /// Requests a slot for a socket that was just accepted. If the result is empty, close the socket; the first refusal of a
   /// series is logged.
   Place enter(const tcp::socket& socket);
-  /// True if a socket that is not a driver's has a descriptor reserved for drivers, or a higher one. A connection of the same
-  /// listener must then be closed.
+  /// True if the descriptor of a socket that is not from a driver is reserved for drivers, or higher. Another connection of the
+  /// same listener must then be closed.
   bool is_drivers(const tcp::socket& socket) const;
   /// Accepts the next connection of a listener, with any descriptor. nullopt: the listener is closed.
   asio::awaitable<std::optional<tcp::socket>> accept(tcp::acceptor& acceptor);
-  /// Accepts the next connection of a listener without slots here, with a descriptor outside the reserve. nullopt: as accept().
+  /// Accepts the next connection of a listener that has no slots here, with a descriptor outside the reserve. nullopt: the
+  /// listener is closed.
   asio::awaitable<std::optional<tcp::socket>> next_visitor(tcp::acceptor& acceptor, Purpose purpose);
 
-  /// The limits per address at the ports of all sonars.
+  /// Returns the limits per address at the ports of all sonars.
   PortGuard& guard() { return guard_; }
 
-  /// The number of clients: connected, waiting and being refused.
+  /// Returns the number of clients: connected, waiting and being refused.
   std::uint64_t now() const { return *count_; }
   std::uint64_t refused_for_places() const { return for_places_; }
   std::uint64_t refused_for_descriptors() const { return for_descriptors_; }
@@ -60,8 +61,8 @@ class Admission {
   void log_first(Steady::time_point& last, const char* what);
   /// Returns false, and logs a line, if the descriptor is a reserved one.
   bool leaves_spare(const tcp::socket& socket, Purpose purpose);
-  /// Call it when accept() failed with `why`. Returns true if descriptors had run out and a waiting client was accepted and
-  /// closed; then accept again.
+  /// Call it when accept() failed with `why`. Returns true if descriptors had run out, and a waiting client was accepted and
+  /// closed; then call accept() again.
   bool send_away(tcp::acceptor& acceptor, const error_code& why);
 
   const LimitConfig& limits_;

@@ -1,7 +1,7 @@
-// A listener whose connections each hold a slot; used by both control servers and the HTTP of sonars. If all slots are taken, a
-// connection is closed for the new one (connection_slots.hpp selects it). If a token is required, clients that have not sent it
-// yet have separate slots, so that they can only evict each other, first those of the address with most connections. The
-// Connection class reads and writes the socket.
+// A listener whose connections each hold a slot, for both control servers and the HTTP of sonars. If all slots are in use, a new
+// connection evicts another (connection_slots.hpp selects it). If a token is required, clients that have not sent it yet have
+// separate slots, so that they can only evict each other, first clients of the address with most connections. The Connection
+// class reads and writes the socket.
 #pragma once
 
 #include <functional>
@@ -21,7 +21,7 @@ class ConnectionListener {
  public:
   using Make = std::function<std::shared_ptr<Connection>(tcp::socket, Sender)>;
 
-  /// `protocol` is its name in the log: "protobuf", "http". `services` must outlive the listener.
+  /// `protocol`: name of the protocol in the log, such as "protobuf" or "http". `services` must outlive the listener.
   ConnectionListener(ConnectionServices& services, std::string protocol, Make make)
       : services_(services),
         protocol_(std::move(protocol)),
@@ -40,10 +40,10 @@ class ConnectionListener {
     untrusted_.close_all();
     rejected_.close_all();
   }
-  /// Port 0 = not listening.
+  /// Returns the address; port 0 = not listening.
   Endpoint at() const { return listener_.at(); }
   bool is_open() const { return listener_.is_open(); }
-  /// Returns true after stop() if no connection is left.
+  /// True after stop() if no connection is left.
   bool gone() const { return running_ == 0; }
 
  private:
@@ -54,12 +54,12 @@ class ConnectionListener {
   void admit(tcp::socket socket) {
     error_code ec;
     const auto peer = socket.remote_endpoint(ec);
-    if (ec) return;  // closed already
+    if (ec) return;  // the socket is closed already
     const std::string address = peer.address().to_string();
     const Sender sender{protocol_ + " tcp " + address + ":" + std::to_string(peer.port()), protocol_ + " " + address};
     const bool untrusted = services_.token.needed();
     ConnectionSlots<Connection>& slots = untrusted ? untrusted_ : slots_;
-    // Clients of sonars count for limits.clients; control has only its own slots.
+    // Clients of sonars count for limits.clients; control has separate slots.
     Admission::Place place;
     if (services_.purpose == Admission::Purpose::client) {
       place = services_.admission.enter(socket);
@@ -91,7 +91,7 @@ class ConnectionListener {
     slots_.add(connection);
     return true;
   }
-  /// Sends the reason before closing; beyond most_rejected connections, closes at once.
+  /// Sends the reason, then closes; beyond most_rejected connections, closes at once.
   void reject(tcp::socket socket, const Sender& sender) {
     if (!rejected_.make_room(sender.source, [](const Connection&) {})) return;
     auto connection = make_(std::move(socket), sender);
@@ -120,7 +120,7 @@ class ConnectionListener {
   Listener listener_;
   ConnectionSlots<Connection> slots_, rejected_{most_rejected};
   ConnectionSlots<Connection> untrusted_{most_untrusted, Steady::duration{}, address_of_client};
-  std::size_t running_ = 0;  // coroutines of connections
+  std::size_t running_ = 0;  // number of running coroutines of connections
 };
 
 }  // namespace sonar

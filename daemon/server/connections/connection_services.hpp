@@ -1,4 +1,4 @@
-// Shared services of TCP connections of control and of sonars' HTTP: limits, admission, the token, the log.
+// Services that the TCP connections of control and of sonars' HTTP share: limits, admission, the token, the log.
 #pragma once
 
 #include <chrono>
@@ -21,19 +21,19 @@ struct ConnectionServices {
   const LimitConfig& limits;
   Admission& admission;
   Log& log;
-  std::string server;  // for the log: "control", "sonar NAME"
+  std::string server;  // name in the log: "control" or "sonar NAME"
   Admission::Purpose purpose = Admission::Purpose::control;
   Token token = {};  // without a token every client is trusted
   LogLimiter refusals = {}, notices = {}, faults = {};
   WorkRate work = {};
 
-  /// The time that a client must wait after this much work.
+  /// Returns the time that a client must wait after this much work.
   WorkRate::Steady::duration pause_after(const Sender& of, std::size_t amount);
 };
 
-inline constexpr std::chrono::seconds greeting_limit{10};    // for the Hello, or to complete an HTTP request that has begun
-inline constexpr std::chrono::seconds keep_alive_limit{60};  // between two HTTP requests
-inline constexpr std::chrono::minutes operation_limit{5};    // after which HTTP stops waiting for a scene to load
+inline constexpr std::chrono::seconds greeting_limit{10};    // limit for the Hello, or to complete an HTTP request
+inline constexpr std::chrono::seconds keep_alive_limit{60};  // limit between two HTTP requests
+inline constexpr std::chrono::minutes operation_limit{5};    // time for which HTTP waits for a scene to load
 
 /// Logs a refusal at a limited rate, because any client can cause it.
 void log_refusal(ConnectionServices& services, const std::string& why, const std::string& from);
@@ -58,12 +58,13 @@ class Deadline : public std::enable_shared_from_this<Deadline> {
   bool passed() const { return passed_; }
 
  private:
-  tcp::socket& socket_;  // socket of the connection that owns this
+  tcp::socket& socket_;  // socket of the connection that owns this object
   asio::steady_timer timer_;
   bool passed_ = false;
 };
 
-/// Writes all bytes, which must stay valid meanwhile. Returns false if the client closed, or read no byte for limits.stall.
+/// Writes all bytes, which must stay valid meanwhile. Returns false if the client closed the connection, or read no byte for
+/// limits.stall.
 asio::awaitable<bool> write_whole(ConnectionServices& services, tcp::socket& socket, Deadline& stall, const Sender& to,
                                   asio::const_buffer bytes);
 

@@ -1,5 +1,5 @@
-// A bounded set of connections of one listener. If all slots are taken, a new connection evicts one of the address with most
-// connections: first one without a request so far, then the one that has been idle longest.
+// A bounded set of connections of one listener. If all slots are in use, a new connection evicts one of the address with most
+// connections: a connection without a request so far or, if there is none, the one that has been idle longest.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,8 @@
 
 namespace sonar {
 
-/// A Connection has `active_at` (steady clock: arrival, or last useful activity), `proved` (it has sent something useful: a
-/// whole request, a pose) and close(), after which its coroutines return.
+/// A Connection has `active_at` (steady time of the arrival or the last useful activity), `proved` (true after a whole request or
+/// a pose) and close(), which makes its coroutines return.
 template <class Connection>
 class ConnectionSlots {
  public:
@@ -26,7 +26,7 @@ class ConnectionSlots {
   /// A connection with useful activity within `busy` is evicted only for an owner that has fewer connections.
   explicit ConnectionSlots(std::size_t most, Silence busy = std::chrono::seconds(1), Owner owner = {})
       : most_(most), busy_(busy), owner_(std::move(owner)) {}
-  /// Returns true if a slot is free for a connection of `owner`. Evicts a connection if necessary, after calling `evicted` with
+  /// Returns true if a slot is free for a connection of `owner`. If necessary, calls `evicted` with a connection and then evicts
   /// it.
   template <class Evicted>
   bool make_room(const std::string& owner, Evicted&& evicted) {

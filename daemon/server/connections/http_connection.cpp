@@ -11,11 +11,11 @@ namespace sonar {
 namespace {
 
 namespace http = boost::beast::http;
-constexpr std::chrono::seconds drain_limit{2};  // for discarding input after our last answer
+constexpr std::chrono::seconds drain_limit{2};  // limit for discarding input after the last answer
 
 const HttpRefusal too_many{503, "too many connections are open"};
 
-/// The head that all answers share. The status line is HTTP/1.1 for HTTP/1.0 clients too (RFC 9112, 2.3).
+/// Fills in the header fields that all answers share. The status line is HTTP/1.1 for HTTP/1.0 clients too (RFC 9112, 2.3).
 template <class Body>
 http::response<Body> response_of(unsigned status, const std::string& type) {
   http::response<Body> response;
@@ -89,7 +89,7 @@ HttpConnection::HttpConnection(ConnectionServices& services, HttpService& servic
   if (!ec && peer.address().is_v4()) peer_ = peer.address().to_v4().to_bytes();
 }
 
-/// Ends all waits; both coroutines then return.
+/// Ends all waits, so that both coroutines return.
 void HttpConnection::close() {
   if (takeover_ && !over()) takeover_->on_closing();
   error_code ec;
@@ -108,10 +108,10 @@ void HttpConnection::reject() {
 
 // ---- requests
 
-// Two coroutines: read() fills the parser and passes on one request; write() answers it and calls next_request(). While a
-// request is being answered (busy_), nothing is read: pipelined requests wait in the parser and in the kernel, and are answered
-// in order (RFC 9112, 9.3.2). Time limits: greeting_limit to complete a request, keep_alive_limit between requests, none while
-// an answer is made.
+// There are two coroutines: read() fills the parser and passes on one request; write() answers it and calls next_request(). While
+// a request is being answered (busy_), nothing is read: pipelined requests wait in the parser and in the kernel, and are answered
+// in order (RFC 9112, 9.3.2). The time limits are greeting_limit to complete a request, and keep_alive_limit between requests;
+// there is none while an answer is made.
 asio::awaitable<void> HttpConnection::read() {
   std::vector<std::byte> buffer(16384);
   request_limit_->within(greeting_limit);
@@ -122,7 +122,7 @@ asio::awaitable<void> HttpConnection::read() {
       co_await takeover_->read();
       break;
     }
-    if (busy_ && !discards_) {  // one request at a time; later bytes wait in the kernel
+    if (busy_ && !discards_) {  // there is one request at a time; later bytes wait in the kernel
       co_await wake_reader_.async_wait(into(ec));
       continue;
     }
@@ -169,7 +169,7 @@ void HttpConnection::hand_over() {
   wake_writer_.cancel();
 }
 
-/// Call it when an answer is sent. A request that has already been received is answered at once; otherwise keep_alive_limit
+/// Called when an answer is sent. A request that has already been received is answered at once; otherwise keep_alive_limit
 /// begins.
 void HttpConnection::next_request() {
   busy_ = false;
@@ -178,8 +178,8 @@ void HttpConnection::next_request() {
   wake_reader_.cancel();
 }
 
-/// Closing while the client still sends would cause an RST, which may destroy our last answer; so input is discarded for a
-/// moment first.
+/// Discards input for a moment before closing, because closing while the client still sends would cause an RST, which may destroy
+/// the last answer.
 void HttpConnection::finish_sending() {
   all_sent_ = true;
   if (peer_closed_ || over()) return close();
@@ -198,7 +198,7 @@ asio::awaitable<void> HttpConnection::write() {
     if (std::exchange(continue_asked_, false)) {
       if (!co_await write_whole(bytes_of(http::response<http::empty_body>(http::status::continue_, 11), Part::head))) break;
     } else if (refusal_) {
-      if (refusal_->status != 503) log_refusal(services_, refusal_->why, sender_.id);  // 503: logged by the listener
+      if (refusal_->status != 503) log_refusal(services_, refusal_->why, sender_.id);  // the listener logs 503
       co_await write_answer(service_.refusal(*refusal_), {false, false, true});
       break;
     } else if (request_) {
@@ -219,7 +219,7 @@ bool HttpConnection::has_slot(const HttpRequest& request) {
   return !services_.token.matches(bearer_token(request.authorization)) || claim_slot();
 }
 
-/// There are three kinds of answers: a stream until the client disconnects, a takeover by another protocol, a document.
+/// An answer is a stream until the client disconnects, a takeover by another protocol, or a document.
 asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!has_slot(request)) {
     refusal_ = too_many;
@@ -252,9 +252,9 @@ asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!over()) next_request();
 }
 
-/// HTTP/1.1 clients get chunks. HTTP/1.0 has no chunks (RFC 9112, 6.1): the end of the connection ends the body.
+/// Writes chunks to HTTP/1.1 clients. HTTP/1.0 has no chunks (RFC 9112, 6.1), so the end of the connection ends the body.
 asio::awaitable<void> HttpConnection::write_stream(HttpStream stream, Head head) {
-  discards_ = true;  // reading continues, to notice that the client disconnects
+  discards_ = true;  // reading continues, to detect that the client disconnects
   wake_reader_.cancel();
   if (!co_await write_whole(head_of_stream(stream.type, !head.http_1_0)) || head.without_body) co_return;
   const auto subscription = stream.subscribe([weak = weak_from_this()] {

@@ -54,7 +54,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
   using Steady = std::chrono::steady_clock;
 
-  /// `services` and `service` must outlive it.
+  /// `services` and `service` must outlive the connection.
   HttpConnection(ConnectionServices& services, HttpService& service, tcp::socket socket, const Sender& sender);
 
   asio::awaitable<void> read();
@@ -67,11 +67,11 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   /// if no slot is free.
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
-  /// Our end of the connection.
+  /// Returns the address of this end of the connection.
   Endpoint reached() const { return reached_; }
-  /// The address of the other end.
+  /// Returns the address of the other end.
   Ipv4 peer() const { return peer_; }
-  /// Claims a slot for a client whose token the service has checked itself. Returns false if no slot is free.
+  /// Claims a slot for a client whose token the service has checked. Returns false if no slot is free.
   bool claim_slot() { return !claim_slot_ || std::exchange(claim_slot_, nullptr)(); }
   /// The socket, for an HttpTakeover.
   tcp::socket& socket() { return socket_; }
@@ -80,11 +80,11 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
 
   /// Counts work in addition to the size of the answer.
   void charge(std::size_t work) { services_.pause_after(sender_, work); }
-  /// The time that an HttpTakeover must wait after this much work.
+  /// Returns the time that an HttpTakeover must wait after this much work.
   Steady::duration pause_after(std::size_t work) { return services_.pause_after(sender_, work); }
 
   Steady::time_point active_at = Steady::now();  // time of the last whole request or answer
-  bool proved = false;                           // a whole request has arrived
+  bool proved = false;                           // true: a whole request has arrived
 
  private:
   struct Head {  // head of the answer to a request
@@ -103,22 +103,22 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   ConnectionServices& services_;
   HttpService& service_;
   tcp::socket socket_;
-  Sender sender_;  // the address without the port, which differs for each connection of a program
+  Sender sender_;  // address without the port, because each connection of a program has another port
   Endpoint reached_;
   Ipv4 peer_{};
   std::shared_ptr<Deadline> request_limit_, stall_;
   asio::steady_timer wake_reader_, wake_writer_, wake_operation_, rest_;
   HttpReader reader_;
-  std::optional<HttpRequest> request_;  // read, not yet answered
+  std::optional<HttpRequest> request_;  // request that is not yet answered
   std::optional<HttpRefusal> refusal_;  // refusal of a request that cannot be parsed
   std::function<bool()> claim_slot_;    // empty: the client is trusted
   std::shared_ptr<HttpTakeover> takeover_;
-  std::size_t unsettled_ = 0;    // work of the answer, not counted yet
-  bool continue_asked_ = false;  // send "100 Continue"
-  bool busy_ = false;            // a request is being answered
-  bool discards_ = false;        // input is discarded
-  bool peer_closed_ = false;     // the client sends no more
-  bool all_sent_ = false;        // we send no more
+  std::size_t unsettled_ = 0;    // work of the answer that is not counted yet
+  bool continue_asked_ = false;  // true: "100 Continue" must be sent
+  bool busy_ = false;            // true: a request is being answered
+  bool discards_ = false;        // true: input is discarded
+  bool peer_closed_ = false;     // true: the client sends no more
+  bool all_sent_ = false;        // true: the server sends no more
 };
 
 }  // namespace sonar

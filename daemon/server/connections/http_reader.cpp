@@ -9,7 +9,7 @@ namespace sonar {
 namespace {
 
 namespace http = boost::beast::http;
-constexpr std::size_t shortest_last_chunk = 5;     // "0", twice the end of a line
+constexpr std::size_t shortest_last_chunk = 5;     // "0" and two line ends
 constexpr std::size_t longest_unread = 64u << 10;  // Beast does not limit chunk headers and trailers
 
 std::string text_of(boost::beast::string_view view) { return {view.data(), view.size()}; }
@@ -26,7 +26,7 @@ HttpRefusal refusal_of(const boost::beast::error_code& ec, std::size_t most_body
   return {400, "this is not an HTTP request: " + ec.message()};
 }
 
-/// Values of all headers of the name, joined (RFC 9110, 5.3).
+/// Returns the values of all headers with the name, joined (RFC 9110, 5.3).
 std::string joined(const http::request<http::string_body>& message, http::field name) {
   std::string all;
   const auto [first, last] = message.equal_range(name);
@@ -34,7 +34,7 @@ std::string joined(const http::request<http::string_body>& message, http::field 
   return all;
 }
 
-/// Detects a Transfer-Encoding for which other parsers could find another end of the body; such a request is refused (RFC 9112,
+/// True for a Transfer-Encoding with which other parsers could find another end of the body; such a request is refused (RFC 9112,
 /// 6.1).
 bool has_other_coding(const http::request<http::string_body>& head) {
   return head.count(http::field::transfer_encoding) > 0 &&
@@ -88,12 +88,12 @@ void HttpReader::feed(std::span<const std::byte> received) {
 
 bool HttpReader::begun() const { return !buffer_.empty() || parser_->beast.got_some(); }
 
-/// Feeds Beast until a request is complete or more bytes are needed. Each request has a new parser, because limits and state
-/// are per request.
+/// Passes bytes to Beast until a request is complete or more bytes are needed. Each request has a new parser, because limits and
+/// state are per request.
 tl::expected<std::optional<HttpRequest>, HttpRefusal> HttpReader::next() {
   auto& beast = parser_->beast;
   while (!buffer_.empty() && !beast.is_done()) {
-    // Beast 1.74 assumes five bytes when it parses a last chunk again. A complete last chunk has at least five.
+    // Beast 1.74 assumes five bytes when it parses a last chunk again. A complete last chunk has at least five bytes.
     if (beast.is_header_done() && beast.chunked() && buffer_.size() < shortest_last_chunk) break;
     boost::beast::error_code ec;
     const std::size_t used = beast.put(boost::asio::const_buffer(buffer_.data(), buffer_.size()), ec);

@@ -1,4 +1,4 @@
-// Parses HTTP requests from a byte stream, with limits on all sizes. It wraps Beast's parser without I/O; the stream may arrive
+// Parses HTTP requests from a byte stream, with limits on all sizes. It uses Beast's parser, without I/O; the stream may arrive
 // in any pieces.
 #pragma once
 
@@ -21,7 +21,7 @@ struct HttpAnswer {
   std::string body;
   std::string type = "application/json";
   std::string allow = {};  // Allow header of status 405
-  std::string why = {};    // the reason of a refusal, for the log; empty = no line
+  std::string why = {};    // the reason for a refusal, for the log; empty = no line
   std::vector<std::pair<std::string, std::string>> headers = {};
 };
 
@@ -30,7 +30,7 @@ struct HttpRequest {
   // Values of headers as received; several headers with the same name are joined by ", ".
   std::string upgrade, connection, accept, accept_encoding, if_none_match;
   std::string socket_key, socket_version, socket_protocols;  // Sec-WebSocket-...
-  bool bytes_behind = false;                                 // bytes after the request had already arrived
+  bool bytes_behind = false;                                 // true: bytes after the request had already arrived
   bool http_1_0 = false, keep_alive = true;
   bool has_host = false, has_origin = false;
 };
@@ -43,13 +43,13 @@ class HttpReader {
  public:
   static constexpr std::size_t longest_header = 8192, longest_body = std::size_t{1} << 20;
 
-  /// `most_body`: bytes, at most longest_body.
+  /// `most_body`: limit of a body [bytes], at most longest_body.
   explicit HttpReader(std::size_t most_body = longest_body);
   ~HttpReader();
   void feed(std::span<const std::byte> received);
-  /// The next whole request; nullopt if more bytes are needed. After a refusal there are no more.
+  /// Returns the next whole request; nullopt if more bytes are needed. Do not call it after a refusal.
   tl::expected<std::optional<HttpRequest>, HttpRefusal> next();
-  /// True once per request, if its header asks for "100 Continue" before the body is sent.
+  /// Returns true once per request, if the header asks for "100 Continue" before the body is sent.
   bool asks_to_continue();
   /// True if a part of a request has been received.
   bool begun() const;

@@ -16,7 +16,7 @@ namespace sonar {
 class InputRate {
  public:
   using Steady = std::chrono::steady_clock;
-  /// Allows the bytes of one second at once after a pause. 0 bytes a second: no limit.
+  /// After a pause, allows the bytes of one second at once. `bytes_per_s` 0 = no limit.
   explicit InputRate(std::size_t bytes_per_s) : rate_(static_cast<double>(bytes_per_s)), tokens_(rate_) {}
   /// Changes the rate from now on.
   void use(std::size_t bytes_per_s) { rate_ = static_cast<double>(bytes_per_s); }
@@ -26,7 +26,7 @@ class InputRate {
     tokens_ = std::max(tokens_, -rate_ * std::chrono::duration<double>(longest).count());
   }
 
-  /// Bytes that may be read now without a pause after them.
+  /// Returns the number of bytes that may be read now without a pause after them.
   std::size_t left(Steady::time_point now) const {
     if (rate_ <= 0) return std::numeric_limits<std::size_t>::max();
     const double tokens =
@@ -51,8 +51,8 @@ class InputRate {
   Steady::time_point last_{};
 };
 
-// Limits the rate at which the bytes of several clients are read: one token bucket for all. A client within its fair share of
-// the rate never waits; when the bucket is empty, only the others wait. Pure arithmetic, like InputRate.
+// Limits the rate at which the bytes of several clients are read, with one token bucket for all. A client within its fair share
+// of the rate never waits; when the bucket is empty, only clients above their share wait.
 
 class SharedRate {
  public:
@@ -73,12 +73,12 @@ class SharedRate {
     return Part(counted_);
   }
 
-  /// The share of one client, bytes a second.
+  /// Returns the share of one client [bytes per second].
   std::size_t share() const {
     const auto parts = static_cast<std::size_t>(std::max(counted_.use_count() - 1, 1L));
     return std::max<std::size_t>(bytes_per_s_ / parts, 1);
   }
-  /// Bytes of the client that may be read now without a pause after them.
+  /// Returns the number of bytes of the client that may be read now without a pause after them.
   std::size_t left(const Part& part, Steady::time_point now) const {
     return std::max(std::min(part.share_.left(now), share()), together_.left(now));
   }
@@ -91,10 +91,10 @@ class SharedRate {
   }
 
  private:
-  static constexpr std::size_t at_once = 4096;  // limit for a new sender; a larger one would reward repeated connecting
+  static constexpr std::size_t at_once = 4096;  // first allowance of a client; a larger one would reward repeated connecting
   std::size_t bytes_per_s_;
   InputRate together_;
-  std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // shared with each Part, which it counts
+  std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // its use count is the number of Parts + 1
 };
 
 /// Work in bytes. Measured: a byte costs at most 50 ns of the I/O thread, so the default rate uses at most 5 % of its time.

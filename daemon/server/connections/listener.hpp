@@ -1,5 +1,4 @@
-// A listening TCP socket and its accept loop: sonars, control and poses use it. An error of one connection does not end the
-// loop.
+// A listening TCP socket and its accept loop, for sonars, control and poses. An error of one connection does not end the loop.
 #pragma once
 
 #include <functional>
@@ -17,12 +16,12 @@ class Listener {
   using Take = std::function<void(tcp::socket)>;
   using Fault = std::function<void(const std::string&)>;
 
-  /// `purpose` selects the reserved descriptors that may be used. If it is nullopt, the caller requests a slot of `admission`
-  /// itself. `admission` must outlive the listener.
+  /// `purpose` selects the reserved descriptors that may be used; nullopt: the caller requests a slot of `admission`. `admission`
+  /// must outlive the listener.
   Listener(asio::io_context& io, Admission& admission, std::optional<Admission::Purpose> purpose)
       : admission_(admission), purpose_(purpose), acceptor_(io), reopen_timer_(io) {}
 
-  /// With port 0 the system chooses a port. After an error the object does not listen.
+  /// Opens the socket. With port 0 the system chooses a port. After an error the object does not listen.
   Result<void> open(Endpoint at);
   /// Passes each connection to `take`, and the text of an exception to `fault`. Does nothing if the listener is not open. The
   /// object must exist for 100 ms after stop(), the longest pause in Admission.
@@ -30,10 +29,10 @@ class Listener {
   void stop();
   /// Closes the socket, so that connections are refused as at a port without a listener.
   void pause();
-  /// Accepts connections again, at the same address and port. While another program uses that port it retries, and passes the
-  /// reason to `taken` once.
+  /// Accepts connections again, at the same address and port. Retries while another program uses that port, and passes the reason
+  /// to `taken` once.
   void resume(Fault taken);
-  /// Returns true also while paused.
+  /// True also while paused.
   bool is_open() const { return acceptor_.is_open() || paused_; }
   /// Returns the address, with the port that the system chose. The port is 0 if the listener was never opened.
   Endpoint at() const { return at_; }

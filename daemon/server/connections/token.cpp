@@ -45,7 +45,7 @@ Result<Token> Token::read(const std::filesystem::path& file, std::string& warnin
   return Token(std::move(text));
 }
 
-/// Compares digests: they have equal lengths, and the time of the comparison reveals nothing about the secret.
+/// Compares digests, because they have equal lengths and the time of the comparison reveals nothing about the secret.
 bool Token::matches(std::string_view shown) const {
   if (!needed()) return true;
   const std::string ours = digest_of(secret_), theirs = digest_of(shown);

@@ -1,5 +1,5 @@
-// The shared secret of control clients, from the configuration's control.token_file. Read once at start, compared in constant
-// time, never logged.
+// The shared secret of control clients, from the file control.token_file of the configuration. It is read once at the start,
+// compared in constant time, and never logged.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ class Token {
  public:
   static constexpr std::size_t shortest = 16, longest = 1024;
 
-  Token() = default;  // no token: all clients are authorized
+  Token() = default;  // without a token, all clients are authorized
   explicit Token(std::string secret) : secret_(std::move(secret)) {}
   /// Reads the text of the file without surrounding blanks. Sets `warning` if other users can read the file.
   static Result<Token> read(const std::filesystem::path& file, std::string& warning);

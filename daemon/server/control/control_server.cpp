@@ -14,7 +14,7 @@ using control::StatusCode;
 
 }  // namespace
 
-/// Each branch is a kind of action that the router can choose; the last one is help.
+/// Each branch is a kind of action that the router can choose; the last branch is help.
 asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, HttpConnection& from) {
   RoutedRequest routed = route_request(request, {services_.token, from.reached().ip, config_.hosts});
   if (!routed.pose_refusal.empty()) targets_.poses.refuse(routed.pose_refusal, from.sender());
@@ -35,7 +35,7 @@ asio::awaitable<HttpOutcome> ControlHttp::answer(const HttpRequest& request, Htt
   co_return help;
 }
 
-/// Order of the checks: a live view exists, this client may open it, the recording exists, a slot is free.
+/// Checks in this order: a live view exists, this client may open it, the recording exists, a slot is free.
 HttpOutcome ControlHttp::open_socket(const HttpRequest& request, const SocketAction& asked, HttpConnection& from) {
   if (view_ == nullptr) return answer_of(404, StatusCode::unsupported, "there is no live view");
   auto opened = open_view(request, asked.query, {services_.token, view_->secrets(), from.reached().ip, config_},
@@ -70,7 +70,7 @@ HttpAnswer ControlHttp::health(bool with_text) const {
   return {503, (with_text ? problem : "unhealthy") + "\n", "text/plain"};
 }
 
-/// The result may arrive at once, after minutes, or after the time limit.
+/// Performs an operation. The result may arrive at once, after minutes, or after the time limit.
 asio::awaitable<HttpAnswer> ControlHttp::perform(control::Operation operation, HttpConnection& from) {
   const auto result = std::make_shared<std::optional<OperationResult>>();
   const Operations::Done done = [weak = from.weak_from_this(), result](OperationResult made) {

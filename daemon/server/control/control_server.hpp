@@ -1,5 +1,5 @@
 // The two control interfaces of a running daemon: the control stream (protobuf over TCP) and HTTP with JSON (docs/control.md).
-// Owned by App; Operations executes the requests.
+// App owns them; Operations executes the requests.
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-// The HTTP side of control: routes requests to operations, metrics, health and events (docs/control.md).
+// The HTTP service of control: routes requests to operations, metrics, health and events (docs/control.md).
 
 class ViewFeed;
 
@@ -43,13 +43,13 @@ class ControlServer {
   ControlServer(asio::io_context& io, const ControlConfig& config, const LimitConfig& limits, Admission& admission,
                 Operations& operations, Events& events, PoseIntake& poses, Log& log, ViewFeed* view = nullptr);
 
-  /// Reads the token and opens both listeners. If an address is in use: a warning for a default address, an error for an
-  /// address from the configuration.
+  /// Reads the token and opens both listeners. An address in use is an error if it is from the configuration; a default address
+  /// only causes a warning.
   Result<void> open();
   void start();
   void stop();
 
-  /// The addresses of the listeners, with the ports that the system chose for 0. Port 0 = not listening.
+  /// Return the addresses of the listeners, with the ports that the system chose. Port 0 = not listening.
   Endpoint stream() const { return stream_.at(); }
   Endpoint http() const { return http_.at(); }
 

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// The text format of Prometheus escapes \ and newlines, and in the values of labels also quotes.
+/// Escapes \ and newlines for the text format of Prometheus, and quotes in the values of labels.
 std::string escaped(std::string_view text, bool label) {
   std::string out;
   for (const char c : text) {
@@ -22,7 +22,7 @@ std::string escaped(std::string_view text, bool label) {
   return out;
 }
 
-/// Whole numbers up to 2^53, the largest range that a double represents exactly, are written without an exponent.
+/// Writes whole numbers up to 2^53, the range that a double represents exactly, without an exponent.
 std::string number(double value) {
   std::array<char, 32> text{};
   // Counters are whole numbers, and stay exact up to 2^53.
@@ -56,11 +56,11 @@ void PrometheusText::line(std::string_view suffix, const Labels& labels, const s
 
 void PrometheusText::sample(const Labels& labels, double value) { line("", labels, number(value)); }
 
-// Buckets of the format are cumulative: "le" counts all values up to its bound.
+// Buckets are cumulative: "le" counts all values up to its bound.
 void PrometheusText::sample(const Labels& labels, const Histogram& histogram) {
   std::uint64_t up_to = 0;
   for (std::size_t i = 0; i <= Histogram::bounds_s.size(); ++i) {
-    // Buckets are cumulative: each one contains those before it.
+    // Buckets are cumulative: each bucket contains the previous ones.
     up_to += histogram.counts()[i];
     const std::string bound = i < Histogram::bounds_s.size() ? number(Histogram::bounds_s[i]) : "+Inf";
     Labels with_bound = labels;

@@ -1,5 +1,5 @@
-// Writes the figures in the text format 0.0.4 of Prometheus, with names by its conventions (base units, _total for counters).
-// Pure; Operations::metrics() calls metrics_text, and docs/operations.md explains the counters.
+// Writes the figures in the text format 0.0.4 of Prometheus, with conventional names (base units, _total for counters).
+// Operations::metrics() calls metrics_text, and docs/operations.md explains the counters.
 #pragma once
 
 #include <string>
@@ -35,7 +35,7 @@ class PrometheusText {
 struct DaemonFigures {
   std::string version;
   double uptime_s = 0;
-  std::vector<std::pair<std::string, DeviceFigures>> sonars;  // by name
+  std::vector<std::pair<std::string, DeviceFigures>> sonars;  // name and figures
   PoseCounters poses;
   std::vector<LinkFigures> links;                                                      // MAVLink links
   std::uint64_t clients_now = 0, refused_for_places = 0, refused_for_descriptors = 0;  // sums over all sonars

@@ -13,10 +13,10 @@ using control::response_of;
 using control::StatusCode;
 
 constexpr std::size_t longest_before_hello = 4096;  // bytes that a client may send before its Hello is accepted
-constexpr std::size_t work_of_a_turn = 4096;        // bytes, after which other connections have their turn
+constexpr std::size_t work_of_a_turn = 4096;        // bytes after which other connections have their turn
 constexpr std::size_t least_work = 64;              // cost of a message in addition to its bytes
 constexpr std::size_t skipping_is_cheaper = 16;     // factor by which skipping a pose costs less than accepting it
-constexpr int receive_buffer = 256 << 10;           // bytes; in a larger buffer, waiting poses would only become older
+constexpr int receive_buffer = 256 << 10;           // bytes; a larger buffer would only hold older poses
 constexpr std::chrono::milliseconds between_looks{10};
 
 StatusCode code_of(OperationResult::Code code) {
@@ -115,7 +115,7 @@ asio::awaitable<void> StreamConnection::read() {
       }
       if (const auto pose = std::exchange(newest_pose_, std::nullopt)) accept(*pose, work);
       ending_ = !accept(**message, work);
-      // While a client does not read its answers, its requests are not read, so the number of waiting answers is bounded.
+      // While a client does not read answers, its requests are not read, so the number of waiting answers is bounded.
       while (!over() && answers_.size() + in_progress_ >= most_open_requests) co_await wake_reader_.async_wait(into(ec));
     }
     if (!greeted_ && received > longest_before_hello) ending_ = true;
@@ -125,8 +125,8 @@ asio::awaitable<void> StreamConnection::read() {
   wake_writer_.cancel();  // write() sends the remaining answers, then closes the connection
 }
 
-/// Returns whether the client has used up its share of the rate of poses. Then its poses are skipped, except the newest, so that
-/// no pose takes effect late.
+/// Returns whether the client has used up its share of the rate of poses. Then all but the newest of its poses are skipped, so
+/// that no pose takes effect late.
 bool StreamConnection::is_beyond_pose_rate() {
   if (!pose_rate_) pose_rate_ = targets_.pose_rate.join(services_.limits.pose_bytes_per_s);
   return targets_.pose_rate.left(*pose_rate_, Steady::now()) == 0;
@@ -145,7 +145,8 @@ asio::awaitable<void> StreamConnection::take_newest_pose() {
   co_await limit_rate(work);
 }
 
-/// Waits if the client has exceeded its rate of bytes, or its address the limit of work. Meanwhile input waits in the kernel.
+/// Waits if the client has exceeded its rate of bytes, or if its address has exceeded the limit of work. Meanwhile input waits in
+/// the kernel.
 asio::awaitable<void> StreamConnection::limit_rate(const Work& work) {
   const auto now = Steady::now();
   auto pause = rate_.pause_after(work.bytes, now);
@@ -174,7 +175,7 @@ bool StreamConnection::accept(control::BytesView message, Work& work) {
   }
   if (const auto* hello = std::get_if<control::Hello>(&request->op)) return greet(request->id, *hello);
   if (!greeted_) return refuse_and_end(request->id, StatusCode::refused, "the first message must be a Hello");
-  // Poses without an id have a rate limit of their own; other requests count as work of the address.
+  // Poses without an id have a separate rate limit; other requests count as work of the address.
   if (is_unasked(request->id, request->op))
     work.pose_bytes += message.size() + least_work;
   else
@@ -204,14 +205,14 @@ bool StreamConnection::greet(std::uint64_t id, const control::Hello& hello) {
   return true;
 }
 
-/// The answer is still written before the connection is closed.
+/// Answers with a refusal, which is still written before the connection is closed.
 bool StreamConnection::refuse_and_end(std::uint64_t id, StatusCode code, const std::string& why) {
   log_refusal(services_, why, sender_.id);
   answer(response_of(id, code, why));
   return false;
 }
 
-/// Returns true: no valid request after the greeting ends the connection.
+/// Always returns true, because a valid request after the greeting does not end the connection.
 bool StreamConnection::accept_greeted(const control::Request& request) {
   std::visit(
       [&](const auto& op) {
@@ -229,7 +230,7 @@ bool StreamConnection::accept_greeted(const control::Request& request) {
   return true;
 }
 
-/// The result may arrive after results of later requests, or after the end of this connection.
+/// Performs a request. The result may arrive after results of later requests, or after the end of this connection.
 void StreamConnection::perform(std::uint64_t id, const control::Operation& operation) {
   const bool unasked = is_unasked(id, operation);
   if (!unasked) ++in_progress_;
@@ -248,7 +249,7 @@ void StreamConnection::perform(std::uint64_t id, const control::Operation& opera
   targets_.operations.perform(operation, sender_, done, has_left);
 }
 
-/// A subscription holds a listener only while it selects a kind of event.
+/// Replaces the subscription, which has a listener only while it selects a kind of event.
 void StreamConnection::subscribe(const control::Subscribe& wanted) {
   events_.subscribe(wanted);
   if (!events_.subscribes_any()) {
@@ -268,7 +269,7 @@ void StreamConnection::answer(const v1::Response& response) {
   wake_writer_.cancel();
 }
 
-/// Answers come before events. At the end it waits for requests in progress, so that each gets its answer.
+/// Writes answers before events. At the end it waits for requests in progress, so that each request gets an answer.
 asio::awaitable<void> StreamConnection::write() {
   while (!over()) {
     if (!answers_.empty()) {

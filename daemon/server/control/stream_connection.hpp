@@ -1,5 +1,5 @@
-// One client of the control stream: requests in, answers and events out. One coroutine reads, one writes; answers are sent as
-// operations finish, in any order. Owned by the listener's slots and by its own coroutines.
+// One client of the control stream, which sends requests and gets answers and events. One coroutine reads, another writes;
+// answers are sent as operations finish, in any order. The listener's slots and the coroutines own the object.
 #pragma once
 
 #include <deque>
@@ -29,10 +29,10 @@ struct ControlTargets {
 class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
  public:
   using Steady = std::chrono::steady_clock;
-  /// Limit for requests in progress or with unread answers, at which reading pauses.
+  /// Limit for requests in progress or with unread answers. At the limit, reading pauses.
   static constexpr std::size_t most_open_requests = 64;
 
-  /// `services` and `targets` must outlive it.
+  /// `services` and `targets` must outlive the connection.
   StreamConnection(ConnectionServices& services, ControlTargets& targets, tcp::socket socket, Sender sender);
 
   asio::awaitable<void> read();
@@ -46,12 +46,12 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   void must_claim_slot(std::function<bool()> claim_slot) { claim_slot_ = std::move(claim_slot); }
   const Sender& sender() const { return sender_; }
 
-  Steady::time_point active_at = Steady::now();  // time of the last whole message received or sent (subscribers send nothing)
-  bool proved = false;                           // the client has sent Hello
+  Steady::time_point active_at = Steady::now();  // time of the last whole message, received or (for subscribers) sent
+  bool proved = false;                           // true: the client has sent Hello
 
  private:
   struct Work {
-    std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: the part of `bytes` that is poses without an answer
+    std::size_t bytes = 0, pose_bytes = 0;  // pose_bytes: the part of `bytes` for poses without an answer
   };
   bool accept(control::BytesView message, Work& work);
   bool is_beyond_pose_rate();
@@ -74,15 +74,15 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   control::DelimitedParser parser_;
   InputRate rate_;
   std::optional<SharedRate::Part> pose_rate_;  // set with the first pose without an answer
-  std::optional<control::Bytes> newest_pose_;  // newest of the poses beyond the rate
-  std::deque<control::Bytes> answers_;         // framed
-  std::size_t unsettled_ = 0;                  // bytes of answers and work of requests, not counted yet
+  std::optional<control::Bytes> newest_pose_;  // newest pose beyond the rate
+  std::deque<control::Bytes> answers_;         // framed answers
+  std::size_t unsettled_ = 0;                  // bytes of answers and work of requests that are not counted yet
   std::size_t in_progress_ = 0;                // requests whose answer is not in answers_ yet
   EventQueue events_;
   Events::Token subscription_;
   HttpDetector http_;
   std::function<bool()> claim_slot_;       // empty if the client is trusted
-  bool greeted_ = false, ending_ = false;  // ending_: the last answer is being written
+  bool greeted_ = false, ending_ = false;  // ending_: only the last answer is still written
 };
 
 }  // namespace sonar

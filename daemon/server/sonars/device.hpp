@@ -116,9 +116,9 @@ class Device final : public SessionParent {
   RecordedSonar recorded() const;
   /// Returns a sentence about a problem, or an empty text.
   std::string problem() const;
-  /// Changes settings as a client would. An error states what the product can do; the settings then stay.
+  /// Changes settings as a client would. An error states what the product can do; the settings then do not change.
   Result<void> ask(const control::SetSonar& asked, const std::string& who);
-  /// Takes vehicle and mount from `config`, which is otherwise equal to the present one.
+  /// Uses vehicle and mount of `config`, which is otherwise equal to the present configuration.
   void use_place(const SonarConfig& config) { sonar_.move(config, network_.clock.now()); }
   void use_water(const Water& water);
   /// See Sonar::run_itself.
