@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// At most one reload begins per `pause`. A request within the pause waits for its end; further requests join it.
+/// Begins at most one reload per `pause`. A request within the pause waits for the end of the pause; further requests join it.
 void Reload::request() {
   if (waits_) return;
   const auto now = std::chrono::steady_clock::now();
@@ -32,7 +32,7 @@ void Reload::stop() {
 void Reload::begin() {
   if (!steps_.read_config || !steps_.load_scene) return log_.info("reload: there is no configuration file; nothing changed");
   if (changes_.is_full()) return log_.warning("reload: too many changes of the scene wait already; nothing changed");
-  if (under_way_ == 2) return;  // one reload runs, and the next one waits; it will read the file when it begins
+  if (under_way_ == 2) return;  // one reload runs, and the next one, which waits, will read the file when it begins
   ++under_way_;
   steps_.begin();
   auto next = std::make_shared<Config>();

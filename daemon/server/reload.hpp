@@ -1,5 +1,5 @@
 // Reads the configuration again on request. The scene thread reads the file and builds the scene; then the I/O thread changes
-// everything in one step. App owns it; I/O thread only.
+// everything in one step. App owns the object, and only the I/O thread uses it.
 #pragma once
 
 #include <chrono>
@@ -14,15 +14,15 @@ namespace sonar {
 
 class Reload {
  public:
-  /// Shortest time from the beginning of one reload to that of the next.
+  /// Shortest time between the beginnings of two reloads.
   static constexpr std::chrono::milliseconds pause{500};
 
   /// Steps of a reload, in this order.
   struct Steps {
     std::function<void()> begin;
-    std::function<Result<Config>()> read_config;  // any thread; empty: there is no configuration file
+    std::function<Result<Config>()> read_config;  // may be called on any thread; empty: there is no configuration file
     LoadScene load_scene;
-    std::function<void(Config next)> take_over;  // the new scene is in use; not called after an error
+    std::function<void(Config next)> take_over;  // called when the new scene is in use, but not after an error
     std::function<void()> end;
   };
   Reload(asio::io_context& io, SceneChanges& changes, Log& log, Steps steps)
@@ -40,7 +40,7 @@ class Reload {
   Steps steps_;
   asio::steady_timer timer_;
   int under_way_ = 0;   // number of reloads that run or wait for the running one
-  bool waits_ = false;  // waits for the end of the pause
+  bool waits_ = false;  // true: a reload waits for the end of the pause
   bool stopped_ = false;
   std::chrono::steady_clock::time_point not_before_{};
 };

@@ -16,8 +16,8 @@ class PoseHistory {
   struct Sample {
     Time at{};
     Pose pose;                                    // pose of the body in the world
-    std::optional<Vec3d> velocity_mps;            // body axes
-    std::optional<Vec3d> angular_velocity_radps;  // body axes
+    std::optional<Vec3d> velocity_mps;            // in body axes
+    std::optional<Vec3d> angular_velocity_radps;  // in body axes
   };
   using Motion = motion::Motion;
   static constexpr std::chrono::nanoseconds length = std::chrono::seconds(2);

@@ -11,9 +11,10 @@
 
 namespace sonar {
 
-/// `say` is called with the reason if the CPU replaces a requested device, on the thread that makes or runs the engine. Throws
-/// std::runtime_error, which start_engine converts to a sentence, if a required device is missing. If a device fails later:
-/// EngineUnavailable if it is required; `automatic` continues with the CPU. The pool must outlive the engine.
+/// Makes the engine. `say` is called with the reason if the CPU replaces a requested device, on the thread that makes or runs the
+/// engine. If a required device is missing, throws std::runtime_error, which start_engine converts to a sentence. If a device
+/// fails later, a required one causes EngineUnavailable, and `automatic` continues with the CPU. The pool must outlive the
+/// engine.
 std::unique_ptr<PingEngine> choose_engine(EngineDevice device, std::shared_ptr<const Scene> scene, Parallel& pool,
                                           const EngineOptions& options, std::function<void(const std::string&)> say);
 

@@ -1,5 +1,5 @@
-// Chooses the next ping if several sonars share one engine: that of the sonar with the least used computing time. Also decides
-// whether a ping may start before the present one is finished. Pure: times are passed in.
+// Chooses the next ping if several sonars share one engine: the ping of the sonar with the least used computing time. Also
+// decides whether a ping may start before the present one is finished. Callers pass the times.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ class FairTurns {
   }
   /// Call it when a ping of the sonar begins.
   void begin(std::uint32_t sonar) { floor_s_ = std::max(floor_s_, accounts_[sonar].used_s); }
-  /// Call it when a ping of the sonar is finished. `seconds`: the engine's time for it.
+  /// Call it when a ping of the sonar is finished. `seconds`: time that the engine took.
   void end(std::uint32_t sonar, double seconds) {
     Account& a = accounts_[sonar];
     a.used_s += seconds;
@@ -31,7 +31,7 @@ class FairTurns {
   bool several() const { return accounts_.size() > 1; }
 
   /// True if a ping of `other` should be computed before the rest of a ping of `running`, which has taken `elapsed_s` so far.
-  /// That is so if `other` has used less time and its ping takes less time than that rest.
+  /// The condition is that `other` has used less time, and that its ping takes less time than the rest.
   bool goes_first(std::uint32_t other, std::uint32_t running, double elapsed_s) const {
     const auto a = accounts_.find(other), b = accounts_.find(running);
     if (a == accounts_.end() || b == accounts_.end() || a->second.pings == 0 || b->second.pings == 0) return false;
@@ -45,7 +45,7 @@ class FairTurns {
     std::uint64_t pings = 0;
   };
   std::map<std::uint32_t, Account> accounts_;
-  double floor_s_ = 0;  // used_s of the sonar whose ping began last, when it began
+  double floor_s_ = 0;  // used_s that the sonar of the last begun ping had at the beginning of the ping
 };
 
 }  // namespace sonar

@@ -21,13 +21,13 @@ SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePoin
       on_change_(std::move(on_change)),
       pause_(io) {
   asio::post(thread_, [nice_by] {
-    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // a failure only makes other threads less smooth
+    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // after a failure, this thread only disturbs other threads more
   });
 }
 
 SceneChanges::~SceneChanges() { thread_.join(); }
 
-/// A running build continues; finish() then drops its result.
+/// Stops. A running build continues, but finish() drops its result.
 void SceneChanges::stop() {
   stopped_ = true;
   waiting_.clear();
@@ -66,7 +66,7 @@ std::chrono::steady_clock::duration SceneChanges::pause_before_engine() {
   return std::max(due - now, std::chrono::steady_clock::duration{});
 }
 
-/// The first waiting change, and the changes directly after it that may share its engine.
+/// Returns the first waiting change, and the changes directly after it that may share the engine.
 std::vector<SceneChanges::Make> SceneChanges::next_makes() const {
   std::vector<Make> makes;
   for (const Change& change : waiting_) {
@@ -117,20 +117,20 @@ SceneChanges::Built SceneChanges::build(const std::vector<Make>& makes, const Sc
     built.engine = std::make_shared<std::unique_ptr<PingEngine>>(*std::move(engine));
     return built;
   }
-  // One change may need too much memory, which must not make the others fail; so the first is tried alone.
+  // If one change needs too much memory, other changes must not fail, so the first is tried alone.
   if (makes.size() > 1) return build({makes.front()}, now);
   return {now, nullptr, {tl::make_unexpected(engine.error())}};
 }
 
-/// Runs on the I/O thread. The order matters: first the simulator gets the engine, then the world gets the bodies of the scene,
-/// and only then are the changes reported as done.
+/// Runs on the I/O thread. First the simulator gets the engine, then the world gets the bodies of the scene, and only then are
+/// the changes reported as done.
 void SceneChanges::finish(Built built) {
   building_ = false;
   if (stopped_) return;
   if (built.engine) {
     scene_ = built.scene;
     simulator_.use(std::move(*built.engine), [this](std::shared_ptr<PingEngine> before) {
-      // The old engine's cells may have a hundred megabytes, which are freed on the scene thread to keep the I/O thread fast.
+      // The cells of the old engine may have a hundred megabytes, so the scene thread frees them to keep the I/O thread fast.
       if (!stopped_) asio::post(thread_, [before = std::move(before)]() mutable { before.reset(); });
     });
     in_use_(scene_);
@@ -139,7 +139,7 @@ void SceneChanges::finish(Built built) {
     const auto done = std::move(waiting_.front().done);
     waiting_.pop_front();
     done(outcome);
-    if (stopped_) break;  // no request waits for the result
+    if (stopped_) break;  // after stop() no request waits for the result
   }
   under_way_ = false;
   if (!stopped_ && !waiting_.empty()) begin();

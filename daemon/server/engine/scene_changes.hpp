@@ -1,5 +1,5 @@
 // Loads and changes the scene while pings continue. Changes are made in sequence: a separate thread makes the new scene and
-// builds an engine for it, which then replaces the old one. Waiting edits share one engine. App owns this object; all functions
+// builds an engine, which then replaces the old engine. Waiting edits share one engine. App owns this object; all functions
 // except Change::make are called on the I/O thread.
 //
 // Pings use the old scene until the new one is ready. Then the simulator gets the new engine and the world gets the new moving
@@ -26,13 +26,13 @@ using LoadScene = std::function<Result<ScenePointer>(const SceneFile&)>;
 
 class SceneChanges {
  public:
-  /// Called on the separate thread with the present scene; returns the new scene, or the present one for no change.
+  /// Called on the separate thread with the present scene; returns the new scene, or the present one if nothing changes.
   using Make = std::function<Result<ScenePointer>(const ScenePointer& now)>;
   struct Change {
-    Make make;  // empty: the change only waits for those before it
+    Make make;  // empty: the change only waits for earlier changes
     /// Called on the I/O thread when the new scene is in use, or if nothing was changed. Never called after stop().
     std::function<void(const Result<void>& outcome)> done;
-    bool shares_engine = false;  // shares an engine with other such changes; `done` is then called when all are in use
+    bool shares_engine = false;  // true: shares an engine with other such changes; `done` is called when all are in use
   };
   /// Called when a new scene is in use, before its Change is done.
   using InUse = std::function<void(const ScenePointer& scene)>;
@@ -51,11 +51,11 @@ class SceneChanges {
 
   /// Call it before the first change. The function returns whether drivers are served now, in real time.
   void pace_while(std::function<bool()> drivers_wait) { drivers_wait_ = std::move(drivers_wait); }
-  /// Submits a change. If its `make` is empty and no change waits, it is done before this call returns.
+  /// Submits a change. If `make` is empty and no change waits, the change is done before this call returns.
   void submit(Change change);
   bool busy() const { return under_way_ || !waiting_.empty(); }
   bool is_full() const { return waiting_.size() >= most_waiting; }
-  /// Duration of the present change so far; 0 = none.
+  /// Returns the duration of the present change so far; 0 = none.
   std::chrono::steady_clock::duration building_for() const;
   void stop();
 
@@ -64,7 +64,7 @@ class SceneChanges {
  private:
   struct Built {
     ScenePointer scene;
-    std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene stays
+    std::shared_ptr<std::unique_ptr<PingEngine>> engine;  // empty: the scene does not change
     std::vector<Result<void>> outcomes;                   // outcome of each change
   };
   void begin();
@@ -81,8 +81,8 @@ class SceneChanges {
   EngineFactory make_engine_;
   InUse in_use_;
   std::function<void()> on_change_;
-  std::deque<Change> waiting_;  // the first ones are being made
-  bool under_way_ = false;      // until `done` has returned, which may submit another change
+  std::deque<Change> waiting_;  // begins with the changes that are being made
+  bool under_way_ = false;      // true until `done`, which may submit another change, has returned
   bool stopped_ = false, building_ = false;
   std::chrono::steady_clock::time_point building_since_{}, engine_due_{};
   std::function<bool()> drivers_wait_;

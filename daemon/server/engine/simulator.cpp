@@ -14,7 +14,7 @@ using Steady = std::chrono::steady_clock;
 
 double seconds_since(Steady::time_point begin) { return std::chrono::duration<double>(Steady::now() - begin).count(); }
 
-/// Adds the findings to the ping. This is done here, so that the I/O thread need not do it.
+/// Adds the findings to the ping, so that the I/O thread need not do it.
 std::shared_ptr<const Ping> looked_at(Ping ping) {
   look_at(ping);
   return std::make_shared<const Ping>(std::move(ping));
@@ -33,7 +33,7 @@ Simulator::Simulator(asio::io_context& io, std::unique_ptr<PingEngine> engine, i
   });
 }
 
-// The thread ends when its queue is empty: jobs that were submitted are computed first.
+// The thread ends when its queue is empty, so submitted jobs are computed first.
 Simulator::~Simulator() {
   queue_stays_.reset();
   thread_.join();
@@ -47,7 +47,7 @@ void Simulator::submit(PingRequest request, Done done) {
   });
 }
 
-/// The change of the engine waits in the same queue as pings, so that the old engine computes the pings submitted before it.
+/// Queues the change of the engine with the pings, so that the old engine computes earlier pings.
 void Simulator::use(std::unique_ptr<PingEngine> engine, Retired retired) {
   description_ = engine->description();
   asio::post(queue_, [this, job = Job{{}, {}, std::move(engine), std::move(retired), asio::make_work_guard(io_)}]() mutable {
@@ -61,7 +61,7 @@ std::chrono::nanoseconds Simulator::under_way_for() const {
 
 // ---- the simulation thread
 
-// Called from the queue. run_other() and work_off() poll the queue: then working_ is set, and the job only waits.
+// Called from the queue. If run_other() or work_off() polls the queue, working_ is set and the job only waits.
 void Simulator::arrive(Job job) {
   if (!job.engine) turns_.ask(job.request.sonar_id);
   waiting_.push_back(std::move(job));
@@ -79,12 +79,12 @@ void Simulator::work_off() {
       continue;
     }
     simulate(take_together());
-    queue_.poll();  // requests that arrived meanwhile take part in the choice
+    queue_.poll();  // adds requests that arrived meanwhile to the choice
   }
   working_ = false;
 }
 
-/// The next job, and waiting jobs that the engine can compute together with it.
+/// Returns the next job, and waiting jobs that the engine can compute together with it.
 std::vector<Simulator::Job> Simulator::take_together() {
   std::vector<Job> jobs;
   while (!waiting_.empty() && !waiting_.front().engine) {
@@ -96,7 +96,7 @@ std::vector<Simulator::Job> Simulator::take_together() {
   return jobs;
 }
 
-/// The job whose sonar has used the least time of the present engine; among equals, the one that has waited longest.
+/// Returns the job whose sonar has used the least time of the present engine; among equals, the job that has waited longest.
 std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   auto best = waiting_.begin();
   for (auto it = waiting_.begin(); it != waiting_.end() && !it->engine; ++it)
@@ -104,8 +104,8 @@ std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   return best;
 }
 
-/// Called by the engine between two parts of a ping: first runs a ping of another sonar if that sonar has used less time and
-/// its ping takes less time than the rest of this one.
+/// The engine calls it between two parts of a ping. Runs a ping of another sonar if that sonar has used less time, and its ping
+/// takes less time than the rest of this ping.
 void Simulator::run_other() {
   queue_.poll();
   if (under_way_ > 1 || waiting_.empty() || waiting_.front().engine) return;
@@ -119,13 +119,13 @@ void Simulator::run_other() {
   const std::uint32_t running = running_;
   const double let_in_s = let_in_s_;
   simulate(std::move(job));
-  // The call above has changed the account of the interrupted ping; its time must not include the inner ping.
+  // The call above has begun another account; the time of the interrupted ping must not include the inner ping.
   running_ = running;
   running_since_ = since;
   let_in_s_ = let_in_s + seconds_since(begin);
 }
 
-/// Computes one job, or several if the engine computes them together; each sonar is charged an equal share of the time.
+/// Computes one job, or several jobs together; each sonar is charged an equal share of the time.
 void Simulator::simulate(std::vector<Job> jobs) {
   for (const Job& job : jobs) turns_.begin(job.request.sonar_id);
   running_ = jobs.front().request.sonar_id;
@@ -147,7 +147,7 @@ void Simulator::simulate(std::vector<Job> jobs) {
   }
 }
 
-/// The outcomes are in the order of the jobs.
+/// Returns the outcomes in the order of the jobs.
 std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
   if (jobs.size() == 1) return {run(jobs[0].request)};
   std::vector<Outcome> outcomes(jobs.size());
@@ -157,13 +157,14 @@ std::vector<Simulator::Outcome> Simulator::run(const std::vector<Job>& jobs) {
     std::vector<Ping> pings = engine_->run(requests);
     for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i].ping = looked_at(std::move(pings.at(i)));
     return outcomes;
-  } catch (const std::exception&) {  // one of them failed: all are computed again one by one, so that only that one fails
+  } catch (const std::exception&) {  // all are computed again one by one, so that only the faulty request fails
   }
   for (std::size_t i = 0; i < jobs.size(); ++i) outcomes[i] = run(requests[i]);
   return outcomes;
 }
 
-/// An invalid request or too little memory fails only this ping. Any other exception means that the engine has failed.
+/// Computes a ping. An invalid request, or too little memory, fails only this ping. Any other exception means that the engine has
+/// failed.
 Simulator::Outcome Simulator::run(const PingRequest& request) {
   Outcome outcome;
   try {
@@ -184,7 +185,7 @@ Simulator::Outcome Simulator::run(const PingRequest& request) {
   return outcome;
 }
 
-/// Swaps the engines between two pings. The old one goes back to the I/O thread through `retired`.
+/// Swaps the engines between two pings. `retired` gets the old engine on the I/O thread.
 void Simulator::change_engine(Job job) {
   engine_->set_interruption(nullptr);
   std::swap(engine_, job.engine);

@@ -1,6 +1,6 @@
-// The simulation thread owns the ping engine and computes requests. Several sonars take turns by used time (FairTurns), or are
-// computed together if that is faster (PingEngine::most_together). Requests are passed by value, and finished pings come back
-// on the I/O thread; nothing else is shared.
+// The simulation thread owns the ping engine and computes requests. Several sonars take turns according to the used time
+// (FairTurns), or are computed together if that is faster (PingEngine::most_together). Requests are passed by value, and finished
+// pings come back on the I/O thread; nothing else is shared.
 #pragma once
 
 #include <chrono>
@@ -32,13 +32,13 @@ class Simulator : private Interruption {
   Simulator(const Simulator&) = delete;
   Simulator& operator=(const Simulator&) = delete;
 
-  /// I/O thread. `done` is called there; the I/O thread stays alive until it was.
+  /// Call it on the I/O thread, which also calls `done` and stays alive until then.
   void submit(PingRequest request, Done done);
-  /// I/O thread. Requests submitted from now on go to `engine`. The previous engine is passed to `retired`, on the I/O thread,
-  /// after it has answered the earlier requests.
+  /// Call it on the I/O thread. `engine` gets later requests. When the previous engine has answered the earlier requests, it is
+  /// passed to `retired` on the I/O thread.
   void use(std::unique_ptr<PingEngine> engine, Retired retired);
   const std::string& engine_description() const { return description_; }
-  /// I/O thread. Duration of the engine's present ping so far; 0 = it waits for work.
+  /// Call it on the I/O thread. Returns the duration of the engine's present ping so far; 0 = the engine waits for work.
   std::chrono::nanoseconds under_way_for() const;
 
  private:
@@ -64,9 +64,9 @@ class Simulator : private Interruption {
   asio::io_context& io_;
   std::string description_;
   std::size_t unanswered_ = 0;                     // requests without an answer; this and the next are the I/O thread's
-  std::chrono::steady_clock::time_point begun_{};  // time at which the engine began the oldest of them
+  std::chrono::steady_clock::time_point begun_{};  // time at which the engine began the oldest request
 
-  // The following are the simulation thread's.
+  // Only the simulation thread uses the following members.
   std::shared_ptr<PingEngine> engine_;
   std::list<Job> waiting_;
   FairTurns turns_;

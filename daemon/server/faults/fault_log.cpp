@@ -27,7 +27,7 @@ void FaultLog::append(const std::string& json) {
   if (!writing_) write_pending();
 }
 
-/// Writes one batch at a time; entries that arrive meanwhile form the next batch.
+/// Writes one batch at a time; entries that arrive meanwhile are the next batch.
 void FaultLog::write_pending() {
   writing_ = true;
   const std::uint64_t entries = std::exchange(pending_entries_, 0);
@@ -48,7 +48,7 @@ void FaultLog::write_pending() {
       });
 }
 
-/// Logs one line when losses begin and one when they end, independent of the number of lost entries.
+/// Logs one line when losses begin and one line when they end, independent of the number of lost entries.
 void FaultLog::lose(std::uint64_t entries, const std::string& why) {
   lost_ += entries;
   why_lost_ = why;

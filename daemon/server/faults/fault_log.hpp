@@ -61,7 +61,7 @@ class FaultLog final : public FaultJournal {
   Log& log_;
   std::filesystem::path path_;
   std::shared_ptr<JournalFile> file_;  // used by the writer thread while it writes
-  std::string pending_;                // JSON lines not yet passed to the writer thread
+  std::string pending_;                // JSON lines that the writer thread has not got yet
   std::uint64_t pending_entries_ = 0, lost_ = 0;
   std::string why_lost_;
   bool writing_ = false, losing_ = false;

@@ -24,7 +24,7 @@ bool is_missing(const std::filesystem::path& file) {
   return std::filesystem::status(file, ec).type() == std::filesystem::file_type::not_found;
 }
 
-/// The reason if the file, existing or new, cannot be a journal; else an empty text.
+/// Returns the reason if the file, existing or new, cannot be a journal; else an empty text.
 std::string why_no_journal(const std::filesystem::path& file) {
   std::error_code ec;
   if (std::filesystem::is_block_file(file, ec)) return "is a disk, not a file";
@@ -65,7 +65,7 @@ Result<void> JournalFile::check(const std::filesystem::path& file) {
 
 JournalFile::~JournalFile() { ::close(descriptor_); }
 
-/// Returns the number of written lines; the caller counts the others as lost.
+/// Returns the number of written lines; the caller counts the other lines as lost.
 JournalFile::Written JournalFile::append(std::string_view lines) {
   Written written;
   while (!lines.empty()) {

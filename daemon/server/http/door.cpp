@@ -16,7 +16,7 @@ using control::StatusCode;
 constexpr std::array<std::string_view, 2> protocols = {"foxglove.websocket.v1", "foxglove.sdk.v1"};
 
 HttpAnswer socket_refusal(unsigned status, const std::string& text) { return answer_of(status, StatusCode::refused, text); }
-/// `cure`: the key of the configuration that would allow it, for the log only.
+/// Makes a refusal. `cure`: the configuration that would allow the connection, for the log only.
 HttpAnswer socket_refusal(unsigned status, const std::string& text, const std::string& cure) {
   HttpAnswer answer = socket_refusal(status, text);
   answer.why = text + "; " + cure;
@@ -56,7 +56,8 @@ std::optional<HttpAnswer> wrong_handshake(const HttpRequest& request) {
   return std::nullopt;
 }
 
-/// Accepted secrets: a ticket, for one connection; the token; if no token is configured, the key of this run.
+/// True if the request has a secret: a ticket, which is for one connection; the token; or, if no token is configured, the key of
+/// this run.
 bool shows_secret(const HttpRequest& request, const std::vector<std::pair<std::string, std::string>>& query, const ViewDoor& door,
                   ViewSecrets::Steady::time_point now) {
   if (const std::string ticket = value_of(query, "ticket"); !ticket.empty() && door.secrets.take_ticket(ticket, now)) return true;
@@ -85,8 +86,8 @@ bool ViewSecrets::take_ticket(std::string_view shown, Steady::time_point now) {
   return true;
 }
 
-/// Order of the checks: handshake, protocol, query, secret, origin. With a secret, any page is allowed. Without one, the client
-/// is refused if a token is configured; otherwise the origin decides.
+/// Checks handshake, protocol, query, secret and origin in this order. With a secret, any page is allowed. Without a secret, the
+/// client is refused if a token is configured; otherwise the origin must be allowed.
 std::variant<HttpAnswer, ViewWelcome> open_view(const HttpRequest& request,
                                                 const std::vector<std::pair<std::string, std::string>>& query,
                                                 const ViewDoor& door, ViewSecrets::Steady::time_point now) {

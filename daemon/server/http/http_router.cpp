@@ -19,7 +19,7 @@ HttpAnswer wrong_method(const Route& route) {
   return answer;
 }
 
-/// Parses the body. A name in the path replaces the message's name.
+/// Parses the body. A name in the path replaces the name in the message.
 RoutedRequest operation_of(const Route& route, const std::string& body) {
   const bool pose = route.op == "pose" || route.op == "object";
   auto request = control::request_from_json(route.op, body, route.name);
@@ -58,7 +58,7 @@ HttpAnswer answer_of(unsigned status, StatusCode code, const std::string& text) 
 
 bool wants_socket(const HttpRequest& request) { return request.method == "GET" && header_names(request.upgrade, "websocket"); }
 
-/// The order of the rules matters for security: host, WebSocket, origin, page, token, route, method, body.
+/// Applies the rules in this order, which matters for security: host, WebSocket, origin, page, token, route, method, body.
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy) {
   if (auto answer = reject_host(request, policy)) return {*std::move(answer)};
   const auto target = parse_target(request.target);

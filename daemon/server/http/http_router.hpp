@@ -1,5 +1,5 @@
-// Maps a request to an action, or to the answer that rejects it: the rules of http_rules.hpp in order. Pure; ControlHttp
-// executes the action.
+// Applies the rules of http_rules.hpp in order, to map a request to an action, which ControlHttp executes, or to the answer that
+// rejects the request.
 #pragma once
 
 #include <string>
@@ -13,15 +13,15 @@
 
 namespace sonar {
 
-/// An answer with the body {"code", "text"}, which every answer without a document has.
+/// Makes an answer with the body {"code", "text"}, as every answer without a document.
 HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);
 
-/// GET with "Upgrade: websocket".
+/// True for GET with "Upgrade: websocket".
 bool wants_socket(const HttpRequest& request);
 
 struct HttpPolicy {
   const Token& token;
-  Ipv4 reached;  // our address of the connection
+  Ipv4 reached;  // local address of the connection
   const std::vector<std::string>& hosts;
 };
 
@@ -44,11 +44,11 @@ using HttpAction = std::variant<HttpAnswer, HelpAction, HealthAction, MetricsAct
 
 struct RoutedRequest {
   HttpAction action;
-  std::string pose_refusal = {};  // reason for refusing a malformed pose, which is counted
+  std::string pose_refusal = {};  // reason why a malformed pose was refused; the server counts it
 };
 RoutedRequest route_request(const HttpRequest& request, const HttpPolicy& policy);
 
-/// The text of GET / for clients that do not request the page.
+/// Returns the answer to GET / for clients that do not request the page.
 std::string help_text(const std::string& address);
 
 }  // namespace sonar

@@ -14,7 +14,7 @@ int hex_value(char c) {
   return l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
 }
 
-/// Decodes %xx. Control characters, plain or encoded, are refused, so that they reach no log or answer.
+/// Decodes %xx. Refuses control characters, plain or encoded, so that they get into no log or answer.
 std::optional<std::string> decoded(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -66,7 +66,8 @@ std::optional<Target> parse_target(std::string_view text) {
   return target;
 }
 
-/// With DNS rebinding, a page of another site reaches this server by the site's own name, which is not an allowed name.
+/// Compares the host with the allowed names. With DNS rebinding, a page of another site connects to this server with the name of
+/// its site, which is not allowed.
 bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::string>& names) {
   std::string_view port = host;
   const std::string_view name = cut(port, ':');
@@ -83,7 +84,7 @@ bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std
   for (const std::string_view scheme : {"http://", "https://"})
     if (origin.size() > scheme.size() && same_letters(origin.substr(0, scheme.size()), scheme))
       return host_allowed(origin.substr(scheme.size()), reached, names);
-  return false;  // "null" and other schemes
+  return false;  // the origin is "null" or has another scheme
 }
 
 bool begins_http_request(std::string_view bytes) {
@@ -92,7 +93,7 @@ bool begins_http_request(std::string_view bytes) {
   return std::any_of(methods.begin(), methods.end(), [bytes](std::string_view method) { return bytes.starts_with(method); });
 }
 
-/// The first bytes are collected, because a request may arrive in pieces.
+/// Collects the first bytes, because a request may arrive in pieces.
 bool HttpDetector::speaks_http(std::span<const std::byte> received) {
   for (std::size_t i = 0; i < received.size() && first_bytes_.size() < longest_http_method; ++i)
     first_bytes_ += static_cast<char>(received[i]);
@@ -126,7 +127,7 @@ bool is_json(std::string_view content_type) {
 
 namespace {
 
-/// Routes below /api/v1/faults, which resemble those of Toxiproxy.
+/// Returns the route for a path below /api/v1/faults; these paths are like those of Toxiproxy.
 Route fault_route(const std::vector<std::string>& s, std::string_view method) {
   if (s.size() == 3)
     return method == "POST" ? Route{Route::Kind::operation, "POST", "add_fault"} : Route{Route::Kind::faults, "GET", "faults"};

@@ -1,5 +1,5 @@
-// The rules of the HTTP server, each a pure function: targets, hosts, origins, tokens, routes.
-// daemon/server/http/http_router.hpp applies them in order.
+// The rules of the HTTP server about targets, hosts, origins, tokens and routes. daemon/server/http/http_router.hpp applies them
+// in order.
 #pragma once
 
 #include <cstddef>
@@ -24,12 +24,12 @@ struct Target {
 std::optional<Target> parse_target(std::string_view text);
 
 /// Checks "Host: name:port" against DNS rebinding. Allowed names are the local address `reached` of the connection, loopback,
-/// localhost, and those of control.hosts.
+/// localhost, and the names in control.hosts.
 bool host_allowed(std::string_view host, Ipv4 reached, const std::vector<std::string>& names);
 /// Checks "Origin: http://name:port" in the same way, to reject cross-origin requests of browsers.
 bool origin_allowed(std::string_view origin, Ipv4 reached, const std::vector<std::string>& names);
 
-/// Splits a header that is a list into its words.
+/// Splits the list in a header into words.
 std::vector<std::string> words_of_header(std::string_view list);
 /// True if a list header contains the word, ignoring case. `wanted` must be in small letters.
 bool header_names(std::string_view list, std::string_view wanted);
@@ -37,11 +37,11 @@ bool header_names(std::string_view list, std::string_view wanted);
 /// True if the type is "application/json", with or without parameters.
 bool is_json(std::string_view content_type);
 
-/// True if a stream begins with an HTTP request. Needs the first longest_http_method bytes.
+/// True if a stream begins with an HTTP request. `bytes` must have the first longest_http_method bytes.
 bool begins_http_request(std::string_view bytes);
 inline constexpr std::size_t longest_http_method = 8;  // "OPTIONS "
 
-/// Detects HTTP requests on ports of other protocols, which any web page can make a browser send.
+/// Detects HTTP requests on ports of other protocols; any web page can make a browser send such requests.
 class HttpDetector {
  public:
   /// Reads the next bytes. True if the stream begins with an HTTP request.
@@ -55,7 +55,7 @@ struct Route {
   enum class Kind { unknown, help, health, metrics, status, events, operation, faults, end_fault, ticket };
   Kind kind = Kind::unknown;
   std::string_view method;  // the allowed method
-  std::string op;           // operation: the member of Request.op; for faults "faults", "kinds" or "journal"
+  std::string op;           // member of Request.op; for faults "faults", "kinds" or "journal"
   std::string name = {};    // name of the sonar, object or fault in the path
 };
 Route route_of(const Target& target, std::string_view method);

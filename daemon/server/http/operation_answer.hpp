@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// The answer, including its body.
+/// Returns the answer, including the body.
 HttpAnswer answer_from(const OperationResult& result);
 
 }  // namespace sonar

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-// The page may use only files of this server: no inline code, no other hosts, no frames around the page.
+// The page may use only files of this server: no inline code, and no other hosts. Other pages cannot contain it in frames.
 constexpr const char* policy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -29,7 +29,7 @@ bool any_of_list(std::string_view list, auto take) {
   return false;
 }
 
-/// True for "q=0" and "q=0.000", which mean: not acceptable.
+/// True for "q=0" and "q=0.000", which mean that the type is not acceptable.
 bool excluded(std::string_view parameters) {
   return parameters.starts_with("q=0") && parameters.find_first_not_of("0.", 3) == std::string_view::npos;
 }

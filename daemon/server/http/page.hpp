@@ -12,13 +12,13 @@ namespace sonar {
 // The compressed files of the page, which the build embeds (clients/web/bundle.py); none if sonard was built without the page.
 
 struct PageFile {
-  std::string_view path, type, hash;     // "/"; "text/html; ..."; hash of the content
-  std::span<const unsigned char> bytes;  // gzip
+  std::string_view path, type, hash;     // such as "/"; such as "text/html; ..."; hash of the content
+  std::span<const unsigned char> bytes;  // content, compressed with gzip
 };
 std::span<const PageFile> page_files();
 
 struct PageRequest {
-  std::string_view path;  // without its query
+  std::string_view path;  // path without the query
   std::string_view accept, accept_encoding, if_none_match;
 };
 

@@ -27,7 +27,7 @@ OperationResult SonarOperations::set(const control::SetSonar& asked, const Sende
   return device ? result_of((*device)->ask(asked, sender.id)) : result_of(device.error());
 }
 
-/// Unset values stay. All sonars are in the same water.
+/// Changes the values that are set. All sonars are in the same water.
 OperationResult SonarOperations::set(const control::SetEnvironment& asked, const Sender& sender) {
   Water water = config_.water;
   water.temperature_c = asked.temperature_c.value_or(water.temperature_c);
@@ -55,8 +55,8 @@ void SonarOperations::stop(const control::StopRecording& asked, Operations::Done
   recordings_.stop(asked, [done = std::move(done)](const Result<void>& outcome) { done(result_of(outcome)); });
 }
 
-/// If time follows the poses, a pose is answered after the pings that it made possible have been sent. So a client that waits
-/// for answers runs in step with the sonars.
+/// Passes on a pose. If time follows the poses, the answer comes after the pings that the pose made possible have been sent, so
+/// that a client that waits for answers runs in step with the sonars.
 void TimeOperations::take(const control::PoseSample& sample, const Sender& sender, Operations::Done done) {
   std::string refusal = poses_.take(sample, sender);
   if (!refusal.empty()) return done(refused(std::move(refusal)));
@@ -68,8 +68,8 @@ void TimeOperations::take(const control::PoseSample& sample, const Sender& sende
   time_.wait([done = std::move(done)](Time, bool) { done({}); });
 }
 
-/// The answer comes when the step is over, with the pings made since the answer before. A client that has shut down only its half
-/// of the connection still gets an answer.
+/// Advances time. The answer comes when the step is over, and has the number of pings since the previous answer. A client that
+/// has shut down only its half of the connection still gets an answer.
 void TimeOperations::step(const control::Step& asked, Operations::Done done, HasLeft has_left) {
   if (std::string why = time_.step(asked.dt_s); !why.empty()) return done(refused(std::move(why)));
   const auto reached = [this, done = std::move(done)](Time then, bool is_whole) {
@@ -79,7 +79,7 @@ void TimeOperations::step(const control::Step& asked, Operations::Done done, Has
                               "answer",
                               seconds(then.time_since_epoch()))));
     const std::uint64_t before = std::exchange(pings_reported_, pings_made());
-    // If a reload removed a sonar, its pings are gone too.
+    // If a reload removed a sonar, its pings are no longer counted.
     const std::uint64_t pings = pings_reported_ - std::min(before, pings_reported_);
     const auto stepped = std::make_shared<v1::Stepped>();
     stepped->set_now_ns(then.time_since_epoch().count());

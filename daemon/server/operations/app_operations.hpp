@@ -1,5 +1,5 @@
-// Carries out the requests of the control protocol (operations.hpp) by passing each to the responsible class. Owned by App,
-// like these classes.
+// Carries out the requests of the control protocol (operations.hpp) by passing each to the responsible class. App owns it and
+// these classes.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@ namespace sonar {
 
 class SonarOperations {
  public:
-  /// Changed water is written to `config`.
+  /// Writes changed water to `config`.
   SonarOperations(Config& config, Fleet& fleet, Recordings& recordings, Log& log)
       : config_(config), fleet_(fleet), recordings_(recordings), log_(log) {}
 
@@ -57,7 +57,7 @@ class TimeOperations {
   PoseIntake& poses_;
   const Fleet& fleet_;
   std::function<void()> on_change_;
-  std::uint64_t pings_reported_ = 0;  // pings counted in answers to steps so far
+  std::uint64_t pings_reported_ = 0;  // number of pings in answers to steps so far
 };
 
 class AppOperations final : public Operations {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr const char* name_by_mavlink = "mavlink";
 constexpr std::array<std::string_view, 8> kinds_of_failures = {"",    "L05", "P01", "P04",
-                                                               "P12", "T11", "T10", "P13"};  // by FailureType
+                                                               "P12", "T11", "T10", "P13"};  // index: FailureType
 
 void fill_effects(v1::FaultKind& out, const FaultKind& kind) {
   fill(out, kind);
@@ -23,7 +23,7 @@ void fill_effects(v1::FaultKind& out, const FaultKind& kind) {
       (*out.mutable_without_effect())[std::string(vendor->name())] = why;
 }
 
-/// The event for which a fault waits if it was requested without a trigger; empty = none.
+/// Returns the event for which a fault waits if it was requested without a trigger; empty = none.
 std::string awaited(const Fault& fault) {
   constexpr std::array<const char*, occasion_names.size()> words = {"a connection", "new settings", "a status message",
                                                                     "the end of a connection"};
@@ -82,7 +82,7 @@ OperationResult FaultOperations::add(const control::AddFault& asked, const Sende
   return result;
 }
 
-/// All sonars are checked first, so that a fault is never applied to only some of them.
+/// Checks all sonars first, so that a fault is never applied to only some of them.
 OperationResult FaultOperations::add(const control::FaultRecord& record, bool manual, const Device* only) {
   const auto faults = check_fault(record, manual);
   if (!faults) return result_of(faults.error());
@@ -97,7 +97,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
     if (!why_not)
       takers.push_back(&device);
     else if (record.sonar.empty() && why_not->code == FaultRefusal::Code::no_effect)
-      // A request for all sonars skips those on which the fault has no effect. Any other refusal ends the request.
+      // A request for all sonars skips sonars on which the fault has no effect. Any other refusal ends the request.
       why = std::move(why_not->text);
     else
       return refused(std::move(why_not->text));
@@ -109,7 +109,7 @@ OperationResult FaultOperations::add(const control::FaultRecord& record, bool ma
   return {};
 }
 
-/// An empty name ends all faults and always succeeds.
+/// Ends a fault. An empty name ends all faults, and always succeeds.
 OperationResult FaultOperations::end(const control::EndFaults& asked, const Sender& sender) {
   bool found = asked.name.empty();
   for (Device& device : fleet_.devices()) found = device.end_faults(asked.name) || found;
@@ -132,12 +132,12 @@ OperationResult FaultOperations::report(const control::GetFaults& asked) const {
   return result;
 }
 
-/// The new failure is checked before the previous one is ended, except for conflicts with other faults.
+/// Checks the new failure, except for conflicts with other faults, before it ends the previous one.
 mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance) {
   using enum mavlink::MavResult;
   if (unit != mavlink::distance_sensor) return unsupported;
   if (!config_.faults.armed || instance > fleet_.devices().size()) return denied;
-  if (!config_.control.token_file.empty()) {  // requests need the token, for which MAVLink has no field
+  if (!config_.control.token_file.empty()) {  // requests need the token, but MAVLink has no field for it
     log_.warning("failure refused: a command of MAVLink cannot show the token of control.token_file",
                  {{"client", name_by_mavlink}});
     return denied;
@@ -153,7 +153,7 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   record.what = kinds_of_failures[static_cast<std::size_t>(type)];
   record.sonar = instance == 0 ? std::string() : chosen.front()->config().name;
   record.lasts.seconds = static_cast<double>(longest_manual_fault.count());
-  const FaultKind* const kind = find_fault_kind(record.what);  // null: the sonars work again
+  const FaultKind* const kind = find_fault_kind(record.what);  // null: the failure ends
   const auto has_it = [&](const Device* device) { return why_without_effect(*kind, *device->config().profile.vendor).empty(); };
   if (kind != nullptr && std::none_of(chosen.begin(), chosen.end(), has_it)) return unsupported;
 
@@ -167,7 +167,7 @@ mavlink::MavResult FaultOperations::inject(std::uint32_t unit, mavlink::FailureT
   return accepted;
 }
 
-/// A refused record is logged; the other records of the plan begin nevertheless.
+/// Begins the records of the plan. A refused record is logged, and the other records begin nevertheless.
 void FaultOperations::begin_plan(const Device* only) {
   for (const control::FaultRecord& record : config_.faults.plan)
     if (only != nullptr && !record.sonar.empty() && record.sonar != only->config().name)

@@ -12,7 +12,7 @@ namespace sonar {
 namespace v1 {
 class FaultStatus;
 }
-/// The states of the faults of all sonars. `over_too`: including the last ended ones.
+/// Returns the states of the faults of all sonars. `over_too`: include the last ended faults.
 std::vector<v1::FaultStatus> fault_statuses(const Fleet& fleet, Time now, bool over_too);
 
 class FaultOperations {
@@ -23,9 +23,9 @@ class FaultOperations {
   OperationResult add(const control::AddFault& asked, const Sender& sender);
   OperationResult end(const control::EndFaults& asked, const Sender& sender);
   OperationResult report(const control::GetFaults& asked) const;
-  /// MAVLink's command to inject a failure. The sonars of the configuration are the distance sensors 1, 2, ...; 0 = all. A
-  /// failure replaces the previous one and ends after at most longest_manual_fault. unsupported: another unit, or no effect;
-  /// denied: not armed, no such sonar, or a conflict with another fault.
+  /// Executes MAVLink's command to inject a failure. The sonars of the configuration are the distance sensors 1, 2, ...; 0 = all.
+  /// A failure replaces the previous one and ends after at most longest_manual_fault. Returns unsupported for another unit or a
+  /// failure without effect; denied if faults are not armed, for an unknown sonar, or at a conflict with another fault.
   mavlink::MavResult inject(std::uint32_t unit, mavlink::FailureType type, std::uint32_t instance);
   /// Starts the fault plan of the configuration, which has been checked.
   void begin_plan(const Device* only = nullptr);  // null: on all sonars

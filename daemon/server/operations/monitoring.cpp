@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-constexpr auto longest_ping = std::chrono::seconds(30);  // if it takes longer, the simulation is stuck
+constexpr auto longest_ping = std::chrono::seconds(30);  // if a ping takes longer, the simulation hangs
 constexpr double largest_wall_difference_s = 2;          // more than a leap second
 
 std::string whole_seconds(std::chrono::nanoseconds t) {
@@ -43,7 +43,7 @@ void add_vehicles(v1::DaemonStatus& out, const Config& config, const World& worl
 void add_objects(v1::DaemonStatus& out, const Scene& scene, const World& world, Time now) {
   const std::vector<Pose> bodies = world.objects_at(now);
   for (const Object& o : scene.objects) {
-    if (o.name.empty()) continue;  // a removed object
+    if (o.name.empty()) continue;  // the object was removed
     v1::ObjectStatus& object = *out.add_objects();
     object.set_name(o.name);
     object.set_moving(body_named(scene, o.name) >= 0);
@@ -155,7 +155,7 @@ std::string Monitoring::metrics() const {
   return metrics_text(f);
 }
 
-/// Reports the first of these: the simulation hangs, a scene takes too long, a sonar does not listen.
+/// Returns the first problem of these: the simulation hangs, a scene takes too long, a sonar does not listen.
 std::string Monitoring::problem() const {
   const auto under_way = of_.simulator.under_way_for();
   if (under_way > longest_ping) return "the simulation has computed one ping for " + whole_seconds(under_way);

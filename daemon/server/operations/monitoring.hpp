@@ -1,4 +1,4 @@
-// The daemon's report on itself: the answer to GetStatus, figures for /metrics, and problems for /healthz and the log.
+// Makes the answer to GetStatus, the figures for /metrics, and the problems for /healthz and the log.
 #pragma once
 
 #include <chrono>
@@ -21,7 +21,7 @@
 
 namespace sonar {
 
-/// The parts of the daemon on which Monitoring reports. They must outlive it.
+/// The parts of the daemon on which Monitoring reports. They must outlive the Monitoring.
 struct Monitored {
   const Config& config;
   const Clock& clock;
@@ -43,12 +43,12 @@ class Monitoring {
   explicit Monitoring(const Monitored& parts) : of_(parts) {}
 
   std::shared_ptr<const v1::DaemonStatus> status() const;
-  /// See the functions of Operations with these names.
+  /// The functions of Operations with these names describe the results.
   std::string metrics() const;
   std::string problem() const;
   /// Returns a sentence if a change of the scene takes longer than limits.load_s; else empty.
   std::string slow_load() const;
-  /// A note if the computer's clock was set since sonard started.
+  /// Returns a note if the computer's clock was set since sonard started.
   std::vector<Note> notes_on_clock() const;
 
  private:

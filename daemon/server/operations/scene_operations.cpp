@@ -9,7 +9,7 @@ namespace {
 
 OperationResult too_many_changes() { return failed("64 changes of the scene wait already"); }
 
-/// True if the World handles the request: the World places and hides moving objects, unless the scene hides them.
+/// True if the World handles the request: it places and hides moving objects, except objects that the scene hides.
 bool is_the_worlds(const Scene& scene, const control::SetObject& asked) {
   const Object* const object = object_named(scene, asked.object);
   return body_named(scene, asked.object) >= 0 && (object == nullptr || object->visible || !asked.visible.value_or(false));
@@ -22,7 +22,7 @@ void SceneOperations::log_change(const std::string& what, const Sender& sender) 
   events_.publish_scene(config_.scene.name(), what);
 }
 
-/// The edit is applied to the result of the earlier changes, and shares an engine with other waiting edits.
+/// Submits an edit, which is applied to the result of the earlier changes, and shares an engine with other waiting edits.
 void SceneOperations::edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done) {
   if (changes_.is_full()) return done(too_many_changes());
   changes_.submit({[edit = std::move(edit)](const ScenePointer& now) { return edit(*now); },
@@ -42,7 +42,7 @@ void SceneOperations::remove(const control::RemoveObject& asked, const Sender& s
        std::move(done));
 }
 
-/// The name is looked up at once, so that a wrong name is refused without waiting for other changes.
+/// Looks up the name at once, so that a wrong name is refused without waiting for other changes.
 void SceneOperations::load(const control::LoadScene& asked, const Sender& sender, Operations::Done done) {
   if (!load_scene_) return done(failed("this program cannot load scenes"));
   if (changes_.is_full()) return done(too_many_changes());
@@ -73,7 +73,7 @@ OperationResult SceneOperations::without_details(const Error& error, const Scene
   return result;
 }
 
-/// Waits for the earlier changes, even if no engine must be built.
+/// Sets an object after the earlier changes, even if no engine must be built.
 void SceneOperations::set(const control::SetObject& asked, const Sender& sender, Operations::Done done) {
   if (changes_.is_full()) return done(too_many_changes());
   auto finish = [this, asked, sender, done = std::move(done)](const Result<void>& outcome) {

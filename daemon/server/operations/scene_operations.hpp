@@ -26,7 +26,7 @@ class SceneOperations {
  private:
   using Edit = std::function<Result<ScenePointer>(const Scene&)>;
 
-  /// Edits the scene that results from the previous changes. `what` is for the log: "object crate added".
+  /// Edits the scene that results from the previous changes. `what` is the text for the log, such as "object crate added".
   void edit(Edit edit, const std::string& what, const Sender& sender, Operations::Done done);
   OperationResult without_details(const Error& error, const SceneFile& file, const Sender& sender);
   void log_change(const std::string& what, const Sender& sender);

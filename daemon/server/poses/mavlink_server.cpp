@@ -10,7 +10,7 @@ namespace {
 constexpr auto tick_period = std::chrono::milliseconds(250);
 constexpr std::size_t work_of_datagram = 64, work_of_byte = 4;
 
-/// Heartbeats and silence are measured in real time, even if the daemon's time is stepped.
+/// Returns real time, in which heartbeats and silence are measured even if the daemon's time is stepped.
 Time wire_time() { return Time(std::chrono::steady_clock::now().time_since_epoch()); }
 
 mavlink::Settings settings_of(const MavlinkConfig& link, const Config& config) {
@@ -114,7 +114,7 @@ Endpoint MavlinkServer::listens_at(std::size_t link) const {
   return link < links_.size() ? std::next(links_.begin(), static_cast<std::ptrdiff_t>(link))->config.at : Endpoint{};
 }
 
-/// Accepts datagrams of the dialled peer, and others only from addresses that the configuration allows.
+/// True for datagrams of the dialled peer or, on a listening link, of addresses that the configuration allows.
 bool MavlinkServer::is_allowed(const Link& link, const asio::ip::address& from) const {
   if (link.config.dials) return from == address_of(link.config.at.ip);
   return is_admitted(config_.poses.allow_from, from);
@@ -128,7 +128,7 @@ asio::awaitable<void> MavlinkServer::receive(Link& link) {
     udp::endpoint from;
     const std::size_t n = co_await link.socket.async_receive_from(asio::buffer(buffer), from, into(ec));
     if (stopping_) co_return;
-    if (ec) continue;  // an ICMP answer: the port is not open yet
+    if (ec) continue;  // after an ICMP answer, the port is not open yet
     const auto now = std::chrono::steady_clock::now();
     const std::size_t work = work_of_datagram + work_of_byte * n;  // a frame has at least 12 bytes
     const bool taken = link.of_address.takes(from.address().to_string(), work, config_.limits.input_bytes_per_s, now);
@@ -138,7 +138,7 @@ asio::awaitable<void> MavlinkServer::receive(Link& link) {
       intake_.refuse("more than limits.input_bytes_per_s was sent", {link.name, link.name});
     const auto wait = link.rate.pause_after(taken, now);
     if (wait.count() == 0) continue;
-    pause.expires_after(wait);  // some milliseconds
+    pause.expires_after(wait);  // a few milliseconds
     co_await pause.async_wait(into(ec));
   }
 }
@@ -162,14 +162,14 @@ bool MavlinkServer::wants_distances(const std::string& vehicle) const {
                      [&](const Link& l) { return l.config.vehicle == vehicle && l.poses.wants_distances(); });
 }
 
-/// Reports when the vehicle of this link starts or stops requesting distances, because its range finders then start or stop
-/// pinging by themselves.
+/// Reports that the vehicle of this link has started or stopped requesting distances, because its range finders then start or
+/// stop pinging without clients.
 void MavlinkServer::look_at_wants(Link& link) {
   const bool wants = link.poses.wants_distances();
   if (std::exchange(link.distances_wanted, wants) != wants && distances_wanted_) distances_wanted_();
 }
 
-/// Sends a distance to every link of the vehicle that requested it, and counts it as sent or dropped there.
+/// Sends a distance on every link of the vehicle that requested distances, and counts it there as sent or dropped.
 void MavlinkServer::on_distance(const SonarConfig& sonar, const PingQueued& ping) {
   if (sonar.vehicle >= config_.vehicles.size()) return;
   const std::string& vehicle = config_.vehicles[sonar.vehicle].name;

@@ -1,5 +1,5 @@
-// The sockets for poses by MAVLink. Each link has one, listening (udpin) or sending first (udpout), and a MavlinkPoses. Poses
-// go to the same PoseIntake as those of PoseServer. Owned by App.
+// The sockets for poses over MAVLink. Each link has a socket, which listens (udpin) or sends first (udpout), and a MavlinkPoses.
+// The links and the PoseServer use the same PoseIntake. App owns the server.
 #pragma once
 
 #include <functional>
@@ -22,12 +22,12 @@ namespace sonar {
 
 class MavlinkServer {
  public:
-  /// Links and origin are read from `config` now; the allowed addresses follow later changes of it. `began`: the daemon's time
+  /// Links and origin are read from `config` now; the allowed addresses are read for each datagram. `began`: the daemon's time
   /// that counts as boot time in messages.
   MavlinkServer(asio::io_context& io, const Config& config, PoseIntake& intake, Log& log, Time began);
 
-  /// Call it before open(). Sets the function for the command to inject a failure, on every link. Without it the command is
-  /// answered as unsupported.
+  /// Call it before open(). Sets the function for the command to inject a failure, on every link. Without the function the answer
+  /// to the command is "unsupported".
   void inject_failures_with(mavlink::InjectFailure inject) { inject_ = std::move(inject); }
   /// Call it before open(). `tell` is called when wants_distances() of a vehicle has changed.
   void on_distances_wanted(std::function<void()> tell) { distances_wanted_ = std::move(tell); }
@@ -39,17 +39,17 @@ class MavlinkServer {
   void start();
   void stop();
 
-  /// "udpin:127.0.0.1:14551", with the port the system chose for 0.
+  /// Returns texts such as "udpin:127.0.0.1:14551", with the port that the system chose for 0.
   std::vector<std::string> endpoints() const;
-  /// Counts of the distances of each link, in the order of the configuration.
+  /// Returns the counts of the distances of each link, in the order of the configuration.
   std::vector<LinkFigures> figures() const;
-  /// Notes on links without poses: the missing messages.
+  /// Returns notes that list the missing messages of links without poses.
   std::vector<Note> notes() const;
-  /// Address of a listening link, in the order of the configuration.
+  /// Returns the address of a listening link; links are in the order of the configuration.
   Endpoint listens_at(std::size_t link) const;
 
  private:
-  static constexpr std::size_t most_datagrams_per_s = 4096;  // autopilots send a few hundred
+  static constexpr std::size_t most_datagrams_per_s = 4096;  // limit; autopilots send a few hundred
 
   struct Link {
     MavlinkConfig config;
@@ -57,7 +57,7 @@ class MavlinkServer {
     udp::socket socket;
     asio::steady_timer timer;
     std::optional<udp::endpoint> peer;  // the address to which replies are sent
-    std::string name;                   // "mavlink udpin:127.0.0.1:14551"
+    std::string name;                   // such as "mavlink udpin:127.0.0.1:14551"
     LogLimiter notices = {}, drops = {};
     LinkFigures distances = {};
     WorkRate of_address = {};

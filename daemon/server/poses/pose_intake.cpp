@@ -17,8 +17,8 @@ void PoseIntake::refuse(const std::string& why, const Sender& sender) {
   log_refusal(why, sender);
 }
 
-/// WALL stamps follow the computer's clock, which may be set while sonard runs; the time of the World never jumps. The
-/// difference of both is kept while it is correct to a millisecond, so that equal stamps stay equal.
+/// Converts a WALL stamp, which is of the computer's clock, to the time of the World, which never jumps. The difference of both
+/// times is kept while it is correct to a millisecond, so that equal stamps stay equal.
 void PoseIntake::map_wall(control::Stamp& stamp) {
   if (stamp.domain != control::ClockDomain::wall || clock_.stepped()) return;
   const auto shift = clock_.ahead_of_wall();
@@ -52,7 +52,7 @@ std::string PoseIntake::place(const control::SetObject& asked, std::size_t body,
     sample.of = control::PoseSample::Of::object;
     sample.name = asked.object;
     sample.pose = *asked.in_world;
-    sample.velocity_mps = sample.angular_velocity_radps = Vec3d{};  // placed, not moved: do not extrapolate
+    sample.velocity_mps = sample.angular_velocity_radps = Vec3d{};  // zero velocity, so that a placed object is not extrapolated
     sample.reset_counter = ++placements_;
     if (std::string refusal = take(std::move(sample), sender); !refusal.empty()) return refusal;
   }

@@ -1,5 +1,5 @@
 // Receives poses, and requests to place objects and to control trajectories, from PoseServer and the control servers. It
-// converts wall time to the daemon's time, passes poses to the world, which accepts or refuses them, and logs refusals.
+// converts wall time to the daemon's time, passes poses to the World, which accepts or refuses them, and logs refusals.
 #pragma once
 
 #include <chrono>

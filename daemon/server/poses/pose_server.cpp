@@ -16,13 +16,13 @@ namespace {
 
 constexpr std::size_t most_connections = 32;
 constexpr std::size_t most_lines_of_a_datagram = 64;
-constexpr std::size_t work_of_a_turn = 4096;  // bytes processed before yielding
-constexpr std::size_t least_work = 64;        // bytes: cost of a read or of a line, in addition to its own bytes
+constexpr std::size_t work_of_a_turn = 4096;  // bytes processed before other connections have their turn
+constexpr std::size_t least_work = 64;        // cost of a read or of a line [bytes], in addition to its bytes
 constexpr int most_not_json = 8;  // limit of successive lines that are too long or not JSON, after which the connection ends
 constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes; 32 floods keep 0.1 to 1 GB in the kernel
 constexpr std::chrono::milliseconds between_looks{10};  // pause before the next look for new input
 constexpr std::chrono::milliseconds longest_wait{100};  // limit for poses that wait in the kernel
-constexpr int most_tries = 16;  // at port 0: the number that the system chose for TCP may be in use for UDP
+constexpr int most_tries = 16;  // for port 0, because the number that the system chooses for TCP may be in use for UDP
 constexpr const char* no_json = "not JSON: this port accepts poses as lines of JSON";
 
 std::size_t waiting_bytes(tcp::socket& socket) {
@@ -53,7 +53,7 @@ PoseServer::PoseServer(asio::io_context& io, const PoseConfig& config, const Lim
 Result<Endpoint> PoseServer::open(Port& port, Endpoint at) {
   if (port.encoding == Encoding::json) {
     if (auto r = port.lines.open(at); !r) return tl::make_unexpected(r.error());
-    at = port.lines.at();  // if port 0 was configured: both get the same number
+    at = port.lines.at();  // if port 0 was configured, UDP gets the number of TCP
   }
   if (auto r = bind_udp(port.datagrams, at, false); !r) return tl::make_unexpected(r.error());
   at.port = port.datagrams.local_endpoint().port();
@@ -153,7 +153,7 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
     udp::endpoint from;
     const std::size_t n = co_await port.datagrams.async_receive_from(asio::buffer(buffer), from, into(ec));
     if (stopping_) co_return;
-    if (ec) continue;  // an ICMP answer; this socket sends nothing
+    if (ec) continue;  // the error is an ICMP answer; this socket sends nothing
     if (!is_admitted(config_.allow_from, from.address())) {
       intake_.refuse("address is not in poses.allow_from", sender_of(false, "udp", from.address(), from.port()));
       continue;
@@ -168,22 +168,22 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
       intake_.refuse("more than limits.input_bytes_per_s was sent", sender_of(false, "udp", from.address(), from.port()));
     const auto wait = port.rate.pause_after(taken, now);
     if (wait.count() == 0) continue;
-    pause.expires_after(wait);  // some milliseconds
+    pause.expires_after(wait);  // a few milliseconds
     co_await pause.async_wait(into(ec));
   }
 }
 
 // ---- JSON lines by TCP
 
-/// Order of the checks: the address is allowed, descriptors are available, a slot is free or can be taken from a less active
+/// Checks in this order: the address is allowed, descriptors are available, a slot is free or can be taken from a less active
 /// sender.
 void PoseServer::admit(tcp::socket socket) {
   error_code ec;
   const auto peer = socket.remote_endpoint(ec);
-  if (ec) return;  // gone already
+  if (ec) return;  // the sender has disconnected already
   const Sender sender = sender_of(true, "tcp", peer.address(), peer.port());
   if (!is_admitted(config_.allow_from, peer.address()))
-    return intake_.refuse("address is not in poses.allow_from", sender);  // closes it
+    return intake_.refuse("address is not in poses.allow_from", sender);  // the destructor closes the socket
   connections_.forget_if([](Connection& c) { return has_left(c.socket); });
   const auto say_evicted = [this](const Connection& evicted) {
     log_limited(log_, notices_, LogLevel::info, "pose connection closed to make room: it was idle or over its limit for longest",
@@ -205,8 +205,8 @@ void PoseServer::admit(tcp::socket socket) {
       });
 }
 
-/// Each turn reads at most work_of_a_turn bytes and then lets others proceed. If a sender has disconnected with more waiting
-/// input than its limits allow, only its last pose is applied.
+/// Reads at most work_of_a_turn bytes in each turn, then lets other connections proceed. If a sender has disconnected with more
+/// waiting input than its limits allow, only its last pose is applied.
 asio::awaitable<void> PoseServer::read_lines(ConnectionPointer connection) {
   Connection& c = *connection;
   std::array<std::byte, work_of_a_turn> buffer;
@@ -247,7 +247,8 @@ PoseServer::Turn PoseServer::take_turn(Connection& c, Work& work) {
   return Turn::not_over;
 }
 
-/// Lets other connections proceed. The pause is longer if this connection is over its own limit or its share of the common one.
+/// Lets other connections proceed. The pause is longer if this connection is over its limit, or over its share of the common
+/// limit.
 asio::awaitable<PoseServer::Rested> PoseServer::rest(Connection& c, const Work& work) {
   const auto now = std::chrono::steady_clock::now();
   const auto pause = std::max(c.rate.pause_after(work.bytes, now), together_.pause_after(c.of_all, work.bytes, now));
@@ -282,9 +283,9 @@ void PoseServer::take_newest(Connection& c) {
   if (newest) on_line(*newest, c.sender);
 }
 
-/// Drops all but the newest bytes that wait in the kernel: 0.1 s of the allowed rate are kept, or two lines if the sender is
-/// over the limit or this computer has not kept up with it for 0.1 s. Otherwise old poses would act for seconds, because the
-/// sender's kernel may have megabytes more, even after it has closed. Returns true if bytes were dropped.
+/// Drops all but the newest bytes that wait in the kernel: 0.1 s of the allowed rate are kept, or two lines if the sender is over
+/// the limit, or if this computer has been too slow for 0.1 s. Otherwise old poses would act for seconds, because the sender's
+/// kernel may have megabytes more, even after it has closed. Returns true if bytes were dropped.
 bool PoseServer::drop_backlog(Connection& c, bool pauses) {
   const std::size_t waiting = waiting_bytes(c.socket);
   const auto now = std::chrono::steady_clock::now();

@@ -1,7 +1,7 @@
-// Listens for poses: protobuf datagrams, and JSON lines by UDP and TCP. App owns it. (The control stream has its own server,
-// daemon/server/control/.) Malformed messages are refused and counted, and logged at a limited rate; a connection that does not
-// send JSON is closed. Connections are served in turns of bounded work, no faster than the limits allow. Of the poses beyond
-// the limits only the newest is kept, so that no pose takes effect late.
+// Listens for poses: protobuf datagrams, and JSON lines over UDP and TCP. App owns the server. (The control stream has its own
+// server, daemon/server/control/.) Malformed messages are refused and counted, and logged at a limited rate; a connection that
+// does not send JSON is closed. Connections are served in turns of bounded work, no faster than the limits allow. Beyond the
+// limits only the newest pose is kept, so that no pose takes effect late.
 #pragma once
 
 #include <list>
@@ -32,23 +32,23 @@ class PoseServer {
   void start();
   void stop();
 
-  /// The listening addresses, with the port that the system chose if 0 was configured. Port 0: off.
+  /// Return the listening addresses, with the port that the system chose if 0 was configured. Port 0 = off.
   Endpoint protobuf() const { return protobuf_at_; }
   Endpoint json() const { return json_at_; }
 
  private:
   enum class Encoding { protobuf, json };
-  static constexpr std::size_t most_datagrams_per_s = 8192;  // sum over all senders; simulators send up to a few thousand
+  static constexpr std::size_t most_datagrams_per_s = 8192;  // limit for all senders; simulators send up to a few thousand
   struct Port {
     Port(Encoding e, udp::socket s, asio::io_context& io, Admission& admission)
         : encoding(e), datagrams(std::move(s)), lines(io, admission, Admission::Purpose::client) {}
     Encoding encoding;
     udp::socket datagrams;
     DatagramRate rate{most_datagrams_per_s};
-    Listener lines;  // for JSON only
+    Listener lines;  // TCP listener, for JSON only
   };
-  /// One TCP sender. It is closed by stop(), or if its slot is needed and no other sender has been idle or over its limits for
-  /// longer. A sender that has disconnected has no slot.
+  /// The connection of a TCP sender. It is closed by stop(), or if its slot is needed and no other sender has been idle or over
+  /// its limits for longer. A sender that has disconnected has no slot.
   struct Connection {
     Connection(tcp::socket s, Sender from, std::size_t bytes_per_s, SharedRate::Part part)
         : socket(std::move(s)),
@@ -67,7 +67,7 @@ class PoseServer {
         std::chrono::steady_clock::now();                          // time of its last pose within the limits
     std::chrono::steady_clock::time_point kept_up_at = active_at;  // last time at which little or nothing waited in the kernel
     std::chrono::steady_clock::time_point behind_until{};
-    bool proved = false;  // the last pose was within the limits
+    bool proved = false;  // true: the last pose was within the limits
     void close() {
       error_code ec;
       socket.close(ec);
@@ -83,7 +83,7 @@ class PoseServer {
   enum class Turn { over, not_over, end };  // over: no whole line remains; end: the connection does not send JSON
   struct Work {
     std::size_t bytes = 0;
-    bool has_pose = false;  // an accepted pose
+    bool has_pose = false;  // true: a pose was accepted
   };
   Turn take_turn(Connection& connection, Work& work);
   enum class Rested { goes_on, leaves_much };  // leaves_much: the sender disconnected after sending more than the limits allow

@@ -30,7 +30,7 @@ bool may_stand_in_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
 }
 
-/// Counts the bytes of the file.
+/// A sink that counts the bytes of the file.
 class CountedSink final : public recording::Sink {
  public:
   CountedSink(std::unique_ptr<recording::Sink> sink, std::shared_ptr<std::uint64_t> bytes)
@@ -90,7 +90,7 @@ bool RecordingFile::is_inside(const std::filesystem::path& folder, const std::fi
   return !ec && std::mismatch(within.begin(), within.end(), place.begin(), place.end()).first == within.end();
 }
 
-/// Names are restricted to plain file names, because clients of control choose them.
+/// Returns the format for a name. Only plain file names are allowed, because clients of control choose them.
 Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vendor) {
   const auto refuse = [&](const std::string& why) {
     return failure(ErrorKind::usage, "\"" + std::string(name.substr(0, longest_name)) + "\": " + why);
@@ -99,8 +99,8 @@ Result<Kind> RecordingFile::kind_of(std::string_view name, std::string_view vend
     return refuse("the name of a recording has letters, digits, - _ and . only, 128 at most, and no folder: run-1.mcap");
   if (name.front() == '-')
     return refuse("the name of a recording must not begin with -, because programs would read it as an option: run-1.mcap");
-  // MCAP is possible for all sonars. Then follow the formats for any single stream, those of this make, and those of other
-  // makes, which are refused with a reason.
+  // MCAP is possible for all sonars. The next formats are for single streams of any make, then those of this make, then those of
+  // other makes, which are refused with a reason.
   if (name.ends_with(mcap.ending)) return &mcap;
   const protocol::Make& own = make_of(vendor);
   for (const Kind kind : {&pcap, &raw_dump}) {
@@ -135,7 +135,7 @@ RecordingFile::RecordingFile(std::unique_ptr<recording::Sink> sink, Kind kind, c
   }
 }
 
-/// Order in the file: a status message if one is due, the ping as a stream, its datagrams, and in MCAP the truth.
+/// Writes a status message if one is due, then the bytes of the ping, its datagrams, and in MCAP the truth.
 Result<void> RecordingFile::write(const RecordedPing& ping) {
   const bool keeps_status = kind_ == &mcap || kind_ == &pcap;
   if (keeps_status && !ping.status.empty() && (!status_at_ || ping.at - *status_at_ >= status_period)) {
@@ -162,7 +162,7 @@ Result<void> RecordingFile::put(recording::RecordedMessage message) {
 
 Result<void> RecordingFile::put_truth(const RecordedPing& ping) {
   const PingRequest& request = ping.ping->request;
-  if (make_->codec.samples == nullptr)  // otherwise the session reads the samples from the messages
+  if (make_->codec.samples == nullptr)  // with a reader, the session takes the samples from the messages
     if (Result<void> written = mcap_->write_image(ping.at, ping.ping); !written) return written;
   if (Result<void> written = mcap_->write_pose(ping.at, request.fired_at, request.sonar_in_world); !written) return written;
   recording::mcap::PingTruth truth;

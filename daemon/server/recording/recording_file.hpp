@@ -1,5 +1,5 @@
 // One file that the daemon records: the messages of a sonar, and in MCAP also pictures, true poses and the first hit of each
-// beam. The writer thread creates and writes it (recordings.hpp). It has no queue, clock or log.
+// beam. The writer thread creates and writes the file (recordings.hpp).
 #pragma once
 
 #include <cstdint>
@@ -22,14 +22,14 @@ using recording::mcap::SceneNames;
 
 /// A ping to be written. It shares its large parts with the clients to which the ping was sent.
 struct RecordedPing {
-  Time at{};  // when it was made
+  Time at{};  // time at which the ping was made
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;  // the message that clients get; null = not sent over TCP
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream, as receivers get them
   protocol::Bytes status;                                                      // status message at that time; empty = none
   std::shared_ptr<const SceneNames> names;                                     // names of objects and bodies in the ping's scene
 
-  /// Bytes of memory while it waits.
+  /// Returns the bytes of memory that the ping needs while it waits.
   std::size_t size() const;
 };
 
@@ -38,7 +38,7 @@ struct RecordedSonar {
   std::string name, vendor;
   recording::PcapConversation ends;  // for the headers of a capture
   bool has_range_images = false;     // range images have no labels
-  std::string profile = {};          // of the sonar; empty: unknown
+  std::string profile = {};          // profile of the sonar; empty = unknown
 };
 
 class RecordingFile {
@@ -53,10 +53,11 @@ class RecordingFile {
   static bool is_recording(std::string_view name);
   /// True if the file, after following symbolic links, lies in the folder.
   static bool is_inside(const std::filesystem::path& folder, const std::filesystem::path& file);
-  /// The format of a plain file name, by its extension: .mcap, those of this vendor, and .pcap or .raw if pings are sent as a
-  /// stream. Other names are errors.
+  /// Returns the format for the extension of a plain file name: .mcap, an extension of this vendor or, if pings are sent as a
+  /// stream, .pcap or .raw. Other names are errors.
   static Result<Kind> kind_of(std::string_view name, std::string_view vendor);
-  /// Creates the file. `labels`: also write the labels of pings, in MCAP. Errors: io. An existing file is not changed.
+  /// Creates the file. `labels`: also write the labels of pings, in MCAP. Errors: io, also if the file exists, which is then not
+  /// changed.
   static Result<std::unique_ptr<RecordingFile>> create(const std::filesystem::path& file, Kind kind, const RecordedSonar& sonar,
                                                        bool labels = false);
 
@@ -69,7 +70,7 @@ class RecordingFile {
   Result<void> write_fault(Time at, const std::string& json) {
     return mcap_ == nullptr ? Result<void>{} : mcap_->write_fault(at, json);
   }
-  /// Finishes the file, after an error as far as possible. Errors: io.
+  /// Completes the file; after an error, as far as possible. Errors: io.
   Result<void> close() { return writer_->close(); }
 
   struct Figures {
@@ -86,7 +87,7 @@ class RecordingFile {
   bool labels_;
   std::shared_ptr<std::uint64_t> bytes_ = std::make_shared<std::uint64_t>(0);
   std::unique_ptr<recording::RecordingWriter> writer_;
-  recording::McapSession* mcap_ = nullptr;  // writer_, if it is a McapSession
+  recording::McapSession* mcap_ = nullptr;  // equals writer_ if that is a McapSession
   std::optional<Time> status_at_;
   std::uint64_t pings_ = 0, messages_ = 0;
 };

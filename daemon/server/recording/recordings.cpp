@@ -25,8 +25,8 @@ std::string why_without_labels(RecordingFile::Kind kind, const RecordedSonar& so
 
 }  // namespace
 
-/// A recording is opening until its file is created, running until end(), then ending until its file is closed. Only the I/O
-/// thread uses this struct, except `work`, which belongs to the writer thread.
+/// The state of a recording is `opening` until the file is created, `running` until end(), then `ending` until the file is
+/// closed. Only the I/O thread uses this struct, except `work`, which belongs to the writer thread.
 struct Recordings::Recording {
   enum class State { opening, running, ending, ended } state = State::opening;
   std::string name;  // file name in the folder
@@ -126,7 +126,7 @@ void Recordings::find_earlier() {
   }
 }
 
-/// Checks a request and adds the recording in state `opening`. No file is touched on this thread.
+/// Checks a request and adds the recording in state `opening`. The I/O thread does not access the file.
 Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& asked, const RecordedSonar& sonar) {
   if (config_.recording.folder.empty())
     return failure(ErrorKind::usage,
@@ -157,7 +157,7 @@ void Recordings::remove_oldest() {
   }
 }
 
-/// A sentence that names the newest matching recording and the reason why it has already ended, for example a full disk.
+/// Returns a sentence with the newest matching recording and the reason why it has already ended, for example a full disk.
 std::string Recordings::why_none_to_stop(const std::string& file) const {
   const auto last = std::find_if(recordings_.rbegin(), recordings_.rend(), [&](const Pointer& r) {
     return (file.empty() || r->name == file) && !r->status.why().empty() && r->status.why() != stop_requested;
@@ -167,7 +167,7 @@ std::string Recordings::why_none_to_stop(const std::string& file) const {
   return ended.empty() ? "no recording is called \"" + file.substr(0, 128) + "\"" : ended;
 }
 
-/// `done` is called once, with the first error, when the last of the recordings is closed.
+/// Stops recordings. Calls `done` once, with the first error, when the last of the recordings is closed.
 void Recordings::stop(const control::StopRecording& asked, Done done) {
   std::vector<Pointer> meant;
   for (const Pointer& r : recordings_)
@@ -190,7 +190,7 @@ void Recordings::stop(const control::StopRecording& asked, Done done) {
   }
 }
 
-/// A recording that is still opening cannot end yet: start() ends it when its file is open.
+/// Ends the recordings of a sonar. A recording that is still opening cannot end yet, so start() ends it when the file is open.
 void Recordings::end_of(const std::string& sonar, const std::string& why) {
   for (const Pointer& r : recordings_) {
     if (r->status.sonar() != sonar) continue;
@@ -247,8 +247,8 @@ void Recordings::take_fault(const std::string& sonar, Time at, const std::string
       write(r, json.size(), [at, json](RecordingFile& file) { return file.write_fault(at, json); });
 }
 
-/// The limit applies to all recordings together. If it is exceeded, the recording with the most data in memory ends, which may
-/// be another one.
+/// Checks the limit of all recordings together. If it is exceeded, the recording with the most data in memory ends, which may be
+/// another than `recording`.
 bool Recordings::has_room_for(const Pointer& recording, std::size_t bytes) {
   const auto is_running = [](const Pointer& r) { return r->state == Recording::State::running; };
   std::size_t waiting = 0;
@@ -279,7 +279,7 @@ void Recordings::write(const Pointer& recording, std::size_t size, auto job) {
 
 // ---- the end
 
-/// The first failure of a recording is logged and becomes its result; later ones are ignored.
+/// Logs the first failure of a recording, which is also its result; ignores later failures.
 void Recordings::fail(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running && !(recording->state == Recording::State::ending && !recording->failed))
     return;
@@ -289,7 +289,7 @@ void Recordings::fail(const Pointer& recording, const std::string& why) {
   end(recording, why);
 }
 
-/// Waiting messages are written before the file is closed.
+/// Ends a recording. Waiting messages are written before the file is closed.
 void Recordings::end(const Pointer& recording, const std::string& why) {
   if (recording->state != Recording::State::running) return;
   recording->state = Recording::State::ending;
@@ -300,7 +300,7 @@ void Recordings::end(const Pointer& recording, const std::string& why) {
       [this, recording](const Outcome& outcome) { ended(recording, outcome); });
 }
 
-/// The file is closed. Requests to end the recording are answered now.
+/// Called when the file is closed. Answers the requests to end the recording.
 void Recordings::ended(const Pointer& recording, const Outcome& outcome) {
   if (!outcome.result) fail(recording, outcome.result.error().text);
   recording->state = Recording::State::ended;

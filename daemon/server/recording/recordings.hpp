@@ -1,8 +1,8 @@
-// Recordings inside the daemon: control starts and stops them, devices pass the pings that they send, and the writer thread
+// Recordings in the daemon. Control starts and stops recordings, devices pass the pings that they send, and the writer thread
 // writes the files. App owns the object. All functions are called on the I/O thread.
 //
-// Pings never wait for a file: recorded pings wait in memory up to a limit. Beyond it, or if a file fails, the recording ends
-// with one log line; the file stays readable.
+// Sending never waits for a file, because recorded pings wait in memory, up to a limit. Beyond the limit, or if a file fails, the
+// recording ends with one log line; the file is still readable.
 #pragma once
 
 #include <functional>
@@ -29,7 +29,7 @@ class Recordings {
  public:
   static constexpr std::size_t most_at_once = 4, most_remembered = 8;
   static constexpr std::size_t default_most_waiting_bytes = 64u << 20;  // limit for all recordings together
-  /// Called once when the recording has begun or ended, possibly before start() or stop() returns; never after finish().
+  /// Called once when the recording has begun or ended, possibly before start() or stop() returns, but never after finish().
   using Done = std::function<void(const Result<void>&)>;
 
   /// `on_change` is called when a recording has ended.
@@ -41,9 +41,10 @@ class Recordings {
 
   /// Lists the newest existing files of the folder as ended recordings.
   void find_earlier();
-  /// `who` is the requester's name for the log. Errors: usage (a bad file name, or recording is not configured), io, unavailable.
+  /// Starts a recording. `who` is the requester's name for the log. Errors: usage (a bad file name, or recording is not
+  /// configured), io, unavailable.
   void start(const control::StartRecording& asked, RecordedSonar sonar, const std::string& who, Done done);
-  /// An empty name stops all recordings.
+  /// Stops a recording, or all if the name is empty.
   void stop(const control::StopRecording& asked, Done done);
   /// Ends the recordings of a sonar that stops.
   void end_of(const std::string& sonar, const std::string& why);
@@ -61,12 +62,12 @@ class Recordings {
 
   /// Call it before anything is recorded, and whenever another scene is used.
   void use_scene(const Scene& scene);
-  /// The names of objects and bodies in the present scene.
+  /// Returns the names of objects and bodies in the present scene.
   const std::shared_ptr<const SceneNames>& names() const { return names_; }
 
   /// Returns the open recordings and the last ones that have ended, oldest first.
   std::vector<v1::RecordingStatus> status() const;
-  /// Returns true if no recording is open.
+  /// True if no recording is open.
   bool idle() const { return running() == 0; }
 
  private:
@@ -83,7 +84,7 @@ class Recordings {
 
   void on_thread(const std::shared_ptr<Work>& work, auto job, auto after);
   std::size_t running() const;
-  /// True if `bytes` more of this recording may wait. If not, the recording with most waiting bytes ends.
+  /// True if `bytes` more bytes of this recording may wait. If not, ends the recording with most waiting bytes.
   bool has_room_for(const Pointer& recording, std::size_t bytes);
   Result<Pointer> begin(const control::StartRecording& asked, const RecordedSonar& sonar);
   /// Queues `job`, which writes `bytes` bytes, for the writer thread.

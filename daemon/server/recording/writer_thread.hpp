@@ -1,5 +1,5 @@
-// The thread that writes files: recordings and the journal of faults. The I/O thread passes jobs to it so as not to wait for a
-// disk; jobs run in order. App owns it.
+// The thread that writes recordings and the journal of faults, so that the I/O thread does not wait for a disk. Jobs run in
+// order. App owns the object.
 #pragma once
 
 #include <unistd.h>
@@ -20,7 +20,7 @@ class WriterThread {
   /// `nice_by` is added to the niceness of the thread; `on_idle` is called after the last job, on the I/O thread.
   WriterThread(asio::io_context& io, int nice_by, std::function<void()> on_idle = {}) : io_(io), on_idle_(std::move(on_idle)) {
     asio::post(thread_, [nice_by] {
-      if (nice_by != 0 && ::nice(nice_by) == -1) return;  // a failure only makes other threads less smooth
+      if (nice_by != 0 && ::nice(nice_by) == -1) return;  // after a failure, this thread only disturbs other threads more
     });
   }
   /// Waits until all jobs are done.

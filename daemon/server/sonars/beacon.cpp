@@ -9,7 +9,7 @@ namespace sonar {
 Result<void> Beacon::open(const SonarConfig& sonar, const protocol::Port& port) {
   period_ = port.period;
   for (const Endpoint& to : sonar.status_to) to_.emplace_back(address_of(to.ip), to.port == 0 ? port.number : to.port);
-  // Binds an ephemeral port, but never the one on which drivers listen.
+  // Binds an ephemeral port, but never the port on which drivers listen.
   for (int attempt = 0; attempt < 8; ++attempt) {
     if (socket_.is_open()) socket_.close();
     if (auto r = bind_udp(socket_, {sonar.bind_ip, 0}, true); !r) return r;
@@ -28,7 +28,7 @@ void Beacon::start() {
         if (!fault || stopping_) return;
         fault_(text_of(fault));
         timer_.expires_after(period_);
-        timer_.async_wait([this](const error_code&) {  // send_now() cancels it
+        timer_.async_wait([this](const error_code&) {  // send_now() cancels this wait
           if (!stopping_) start();
         });
       });

@@ -1,4 +1,4 @@
-// The status broadcast of an emulated sonar (Port::Kind::udp_beacon): sent periodically from its own port. Owned by Device.
+// Sends the status broadcast of an emulated sonar (Port::Kind::udp_beacon) periodically from a separate port. Device owns it.
 #pragma once
 
 #include <algorithm>

@@ -12,7 +12,7 @@
 namespace sonar {
 namespace {
 
-/// Binds a broadcast address, which several sonars of a network share.
+/// Binds a broadcast address, which several sonars in a network share.
 bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   error_code ec;
   socket.open(udp::v4(), ec);
@@ -22,7 +22,7 @@ bool bind_shared(udp::socket& socket, const udp::endpoint& at) {
   return !ec;
 }
 
-/// On loopback (127.0.0.0/8 with any netmask) the broadcast address is 127.255.255.255.
+/// Returns the broadcast address; on loopback (127.0.0.0/8 with any netmask) it is 127.255.255.255.
 Ipv4 broadcast_of(const SonarConfig& sonar) {
   if (sonar.bind_ip[0] == 127) return {127, 255, 255, 255};
   Ipv4 address{};
@@ -47,7 +47,7 @@ bool is_closed_port(msghdr& message) {
 Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port, bool shared) {
   number_ = port;
   Socket& own = sockets_.emplace_back(io_);
-  // With `groups` broadcasts are enabled, because only the system has the list of all broadcast addresses.
+  // If there are `groups`, broadcasts are enabled, because only the system has the list of all broadcast addresses.
   if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, !sonar.groups.empty(), shared); !r) return r;
   send_multicast_from(own.socket, sonar.bind_ip);
   return {};
@@ -62,7 +62,7 @@ void DatagramPort::receive_broadcasts(const SonarConfig& sonar) {
   }
 }
 
-/// Without functions for answers and errors, the port only sends.
+/// Starts to receive. Without functions for answers and errors, the port only sends.
 void DatagramPort::start() {
   if (!answer_ && !closed_) return;
   if (closed_) {
@@ -72,7 +72,7 @@ void DatagramPort::start() {
   for (Socket& socket : sockets_) receive(socket);
 }
 
-/// Reads the error queue of the socket; with IP_RECVERR, an entry for an ICMP answer names the host.
+/// Reads the error queue of the socket. With IP_RECVERR, an entry for an ICMP answer contains the host.
 void DatagramPort::take_errors() {
   while (closed_ && !stopping_) {
     sockaddr_in host{};
@@ -100,8 +100,8 @@ void DatagramPort::stop() {
   }
 }
 
-/// Answers a datagram. The answer is sent from the sonar's own address, so that hosts learn this address. An unreachable host
-/// gets no answer. Returns false if the datagram was dropped.
+/// Answers a datagram from the sonar's own address, so that hosts learn this address. An unreachable host gets no answer. Returns
+/// false if the datagram was dropped.
 bool DatagramPort::take(Socket& at, std::size_t size) {
   if (!answer_ || !at.from.address().is_v4()) return false;
   const Endpoint from{at.from.address().to_v4().to_bytes(), at.from.port()};

@@ -44,7 +44,7 @@ asio::awaitable<void> DatagramStream::send() {
   }
 }
 
-/// An empty datagram has no effect on a host, but a closed port answers it with ICMP.
+/// Sends an empty datagram, which has no effect on a host, but which a closed port answers with ICMP.
 void DatagramStream::send_nothing_to(const Endpoint& to) {
   error_code ignored;
   socket_.send_to(asio::const_buffer(), {address_of(to.ip), to.port}, 0, ignored);
@@ -70,7 +70,8 @@ asio::awaitable<void> DatagramStream::wait() {
   parent_.look_for_host(id_);
 }
 
-/// False: the socket was closed before the whole message was sent. A receiver that is removed meanwhile gets no more parts.
+/// Returns false if the socket was closed before the whole message was sent. A receiver that is removed meanwhile gets no more
+/// parts.
 asio::awaitable<bool> DatagramStream::send_message(const Outbox::Message& message, std::vector<Endpoint> receivers) {
   if (message.datagrams == nullptr) co_return co_await send_datagram(*message.bytes, receivers);
   for (std::size_t i = 0; i < message.datagrams->size(); ++i) {
@@ -94,7 +95,7 @@ asio::awaitable<bool> DatagramStream::send_datagram(const protocol::Bytes& datag
     error_code ec;
     const auto sent_to = udp::endpoint(address_of(to.ip), to.port);
     co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
-    // The error belongs to an earlier datagram, maybe to another host; this datagram was not sent.
+    // The error belongs to an earlier datagram, perhaps to another host; this datagram was not sent.
     if (ec == asio::error::connection_refused) co_await socket_.async_send_to(asio::buffer(datagram), sent_to, into(ec));
     if (!socket_.is_open()) co_return false;
     if (ec)

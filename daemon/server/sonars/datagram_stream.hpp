@@ -1,6 +1,6 @@
 // Sends the messages of an emulated sonar as datagrams: to all receivers of a port of kind udp_stream, or to the host of a port
-// of kind udp_dialogue. It sends whole messages in order, and pauses between the datagrams of a message. Owned by its Device and
-// its coroutine.
+// of kind udp_dialogue. It sends whole messages in order, and pauses between the datagrams of a message. The Device and the
+// coroutine own it.
 #pragma once
 
 #include <chrono>
@@ -13,12 +13,12 @@ namespace sonar {
 
 class DatagramStream : public std::enable_shared_from_this<DatagramStream> {
  public:
-  /// `socket` and `parent` must outlive it. `gap`: shortest time between two datagrams of a message.
+  /// `socket` and `parent` must outlive the stream. `gap`: shortest time between two datagrams of a message.
   DatagramStream(SessionParent& parent, udp::socket& socket, ConnectionId id, std::chrono::nanoseconds gap)
       : parent_(parent), socket_(socket), id_(id), gap_(gap), wake_(socket.get_executor()), pause_(socket.get_executor()) {}
 
   void start();
-  /// Call it when there is something to send.
+  /// Call it when there is a message to send.
   void wake() { wake_.cancel(); }
   /// Ends the stream after the current ping, or at once when the socket is closed.
   void finish(std::string why, bool by_host = false);

@@ -36,11 +36,12 @@ Result<void> Device::open() {
   return open_observers();
 }
 
-/// Each kind of port has its own listener or socket. Streams and dialogues share a datagram socket if their numbers are equal.
+/// Opens a port. Each kind of port has its own listener or socket, but streams and dialogues share a datagram socket if their
+/// numbers are equal.
 Result<void> Device::open(const protocol::Port& port) {
   using Kind = protocol::Port::Kind;
   const Ipv4 ip = config().bind_ip;
-  if (port.kind == Kind::tcp_stream)  // on_client_socket() asks `admission`, so that refusals are counted for this sonar
+  if (port.kind == Kind::tcp_stream)  // on_client_socket() calls `admission`, so that refusals are counted for this sonar
     return tcp_ports_.emplace_back(&port, Listener(network_.io, network_.admission, std::nullopt))
         .listener.open({ip, port.number});
   if (port.kind == Kind::udp_beacon) return beacon_.open(config(), port);
@@ -89,12 +90,12 @@ Result<void> Device::open(const protocol::Port& port) {
   return {};
 }
 
-/// The socket of a port number; several ports can share it.
+/// Returns the socket of a port number; several ports can share it.
 Result<DatagramPort*> Device::datagram_port(std::uint16_t number) {
   for (DatagramPort& port : datagram_ports_)
     if (number != 0 && port.number() == number) return &port;
   DatagramPort& port = datagram_ports_.emplace_back(network_.io);
-  // The port of discovery is shared, because hosts bind it too. A sonar that is started twice is detected by its other ports.
+  // The port of discovery is shared, because hosts bind it too. If a sonar is started twice, its other ports are in use.
   const auto ports = sonar_.vendor().ports();
   const bool shared = std::any_of(ports.begin(), ports.end(), [&](const protocol::Port& p) {
     return p.kind == protocol::Port::Kind::udp_answer && p.number == number;
@@ -136,7 +137,7 @@ void Device::start() {
 
 void Device::stop(const std::string& why) {
   if (std::exchange(stopping_, true)) return;
-  // Listeners are closed first, so that no client arrives while the present ones are finished.
+  // Listeners are closed first, so that no client arrives while the present clients are disconnected.
   for (TcpPort& tcp : tcp_ports_) tcp.listener.stop();
   observer_listener_.stop();
   beacon_.stop();
@@ -149,7 +150,7 @@ void Device::stop(const std::string& why) {
   if (!started_) streams_.clear();
 }
 
-/// True if nothing of the device uses a socket any more, so that it can be destroyed.
+/// True if no part of the device uses a socket any more, so that the device can be destroyed.
 bool Device::gone() const {
   return sessions_.empty() && streams_.empty() && refusing_ == 0 && waiting_ == 0 && !sonar_.busy() &&
          std::all_of(http_.begin(), http_.end(), [](const SonarHttp& http) { return http.gone(); });
@@ -187,7 +188,7 @@ std::optional<std::chrono::milliseconds> Device::longest_silence(ConnectionId of
   return connection == nullptr || !connection->dialogue ? std::nullopt : connection->dialogue->longest_silence();
 }
 
-/// Reports a mistake in sonard (not of a client). It may end the connection of that client, but no other.
+/// Reports a bug of sonard (not a mistake of a client). A bug may end the connection of one client, but no other.
 void Device::on_fault(const std::string& what) { log_fault(network_.log, faults_, what, {"sonar", config().name}); }
 
 void Device::on_send_error(const Endpoint& to, const std::string& why) {
@@ -205,7 +206,7 @@ void Device::on_over(ConnectionId id, const std::string& why, bool by_client) {
   if (const StreamPointer dialogue = stream_of(id)) lasted = dialogue->connected_for();
   sessions_.remove(session);
   streams_.remove_if([id](const StreamPointer& s) { return s->id() == id; });
-  // Before the free slot is assigned, because a waiting client may have disconnected.
+  // This precedes the assignment of the free slot, because a waiting client may have disconnected.
   forget_who_left();
   closing_since_ = std::chrono::steady_clock::now() - lasted;
   perform(sonar_.on_closed(id, why, network_.clock.now(), by_client));
@@ -213,7 +214,7 @@ void Device::on_over(ConnectionId id, const std::string& why, bool by_client) {
 
 // ---- actions
 
-/// Actions are carried out in order, because later ones may refer to the session that a Serve creates.
+/// Carries out actions in order, because later actions may refer to the session that a Serve creates.
 void Device::perform(Actions actions) {
   for (Action& action : actions) std::visit([this](auto& a) { carry_out(a); }, action);
   arm();
@@ -221,7 +222,7 @@ void Device::perform(Actions actions) {
 }
 
 void Device::arm() {
-  // In stepped time the Stepper ticks the sonar.
+  // In stepped time the Stepper calls the sonar's ticks.
   if (stopping_ || network_.clock.stepped()) return;
   const auto next = sonar_.next_tick();
   const auto at = next ? std::optional(network_.clock.timer_at(*next)) : std::nullopt;
@@ -285,7 +286,7 @@ void Device::carry_out(const Refuse& action) {
   }
   const std::string most = std::to_string(config().max_clients);
   report_visit(from.role, VisitLog::Kind::refused, "client refused: " + most + " already connected", {});
-  // Beyond the limit the socket is closed without reading: the client may see a reset in place of a FIN.
+  // Beyond the limit the socket is closed without reading, so the client may get RST, not FIN.
   if (refusing_ >= most_refused_at_once || stopping_) return;
   ++refusing_;
   asio::co_spawn(

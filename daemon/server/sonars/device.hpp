@@ -1,5 +1,5 @@
 // The network side of one emulated sonar: the vendor's ports, the port for observers, a timer. It passes bytes to the Sonar and
-// carries out the returned Actions. Owned by Fleet. I/O thread only.
+// carries out the returned Actions. Fleet owns it, and only the I/O thread uses it.
 #pragma once
 
 #include <array>
@@ -48,7 +48,7 @@ class DeviceParent {
   virtual void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) = 0;
   /// Called when the device has stopped.
   virtual void on_stop(const Device& of, const std::string& why) = 0;
-  /// Called after a change that stepped time or the shutdown may wait for.
+  /// Called after a change for which stepped time or the shutdown may wait.
   virtual void on_change() = 0;
   /// Called when the daemon must end.
   virtual void on_engine_failure(const Error& why) = 0;
@@ -60,7 +60,7 @@ struct DeviceNetwork {
   Clock& clock;
   Admission& admission;
   Log& log;
-  bool digest = false;  // compute the SHA-256 of the bytes sent to each client
+  bool digest = false;  // true: computes the SHA-256 of the bytes sent to each client
 };
 
 struct StreamDigest {
@@ -72,7 +72,7 @@ struct StreamDigest {
 struct Visit {
   std::string address, why;
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
-  std::chrono::steady_clock::time_point noted = std::chrono::steady_clock::now();  // the same time, by a clock that is never set
+  std::chrono::steady_clock::time_point noted = std::chrono::steady_clock::now();  // steady time of the visit
   bool by_itself = false, without_ping = false;
   std::optional<std::chrono::steady_clock::time_point> connected_at = {};  // start of a connection that ended
 };
@@ -89,7 +89,7 @@ class Device final : public SessionParent {
   /// Stops accepting clients and making pings, and ends every connection with FIN after its current message.
   void stop(const std::string& why = "sonard stops");
 
-  // For stepped time:
+  // Called in stepped time.
   void step() { perform(sonar_.tick_pacer(network_.clock.now())); }
   void tick_sessions() { perform(sonar_.tick_conversations(network_.clock.now())); }
   void skip(std::chrono::nanoseconds by) { sonar_.skip(by); }
@@ -104,7 +104,7 @@ class Device final : public SessionParent {
   const SonarConfig& config() const { return sonar_.config(); }
   DeviceFigures figures() const { return sonar_.figures(); }
   std::vector<StreamDigest> digests() const;
-  /// The address of the vendor's first TCP port; port 0 if it has none.
+  /// Returns the address of the vendor's first TCP port; port 0 if there is none.
   Endpoint data_endpoint() const;
   std::vector<udp::endpoint> status_destinations() const { return beacon_.destinations(); }
   std::vector<protocol::DriverAddress> addresses() const;
@@ -112,7 +112,7 @@ class Device final : public SessionParent {
   // Control (device_control.cpp).
   v1::SonarStatus status(Time now) const;
   v1::PingEvent event_of(const PingQueued& queued) const;
-  /// The name that recordings use.
+  /// Returns the properties that recordings need.
   RecordedSonar recorded() const;
   /// Returns a sentence about a problem, or an empty text.
   std::string problem() const;
@@ -215,14 +215,14 @@ class Device final : public SessionParent {
   std::optional<std::chrono::steady_clock::time_point> timer_at_;
 
   ConnectionId last_connection_ = 0;
-  std::map<ConnectionId, Arrived> arrived_;  // connections that wait for a decision or a slot
+  std::map<ConnectionId, Arrived> arrived_;  // connections that wait for a verdict or a slot
   std::list<SessionPointer> sessions_;
   std::list<StreamPointer> streams_;
   std::list<std::pair<Endpoint, std::chrono::steady_clock::time_point>>
       closed_;                                           // receivers that were unreachable, with the time of the next attempt
-  int refusing_ = 0, waiting_ = 0;                       // connections
-  std::optional<Visit> refused_, gone_, searched_;       // the last ones
-  std::chrono::steady_clock::time_point closing_since_;  // when the connection that ends now had connected
+  int refusing_ = 0, waiting_ = 0;                       // numbers of connections
+  std::optional<Visit> refused_, gone_, searched_;       // the last visit of each kind
+  std::chrono::steady_clock::time_point closing_since_;  // time at which the connection that ends now had connected
   std::string silenced_by_;
 
   bool started_ = false, stopping_ = false;

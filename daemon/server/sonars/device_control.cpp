@@ -1,4 +1,4 @@
-// The part of Device for the control protocol: its status, and the requests that it accepts while running.
+// The part of Device for the control protocol: the status, and requests to the running device.
 #include <algorithm>
 
 #include "core/sonar/range_image.hpp"
@@ -37,7 +37,7 @@ v1::Visit message_of(const Visit& visit) {
   return out;
 }
 
-/// `session` is null if the session has ended.
+/// Fills in the status of a client; `session` is null if the session has ended.
 void fill(v1::ClientStatus& out, const Connection& c, Session* session) {
   out.set_address(c.peer.name);
   out.set_pings_written(c.pings_written());
@@ -56,7 +56,7 @@ void fill(v1::ClientStatus& out, const Connection& c, Session* session) {
 
 }  // namespace
 
-/// The status that control, the live view and the doctor show.
+/// Returns the status that control, the live view and the doctor show.
 v1::SonarStatus Device::status(Time now) const {
   const protocol::DeviceState& state = sonar_.state();
   const PingSettings& settings = sonar_.settings();
@@ -147,7 +147,7 @@ RecordedSonar Device::recorded() const {
   return sonar;
 }
 
-/// Settings are checked first: if the product refuses them, neither transmission nor mount changes.
+/// Checks settings first, so that neither transmission nor mount changes if the product refuses the settings.
 Result<void> Device::ask(const control::SetSonar& asked, const std::string& who) {
   const Time now = network_.clock.now();
   const protocol::SettingsOverride wanted{asked.range_m, asked.rate_hz, asked.gain_percent, asked.mode, asked.beams};

@@ -9,13 +9,13 @@
 namespace sonar {
 namespace {
 
-constexpr std::chrono::seconds closed_for{2};  // after this, a receiver whose port was closed is tried with one ping
+constexpr std::chrono::seconds closed_for{2};  // time after which a receiver whose port was closed gets one ping as a test
 constexpr std::uint16_t discard = 9;           // a port that is usually closed (RFC 863)
 constexpr std::size_t most_closed = 64;
 
 }  // namespace
 
-/// The receivers that clients requested, except group addresses that neither the product nor the configuration names, and
+/// Returns the receivers that clients requested, except group addresses that neither the product nor the configuration names, and
 /// receivers whose port is closed.
 std::vector<Endpoint> Device::receivers(ConnectionId stream) {
   const Connection* const connection = sonar_.connections().find(stream);
@@ -39,7 +39,7 @@ void Device::on_receiver_closed(const Endpoint& receiver) {
   if (!known && closed_.size() < most_closed) closed_.emplace_back(receiver, std::chrono::steady_clock::now() + closed_for);
 }
 
-/// Probes a silent host: its computer answers a datagram to a closed port (ICMP), which counts as a sign of life.
+/// Probes a silent host with a datagram to a closed port. An answer (ICMP) of the host's computer counts as a sign of life.
 void Device::look_for_host(ConnectionId stream) {
   const Connection* const host = sonar_.connections().find(stream);
   const StreamPointer dialogue = stream_of(stream);
@@ -47,7 +47,7 @@ void Device::look_for_host(ConnectionId stream) {
   dialogue->send_nothing_to({host->peer.ip, discard});
 }
 
-/// Handles a datagram. nullopt: dropped, because the requests of the address cost too much.
+/// Handles a datagram. Returns nullopt if it was dropped because the requests of the address cost too much.
 std::optional<std::vector<protocol::Bytes>> Device::on_limited_datagram(
     const Endpoint& from, protocol::BytesView datagram, const std::function<std::vector<protocol::Bytes>()>& act) {
   PortGuard& guard = network_.admission.guard();
@@ -64,7 +64,8 @@ std::optional<std::vector<protocol::Bytes>> Device::on_limited_datagram(
   return answers;
 }
 
-/// The dialogue belongs to the last sender, because UDP has no connection whose end would show that a host has gone.
+/// Passes a datagram to the dialogue, which belongs to the last sender, because UDP has no connection whose end would show that a
+/// host has gone.
 void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, const Endpoint& from, protocol::BytesView datagram) {
   if (stopping_ || !sonar_.vendor().is_request(port, datagram)) return;
   const Peer host{text_of(from), from.ip, from.port};
@@ -78,8 +79,8 @@ void Device::on_host_datagram(DatagramPort& at, const protocol::Port& port, cons
   datagram_work_ = on_bytes(dialogue->id(), datagram);
 }
 
-/// Called when a host's computer has answered that a port is closed. For the host's own port this is the only sign of its end,
-/// because UDP has no connection; for the port of look_for_host() it is a sign of life.
+/// Called when a host's computer has answered that a port is closed. If it is the host's own port, the host has ended, which UDP
+/// does not show otherwise; if it is the port of look_for_host(), the host is alive.
 void Device::on_host_closed(const protocol::Port& port, const Endpoint& host) {
   const StreamPointer dialogue = host_of(port);
   if (!dialogue) return;
@@ -99,7 +100,7 @@ Device::StreamPointer Device::host_of(const protocol::Port& port) const {
   return nullptr;
 }
 
-/// Null: no slot is free. Datagrams do not wait for a slot.
+/// Begins a dialogue; returns null if no slot is free, because datagrams do not wait for a slot.
 Device::StreamPointer Device::begin_dialogue(DatagramPort& at, const protocol::Port& port, Peer host) {
   const ConnectionId id = ++last_connection_;
   perform(sonar_.on_connect(id, Role::client, host, network_.clock.now(), &port));

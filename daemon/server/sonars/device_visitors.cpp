@@ -1,4 +1,4 @@
-// New connections at the TCP ports of a Device, until the sonar has decided about them.
+// Handles new connections at the TCP ports of a Device, until the sonar has accepted or refused them.
 #include <array>
 
 #include "daemon/server/sonars/device.hpp"
@@ -6,8 +6,8 @@
 
 namespace sonar {
 
-/// A host that connects too often must wait (a driver that reconnects at once must not fail). Only a few of an address wait;
-/// the others are refused.
+/// Delays a host that connects too often (a driver that reconnects at once must not fail). Only a few connections of an address
+/// wait; others are refused.
 void Device::admit(tcp::socket socket, OnAdmitted serve) {
   constexpr int most_waiting = 8;
   error_code ec;
@@ -51,7 +51,7 @@ void Device::on_client_socket(tcp::socket socket, const protocol::Port& port) {
 }
 
 void Device::on_arrival(tcp::socket socket, Admission::Place place, Role role, const protocol::Port* port) {
-  // Frees slots of clients that have disconnected before deciding about this one.
+  // Frees the slots of clients that have disconnected, before it accepts or refuses this client.
   forget_who_left();
   const ConnectionId id = ++last_connection_;
   Peer peer = peer_of(socket);
@@ -73,7 +73,7 @@ asio::awaitable<void> Device::refuse(tcp::socket socket, Admission::Place place)
   std::array<std::byte, 1024> discarded;
   for (int reads = 0; !ec && !late && reads < 64; ++reads) co_await socket.async_read_some(asio::buffer(discarded), into(ec));
   deadline.cancel();
-  // The handler above must finish with `socket` before this coroutine frame is destroyed.
+  // The handler above uses `socket`, so it must end before this coroutine frame is destroyed.
   co_await asio::post(network_.io, asio::use_awaitable);
   socket.close(ec);  // closed before its slot is free
   place.reset();

@@ -56,7 +56,7 @@ std::string Fleet::problem() const {
   return {};
 }
 
-/// The sonar's position in the configuration; if another sonar has that index, the first free one.
+/// Returns the sonar's position in the configuration or, if another sonar has that index, the first free index.
 std::uint32_t Fleet::free_index(std::size_t wanted, const std::vector<Opening>& given) const {
   const auto taken = [&](std::uint32_t index) {
     return std::any_of(devices_.begin(), devices_.end(), [&](const Device& d) { return d.sonar().index() == index; }) ||
@@ -75,8 +75,8 @@ void Fleet::retire(std::list<Device>::iterator device) {
   retired_.back().device.splice(retired_.back().device.end(), devices_, device);
 }
 
-/// Cancelled handlers still refer to the device and need a few turns of the event loop. So a device is erased only after
-/// several successive sweeps have found it gone.
+/// Erases a device only after several successive calls have found it gone, because cancelled handlers still refer to the device
+/// for a few turns of the event loop.
 void Fleet::sweep() {
   for (auto it = retired_.begin(); it != retired_.end();) {
     const Device& device = it->device.front();
@@ -111,7 +111,7 @@ bool Fleet::is_held(Ipv4 ip) const {
   });
 }
 
-/// Gives continuing sonars the mount and vehicle of the new configuration; returns the sonars to open.
+/// Sets the mount and vehicle of the new configuration for sonars that continue; returns the sonars to open.
 std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& next, Outcomes& outcomes) {
   std::vector<Opening> openings;
   for (auto it = devices_.begin(); it != devices_.end();) {
@@ -134,7 +134,7 @@ std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& nex
   return openings;
 }
 
-/// Called if the changed sonar cannot be opened: the previous one continues if its vehicle still exists, else it ends.
+/// Called if a changed sonar cannot be opened: the previous sonar continues if its vehicle still exists, else it ends.
 void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Config& next) {
   SonarConfig is = device->config();
   const auto vehicle = std::find_if(next.vehicles.begin(), next.vehicles.end(),
@@ -144,15 +144,15 @@ void Fleet::stay(std::list<Device>::iterator device, const Config& now, const Co
   device->use_place(is);
 }
 
-/// Replaces the sonars by those of the new configuration. A sonar that cannot be opened is an error in the result; the others
+/// Replaces the sonars with those of the new configuration. A sonar that cannot be opened is an error in the result; other sonars
 /// are opened nevertheless.
 Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
   Change change;
   Outcomes outcomes;
   std::vector<Opening> openings = sort_out(now, next, outcomes);
   std::vector<Opening> after;  // to be opened after the sonars that use their addresses are stopped
-  // Three passes, so that sonars can swap addresses and none is stopped needlessly: open sonars at free addresses, while the
-  // previous ones still serve; stop the sonars whose addresses are needed; open the rest.
+  // There are three passes, so that sonars can swap addresses and none is stopped needlessly: open sonars at free addresses,
+  // while the previous sonars still serve; stop sonars whose addresses are needed; open the rest.
   for (const Opening& o : openings) {
     const bool changed = o.before != devices_.end();
     outcomes[o.sonar->name] = changed ? "changed" : "added";
@@ -184,8 +184,8 @@ Fleet::Change Fleet::take_over(const Config& now, const Config& next) {
 
 // ---- pings and clients, passed on to the simulator, recordings and events
 
-/// Adds what recordings and viewers need besides samples. The scene's names are stored for the ping, because another scene may
-/// be in use when it is finished.
+/// Requests a ping, with the additions that recordings and viewers need. The scene's names are stored for the ping, because
+/// another scene may be in use when the ping is finished.
 void Fleet::compute(const Device& of, PingRequest request, Simulator::Done done) {
   const std::string& name = of.config().name;
   request.switches.keep_truth = recordings_.wants_truth(name) || (tap_wants_truth_ && tap_wants_truth_(name));

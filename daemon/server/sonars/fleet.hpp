@@ -1,6 +1,6 @@
-// The daemon's sonars: a Device for each, and the Devices that are closing after a reload. Owned by App. A sonar that a reload
-// does not change continues with its clients and keeps its index, which is part of the key of its noise. The fleet passes
-// requests, pings and events of the sonars to the simulator, recordings and subscribers.
+// The daemon's sonars: a Device for each, and the Devices that are closing after a reload. App owns the fleet. A sonar that a
+// reload does not change continues with its clients and keeps its index, which is part of the key of random numbers. The fleet
+// passes requests, pings and events of the sonars to the simulator, recordings and subscribers.
 #pragma once
 
 #include <functional>
@@ -19,9 +19,9 @@ namespace sonar {
 class Fleet final : public DeviceParent {
  public:
   struct Handlers {
-    std::function<void()> on_change;  // called after a change that stepped time or the shutdown may wait for
-    std::function<void(const Error& why)> on_engine_failure;  // the daemon must end
-    /// Called for each ping of a range finder; its distance is absent if a fault withholds it.
+    std::function<void()> on_change;  // called after a change for which stepped time or the shutdown may wait
+    std::function<void(const Error& why)> on_engine_failure;  // called when the daemon must end
+    /// Called for each ping of a range finder; the distance is absent if a fault withholds the ping.
     std::function<void(const SonarConfig& of, const PingQueued& ping)> on_distance = {};
   };
   /// The arguments must outlive the fleet.
@@ -40,9 +40,9 @@ class Fleet final : public DeviceParent {
   void stop();
 
   struct Change {
-    std::string summary;  // "front untouched, left changed, right added"
+    std::string summary;  // such as "front untouched, left changed, right added"
     std::vector<const Device*> opened;
-    std::vector<std::string> errors;  // sonars that could not be opened; the previous sonar stays if possible
+    std::vector<std::string> errors;  // errors of sonars that could not be opened; the previous sonar continues if possible
   };
   /// Stops, starts and keeps sonars according to the configuration `next`. The World must already have its vehicles.
   Change take_over(const Config& now, const Config& next);
@@ -54,7 +54,7 @@ class Fleet final : public DeviceParent {
   std::list<Device>& devices() { return devices_; }
   Device* find(const std::string& name);
   const Device* find(const std::string& name) const { return const_cast<Fleet*>(this)->find(name); }
-  /// `tap` is called with each ping that is queued for clients; empty = none.
+  /// Called with each ping that is queued for clients; empty = none.
   using PingTap = std::function<void(const Device& of, const PingQueued& ping)>;
   /// `wants_truth` returns whether the tap needs the ground truth of a sonar's next ping.
   using WantsTruth = std::function<bool(const std::string& sonar)>;
@@ -80,7 +80,7 @@ class Fleet final : public DeviceParent {
     std::uint32_t index = 0;
     std::list<Device>::iterator before;  // the device that it replaces, or end()
   };
-  /// By name of the sonar: the word in the summary for the effect of the reload on it.
+  /// The effect of the reload on each sonar, as a word in the summary. Key: name of the sonar.
   using Outcomes = std::map<std::string, std::string>;
   bool is_held(Ipv4 ip) const;
   std::vector<Opening> sort_out(const Config& now, const Config& next, Outcomes& outcomes);
@@ -105,7 +105,7 @@ class Fleet final : public DeviceParent {
   PingTap tap_;
   WantsTruth tap_wants_truth_;
   std::map<std::uint32_t, std::shared_ptr<const SceneNames>>
-      computed_names_;         // by index: names of the scene in which its ping is computed
+      computed_names_;         // key: index of the sonar; names of the scene in which its ping is computed
   std::list<Device> devices_;  // in the configuration's order
   std::list<Retired> retired_;
   std::uint64_t served_before_ = 0;   // pings served by erased devices
