@@ -1,5 +1,5 @@
-// Advances stepped time to the next ping or tick of a conversation, as far as SteppedTime allows. App owns it and calls step()
-// after every change; I/O thread only.
+// Advances stepped time to the next ping or tick of a dialogue, as far as SteppedTime allows. App owns the Stepper and calls
+// step() after every change, on the I/O thread.
 #pragma once
 
 #include <functional>

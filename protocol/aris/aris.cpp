@@ -22,7 +22,7 @@ class ArisVendor final : public protocol::Vendor {
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return aris::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return aris::options(); }
-  int default_max_clients() const override { return 1; }  // one controller at a time
+  int default_max_clients() const override { return 1; }  // one controller is connected at a time
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(aris::initial_settings(device), device);
@@ -45,7 +45,7 @@ class ArisVendor final : public protocol::Vendor {
   }
   std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
                                        protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // fields of the beacon have no fixed place
+    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // fields of the beacon have no fixed offset
   }
   bool change_integer(protocol::Part part, protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change,
                       protocol::Bytes& message) const override {

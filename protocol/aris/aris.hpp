@@ -1,4 +1,4 @@
-// Sound Metrics ARIS (docs/protocols/aris.md): the device, the controller, which sends commands by TCP and receives frames by
+// Sound Metrics ARIS (docs/protocols/aris.md): the device, the controller, which sends commands over TCP and receives frames over
 // UDP, and the codec for recordings.
 #pragma once
 
@@ -11,11 +11,11 @@
 namespace sonar::aris {
 
 const protocol::Vendor& vendor();
-/// One controller's connection: commands in, changes of settings and receivers out. The device never replies. The state must
-/// outlive it.
+/// Makes the dialogue with one controller, which converts commands to changes of settings and receivers. The device never
+/// replies. `device` must outlive the dialogue.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device);
 
-/// Frames arrive at any free port (0); the controller sends the port number to the device by SET_FRAMESTREAM_RECEIVER.
+/// Frames arrive at any free port (0); the controller sends the port number to the device in SET_FRAMESTREAM_RECEIVER.
 inline constexpr std::array<protocol::HostPort, 2> host_ports{
     {{protocol::HostPort::Kind::tcp, command_port}, {protocol::HostPort::Kind::udp_listen, 0}}};
 
@@ -23,7 +23,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
 
 recording::Codec codec();
 
-/// The time in a text such as "2014-Jan-31 23:58:15", in UTC. nullopt: the text has another form.
+/// Returns the time in a text such as "2014-Jan-31 23:58:15", in UTC; nullopt if the text has another form.
 std::optional<Time> parse_date_time(const std::string& text);
 
 }  // namespace sonar::aris

@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::uint32_t most_beams = 128;
 
-/// The first fields of the file header, from the vendor's aris-file-sdk. Readers take the numbers of beams and samples from here,
-/// not from the frames.
+/// The first fields of the file header, from the vendor's aris-file-sdk. Readers use its numbers of beams and samples, not those
+/// of the frames.
 struct FileHeader {
   std::uint32_t version = aris::file_version, frames = 0;
   std::array<std::uint32_t, 2> reserved0{};
@@ -29,8 +29,7 @@ constexpr void fields(auto& visit, wire::Like<FileHeader> auto& m) {
   visit("SerialNumber", m.serial);
 }
 
-/// Reads frame by frame. All frames have the size that the file header states, so a damaged frame is skipped and the next one is
-/// read.
+/// Reads frame by frame. All frames have the size that the file header states, so a damaged frame can be skipped.
 class ArisFileReader final : public RecordingReader {
  public:
   ArisFileReader(std::unique_ptr<Source> source, const FileHeader& header)
@@ -56,7 +55,7 @@ class ArisFileReader final : public RecordingReader {
   }
 
  private:
-  /// False at the end of the file.
+  /// Reads a frame. Returns false at the end of the file.
   bool read_frame() {
     const std::size_t record = aris::padded_header_size + picture_size_;
     if (ended_) return false;
@@ -84,7 +83,7 @@ class ArisFileReader final : public RecordingReader {
                    " is damaged: its version or number of samples is not the file's");
       return true;
     }
-    // The frames are turned into datagrams again, so that the host that reads live frames reads files too.
+    // Frames are converted to datagrams again, so that the host for live frames reads files too.
     at_ = Time(std::chrono::microseconds(header.frame_time_us % longest_time_us));
     for (Bytes& part : aris::parts_of(++frames_, bytes.first(aris::header_size), bytes.subspan(aris::padded_header_size)))
       parts_.push_back(std::move(part));
@@ -104,8 +103,8 @@ class ArisFileReader final : public RecordingReader {
   Damages damages_;
 };
 
-/// Collects the datagrams of frames and writes whole frames in the order of the picture. The file header takes its sizes from the
-/// first.
+/// Collects the datagrams of frames and writes whole frames in the order of the picture. The sizes in the file header are those
+/// of the first frame.
 class ArisFileWriter final : public RecordingWriter {
  public:
   explicit ArisFileWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}

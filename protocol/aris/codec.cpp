@@ -9,7 +9,7 @@
 namespace sonar::aris {
 namespace {
 
-/// The sender of the first datagram of a frame; only that one has the header, which names the product.
+/// Returns the sender of the first datagram of a frame; only this datagram has the header, which states the product.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   FramePart part;
   if (message.by != recording::Carrier::datagram || !protobuf::read(message.bytes, part)) return std::nullopt;

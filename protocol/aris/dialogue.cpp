@@ -20,8 +20,8 @@ constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hos
 
 bool is_multicast(protocol::Ipv4 ip) { return ip[0] >= 224 && ip[0] < 240; }
 
-/// One controller's conversation (docs/protocols/aris.md, "Session"). The device never answers over TCP; beacons and frame
-/// headers report its state. It sends frames once it has both valid acoustic settings and a receiver, in either order.
+/// The dialogue with one controller (docs/protocols/aris.md, "Session"). The device never answers over TCP; beacons and frame
+/// headers report its state. It sends frames once it has valid acoustic settings and a receiver, in any order.
 class ArisDialogue final : public protocol::Dialogue {
  public:
   explicit ArisDialogue(const DeviceState& device) : device_(device), seen_(device.settings), first_ping_(device.last_ping) {}
@@ -29,10 +29,10 @@ class ArisDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // All commands of one call become one change of settings, with the result of the last command.
+    // All commands of one call are one change of settings, with the result of the last command.
     settings_ = base();
     settings_.streaming |= streaming_;
-    // frame_index counts from the first ping of a connection. If several controllers are connected, it is that of the first one.
+    // frame_index counts from the first ping of a connection. If several controllers are connected, the first connection counts.
     settings_.first_ping = std::min(settings_.first_ping, first_ping_);
     changed_ = false;
     framer_.append(received);
@@ -49,8 +49,8 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  private:
-  /// Returns the settings that the next command changes. They are those of the last command, even if a fault delays their use. If
-  /// something else, such as the control interface, has replaced the device's settings since then, they are the device's.
+  /// Returns the settings that the next command changes: the settings after the last command, even if a fault delays their use,
+  /// or the device's settings, if for example the control interface has changed them since then.
   Settings base() {
     if (device_.settings != seen_) {
       const auto applied = std::find(waiting_.begin(), waiting_.end(), device_.settings);
@@ -104,8 +104,8 @@ class ArisDialogue final : public protocol::Dialogue {
     changed_ = true;
   }
 
-  /// On the wire an empty address is the controller's own and "0.0.0.0" stops the frames. In SetReceivers 0.0.0.0 is the
-  /// controller's own and an empty list stops the frames.
+  /// Handles SET_FRAMESTREAM_RECEIVER. In the command an empty address is the controller's and "0.0.0.0" stops the frames; in
+  /// SetReceivers 0.0.0.0 is the controller's address and an empty list stops the frames.
   void on_receiver(const Command& command, Reaction& reaction) {
     const Receiver wanted = command.receiver.value_or(Receiver{});
     protocol::SetReceivers receivers;
@@ -135,9 +135,9 @@ class ArisDialogue final : public protocol::Dialogue {
     changed_ = true;
   }
 
-  /// A controller that does not know the product sends the settings of each product, one after the other, and the device accepts
-  /// those of its own. So refusals are logged only if the device accepted none of these settings. That is known at the next
-  /// command of another type, for example the keep-alive, which is sent every second.
+  /// Handles SET_ACOUSTICS. A controller without information about the product sends settings for each product, one after the
+  /// other, and the device accepts those for itself. So refusals are logged only if the device accepted none of these settings,
+  /// which is known at the next command of another type, for example the keep-alive, which is sent every second.
   void on_acoustics(const Command& command) {
     const Verdict verdict = apply(settings_, command.acoustics.value_or(Acoustics{}), device_);
     accepts_ |= verdict.refusal.empty();
@@ -176,11 +176,11 @@ class ArisDialogue final : public protocol::Dialogue {
 
   const DeviceState& device_;
   std::shared_ptr<const VendorSettings> seen_;                 // the settings of the device at the last call
-  std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // settings commanded since, the oldest first
+  std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // settings of later commands, oldest first
   std::uint32_t first_ping_;
-  bool streaming_ = false;             // this controller has set a receiver
+  bool streaming_ = false;             // true: this controller has set a receiver
   std::vector<std::string> refusals_;  // refusals of SET_ACOUSTICS since the last command of another type
-  bool accepts_ = false;               // a SET_ACOUSTICS since then was accepted
+  bool accepts_ = false;               // true: a SET_ACOUSTICS since then was accepted
   CommandFramer framer_;
   Settings settings_;  // the settings of base(), changed by the commands of this call
   bool changed_ = false;

@@ -9,8 +9,8 @@
 namespace sonar::aris {
 namespace {
 
-/// Each ping of a frame forms 16 beams, one for each channel of the digitiser. If a frame consists of n pings, channel k of ping
-/// p holds beam n * sixteenth[k] + p. This order is a property of the hardware; the vendor's library has the same table.
+/// Each ping of a frame makes 16 beams, one for each channel of the digitiser. If a frame has n pings, channel k of ping p is
+/// beam n * sixteenth[k] + p. This order is a property of the hardware; the vendor's library has the same table.
 constexpr std::array<std::size_t, channels> sixteenth{10, 2, 14, 6, 8, 0, 12, 4, 11, 3, 15, 7, 9, 1, 13, 5};
 constexpr std::size_t first_part_samples = 620, part_samples = 1370;  // samples in a datagram of 1400 bytes
 constexpr std::size_t largest_picture = std::size_t{most_samples} * 128;
@@ -30,8 +30,8 @@ void for_each_sample(std::size_t samples, int pings, auto copy) {
       for (std::size_t channel = 0; channel < channels; ++channel) copy(raw++, sample * beams + sixteenth[channel] * n + ping);
 }
 
-/// Repeats the acoustic settings as the controller sent them, after the limits of judge(). Only the window comes from
-/// PingSettings: it depends on the sound speed at the time of the ping.
+/// Repeats the acoustic settings of the controller, after the limits of judge(). Only the window is from PingSettings, because it
+/// depends on the sound speed at the time of the ping.
 void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, const Product& product) {
   const Acoustics& a = s.acoustics;
   h.window_start_m = static_cast<float>(used.range_start_m);
@@ -58,7 +58,7 @@ void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, c
   h.interpacket_delay_us = s.packet_delay_us;
 }
 
-/// The compass and the accelerometer are in the sonar, so they measure the attitude of the sonar and not that of the vehicle.
+/// Sets the attitude of the sonar, not of the vehicle, because compass and accelerometer are in the sonar.
 void set_attitude(FrameHeader& h, const Quatd& sonar_in_world) {
   const RollPitchYaw angles = rpy_from_quat(sonar_in_world);
   h.compass_heading_deg = static_cast<float>(deg_from_rad(heading_rad(sonar_in_world)));
@@ -68,7 +68,7 @@ void set_attitude(FrameHeader& h, const Quatd& sonar_in_world) {
   h.acceleration_g = {static_cast<float>(down.x), static_cast<float>(down.y), static_cast<float>(down.z)};
 }
 
-/// All times of a frame are equal: the emulated sonar has no delay between trigger, ping and frame.
+/// Makes the header. All times of a frame are equal, because the emulated sonar has no delay between trigger, ping and frame.
 FrameHeader header_of(const Ping& ping, const protocol::DeviceState& device, const Settings& settings, std::int32_t index) {
   const PingRequest& request = ping.request;
   FrameHeader h;
@@ -87,7 +87,8 @@ FrameHeader header_of(const Ping& ping, const protocol::DeviceState& device, con
   return h;
 }
 
-/// The samples with the beams of each row in reverse order: beam 0 of a Ping is at port, beam 0 of an ARIS at starboard.
+/// Returns the samples with the beams of each row in reverse order, because beam 0 of a Ping is at port, beam 0 of an ARIS at
+/// starboard.
 Bytes mirrored(const Ping& ping) {
   const auto beams = static_cast<std::ptrdiff_t>(ping.request.settings.beam_count);
   Bytes out(ping.samples);
@@ -106,7 +107,7 @@ Place place_of(BytesView inside, BytesView whole) {
   return {inside.empty() ? whole.size() : static_cast<std::size_t>(inside.data() - whole.data()), inside.size()};
 }
 
-/// The first part of a frame; nothing if the part has no frame header.
+/// Returns the first part of a frame; nullopt if the part has no frame header.
 std::optional<FramePart> first_of(BytesView first_part) {
   FramePart part;
   return protobuf::read(first_part, part) && part.header ? std::optional(part) : std::nullopt;
@@ -176,7 +177,7 @@ std::optional<DecodedFrame> FrameAssembler::add(BytesView datagram) {
   const auto total = static_cast<std::size_t>(part.total_size), at = static_cast<std::size_t>(part.data_offset);
   if (total > largest_picture || at + part.data.size() > total) return std::nullopt;
   if (part.frame_index != index_ || done_ || total != total_) {
-    if (part.frame_index == index_ && total == total_) return std::nullopt;  // a repeated part of a frame that is whole
+    if (part.frame_index == index_ && total == total_) return std::nullopt;  // the part is a repetition
     incomplete_ += done_ ? 0 : 1;
     index_ = part.frame_index;
     total_ = total;
@@ -213,11 +214,11 @@ std::optional<DecodedFrame> FrameAssembler::whole() {
   return frame;
 }
 
-// Finds fields in the first datagram of a frame and in the beacon. Fields of the frame header have a fixed place. Integers of
-// the protobuf messages are varints, whose place and size depend on other values; to change one, the message is decoded and
-// encoded again.
+// Finds fields in the first datagram of a frame and in the beacon. Fields of the frame header have a fixed offset. Integers of
+// the protobuf messages are varints, whose offset and size depend on other values; to change an integer, the message is decoded
+// and encoded again.
 
-// For an empty message the result is the position within the frame header, as Vendor::field() requires.
+// For an empty message, returns the position in the frame header, as Vendor::field() requires.
 std::optional<Field> locate(FieldName name, BytesView first_part) {
   auto found = wire::locate<FrameHeader>(name);
   if (!found || first_part.empty()) return found;
@@ -246,7 +247,7 @@ bool change_part(FieldName name, const std::function<std::int64_t(std::int64_t)>
   if (name == FieldName::image_size) {
     part.total_size = static_cast<std::int32_t>(change(part.total_size));
   } else {
-    // Two fields hold the number: frame_index of the part counts from 1, FrameIndex of the header from 0.
+    // Two fields contain the number: frame_index of the part counts from 1, FrameIndex of the header from 0.
     part.frame_index = static_cast<std::int32_t>(change(part.frame_index - 1) + 1);
     const auto number = static_cast<std::uint32_t>(part.frame_index - 1);
     Bytes index;
@@ -267,7 +268,8 @@ bool change_beacon(FieldName name, const std::function<std::int64_t(std::int64_t
   } else if (name == FieldName::connected_address) {
     a.busy = change(a.busy) != 0;
   } else {
-    // An ARIS has no status word. The bits that faults set in that of an Oculus become the fields with the same meaning.
+    // An ARIS has no status word. The bits that faults set in the status word of an Oculus are converted to fields with the same
+    // meaning.
     const std::int64_t status = change(0);
     if (status & (too_hot | stopped_by_heat)) a.cpu_c = a.hot_limit_c + 2;
     if (status & stopped_by_heat) a.power_down_reason = 0;

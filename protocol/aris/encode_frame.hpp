@@ -13,12 +13,12 @@ namespace sonar::aris {
 
 inline constexpr std::size_t longest_datagram = 1400;  // an older sample program has a buffer of that size
 
-/// Converts from the picture, [samples][beams] with beam 0 most to starboard, to the order in which the device digitises: by
-/// ping, sample and channel. Sizes: samples x 16 x pings.
+/// Converts from the picture, [samples][beams] with beam 0 most to starboard, to the order in which the device digitises:
+/// [pings][samples][16 channels].
 Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings);
 Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings);
 
-/// The datagrams of a frame. The first has the header; all have samples. `longest`: largest size of a datagram in bytes, at
+/// Makes the datagrams of a frame. The first has the header; all have samples. `longest`: largest size of a datagram in bytes, at
 /// least 1400.
 std::vector<Bytes> parts_of(std::int32_t frame_index, BytesView header, BytesView samples,
                             std::size_t longest = longest_datagram);
@@ -30,10 +30,10 @@ std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region regio
 
 Bytes make_beacon(const protocol::DeviceState& device);
 
-/// Implements Vendor::change_integer() for a datagram of a frame. It knows two fields: ping_id (FrameIndex, which counts from 0)
-/// and image_size (total_data_size).
+/// Implements Vendor::change_integer() for a datagram of a frame, for two fields: ping_id (FrameIndex, which counts from 0) and
+/// image_size (total_data_size).
 bool change_part(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& part);
-/// Implements Vendor::change_integer() for a beacon. It knows these fields: device_id; connected_address (not 0: a controller is
+/// Implements Vendor::change_integer() for a beacon, for these fields: device_id; connected_address (not 0: a controller is
 /// connected); device_status (bits of an Oculus: 0x4000 too hot, 0x8000 stopped by heat).
 bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change, Bytes& beacon);
 
@@ -44,7 +44,7 @@ struct DecodedFrame {
   Bytes picture;  // [samples][beams], beam 0 most to starboard
   std::size_t samples = 0, beams = 0;
 };
-/// Collects the datagrams of a frame until it is complete. If the next frame begins before that, the incomplete one is dropped
+/// Collects the datagrams of a frame until it is complete. If the next frame begins before that, the incomplete frame is dropped
 /// and counted.
 class FrameAssembler {
  public:

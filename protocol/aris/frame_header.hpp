@@ -1,5 +1,5 @@
-// The header of a frame, described once with the vendor's names: little-endian, packed, 744 bytes used. Recordings pad it to
-// 1024.
+// The header of a frame, described once with the vendor's names. It is little-endian and packed, and has 744 bytes; recordings
+// pad it to 1024.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ inline constexpr std::size_t padded_header_size = 1024;
 struct FrameHeader {
   static constexpr float no_axis = std::numeric_limits<float>::quiet_NaN();  // axis of a missing rotator or arm
   std::uint32_t frame_index = 0;
-  std::uint64_t frame_time_us = 0;  // since 1970
+  std::uint64_t frame_time_us = 0;  // time since 1970
   std::uint32_t version = file_version, status = 0;
   std::uint64_t sonar_time_us = 0;
   std::array<std::uint32_t, 6> calendar{};

@@ -17,12 +17,12 @@ using namespace std::chrono_literals;
 using protocol::HostActions;
 
 constexpr auto ping_after = 1s;                   // keep-alive; the device disconnects a controller after 10 s of silence
-constexpr double nominal_sound_speed_mps = 1490;  // converts a wanted range to time before a frame states the sound speed
+constexpr double nominal_sound_speed_mps = 1490;  // converts a requested range to time until a frame states the sound speed
 constexpr std::uint32_t most_pulse_us = 80;
 constexpr std::size_t commands = 0, frames = 1;  // indices of ports
 
-/// Settings for a product. `refusal`: why it cannot have those that are wanted; `acoustics` then are its nearest ones. Empty: it
-/// can.
+/// Settings for a product. `refusal`: reason why the product cannot have the requested settings (empty: it can); `acoustics` are
+/// then the nearest possible settings.
 struct Choice {
   Acoustics acoustics;
   std::string refusal;
@@ -33,7 +33,7 @@ Choice choice_for(const SonarModel& model, const protocol::SettingsOverride& wan
   Acoustics a = product.initial;
   std::string refusal;
   if (wanted.mode) {
-    // The modes with the telephoto lens are the last ones.
+    // The modes with the telephoto lens are last.
     const auto modes = static_cast<std::uint32_t>(model.modes.size() / (product.has_telephoto ? 2 : 1));
     if (*wanted.mode < modes) {
       const ModeChoice choice = choice_of(product, static_cast<int>(*wanted.mode));
@@ -72,13 +72,13 @@ PolarImage picture_of(const DecodedFrame& frame, const std::vector<double>& azim
   image.azimuth_rad = azimuth_rad;
   image.samples.reserve(image.rows * image.beams);
   for (std::size_t row = 0; row < image.rows; ++row)
-    for (std::size_t beam = image.beams; beam > 0; --beam)  // beam 0 of an ARIS is at starboard, that of a picture at port
+    for (std::size_t beam = image.beams; beam > 0; --beam)  // beam 0 of an ARIS is at starboard, beam 0 of a picture at port
       image.samples.push_back(static_cast<float>(std::to_integer<int>(frame.picture[row * image.beams + beam - 1])));
   return image;
 }
 
-/// The mode that a frame states. Null: the product or the mode is unknown, or the frame has another number of beams than the
-/// mode.
+/// Returns the mode that a frame states; null if the product or the mode is unknown, or if the frame has another number of beams
+/// than the mode.
 const FrequencyMode* mode_of(const DecodedFrame& frame) {
   for (const auto& model : models()) {
     const Product& product = product_of(*model);
@@ -96,9 +96,10 @@ class ArisHost final : public protocol::Host {
  public:
   explicit ArisHost(const protocol::Wanted& wanted) : wanted_(wanted) {}
 
-  /// Only beacons name the product, and they may not arrive here. So the host sends settings for each product, and the device
-  /// refuses those of other products. An ARIS 1800 also accepts those of a 1200, so its own are sent later. Frames begin when the
-  /// receiver is set. The first one names the product; if this cannot have the wanted settings, the host gives up.
+  /// Sends settings for each product, because only beacons state the product, and beacons may not arrive here. The device refuses
+  /// settings for other products. An ARIS 1800 also accepts settings for a 1200, so its settings are sent after those. Frames
+  /// begin when the receiver is set. The first frame states the product; if this product cannot have the requested settings, the
+  /// host gives up.
   HostActions on_open(std::span<const std::uint16_t> own, Time now) override {
     HostActions actions;
     std::uint32_t cookie = 0;
@@ -163,7 +164,7 @@ class ArisHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{commands, framed(command)});
   }
 
-  /// Adds notices, each at most once: the sonar does not use the sent settings; frames were lost.
+  /// Adds two notices, at most once each: the sonar does not use the sent settings; frames were lost.
   void warn_of(const DecodedFrame& frame, HostActions& actions) {
     constexpr int settled = 3;  // the first frames may have been made before the settings arrived
     const FrameHeader& h = frame.header;
@@ -180,11 +181,11 @@ class ArisHost final : public protocol::Host {
 
   protocol::Wanted wanted_;
   FrameAssembler assembler_;
-  std::map<SystemType, std::uint32_t> asked_;   // the cookie of the settings for each product; empty = none were sent
-  std::map<SystemType, std::string> refusals_;  // why a product cannot have the wanted settings
+  std::map<SystemType, std::uint32_t> asked_;   // cookie of the settings for each product; empty = none were sent
+  std::map<SystemType, std::string> refusals_;  // reasons why products cannot have the requested settings
   bool warned_of_settings_ = false, warned_of_losses_ = false;
   Time sent_at_{};
-  std::size_t bytes_ = 0;  // received since the last whole frame
+  std::size_t bytes_ = 0;  // number of bytes since the last whole frame
 };
 
 }  // namespace

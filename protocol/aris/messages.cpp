@@ -19,7 +19,7 @@ void CommandFramer::append(BytesView received) {
   if (!broken_) buffer_.insert(buffer_.end(), received.begin(), received.end());
 }
 
-// A message beyond the limit is not skipped, because its length can be up to 4 GiB.
+// A message beyond the limit is not skipped, because its length may be up to 4 GiB.
 std::optional<BytesView> CommandFramer::next() {
   const BytesView waiting = BytesView(buffer_).subspan(begin_);
   if (broken_ || waiting.size() < length_prefix) return std::nullopt;

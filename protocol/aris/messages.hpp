@@ -83,7 +83,7 @@ enum class CommandType : std::uint32_t {
 };
 
 struct DateTime {
-  std::string text;  // "2014-Jan-31 23:58:15"
+  std::string text;  // such as "2014-Jan-31 23:58:15"
 };
 void fields(auto& visit, wire::Like<DateTime> auto& m) { visit(1, m.text); }
 struct Receiver {
@@ -154,7 +154,7 @@ struct Command {
   std::optional<Acoustics> acoustics;
   std::optional<Choice> salinity, telephoto;
   std::optional<Focus> focus;
-  std::optional<Words> ping;  // empty
+  std::optional<Words> ping;  // an empty message
 };
 void fields(auto& visit, wire::Like<Command> auto& m) {
   visit(1, m.type);
@@ -183,14 +183,14 @@ void fields(auto& visit, wire::Like<FramePart> auto& m) {
   visit(5, m.data_offset);
 }
 
-/// The bytes of a command on the TCP connection: length and message.
+/// Returns the bytes of a command on the TCP connection: length and message.
 Bytes framed(const Command& command);
 
 /// Splits the stream of a controller, which arrives in pieces of any size, into commands. Keeps at most longest_command bytes.
 class CommandFramer {
  public:
   void append(BytesView received);
-  /// The next whole message; the view is valid until the next call.
+  /// Returns the next whole message; the view is valid until the next call.
   std::optional<BytesView> next();
   /// True after a length above longest_command; the rest of the stream is then unreadable.
   bool broken() const { return broken_; }

@@ -24,9 +24,8 @@ constexpr LensRow telephoto_lens[] = {{48, 7.522, -0.179}, {96, 7.603, -0.180}};
 constexpr double elevation_1800_deg = 14, elevation_3000_deg = 15, telephoto_elevation_deg = 3;  // recalled from data sheets
 constexpr double frequencies_hz[3][2] = {{1.108e6, 1.8e6}, {1.8e6, 3.0e6}, {0.692e6, 1.2e6}};    // DOC, by SystemType
 
-// unknown: levels. Assumed: TVG of 20 log r without absorption, because the level of SMP falls with range throughout. Full
-// scale is chosen so that, with SMP's settings, the demo scene has SMP's level on an ARIS 1200 and a similar level on the
-// others.
+// unknown: levels. Assumed: TVG of 20 log r without absorption, because the level of SMP falls over the whole range. Full scale
+// is chosen so that, with SMP's settings, the demo scene has SMP's level on an ARIS 1200 and a similar level on other products.
 constexpr float source_level_db = 210, tvg_slope_db = 20, tvg_ceiling_db = 60;
 constexpr float full_scale_upa[3] = {2.5e4f, 1e4f, 4e4f};  // by SystemType
 
@@ -68,8 +67,8 @@ const std::vector<Product>& products() {
   return all;
 }
 
-/// -3 dB widths of the beams: each reaches half way to its neighbours. unknown: widths at the low frequency; `factor` makes them
-/// grow with the wavelength, as with any lens.
+/// Returns the -3 dB widths of the beams; each beam reaches half way to its neighbours. unknown: widths at the low frequency;
+/// `factor` increases them with the wavelength, as with any lens.
 std::vector<float> beam_widths(const std::vector<double>& azimuths, double factor) {
   std::vector<float> widths;
   const auto n = azimuths.size();
@@ -93,7 +92,7 @@ FrequencyMode mode_of(const Product& product, const ModeChoice& choice) {
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = beam_azimuths(product, beams, choice.telephoto);
   mode.beam_widths_rad = beam_widths(mode.beam_azimuths_rad, hz[1] / hz[frequency]);
-  // unknown; a tone after its matched filter fits the correlation of neighbouring rows in SMP.
+  // unknown; assumed: a tone after its matched filter, which fits the correlation of neighbouring rows in SMP.
   mode.waveform.shape = Waveform::Shape::cw;
   mode.horizontal_aperture_rad = static_cast<float>(2 * mode.beam_azimuths_rad.front()) + mode.beam_widths_rad.front();
   const double elevation_deg = choice.telephoto                          ? telephoto_elevation_deg

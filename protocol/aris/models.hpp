@@ -37,7 +37,7 @@ struct Product {
   SystemType system{};
   std::vector<PingMode> ping_modes;
   bool has_telephoto = false;
-  std::array<double, 2> pulse_limit_us{};  // low, high frequency
+  std::array<double, 2> pulse_limit_us{};  // at the low and the high frequency
   double pulse_energy_us_hz = 0;           // longest pulse times frame rate
   double window_end_m = 0;
   double small_period_margin = 0, period_margin = 0;  // margins of a cycle: for sample periods up to 4 us, and for longer ones
@@ -58,7 +58,7 @@ std::optional<int> mode_index(const Product& product, const ModeChoice& choice);
 ModeChoice choice_of(const Product& product, int mode_index);
 const PingMode* find_ping_mode(const Product& product, std::uint32_t number);
 
-/// Azimuths of the beams' centres, most to port first [rad].
+/// Returns the azimuths of the beams' centres [rad], from port to starboard.
 std::vector<double> beam_azimuths(const Product& product, int beams, bool telephoto);
 
 }  // namespace sonar::aris

@@ -5,7 +5,7 @@
 
 namespace sonar::aris::protobuf {
 
-// The format is that of the protobuf encoding guide: a field is a varint `number << 3 | wire type` and its value.
+// Source: the protobuf encoding guide. A field is a varint `number << 3 | wire type` and a value.
 void append_varint(Bytes& out, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::byte>((value & 0x7F) | 0x80));
   out.push_back(static_cast<std::byte>(value));

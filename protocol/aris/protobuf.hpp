@@ -60,14 +60,14 @@ struct RawField {
   unsigned number = 0;
   WireType type{};
   std::uint64_t value = 0;  // value of a varint or a fixed number
-  BytesView bytes;          // a length-delimited field; points into the message
+  BytesView bytes;          // content of a length-delimited field; points into the message
 };
 
 /// Reads the fields of a message one by one, without interpreting them.
 class RawReader {
  public:
   explicit RawReader(BytesView message) : rest_(message) {}
-  /// The next field. nullopt: the end of the message, or, if ok() is false, bytes that are not a field.
+  /// Returns the next field; nullopt at the end of the message or, with ok() false, if the bytes are not a field.
   std::optional<RawField> next();
   bool ok() const { return ok_; }
 
@@ -81,7 +81,7 @@ class RawReader {
 template <class M>
 bool read(BytesView bytes, M& message);
 
-/// Stores one received field: it visits the description of the message and sets the member with the same number and type.
+/// Stores one received field in the member that has the same number and type in the description of the message.
 class Reader {
  public:
   explicit Reader(const RawField& field) : field_(field) {}
@@ -132,7 +132,7 @@ class Reader {
   bool ok_ = true;
 };
 
-/// Fields that the message does not describe are skipped. False: the bytes are not a message of this kind.
+/// Reads a message; skips fields that the message does not describe. Returns false if the bytes are not a message of this kind.
 template <class M>
 bool read(BytesView bytes, M& message) {
   RawReader raw(bytes);

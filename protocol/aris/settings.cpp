@@ -10,7 +10,7 @@
 namespace sonar::aris {
 namespace {
 
-constexpr std::uint32_t rest_us = 360;                  // from the SDK document: rest of a cycle after its last sample
+constexpr std::uint32_t rest_us = 360;                  // time from the last sample to the end of a cycle (SDK document)
 constexpr double lenient_share = 0.05;                  // assumed: the vendor's C++ sample sends cycles that are too short
 constexpr auto focus_travel = std::chrono::seconds(1);  // from 0 to 1000; the device's log has about a second
 
@@ -19,7 +19,7 @@ struct Limits {
   double low, high;
 };
 
-/// The reason if a value is outside the range that the vendor documents, else an empty text.
+/// Returns the reason if a value is outside the range that the vendor documents, else an empty text.
 std::string out_of_range(const Acoustics& a, const Product& product) {
   if (find_ping_mode(product, a.ping_mode) == nullptr) return "has no ping mode " + std::to_string(a.ping_mode);
   if (a.frequency != Frequency::low && a.frequency != Frequency::high) return "frequency must be 0 or 1";
@@ -46,7 +46,7 @@ using protocol::refused;
 
 constexpr std::uint32_t shortest_period_us = 4, longest_period_us = 100, longest_pulse_us = 80;
 
-/// Sets the wanted mode, or else the ping mode with the wanted number of beams.
+/// Sets the requested mode, or the ping mode with the requested number of beams.
 Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   const Product& product = product_of(*device.model);
   if (wanted.mode) {
@@ -72,8 +72,8 @@ Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, con
   return refused(device.model->name + " forms " + counts + " beams" + asked);
 }
 
-/// Changes the end of the window and keeps its start. Keeps the sample period too if the resulting number of samples is valid.
-/// Makes the pulse at least as long as the sample period.
+/// Changes the end of the window, not its start, and keeps the sample period if the resulting number of samples is valid. Makes
+/// the pulse at least as long as the sample period.
 Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState& device) {
   const PingSettings now = ping_settings(s, device);
   const double speed = static_cast<double>(now.device_sound_speed_mps), end_m = product_of(*device.model).window_end_m;
@@ -88,13 +88,13 @@ Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState&
       std::clamp(period_us, static_cast<double>(shortest_period_us), static_cast<double>(longest_period_us)));
   a.samples_per_beam =
       std::clamp(static_cast<std::uint32_t>(std::lround(window_us / a.sample_period_us)), least_samples, most_samples);
-  a.pulse_us = std::max(a.pulse_us, std::min(a.sample_period_us, longest_pulse_us));  // judge() limits it
+  a.pulse_us = std::max(a.pulse_us, std::min(a.sample_period_us, longest_pulse_us));  // judge() limits the pulse
   return {};
 }
 
 }  // namespace
 
-// The salinity is that of the three allowed values that is nearest to the water's; the focus is at an eighth of the window.
+// The salinity is the allowed value nearest to that of the water; the focus is at an eighth of the window.
 Settings initial_settings(const protocol::DeviceState& device) {
   Settings s;
   const Product& product = product_of(*device.model);
@@ -110,8 +110,8 @@ Settings settings_from(const VendorSettings* held, const protocol::DeviceState& 
   return of != nullptr ? of->settings : initial_settings(device);
 }
 
-// The vendor's formula, by which clients place the samples. Other formulas differ by some tenths of a metre a second, which would
-// shift the ranges that a client computes from the header.
+// The vendor's formula, with which clients compute the ranges of samples. Other formulas differ by some tenths of a metre per
+// second, which would shift these ranges.
 double sound_speed_mps(double t, double s, double z) {
   return 1402.5 + 5 * t - 5.44e-2 * t * t + 2.1e-4 * t * t * t + 1.33 * s - 1.23e-2 * s * t + 8.7e-5 * s * t * t + 1.56e-2 * z +
          2.55e-7 * z * z - 7.3e-12 * z * z * z;
@@ -121,8 +121,8 @@ std::uint32_t shortest_cycle_us(const Acoustics& a) {
   return a.start_delay_us + a.sample_period_us * a.samples_per_beam + rest_us;
 }
 
-// The formula of the vendor's SDK: a frame lasts as long as its cycles plus a margin, which depends on the product, plus the
-// time of its packets if they are sent with a delay.
+// The formula of the vendor's SDK: the duration of a frame is that of its cycles plus a margin, which depends on the product,
+// plus the time of its packets if they are sent with a delay.
 double highest_frame_rate_hz(const Product& product, const Acoustics& a, std::optional<std::uint32_t> packet_delay_us) {
   constexpr double overhead_us = 420, per_packet_us = 16.6;
   const PingMode& mode = *find_ping_mode(product, a.ping_mode);
@@ -142,8 +142,8 @@ Verdict judge(const Acoustics& asked, const Product& product, bool lenient_cycle
   if (!verdict.refusal.empty()) return verdict;
   Acoustics& used = verdict.used;
   const std::uint32_t needed_us = shortest_cycle_us(asked);
-  // The order is that of docs/protocols/aris.md, "Acoustic settings": first settings that are refused, then those that are
-  // limited.
+  // The checks are in the order of docs/protocols/aris.md, "Acoustic settings": first settings that are refused, then settings
+  // that are limited.
   const double accepted_us = needed_us * (lenient_cycle ? 1 - lenient_share : 1.0);
   char text[128] = "";
   if (asked.cycle_us < accepted_us)
@@ -204,7 +204,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.range_bin_m = a.sample_period_us * m_per_us;
   s.range_start_m = a.start_delay_us * m_per_us;
   s.range_m = s.range_start_m + s.range_bin_count * s.range_bin_m;
-  s.row_centre = 0;  // sample i lies at the start delay plus i sample periods
+  s.row_centre = 0;  // the time of sample i is the start delay plus i sample periods
   // -3 dB of a tone in its matched filter (docs/acoustics.md, eq. 23).
   const double width_m = (2 - std::sqrt(2.0)) * a.pulse_us * m_per_us;
   s.pulse_width_m = static_cast<float>(width_m);
@@ -215,7 +215,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.gain_db = a.gain_db;
   s.transmit = a.transmit;
   s.device_sound_speed_mps = static_cast<float>(speed);
-  s.device_absorption_db_per_m = 0;  // unknown: assumed, because the level of a real recording falls with range throughout
+  s.device_absorption_db_per_m = 0;  // assumed, because the level of a real recording falls over the whole range
   s.format = {.bits = 8, .max_code = 255, .scale = SampleFormat::Scale::logarithmic, .floor_db = 0, .ceiling_db = 80};
   return s;
 }

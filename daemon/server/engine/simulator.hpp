@@ -63,7 +63,7 @@ class Simulator : private Interruption {
 
   asio::io_context& io_;
   std::string description_;
-  std::size_t unanswered_ = 0;                     // requests without an answer; this and the next are the I/O thread's
+  std::size_t unanswered_ = 0;                     // requests without an answer, used only by the I/O thread
   std::chrono::steady_clock::time_point begun_{};  // time at which the engine began the oldest request
 
   // Only the simulation thread uses the following members.

@@ -26,7 +26,7 @@ struct RecordedPing {
   std::shared_ptr<const Ping> ping;
   std::shared_ptr<const protocol::Bytes> bytes;  // the message that clients get; null = not sent over TCP
   std::vector<std::shared_ptr<const std::vector<protocol::Bytes>>> datagrams;  // datagrams of each stream, as receivers get them
-  protocol::Bytes status;                                                      // status message at that time; empty = none
+  protocol::Bytes status;                                                      // status message then; empty = none
   std::shared_ptr<const SceneNames> names;                                     // names of objects and bodies in the ping's scene
 
   /// Returns the bytes of memory that the ping needs while it waits.

@@ -153,7 +153,7 @@ Result<Recordings::Pointer> Recordings::begin(const control::StartRecording& ask
 void Recordings::remove_oldest() {
   while (recordings_.size() >= most_remembered) {
     const auto ended = [](const Pointer& r) { return r->state == Recording::State::ended; };
-    recordings_.erase(std::find_if(recordings_.begin(), recordings_.end(), ended));  // one exists, because few run at once
+    recordings_.erase(std::find_if(recordings_.begin(), recordings_.end(), ended));  // one has ended, because few run at once
   }
 }
 

@@ -12,7 +12,7 @@
 namespace sonar {
 namespace {
 
-// Limit of bytes in the kernel that are not yet on the wire. A larger one would only make a slow client's picture older.
+// Limit of bytes in the kernel that are not yet on the wire. A larger limit would only make a slow client's picture older.
 constexpr int unsent_limit_bytes = 256 * 1024;
 constexpr std::size_t piece_bytes = 256;  // bytes of a client that are processed at a time
 constexpr auto idle_watch = std::chrono::seconds(1);
@@ -29,7 +29,7 @@ void prepare(tcp::socket& socket, const LimitConfig& limits) {
   socket.set_option(tcp::no_delay(true), ec);
   using UnsentLimit = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>;
   socket.set_option(UnsentLimit(unsent_limit_bytes), ec);
-  end_when_silent(socket, limits.dead_peer);  // detects a peer that vanished without a FIN while little or nothing is sent
+  end_when_silent(socket, limits.dead_peer);  // detects a peer that vanished without FIN while little or nothing is sent
 }
 
 }  // namespace
@@ -55,16 +55,17 @@ Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
   input_rate_.pause_after(per_s - std::min(per_s, at_once), connected_at_);
 }
 
-// Three coroutines on the I/O thread: read() passes bytes to the sonar, write() takes messages from the outbox, watch() ends
-// the session of a client that reads nothing or is silent. States: serving, finishing_ (the last message, then FIN), over_ (the
-// socket is closed). Each coroutine tests over_ after every wait, because any of them may have ended the session.
+// A session has three coroutines on the I/O thread: read() passes bytes to the sonar, write() takes messages from the outbox,
+// watch() ends the session of a client that reads nothing or is silent. It is first serving, then finishing_ (the last message,
+// then FIN), then over_ (the socket is closed). Each coroutine tests over_ after every wait, because another coroutine may have
+// ended the session.
 void Session::start() {
   spawn(&Session::read);
   spawn(&Session::write);
   spawn(&Session::watch);
 }
 
-/// If one of its coroutines failed, the session would keep its slot forever; so an exception ends this session.
+/// Starts a coroutine. An exception in it ends the session, which would otherwise keep its slot forever.
 void Session::spawn(asio::awaitable<void> (Session::*part)()) {
   const auto self = shared_from_this();
   asio::co_spawn(
@@ -86,11 +87,11 @@ asio::awaitable<void> Session::read() {
       over_after(ec);
       co_return;
     }
-    // A fault may stop reading: these bytes wait here, later ones in the kernel.
+    // While a fault stops reading, these bytes wait here, and later bytes wait in the kernel.
     while (!reading_ && !finishing_ && !over_) co_await rest(never);
     if (over_) co_return;
     received_at_ = Steady::now();
-    // Its bytes must have no effect, and it must not occupy a driver's slot.
+    // An HTTP request must have no effect, and must not occupy a driver's slot.
     if (http_.speaks_http(std::span(received_).first(n))) co_return over("it speaks HTTP");
     co_await pass_on(std::span(received_).first(n));
   }
@@ -107,7 +108,7 @@ asio::awaitable<void> Session::pass_on(protocol::BytesView bytes) {
   }
 }
 
-/// Pauses reading from a client that sends too much; its FIN, too, is read only afterwards. finish() and over() end the pause.
+/// Pauses reading from a client that sends too much; even FIN is read only after the pause. finish() and over() end the pause.
 asio::awaitable<void> Session::rest(Steady::time_point until) {
   wake_reader_.expires_at(until);
   error_code ec;
@@ -122,7 +123,7 @@ void Session::read_from_client(bool on) {
 
 void Session::wake() { wake_writer_.cancel(); }
 
-/// False: the session is over. A ping with prefixes is sent once for each of them.
+/// Writes a message; a ping with prefixes is sent once after each prefix. Returns false if the session is over.
 asio::awaitable<bool> Session::write_whole(const Outbox::Message& message) {
   if (message.shape) {
     assert(message.prefixes.empty());
@@ -136,7 +137,7 @@ asio::awaitable<bool> Session::write_whole(const Outbox::Message& message) {
   co_return true;
 }
 
-/// The bytes must stay valid until it returns.
+/// Writes bytes, which must stay valid until it returns.
 asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
   std::size_t done = 0;
   while (done < bytes.size()) {
@@ -159,7 +160,7 @@ asio::awaitable<bool> Session::write_bytes(protocol::BytesView bytes) {
 /// client has the bytes.
 asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Outbox::Shape& shape) {
   for (std::size_t done = 0; const Outbox::Shape::Pause& pause : shape.pauses) {
-    // Positions of pauses count from the start of the message; `bytes` is the rest of it.
+    // Positions of pauses count from the start of the message; `bytes` is the rest of the message.
     const std::size_t count = std::clamp(pause.before, done, done + bytes.size()) - done;
     if (!co_await write_bytes(bytes.first(count)) || !co_await pause_writing(pause.length)) co_return false;
     bytes = bytes.subspan(count);
@@ -182,18 +183,18 @@ asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
 }
 
 void Session::end_pauses() {
-  // Only the current message is sent without pauses; the next one has its own.
+  // Only the current message is sent without pauses.
   hurries_ = writing_;
   pause_.cancel();
 }
 
-/// Bytes in the kernel that the client has not acknowledged. 0 if the kernel does not report them.
+/// Returns the number of bytes in the kernel that the client has not acknowledged; 0 if the kernel does not report it.
 int Session::unconfirmed_bytes() {
   int bytes = 0;
   return ::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) == 0 ? bytes : 0;
 }
 
-/// The time since the last progress of the current message.
+/// Returns the time since the last progress of the current message.
 std::chrono::steady_clock::duration Session::stands_for() const {
   return writing_ ? std::max(Steady::duration{}, Steady::now() - progress_at_) : Steady::duration{};
 }
@@ -218,7 +219,7 @@ void Session::end_by(Outbox::Shape::End end) {
   send_fin();
 }
 
-/// Afterwards read() waits for the client's FIN, and watch() for the deadline.
+/// Sends FIN. Then read() waits for the client's FIN, and watch() for the deadline.
 void Session::send_fin() {
   error_code ec;
   socket_.shutdown(tcp::socket::shutdown_send, ec);
@@ -227,8 +228,7 @@ void Session::send_fin() {
   wake_watch_.cancel();
 }
 
-/// Writes whole messages one by one. If none waits, it waits for wake(); when finishing_, it sends FIN instead of the next
-/// message.
+/// Writes whole messages one by one. If none waits, it waits for wake(); when finishing_, it sends FIN and no further message.
 asio::awaitable<void> Session::write() {
   const auto self = shared_from_this();
   while (!over_) {
@@ -250,7 +250,7 @@ asio::awaitable<void> Session::write() {
   }
 }
 
-/// The time of the next check: in a second, or at an earlier deadline.
+/// Returns the time of the next check: in a second, or at an earlier deadline.
 Session::Steady::time_point Session::watch_until() const {
   auto until = Steady::now() + idle_watch;
   if (finishing_) until = std::min(until, finish_by_);
@@ -283,7 +283,8 @@ asio::awaitable<void> Session::watch() {
   }
 }
 
-/// A client with unread bytes is not silent, because this process may have been suspended for a while.
+/// True if the client has sent nothing for too long. Unread bytes count, because this process may have been suspended for a
+/// while.
 bool Session::is_silent(Steady::time_point now) const {
   const auto longest = parent_.longest_silence(setup_.id);
   error_code ec;
@@ -323,7 +324,7 @@ void Session::end_if_closed() {
   over_after(ec);
 }
 
-/// If the peer closes after finish() was called, the reason stays that of finish().
+/// Ends the session after an error. If finish() was called before, its reason is kept.
 void Session::over_after(const error_code& ec) {
   const bool left = ec == asio::error::eof || ec == asio::error::connection_reset || ec == asio::error::broken_pipe;
   if (finishing_)

@@ -1,6 +1,6 @@
-// One connection of a sonar: its socket, two coroutines that read and write it, and a third that detects unresponsive peers.
-// The emulated sonar (daemon/emulator/sonar) interprets the bytes and has the outbox. Owned by the Device and the coroutines;
-// it reports its end once to the Device.
+// One connection of a sonar: a socket, two coroutines that read and write it, and a third that detects unresponsive peers. The
+// emulated sonar (daemon/emulator/sonar) interprets the bytes and has the outbox. The Device and the coroutines own the session,
+// which reports its end once to the Device.
 #pragma once
 
 #include <array>
@@ -38,7 +38,8 @@ class SessionParent {
   virtual void on_not_sent(ConnectionId stream) = 0;
   /// Returns the silence after which a peer is disconnected; nullopt = no limit.
   virtual std::optional<std::chrono::milliseconds> longest_silence(ConnectionId of) const = 0;
-  /// Called when the host of a stream has been silent for half of that time, so that the parent can check whether it is alive.
+  /// Called when the host of a stream has been silent for half of longest_silence(), so that the parent can check whether the
+  /// host is alive.
   virtual void look_for_host(ConnectionId stream) = 0;
   /// Reports that the session will end after the current message.
   virtual void on_finish(ConnectionId session) = 0;
@@ -54,24 +55,24 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   struct Setup {
     ConnectionId id = 0;
-    bool digest = false;                // compute the SHA-256 of the sent bytes
+    bool digest = false;                // true: computes the SHA-256 of the sent bytes
     LimitConfig limits;                 // limits for one client
     std::shared_ptr<const void> place;  // slot of the session
   };
-  /// Limit for a client to receive its last message after finish(), after which it is reset. Once its computer has acknowledged
-  /// everything, the limit for the client's FIN is `fin_limit`.
+  /// After finish(), a client that does not receive its last message within `finish_limit` is reset. Once the client's computer
+  /// has acknowledged everything, the limit for the client's FIN is `fin_limit`.
   static constexpr std::chrono::milliseconds finish_limit{800}, fin_limit{400};
   /// Work that a new client may cause at once. A larger value would reward repeated connecting.
   static constexpr std::size_t at_once = 4096;
-  /// The same limit after a fault has ended the stream; longer, so that a client that ignores the end can be observed.
+  /// Replaces fin_limit after a fault has ended the stream; longer, so that a client that ignores the end can be observed.
   static constexpr std::chrono::milliseconds fault_fin_limit{1500};
 
   Session(SessionParent& parent, tcp::socket socket, const Setup& setup);
 
   void start();
-  /// Call it when there is something to write.
+  /// Call it when there is a message to write.
   void wake();
-  /// Completes the current message without pauses, then sends FIN. Resets a client that does not receive it in time.
+  /// Completes the current message without pauses, then sends FIN. Resets a client that does not receive the message in time.
   void finish(std::string why);
   /// Ends the connection at once with RST.
   void reset(std::string why);
@@ -85,11 +86,11 @@ class Session : public std::enable_shared_from_this<Session> {
   ConnectionId id() const { return setup_.id; }
   const Sha256& digest() const { return digest_; }
   std::chrono::steady_clock::duration connected_for() const { return Steady::now() - connected_at_; }
-  /// The time since the last sent byte of the current message; 0 if none is being written, and in a pause of a fault.
+  /// Returns the time since the last sent byte of the current message; 0 if none is being written, or during a pause of a fault.
   std::chrono::steady_clock::duration stands_for() const;
-  /// Number of the ping that is being written; 0 = none.
+  /// Returns the number of the ping that is being written; 0 = none.
   std::uint32_t writes_ping() const { return writing_ ? ping_ : 0; }
-  /// The number of bytes in the kernel that the client's computer has not acknowledged.
+  /// Returns the number of bytes in the kernel that the client's computer has not acknowledged.
   int unconfirmed_bytes();
 
  private:
@@ -132,7 +133,7 @@ class Session : public std::enable_shared_from_this<Session> {
   std::string why_;
 };
 
-/// Name and address of the other end, for the log and the status message.
+/// Returns name and address of the other end, for the log and the status message.
 Peer peer_of(const tcp::socket& socket);
 
 }  // namespace sonar

@@ -16,9 +16,9 @@ SonarHttp::SonarHttp(asio::io_context& io, const LimitConfig& limits, Admission&
         return std::make_shared<HttpConnection>(services_, *this, std::move(socket), sender);
       }) {}
 
-/// Passes the request to the vendor after the checks that protect it from web pages of other sites.
+/// Refuses requests of web pages of other sites, and passes other requests to the vendor.
 asio::awaitable<HttpOutcome> SonarHttp::answer(const HttpRequest& request, HttpConnection& from) {
-  // Programs send no Origin, and the sonar's address as Host (docs/control.md, "Access").
+  // Programs send the sonar's address as Host, and no Origin (docs/control.md, "Access").
   const std::vector<std::string> names = names_();
   const bool host = request.has_host ? host_allowed(request.host, from.reached().ip, names) : request.http_1_0;
   if (!host || (request.has_origin && !origin_allowed(request.origin, from.reached().ip, names))) {

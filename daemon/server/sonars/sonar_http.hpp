@@ -1,5 +1,5 @@
-// The HTTP side of an emulated sonar (Port::Kind::http): passes requests to its vendor, and refuses those of web pages,
-// recognised by Host and Origin. Owned by Device.
+// The HTTP server of an emulated sonar (Port::Kind::http): passes requests to the vendor, but refuses those of web pages,
+// recognised by Host and Origin. Device owns it.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ class SonarHttp final : public HttpService {
   /// The host names that requests may use, besides the sonar's address.
   using Names = std::function<std::vector<std::string>()>;
 
-  /// `limits`, `admission` and `log` must outlive it. `sonar`: its name, for the log.
+  /// `limits`, `admission` and `log` must outlive the server. `sonar`: name of the sonar in the log.
   SonarHttp(asio::io_context& io, const LimitConfig& limits, Admission& admission, Log& log, const std::string& sonar,
             Names names, Answer answer);
 

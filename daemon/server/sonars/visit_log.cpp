@@ -8,7 +8,7 @@ namespace sonar {
 VisitLog::VisitLog(asio::io_context& io, Log& log, std::string sonar, std::chrono::milliseconds spell)
     : log_(log), sonar_(std::move(sonar)), spell_(spell), timer_(io) {}
 
-/// The first few visits of a spell are logged individually; the others are counted and summarised in one line.
+/// Logs the first few visits of a spell individually; counts the other visits and summarises them in one line.
 void VisitLog::say(Kind kind, const std::string& what, std::vector<LogField> fields) {
   if (!ended_ && !in_spell_) begin_spell();
   ++visits_;
@@ -20,7 +20,7 @@ void VisitLog::say(Kind kind, const std::string& what, std::vector<LogField> fie
   last_suppressed_ = what;
 }
 
-/// After a crowded spell the next one begins at once, in which visits are only counted.
+/// Begins a spell. After a crowded spell the next one begins at once, and its visits are only counted.
 void VisitLog::begin_spell() {
   in_spell_ = true;
   visits_ = 0;

@@ -1,5 +1,5 @@
-// Logs clients that connect and leave: one line for each, but for frequent visits only a periodic line with their number,
-// because any client can cause such lines. I/O thread only.
+// Logs clients that connect and leave: one line per visit, but for frequent visits only a periodic line with their number,
+// because any client can cause such lines. Only the I/O thread uses it.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ class VisitLog {
   /// `spell`: length of a period, in which up to lines_a_spell visits are logged individually.
   VisitLog(asio::io_context& io, Log& log, std::string sonar, std::chrono::milliseconds spell = std::chrono::seconds(10));
   void say(Kind kind, const std::string& what, std::vector<LogField> fields);
-  /// Writes the held lines; from now on every line is written at once.
+  /// Writes the held lines. Later lines are written at once.
   void end();
 
  private:
@@ -32,7 +32,7 @@ class VisitLog {
   std::chrono::milliseconds spell_;
   asio::steady_timer timer_;
   bool in_spell_ = false, ended_ = false;
-  bool crowded_ = false;  // the previous spell had too many visits, so this one is only summarised
+  bool crowded_ = false;  // true: the previous spell had too many visits, so this one is only summarised
   int visits_ = 0;        // visits in this spell
   std::array<std::uint64_t, static_cast<std::size_t>(Kind::kinds)> suppressed_{};
   std::string last_suppressed_;

@@ -16,7 +16,7 @@ using asio::ip::tcp;
 using asio::ip::udp;
 using boost::system::error_code;
 
-/// co_await socket.async_...(..., into(ec)): no exceptions in coroutines.
+/// Prevents exceptions in coroutines: co_await socket.async_...(..., into(ec)).
 inline auto into(error_code& ec) { return asio::redirect_error(asio::use_awaitable, ec); }
 
 /// Expiry of a timer that only waits for an event.

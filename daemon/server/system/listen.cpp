@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-/// The range of ports of outgoing connections; Linux default 32768-60999.
+/// Returns the range of ports of outgoing connections; the default of Linux is 32768-60999.
 std::pair<int, int> ephemeral_range() {
   std::pair<int, int> range{32768, 60999};
   std::ifstream file("/proc/sys/net/ipv4/ip_local_port_range");
@@ -59,10 +59,10 @@ Result<void> listen_tcp(tcp::acceptor& acceptor, Endpoint at) {
 
 void end_when_silent(tcp::socket& socket, std::chrono::milliseconds limit) {
   namespace option = asio::detail::socket_option;
-  // Three probes, the last a second before the limit if possible, because kernel timers tend to be late.
+  // There are three probes, the last a second before the limit if possible, because kernel timers tend to be late.
   const auto probe_s =
       static_cast<int>(std::max(std::chrono::floor<std::chrono::seconds>(limit).count() - 1, std::int64_t{3}) / 3);
-  error_code ec;  // on failure the kernel's time-out stays: a quarter of an hour or more
+  error_code ec;  // after a failure, the time-out of the kernel applies: a quarter of an hour or more
   socket.set_option(asio::socket_base::keep_alive(true), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPIDLE>(probe_s), ec);
   socket.set_option(option::integer<IPPROTO_TCP, TCP_KEEPINTVL>(probe_s), ec);
@@ -87,7 +87,7 @@ Result<void> bind_udp(udp::socket& socket, Endpoint at, bool broadcast, bool sha
 }
 
 void send_multicast_from(udp::socket& socket, Ipv4 ip) {
-  error_code ec;  // on failure the system chooses
+  error_code ec;  // after a failure, the system chooses the interface
   if (ip != Ipv4{}) socket.set_option(asio::ip::multicast::outbound_interface(address_of(ip)), ec);
 }
 

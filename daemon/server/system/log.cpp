@@ -16,12 +16,12 @@ namespace {
 
 constexpr std::size_t longest_line = 3900;  // writes to a pipe are atomic up to 4096 bytes
 
-/// A JSON string. Bytes that are not UTF-8, which file names may contain, are replaced.
+/// Returns a JSON string. Bytes that are not UTF-8, which file names may contain, are replaced.
 std::string json_string(std::string_view text) {
   return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-/// Text from outside must not forge lines: control characters become '?', values with spaces are quoted.
+/// Replaces control characters with '?' and quotes values with spaces, so that text from outside cannot forge lines.
 std::string plain(std::string_view text, bool quote_spaces) {
   std::string out(text);
   std::replace_if(
@@ -103,7 +103,8 @@ void Log::emit(LogLevel level, std::string_view phrase, const std::vector<LogFie
     ++sink_->lost;
     return;
   }
-  // A text line is truncated, so that the write to a pipe is atomic. A JSON line is not, because the result would not be JSON.
+  // A text line is truncated, so that the write to a pipe is atomic. A JSON line is not truncated, because the result would not
+  // be JSON.
   std::string line = options_.json ? json_members(phrase, fields) : text_line(phrase, fields);
   if (!options_.json && line.size() > longest_line) line.replace(longest_line, std::string::npos, "...");
   sink_->logger.log(spdlog_level(level), spdlog::string_view_t(line));

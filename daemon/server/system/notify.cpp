@@ -51,7 +51,8 @@ Notify::~Notify() {
 }
 
 void Notify::ready(const std::string& status) {
-  // Also sent after a reload, because systemd waits for READY after RELOADING. Watchdog messages begin with the first READY.
+  // READY is also sent after a reload, because systemd waits for it after RELOADING. Watchdog messages begin with the first
+  // READY.
   send("READY=1\nSTATUS=" + one_line(status), 0);
   if (target_.socket.empty() || target_.watchdog.count() == 0 || stopping_ || std::exchange(keeping_, true)) return;
   keep_alive();
@@ -69,7 +70,7 @@ void Notify::stopping() {
   timer_.cancel();
 }
 
-/// Reports twice per watchdog period, except while a ping takes longer than that period; then the manager acts.
+/// Reports twice per watchdog period, except while a ping takes longer than that period; then the manager restarts sonard.
 void Notify::keep_alive() {
   const bool stuck = ping_under_way_() > target_.watchdog;
   if (stuck && !stuck_)
@@ -92,8 +93,8 @@ void Notify::send(const std::string& message, int flags) {
     why = "not the address of a local socket";
   } else {
     std::copy(target_.socket.begin(), target_.socket.end(), at.sun_path);
-    if (at.sun_path[0] == '@') at.sun_path[0] = '\0';  // the abstract namespace
-    // The length of a file-system address includes the terminating zero; that of an abstract address does not.
+    if (at.sun_path[0] == '@') at.sun_path[0] = '\0';  // address in the abstract namespace
+    // The length of a file-system address includes the terminating zero; the length of an abstract address does not.
     const bool abstract = at.sun_path[0] == '\0';
     const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + target_.socket.size() + (abstract ? 0 : 1));
     const auto* address = static_cast<const sockaddr*>(static_cast<const void*>(&at));

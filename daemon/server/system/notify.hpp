@@ -1,9 +1,9 @@
-// Informs a service manager (by systemd's sd_notify protocol, implemented here) that the daemon is ready, reloads, stops, or is
-// alive. Owned by App; without a manager every call does nothing. I/O thread only.
+// Informs a service manager (with systemd's sd_notify protocol, implemented here) that the daemon is ready, reloads, stops, or is
+// alive. Without a manager the calls do nothing. App owns it, and only the I/O thread uses it.
 //
-// Alive means: the I/O loop runs, because a timer of that loop sends the message; and the simulation thread is not stuck, that
-// is, the present ping has taken less than the watchdog's period. A daemon without clients, which computes no pings, is alive.
-// A single failure (a refused ping, a client) is not a reason for a restart.
+// The daemon is alive if the I/O loop runs (a timer of that loop sends the message) and the simulation thread does not hang: the
+// present ping has taken less than the watchdog's period. A daemon without clients, which computes no pings, is alive. A single
+// failure (a refused ping, a client) is not a reason for a restart.
 #pragma once
 
 #include <chrono>
@@ -18,9 +18,9 @@ namespace sonar {
 /// Address from a service manager's environment.
 struct NotifyTarget {
   std::string socket;                     // a path, or @name in the abstract namespace; empty = no service manager
-  std::chrono::microseconds watchdog{0};  // 0 = none
+  std::chrono::microseconds watchdog{0};  // period; 0 = no watchdog
 };
-/// Read from NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; a watchdog that is meant for another process is ignored.
+/// Reads NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID; ignores a watchdog for another process.
 NotifyTarget notify_target_from_environment();
 
 class Notify {

@@ -29,7 +29,7 @@ ProcessFigures figures_of_this_process() {
   if (statm >> pages >> resident_pages) f.resident_bytes = resident_pages * page_bytes;
   statm.close();
   const std::uint64_t descriptors = entries_of("/proc/self/fd");
-  f.open_descriptors = descriptors > 0 ? descriptors - 1 : 0;  // without the one used for counting
+  f.open_descriptors = descriptors > 0 ? descriptors - 1 : 0;  // without the descriptor used for counting
   f.threads = entries_of("/proc/self/task");
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0) f.descriptor_limit = limit.rlim_cur;

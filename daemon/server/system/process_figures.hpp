@@ -1,4 +1,4 @@
-// Memory, descriptors, threads and processor time of this process, for /metrics and the status.
+// Measures memory, descriptors, threads and processor time of this process, for /metrics and the status.
 #pragma once
 
 #include <cstdint>

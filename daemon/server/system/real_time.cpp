@@ -31,7 +31,7 @@ void hurry_all_threads() {
     id_t thread = 0;
     const std::string name = it->path().filename();
     std::from_chars(name.data(), name.data() + name.size(), thread);
-    if (::setpriority(PRIO_PROCESS, thread, first) != 0 && errno != ESRCH) return;  // not permitted
+    if (::setpriority(PRIO_PROCESS, thread, first) != 0 && errno != ESRCH) return;  // the process has no permission
   }
 }
 
@@ -39,7 +39,7 @@ void compute_apart(const std::function<void()>& work) {
   std::exception_ptr fault;
   std::thread([&] {
     if (::nice(background_niceness) == -1) {
-      // On Linux niceness belongs to the thread; a refusal costs only smoothness.
+      // On Linux niceness belongs to the thread; after a failure, this thread only disturbs others more.
     }
     try {
       work();

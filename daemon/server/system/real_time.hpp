@@ -1,4 +1,4 @@
-// Scheduling of the daemon's threads: the I/O thread has priority (real-time priority on request) over computing threads.
+// Schedules the daemon's threads: the I/O thread has priority (real-time priority on request) over computing threads.
 #pragma once
 
 #include <functional>
@@ -7,7 +7,7 @@
 namespace sonar {
 
 /// Niceness of the threads that compute pings, so that the I/O thread has priority over them. Higher values would be too high: at
-/// +10, other busy programs get nine tenths of a shared core.
+/// +10, other busy programs would get nine tenths of a shared core.
 inline constexpr int compute_niceness = 1;
 /// Niceness of threads for which no ping waits: building a scene, recording.
 inline constexpr int background_niceness = 10;
@@ -16,12 +16,13 @@ inline constexpr int background_niceness = 10;
 /// Returns an empty text, or a sentence with the reason of a failure and the remedy.
 std::string schedule_in_real_time(int priority);
 
-/// Gives all threads of the process the niceness of the first one. At its end each of them needs processor time: beside busy
-/// programs, one at +10 took seconds to free the memory. It needs the limit LimitNICE= of the unit, or CAP_SYS_NICE.
+/// Sets the niceness of all threads of the process to that of the first thread, because each thread needs processor time to end:
+/// on a busy computer, a thread at +10 took seconds to free the memory. The process needs the limit LimitNICE= of the unit, or
+/// CAP_SYS_NICE.
 void hurry_all_threads();
 
-/// Runs `work` on a separate background thread, and waits for it. Threads that `work` starts inherit its niceness, for example
-/// those of Embree, which stay. Exceptions are passed on to the caller.
+/// Runs `work` on a separate background thread, and waits for it. Threads that `work` starts inherit the niceness, for example
+/// the threads of Embree, which do not end with it. Exceptions are passed on to the caller.
 void compute_apart(const std::function<void()>& work);
 
 }  // namespace sonar

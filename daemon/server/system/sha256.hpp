@@ -13,7 +13,7 @@ namespace sonar {
 class Sha256 {
  public:
   void add(std::span<const std::byte> bytes);
-  /// Lower-case hexadecimal digest of all bytes so far; more may follow.
+  /// Returns the lower-case hexadecimal digest of all bytes so far; more may follow.
   std::string hex() const;
   std::uint64_t size() const { return size_; }
 

@@ -15,10 +15,10 @@ inline constexpr const char* not_enough_threads =
     "cannot start a thread: allow this user or service more threads (ulimit -u, TasksMax=) or more memory (ulimit -v, LimitAS=), "
     "whichever is limited";
 
-/// Returns whether an exception that std::thread, Boost or Embree threw means that no more threads can be started. This has the
-/// same code if the limit of threads is reached and if the memory of a stack is missing.
+/// Returns whether an exception that std::thread, Boost or Embree threw means that no more threads can be started. The error code
+/// is the same if the limit of threads is reached and if there is no memory for a stack.
 inline bool is_short_of_threads(const std::exception& e) {
-  if (std::string_view(e.what()).find("pthread_create") != std::string_view::npos) return true;  // a text of Embree
+  if (std::string_view(e.what()).find("pthread_create") != std::string_view::npos) return true;  // from Embree
   if (const auto* error = dynamic_cast<const std::system_error*>(&e))
     return error->code() == std::errc::resource_unavailable_try_again;
   const auto* error = dynamic_cast<const boost::system::system_error*>(&e);

@@ -1,5 +1,5 @@
-// The daemon's time: real (UNIX time that never jumps) or stepped (advanced only by daemon/server/time/stepped_time.hpp). I/O
-// thread only.
+// The daemon's time: real (UNIX time that never jumps) or stepped (advanced only by daemon/server/time/stepped_time.hpp). Only
+// the I/O thread uses it.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace sonar {
 
 class Clock {
  public:
-  /// Reads the computer's wall clock. If that is set, for example by NTP, now() does not change.
+  /// Reads the computer's wall clock. now() does not change if that clock is set, for example by NTP.
   using Wall = Time (*)();
   static Time system_wall() { return std::chrono::time_point_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now()); }
   explicit Clock(bool stepped, Wall wall = system_wall)
@@ -20,18 +20,18 @@ class Clock {
   bool stepped() const { return stepped_; }
   /// Stepped time begins at the epoch, so that two runs send the same packets.
   Time now() const { return stepped_ ? origin_ : origin_ + (std::chrono::steady_clock::now() - started_); }
-  /// The lead of now() over the wall clock; about 0 until that clock is set. Real time only.
+  /// Returns the lead of now() over the wall clock; about 0 until that clock is set. Call it only in real time.
   std::chrono::nanoseconds ahead_of_wall() const { return now() - wall_(); }
-  /// The time at which a timer must expire for `t`. Real time only.
+  /// Returns the time at which a timer must expire for `t`. Call it only in real time.
   std::chrono::steady_clock::time_point timer_at(Time t) const { return started_ + (t - origin_); }
-  /// Advances to a time that is not before now(). Stepped time only.
+  /// Advances to a time that is not before now(). Call it only in stepped time.
   void advance_to(Time t) { origin_ = std::max(origin_, t); }
-  /// Advances the clock without advancing unskipped time (stepped mode only).
+  /// Advances the clock, but not unskipped time. Call it only in stepped time.
   void skip(std::chrono::nanoseconds by) {
     origin_ += by;
     skipped_ += by;
   }
-  /// The sum of all skips. Conversations use unskipped time, so that a jump causes no time-outs and no keep-alives.
+  /// Returns the sum of all skips. Dialogues use unskipped time, so that a jump causes no time-outs and no keep-alives.
   std::chrono::nanoseconds skipped() const { return skipped_; }
 
  private:
@@ -39,7 +39,7 @@ class Clock {
   Wall wall_;
   std::chrono::steady_clock::time_point started_;
   std::chrono::nanoseconds skipped_{0};
-  Time origin_;  // real: the UNIX time at started_; stepped: now
+  Time origin_;  // real time: the UNIX time at started_; stepped time: now
 };
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// The question of a step of stepped time whether its client has left.
+// The function with which a step of stepped time tests whether its client has left.
 #pragma once
 
 #include <functional>

@@ -6,7 +6,7 @@
 namespace sonar {
 
 SteppedTime::Bound SteppedTime::bound(std::optional<Time> for_pings) const {
-  // A ping that is due exactly at the end of a step belongs to the next one.
+  // A ping that is due exactly at the end of a step belongs to the next step.
   if (mode_ == ClockMode::lockstep) return {asked_ - std::chrono::nanoseconds(1), asked_};
   if (mode_ != ClockMode::follow) return {std::max(for_pings.value_or(Time::min()), clock_.now()), {}};
   const std::optional<Time> stamped = world_.followed_until();
@@ -33,7 +33,7 @@ std::string SteppedTime::step(double dt_s) {
   if (dt.count() == 0) return "dt_s is less than a nanosecond";
   if (seconds(asked_ + dt - clock_.now()) > longest_step_s)
     return "steps that wait to be done would take more than " + std::to_string(static_cast<int>(longest_step_s)) + " seconds";
-  // From now on pings up to the new end are computed; the clock advances with them.
+  // Pings up to the new end are now computed, and the clock advances with them.
   asked_ += dt;
   return {};
 }
@@ -61,8 +61,8 @@ bool SteppedTime::end_left() {
 }
 
 bool SteppedTime::answer(std::optional<Time> next) {
-  // The bound decreases when a vehicle that lags joins the followed ones. Requests that wait for a later time are then
-  // answered, or the sender and sonard would wait for each other. Answering a request may add another.
+  // The bound decreases when a vehicle that lags joins the followed vehicles. Requests that wait for a later time are then
+  // answered, because otherwise the sender and sonard would wait for each other. Answering a request may add another.
   bool any = false;
   while (!waiting_.empty() && (!next || *next > std::min(waiting_.front().until.last_tick, bound().last_tick))) {
     // The request is removed before the call, because the call may add another.

@@ -22,9 +22,9 @@ struct PlayedRecording {
 /// Set when the viewer has left; another thread reads the recording.
 using ViewerLeft = std::shared_ptr<std::atomic<bool>>;
 
-/// Errors as of open_recording(), with the file's name; missing_file for a symbolic link out of the folder. After `left` is set,
-/// this call and the pings throw: the search for the next ping could read gigabytes, such as zeros that a power cut left at the
-/// end.
+/// Opens a recording. Errors: those of open_recording(), with the file's name; missing_file for a symbolic link out of the
+/// folder. After `left` is set, this call and the pings throw, because the search for the next ping could read gigabytes, such as
+/// zeros that a power cut left at the end.
 Result<recording::RecordedPings> open_pings(const PlayedRecording& wanted, const ViewerLeft& left);
 
 }  // namespace sonar

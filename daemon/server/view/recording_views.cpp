@@ -80,11 +80,11 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   struct Work {
     std::optional<RecordingPlayer> player;
     PicturePainter painter{view_fan_style()};
-    std::string failure;  // reason if it cannot be played
+    std::string failure;  // reason if the recording cannot be played
     bool is_measured = false;
-    bool is_behind = false;  // the slice ended before the ping was found
+    bool is_behind = false;  // true: the slice ended before the ping was found
     std::optional<RecordingPlayer::Ns> drawn_at;
-    Payloads made;  // anew
+    Payloads made;  // payloads that the slice made
     protocol::PingFacts facts;
   };
 
@@ -138,9 +138,9 @@ class RecordingViews::Seen final : public ViewerHost, public std::enable_shared_
   std::map<std::uint32_t, ViewChannel> channels_;
   std::shared_ptr<Work> work_ = std::make_shared<Work>();
   std::optional<motion::Playback> playback_;  // set when the length is known
-  // Results of the last job:
+  // Results of the last slice:
   std::string failure_;
-  std::shared_ptr<const SonarModel> model_;  // null: no message names it
+  std::shared_ptr<const SonarModel> model_;  // null: no message names the model
   Time begin_{};
   std::uint64_t count_ = 0;
   protocol::PingFacts facts_;
@@ -183,12 +183,12 @@ void RecordingViews::Seen::draw(Work& work, const RecordingPlayer::Shown& shown)
   event.SerializeToArray(bytes.data(), static_cast<int>(bytes.size()));
   work.made[ping_channel] = view_payload(at, std::move(bytes));
   const auto picture = protocol::drawing_of(shown.ping);
-  if (!picture) return;  // for example too few lines of a sweep
+  if (!picture) return;  // for example, if the sweep has too few lines yet
   work.made[picture_channel] = picture_payload(at, *picture);
   work.made[fan_channel] = fan_payload(sonar_name, at, *picture, work.painter);
 }
 
-/// Runs on the I/O thread after each slice of work. While `busy_`, only the work thread uses `work_`.
+/// Takes the results on the I/O thread after each slice of work. While `busy_`, only the work thread uses `work_`.
 void RecordingViews::Seen::take() {
   busy_ = false;
   const auto connection = connection_.lock();
@@ -226,7 +226,7 @@ void RecordingViews::Seen::arm() {
   });
 }
 
-/// Begins a slice if one is due. take() and the timer call it again.
+/// Begins a slice if one is due. take() and the timer call it.
 void RecordingViews::Seen::tick() {
   const auto connection = connection_.lock();
   if (!connection || connection->over()) return;
@@ -267,7 +267,7 @@ std::string RecordingViews::Seen::server_info() const {
   return foxglove::text_of(info);
 }
 
-/// The status for the page's time line, in which the recording takes the role of a vehicle's trajectory.
+/// Returns the status for the page's time line, in which the recording has the role of a vehicle's trajectory.
 ViewPayloadPointer RecordingViews::Seen::status() const {
   v1::DaemonStatus status;
   status.set_version(SONARD_VERSION);
@@ -373,7 +373,7 @@ RecordingViews::~RecordingViews() {
 
 std::shared_ptr<HttpTakeover> RecordingViews::open(ConnectionServices& services, HttpConnection& from, const HttpRequest& request,
                                                    ViewWelcome welcome, const PlayedRecording& wanted) {
-  welcome.may_steer = true;  // only its own time line can be steered
+  welcome.may_steer = true;  // a viewer can steer only its own time line
   const auto seen = std::make_shared<Seen>(io_, thread_, wanted);
   // The connection owns the function below and thereby this object, so the work ends with the connection.
   const std::shared_ptr<void> connected(nullptr, [left = seen->left()](void*) { *left = true; });

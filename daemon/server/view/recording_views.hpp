@@ -1,6 +1,6 @@
-// Recordings on the page. A viewer requests one by ?recording=NAME and gets its pictures; each viewer has its own time line.
-// One thread reads files and draws pictures for all such viewers, in short slices, so that neither drivers nor other viewers
-// wait. All functions: I/O thread only. Owned by ViewFeed or `sonard replay`.
+// Recordings on the page. A viewer requests a recording with ?recording=NAME and gets its pictures; each viewer has its own time
+// line. One thread reads files and draws pictures for all such viewers, in short slices, so that neither drivers nor other
+// viewers wait. The functions are called on the I/O thread. ViewFeed or `sonard replay` owns the object.
 #pragma once
 
 #include <memory>
@@ -14,14 +14,14 @@ namespace sonar {
 class RecordingViews {
  public:
   RecordingViews(asio::io_context& io, Log& log);
-  /// Ends the present slice, and waits for it.
+  /// Stops the present slice, and waits for its end.
   ~RecordingViews();
   RecordingViews(const RecordingViews&) = delete;
   RecordingViews& operator=(const RecordingViews&) = delete;
 
   std::shared_ptr<HttpTakeover> open(ConnectionServices& services, HttpConnection& from, const HttpRequest& request,
                                      ViewWelcome welcome, const PlayedRecording& wanted);
-  /// The present number of viewers of recordings.
+  /// Returns the present number of viewers of recordings.
   int count() const;
 
  private:

@@ -10,7 +10,7 @@
 namespace sonar {
 namespace {
 
-/// Not shown, because seen from above it would hide everything else.
+/// This object is not shown, because seen from above it would hide everything else.
 constexpr std::string_view not_shown = "sea surface";
 
 bool is_shown(const Object& object) { return !object.name.empty() && object.name != not_shown && object.mesh != nullptr; }
@@ -19,8 +19,8 @@ ViewBytes shared(wire::Bytes bytes) { return std::make_shared<const wire::Bytes>
 
 using Colour = std::array<double, 3>;
 
-/// The colour of a material, by the first known word in its name ("rusty pipe", "quay_stone"); for other names a muted colour
-/// that depends on the name.
+/// Returns the colour of a material, from the first known word in its name ("rusty pipe", "quay_stone"); for other names a muted
+/// colour that depends on the name.
 Colour colour_of(const std::string& material) {
   struct Row {
     std::string_view word;
@@ -69,7 +69,7 @@ Mesh bounding_box(const Mesh& mesh) {
 
 }  // namespace
 
-/// Runs on the thread of the view. An object with too many triangles is shown as its bounding box.
+/// Makes the messages on the thread of the view. An object with too many triangles is shown as its bounding box.
 std::vector<SceneShapes::Made> SceneShapes::make(const Job& job) {
   std::vector<Made> all;
   for (const std::size_t index : job.objects) {
@@ -89,8 +89,8 @@ std::vector<SceneShapes::Made> SceneShapes::make(const Job& job) {
   return all;
 }
 
-/// Compares the scene with the shown objects: new and changed objects are added to the job, hidden and removed ones are deleted
-/// at once. While a job runs, nothing is compared.
+/// Compares the scene with the shown objects: adds new and changed objects to the job, and deletes hidden and removed objects at
+/// once. While a job runs, nothing is compared.
 std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const Scene>& scene, const World& world, Time now,
                                                     Job& job) {
   if (under_way_) return {};
@@ -119,7 +119,7 @@ std::vector<ViewPayload::Piece> SceneShapes::update(const std::shared_ptr<const 
   return pieces;
 }
 
-/// Ignores objects that were removed while their mesh was made.
+/// Takes the made objects, except those that were removed meanwhile.
 std::vector<ViewPayload::Piece> SceneShapes::take(std::vector<Made> made) {
   under_way_ = false;
   std::vector<ViewPayload::Piece> pieces;

@@ -26,15 +26,15 @@ class SceneShapes {
     Object object;
     ViewBytes bytes;
   };
-  /// Slow; any thread.
+  /// Makes the messages; slow. May be called on any thread.
   static std::vector<Made> make(const Job& job);
 
   /// Compares the scene with that of the last call. Returns the pieces to offer, and sets `job` to the objects to make (empty
   /// while a job runs).
   std::vector<ViewPayload::Piece> update(const std::shared_ptr<const Scene>& scene, const World& world, Time now, Job& job);
-  /// Pieces to offer.
+  /// Returns the pieces to offer.
   std::vector<ViewPayload::Piece> take(std::vector<Made> made);
-  /// All pieces, for a new subscriber.
+  /// Returns all pieces, for a new subscriber.
   std::vector<ViewPayload::Piece> all() const;
   void clear() { shown_.clear(); }
 

@@ -122,7 +122,7 @@ ViewConnection::ViewConnection(ConnectionServices& services, HttpConnection& fro
 }
 ViewConnection::~ViewConnection() = default;
 
-// Answers the handshake (RFC 6455, 4.2) by Beast, which also checks the key.
+// Answers the handshake (RFC 6455, 4.2) with Beast, which also checks the key.
 asio::awaitable<bool> ViewConnection::begin() {
   auto& stream = socket_->stream;
   stream.auto_fragment(false);  // a picture is one frame
@@ -164,15 +164,14 @@ asio::awaitable<void> ViewConnection::read() {
     buffer.consume(buffer.size());
     wake();
   }
-  // Without a close code the viewer has left. With one, write() sends the code and ends the connection.
+  // Without a close code, the viewer has left. With a code, write() sends it and ends the connection.
   if (viewer_.close_code() == Viewer::CloseCode::none) over_ = true;
   wake();
 }
 
 asio::awaitable<void> ViewConnection::write() {
   while (!over_) {
-    // A close code is sent first, then messages that are due. Otherwise the writer waits until the next one is due, or for
-    // wake().
+    // Sends a close code first, then messages that are due. If none is due, waits until the next message is due, or for wake().
     if (const auto code = viewer_.close_code(); code != Viewer::CloseCode::none) {
       co_await say_goodbye(static_cast<std::uint16_t>(code),
                            code == Viewer::CloseCode::policy ? "too many or malformed messages" : "too slow");
@@ -226,7 +225,7 @@ asio::awaitable<void> ViewConnection::say_goodbye(std::uint16_t code, const char
   co_await socket_->stream.async_close(reason, into(ec));
 }
 
-/// Sends a close frame, unless a message (which is one frame) is being written; then the connection just ends.
+/// Sends a close frame, unless a message (which is one frame) is being written; then the connection ends without it.
 void ViewConnection::on_closing() {
   wake_.cancel();
   stall_.cancel();

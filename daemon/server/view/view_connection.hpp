@@ -1,6 +1,6 @@
 // The WebSocket of one viewer, which takes over an HTTP connection after an accepted handshake. It moves messages between the
 // socket and a Viewer, which makes all decisions, and closes if the viewer reads no byte for limits.stall_s. Input has the same
-// rate limit as HTTP. I/O thread only.
+// rate limit as HTTP. Only the I/O thread uses it.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   using Steady = std::chrono::steady_clock;
   static Viewer::Moment now() { return Steady::now().time_since_epoch(); }
 
-  /// `services`, `from` and `host` must outlive it. `on_open` is called after the handshake.
+  /// `services`, `from` and `host` must outlive the connection. `on_open` is called after the handshake.
   ViewConnection(ConnectionServices& services, HttpConnection& from, ViewerHost& host, const HttpRequest& request,
                  const ViewWelcome& welcome, std::function<void(const std::shared_ptr<ViewConnection>&)> on_open);
   ~ViewConnection() override;
@@ -31,11 +31,11 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   Viewer& viewer() { return viewer_; }
   const Viewer& viewer() const { return viewer_; }
   bool over() const { return over_; }
-  /// The address with the port, which no other viewer has.
+  /// Returns the address with the port, which is unique among viewers.
   const std::string& address() const { return address_; }
-  /// The vehicle whose trajectory the viewer requested; empty = none.
+  /// Returns the vehicle whose trajectory the viewer requested; empty = none.
   const std::string& playback() const { return playback_; }
-  /// Call it when the viewer has something to write.
+  /// Call it when the viewer has a message to write.
   void wake() { wake_.cancel(); }
 
  private:

@@ -9,9 +9,9 @@
 namespace sonar {
 namespace {
 
-constexpr double longest_gap_s = 10;  // limit between two compared statuses; without viewers no status is read
+constexpr double longest_gap_s = 10;  // longest time between two compared statuses; without viewers no status is read
 constexpr auto failures_told = std::chrono::seconds(8);
-constexpr std::size_t most_bytes = 256 << 10;  // limit for a table of the kernel: reading it takes a millisecond
+constexpr std::size_t most_bytes = 256 << 10;  // limit for a table of the kernel, which takes a millisecond to read
 
 /// Returns an empty string if the file cannot be read.
 std::string content_of(const char* file) {

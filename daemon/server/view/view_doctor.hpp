@@ -1,5 +1,5 @@
-// The channel `/doctor` of the live view: the causes that keep drivers from getting pings (protocol/doctor/judge.hpp). They are
-// checked and sent every two seconds while a viewer has subscribed. Owned by ViewFeed. I/O thread only.
+// The channel `/doctor` of the live view: the causes that keep drivers from getting pings (protocol/doctor/judge.hpp). The causes
+// are checked and sent every two seconds while a viewer has subscribed. ViewFeed owns it, and only the I/O thread uses it.
 #pragma once
 
 #include <chrono>
@@ -19,18 +19,18 @@ class ViewDoctor {
  public:
   static constexpr std::chrono::milliseconds period{2000};
 
-  /// Both arguments must outlive it.
+  /// Both arguments must outlive the object.
   ViewDoctor(Operations& operations, const Clock& clock) : operations_(operations), clock_(clock) {}
 
-  /// The findings for a new subscriber, no older than the period. Null: there is no status.
+  /// Returns the findings for a new subscriber, no older than the period; null if there is no status.
   ViewPayloadPointer newest();
-  /// New findings; null if all subscribers have the newest.
+  /// Returns new findings; null if all subscribers have the newest.
   ViewPayloadPointer news();
 
  private:
   using Steady = std::chrono::steady_clock;
   void look();
-  /// Signs of a driver with a wrong address.
+  /// Returns signs of a driver with a wrong address.
   doctor::Elsewhere look_elsewhere();
 
   Operations& operations_;

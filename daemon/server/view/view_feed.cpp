@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds tick_period{100}, status_period{1000}, after_change{200};
 constexpr double image_hz = 30, fan_hz = 10, cloud_hz = 5, places_hz = 30, ping_hz = 50;
-constexpr std::size_t most_advertised = 100;  // in one message
+constexpr std::size_t most_advertised = 100;  // number of channels in one message
 
 const Sender ourselves{"live view", "live view"};
 
@@ -79,7 +79,7 @@ void ViewFeed::add(const std::shared_ptr<ViewConnection>& connection) {
   arm();
 }
 
-/// Sends the time, if the viewer's time is not simply the time of arrival.
+/// Sends the time, unless the viewer uses the time of arrival.
 void ViewFeed::send_time(Viewer& viewer) const {
   const Time now = of_.clock.now();
   if (const auto watch = watches_.find(viewer.playback()); watch != watches_.end())
@@ -120,7 +120,7 @@ void ViewFeed::on_subscribed(Viewer& viewer, std::uint32_t channel) {
   drive_previews();
 }
 
-/// The present value of a channel for a new subscriber; null: there is none.
+/// Returns the present value of a channel for a new subscriber; null if there is none.
 ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel) {
   if (channel == tf_) return places();
   if (channel == status_) return status();
@@ -263,7 +263,7 @@ void ViewFeed::remove(const SonarView& sonar) {
     for (const std::uint32_t id : gone) c.viewer().forget(id);
     c.viewer().say(foxglove::unadvertise(gone));
     c.viewer().say(server_info(c.viewer()));
-    // With a new session id viewers clear their state.
+    // At a new session id viewers clear their state.
     send_time(c.viewer());
     for (const auto& [id, channel] : channels_)
       if (id != log_ && c.viewer().subscribes(id)) on_subscribed(c.viewer(), id);
@@ -309,7 +309,7 @@ void ViewFeed::tick() {
   if (connections_.empty() && Steady::now() >= expected_until_) {
     no_preview_.clear();
     of_.fleet.tap_pings({});
-    for (SonarView& sonar : sonars_) sonar.forget();  // the next viewer gets geometry and swath anew
+    for (SonarView& sonar : sonars_) sonar.forget();  // so that the next viewer gets geometry and swath
     shapes_.clear();
     return;
   }
@@ -362,7 +362,7 @@ void ViewFeed::offer_status() {
   if (wanted(tf_) && status_at_ - ping_at_ >= status_period) offer(tf_, places());
 }
 
-/// The waiting, active and ended faults.
+/// Returns the waiting, active and ended faults.
 ViewPayloadPointer ViewFeed::faults() const {
   ViewPayloadPointer payload;
   const control::GetFaults without_journal{.journal_after = std::numeric_limits<std::uint64_t>::max()};

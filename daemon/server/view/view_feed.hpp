@@ -1,6 +1,6 @@
-// The live view inside the daemon: its viewers, its channels, and the messages on them (docs/live-view.md). It gets the same
-// pings as recordings, but none without viewers. Slow work runs on a separate thread, and is skipped while that thread is busy.
-// No driver waits for a viewer. I/O thread only. Owned by App.
+// The live view in the daemon: viewers, channels, and the messages on the channels (docs/live-view.md). It gets the same pings as
+// recordings, but none without viewers. Slow work runs on a separate thread, and is skipped while that thread is busy. No driver
+// waits for a viewer. App owns it, and only the I/O thread uses it.
 #pragma once
 
 #include <deque>
@@ -29,7 +29,7 @@
 
 namespace sonar {
 
-/// The parts of the daemon that the feed reads. They must outlive it.
+/// The parts of the daemon that the feed reads. They must outlive the feed.
 struct Viewed {
   asio::io_context& io;
   const Config& config;
@@ -59,7 +59,7 @@ class ViewFeed final : public ViewerHost {
   bool is_full() const;
   std::vector<ViewerFigures> viewers() const;
   ViewSecrets& secrets() { return secrets_; }
-  /// The viewers of recordings.
+  /// Returns the viewers of recordings.
   RecordingViews& recordings() { return recordings_; }
   const std::filesystem::path& folder_of_recordings() const { return of_.config.recording.folder; }
   const ViewSecrets& secrets() const { return secrets_; }
@@ -75,14 +75,14 @@ class ViewFeed final : public ViewerHost {
  private:
   using Steady = std::chrono::steady_clock;
   using MakePayload = std::function<ViewPayloadPointer(std::uint32_t channel, double threshold)>;
-  /// A payload that the thread makes from the newest ping, the same for all its channels. It may be a few pings old.
+  /// A payload that the thread makes from the newest ping, for all channels that need it. It may be a few pings old.
   struct Slow {
     std::vector<std::uint32_t> channels{};
-    std::string threshold = {};  // parameter on which it depends; empty = none
+    std::string threshold = {};  // parameter on which the payload depends; empty = none
     bool under_way = false;
     Steady::time_point begun_at{};
     Time of{Time::min()};                                                   // time of its ping
-    std::map<std::pair<std::uint32_t, double>, ViewPayloadPointer> made{};  // by channel and threshold
+    std::map<std::pair<std::uint32_t, double>, ViewPayloadPointer> made{};  // key: channel and threshold
   };
   struct SonarView {
     std::string name;
@@ -92,7 +92,7 @@ class ViewFeed final : public ViewerHost {
     const protocol::Make* make = nullptr;
     std::shared_ptr<const Ping> last = nullptr;
     ViewPayloadPointer picture = nullptr;               // picture of `last`, once it was requested
-    wire::Bytes shape = {};                             // shape of `last`, without its number
+    wire::Bytes shape = {};                             // geometry of `last`, without the ping number
     std::string volume = {};                            // the settings on which the swath depends
     std::shared_ptr<PicturePainter> painter = nullptr;  // used only by the view thread
     std::unique_ptr<DriverPicture> driver = nullptr;
@@ -146,7 +146,7 @@ class ViewFeed final : public ViewerHost {
   std::string begin_playback(Viewer& viewer, const std::string& vehicle);
   void watch_playback(const Viewer* but = nullptr);
   ViewPayloadPointer in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const;
-  /// Returns the reason if it was not set, else an empty text; nullopt if it is not a parameter of the view itself.
+  /// Sets a parameter of the view. Returns the reason if it was not set, else an empty text; nullopt for a parameter of control.
   std::optional<std::string> set_own(Viewer& viewer, const foxglove::Parameter& wanted);
   void each(auto visit) const {
     for (const auto& weak : connections_)
@@ -160,10 +160,10 @@ class ViewFeed final : public ViewerHost {
   std::map<std::uint32_t, ViewChannel> channels_;
   std::uint32_t last_channel_ = 0, tf_ = 0, scene_ = 0, swath_ = 0, log_ = 0, status_ = 0, faults_ = 0, doctor_channel_ = 0;
   std::list<SonarView> sonars_;
-  std::map<std::string, PlaybackWatch> watches_;                     // by vehicle
-  std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // the viewer that requested the preview, by sonar
+  std::map<std::string, PlaybackWatch> watches_;                     // key: vehicle
+  std::map<std::string, std::weak_ptr<ViewConnection>> previewers_;  // viewer that requested the preview of each sonar
   std::set<std::string> no_preview_;                                 // sonars whose preview a viewer has switched off
-  std::map<std::string, Steady::time_point> preview_failed_at_;      // by sonar
+  std::map<std::string, Steady::time_point> preview_failed_at_;      // key: sonar
   SceneShapes shapes_;
   ViewDoctor doctor_{of_.operations, of_.clock};
   std::deque<ViewPayloadPointer> lines_;
@@ -171,8 +171,8 @@ class ViewFeed final : public ViewerHost {
   std::vector<foxglove::Parameter> pushed_;
   asio::steady_timer timer_;
   bool armed_ = false, stopping_ = false, changed_ = false;
-  Time last_sent_time_{Time::min()};                               // the daemon's time, last sent to viewers
-  Steady::time_point status_at_{}, ping_at_{}, expected_until_{};  // the last: a viewer is expected until then
+  Time last_sent_time_{Time::min()};                               // time of the daemon that was last sent to viewers
+  Steady::time_point status_at_{}, ping_at_{}, expected_until_{};  // expected_until_: a viewer is expected until then
   std::string session_;
   std::uint64_t sessions_ = 0;
   LogLimiter failures_;

@@ -25,7 +25,7 @@ ViewPayloadPointer figures_payload(const Device& of, const PingQueued& queued) {
   const DeviceFigures f = of.figures();
   const Vec3d at = r.sonar_in_world.position_m;
   const RollPitchYaw turned = rpy_from_quat(r.sonar_in_world.orientation);
-  const double heading_deg = std::fmod(450 - deg_from_rad(turned.yaw_rad), 360);  // from north, clockwise
+  const double heading_deg = std::fmod(450 - deg_from_rad(turned.yaw_rad), 360);  // clockwise from north
   return view_payload(
       r.fired_at,
       foxglove::figures({seconds(r.fired_at.time_since_epoch()), static_cast<double>(r.number), r.settings.range_m,

@@ -19,13 +19,13 @@ tl::unexpected<Error> no_such_parameter() { return refused("there is no such par
 std::string fault_name(std::string_view trouble, const std::string& sonar) {
   return "view." + sonar + "." + std::string(trouble);
 }
-/// The parameter of a trouble: "/faults/thin_tether"; with several sonars "/faults/front/thin_tether".
+/// Returns the parameter of a trouble, such as "/faults/thin_tether"; with several sonars "/faults/front/thin_tether".
 std::string fault_parameter(std::string_view trouble, const std::string& sonar, const Fleet& fleet) {
   std::string name = fleet.devices().size() > 1 ? "/faults/" + sonar + "/" : "/faults/";
   for (const char c : trouble) name += c == '-' ? '_' : c;
   return name;
 }
-/// Seconds until a trouble (a named group of faults) that a viewer started ends; 0 = it is not active.
+/// Returns the seconds until the end of a trouble (a named group of faults) that a viewer started; 0 = it is not active.
 double seconds_left(const Device& device, const std::string& fault, Time now) {
   double left = 0;
   for (const Faults::Listed& listed : device.sonar().faults().list())
@@ -35,7 +35,7 @@ double seconds_left(const Device& device, const std::string& fault, Time now) {
   return std::ceil(left * 10) / 10;
 }
 
-/// True if the product accepts any value of this setting. Products that set their rate or gain themselves accept none.
+/// True if the product accepts a value of this setting. Products that determine their rate or gain themselves accept none.
 template <class Value>
 bool takes(const Device& device, std::optional<Value> protocol::SettingsOverride::*setting, Value value) {
   protocol::SettingsOverride wanted;
@@ -82,7 +82,7 @@ std::optional<bool> flag_of(const Value& value) {
   return flag == nullptr ? std::nullopt : std::optional(*flag);
 }
 
-/// Sets one member of an operation: a number, a whole number or true/false. A value of another type is refused.
+/// Sets one member of an operation: a number, a whole number or true/false. Refuses a value of another type.
 template <class Op, class T>
 Result<control::Operation> with(Op operation, std::optional<T> Op::*member, const std::optional<T>& value) {
   if (!value)
@@ -127,7 +127,8 @@ Result<control::Operation> set_trajectory(control::PoseSample::Of of, const std:
   return no_such_parameter();
 }
 
-/// The value of a trouble's parameter is its duration in seconds; 0 ends it. The result GetFaults means "nothing to do".
+/// Makes the operation for a trouble's parameter, whose value is the duration in seconds; 0 ends the trouble. The operation
+/// GetFaults means that nothing is to be done.
 Result<control::Operation> set_fault(const Parameter& wanted, const ParameterSource& of) {
   if (wanted.name == "/faults/armed") return refused("cannot be set: start sonard with --faults");
   if (!of.config.faults.armed) return refused("start sonard with --faults");
@@ -165,7 +166,7 @@ std::optional<double> number_of(const Value& value) {
   return std::nullopt;
 }
 
-/// All parameters with their present values, in the order in which viewers list them.
+/// Returns all parameters with their present values, in the order in which viewers list them.
 std::vector<Parameter> parameters_of(const ParameterSource& of) {
   const Time now = of.clock.now();
   std::vector<Parameter> all;

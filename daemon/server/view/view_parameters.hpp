@@ -1,5 +1,5 @@
-// Parameters of the Foxglove protocol, by which viewers read and set values of a running daemon: a write becomes an operation,
-// like one over HTTP. docs/live-view.md lists the names.
+// Parameters of the Foxglove protocol, with which viewers read and set values of a running daemon. A write becomes an operation,
+// like a request over HTTP. docs/live-view.md lists the names.
 #pragma once
 
 #include <optional>
@@ -24,7 +24,7 @@ struct ParameterSource {
 
 /// Returns the number of a parameter; nullopt if it is not a finite number.
 std::optional<double> number_of(const foxglove::Value& value);
-/// All parameters; those without a value are unset.
+/// Returns all parameters; parameters without a value are unset.
 std::vector<foxglove::Parameter> parameters_of(const ParameterSource& of);
 /// Returns the operation that a write requests, or an error of kind usage.
 Result<control::Operation> operation_of(const foxglove::Parameter& wanted, const ParameterSource& of);

@@ -12,7 +12,7 @@
 
 namespace sonar {
 
-/// Makes only payloads with subscribers; the view's thread makes the slow ones.
+/// Makes the payloads that have subscribers; the view's thread makes slow payloads.
 void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   SonarView* const sonar = find(of.config().name);
   if (sonar == nullptr) return;
@@ -44,14 +44,15 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
   if (of_.clock.stepped()) arm();
 }
 
-/// After a reload the profile may have another number of beams than the channel was made for.
+/// True if the clouds are of a sonar with one beam. After a reload the profile may have another number of beams than the channel
+/// expects.
 bool ViewFeed::clouds_are_lines(const SonarView& sonar) const {
   return channel(sonar.cloud)->kind == ViewChannel::Kind::event && sonar.last->request.settings.beam_count == 1;
 }
 
-/// The cloud of a sonar with one beam. Each ping gives one: a line that is left out would be a gap in the sweep.
+/// Offers the cloud of a sonar with one beam for each ping, because a missing line would be a gap in the sweep.
 void ViewFeed::offer_line(const SonarView& sonar) {
-  std::map<double, ViewPayloadPointer> made;  // by threshold
+  std::map<double, ViewPayloadPointer> made;  // key: threshold
   each([&](ViewConnection& c) {
     if (!c.viewer().subscribes(sonar.cloud)) return;
     const double threshold = threshold_of(c.viewer(), sonar.points);
@@ -62,7 +63,8 @@ void ViewFeed::offer_line(const SonarView& sonar) {
   });
 }
 
-/// Called for each ping and at each tick, because a payload may become due, or get a subscriber, between pings.
+/// Begins slow payloads. Called for each ping and at each tick, because a payload may become due, or get a subscriber, between
+/// pings.
 void ViewFeed::begin_slow_ones(SonarView& sonar) {
   if (sonar.last == nullptr) return;
   const Time at = sonar.last->request.fired_at;
@@ -80,7 +82,7 @@ void ViewFeed::begin_slow_ones(SonarView& sonar) {
   });
 }
 
-/// Makes a payload, once per threshold. Of the pings that arrive meanwhile only the last is kept, which is next.
+/// Makes a payload, once per threshold. Of the pings that arrive meanwhile, only the last is kept and used next.
 void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make) {
   Slow& slow = sonar.*which;
   const auto now = Steady::now();
@@ -94,13 +96,13 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   });
   const auto is_there = [&slow](const auto& one) { return slow.made.contains(one.first); };
   if (made.empty() || (slow.of == at && std::all_of(made.begin(), made.end(), is_there))) return;
-  // From here on the thread owns only copies. If the sonar's make has changed meanwhile, the result is dropped.
+  // The thread uses only copies. If the sonar's make changes meanwhile, the result is dropped.
   slow.under_way = true;
   slow.begun_at = now;
   asio::post(thread_, [this, name = sonar.name, of = sonar.make, which, at, make = std::move(make), made]() mutable {
     try {
       for (auto& [key, payload] : made) payload = make(key.first, key.second);
-    } catch (const std::bad_alloc&) {  // skipped: more pings will follow
+    } catch (const std::bad_alloc&) {  // the payload is skipped, because more pings will follow
     }
     asio::post(of_.io, [this, name, of, which, at, made = std::move(made)] {
       SonarView* const found = find(name);
@@ -118,7 +120,7 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   });
 }
 
-/// Poses of vehicles, sonars and moving objects: at the last pings or, without pings, now.
+/// Returns the poses of vehicles, sonars and moving objects, at the last pings or, without pings, now.
 ViewPayloadPointer ViewFeed::places() const {
   const Time now = of_.clock.now();
   std::vector<foxglove::Transform> all;

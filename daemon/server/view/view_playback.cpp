@@ -1,4 +1,4 @@
-// Viewers of a vehicle's trajectory (?playback=NAME), which they see like a recording: stamps are the trajectory's time, and
+// Viewers of a vehicle's trajectory (?playback=NAME), which is shown like a recording: stamps are times of the trajectory, and
 // viewers may play, pause and seek.
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 
 namespace sonar {
 
-/// null: the vehicle does not follow a trajectory
+/// Returns null if the vehicle does not follow a trajectory.
 const motion::Playback* ViewFeed::playback_of(const std::string& vehicle) const {
   const auto& vehicles = of_.config.vehicles;
   const auto found = std::find_if(vehicles.begin(), vehicles.end(), [&](const VehicleConfig& v) { return v.name == vehicle; });
@@ -47,7 +47,7 @@ void ViewFeed::watch_playback(const Viewer* but) {
   }
 }
 
-/// Converts the request to an operation of control; a refusal becomes a status for the viewer.
+/// Converts the request to an operation of control; after a refusal, the viewer gets a status.
 bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& asked) {
   auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return false;
@@ -63,7 +63,7 @@ bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& a
   }
   if (!why.empty()) viewer.send_status(foxglove::StatusLevel::error, why);
   watch_playback(&viewer);
-  watch = watches_.find(viewer.playback());  // watches without viewers have been removed
+  watch = watches_.find(viewer.playback());  // may be missing, because watches without viewers are removed
   if (watch == watches_.end()) return false;
   foxglove::PlaybackState state = watch->second.state(of_.clock.now());
   state.did_seek = asked.seeks && why.empty();
@@ -72,7 +72,7 @@ bool ViewFeed::steer_playback(Viewer& viewer, const foxglove::PlaybackControl& a
   return true;
 }
 
-/// The payload with stamps in the time of the viewer's trajectory.
+/// Returns the payload with stamps in the time of the viewer's trajectory.
 ViewPayloadPointer ViewFeed::in_time_of(const Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload) const {
   const auto watch = watches_.find(viewer.playback());
   if (watch == watches_.end()) return payload;

@@ -4,8 +4,8 @@
 namespace sonar {
 namespace {
 
-constexpr std::chrono::seconds rest_after_failure{30};  // pause of previews that start by themselves
-constexpr std::chrono::seconds page_starts_within{5};   // from the request of the page to its subscriptions, on slow computers
+constexpr std::chrono::seconds rest_after_failure{30};  // pause of previews that start without a request
+constexpr std::chrono::seconds page_starts_within{5};   // longest time from the request of the page to its subscriptions
 
 }  // namespace
 
@@ -43,7 +43,7 @@ void ViewFeed::expect_viewer() {
   arm();
 }
 
-/// True in the demo while a viewer looks at the sonar's pings, or is expected, and no driver is connected.
+/// True in the demo while a viewer has subscribed to the sonar's pings, or is expected, and no driver is connected.
 bool ViewFeed::previews_by_itself(const Device& device) {
   const std::string& name = device.config().name;
   if (!of_.config.previews || of_.clock.stepped() || no_preview_.contains(name)) return false;
@@ -78,7 +78,7 @@ void ViewFeed::drive_previews() {
   }
 }
 
-/// If a driver has connected meanwhile, its pings are shown instead.
+/// Shows a preview, unless a driver has connected meanwhile, whose pings are then shown.
 void ViewFeed::on_preview(const std::string& sonar, const PingOutcome& outcome) {
   Device* const device = of_.fleet.find(sonar);
   if (stopping_ || device == nullptr) return;

@@ -1,4 +1,4 @@
-// Requests of viewers (parameters and services), carried out as requests of control.
+// Carries out requests of viewers (parameters and services) as requests of control.
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -10,10 +10,10 @@
 namespace sonar {
 namespace {
 
-/// The name of the viewer in the log.
+/// Returns the name of the viewer in the log.
 Sender sender_of(const Viewer& viewer) { return {"live view " + viewer.who(), viewer.who()}; }
 
-/// A row for every POST of the HTTP API: its name there, its name in Request.op, and the message. Ids count from 1.
+/// A row for every POST of the HTTP API: the name in the API, the name in Request.op, and the message. Ids count from 1.
 struct ServiceRow {
   const char *name, *op, *type;
 };
@@ -79,8 +79,7 @@ std::vector<foxglove::Parameter> ViewFeed::parameters(const Viewer& viewer, cons
   return all;
 }
 
-/// Sets a parameter of the live view itself, not of control. nullopt: it is not such a parameter; else the reason if it was not
-/// set, or an empty text.
+/// Sets a parameter of the view. Returns the reason if it was not set, else an empty text; nullopt for a parameter of control.
 std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Parameter& wanted) {
   for (SonarView& sonar : sonars_) {
     if (wanted.name != sonar.points.threshold) continue;
@@ -133,7 +132,7 @@ void ViewFeed::push_parameters() {
   });
 }
 
-/// The answer may arrive after the viewer has left, so only a weak pointer is kept.
+/// Performs a call. The answer may arrive after the viewer has left, so only a weak pointer to the viewer is kept.
 void ViewFeed::call(Viewer& viewer, const foxglove::ServiceCall& call) {
   if (call.service == 0 || call.service > service_table.size()) return viewer.fail(call, "there is no such service");
   auto request = control::request_from_json(service_table[call.service - 1].op, call.payload);
