@@ -13,23 +13,23 @@ class AwaitedPing {
  public:
   bool is_under_way() const { return fired_ != nullptr; }
   Time fired_at() const { return fired_at_; }
-  /// Time at which the ping counts as lost. A ping that arrives later is still sent.
+  /// Returns the time after which the ping counts as lost. A ping that arrives later is still sent.
   Time lost_at() const { return fired_at_ + longest_wait; }
 
-  /// Begins to wait for a ping. `with`: RequestPing::with, by which arrive() recognises it.
+  /// Begins to wait for a ping. `with`: RequestPing::with, with which arrive() identifies the ping.
   void begin(std::shared_ptr<const VendorSettings> with, Time now) {
     fired_ = std::move(with);
     fired_at_ = now;
   }
-  /// Call it at lost_at(). False: the ping is not lost; its computation has not begun (`ping_pending`), so the wait starts
+  /// Call it at lost_at(). Returns false if the computation of the ping has not begun (`ping_pending`); then the wait starts
   /// again.
   bool lose(bool ping_pending, Time now) {
     if (ping_pending) return fired_at_ = now, false;
     late_ = std::exchange(fired_, nullptr);
     return true;
   }
-  /// Kind of a ping that has arrived: `other` belongs to a request that a newer one has replaced; `late` had been counted as
-  /// lost.
+  /// Kind of a ping that has arrived: `other` belongs to a request that a newer request has replaced; `late` was counted as lost
+  /// before.
   enum class Arrival { other, late, awaited };
   Arrival arrive(const VendorSettings* made_with) {
     if (late_ && made_with == late_.get()) return late_.reset(), Arrival::late;

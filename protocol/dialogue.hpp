@@ -1,5 +1,5 @@
-// One client's conversation with the emulated device, and its effects on the device. Pure: bytes and time in, replies and events
-// out.
+// The dialogue of one client with the emulated device. It gets bytes and times, and returns replies, and events that affect the
+// device.
 #pragma once
 
 #include <chrono>
@@ -26,19 +26,18 @@ struct Endpoint {
   bool operator==(const Endpoint&) const = default;
 };
 
-/// Sets the receivers of ping datagrams. If a client requests it on its connection, the list belongs to this connection and
-/// ends with it; other connections have their own lists. If it is requested by a datagram or over HTTP, it sets the device's
-/// own list, which replaces Port::group.
+/// Sets the receivers of ping datagrams. A request on a client's connection sets the list of this connection, which ends with it;
+/// other connections have their own lists. A request over UDP or HTTP sets the device's list, which replaces Port::group.
 struct SetReceivers {
-  std::vector<Endpoint> to;  // address 0.0.0.0 = that of the requesting host
+  std::vector<Endpoint> to;  // address 0.0.0.0 = the requesting host
   std::size_t stream = 0;    // index of the vendor's port of kind udp_stream, counted from 0
 };
-/// Replaces the device's settings. They may be equal to the present ones, because some drivers repeat them for every ping.
+/// Replaces the device's settings. They may equal the present settings, because some drivers repeat them for every ping.
 struct ChangeSettings {
   PingSettings settings;
   std::shared_ptr<const VendorSettings> vendor_settings;
-  std::string summary;                         // for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, ..."
-  std::optional<SetReceivers> receivers = {};  // the device's own list, if the settings contain it
+  std::string summary;                         // text for the log, such as "mode 2, range 20 m, gain 50 %, gamma 127, ..."
+  std::optional<SetReceivers> receivers = {};  // the device's list, if the settings contain it
 };
 /// Settings that the control interface or a fault changes, in terms that all makes share. Unset fields keep their value; all
 /// values must be finite.
@@ -50,9 +49,9 @@ struct SettingsOverride {
 };
 /// Requests one ping now.
 struct RequestPing {
-  bool joins = false;  // a ping that is already being computed also serves the request
-  /// For a mechanical scan: the ping is fired with the sonar rotated to port by `head_rad` about its own z axis, and framed
-  /// with the settings `with` instead of the device's. Both hold until the next request.
+  bool joins = false;  // true: a ping that is already being computed also serves the request
+  /// For a mechanical scan: the ping is fired with the sonar rotated to port by `head_rad` about its z axis, and framed with the
+  /// settings `with`, which replace the device's. Both values apply until the next request.
   double head_rad = 0;
   std::shared_ptr<const VendorSettings> with = nullptr;
 };
@@ -64,7 +63,7 @@ struct StoredAddress {
 struct StoreAddress {
   StoredAddress address;
 };
-/// A line for the log, whose rate is limited: bytes were skipped, a request was refused.
+/// A line for the log at a limited rate, for example that bytes were skipped or a request was refused.
 struct Notice {
   std::string text;
 };
@@ -87,25 +86,26 @@ struct Delivery {
 class Dialogue {
  public:
   virtual ~Dialogue() = default;
-  /// Reads the stream in pieces of any size, with any content. It never throws and never keeps bytes without bound.
+  /// Reads the stream in pieces of any size, with any content. It never throws, and limits the bytes that it keeps.
   virtual Reaction on_bytes(BytesView received, Time now) = 0;
-  /// Does what is due, such as keep-alives and pings of a subscription. Called at or after next_tick(). `ping_pending`: a
+  /// Does what is due, such as keep-alives and pings of a subscription. Called at or after next_tick(). `ping_pending`: true if a
   /// client has requested a ping whose computation has not begun.
   virtual Reaction on_tick(Time now, bool ping_pending) = 0;
   virtual Time next_tick() const = 0;
-  /// Time of the next ping that on_tick() will request unasked. Stepped time advances to it, but not to keep-alives.
+  /// Returns the time of the next ping that on_tick() will request without input. Stepped time advances to this time, but not to
+  /// keep-alives.
   virtual std::optional<Time> next_ping_request() const { return std::nullopt; }
-  /// A client that sends nothing for longer is disconnected. Counted in wall time, because clients run in wall time even if the
-  /// time of on_bytes() and on_tick() is simulated. nullopt: no limit.
+  /// Returns the time after which a silent client is disconnected; nullopt = no limit. It is wall time, because clients run in
+  /// wall time even if the time of on_bytes() and on_tick() is simulated.
   virtual std::optional<std::chrono::milliseconds> longest_silence() const { return std::nullopt; }
-  /// True if known hosts are silent while they receive pings. If so, and with datagrams, longest_silence() accepts an answer of
-  /// the host's computer as a message of the host.
+  /// True if known hosts are silent while they receive pings. Then, over UDP, an answer of the host's computer also ends a
+  /// silence.
   virtual bool hosts_fall_silent() const { return false; }
   /// Called when a ping was put into this client's outbox; it postpones the keep-alive.
   virtual void on_ping_queued(Time now) = 0;
   /// Called when a ping is ready. `made_with`: the settings of the ping (null: the initial ones); `shared_bytes`: its framed
-  /// size. In most protocols every client gets every ping; in protocols with requests for single pings, only the clients that
-  /// requested it. It calls on_ping_queued() itself if it delivers something.
+  /// size. In most protocols every client gets every ping; in protocols with requests for single pings, only clients that
+  /// requested the ping get it. It calls on_ping_queued() if the client gets the ping.
   virtual Delivery on_ping(const VendorSettings* /*made_with*/, std::size_t /*shared_bytes*/, Time now) {
     on_ping_queued(now);
     return {{Bytes{}}, {}};

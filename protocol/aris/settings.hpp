@@ -1,5 +1,5 @@
 // Checks the acoustic settings that a controller sends to an ARIS, limits them as the device does, and converts them to
-// PingSettings. Pure functions; formulas and sources: docs/protocols/aris.md.
+// PingSettings. docs/protocols/aris.md has the formulas and sources.
 #pragma once
 
 #include <optional>
@@ -17,11 +17,11 @@ namespace sonar::aris {
 inline constexpr double highest_rate_hz = 15, highest_gain_db = 24;
 inline constexpr std::uint32_t least_samples = 128, most_samples = 4096;  // per beam
 
-/// Everything that a controller has set. It is kept beside PingSettings because the headers of frames repeat it.
+/// All values that a controller has set. They are kept in addition to PingSettings, because the headers of frames repeat them.
 struct Settings {
   Acoustics acoustics;
-  bool valid = false;                                       // a SET_ACOUSTICS was accepted
-  bool streaming = false;                                   // a receiver is set
+  bool valid = false;                                       // true: a SET_ACOUSTICS was accepted
+  bool streaming = false;                                   // true: a receiver is set
   std::uint32_t applied = 0, constrained = 0, invalid = 0;  // the last cookie of each kind
   std::uint32_t salinity = 35;                              // 0, 15, 35, as SET_SALINITY sets it
   bool telephoto = false;
@@ -29,7 +29,7 @@ struct Settings {
   Time focus_set_at{};
   bool delays_packets = false;
   std::uint32_t packet_delay_us = 0;
-  std::chrono::nanoseconds clock_offset{0};  // added to the device's clock, from SET_DATETIME
+  std::chrono::nanoseconds clock_offset{0};  // from SET_DATETIME, added to the device's clock
   std::uint32_t first_ping = 0;              // number of the last ping before the controller connected
   bool operator==(const Settings&) const = default;
 };
@@ -38,13 +38,13 @@ Settings initial_settings(const protocol::DeviceState& device);
 /// The settings in `held`; if it is null, initial_settings().
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
 
-/// Sound speed from the temperature and depth of the water at the device, and the salinity that was set [m/s].
+/// Returns the sound speed [m/s] for the temperature and depth of the water at the device, and the salinity that was set.
 double sound_speed_mps(double temperature_c, double salinity_psu, double depth_m);
 
-/// Highest frame rate with these settings, 1 to 15 [Hz].
+/// Returns the highest frame rate with these settings, 1 to 15 [Hz].
 double highest_frame_rate_hz(const Product& product, const Acoustics& acoustics, std::optional<std::uint32_t> packet_delay_us);
 
-/// The shortest cycle period that the device accepts: start delay, all samples, and a rest of 360 us [us].
+/// Returns the shortest cycle period that the device accepts: start delay, all samples, and a pause of 360 us [us].
 std::uint32_t shortest_cycle_us(const Acoustics& acoustics);
 
 /// The device's answer to a SET_ACOUSTICS.
@@ -59,9 +59,9 @@ Verdict judge(const Acoustics& asked, const Product& product, bool lenient_cycle
 /// was refused, the acoustic settings that the device uses.
 Verdict apply(Settings& settings, const Acoustics& asked, const protocol::DeviceState& device);
 
-/// Position of the focus motor for a range: 0 at the sonar, 1000 at the end of the product's longest window.
+/// Returns the position of the focus motor for a range: 0 at the sonar, 1000 at the end of the product's longest window.
 std::uint32_t focus_position(double range_m, const Product& product);
-/// Position of the focus motor at one moment. The motor needs one second from 0 to 1000.
+/// Position of the focus motor at one time. The motor needs one second from 0 to 1000.
 struct FocusNow {
   std::uint32_t position = 0;
   bool moves = false;
@@ -71,7 +71,7 @@ FocusNow focus_at(const Settings& settings, Time at);
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 
-/// The change that a SET_ACOUSTICS with the override's values would cause.
+/// Returns the change that a SET_ACOUSTICS with the override's values would cause.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
 /// Options of a sonar in the configuration, under `options:`: properties that the public sources do not state.

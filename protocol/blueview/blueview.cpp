@@ -8,7 +8,7 @@ namespace sonar::blueview {
 namespace {
 
 using PortKind = protocol::Port::Kind;
-// The drop-in libraries find sonars by a broadcast, so there is no beacon.
+// The drop-in libraries find sonars with a broadcast, so there is no beacon.
 constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::tcp_stream, .number = tcp_port, .carries = "settings, pings"},
      {.kind = PortKind::udp_answer, .number = discovery_port, .carries = "discovery"}}};

@@ -11,14 +11,14 @@
 namespace sonar::blueview {
 
 const protocol::Vendor& vendor();
-/// One host's conversation over BVE1: greeting, settings, triggers, subscription, keep-alives.
+/// Makes the dialogue with one host over BVE1: greeting, settings, triggers, subscription, keep-alives.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now);
-/// The answer to a discovery datagram; empty for other datagrams.
+/// Returns the answer to a discovery datagram; empty for other datagrams.
 protocol::Bytes answer_discovery(protocol::BytesView datagram, const protocol::DeviceState& device);
 
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
-/// Samples are linear. The brightest 1 % saturate in pictures; otherwise weak samples would be black.
+/// Samples are linear. In pictures the brightest 1 % saturate, because otherwise weak samples would be black.
 inline constexpr Shades shades{.per_mille = 990};
 
 extern const protocol::Search search;

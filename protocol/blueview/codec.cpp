@@ -20,8 +20,8 @@ std::optional<std::size_t> length_of(wire::BytesView bytes, recording::Origin, b
   return header ? std::optional(header_size + header->payload_length) : std::nullopt;
 }
 
-/// The sender of a message. Only the greeting names the model. For other messages the model is the first of this make, and
-/// names_model is false.
+/// Returns the sender of a message. Only the greeting states the model. For other messages the model is the first of this make,
+/// and names_model is false.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   const auto header = header_of(message.bytes);
   if (!header || message.by != recording::Carrier::stream) return std::nullopt;

@@ -18,16 +18,16 @@ using protocol::Reaction;
 using protocol::RequestPing;
 
 // The link is sonard's own, so these values are chosen (docs/protocols/blueview-link.md).
-constexpr auto keep_alive_after = 2s;  // since the sonar sent its last message
+constexpr auto keep_alive_after = 2s;  // time since the last message of the sonar
 constexpr auto longest_host_silence = 10s;
 constexpr std::size_t most_waiting = 8;  // PING requests of one host that may be unanswered at a time
 constexpr std::uint32_t longest_wait_ms = 600000;
 constexpr float housing_above_water_c = 2;  // unknown: housing temperature minus water temperature
 
 /// A connection has one state, `greeted_`: before HELLO, all other requests are refused. After it, a host can get pings in two
-/// ways at the same time: by PING requests, which wait in `waiting_` for a ping of their head and settings, and by one
-/// subscription, which requests a ping per interval. All hosts share the settings, and the sonar computes one ping at a time;
-/// so both ways only request a ping of the device, and on_ping() decides which requests the ping answers.
+/// ways at the same time: with PING requests, which wait in `waiting_` for a ping of their head and settings, and with one
+/// subscription, which requests a ping per interval. All hosts share the settings, and the sonar computes one ping at a time, so
+/// both ways only request a ping, and on_ping() determines which requests the ping answers.
 class BlueViewDialogue final : public protocol::Dialogue {
  public:
   BlueViewDialogue(const DeviceState& device, Time now) : device_(device), spoke_at_(now) {}
@@ -56,9 +56,10 @@ class BlueViewDialogue final : public protocol::Dialogue {
     }
     if (subscription_ && subscription_->next <= now) {
       subscription_->wanted = true;
-      // A pending PING request for another head comes first; otherwise a subscription with a short interval would starve it.
+      // A pending PING request for another head has priority, because otherwise a subscription with a short interval would delay
+      // it forever.
       if (!ping_pending || settings_.active_head == subscription_->head) ask_for_ping(subscription_->head, reaction);
-      // Intervals that have passed are skipped, so that a late tick requests one ping and not a burst.
+      // Intervals that have passed are skipped, so that a late tick requests only one ping.
       subscription_->next += ((now - subscription_->next) / subscription_->interval + 1) * subscription_->interval;
     }
     if (now >= spoke_at_ + keep_alive_after) reaction.replies.push_back(make_frame(FrameType::keep_alive, 0, {}));
@@ -87,8 +88,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const HeadSettings& fired = fired_with.heads[static_cast<std::size_t>(head)];
     const HeadSettings now_set = settings_from(device_.settings.get(), device_).heads[static_cast<std::size_t>(head)];
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-      // A ping that was fired before a SET does not answer a PING request that came after the SET: the settings of the ping
-      // differ both from those at the request and from the present ones.
+      // A ping that was fired before a SET does not answer a PING request that came after the SET, because its settings differ
+      // from those at the request and from the present settings.
       if (it->head != head || (fired != it->asked_with && fired != now_set)) {
         ++it;
         continue;
@@ -101,7 +102,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
       subscription_->wanted = false;
     }
     const bool subscriber_waits = subscription_ && subscription_->wanted;
-    if (!waiting_.empty() || subscriber_waits) {  // the others need another head or other settings: request that ping next
+    if (!waiting_.empty() || subscriber_waits) {  // other requests need another head or other settings; request their ping next
       Reaction reaction;
       settings_ = settings_from(device_.settings.get(), device_);
       ask_for_ping(waiting_.empty() ? subscription_->head : waiting_.front().head, reaction);
@@ -112,14 +113,14 @@ class BlueViewDialogue final : public protocol::Dialogue {
   }
 
  private:
-  /// A PING request that has not been answered. `asked_with`: the settings of its head at the request.
+  /// A PING request that has not been answered. `asked_with`: the settings of the head at the request.
   struct Waiting {
     std::uint32_t request_id = 0;
     int head = 0;
     Time until{};
     HeadSettings asked_with;
   };
-  /// `wanted`: the ping of the present interval was requested but not sent yet.
+  /// A subscription. `wanted`: true if the ping of the present interval was requested but not sent yet.
   struct Subscription {
     int head = 0;
     std::chrono::milliseconds interval{0};
@@ -129,8 +130,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
 
   int base() const { return text_option(device_.options, option_name::heads_base) == "1" ? 1 : 0; }
 
-  /// Index of the head with the host's number `id`. Hosts number heads from 0 or from 1; if there is one head, both mean that
-  /// head.
+  /// Returns the index of the head with the host's number `id`. Hosts number heads from 0 or from 1; if there is one head, both
+  /// numbers mean that head.
   std::optional<int> head_of(std::int32_t id) const {
     const int count = static_cast<int>(settings_.heads.size());
     const int index = id - base();
@@ -139,7 +140,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     return alias ? std::optional<int>(0) : std::nullopt;
   }
 
-  /// Before a HELLO of version 1 only HELLO and KEEPALIVE are accepted; other requests get error 14004.
+  /// Handles a frame. Before a HELLO of version 1 only HELLO and KEEPALIVE are accepted; other requests get error 14004.
   void on_frame(const Frame& frame, Time now, Reaction& reaction) {
     wire::Reader reader(frame.payload);
     switch (frame.header.type) {
@@ -162,7 +163,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const auto head = head_of(id);
     if (reader.ok() && !head) return refuse(frame, Code::no_head, "no head " + std::to_string(id), reaction);
     if (head) on_head_frame(frame, *head, reader, now, reaction);
-    // If the frame is too short, its handler returns without a reply; the frame is refused here, once.
+    // If the frame is too short, the handler returns without a reply, and the frame is refused here.
     if (!reader.ok()) refuse(frame, Code::bad_parameter, reader.failure_text(), reaction);
   }
 
@@ -200,8 +201,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::hello), frame.header.request_id, hello_payload()));
   }
 
-  /// The greeting describes the sonar and all heads, so that the drop-in libraries can answer the SDK's questions without a
-  /// request.
+  /// Describes the sonar and all heads, so that the drop-in libraries can execute the SDK's queries without a request.
   wire::Bytes hello_payload() const {
     wire::Bytes out;
     const Put write(out);
@@ -265,7 +265,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::get), frame.header.request_id, payload));
   }
 
-  /// Puts a PING request into `waiting_`. on_ping() answers it, or on_tick() with error 18 when its time is over.
+  /// Puts a PING request into `waiting_`. on_ping() answers it or, when its time is over, on_tick() with error 18.
   void on_ping_request(const Frame& frame, int head, wire::Reader& reader, Time now, Reaction& reaction) {
     std::uint32_t timeout_ms = 0;
     reader("timeout_ms", timeout_ms);
@@ -274,12 +274,12 @@ class BlueViewDialogue final : public protocol::Dialogue {
       return refuse(frame, Code::bad_parameter, "8 requests of this host wait for their pings already", reaction);
     const std::chrono::milliseconds wait(std::min(timeout_ms == 0 ? longest_wait_ms : timeout_ms, longest_wait_ms));
     Time until = now + wait;
-    if (!waiting_.empty()) until = std::max(until, waiting_.back().until);  // answers go out in the order of the requests
+    if (!waiting_.empty()) until = std::max(until, waiting_.back().until);  // answers are sent in the order of the requests
     waiting_.push_back({frame.header.request_id, head, until, settings_.heads[static_cast<std::size_t>(head)]});
     ask_for_ping(head, reaction);
   }
 
-  /// A host has one subscription: a new one replaces it, interval 0 ends it.
+  /// Sets the only subscription of a host; interval 0 ends it.
   void on_subscribe(const Frame& frame, int head, wire::Reader& reader, Time now, Reaction& reaction) {
     std::uint32_t interval_ms = 0;
     reader("interval_ms", interval_ms);
@@ -292,8 +292,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     reaction.replies.push_back(make_frame(reply_to(FrameType::subscribe), frame.header.request_id, {}));
   }
 
-  /// Requests a ping of a head. It makes the head active first, because the device pings with the active head. A ping of that
-  /// head that is already being computed with these settings serves the request too (`joins`).
+  /// Requests a ping of a head. First makes the head active, because the device pings with the active head. A ping of that head
+  /// that is already being computed with these settings also serves the request (`joins`).
   void ask_for_ping(int head, Reaction& reaction) {
     settings_.active_head = head;
     reaction.events.emplace_back(change());
@@ -319,7 +319,7 @@ std::unique_ptr<protocol::Dialogue> make_dialogue(const DeviceState& device, Tim
   return std::make_unique<BlueViewDialogue>(device, now);
 }
 
-// Other datagrams get no answer. The answer is longer than the question, but only by the names of the model and the sonar.
+// Other datagrams get no answer. The answer is longer than the request, but only by the names of the model and the sonar.
 protocol::Bytes answer_discovery(protocol::BytesView datagram, const DeviceState& device) {
   std::array<std::uint8_t, 4> letters{};
   std::uint16_t version = 0;

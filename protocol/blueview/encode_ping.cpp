@@ -31,7 +31,8 @@ void set_nav(PingHead& to, const PingRequest& request) {
   to.heading_deg = static_cast<float>(deg_from_rad(heading_rad(vehicle.orientation)));
 }
 
-/// The samples from the start range on, transposed from row by row to beam by beam. They are little-endian in both.
+/// Returns the samples from the start range on, transposed from row by row to beam by beam. They are little-endian in both
+/// orders.
 wire::Bytes beam_major(const Ping& ping, const HeadGrid& grid) {
   const auto beams = static_cast<std::size_t>(ping.request.settings.beam_count);
   const auto bins = static_cast<std::size_t>(grid.bins), skipped = static_cast<std::size_t>(grid.skipped);
@@ -58,7 +59,7 @@ wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, c
   const wire::Bytes samples = beam_major(ping, grid);
   wire::Bytes packed;
   if (text_option(device.options, option_name::compression) == "deflate") packed = deflated(samples);
-  const wire::Bytes& body = packed.empty() ? samples : packed;  // deflated() returns nothing if zlib has no memory
+  const wire::Bytes& body = packed.empty() ? samples : packed;  // deflated() returns an empty buffer if zlib has no memory
   const float half_deg = static_cast<float>(0.5 * deg_from_rad(static_cast<double>(ping.mode().horizontal_aperture_rad)));
   const int base = text_option(device.options, option_name::heads_base) == "1" ? 1 : 0;
 

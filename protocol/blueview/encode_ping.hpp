@@ -8,7 +8,7 @@
 
 namespace sonar::blueview {
 
-/// Bits of the mask of navigation fields. The fields that it names follow it, in the order of the bits.
+/// Bits of the mask of navigation fields. The fields follow the mask, in the order of the bits.
 enum NavField : std::uint16_t {
   nav_time = 1 << 0,              // f64, seconds since 1970 UTC
   nav_latitude = 1 << 1,          // f64, degrees
@@ -29,13 +29,13 @@ enum class Compression : std::uint8_t { none = 0, deflate = 1 };
 struct PingHead {
   std::int32_t head = 0;
   std::uint32_t number = 0;
-  double utc_s = 0;  // since 1970
+  double utc_s = 0;  // time since 1970
   std::int32_t time_zone = 0;
   float start_m = 0, stop_m = 0;
   std::int32_t sound_speed_mps = 0;
   float fov_min_deg = 0, fov_max_deg = 0, bin_m = 0;
   std::uint16_t beams = 0, bins = 0;
-  std::uint8_t format = 1;  // 16-bit samples without sign
+  std::uint8_t format = 1;  // 1 = unsigned 16-bit samples
   Compression compression{};
   std::uint16_t nav_fields = nav_time | nav_depth | nav_pitch | nav_roll | nav_heading;
   double nav_time_s = 0;
@@ -70,7 +70,7 @@ constexpr void fields(auto& visit, wire::Like<PingHead> auto& m) {
 std::optional<protocol::Field> locate(protocol::FieldName name, wire::BytesView ping);
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
 
-/// The payload of PING_DATA. `settings`: those under which the ping was made.
+/// Returns the payload of PING_DATA. `settings`: the settings with which the ping was made.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const SonarSettings& settings);
 
 }  // namespace sonar::blueview

@@ -97,7 +97,7 @@ std::optional<Frame> Framer::next() {
   Frame frame;
   wire::Reader reader(left.first(header_size));
   fields(reader, frame.header);
-  // The length of a broken frame cannot be trusted, so the start of the next frame is unknown and the connection ends.
+  // The length in a damaged frame may be wrong, so the start of the next frame is unknown and the connection ends.
   if (frame.header.magic != magic) {
     broken_ = "is not a BVE1 link: a frame has another magic number";
     return std::nullopt;
@@ -114,7 +114,7 @@ std::optional<Frame> Framer::next() {
 }
 
 wire::Bytes deflated(wire::BytesView plain) {
-  // zlib has a byte type of its own. Copying the bytes avoids casts of buffers.
+  // zlib has its own byte type. Copying the bytes avoids casts of buffers.
   std::vector<Bytef> in(plain.size()), out(compressBound(static_cast<uLong>(plain.size())));
   if (!plain.empty()) std::memcpy(in.data(), plain.data(), plain.size());
   auto size = static_cast<uLongf>(out.size());
@@ -125,7 +125,8 @@ wire::Bytes deflated(wire::BytesView plain) {
 }
 
 wire::Bytes inflated(wire::BytesView packed, std::size_t size) {
-  // A stream of deflate grows at most 1032-fold (zlib's technical notes). A false size must not make this allocate more.
+  // Decompression grows a stream at most 1032-fold (zlib's technical notes). With a wrong size this function must not allocate
+  // more.
   constexpr std::size_t best = 1032;
   if (size > best * packed.size() + 64 || size == 0) return {};
   std::vector<Bytef> in(packed.size()), out(size);

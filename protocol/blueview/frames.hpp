@@ -34,13 +34,13 @@ constexpr void fields(auto& visit, wire::Like<FrameHeader> auto& m) {
   visit("payload_len", m.payload_length, means::payload_size);
 }
 
-/// Value of SET and GET: one value, or two floats for Key::range.
+/// The two floats of Key::range. Other keys of SET and GET have one value.
 struct FloatPair {
   float first = 0, second = 0;
 };
 using Value = std::variant<std::int32_t, float, std::string, FloatPair>;
 
-/// Appends single values to a message whose layout depends on its content, which fields() cannot describe.
+/// Appends single values to a message whose layout depends on its content, so that fields() cannot describe it.
 class Put {
  public:
   explicit Put(wire::Bytes& out) : out_(out) {}
@@ -53,15 +53,15 @@ class Put {
   wire::Bytes& out_;
 };
 
-/// A text is a 16-bit length and that number of bytes of UTF-8; longer texts are cut.
+/// Appends a text: a 16-bit length and that number of bytes of UTF-8. Longer texts are cut.
 void put_text(wire::Bytes& out, std::string_view text);
 std::string read_text(wire::Reader& reader, std::string_view name);
-/// Appends the kind of a value, one byte, and the value.
+/// Appends the kind of a value (one byte) and the value.
 void put_value(wire::Bytes& out, const Value& value);
 std::optional<Value> read_value(wire::Reader& reader, Key key);
 
 wire::Bytes make_frame(FrameType type, std::uint32_t request_id, wire::BytesView payload);
-/// The header of a frame (16 bytes) with the given payload length.
+/// Makes the header of a frame (16 bytes) with the given payload length.
 wire::Bytes make_header(FrameType type, std::uint32_t request_id, std::size_t payload_length);
 wire::Bytes make_error(std::uint32_t request_id, Code code, std::string_view text);
 
@@ -77,7 +77,7 @@ class Framer {
   /// `longest`: longest accepted payload; a host passes longest_payload.
   explicit Framer(std::size_t longest = longest_request) : longest_(longest) {}
   void append(wire::BytesView received);
-  /// The next whole frame; valid until the next call.
+  /// Returns the next whole frame, which is valid until the next call.
   std::optional<Frame> next();
   const std::string& broken() const { return broken_; }
 
@@ -87,10 +87,10 @@ class Framer {
   std::string broken_;
 };
 
-/// A zlib stream (RFC 1950) at the fastest level; empty when zlib has no memory.
+/// Returns a zlib stream (RFC 1950) of the fastest level; empty if zlib has no memory.
 wire::Bytes deflated(wire::BytesView plain);
 
-/// Decompresses a stream of exactly `size` bytes; empty if it has another size or is damaged.
+/// Decompresses a stream of exactly `size` bytes; returns an empty buffer if it has another size or is damaged.
 wire::Bytes inflated(wire::BytesView packed, std::size_t size);
 
 }  // namespace sonar::blueview

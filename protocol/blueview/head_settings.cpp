@@ -20,8 +20,8 @@ const FrequencyMode& mode_of(const protocol::DeviceState& device, int head) {
 }
 bool strict_range(const protocol::DeviceState& device) { return text_option(device.options, option_name::strict_range) == "on"; }
 
-/// The number in a value. Hosts may send integers and floats for any numeric key, as the interface of the SDK does. NaN and
-/// infinity are refused.
+/// Returns the number in a value; nullopt for NaN and infinity. Hosts may send integers and floats for any numeric key, as the
+/// interface of the SDK does.
 std::optional<double> number_in(const Value& value) {
   if (const auto* i = std::get_if<std::int32_t>(&value)) return *i;
   if (const auto* f = std::get_if<float>(&value)) return std::isfinite(*f) ? std::optional<double>(*f) : std::nullopt;
@@ -53,8 +53,8 @@ Applied keep(T& at, double value, double low, double high) {
   return {Value(at), {}};
 }
 
-/// Clamps a number to the limits of its key. The keys from dynamic_power on are only stored: their effect on a real head is
-/// unknown.
+/// Clamps a number to the limits of its key, and stores it. The keys from dynamic_power on have no other effect, because their
+/// effect on a real head is unknown.
 Applied apply_number(HeadSettings& head, SonarSettings& all, Key key, double value) {
   switch (key) {
     case Key::sound_speed:
@@ -202,7 +202,7 @@ HeadGrid grid_of(const HeadSettings& head, double finest_bin_m) {
   grid.bin_m = std::max(finest_bin_m, (stop - start) / most_bins);
   grid.bins = std::max(1, static_cast<int>(std::lround((stop - start) / grid.bin_m)));
   // The pipeline's rows begin at the sonar. The rows before the start are dropped, and the grid is shifted by a fraction of a
-  // row, so that the centre of the first bin lies half a bin after the start.
+  // row, so that the centre of the first bin is half a bin after the start.
   const double rows_before = start / grid.bin_m;
   grid.skipped = static_cast<int>(std::floor(rows_before + 0.5));
   grid.row_centre = std::clamp(0.5 + rows_before - grid.skipped, 0.0, 1.0);
@@ -230,12 +230,12 @@ PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState
   s.transmit = head.transmit != 0;
   s.gain_db = base_gain_db + head.gain_db;
   s.device_sound_speed_mps = static_cast<float>(head.sound_speed_mps);
-  // The device compensates the absorption of the fluid that the host states; for `other`, that of the actual water.
+  // The device compensates the absorption of the fluid that the host states; for `other`, the absorption of the actual water.
   Water believed = device.water;
   if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
   if (head.fluid == 1) believed.salinity_psu = 0;
-  // The absorption applies to the way out and to the way back, but the slope applies once to each metre of range. So half of the
-  // slope is added to the absorption.
+  // The absorption applies to the path out and to the path back, but the slope applies once to each metre of range. So half of
+  // the slope is added to the absorption.
   s.device_absorption_db_per_m =
       static_cast<float>(absorption_db_per_m(believed, device.depth_m, static_cast<double>(mode.centre_hz)) +
                          0.5 * static_cast<double>(head.tvg_db_per_m));
@@ -277,7 +277,7 @@ float gain_db_from(double percent) { return static_cast<float>(half_gain_db * (p
 
 double gain_percent_from(double gain_db) { return 50 * (gain_db / half_gain_db + 1); }
 
-// SET clamps a range that is not possible. An override refuses such a range, and its error states the limits of the product
+// SET clamps a range that is not possible. An override refuses such a range, and the error states the limits of the product
 // (Vendor::apply_override).
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   SonarSettings all = settings_from(device.settings.get(), device);

@@ -21,7 +21,7 @@ struct HeadSettings {
   float tvg_db_per_m = 0;
   std::int32_t fluid = 0;  // 0 salt, 1 fresh, 2 other
   std::int32_t transmit = 1;
-  std::int32_t ping_interval_ms = 0;  // 0 = at the rate of the requests
+  std::int32_t ping_interval_ms = 0;  // 0 = pings at the rate of the requests
   std::int32_t dynamic_power = 0;
   float source_level_db = 0;  // stored and returned; no effect
   bool operator==(const HeadSettings&) const = default;
@@ -37,7 +37,7 @@ struct SonarSettings final : VendorSettings {
   std::vector<HeadSettings> heads;
 };
 SonarSettings initial_sonar_settings(const protocol::DeviceState& device);
-/// The settings in `settings`; if they are null, initial_sonar_settings().
+/// Returns the settings in `settings`; if it is null, initial_sonar_settings().
 SonarSettings settings_from(const VendorSettings* settings, const protocol::DeviceState& device);
 
 struct Refusal {
@@ -48,11 +48,11 @@ struct Applied {
   std::optional<Value> value;
   Refusal refusal;  // set if there is no value
 };
-/// Sets one key of a head and returns the applied value: the nearest valid one.
+/// Sets one key of a head and returns the applied value, which is the nearest valid value.
 Applied apply(SonarSettings& settings, int head, Key key, const Value& value, const protocol::DeviceState& device);
 std::optional<Value> read_back(const SonarSettings& settings, int head, Key key);
 
-/// The sample grid of a head. Rows count from the sonar; the first `skipped` rows lie before the start range.
+/// The sample grid of a head. Rows count from the sonar; the first `skipped` rows are before the start range.
 struct HeadGrid {
   double bin_m = 0;
   int skipped = 0, bins = 0;
@@ -62,7 +62,7 @@ HeadGrid grid_of(const HeadSettings& head, double finest_bin_m);
 
 PingSettings ping_settings(const SonarSettings& settings, const protocol::DeviceState& device);
 
-/// One line for the log.
+/// Returns one line for the log.
 std::string describe(const SonarSettings& settings, const protocol::DeviceState& device);
 
 /// Options of a sonar in the configuration, by name, under `options:`.
@@ -76,11 +76,11 @@ using protocol::text_option;
 float gain_db_from(double percent);
 double gain_percent_from(double gain_db);
 
-/// The interval between pings, limited to 1 ms up to one hour. `rate_hz` must be above 0.
+/// Returns the interval between pings, limited to the range from 1 ms to one hour. `rate_hz` must be above 0.
 std::int32_t ping_interval_ms(double rate_hz);
 
-/// Converts an override to the settings that a host would set: selects the head `wanted.mode`, if set, and changes on the active
-/// head only the fields that are set. Refuses values that the product does not support.
+/// Converts an override to the settings that a host would set: selects the head `wanted.mode`, if it is set, then changes the
+/// other set fields on the active head. Refuses values that the product does not support.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
 }  // namespace sonar::blueview

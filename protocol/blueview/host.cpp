@@ -13,10 +13,10 @@ namespace {
 using namespace std::chrono_literals;
 using protocol::HostActions;
 
-constexpr auto host_keep_alive_after = 2s;  // since this host sent its last message
+constexpr auto host_keep_alive_after = 2s;  // time since the last message of this host
 constexpr std::uint16_t abi_of_sdk = 4;     // the sonar reads this number and ignores it
 
-/// The text of an error frame, such as "no head 3 (code 2010)".
+/// Returns the text of an error frame, such as "no head 3 (code 2010)".
 std::string text_of_error(wire::BytesView payload) {
   wire::Reader reader(payload);
   std::int32_t code = 0;
@@ -33,8 +33,8 @@ struct Greeting {
   std::string model, serial;
   std::vector<GreetedHead> heads;
 };
-/// Reads HELLO_OK (docs/protocols/blueview-link.md, "Requests"). Fields that this host does not need are skipped. nullopt: the
-/// payload is too short, or has no head.
+/// Reads HELLO_OK (docs/protocols/blueview-link.md, "Requests"), but skips fields that this host does not need. Returns nullopt
+/// if the payload is too short, or has no head.
 std::optional<Greeting> read_greeting(wire::BytesView payload) {
   wire::Reader reader(payload);
   std::uint16_t version = 0, beams = 0;
@@ -75,8 +75,8 @@ struct DecodedPing {
   PingHead head;
   wire::Bytes samples;
 };
-/// Errors: bad_data for an invalid ping. fields(PingHead) cannot read the payload, because it describes pings of the emulated
-/// sonar, which fills five of the eleven navigation fields; the protocol allows any of them.
+/// Reads a ping. Errors: bad_data for an invalid ping. fields(PingHead) cannot read the payload, because it describes pings of
+/// the emulated sonar, which have five of the eleven navigation fields; the protocol allows any of the fields.
 Result<DecodedPing> read_ping(wire::BytesView payload) {
   constexpr std::size_t fixed = wire::wire_size<PingHead>() - 8 - 4 * 4 - 4;  // bytes before the navigation data
   DecodedPing ping;
@@ -203,14 +203,14 @@ class BlueViewHost final : public protocol::Host {
     actions.emplace_back(protocol::HostSend{0, make_frame(type, id, payload)});
   }
 
-  /// Reads frames of a recording. They answer the requests of the host that was recorded, so their request ids are ignored.
+  /// Reads frames of a recording. Ignores the request ids, which belong to the requests of the recorded host.
   void on_recorded(const Frame& frame, HostActions& actions) {
     if (frame.header.type == FrameType::hello_ok) greeting_ = read_greeting(frame.payload).value_or(greeting_);
     if (frame.header.type == FrameType::ping_data) on_ping(frame, actions);
   }
 
-  /// Handles the answer to the last request. Requests go out one by one: HELLO, a SET for each setting, then pings. Each answer
-  /// triggers the next SET; after the last one the host is open.
+  /// Handles the answer to the last request. Requests are sent one by one: HELLO, a SET for each setting, then pings. Each answer
+  /// triggers the next SET; after the last SET the host is open.
   void on_answer(const Frame& frame, Time now, HostActions& actions) {
     const auto fail = [&actions](ErrorKind kind, std::string text) { actions.emplace_back(Error{kind, std::move(text)}); };
     if (frame.header.type == FrameType::error)
@@ -280,7 +280,7 @@ class BlueViewHost final : public protocol::Host {
   std::deque<std::pair<Key, Value>> settings_;  // settings that are not sent yet
   std::size_t head_;                            // index into greeting_.heads
   std::uint32_t last_id_ = 0;
-  bool is_open_ = false, asked_ = false;  // asked_: a requested ping has not arrived yet
+  bool is_open_ = false, asked_ = false;  // asked_: true if a requested ping has not arrived yet
   Time sent_at_{};
 };
 

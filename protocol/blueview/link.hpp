@@ -15,7 +15,7 @@ inline constexpr std::array<std::uint8_t, 4> magic{'B', 'V', 'E', '1'};
 inline constexpr std::array<std::uint8_t, 4> discovery_question{'B', 'V', 'E', '?'};
 inline constexpr std::array<std::uint8_t, 4> discovery_answer{'B', 'V', 'E', '!'};
 inline constexpr std::size_t header_size = 16;             // magic, type, flags, request id, payload length
-inline constexpr std::size_t longest_payload = 64u << 20;  // limit for messages of the sonar; frames.hpp has the limit for hosts
+inline constexpr std::size_t longest_payload = 64u << 20;  // limit for messages of the sonar; frames.hpp limits those of hosts
 
 /// A reply has the type of its request with this bit set.
 inline constexpr std::uint16_t reply_bit = 0x8000;

@@ -8,11 +8,11 @@
 namespace sonar::blueview {
 namespace {
 
-// Sources. P25: Choi et al. 2025, tables 1 and 2. DS: figures of the P900 data sheet as quoted in a public note on IOES-Lab/dave.
-// NPS: the public model files of nps_uw_multibeam_sonar. UUV: those of uuv_simulator. Rows without a source are recalled from
-// data sheets and not verified; all beams are about 1 degree wide, three times their spacing.
-// unknown: source levels (P25's Table 2 has 220 dB for the P900 it simulates; its fit, 170 dB, is of an Oculus), noise
-// figures, full scale, tapers, vertical widths of the MB heads' transmitters.
+// Sources. P25: Choi et al. 2025, tables 1 and 2. DS: figures of the P900 data sheet that a public note on IOES-Lab/dave quotes.
+// NPS: the public model files of nps_uw_multibeam_sonar. UUV: the model files of uuv_simulator. Rows without a source are
+// recalled from data sheets and not verified; all beams are about 1 degree wide, three times their spacing. unknown: source
+// levels (P25's Table 2 has 220 dB for the P900 it simulates; its fit, 170 dB, is of an Oculus), noise figures, full scale,
+// tapers, vertical widths of the MB heads' transmitters.
 constexpr double inch = 0.0254;
 
 struct Head {

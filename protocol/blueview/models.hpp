@@ -10,7 +10,7 @@
 
 namespace sonar::blueview {
 
-/// Values of one head that its FrequencyMode does not have.
+/// Values of one head in addition to its FrequencyMode.
 struct HeadPreset {
   int beams = 512;
   double bin_m = 0.0254;  // range resolution
@@ -19,7 +19,7 @@ struct HeadPreset {
 };
 
 std::span<const std::shared_ptr<const SonarModel>> models();
-/// One preset per frequency mode of the model.
+/// Returns one preset per frequency mode of the model.
 std::span<const HeadPreset> head_presets(std::string_view profile);
 
 }  // namespace sonar::blueview

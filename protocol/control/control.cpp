@@ -5,7 +5,8 @@
 namespace sonar::control {
 namespace {
 
-/// Removes a varint from the front of `bytes`. nullopt: it does not end within them, or is longer than 10 bytes.
+/// Removes a varint from the front of `bytes`. Returns nullopt if the varint does not end within them, or is longer than 10
+/// bytes.
 std::optional<std::uint64_t> take_varint(BytesView& bytes) {
   std::uint64_t value = 0;
   for (std::size_t i = 0; i < bytes.size() && i < 10; ++i) {
@@ -34,8 +35,8 @@ tl::expected<Request, RefusedRequest> decode_request(BytesView bytes) {
 }
 
 bool is_unasked_pose(BytesView rest) {
-  // Reads only the keys of the outermost message, each `field number << 3 | wire type` (protobuf encoding guide), and skips the
-  // values. Request has only varints and messages.
+  // Reads only the keys of the outermost message, which are `field number << 3 | wire type` (protobuf encoding guide), and skips
+  // the values. Request has only varints and messages.
   constexpr std::uint64_t varint = 0, with_length = 2;
   bool has_id = false, is_pose = false;
   while (!rest.empty()) {
@@ -122,7 +123,7 @@ Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
   const auto first = buffer_.begin() + static_cast<std::ptrdiff_t>(start_ + used);
   std::vector<std::byte> message(first, first + static_cast<std::ptrdiff_t>(length));
   start_ += used + static_cast<std::size_t>(length);
-  // The front is erased rarely, so that many small messages do not move the rest each time.
+  // The front is erased rarely, so that the rest is not moved for each small message.
   if (start_ == buffer_.size() || start_ > (64u << 10)) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(start_));
     start_ = 0;
@@ -130,7 +131,7 @@ Result<std::optional<std::vector<std::byte>>> DelimitedParser::next() {
   return std::optional(std::move(message));
 }
 
-// protobuf's varint: 7 bits per byte, the lowest first; the top bit means that another byte follows.
+// A varint of protobuf has 7 bits per byte, the lowest first; the top bit means that another byte follows.
 std::vector<std::byte> delimited(std::span<const std::byte> message) {
   std::vector<std::byte> out;
   out.reserve(message.size() + longest_length_field);

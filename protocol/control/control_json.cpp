@@ -1,5 +1,5 @@
-// The control protocol's messages as JSON text. Received text is parsed twice: first by our strict reader, which limits the
-// depth and refuses invalid JSON and duplicate keys, then by protobuf's, which checks the messages.
+// Converts the control protocol's messages from and to JSON. Received text is parsed twice: first by our strict reader, which
+// limits the depth and refuses invalid JSON and duplicate keys, then by the reader of protobuf, which checks the messages.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/util/json_util.h>
 
@@ -17,7 +17,7 @@ namespace {
 using google::protobuf::Message;
 constexpr std::size_t deepest_request = 16, most_values = 4096;  // our choice: the longest request has some dozen values
 
-/// The name in the form in which protobuf compares names: "range_m" and "rangeM" are the same field.
+/// Returns the name in the form in which protobuf compares names: "range_m" and "rangeM" are the same field.
 std::string as_protobuf_reads(const std::string& name) {
   std::string read;
   bool after_underscore = false;
@@ -72,11 +72,11 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
     keys_.pop_back();
     return true;
   }
-  std::vector<std::set<std::string>> keys_;  // keys of each object that is open
+  std::vector<std::set<std::string>> keys_;  // keys so far of each unfinished object
   std::size_t values_ = 0;
 };
 
-/// Sets the name that the path of the request has. False: the message has another name, or none can be set.
+/// Sets the name from the path of the request. Returns false if the message has another name, or has no field for a name.
 bool set_name(Message& message, const std::string& name) {
   const auto& of = *message.GetDescriptor();
   const auto* field = of.FindFieldByName("sonar") != nullptr ? of.FindFieldByName("sonar") : of.FindFieldByName("object");
@@ -123,7 +123,7 @@ std::string json_of(const Message& message) {
   options.preserve_proto_field_names = true;
   std::string out;
   if (!google::protobuf::util::MessageToJsonString(*repaired, &out, options).ok())
-    return "{}";  // cannot happen: the texts were repaired
+    return "{}";  // cannot happen, because the texts were repaired
   return out;
 }
 std::string json_of(StatusCode code, const std::string& text) { return json_of(status_of(code, text)); }

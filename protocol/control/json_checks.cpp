@@ -24,12 +24,12 @@ const FieldDescriptor* field_of(const Descriptor& type, const std::string& name)
   return nullptr;
 }
 
-/// Converts a text that holds a number to the number, because protobuf accepts both. Other values are returned unchanged.
+/// Converts a text with a number to the number, because protobuf accepts both. Returns other values unchanged.
 json number_of(const json& value) {
   return value.is_string() ? json::parse(value.get_ref<const std::string&>(), nullptr, false) : value;
 }
 
-/// The kind of value that protobuf expects in place of this one. Empty: the value is right.
+/// Returns the kind of value that protobuf expects here; empty if the value has that kind.
 template <class T>
 std::string expected_whole_number(const json& value) {
   using Limits = std::numeric_limits<T>;

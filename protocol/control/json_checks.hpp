@@ -1,6 +1,6 @@
-// Checks of JSON text: its depth, and the mistake in the JSON form of a control message, by the message's descriptor. protobuf
-// 3.21 reports mistakes only as an English sentence: its status has one code for all mistakes, and the interface that reports
-// field and value is not installed.
+// Checks JSON text: finds its depth, and the mistake in the JSON form of a control message, with the message's descriptor.
+// protobuf 3.21 reports mistakes only as an English sentence, because its status has one code for all mistakes, and the interface
+// that reports field and value is not installed.
 #pragma once
 
 #include <string>
@@ -12,11 +12,11 @@ class Descriptor;
 
 namespace sonar::control {
 
-/// In quotes, on one line; long texts are cut.
+/// Returns the text in quotes, on one line; long texts are cut.
 std::string in_quotes(const std::string& name);
 
-/// The first mistake in valid JSON that protobuf has refused for a message of this type: "\"mount.xyz_m\": unknown key". Empty
-/// if none was found.
+/// Returns the first mistake in valid JSON that protobuf has refused for a message of this type, such as "\"mount.xyz_m\":
+/// unknown key"; empty if none was found.
 std::string mistake_in(std::string_view json, const google::protobuf::Descriptor& type);
 
 // Measures how deep JSON text is nested. Parsers are recursive, so the depth is limited before they run.

@@ -41,8 +41,8 @@ Result<std::string> text_of(const json& object, const char* key) {
   return found->get<std::string>();
 }
 
-/// The time of the sender's clock, whatever its origin: ArduPilot counts from the start of its simulation. Without one the pose
-/// gets the time of its arrival.
+/// Returns the time of the sender's clock, which may have any origin: ArduPilot counts from the start of the simulation. Without
+/// a time, the pose gets the time of its arrival.
 Result<Stamp> stamp_of(const json& object) {
   const auto found = object.find("timestamp");
   if (found == object.end()) return Stamp{};
@@ -60,7 +60,8 @@ Result<Frame> frame_of(const json& object) {
   return refused("frame must be \"NED_FRD\" or \"ENU_FLU\"");
 }
 
-/// The orientation of the body in the world, in the axes of the message, from `quaternion` or, without it, from `attitude`.
+/// Returns the orientation of the body in the world, in the axes of the message, from `quaternion` or, if there is none, from
+/// `attitude`.
 Result<std::array<double, 4>> orientation_of(const json& object, std::string& fields, RollPitchYaw& sent_angles) {
   const auto quaternion = numbers<4>(object, "quaternion");
   if (!quaternion) return tl::unexpected(quaternion.error());
@@ -142,7 +143,7 @@ void LineParser::feed(std::span<const std::byte> received) {
   for (const std::byte b : received) buffer_.push_back(static_cast<char>(b));
 }
 
-// Keeps whole lines and drops the incomplete line, because its end is lost. The next bytes belong to the middle of a line.
+// Keeps whole lines and drops the incomplete line, because its end is lost. The next bytes are from the middle of a line.
 void LineParser::skip_gap() {
   begun_ = in_gap_ = true;
   const std::size_t last = buffer_.rfind('\n');
@@ -151,7 +152,7 @@ void LineParser::skip_gap() {
   buffer_.resize(whole_lines ? last + 1 : std::min(start_, buffer_.size()));
 }
 
-/// Skips a byte order mark at the start of the stream. False: more bytes are needed to know whether there is one.
+/// Skips a byte order mark at the start of the stream. Returns false if more bytes are needed to recognise one.
 bool LineParser::begin() {
   if (begun_) return true;
   if (buffer_.size() < byte_order_mark.size() && byte_order_mark.starts_with(buffer_)) return false;
@@ -159,13 +160,13 @@ bool LineParser::begin() {
   return begun_ = true;
 }
 
-// Blank lines are skipped. A line without its end waits for more bytes, up to longest_line.
+// Returns the next line, but skips blank lines. An incomplete line waits for more bytes, up to longest_line.
 std::optional<LineParser::Line> LineParser::next() {
   if (!begin()) return std::nullopt;
   while (true) {
     const std::size_t end = buffer_.find('\n', start_);
     if (end == std::string::npos) {
-      // A line that is too long is reported once, as soon as that is known; the rest of it is skipped.
+      // A line that is too long is reported once, as soon as it exceeds the limit; the rest of the line is skipped.
       const bool too_long = !swallowing_ && buffer_.size() - start_ > longest_line;
       if (!swallowing_ && !too_long) return std::nullopt;
       const bool object = begins_object(std::string_view(buffer_).substr(start_));

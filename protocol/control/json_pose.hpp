@@ -32,15 +32,15 @@ class LineParser {
   struct Line {
     std::string text;
     bool too_long = false;
-    bool begins_object = false;  // its first character is a brace
+    bool begins_object = false;  // true: the first character is a brace
   };
   void feed(std::span<const std::byte> received);
   std::optional<Line> next();
   /// Call it when a part of the stream was dropped. It discards the current line and all bytes up to the next line end, because
   /// they may belong to a dropped line.
   void skip_gap();
-  /// True if the current line can become a JSON object: it is blank so far, or its first character is a brace. A request line
-  /// of HTTP never can.
+  /// True if the current line is blank so far or begins with a brace, so that it can be a JSON object, and not a request line of
+  /// HTTP.
   bool may_become_object() const;
 
  private:
@@ -48,7 +48,7 @@ class LineParser {
   std::string buffer_;     // never longer than one line and one read
   std::size_t start_ = 0;  // start of the next line
   bool swallowing_ = false;
-  bool begun_ = false;  // the stream has begun: a byte order mark is no longer expected
+  bool begun_ = false;  // true: the stream has begun, so a byte order mark is no longer expected
   bool in_gap_ = false;
 };
 

@@ -17,14 +17,14 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
 
-/// The path with the name of a field. The `value` of wrappers such as DoubleValue is left out, since users write none.
+/// Returns the path with the name of a field, without the `value` of wrappers such as DoubleValue, which users do not write.
 std::string joined(const std::string& path, const FieldDescriptor& field) {
   if (field.containing_type()->full_name().starts_with("google.protobuf.")) return path;
   return path.empty() ? field.name() : path + "." + field.name();
 }
 
 using Predicate = std::function<bool(const Message&, const FieldDescriptor*)>;  // called with null for the message itself
-/// Path of the first field or message for which `bad` is true.
+/// Returns the path of the first field or message for which `bad` is true.
 std::optional<std::string> find_first(const Message& message, const std::string& path, const Predicate& bad) {
   if (bad(message, nullptr)) return path;
   std::vector<const FieldDescriptor*> given;
@@ -47,7 +47,8 @@ std::optional<std::string> find_first(const Message& message, const std::string&
   return std::nullopt;
 }
 
-/// The text with '?' in place of each byte that belongs to no UTF-8 character. Receivers refuse proto3 messages with other texts.
+/// Returns the text with '?' for each byte that belongs to no UTF-8 character, because receivers refuse proto3 messages with
+/// other texts.
 std::string repaired(std::string_view text) {
   std::string out;
   while (!text.empty()) {
@@ -90,7 +91,7 @@ std::optional<std::string> first_unreal_number(const Message& message) {
   });
 }
 
-// An orientation that is absent is not visited: it counts as level.
+// An absent orientation is not visited, because it counts as level.
 std::optional<std::string> first_bad_orientation(const Message& message) {
   return find_first(message, "", [](const Message& m, const FieldDescriptor* field) {
     if (field != nullptr || m.GetDescriptor() != v1::Quat::descriptor()) return false;

@@ -13,14 +13,14 @@ namespace sonar::control {
 
 bool parse(google::protobuf::Message& message, BytesView bytes);
 Bytes serialized(const google::protobuf::Message& message);
-/// Turns off the library's own log lines about ill-formed strings, which untrusted clients could flood.
+/// Turns off the library's log lines about ill-formed strings, with which untrusted clients could flood the log.
 void keep_protobuf_quiet();
 
-/// Path of the first number that is NaN or infinite: "sonar.range_m".
+/// Returns the path of the first number that is NaN or infinite, such as "sonar.range_m".
 std::optional<std::string> first_unreal_number(const google::protobuf::Message& message);
-/// Path of the first orientation whose length is not 1.
+/// Returns the path of the first orientation whose length is not 1.
 std::optional<std::string> first_bad_orientation(const google::protobuf::Message& message);
-/// Makes all texts valid for protobuf and JSON: bytes that are not UTF-8 become '?'.
+/// Makes all texts valid for protobuf and JSON: replaces bytes that are not UTF-8 with '?'.
 void repair_texts(google::protobuf::Message& message);
 
 // ---- poses (pose_messages.cpp)

@@ -26,14 +26,14 @@ struct FaultRecord {
   std::map<std::string, std::string> with;
   std::string sonar;   // empty = all
   std::string client;  // "" or all, newest, oldest, an ordinal counted from 1, an address, a prefix 10.0.0.0/8
-  struct At {          // at most one is set; none = at once
+  struct At {          // trigger: at most one member is set; none = the fault begins at once
     std::optional<std::uint64_t> ping, every;
     std::uint64_t phase = 0;  // remainder, with `every`
     std::optional<double> time_s, probability;
-    std::string on;  // an Occasion
+    std::string on;  // name of an Occasion
     bool operator==(const At&) const = default;
   } at;
-  struct For {  // each optional; see Span
+  struct For {  // duration; all members are optional (see Span)
     std::optional<double> seconds;
     std::optional<std::uint64_t> pings, count;
     bool operator==(const For&) const = default;
@@ -110,7 +110,7 @@ struct Subscribe {
   bool pings = false, clients = false, poses = false, scene = false, faults = false;
 };
 
-/// Requests that the daemon executes; Hello and Subscribe are handled by the connection.
+/// Requests that the daemon executes. The connection handles Hello and Subscribe.
 using Operation = std::variant<GetStatus, PoseSample, SetSonar, SetEnvironment, LoadScene, AddObject, RemoveObject, SetObject,
                                SetTrajectory, Step, StartRecording, StopRecording, AddFault, EndFaults, GetFaults>;
 

@@ -14,8 +14,8 @@ constexpr double most_degrees = 360;
 std::array<double, 3> array_from(const v1::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 std::array<double, 4> array_from(const v1::Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
-/// A stamp without a domain is refused, because WALL and SIM times are mapped to the daemon's clock in different ways. Without
-/// any time the moment of arrival counts.
+/// Reads a stamp. Refuses a stamp without a domain, because WALL and SIM times are mapped to the daemon's clock in different
+/// ways. If there is no time, the time of arrival is used.
 Result<Stamp> stamp_from(const v1::Time& time) {
   if (time.ns() > largest_stamp_ns || time.ns() < -largest_stamp_ns)
     return refused("time.ns is beyond 4.5e18 ns (142 years): send nanoseconds, or ARRIVAL time");

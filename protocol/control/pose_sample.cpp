@@ -30,7 +30,7 @@ Vec3d vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 std::string_view name_of(Frame frame) { return frame == Frame::ned_frd ? "NED/FRD" : "ENU/FLU"; }
 
-// Both JSON and protobuf poses pass here, so both have the same limits and the same texts.
+// This function checks both JSON and protobuf poses, so that both have the same limits and the same texts.
 Result<PoseSample> checked(PoseSample sample, const RawPose& raw) {
   if (!raw.frame) return refused("frame is missing: give NED_FRD or ENU_FLU; there is no default");
   if (!all_finite(raw.position_m)) return refused("position has a NaN or infinite component");

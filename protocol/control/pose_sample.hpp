@@ -19,18 +19,18 @@ inline constexpr double largest_norm_error = 1e-3;
 /// The clock of a time stamp (docs/poses.md, "Time and order").
 enum class ClockDomain {
   wall,     // UNIX time of a computer whose clock agrees with ours
-  sim,      // the sender's own, any origin
+  sim,      // the sender's own clock, with any origin
   arrival,  // no stamp: the time of arrival is used
 };
-/// About 142 years on either side of 1970; sums and differences of such stamps fit int64 nanoseconds.
+/// About 142 years before and after 1970; sums and differences of such stamps fit int64 nanoseconds.
 inline constexpr std::int64_t largest_stamp_ns = 4'500'000'000'000'000'000;
 struct Stamp {
   ClockDomain domain = ClockDomain::arrival;
   std::int64_t ns = 0;
 };
-/// The axes of a sender's poses: those of the world and of the body.
+/// The axes of a sender's poses: axes of the world, and of the body.
 enum class Frame { ned_frd, enu_flu };
-std::string_view name_of(Frame frame);  // "NED/FRD"
+std::string_view name_of(Frame frame);  // returns a name such as "NED/FRD"
 
 struct PoseSample {
   enum class Of { vehicle, object };
@@ -38,14 +38,14 @@ struct PoseSample {
   std::string name;       // name of the vehicle or object; empty = the only one there is
   std::uint64_t seq = 0;  // 0 = the sender does not number its poses
   Stamp stamp;
-  Pose pose;                                    // body (FLU) in world (ENU)
-  std::optional<Vec3d> velocity_mps;            // body axes, FLU
-  std::optional<Vec3d> angular_velocity_radps;  // body axes, FLU
-  std::uint32_t reset_counter = 0;              // after a change, do not interpolate from the pose before
-  bool hidden = false;                          // objects only: removed from the scene until a pose without it
-  RollPitchYaw sent_angles = {};                // as sent, in radians and not wrapped; 0 if a quaternion was sent
-  Frame sent_in = Frame::enu_flu;               // for the log
-  std::string fields;                           // for the log: what the message contained
+  Pose pose;                                    // pose of the body (FLU) in the world (ENU)
+  std::optional<Vec3d> velocity_mps;            // in body axes, FLU
+  std::optional<Vec3d> angular_velocity_radps;  // in body axes, FLU
+  std::uint32_t reset_counter = 0;              // after a change, do not interpolate from the previous pose
+  bool hidden = false;                          // objects only; true: the object is hidden until the next pose with false
+  RollPitchYaw sent_angles = {};                // sent angles in radians, not wrapped; 0 if a quaternion was sent
+  Frame sent_in = Frame::enu_flu;               // frame of the message, for the log
+  std::string fields;                           // names of the fields of the message, for the log
 };
 
 /// The numbers of a message before checked() has validated them. Velocities are in the body axes of `frame`.

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t longest_name = 256, longest_path = 4096;
 
-/// Names are printed in log lines and answers, so control characters are refused: they could forge lines.
+/// Checks a name. Names are printed in log lines and answers, so control characters, which could forge lines, are refused.
 Result<std::string> checked_text(const std::string& text, const char* key, bool needed, std::size_t longest = longest_name) {
   if (needed && text.empty()) return refused(std::string(key) + " is missing");
   if (text.size() > longest) return refused(std::string(key) + " is longer than " + std::to_string(longest) + " bytes");
@@ -105,7 +105,7 @@ Result<SetObject> from(const v1::SetObject& m) {
   return set;
 }
 
-// Neither a vehicle nor an object is named: the only vehicle is meant, as with poses.
+// If neither a vehicle nor an object is named, the only vehicle is meant, as with poses.
 Result<SetTrajectory> from(const v1::SetTrajectory& m) {
   SetTrajectory set;
   const bool object = !m.object().empty();
@@ -136,7 +136,7 @@ Result<StopRecording> from(const v1::StopRecording& m) {
 
 Subscribe from(const v1::Subscribe& m) { return {m.pings(), m.clients(), m.poses(), m.scene(), m.faults()}; }
 
-/// A parameter of a fault as text. JSON and protobuf may give it as a number, a string or a boolean.
+/// Returns a parameter of a fault as text. In JSON and protobuf it may be a number, a string or a boolean.
 Result<std::string> text_from(const std::string& key, const google::protobuf::Value& value) {
   if (value.kind_case() == google::protobuf::Value::kStringValue) return checked_text(value.string_value(), key.c_str(), false);
   if (value.kind_case() == google::protobuf::Value::kBoolValue) return std::string(value.bool_value() ? "yes" : "no");
@@ -148,8 +148,7 @@ Result<std::string> text_from(const std::string& key, const google::protobuf::Va
   return refused("with." + key + " must be a number or a word");
 }
 
-// Only the form is checked here. Kinds, parameters and times are checked by daemon/config/faults, which also reads the
-// configuration.
+// Only the form is checked here. daemon/config/faults, which also reads the configuration, checks kinds, parameters and times.
 Result<AddFault> from(const v1::Fault& f) {
   FaultRecord record;
   for (const auto& [key, text, needed, to] :
@@ -192,8 +191,8 @@ Result<Operation> checked(Result<Op> op) {
   return Operation{*std::move(op)};
 }
 
-/// The operation of a request. If the operation is unknown, for example because the client is newer, the result is Unsupported
-/// and not an error.
+/// Returns the operation of a request; for an unknown operation, for example of a newer client, returns Unsupported, not an
+/// error.
 Result<Operation> operation_of(const v1::Request& message) {
   switch (message.op_case()) {
     case v1::Request::kHello:
@@ -338,7 +337,7 @@ struct FillRequest {
 
 }  // namespace
 
-// The operation is read first, because its refusals explain a wrong field better than "is NaN" does.
+// The operation is read first, because its refusals are more helpful than "is NaN".
 tl::expected<Request, RefusedRequest> from(const v1::Request& message) {
   const auto refused_here = [&](std::string why) {
     return tl::unexpected(RefusedRequest{message.id(), std::move(why), message.has_pose() || message.has_object()});

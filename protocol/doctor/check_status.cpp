@@ -8,7 +8,7 @@
 namespace sonar::doctor {
 namespace {
 
-/// True if the daemon has a note on the poses of the vehicle, which then replaces the finding that they are in order.
+/// True if the daemon has a note on the poses of the vehicle. The note replaces the finding that the poses are in order.
 bool has_notes(const v1::DaemonStatus& status, const std::string& vehicle) {
   return std::any_of(status.notes().begin(), status.notes().end(),
                      [&vehicle](const v1::Note& note) { return note.vehicle() == vehicle; });

@@ -14,12 +14,12 @@ namespace {
 using text::counted;
 using text::format;
 
-// Visit::why of connections that ended through no fault of their driver.
+// The values of Visit::why for connections that ended although their driver made no mistake.
 constexpr std::string_view ended_by_fault = "a fault", ended_by_take_over = "another client took over";
 constexpr double soon_s = 1;               // time in which a correct driver requests pings, and reads what was sent
-constexpr double recent_s = 60;            // visits that are longer ago are not reported
+constexpr double recent_s = 60;            // earlier visits are not reported
 constexpr double enough_of_rate = 0.9;     // share of the requested rate below which the rate is reported
-constexpr std::size_t most_elsewhere = 4;  // connections to wrong addresses that are reported at a time
+constexpr std::size_t most_elsewhere = 4;  // limit for reported connections to wrong addresses
 
 std::string seconds_text(double s) { return format("%.0f s", s); }
 
@@ -36,8 +36,8 @@ std::string addresses_of(const v1::SonarStatus& sonar) {
   return all;
 }
 
-/// The address at which a driver connects, such as "127.0.0.2, TCP port 52100"; without a port if the sonar is controlled by
-/// HTTP.
+/// Returns the address at which a driver connects, such as "127.0.0.2, TCP port 52100"; without a port if the sonar is controlled
+/// over HTTP.
 std::string where_to_connect(const v1::SonarStatus& sonar) {
   std::string at = sonar.listens();
   for (const v1::SonarAddress& address : sonar.addresses())
@@ -63,8 +63,8 @@ const v1::ClientStatus* find(const v1::SonarStatus* in, const std::string& addre
   return nullptr;
 }
 
-/// Makes one finding for each fault or trouble that acts. The kinds of a trouble are faults of their own in the status, so they
-/// are collected under its name.
+/// Makes one finding for each active fault or trouble. In the status the kinds of a trouble are separate faults, so they are
+/// collected under the name of the trouble.
 void check_faults(const v1::DaemonStatus& status, std::vector<Finding>& findings) {
   std::map<std::pair<std::string, std::string>, std::string> codes;  // codes by sonar and check
   std::set<std::pair<std::string, std::string>> ending;
@@ -84,7 +84,7 @@ void check_faults(const v1::DaemonStatus& status, std::vector<Finding>& findings
   if (codes.empty()) findings.push_back({Level::ok, "fault", "No fault acts", ""});
 }
 
-/// Makes the findings of one sonar. `before_` is its earlier status, for values that are judged by their change.
+/// Makes the findings of one sonar. `before_` is its earlier status, for values whose change matters.
 class SonarJudge {
  public:
   SonarJudge(const v1::DaemonStatus& status, const v1::SonarStatus& sonar, const v1::DaemonStatus* before,
@@ -96,7 +96,7 @@ class SonarJudge {
         past_s_(before == nullptr ? 0 : status.uptime_s() - before->uptime_s()),
         findings_(findings) {}
 
-  /// If there is no driver and no ping, only that is reported: settings and rates mean nothing then.
+  /// Makes all findings. If there is no driver and no ping, only that is reported, because settings and rates then mean nothing.
   void run() {
     check_places();
     if (sonar_.clients().empty() && !sonar_.pinging()) return check_absence();
@@ -113,7 +113,7 @@ class SonarJudge {
     findings_.push_back({level, check, text, cure, sonar_.name(), client});
   }
 
-  /// Reports drivers that were refused a slot or that wait for one. A driver that is connected by now is not reported.
+  /// Reports drivers that were refused a slot or that wait for one, unless they are connected by now.
   void check_places() {
     const v1::Visit& visit = sonar_.turned_away();
     const std::string holders = sonar_.clients().empty() ? "" : " (" + addresses_of(sonar_) + ")";
@@ -159,12 +159,12 @@ class SonarJudge {
           "point it at " + where_to_connect(sonar_), observer);
   }
 
-  /// Connections that the sonar, or a time-out, has ended; a driver that disconnected by itself is not reported.
+  /// Reports connections that the sonar, or a time-out, has ended, but not drivers that disconnected.
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
     if (!is_recent(gone) || gone.by_itself()) return;
-    // A driver that has connected again and gets pings is not reported. Its new connection may begin before the old one ends, but
-    // not before the old one began: a client of the same host that did so is another driver.
+    // A driver that has connected again and gets pings is not reported. Its new connection may begin before the end of the old
+    // one, but not before its beginning; a client of the same host with an earlier connection is another driver.
     const auto host = [](const std::string& address) { return address.substr(0, address.rfind(':')); };
     const bool is_back = std::any_of(sonar_.clients().begin(), sonar_.clients().end(), [&](const v1::ClientStatus& client) {
       return client.pings_written() > 0 && host(client.address()) == host(gone.address()) &&
@@ -206,7 +206,7 @@ class SonarJudge {
         std::string(make_.remedy), client.address());
   }
 
-  /// A driver that does not read loses pings. A pause is a fault, slow reading a warning.
+  /// Reports a driver that does not read, and so loses pings: a pause is a fault, slow reading a warning.
   void check_reading(const v1::ClientStatus& client) {
     const v1::ClientStatus* const earlier = find(before_, client.address());
     const std::uint64_t dropped =
@@ -245,7 +245,7 @@ class SonarJudge {
                  "see the reason in sonard's log");
     if (status_.clock() != "realtime") return;
     const auto made = static_cast<double>(f.pings() - std::min(f.pings(), then.pings()));
-    // Both statuses have the mean computing time since the start; this is the mean between them.
+    // Both statuses have the mean computing time since the start; this is the mean for the time between the two statuses.
     const double ms =
         made > 0
             ? (f.simulation_ms() * static_cast<double>(f.pings()) - then.simulation_ms() * static_cast<double>(then.pings())) /
@@ -307,7 +307,7 @@ void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, st
                         ""});
 }
 
-/// Finds programs of this computer that connect to the port of a sonar, but at an address without one.
+/// Finds programs of this computer that connect to the port of a sonar, but at an address without a sonar.
 void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere, std::vector<Finding>& findings) {
   std::set<std::string> ports, ours;
   std::string where;
@@ -348,7 +348,7 @@ bool looks_elsewhere(const v1::DaemonStatus& status) {
                       [](const v1::FaultStatus& fault) { return fault.state() == "active"; });
 }
 
-// Findings of one level keep the order in which they are made: faults, clock, sonars, poses.
+// Findings of one level are in the order in which they are made: faults, clock, sonars, poses.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere) {
   std::vector<Finding> findings;
   check_faults(now, findings);

@@ -1,4 +1,4 @@
-// Finds out from the daemon's status why a driver gets no pings: one finding per check. Pure. (`sonarctl doctor` checks from
+// Determines from the daemon's status why a driver gets no pings, with one finding per check. (`sonarctl doctor` checks from
 // outside, as a driver would.)
 #pragma once
 
@@ -13,11 +13,11 @@ namespace sonar::doctor {
 /// looks_elsewhere().
 struct Elsewhere {
   std::vector<SocketLine> tcp;
-  std::uint64_t refused = 0;  // refused connections of the last seconds
+  std::uint64_t refused = 0;  // number of refused connections in the last seconds
 };
 
-/// Active faults come first, then the worst findings. `before`: a status from about two seconds earlier, for changes with time;
-/// null = none.
+/// Returns active faults first, then the other findings, worst first. `before`: a status from about two seconds earlier, for
+/// changes with time; null = none.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere = {});
 
 /// True if a search for drivers with wrong addresses is useful: no driver is connected, and no active fault may refuse

@@ -16,7 +16,7 @@ std::optional<std::uint32_t> hexadecimal(std::string_view text) {
   return value;
 }
 
-/// The text of an IPv4 address. The kernel prints the four bytes of an address as a number of this computer, which is
+/// Returns the text of an IPv4 address. The kernel prints the four bytes of an address as a number of this computer, which is
 /// little-endian, so the first byte is the lowest.
 std::string ipv4_text(std::uint32_t word) {
   return std::to_string(word & 0xff) + "." + std::to_string(word >> 8 & 0xff) + "." + std::to_string(word >> 16 & 0xff) + "." +
@@ -56,7 +56,7 @@ std::vector<SocketLine> parse_proc_net(std::string_view text) {
     std::string slot, local, remote, state, skipped;
     SocketLine socket;
     if (!(words >> slot >> local >> remote >> state)) continue;
-    for (int i = 0; i < 5; ++i) words >> skipped;  // queues, timer, retransmits, user, timeout
+    for (int i = 0; i < 5; ++i) words >> skipped;  // skips queues, timer, retransmits, user, timeout
     if (!(words >> socket.inode)) continue;
     const auto state_number = hexadecimal(state);
     if (!state_number || !read_endpoint(local, socket.local_host, socket.local_port) ||

@@ -6,7 +6,7 @@
 namespace sonar::dvl {
 namespace {
 
-// Messages are lines: Framing::length is null, so a message ends with the line.
+// Messages are lines, so Framing::length is null, and a message ends with the line.
 constexpr recording::Framing framing{.magic = {'{', '"'}, .header_size = 2};
 
 bool is_json(BytesView message) { return recording::begins_with(message, {'{', '"'}) && message.size() <= longest_line; }
@@ -24,7 +24,7 @@ std::optional<recording::PingPart> ping_part(BytesView message) {
   return line.velocity || line.position ? std::optional(recording::PingPart{.port = tcp_port}) : std::nullopt;
 }
 
-/// The recorded line, and the same report in the sentences of the serial line.
+/// Returns the recorded line, and the same report as sentences of the serial line.
 std::vector<Bytes> answer(BytesView message, const VendorSettings* request) {
   std::vector<Bytes> lines{Bytes(message.begin(), message.end())};
   const Line line = read_line(message);

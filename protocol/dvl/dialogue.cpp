@@ -12,7 +12,7 @@ using protocol::Reaction;
 constexpr std::size_t longest_command = 4096;
 constexpr int deepest_command = 8;  // nested braces (our choice)
 
-/// Finds the JSON objects in a stream by counting braces. Lines do not separate them: libwaterlinked sends no line ends.
+/// Finds the JSON objects in a stream by counting braces, because libwaterlinked sends no line ends between objects.
 class ObjectSplitter {
  public:
   /// Returns the object that ends with this byte.
@@ -37,7 +37,7 @@ class ObjectSplitter {
     } else if (c == '}' && --depth_ == 0) {
       return std::exchange(object_, {});
     }
-    // An object that is too long or too deep is dropped. What follows it is read as a new stream.
+    // An object that is too long or too deep is dropped. The following bytes are read as a new stream.
     if (object_.size() < longest_command && depth_ <= deepest_command) return std::nullopt;
     junk_ += object_.size();
     depth_ = 0;

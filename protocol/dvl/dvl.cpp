@@ -5,8 +5,8 @@
 namespace sonar::dvl {
 namespace {
 
-/// Delay from the last echo to the report. Three public reports have 88 ms and 147 ms (USR) and 189 ms (DOC), from software of
-/// different years. These are too few for a default.
+/// Delay from the last echo to the report. Three public reports, from software of different years, have 88 ms and 147 ms (USR)
+/// and 189 ms (DOC), which is too little evidence for a default.
 constexpr std::string_view report_delay = "report_delay_ms";
 constexpr double assumed_delay_ms = 2;
 
@@ -47,7 +47,7 @@ class DvlVendor final : public protocol::PushingVendor {
     Settings s = settings_from(device.settings.get());
     s.reckoning = reckoned(s.reckoning, measured, ping.request, s);
     // The search among range modes continues only after a ping of the present mode. A ping that was fired before a client changed
-    // the mode does not show whether the new one fits.
+    // the mode does not show whether the new mode fits.
     if (settings_from(ping.request.vendor_settings.get()).mode == s.mode)
       s.mode = next_mode(measured, s, product_of(*device.model));
     return change_to(s, device);
@@ -74,7 +74,7 @@ class DvlVendor final : public protocol::PushingVendor {
   }
 
  private:
-  /// A report states the time since the previous report; the first has 0.
+  /// Returns the time since the previous report, which a report states; 0 for the first report.
   static std::chrono::nanoseconds since_last(const Ping& ping, const protocol::DeviceState& device) {
     const Time before = device.framed_at, fired = ping.request.fired_at;
     return before != Time{} && fired > before ? fired - before : std::chrono::nanoseconds(0);

@@ -6,9 +6,9 @@
 namespace sonar::dvl {
 
 const protocol::Vendor& vendor();
-/// One client's conversation in JSON over TCP: commands and their responses, and the reports of dead reckoning.
+/// Makes the dialogue with one client in JSON over TCP: commands and responses, and the reports of dead reckoning.
 std::unique_ptr<protocol::Dialogue> converse_in_json(const protocol::DeviceState& device, Time now);
-/// The same in sentences on the serial line.
+/// Makes the same dialogue in sentences of the serial line.
 std::unique_ptr<protocol::Dialogue> converse_in_sentences(const protocol::DeviceState& device, Time now);
 
 inline constexpr std::uint16_t tcp_port = 16171;

@@ -14,7 +14,7 @@ using protocol::HostPing;
 
 constexpr std::string_view title = "a DVL";
 constexpr std::size_t points = 200;  // points of a line of the waterfall
-constexpr float silent_db = -2000;   // below every echo, so that lines without one are dark
+constexpr float silent_db = -2000;   // below every echo, so that lines without an echo are dark
 
 Bytes set_config(bool acoustics, const std::string& range_mode) {
   const nlohmann::ordered_json message{{"command", "set_config"},
@@ -52,7 +52,7 @@ class DvlHost final : public protocol::Host {
     if (!request_) return {};
     return {protocol::HostSend{0, *request_}};
   }
-  /// Reports end with CR LF. A line that is too long is dropped, and reading continues after the next line end.
+  /// Reads reports, which end with CR LF. A line that is too long is dropped, and reading continues after the next line end.
   HostActions on_bytes(std::size_t, BytesView received, Time now) override {
     HostActions actions;
     for (const std::byte b : received) {
@@ -122,7 +122,7 @@ class DvlHost final : public protocol::Host {
 
 }  // namespace
 
-// The device has no command for its rate and its gain: it chooses both.
+// The device has no command for rate and gain, which it determines itself.
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted) {
   if (auto accepted = protocol::accept_settings(wanted, title, {"range", "rate", "mode"}); !accepted)
     return tl::unexpected(accepted.error());
