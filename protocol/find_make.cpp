@@ -59,7 +59,7 @@ std::span<const Vendor* const> vendors() {
   return all;
 }
 
-// If two makes have a profile of the same name, the first make is used, as in make_of_profile().
+// If two makes have a profile with the same name, the first make is used, as in make_of_profile().
 Result<Profile> find_profile(std::string_view profile) {
   std::vector<std::string_view> names;
   for (const Vendor* vendor : vendors()) {

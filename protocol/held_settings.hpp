@@ -9,8 +9,8 @@
 
 namespace sonar::protocol {
 
-/// True if a client would see no difference between two settings. A make whose settings have parts that differ from ping to ping
-/// defines this function in its own namespace.
+/// True if two settings are equal for a client. A make whose settings have parts that differ between pings defines this function
+/// in its own namespace.
 template <class Settings>
 bool same_settings(const Settings& a, const Settings& b) {
   return a == b;
@@ -19,7 +19,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 /// The device's findings in a ping; null: none. A make whose device has findings defines this function in its own namespace.
 std::shared_ptr<const PingFindings> findings_of(const auto&, const Ping&) { return nullptr; }
 
-/// The findings of type T, as PingFindings.
+/// Findings of type T, as PingFindings.
 template <class T>
 struct Found final : PingFindings {
   explicit Found(T v) : value(std::move(v)) {}
@@ -29,7 +29,7 @@ template <class T>
 std::shared_ptr<const PingFindings> found(T value) {
   return std::make_shared<const Found<T>>(std::move(value));
 }
-/// The findings of type T in the ping; if it has none, those that `look` makes now.
+/// Returns the findings of type T in the ping; if there are none, the findings that `look` makes now.
 template <class T>
 T found_in(const Ping& ping, T (*look)(const Ping&)) {
   const auto* const made = dynamic_cast<const Found<T>*>(ping.findings.get());
@@ -47,14 +47,14 @@ struct Held final : Base {
   Settings settings;
 };
 
-/// The held settings; null = those of a new device.
+/// Returns the held settings; for null, the settings of a new device.
 template <class HeldSettings>
 auto settings_in(const VendorSettings* held) {
   const auto* of = dynamic_cast<const HeldSettings*>(held);
   return of != nullptr ? of->settings : decltype(of->settings){};
 }
 
-/// The settings that will hold after the daemon has carried out `reaction`; without a change, the settings `now`.
+/// Returns the settings after the daemon has carried out `reaction`; if it changes none, returns `now`.
 inline const VendorSettings* settings_after(const Reaction& reaction, const VendorSettings* now) {
   for (const Event& event : reaction.events)
     if (const auto* change = std::get_if<ChangeSettings>(&event)) now = change->vendor_settings.get();

@@ -1,6 +1,6 @@
-// The driver's side of a make's protocol: it makes the messages of a driver, and decodes pings from the bytes of a sonar. It is
-// the counterpart of Dialogue and equally pure: no sockets, no clock, no log. The caller opens the ports, passes on the bytes
-// that arrive, and carries out the HostActions.
+// The driver's side of a make's protocol, the counterpart of Dialogue: it makes the messages of a driver, and decodes pings from
+// the bytes of a sonar. It has no sockets, clock or log. The caller opens the ports, passes on the bytes that arrive, and carries
+// out the HostActions.
 #pragma once
 
 #include <algorithm>
@@ -23,10 +23,10 @@
 
 namespace sonar::protocol {
 
-/// The settings that a user requests. For unset values the sonar keeps its own, or the host sends those of a usual driver.
+/// The settings that a user requests. Of unset values the sonar keeps its own, or the host sends those of a usual driver.
 struct Wanted {
-  bool as_it_is = false;                         // send no settings; request pings only from makes that need a request for each
-  bool stamped = false;                          // prefer messages that state when a ping was fired
+  bool as_it_is = false;                         // true: sends no settings, and requests pings only if the make needs it
+  bool stamped = false;                          // true: prefers messages that state when a ping was fired
   SettingsOverride settings;                     // settings that all makes share
   std::map<std::string, std::string> more = {};  // settings of one make: name of sonarctl's option without dashes, and value
 };
@@ -36,20 +36,20 @@ struct PingFacts {
   unsigned beams = 0, rows = 0, bits = 0;
   double row_m = 0, range_m = 0;  // range_m: far end of the last row
   double frequency_hz = 0;
-  std::size_t message_size = 0;  // bytes of all its messages
+  std::size_t message_size = 0;  // total size of the messages of the ping [bytes]
   std::string note = {};         // text at the end of a ping's line, such as its distance
 };
 /// A ping as a host decoded it.
 struct HostPing {
   PingFacts facts;
   std::function<Result<PolarImage>()> picture;  // for a mechanical scan: the sector scanned so far
-  /// For a picture of many pings, one scan line each: the number of lines so far, and of a complete picture.
+  /// For a picture of many pings (scan lines): the number of lines so far, and of a complete picture.
   std::size_t lines = 1, whole_lines = 1;
   std::vector<std::string> errors = {};           // violated identities, and errors of the sequence
   std::vector<std::string> echo_mismatches = {};  // settings that do not have the requested value yet
-  std::vector<std::string> limited = {};          // settings that the ping echoes as requested, but was not made with
-  std::optional<double> fired_s = {};             // by the clock of the device
-  /// Makes the drawing for users. Unset: a fan of `picture` is drawn.
+  std::vector<std::string> limited = {};          // settings that the ping echoes as requested, but that the sonar limited
+  std::optional<double> fired_s = {};             // time of the ping in the device's clock
+  /// Makes the drawing for users; empty: a fan of `picture` is drawn.
   std::function<SonarPicture()> drawing = {};
   bool is_whole() const { return lines >= whole_lines; }
 };
@@ -61,18 +61,18 @@ struct HostSend {
   std::size_t port = 0;
   Bytes bytes;
 };
-/// Actions that the caller carries out in order. ResourceRequest goes to port 0, of kind http, and its reply to on_reply().
-/// Error: the host cannot continue. The text begins with a verb whose subject is the sonar ("refuses a request: ..."); with
-/// ErrorKind::usage it is a whole sentence.
+/// Actions that the caller carries out in order. A ResourceRequest is for port 0, of kind http; its reply is passed to
+/// on_reply(). After an Error the host cannot continue. The text of the error begins with a verb whose subject is the sonar
+/// ("refuses a request: ..."); with ErrorKind::usage it is a whole sentence.
 using HostAction = std::variant<HostSend, ResourceRequest, HostPing, Notice, Error>;
 using HostActions = std::vector<HostAction>;
 
-/// A port that a host opens. A user may change the number of the first.
+/// A port that a host opens. A user may change the number of the first port.
 struct HostPort {
   enum class Kind {
     tcp,         // connects to `number` of the device
     udp,         // sends to `number` of the device, and receives its answers
-    udp_listen,  // receives at `number` (0: any free one), with `group` as a member of that multicast group
+    udp_listen,  // receives at `number` (0: any free port), and as a member of the multicast group `group`, if there is one
     http,        // requests resources at `number`
   } kind{};
   std::uint16_t number = 0;
@@ -82,23 +82,23 @@ struct HostPort {
 class Host {
  public:
   virtual ~Host() = default;
-  /// Called when the ports are open. `own`: their local numbers.
+  /// Called when the ports are open. `own`: local numbers of the ports.
   virtual HostActions on_open(std::span<const std::uint16_t> own, Time now) = 0;
-  /// Reads a piece of a stream, of any size, or a datagram, with any content. It never throws and never keeps bytes without
-  /// bound.
+  /// Reads a piece of a stream, of any size, or a datagram, with any content. It never throws, and limits the bytes that it
+  /// keeps.
   virtual HostActions on_bytes(std::size_t port, BytesView received, Time now) = 0;
   virtual HostActions on_reply(const ResourceReply& /*reply*/, Time /*now*/) { return {}; }
   /// Sends keep-alives and repeats requests. Called at or after next_tick().
   virtual HostActions on_tick(Time /*now*/) { return {}; }
   virtual std::optional<Time> next_tick() const { return std::nullopt; }
-  /// Called whenever the caller waits for a ping. Hosts that must request each ping then do so.
+  /// Called whenever the caller waits for a ping. Hosts that must request each ping then send a request.
   virtual HostActions on_demand(Time /*now*/) { return {}; }
   /// Called before the ports are closed.
   virtual HostActions on_leave() { return {}; }
 
   /// True if the sonar has answered and its settings have been requested.
   virtual bool is_open() const { return true; }
-  /// A text such as "an ARIS" or "a BlueView P900-90, serial 7001".
+  /// Returns a text such as "an ARIS" or "a BlueView P900-90, serial 7001".
   virtual std::string about() const = 0;
   /// Counts of skipped bytes and missing pings, for protocols that recognise messages and number pings.
   struct Counts {
@@ -111,15 +111,15 @@ class Host {
 
 /// The content of a beacon that hosts need.
 struct Announcement {
-  Ipv4 address{}, client{};  // address to which hosts connect; address of the connected host (0.0.0.0: none)
+  Ipv4 address{}, client{};  // address to which hosts connect; address of the connected host (0.0.0.0 = none)
   std::uint32_t device_id = 0;
-  std::vector<std::string> complaints;  // faults because of which hosts would reject the beacon
+  std::vector<std::string> complaints;  // errors because of which hosts would reject the beacon
 };
-/// The broadcast by which hosts find sonars, and its answer.
+/// The broadcast with which hosts find sonars, and its answer.
 struct Search {
   struct Answer {
     std::uint16_t port = 0;
-    std::string about;  // "BlueView head P900-90 (7001)"
+    std::string about;  // such as "BlueView head P900-90 (7001)"
   };
   std::uint16_t port = 0;
   Bytes (*question)() = nullptr;
@@ -129,9 +129,9 @@ struct Search {
 /// A make of sonar: the device's side and the driver's side. A new make is one folder and one row of makes.cpp.
 struct Make {
   const Vendor* device = nullptr;
-  std::string_view title;    // "an ARIS"
-  std::string_view request;  // the message by which a driver gets pings, for the text "no valid ... among them"
-  std::string_view remedy;   // "send a fire message (type 0x15)"
+  std::string_view title;    // such as "an ARIS"
+  std::string_view request;  // the message that requests pings, for the text "no valid ... among them"
+  std::string_view remedy;   // such as "send a fire message (type 0x15)"
   std::span<const HostPort> ports;
   /// Error usage: a setting that this make does not have.
   Result<std::unique_ptr<Host>> (*host)(const Wanted& wanted) = nullptr;
@@ -142,36 +142,36 @@ struct Make {
   std::string_view usual_settings = {};  // settings that a host sends if none are given, as options of sonarctl: "--rate 10"
   std::string_view driver_call = {};     // call that opens the sonar at {at}, for makes whose drivers use one of our libraries
   char own_faults = 0;                   // first letter of the kinds of faults that only this make has
-  bool each_ping_requested = false;      // hosts request each ping; the rate is only a limit
-  bool own_numbers = false;              // ping numbers of the wire differ from those of sonard's events
-  bool shares_port = false;              // another make uses the same port; each of the two hosts serves both makes
-  bool scans = false;                    // the turning head determines the ping rate
+  bool each_ping_requested = false;      // true: hosts request each ping; the rate is only a limit
+  bool own_numbers = false;              // true: ping numbers in messages differ from those in sonard's events
+  bool shares_port = false;              // true: another make uses the same port, and the hosts of both accept both makes
+  bool scans = false;                    // true: the turning head determines the ping rate
   std::string_view demo_name = {};       // NAME of `sonard --demo NAME`; empty: name()
   std::string_view demo_profile = {};    // product of the demo; empty: the first model
-  std::optional<RollPitchYaw> demo_mount = {};  // mount in the demo; nullopt: the sonar looks ahead
+  std::optional<RollPitchYaw> demo_mount = {};  // mount in the demo; nullopt: the sonar points ahead
   PictureKind picture = PictureKind::fan;
-  Shades shades = {};  // for its pictures
+  Shades shades = {};  // shades of its pictures
 
   std::string_view name() const { return device->name(); }
   bool has_several_streams() const { return std::ranges::count(ports, HostPort::Kind::tcp, &HostPort::kind) > 1; }
-  bool is_by_udp() const { return ports.front().kind == HostPort::Kind::udp; }  // hosts send by UDP
-  /// The unit of the ping rate. In some kinds of pictures a ping is one line.
+  bool is_by_udp() const { return ports.front().kind == HostPort::Kind::udp; }  // true: hosts send over UDP
+  /// Returns the unit of the ping rate. In some kinds of pictures a ping is one line.
   std::string_view rate_unit() const {
     return picture == PictureKind::sweep || picture == PictureKind::waterfall ? "lines/s" : "Hz";
   }
   std::string_view name_in_demo() const { return demo_name.empty() ? name() : demo_name; }
 };
-/// The rows of makes.cpp.
+/// Returns the rows of makes.cpp.
 std::vector<Make> product_makes();
-/// All makes of the program, in the order of their rows.
+/// Returns all makes of the program, in the order of their rows.
 std::span<const Make> makes();
-/// Null: no make has this name.
+/// Returns the make with this name, or null.
 const Make* find_make(std::string_view name);
-/// The make of a product; for an unknown product the first make.
+/// Returns the make of a product; for an unknown product the first make.
 const Make& make_of_profile(std::string_view profile);
 
-/// Checks that all wanted settings are among `known`, the names of sonarctl's options: "range", "rate", "gain", "mode", ...
-/// Error usage: one is not.
+/// Checks that all requested settings are among `known`, the names of sonarctl's options: "range", "rate", "gain", "mode", ...
+/// Error usage: another setting.
 Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known);
 
 }  // namespace sonar::protocol

@@ -1,5 +1,5 @@
-// Texts that refuse wanted settings, shared by all makes. They use the names and units of SettingsOverride, with the protocol's
-// field in brackets.
+// Texts with which all makes refuse settings. The texts have the names and units of SettingsOverride, and the protocol's field in
+// brackets.
 #pragma once
 
 #include <string>
@@ -14,8 +14,8 @@ namespace sonar::protocol {
 
 inline tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
-/// The refusal of a range, such as "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)". Empty if `range_m` is from
-/// `low_m` to `high_m`. `of`: the sonar, such as "a Surveyor".
+/// Returns the refusal of a range, such as "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)"; empty if `range_m` is
+/// from `low_m` to `high_m`. `of`: the sonar, such as "a Surveyor".
 inline std::string range_complaint(double range_m, std::string_view of, double low_m, double high_m,
                                    std::string_view field = {}) {
   if (range_m >= low_m && range_m <= high_m) return {};
@@ -23,25 +23,26 @@ inline std::string range_complaint(double range_m, std::string_view of, double l
          (field.empty() ? std::string() : " (" + std::string(field) + ")");
 }
 
-/// The refusal of the range in a message, such as "the range must start at 0 m or later, be at least 1 m long
-/// and end by 142 m (length_mm)". `fields`: those of the message.
+/// Returns the refusal of the range in a message, such as "the range must start at 0 m or later, be at least 1 m long and end by
+/// 142 m (length_mm)". `fields`: those of the message.
 inline std::string range_rule(double least_m, double farthest_m, std::string_view fields) {
   return text::format("the range must start at 0 m or later, be at least %g m long and end by %g m (", least_m, farthest_m) +
          std::string(fields) + ")";
 }
 
-/// The refusal of gain_percent. Empty if it is valid or not set.
+/// Returns the refusal of gain_percent; empty if it is valid or not set.
 inline std::string gain_complaint(const SettingsOverride& wanted) {
   if (!wanted.gain_percent || (*wanted.gain_percent >= 0 && *wanted.gain_percent <= 100)) return {};
   return text::format("the gain must be 0 to 100 %%, not %g %% (gain_percent)", *wanted.gain_percent);
 }
 
-/// The refusal of a rate by a sonar that has a standby. Empty if the rate is valid or not set.
+/// Returns the refusal of a rate by a sonar that has a standby; empty if the rate is valid or not set.
 inline std::string rate_complaint(const SettingsOverride& wanted) {
   if (!wanted.rate_hz || *wanted.rate_hz >= 0) return {};
   return text::format("the rate must be 0 Hz (standby) or above, not %g Hz (rate_hz)", *wanted.rate_hz);
 }
-/// The same for a sonar with a highest rate, such as "the rate of a Norbit is 0 to 60 Hz, not 70 Hz (set_rate)".
+/// Returns the refusal of a rate by a sonar with a highest rate, such as "the rate of a Norbit is 0 to 60 Hz, not 70 Hz
+/// (set_rate)".
 inline std::string rate_complaint(const SettingsOverride& wanted, std::string_view of, float fastest_hz,
                                   std::string_view field = {}) {
   const double fastest = static_cast<double>(fastest_hz);

@@ -61,8 +61,8 @@ double Sweep::bearing_rad(std::size_t direction) const {
   return (all / 2 - static_cast<double>(direction)) * 2 * pi / all;
 }
 
-// A scan of the half circle ahead would fill only half of a round picture, so the picture shows only that half. The first line
-// outside of it makes the picture a whole turn.
+// A scan of the half circle ahead would fill only half of a round picture, so the picture shows only that half. With the first
+// line outside that half, the picture shows a whole turn.
 PolarImage Sweep::shown() const {
   bool only_ahead = lines_.size() % 4 == 0;
   for (std::size_t i = 0; i < lines_.size(); ++i)
@@ -82,7 +82,7 @@ PolarImage Sweep::shown() const {
 }
 
 void Sweep::add(std::size_t direction, Line line, double row_m, HostPing& ping) {
-  // Lines of another range cannot be in one picture with the earlier ones.
+  // Lines with another range cannot be in one picture with the earlier lines.
   if (rows_ != line.size() || row_m_ != row_m) lines_.assign(lines_.size(), nullptr);
   rows_ = line.size();
   row_m_ = row_m;

@@ -1,4 +1,4 @@
-// Pictures of sonars that send single lines: a waterfall, and the sweep of a head that turns.
+// Pictures of sonars that send single lines: a waterfall, or the sweep of a turning head.
 #pragma once
 
 #include <deque>
@@ -9,7 +9,7 @@
 
 namespace sonar::protocol {
 
-using Line = std::vector<float>;  // by range, [dB]
+using Line = std::vector<float>;  // levels in the order of range [dB]
 
 /// The lines of the last pings, one below the other, the newest on top.
 class Waterfall {
@@ -33,22 +33,22 @@ class Waterfall {
   std::deque<Row> rows_;
 };
 
-/// The newest line of each direction of a head that turns. Cheap to copy.
+/// The newest line of each direction of a turning head. Copies are cheap.
 class Sweep {
  public:
-  /// `directions`: number of directions in a turn, at least 4. Direction 0 looks astern; the others follow over port, ahead and
-  /// starboard.
+  /// `directions`: number of directions in a turn, at least 4. Direction 0 is astern; the next directions are to port, ahead and
+  /// to starboard.
   explicit Sweep(std::size_t directions) : lines_(directions) {}
   std::size_t directions() const { return lines_.size(); }
-  /// Adds a line and puts the picture into `ping`; it is complete once the half circle ahead has been scanned. If the rows
-  /// differ from those of earlier lines, the earlier lines are dropped.
+  /// Adds a line and puts the picture into `ping`; the picture is complete once the half circle ahead has been scanned. If the
+  /// rows differ from those of earlier lines, the earlier lines are dropped.
   void add(std::size_t direction, Line line, double row_m, HostPing& ping);
 
  private:
   double bearing_rad(std::size_t direction) const;
   std::size_t ahead_begin() const { return lines_.size() / 4; }
   std::size_t ahead_end() const { return lines_.size() - lines_.size() / 4 + 1; }
-  /// The picture to show: the half circle ahead while only that half was scanned, else the full circle.
+  /// Returns the picture to show: the half circle ahead while only that half was scanned, else the full circle.
   PolarImage shown() const;
 
   std::size_t rows_ = 0;

@@ -1,5 +1,4 @@
-// This function has a file of its own, because a program that adds a make defines makes() in its place
-// (tests/example_make/makes.cpp).
+// This function has a separate file, because a program that adds a make replaces makes() (tests/example_make/makes.cpp).
 #include "protocol/host.hpp"
 
 namespace sonar::protocol {

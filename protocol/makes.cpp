@@ -11,9 +11,9 @@
 
 namespace sonar::protocol {
 
-// One row for each make. Other code outside the folders of the makes names none, except the files that check_floors.py lists
-// (MAY_NAME_MAKES, NAME_MAKES). The first row is the make of the demo without a name and of unknown profiles. A user may give the
-// first of `ports` another number.
+// One row for each make. No other code outside the folders of the makes refers to a particular make, except the files that
+// check_floors.py lists (MAY_NAME_MAKES, NAME_MAKES). The first row is the make of the demo without a name and of unknown
+// profiles. A user may change the number of the first of `ports`.
 std::vector<Make> product_makes() {
   return {
       {.device = &oculus::vendor(),
@@ -47,7 +47,7 @@ std::vector<Make> product_makes() {
        .codec = aris::codec(),
        .own_numbers = true,
        .demo_profile = "aris-3000",
-       .demo_mount = RollPitchYaw{0, 40 * pi / 180, 0}},  // looks down to the bed, because its window ends at 3.4 m
+       .demo_mount = RollPitchYaw{0, 40 * pi / 180, 0}},  // points down to the bed, because its window ends at 3.4 m
       {.device = &waterlinked::vendor(),
        .title = "a Sonar 3D-15",
        .request = "request",
@@ -89,7 +89,7 @@ std::vector<Make> product_makes() {
        .own_numbers = true,
        .shares_port = true,
        .demo_name = "omniscan",
-       .demo_mount = RollPitchYaw{0, pi / 6, -pi / 2},  // to starboard
+       .demo_mount = RollPitchYaw{0, pi / 6, -pi / 2},  // points to starboard
        .picture = PictureKind::waterfall},
       {.device = &ping::ping1d::vendor(),
        .title = "a Ping1D",

@@ -1,4 +1,4 @@
-// Names of the fields and regions of messages that faults can change, the same for every make.
+// Names, common to all makes, of the fields and regions of messages that faults can change.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 
 namespace sonar::protocol {
 
-/// The meaning of a message's field, independent of the vendor's name for it.
+/// The meaning of a message's field, independent of the vendor's name.
 enum class FieldName {
   magic,
   source_id,
@@ -58,7 +58,7 @@ inline constexpr std::array<std::string_view, 34> field_names{
     "address",   "netmask",     "connected_address", "mac"};
 static_assert(field_names.size() == static_cast<std::size_t>(FieldName::mac) + 1);
 
-/// ping: the message of a ping as a client receives it, prefix included.
+/// A kind of message. `ping` is the message of a ping that a client receives, prefix included.
 enum class Part { ping, beacon };
 /// Regions of a ping: the header that every message has, the other fields, the table of the beams' directions, the samples.
 enum class Region { header, metadata, bearings, image };

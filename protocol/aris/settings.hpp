@@ -35,7 +35,7 @@ struct Settings {
 };
 using HeldSettings = protocol::Held<Settings>;
 Settings initial_settings(const protocol::DeviceState& device);
-/// The settings in `held`; if it is null, initial_settings().
+/// Returns the settings in `held`; if it is null, initial_settings().
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
 
 /// Returns the sound speed [m/s] for the temperature and depth of the water at the device, and the salinity that was set.

@@ -317,7 +317,7 @@ void check_elsewhere(const v1::DaemonStatus& status, const Elsewhere& elsewhere,
     ports.insert(sonar.listens().substr(colon + 1));
     ours.insert(sonar.listens());
     where += (where.empty() ? "" : "; or at ") + where_to_connect(sonar);
-    if (sonar.listens().starts_with("0.0.0.0:")) return;  // it listens at every address of this computer, so none is wrong
+    if (sonar.listens().starts_with("0.0.0.0:")) return;  // the sonar listens at all addresses of this computer
   }
   if (ports.empty()) return;
   const std::string cure = "point the driver at " + where;

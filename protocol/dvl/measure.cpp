@@ -8,7 +8,7 @@
 namespace sonar::dvl {
 namespace {
 
-constexpr double rssi_at_full_scale_dbm = 20;  // unknown: at 1 m; sand is then at -30 dBm at 0.5 m, as in the example of DOC
+constexpr double rssi_at_full_scale_dbm = 20;  // unknown: at 1 m; sand at 0.5 m then has -30 dBm, as in the example of DOC
 constexpr double fom_without_velocity = 2.5;   // LOG: 2.4 to 2.7
 constexpr auto longest_gap = std::chrono::seconds(3);  // over a longer gap between pings the velocity is unknown
 constexpr double drift_mps = 0.1;                      // unknown: growth of the error of a position without a valid velocity
@@ -22,8 +22,8 @@ double standard_normal(const PingRequest& r, std::size_t beam) {
   return std::sqrt(2.0) * static_cast<double>(complex_normal(bits.v[0], bits.v[1]).re);
 }
 
-/// Standard deviation of a beam's velocity. unknown: the law. It was fitted to LOG, which has a fom of 0.2 mm/s at rest and 1.3
-/// mm/s at 0.5 m/s, 1.6 m above the ground.
+/// Returns the standard deviation of a beam's velocity. unknown: the law. It was fitted to LOG, which has a fom of 0.2 mm/s at
+/// rest and 1.3 mm/s at 0.5 m/s, 1.6 m above the ground.
 double sigma_of(double along_mps, double speed_mps, double distance_m) {
   const double moving = std::hypot(0.003 * along_mps, 0.001 * speed_mps);
   return std::hypot(0.0001, moving) * (1 + distance_m / 25);
@@ -39,7 +39,7 @@ Beam beam_of(const Ping& ping, std::size_t index, Vec3d velocity_mps) {
   if (echo.range == 0 || echo.strength == 0 || distance_m < s.range_start_m || distance_m > s.range_m) return beam;
   beam.is_valid = true;
   beam.distance_m = distance_m;
-  // The receiver's gain grows by 40 dB a decade of distance (models.cpp). This gain is removed from the level.
+  // The receiver's gain grows by 40 dB per decade of distance (models.cpp). This gain is removed from the level.
   beam.rssi_dbm = rssi_at_full_scale_dbm + db_from_amplitude(echo.strength / static_cast<double>(RangePixel::most_strength)) -
                   40 * std::log10(distance_m);
   const double along_mps = dot(beam_direction(index), velocity_mps);
@@ -49,8 +49,8 @@ Beam beam_of(const Ping& ping, std::size_t index, Vec3d velocity_mps) {
   return beam;
 }
 
-/// The distance along the device's axis to the plane through the ends of the beams. For a pair of opposite beams it is the
-/// harmonic mean of their distances, times the cosine of the tilt. -1: no pair of opposite beams is valid.
+/// Returns the distance along the device's axis to the plane through the ends of the beams: for a pair of opposite beams the
+/// harmonic mean of their distances, times the cosine of the tilt. Returns -1 if no pair of opposite beams is valid.
 double altitude_of(const std::array<Beam, beam_count>& beams) {
   double sum = 0;
   int pairs = 0;
@@ -63,8 +63,8 @@ double altitude_of(const std::array<Beam, beam_count>& beams) {
   return pairs > 0 ? altitude_per_distance * sum / pairs : -1;
 }
 
-/// The inverse of a symmetric matrix, by its minors. Three valid beams are enough for it: their directions are linearly
-/// independent.
+/// Returns the inverse of a symmetric matrix, computed from its minors. It exists for three valid beams, because their directions
+/// are linearly independent.
 Covariance inverse(const Covariance& m) {
   Covariance inverse{};
   const auto minor = [&](std::size_t i, std::size_t j) {
@@ -91,7 +91,7 @@ Covariance turned(const Covariance& m, double rad) {
   return out;
 }
 
-/// Orientation in the world of the vehicle's axes, which differ from those of the device by the mounting rotation.
+/// Returns the orientation in the world of the vehicle's axes, which differ from those of the device by the mounting rotation.
 Quatd vehicle_in_world(const PingRequest& request, const Settings& settings) {
   const double h = std::sqrt(0.5);
   const Quatd device_in_sonar{0, h, 0, h};  // the same rotation as device_from_sonar()
@@ -147,7 +147,7 @@ Measurement measure(const Ping& ping) {
   const double speed_mps = static_cast<double>(r.settings.device_sound_speed_mps);
   const double true_mps = true_sound_speed_mps(r.water, depth_from_z(r.sonar_in_world.position_m.z));
   const Vec3d moves = device_from_sonar(rotate(conjugate(r.sonar_in_world.orientation), r.sonar_moves.velocity_mps));
-  // The device computes the velocity from the Doppler shift with its own sound speed, so a wrong one scales the velocity.
+  // The device computes the velocity from the Doppler shift with its own sound speed, so a wrong sound speed scales the velocity.
   const Vec3d seen = speed_mps / true_mps * moves;
   Measurement m;
   std::size_t valid = 0;
@@ -174,8 +174,8 @@ Measurement measure(const Ping& ping) {
 
 std::shared_ptr<const PingFindings> HeldSettings::look_at(const Ping& ping) const { return protocol::found(measure(ping)); }
 
-// How the device searches is unknown. Here, if it has no velocity, it tries the next higher mode, and the lowest after the
-// highest. If it has a velocity, it keeps its mode while the altitude is within the limits of the mode (docs/protocols/dvl.md,
+// unknown: how the device searches. Here a device without a velocity tries the next higher mode, and the lowest after the
+// highest. A device with a velocity keeps its mode while the altitude is within the limits of the mode (docs/protocols/dvl.md,
 // "Range modes").
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product) {
   if (!measured.is_valid) return settings.mode < settings.highest_mode ? settings.mode + 1 : settings.lowest_mode;

@@ -1,5 +1,5 @@
 // Computes the measurement that the device reports for a ping (four beams, velocity, altitude), and the dead reckoning from one
-// ping to the next. Pure functions.
+// ping to the next.
 #pragma once
 
 #include "protocol/dvl/settings.hpp"
@@ -12,7 +12,7 @@ struct Beam {
   bool is_valid = false;
   double velocity_mps = 0;  // the device's velocity along the beam, positive towards the ground
   double sigma_mps = 0;     // standard deviation of the velocity's noise
-  double distance_m = -1;   // by the device's speed of sound; -1: no echo
+  double distance_m = -1;   // computed with the device's speed of sound; -1 = no echo
   double rssi_dbm = 0, nsd_dbm = usual_nsd_dbm;
 };
 
@@ -25,21 +25,21 @@ struct Measurement {
   Vec3d velocity_mps;
   Covariance covariance{};
   double fom = 0, altitude_m = -1;
-  Time reflected_at{}, heard_at{};  // when the ground reflects the middle of the ping; when the last echo ends
+  Time reflected_at{}, heard_at{};  // time at which the ground reflects the middle of the ping; end of the last echo
   int status = 0;                   // 1 if the device is too hot, which is not emulated
 };
 
-/// The velocities of the beams follow from PingRequest::sonar_moves. World computes it from the poses of the vehicle, and from
-/// the velocity in the newest pose if there is one.
+/// Computes the measurement. The velocities of the beams follow from PingRequest::sonar_moves, which World computes from the
+/// poses of the vehicle, and from the velocity in the newest pose if there is one.
 Measurement measure(const Ping& ping);
 /// Returns the measurement among the findings of the ping; computes it if there is none.
 inline Measurement measured_in(const Ping& ping) { return protocol::found_in(ping, measure); }
 
-/// The range mode of the next ping.
+/// Returns the range mode of the next ping.
 int next_mode(const Measurement& measured, const Settings& settings, const Product& product);
 
 Reckoning reckoned(const Reckoning& before, const Measurement& measured, const PingRequest& request, const Settings& settings);
-/// The position at `now`, some time after the last ping, extrapolated with the last velocity.
+/// Returns the position at `now`, after the last ping, extrapolated with the last velocity.
 Reckoning extrapolated(const Reckoning& last, Time now);
 
 /// The velocity in the device's frame, by weighted least squares from the valid beams (at least three).

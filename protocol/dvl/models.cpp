@@ -13,9 +13,9 @@ constexpr std::array<Product, 2> products{{
 }};
 constexpr std::array<double, beam_count> azimuth_deg{135, -135, -45, 45};  // from forward to starboard
 
-// The grid has `margin` steps beyond each beam, so that a beam's width lies within it, and `steps_between` between two beams.
+// The grid has `margin` steps beyond each beam, so that it contains the width of the beam, and `steps_between` between two beams.
 constexpr int margin = 3, steps_between = grid_size - 1 - 2 * margin;
-/// Azimuth and elevation of the beam ahead to port in the sonar's axes; the others differ by signs.
+/// Azimuth and elevation of the beam ahead to port in the sonar's axes; those of other beams differ in sign.
 struct Corner {
   double azimuth_rad, elevation_rad;
 };
@@ -31,7 +31,7 @@ SonarModel model_of(const Product& product) {
   const double extent = 2.0 * (grid_size - 1) / steps_between;
   mode.horizontal_aperture_rad = static_cast<float>(extent * corner().azimuth_rad);
   mode.pattern.elevation_width_rad = static_cast<float>(extent * corner().elevation_rad);
-  // A beam transmits and receives, so the two-way width is less by a factor of sqrt(2).
+  // A beam transmits and receives, so the two-way width is smaller by a factor of sqrt(2).
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(product.beam_deg) / std::sqrt(2.0));
   mode.beam_spacing = BeamSpacing::uniform_in_angle;
   mode.min_range_m = 0;
@@ -88,8 +88,8 @@ Vec3d beam_direction(std::size_t beam) {
 
 std::size_t pixel_of(std::size_t beam) {
   const Vec3d at = beam_direction(beam);
-  // Columns count from port, rows from the lowest elevation. The sonar looks down the device's z axis with its own z forward, so
-  // row 0 is aft.
+  // Columns count from port, rows from the lowest elevation. The sonar points along the device's z axis, with its own z axis
+  // forward, so row 0 is aft.
   const int column = at.y < 0 ? margin : margin + steps_between, row = at.x < 0 ? margin : margin + steps_between;
   return static_cast<std::size_t>(row * grid_size + column);
 }

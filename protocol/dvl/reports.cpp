@@ -13,7 +13,8 @@ using Json = nlohmann::ordered_json;
 
 Bytes line_of(const Json& message) { return dvl::line_of(message.dump()); }
 
-/// A member of an object. nullopt: there is none, or it is not a finite number below 1e18, so that conversions cannot overflow.
+/// Returns a member of an object; nullopt if it is missing, or is not a finite number below 1e18, which conversions could
+/// overflow.
 std::optional<double> number(const Json& from, const char* name) {
   const auto found = from.find(name);
   if (found == from.end() || !found->is_number()) return std::nullopt;
@@ -29,7 +30,7 @@ std::string text(const Json& from, const char* name) {
   return found != from.end() && found->is_string() ? found->get<std::string>() : std::string();
 }
 
-/// Whole microseconds since 1970. Time{}: there are none, or more than Time holds.
+/// Returns a time in whole microseconds since 1970; Time{} if it is missing, or larger than Time can hold.
 Time time_in(const Json& from, const char* name, double unit_us) {
   const double at_us = unit_us * number(from, name).value_or(0);
   return Time(std::chrono::microseconds(std::abs(at_us) < 9e15 ? std::llround(at_us) : 0));
@@ -43,7 +44,7 @@ Covariance covariance_in(const Json& message) {
   return covariance;
 }
 
-/// A report of older software, without its times, is accepted; the time of the ping is then unknown.
+/// Reads a report. Reports of older software have no times; the time of the ping is then unknown.
 std::optional<VelocityReport> velocity_from(const Json& message) {
   const auto vx = number(message, "vx"), vy = number(message, "vy"), vz = number(message, "vz");
   const auto altitude = number(message, "altitude");
@@ -183,7 +184,7 @@ Bytes sentence_line(std::string_view sentence) {
   return line_of(std::string(sentence) + format("*%02x", unsigned{crc8(sentence)}));
 }
 
-// The order of the lines is assumed.
+// unknown: the order of the lines, which is assumed.
 Bytes velocity_sentences(const Measurement& m, std::chrono::nanoseconds since_last, Time sent_at, SerialOutput output) {
   Bytes lines;
   const auto add = [&lines](const std::string& sentence) {

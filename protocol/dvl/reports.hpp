@@ -16,11 +16,11 @@ using protocol::BytesView;
 inline constexpr std::string_view format_name = "json_v3.3", line_end = "\r\n";
 inline constexpr std::size_t longest_line = 16384;
 
-/// Unix time, the unit of the reports.
+/// Returns the UNIX time in microseconds, the unit of the reports.
 std::int64_t microseconds(Time at);
-/// The angles of the vehicle since the start of dead reckoning.
+/// Returns the angles of the vehicle since the start of dead reckoning.
 RollPitchYaw angles_of(const Reckoning& reckoning);
-/// The bytes of the text and a line end.
+/// Returns the bytes of the text and a line end.
 Bytes line_of(std::string text);
 Bytes velocity_line(const Measurement& measured, std::chrono::nanoseconds since_last, Time sent_at);
 Bytes position_line(const Reckoning& reckoning, Time at);
@@ -31,7 +31,7 @@ struct VelocityReport {
   std::chrono::nanoseconds since_last{0};
   Time sent_at{};
 };
-/// The content of a position_line(). The axes of its reckoning are those at its start.
+/// The content of a position_line(). The axes of the reckoning are those of the vehicle at the start.
 struct PositionReport {
   Reckoning reckoning;
   Time at{};
@@ -50,12 +50,12 @@ struct Line {
 };
 Line read_line(BytesView line);
 
-/// CRC-8 with the polynomial 0x07 and the initial value 0.
+/// Returns the CRC-8 with the polynomial 0x07 and the initial value 0.
 std::uint8_t crc8(std::string_view text);
-/// The sentence with its checksum, as a line.
+/// Returns the sentence with its checksum, as a line.
 Bytes sentence_line(std::string_view sentence);
 
-/// The sentences of a ping; empty if `output` selects none.
+/// Returns the sentences of a ping; empty if `output` selects none.
 Bytes velocity_sentences(const Measurement& measured, std::chrono::nanoseconds since_last, Time sent_at, SerialOutput output);
 Bytes position_sentence(const Reckoning& reckoning, Time at);
 

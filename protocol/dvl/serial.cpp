@@ -1,4 +1,4 @@
-// The conversation on the serial line.
+// The dialogue on the serial line.
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -19,7 +19,7 @@ using text::format;
 
 constexpr std::size_t longest_sentence = 512;                  // our choice
 constexpr std::size_t events_per_call = 32;                    // limits the events that a hostile host can cause
-constexpr auto longest_pause = std::chrono::milliseconds(10);  // between the bytes of a sentence (DOC)
+constexpr auto longest_pause = std::chrono::milliseconds(10);  // longest time between the bytes of a sentence (DOC)
 constexpr std::string_view no_sentence = "wr?", wrong_checksum = "wr!", done = "wra", failed = "wrn";
 
 using Words = std::vector<std::string_view>;
@@ -34,7 +34,7 @@ Words split(std::string_view options) {
   }
 }
 
-/// The sentence up to its checksum, which is optional. nullopt: the checksum is wrong.
+/// Returns the sentence without its checksum, which is optional; nullopt if the checksum is wrong.
 std::optional<std::string_view> without_checksum(std::string_view sentence) {
   const std::size_t star = sentence.rfind('*');
   if (star == std::string_view::npos) return sentence;
@@ -46,8 +46,8 @@ std::optional<std::string_view> without_checksum(std::string_view sentence) {
   return fits ? std::optional(body) : std::nullopt;
 }
 
-/// The parameters of set_config, from words in the order of the sentence; an empty word sets nothing. nullopt: a word
-/// is invalid.
+/// Returns the parameters of set_config from words in the order of the sentence; an empty word sets nothing. Returns nullopt if a
+/// word is invalid.
 std::optional<Json> parameters_from(const Words& words) {
   constexpr std::array<const char*, 6> names{"speed_of_sound",   "mounting_rotation_offset",
                                              "acoustic_enabled", "dark_mode_enabled",
@@ -109,7 +109,7 @@ class SerialDialogue final : public Session {
 
   void end_sentence(Time now, Reaction& reaction) {
     const std::string sentence = std::exchange(sentence_, {});
-    if (sentence.empty()) return;  // LF behind CR
+    if (sentence.empty()) return;  // LF after CR
     const auto body = without_checksum(sentence);
     if (!body) return refuse(sentence, wrong_checksum, reaction);
     const bool is_command = sentence.size() <= longest_sentence && body->size() >= 3 && body->starts_with("wc") &&
@@ -121,7 +121,7 @@ class SerialDialogue final : public Session {
     say(answer, reaction);
   }
 
-  /// Carries out the command with this letter (DOC). The words follow the letter.
+  /// Carries out the command with this letter (DOC). `words`: the words after the letter.
   std::string answer_to(char letter, const Words& words, Time now, Reaction& reaction) {
     const auto result = [&](const char* command, const Json& parameters = nullptr) {
       return *execute(command, parameters, now, reaction);
@@ -179,7 +179,7 @@ class SerialDialogue final : public Session {
     return format("wrw,%s,%s,%s", device().model->profile.c_str(), info["version_short"].get<std::string>().c_str(),
                   info["chipid"].get<std::string>().c_str());
   }
-  /// The sentence in the table of DOC; the examples of DOC have seconds, and 0 or 1.
+  /// Returns the sentence as in the table of DOC; the examples of DOC have seconds, and 0 or 1.
   std::string time_status(Time now, const Settings& s) const {
     return format("wrs,%lld,y,%s,%lld", static_cast<long long>(microseconds(now)), s.ntp_address.c_str(),
                   static_cast<long long>(std::chrono::duration_cast<std::chrono::seconds>(now - device().powered_up_at).count()));
@@ -194,7 +194,7 @@ class SerialDialogue final : public Session {
   static void say(std::string_view answer, Reaction& reaction) { reaction.replies.push_back(sentence_line(answer)); }
 
   std::string sentence_;
-  Time breaks_off_at_ = Time::max();  // if no byte follows until then
+  Time breaks_off_at_ = Time::max();  // time at which an incomplete sentence is dropped
 };
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace {
 
 using protocol::Reaction;
 
-constexpr int most_waiting = 15;  // triggered pings (DOC)
+constexpr int most_waiting = 15;  // limit for waiting triggered pings (DOC)
 constexpr std::chrono::nanoseconds report_period = std::chrono::milliseconds(200);
 constexpr auto longest_wait = std::chrono::seconds(2);  // a triggered ping that takes longer is lost and requested again
 
@@ -41,7 +41,7 @@ Json configuration(const Settings& s) {
           {"periodic_cycling_enabled", s.cycles}};
 }
 
-/// Sets a value, or returns the text of an error. These texts are ours: the device's are unknown.
+/// Sets a value, or returns the text of an error. unknown: the texts of the device; these are ours.
 std::string set_number(const Json& value, const std::string& name, double lowest, double highest, double& to) {
   if (!value.is_number() || !(value.get<double>() >= lowest && value.get<double>() <= highest))
     return text::format("%s must be a number from %g to %g", name.c_str(), lowest, highest);
@@ -82,7 +82,8 @@ Outcome set_config(const Json& parameters, Settings& settings) {
 
 }  // namespace
 
-/// Reports of dead reckoning come at multiples of the period, so that all clients get them at the same times.
+/// Returns the time of the next report of dead reckoning, a multiple of the period, so that all clients get reports at the same
+/// times.
 Time Session::next_report_after(Time now) { return now - now.time_since_epoch() % report_period + report_period; }
 
 Reaction Session::on_tick(Time now, bool ping_pending) {
@@ -98,7 +99,7 @@ Reaction Session::on_tick(Time now, bool ping_pending) {
   return reaction;
 }
 
-// Every client gets every ping, also those that another client has triggered; each counts them for its own triggers.
+// Every client gets every ping, also pings that another client has triggered, and counts each ping for its own triggers.
 protocol::Delivery Session::on_ping(const VendorSettings*, std::size_t, Time now) {
   protocol::Delivery delivery{{protocol::Bytes{}}, {}};
   if (waiting_ > 0 && --waiting_ > 0) {

@@ -1,4 +1,4 @@
-// The part that the conversations in JSON and on the serial line share: the commands of clients, triggered pings and the times of
+// The part that the dialogues in JSON and on the serial line share: the commands of clients, triggered pings and the times of
 // reports.
 #pragma once
 
@@ -20,12 +20,12 @@ struct Outcome {
 /// nullopt if there is no such command.
 std::optional<Outcome> carry_out(const std::string& command, const Json& parameters, const protocol::DeviceState& device,
                                  Time now, Settings& settings);
-/// The answer to get_version_info. The version names sonard, so that a log shows that the device was emulated.
+/// Returns the answer to get_version_info. The version contains "sonard", so that a log shows that the device was emulated.
 Json version_info(const protocol::DeviceState& device);
 protocol::Bytes response_line(const std::string& to, const Outcome& outcome);
 
-/// Every client gets all reports. With acoustics enabled the device pings by itself and trigger_ping is refused; with acoustics
-/// disabled it pings only for triggers, which each client queues for itself.
+/// Every client gets all reports. With acoustics enabled the device pings without triggers, and trigger_ping is refused; with
+/// acoustics disabled it pings only for triggers, of which each client has its own queue.
 class Session : public protocol::Dialogue {
  public:
   /// `device` must outlive it.
@@ -37,16 +37,16 @@ class Session : public protocol::Dialogue {
   protocol::Delivery on_ping(const VendorSettings*, std::size_t, Time now) override;
 
  protected:
-  /// The report of dead reckoning. Empty: none.
+  /// Returns the report of dead reckoning; empty = none.
   virtual protocol::Bytes position_report(Time now) const = 0;
 
   const protocol::DeviceState& device() const { return device_; }
   Settings settings() const { return settings_from(device_.settings.get()); }
-  /// The settings that will hold after the daemon has carried out `reaction`.
+  /// Returns the settings after the daemon has carried out `reaction`.
   Settings settings_after(const protocol::Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
-  /// Carries out a command, and adds the events that follow. Returns nullopt if there is no such command.
+  /// Carries out a command, and adds the resulting events. Returns nullopt if there is no such command.
   std::optional<Outcome> execute(const std::string& command, const Json& parameters, Time now, protocol::Reaction& reaction);
 
  private:
@@ -56,7 +56,7 @@ class Session : public protocol::Dialogue {
   const protocol::DeviceState& device_;
   Time due_;             // time of the next report of dead reckoning
   int waiting_ = 0;      // triggered pings that this client has not received yet
-  Time requested_at_{};  // time at which the first of them was requested
+  Time requested_at_{};  // time at which the first waiting ping was requested
 };
 
 }  // namespace sonar::dvl

@@ -64,7 +64,7 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
                        settings.mounting_rotation_deg)};
 }
 
-// Settings that the device has no command for are refused; a range selects range modes, a rate of 0 disables acoustics.
+// Refuses settings for which the device has no command. A range selects range modes, and a rate of 0 disables acoustics.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   const Product& product = product_of(*device.model);
   const auto refused = [&](const std::string& text) { return failure(ErrorKind::usage, "a " + (product.name + (" " + text))); };

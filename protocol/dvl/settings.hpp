@@ -1,4 +1,4 @@
-// The configuration that clients set, and the state that the device keeps from ping to ping.
+// The configuration that clients set, and the state that the device keeps between pings.
 #pragma once
 
 #include <cstdint>
@@ -30,8 +30,8 @@ struct Product {
 };
 const Product& product_of(const SonarModel& model);
 std::span<const std::shared_ptr<const SonarModel>> models();
-/// The model of a replay of this product. A device of this model sends no positions of its own; they are among the recorded
-/// reports.
+/// Returns the model for a replay of this product. A device of this model makes no positions, because the recorded reports
+/// contain them.
 std::shared_ptr<const SonarModel> replayed_model(const SonarModel& recorded);
 
 struct RangeMode {
@@ -42,16 +42,16 @@ struct RangeMode {
 inline constexpr int range_mode_count = 5;
 RangeMode range_mode(int index, const Product& product);
 
-/// Unit vector of a beam in the device's frame: x forward, y to starboard, z down.
+/// Returns the unit vector of a beam in the device's frame: x forward, y to starboard, z down.
 Vec3d beam_direction(std::size_t beam);
 
-/// A ping is computed as a range image of `grid_size` by `grid_size` directions about the device's axis; the beams are four of
-/// them.
+/// A ping is computed as a range image of `grid_size` by `grid_size` directions about the device's axis; four of the directions
+/// are beams.
 inline constexpr int grid_size = 27;
-/// Index of a beam's pixel in Ping::samples.
+/// Returns the index of a beam's pixel in Ping::samples.
 std::size_t pixel_of(std::size_t beam);
 
-/// Converts a vector from the sonar's axes (it looks along x, z up) to the device's frame. The same formula converts back.
+/// Converts a vector from the sonar's axes (x ahead, z up) to the device's frame. The same formula converts back.
 constexpr Vec3d device_from_sonar(Vec3d v) { return {v.z, -v.y, v.x}; }
 
 /// Dead reckoning, in the vehicle's axes (x forward, y to starboard, z down) at the start of the reckoning.
@@ -73,7 +73,7 @@ struct Settings {
   std::string range_mode = "auto", ntp_address = "auto";
   SerialOutput serial_output = SerialOutput::old_and_new;    // unknown: assumed
   int lowest_mode = 0, highest_mode = range_mode_count - 1;  // allowed by range_mode
-  bool is_triggered = false;                                 // a client has requested a ping while acoustics are off
+  bool is_triggered = false;                                 // true: a client has requested a ping while acoustics are off
 
   int mode = 2;  // range mode of the next ping
   Reckoning reckoning;
@@ -91,12 +91,12 @@ struct HeldSettings final : RangeImageSettings {
   std::shared_ptr<const PingFindings> look_at(const Ping& ping) const override;  // a Measurement (measure.cpp)
   Settings settings;
 };
-/// The settings in `held`; if it is null, those of a new device.
+/// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Sets the allowed modes from "auto", "=a" or "a<=b". False: the text has another form.
+/// Sets the allowed modes from "auto", "=a" or "a<=b". Returns false if the text has another form.
 bool allow_modes(std::string_view text, Settings& settings);
-/// The range_mode text that allows all modes up to the first one that reaches `range_m`.
+/// Returns the text of range_mode that allows all modes up to the first mode that reaches `range_m`.
 std::string range_mode_for(double range_m, const Product& product);
 
 PingSettings ping_settings(const Settings& settings, const Product& product);

@@ -5,7 +5,7 @@
 namespace sonar::foxglove {
 namespace {
 
-// Opcodes. The same number has different meanings in the two directions.
+// Opcodes, whose numbers have different meanings in the two directions.
 constexpr std::uint8_t to_viewer_message = 1, to_viewer_time = 2, to_viewer_answer = 3, to_viewer_playback = 5;
 constexpr std::uint8_t of_viewer_data = 1, of_viewer_call = 2, of_viewer_playback = 3;
 
@@ -32,7 +32,7 @@ class Frame {
   wire::Writer writer_{bytes_};
 };
 
-/// A call and its answer differ in their opcode only. The payload has no length: it goes to the end of the message.
+/// Encodes a call or its answer, which differ only in the opcode. The payload ends with the message, so its length is not stated.
 Bytes service_frame(std::uint8_t opcode, const ServiceCall& call) {
   return Frame(opcode).add(call.service).add(call.call).counted(call.encoding).text(call.payload).take();
 }
@@ -80,8 +80,7 @@ Bytes encode(const PlaybackControl& control) {
       .take();
 }
 
-// The layouts are those of the protocol's text. Bytes that are left over are an error, except in the payload of a call, which
-// ends with the message.
+// The layouts are those of the specification. Further bytes are an error, except in a call, whose payload ends with the message.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame) {
   wire::Reader reader(frame);
   std::uint8_t opcode = 0;

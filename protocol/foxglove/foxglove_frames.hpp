@@ -1,5 +1,5 @@
-// The binary messages of the Foxglove WebSocket protocol, little-endian; the first byte is the type. The specification is in
-// the history of https://github.com/foxglove/ws-protocol (the commit before 8e2a044). Pure.
+// The binary messages of the Foxglove WebSocket protocol, little-endian; the first byte is the type. The specification is in the
+// history of https://github.com/foxglove/ws-protocol (the commit before 8e2a044).
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace sonar::foxglove {
 using wire::Bytes;
 using wire::BytesView;
 
-/// The head of a channel's message; its payload follows.
+/// Returns the head of a channel's message, which precedes the payload.
 Bytes message_head(std::uint32_t subscription, Time at);
 Bytes time_frame(Time now);
 
@@ -33,7 +33,7 @@ struct PlaybackState {
   Time at{};
   float speed = 1;
   bool did_seek = false;
-  std::string request;  // id of the request; empty = not a request
+  std::string request;  // id of the request; empty = the state is not an answer
 };
 Bytes playback_frame(const PlaybackState& state);
 
@@ -44,11 +44,11 @@ struct PlaybackControl {
   Time to{};  // target of a seek
   std::string request;
 };
-/// Reads a frame that a viewer sent. Errors: bad_data if it is too short, its lengths do not fit, or its opcode
-/// is not one of a viewer.
+/// Reads a frame that a viewer sent. Errors: bad_data if the frame is too short, its lengths do not fit, or viewers do not send
+/// its opcode.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame);
 
-/// The bytes of a call or a playback control, as a viewer sends them; for tests and clients.
+/// Returns the bytes of a call or a playback control that a viewer would send; for tests and clients.
 Bytes encode(const ServiceCall& call);
 Bytes encode(const PlaybackControl& control);
 

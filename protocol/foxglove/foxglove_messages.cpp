@@ -45,7 +45,7 @@ void fill(fg::Pose& out, const Pose& pose) {
   fill(*out.mutable_orientation(), pose.orientation);
 }
 
-/// Adds a file after those that it imports, each file once: readers need them in this order.
+/// Adds a file after the files that it imports, each file once, because readers need this order.
 void add_with_imports(const pb::FileDescriptor& file, std::set<std::string>& known, pb::FileDescriptorSet& out) {
   if (!known.insert(file.name()).second) return;
   for (int i = 0; i < file.dependency_count(); ++i) add_with_imports(*file.dependency(i), known, out);
@@ -63,7 +63,7 @@ fg::SceneEntity& entity(fg::SceneUpdate& update, Time at, const std::string& id,
 
 using Stamp = std::function<Time(Time)>;
 
-/// Changes all times in a message and in those inside it: google.protobuf.Timestamp, and our own fields whose names end in _ns.
+/// Changes all times in a message and its sub-messages: google.protobuf.Timestamp, and our own fields whose names end in _ns.
 void change_stamps(pb::Message& message, const Stamp& stamp) {
   if (auto* const at = dynamic_cast<pb::Timestamp*>(&message)) {
     const Time was{std::chrono::seconds(at->seconds()) + std::chrono::nanoseconds(at->nanos())};
@@ -98,7 +98,7 @@ Bytes with_stamps(const Channel& of, BytesView message, const Stamp& stamp) {
 }
 
 Bytes descriptor_set(const std::string& name) {
-  // These messages are looked up only by name. The calls keep the linker from dropping their files.
+  // These messages are looked up only by name, so the calls prevent the linker from dropping their files.
   fg::RawImage::descriptor();
   v1::PingGeometry::descriptor();
   v1::Picture::descriptor();
@@ -113,7 +113,7 @@ Bytes descriptor_set(const std::string& name) {
 
 Schema protobuf_schema(const std::string& name) { return {name, "protobuf", base64(descriptor_set(name))}; }
 
-// Viewers show no integers of more than 16 bits, so those become floats from 0 to 1.
+// Viewers show no integers of more than 16 bits, so these are converted to floats from 0 to 1.
 Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes) {
   const auto width = static_cast<std::size_t>(bits / 8);
   Image image{static_cast<std::uint32_t>(beams), static_cast<std::uint32_t>(rows), width == 1 ? "mono8" : "mono16", width,
@@ -146,7 +146,8 @@ Bytes image_head(Time at, const std::string& frame, const Image& image) {
   message.set_height(image.height);
   message.set_encoding(image.encoding);
   message.set_step(static_cast<std::uint32_t>(image.width * image.bytes_per_sample));
-  // The samples are the last field, `data`. Its key and length end the head, so that the samples need not be copied behind it.
+  // The samples are the last field, `data`. The head ends with the key and length of that field, so that the samples need not be
+  // copied.
   Bytes head = bytes_of(message);
   constexpr unsigned length_delimited = 2;
   head.push_back(static_cast<std::byte>(fg::RawImage::kDataFieldNumber << 3 | length_delimited));
@@ -232,7 +233,7 @@ Bytes log_line(Time at, Severity severity, const std::string& message, const std
   return bytes_of(line);
 }
 
-// A point takes 16 bytes: three floats, and the intensity with three bytes of padding.
+// A point has 16 bytes: three floats, and the intensity with three bytes of padding.
 Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> points) {
   constexpr std::uint32_t stride = 16;
   fg::PointCloud message;
@@ -262,7 +263,7 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
   return bytes_of(message);
 }
 
-// With `number` = 0 two geometries can be compared: viewers get one only when it changes.
+// With `number` = 0 two geometries can be compared, because viewers get a geometry only when it changes.
 Bytes geometry(const Ping& ping, std::uint32_t number) {
   const PingSettings& s = ping.request.settings;
   v1::PingGeometry message;
@@ -339,7 +340,7 @@ wire::Bytes figures(const std::array<double, figure_names.size()>& values) {
 }
 
 wire::Bytes with_stamp(wire::BytesView figures, const std::function<Time(Time)>& stamp) {
-  constexpr std::size_t at = 4;  // offset of the first field, stamp_s: behind the head of CDR
+  constexpr std::size_t at = 4;  // offset of the first field, stamp_s, after the head of CDR
   wire::Reader reader(figures.subspan(at));
   double stamp_s = 0;
   reader("stamp_s", stamp_s);

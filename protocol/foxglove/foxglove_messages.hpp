@@ -1,5 +1,5 @@
-// Messages of the live view as protobuf, in Foxglove's schemas (schemas/foxglove.proto) and our own (schemas/view.proto):
-// functions from plain structs to bytes. World ENU, bodies FLU, metres. Pure.
+// Messages of the live view as protobuf, in Foxglove's schemas (schemas/foxglove.proto) and our own (schemas/view.proto). The
+// functions convert plain structs (world ENU, bodies FLU, metres) to bytes.
 #pragma once
 
 #include <array>
@@ -25,13 +25,13 @@ namespace sonar::foxglove {
 using wire::Bytes;
 using wire::BytesView;
 
-/// The FileDescriptorSet of a message such as "foxglove.RawImage" or "sonar.v1.PingEvent", with all files that it imports.
-/// Empty: the program has no message of this name.
+/// Returns the FileDescriptorSet of a message such as "foxglove.RawImage" or "sonar.v1.PingEvent", with all imported files; empty
+/// if the program has no message with this name.
 Bytes descriptor_set(const std::string& name);
-/// The schema of a channel: the descriptor set in base64.
+/// Returns the schema of a channel: the descriptor set in base64.
 Schema protobuf_schema(const std::string& name);
 
-/// Changes the times in a message of the channel: its stamps, and our own fields in nanoseconds of the daemon's time.
+/// Changes the times in a message of the channel: the stamps, and our own fields in nanoseconds of the daemon's time.
 Bytes with_stamps(const Channel& of, BytesView message, const std::function<Time(Time)>& stamp);
 
 /// A picture. It can share the samples of a ping.
@@ -41,13 +41,13 @@ struct Image {
   std::size_t bytes_per_sample = 1;
   std::shared_ptr<const Bytes> samples;  // [height][width], little-endian
 };
-/// A picture of the sent samples: row 0 nearest, column 0 farthest to port. The encoding is mono8, mono16, or for 24 and 32
-/// bits 32FC1 with fractions of `max_code`. `codes`: [rows][beams], little-endian, `bits` = 8, 16, 24 or 32.
+/// Makes a picture of the sent samples: row 0 is nearest, column 0 farthest to port. The encoding is mono8, mono16, or for 24 and
+/// 32 bits 32FC1 with fractions of `max_code`. `codes`: [rows][beams], little-endian, `bits` = 8, 16, 24 or 32.
 Image image_of(std::size_t beams, std::size_t rows, int bits, std::uint32_t max_code, std::shared_ptr<const Bytes> codes);
 Image image_of(const std::shared_ptr<const Ping>& ping);
-/// The bytes of a foxglove.RawImage before the samples, which are its last field.
+/// Returns the bytes of a foxglove.RawImage before the samples, which are its last field.
 Bytes image_head(Time at, const std::string& frame, const Image& image);
-Bytes raw_image(Time at, const std::string& frame, const Image& image);  // whole
+Bytes raw_image(Time at, const std::string& frame, const Image& image);  // the whole message
 
 struct Transform {
   Time at{};
@@ -62,13 +62,14 @@ struct Model {
   std::string id, frame;
   Pose in_frame;
   std::vector<std::pair<std::string, std::string>> metadata;
-  BytesView glb;  // model/gltf-binary
+  BytesView glb;  // a mesh of type model/gltf-binary
 };
 struct Lines {
   std::string id, frame;
-  std::vector<Vec3d> points;  // two for each line
+  std::vector<Vec3d> points;  // two points per line
 };
-// A foxglove.SceneUpdate with one entity. Concatenated updates are one update, because protobuf merges repeated fields.
+// These functions make a foxglove.SceneUpdate with one entity. Concatenated updates are one update, because protobuf merges
+// repeated fields.
 Bytes scene_update(Time at, const Model& model);
 Bytes scene_update(Time at, const Lines& lines);
 Bytes scene_deletion(Time at, const std::string& id);
@@ -82,26 +83,25 @@ struct CloudPoint {
 };
 Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> points);
 
-/// sonar.v1.PingGeometry. Pass `number` = 0 to compare the geometries of different pings.
+/// Makes a sonar.v1.PingGeometry. Pass `number` = 0 to compare the geometries of different pings.
 Bytes geometry(const Ping& ping, std::uint32_t number);
-/// sonar.v1.PingTruth of a ping that was made with SimulationSwitches::keep_truth.
+/// Makes the sonar.v1.PingTruth of a ping that was made with SimulationSwitches::keep_truth.
 Bytes truth(const Ping& ping);
-/// sonar.v1.Picture.
-/// `times`: the marks beside a waterfall.
+/// Makes a sonar.v1.Picture. `times`: the marks beside a waterfall.
 Bytes picture(const SonarPicture& picture, std::span<const TimeMark> times);
-/// sonar.v1.Findings.
+/// Makes sonar.v1.Findings.
 Bytes findings(std::span<const doctor::Finding> all);
 
-// Figures of a sonar as a ROS 2 message in CDR, the only encoding that PlotJuggler reads over this socket. Pure.
+// Figures of a sonar as a ROS 2 message in CDR, the only encoding that PlotJuggler reads over this socket.
 
 inline constexpr std::array<std::string_view, 15> figure_names = {
     "stamp_s", "number", "range_m", "rate_hz", "simulation_ms", "latency_ms", "clients",    "served",
     "dropped", "x",      "y",       "z",       "roll_deg",      "pitch_deg",  "heading_deg"};
 
-/// The schema of sonard_msgs/msg/SonarFigures: one float64 for each of figure_names.
+/// Returns the schema of sonard_msgs/msg/SonarFigures: one float64 for each of figure_names.
 Schema figures_schema();
 wire::Bytes figures(const std::array<double, figure_names.size()>& values);
-/// The figures with another stamp_s.
+/// Returns the figures with another stamp_s.
 wire::Bytes with_stamp(wire::BytesView figures, const std::function<Time(Time)>& stamp);
 
 }  // namespace sonar::foxglove

@@ -11,12 +11,11 @@
 namespace sonar::foxglove {
 namespace {
 
-using Json =
-    nlohmann::ordered_json;   // for writing: keeps the order of keys, but a look-up takes time proportional to their number
-using Read = nlohmann::json;  // for reading from viewers, which may send thousands of keys
+using Json = nlohmann::ordered_json;  // for writing: keeps the order of keys, but a look-up compares all keys
+using Read = nlohmann::json;          // for reading messages of viewers, which may have thousands of keys
 constexpr int deepest = 16;
 
-/// Names may contain bytes that are not UTF-8. They are replaced, so that no name makes a message fail.
+/// Writes JSON. Replaces bytes that are not UTF-8, which names may contain, so that no name makes a message fail.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(Time at) {
@@ -25,8 +24,8 @@ Json json_of(Time at) {
   return {{"sec", whole.count()}, {"nsec", (since - whole).count()}};
 }
 
-/// A parameter in the form of the protocol. JSON has no NaN and no infinity, so such a value is sent as unset. Numbers have
-/// the type "float64", because JSON does not distinguish 5.0 from 5.
+/// Returns a parameter in the form of the protocol. JSON has no NaN and no infinity, so such a value is sent as unset. Numbers
+/// have the type "float64", because JSON does not distinguish 5.0 from 5.
 Json json_of(const Parameter& parameter) {
   Json json{{"name", parameter.name}};
   std::visit(
@@ -52,7 +51,7 @@ bool is_u32(const Read& json) {
   return json.is_number_unsigned() && json.get<std::uint64_t>() <= std::numeric_limits<std::uint32_t>::max();
 }
 
-/// The items of a list, each read by `take`. nullopt: there is no list, or an item is of a wrong type.
+/// Returns the items of a list, which `take` reads; nullopt if there is no list, or if an item has a wrong type.
 template <class T, class Take>
 std::optional<std::vector<T>> list(const Read& word, const char* key, Take take) {
   const auto found = word.find(key);
@@ -77,8 +76,7 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> subscription(const Read& 
   if (!id || !channel) return std::nullopt;
   return std::pair(*id, *channel);
 }
-/// A value from a viewer, which may write a "float64" without a fraction. Integers beyond 63 bits are not
-/// accepted.
+/// Reads a value from a viewer, which may write a "float64" without a fraction. Integers beyond 63 bits are refused.
 Value value(const Read& json, bool is_float) {
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_float() || (json.is_number() && is_float)) return json.get<double>();
@@ -98,7 +96,7 @@ std::string stray_field(const Read& object, std::span<const std::string_view> kn
     if (std::find(known.begin(), known.end(), key) == known.end()) return key.substr(0, 64);
   return {};
 }
-/// Name of the first unknown field of a message, or of an object in its lists. Empty: all fields are known.
+/// Returns the name of the first unknown field of a message, or of an object in its lists; empty if all fields are known.
 std::string stray_field(const Read& word) {
   constexpr std::array<std::string_view, 6> fields{"op",        "id", "subscriptions", "subscriptionIds", "parameterNames",
                                                    "parameters"};
@@ -185,7 +183,7 @@ std::string parameter_values(std::span<const Parameter> parameters, const std::o
   return dump(json);
 }
 
-// Viewers demand schemas of request and response; ours accept any object, because the daemon checks the content.
+// Viewers need schemas of request and response; these schemas accept any object, because the daemon checks the content.
 std::string advertise_services(std::span<const Service> services) {
   Json list = Json::array();
   for (const Service& s : services) {
@@ -204,7 +202,7 @@ std::string service_failure(std::uint32_t service, std::uint32_t call, const std
   return dump({{"op", "serviceCallFailure"}, {"serviceId", service}, {"callId", call}, {"message", why}});
 }
 
-// Fields that the protocol does not have are ignored, so that newer viewers work, but one of them is reported in `stray`.
+// Ignores unknown fields, so that newer viewers work, but reports one of them in `stray`.
 Result<ViewerWord> word_of_viewer(std::string_view message, std::string* stray) {
   if (control::nests_deeper(message, deepest)) return refused("JSON nested deeper than 16");
   const Read word = Read::parse(message, nullptr, false);

@@ -1,4 +1,4 @@
-// Reads and writes the JSON messages of the Foxglove WebSocket protocol (source: foxglove_frames.hpp). Pure.
+// Reads and writes the JSON messages of the Foxglove WebSocket protocol (source: foxglove_frames.hpp).
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ struct Service {
   std::string name, type;  // requests and answers are JSON objects
 };
 
-/// A parameter's value. monostate = unset; OtherValue = a type that none of our parameters has.
+/// A parameter's value of a type that none of our parameters has. (In a Value, monostate = unset.)
 struct OtherValue {
   bool operator==(const OtherValue&) const = default;
 };
@@ -80,7 +80,7 @@ struct WatchParameters {
   std::vector<std::string> names;  // none = all
   bool on = true;
 };
-/// An operation that needs a capability which sonard does not offer.
+/// An operation that needs a capability that sonard does not offer.
 struct Incapable {
   std::string op, capability;
 };

@@ -17,7 +17,8 @@ constexpr int type_float = 5126, type_u32 = 5125, target_vertices = 34962, targe
 Vec3 y_up(Vec3 v) { return {v.x, v.z, -v.y}; }
 Json list(Vec3 v) { return Json::array({v.x, v.y, v.z}); }
 
-/// The normal of a vertex is the mean of those of its triangles, weighted by area, which is the length of the cross product.
+/// Returns the normals. The normal of a vertex is the mean of the normals of its triangles, weighted by area (the length of the
+/// cross product).
 std::vector<Vec3> normals_of(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles) {
   std::vector<Vec3> normals(vertices.size());
   for (const auto& [a, b, c] : triangles) {
@@ -43,12 +44,12 @@ void put(wire::Bytes& out, std::span<const Vec3> vectors) {
 
 }  // namespace
 
-// Layout: header of 12 bytes; a JSON chunk, padded with blanks to a multiple of 4; a binary chunk with positions, normals and
-// indices, to which the JSON refers by buffer views and accessors.
+// The layout is: a header of 12 bytes; a JSON chunk, padded with blanks to a multiple of 4; a binary chunk with positions,
+// normals and indices, to which the JSON refers with buffer views and accessors.
 wire::Bytes glb(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles,
                 const std::array<double, 3>& colour) {
   const std::size_t of_vectors = 12 * vertices.size(), of_indices = 12 * triangles.size();
-  const std::size_t of_data = 2 * of_vectors + of_indices;  // always a multiple of 4, which the format demands of chunks
+  const std::size_t of_data = 2 * of_vectors + of_indices;  // always a multiple of 4, as the format requires for chunks
   Vec3 least = vertices.empty() ? Vec3{} : y_up(vertices.front()), most = least;
   for (const Vec3& v : vertices) {
     const Vec3 t = y_up(v);

@@ -35,7 +35,7 @@ PolarImage picture_of(const Packet& packet) {
   return image;
 }
 
-/// The reason if the packet cannot be drawn, else an empty text.
+/// Returns the reason if the packet cannot be drawn, else an empty text.
 std::string why_no_picture(const Packet& packet) {
   const auto& angles = packet.header.beam_deg;
   for (std::size_t i = 0; i < packet.header.front.beams; ++i)

@@ -5,8 +5,8 @@
 namespace sonar::m3 {
 namespace {
 
-/// The port only streams. Bytes that a client sends are logged and have no effect; the program takes commands on another port,
-/// which is not emulated.
+/// The dialogue of a port that only streams. Bytes of a client are logged and have no effect; the program accepts commands on
+/// another port, which is not emulated.
 class SilentDialogue final : public protocol::Dialogue {
  public:
   protocol::Reaction on_bytes(BytesView received, Time) override {

@@ -36,7 +36,7 @@ struct Packet {
   double start_m() const;
   double spacing_m() const;
 };
-/// Reads a packet. nullopt: `whole` is not exactly one packet of complex samples.
+/// Reads a packet. Returns nullopt if `whole` is not exactly one packet of complex samples.
 std::optional<Packet> read_packet(BytesView whole);
 
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packet);

@@ -111,7 +111,7 @@ struct DataBack {
   GainLaw gain;
   float heading_deg = 0, magnetic_variation_deg = 0, pitch_deg = 0, roll_deg = 0, depth_m = 0, temperature_c = 0;
   std::array<float, 3> offset_m{}, rotation_deg{};  // mounting of the head: x to starboard, y ahead, z up
-  std::uint32_t mounting = 0;                       // 0: the head looks ahead
+  std::uint32_t mounting = 0;                       // 0 = the head points ahead
   double latitude_deg = 0, longitude_deg = 0;
   float transmit_s = 0;  // start of the pulse, from the start of the ping
   std::uint8_t head_sensors = 1, head_status = 0, sound_speed_source = 1, time_mode = 1;

@@ -70,7 +70,7 @@ void set_attitude(DataBack& to, const PingRequest& request) {
   to.temperature_c = static_cast<float>(request.water.temperature_c);
 }
 
-/// The data header of a ping. Fields that are not set here keep the defaults of messages.hpp.
+/// Makes the data header of a ping. Fields that are not set here keep the defaults of messages.hpp.
 DataHeader header_of(const Ping& ping, const protocol::DeviceState& device) {
   using namespace std::chrono;
   const PingRequest& r = ping.request;
@@ -143,7 +143,7 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin from, bo
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 
-/// Offset and size of a region in a packet of that many bytes.
+/// Returns offset and size of a region in a packet of `size` bytes.
 Place place_of(protocol::Region region, std::size_t size) {
   switch (region) {
     case protocol::Region::header:
@@ -186,7 +186,7 @@ double Packet::spacing_m() const {
   return static_cast<double>(header.back.sample_interval_s) * static_cast<double>(header.front.sound_speed_mps) / 2;
 }
 
-// The foot repeats the size of the body; a packet whose sizes differ is cut or damaged.
+// The foot repeats the size of the body; if the sizes differ, the packet is cut or damaged.
 std::optional<Packet> read_packet(BytesView whole) {
   if (!framing.begins_message(whole, recording::Origin::device)) return std::nullopt;
   const auto length = length_of(whole.first(stream_front_size), recording::Origin::device, true);

@@ -21,8 +21,8 @@ constexpr double near_per_far = 0.02;             // PKT, LOG: 0.2 of 10 m, 0.4 
 
 double near_of(double far_m) { return std::max(nearest_m, near_per_far * far_m); }
 
-// The window does not depend on the true sound speed: it fits every speed from slowest_mps to fastest_mps (PKT, LOG). The
-// interval is doubled until the samples fit.
+// The window does not depend on the true sound speed, because it covers every speed from slowest_mps to fastest_mps (PKT, LOG).
+// The interval is doubled until the samples fit.
 Window window_of(double near_m, double far_m) {
   Window window;
   window.start_s = 1e-6 * std::round(1e6 * (2 * near_m / fastest_mps + transmit_s)) - transmit_s;  // PKT, LOG: whole microseconds
@@ -47,12 +47,12 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.range_start_m = window.start_s * half_mps;
   s.range_bin_m = window.interval_s * half_mps;
   s.range_m = s.range_start_m + s.range_bin_count * s.range_bin_m;
-  s.row_centre = 0;  // CLI: the first sample lies at the window's start
+  s.row_centre = 0;  // CLI: the first sample is at the start of the window
   // -3 dB of a tone in its matched filter (docs/acoustics.md, eq. 23).
   s.pulse_width_m = static_cast<float>((2 - std::sqrt(2.0)) * 1e-6 * window.pulse_us * half_mps);
   s.rate_hz = settings.rate_hz;
   s.gain_db = settings.c_db;
-  // The gain law has b dB per 1000 m of range; the absorption counts the way there and back.
+  // The gain law has b dB per 1000 m of range; the absorption counts the path out and back.
   s.device_absorption_db_per_m = static_cast<float>(GainLaw{}.b / 1000.0 / 2);
   s.format = {.bits = 32, .max_code = 0xFFFFFFFF};
   return s;
@@ -64,7 +64,7 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
                        settings.far_m, static_cast<double>(settings.rate_hz), static_cast<double>(settings.c_db))};
 }
 
-// Only range, rate and gain can be set: the maker's program sets them, its drivers cannot.
+// Only range, rate and gain can be set, as in the maker's program; drivers cannot set them.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   using protocol::refused;
   Settings s = settings_from(device.settings.get());

@@ -38,10 +38,10 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 using HeldSettings = protocol::Held<Settings, PhasedSettings>;
-/// The settings in `held`; if it is null, those of a new device.
+/// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The near range that the program sets for a far range.
+/// Returns the near range that the program sets for a far range.
 double near_of(double far_m);
 
 /// The time in which the receiver samples; `start_s` counts from the start of the pulse.

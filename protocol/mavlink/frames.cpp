@@ -6,7 +6,7 @@ namespace sonar::mavlink {
 namespace {
 
 constexpr std::byte magic_1{0xFE}, magic_2{0xFD};
-constexpr std::size_t header_1 = 6, header_2 = 10;  // magic included
+constexpr std::size_t header_1 = 6, header_2 = 10;  // sizes of the headers, magic included
 constexpr std::size_t checksum_size = 2, signature_size = 13;
 constexpr std::uint8_t is_signed = 0x01;  // the only incompatibility flag that is supported; signatures are skipped, not verified
 
@@ -66,10 +66,10 @@ static_assert(wire::wire_size<Header2>() == header_2);
 struct FrameReader::Header {
   Frame frame;                      // the frame, except for the payload
   std::size_t before = 0, end = 0;  // offsets of the payload, and of the end of the frame with checksum and signature
-  bool readable = true;             // the frame has no incompatibility flag that is not supported
+  bool readable = true;             // false: the frame has an unsupported incompatibility flag
 };
 
-/// The header at the front. nullopt: there is none, or its frame does not fit into the datagram.
+/// Returns the header at the front; nullopt if there is none, or if its frame does not fit into the datagram.
 std::optional<FrameReader::Header> FrameReader::header() const {
   const auto byte = [this](std::size_t i) { return std::to_integer<std::uint8_t>(rest_[i]); };
   Header h;
@@ -96,8 +96,8 @@ bool FrameReader::begins_a_frame(std::size_t at) const {
   return at == rest_.size() || rest_[at] == magic_1 || rest_[at] == magic_2;
 }
 
-/// The whole frame if it is valid. Otherwise counts and skips it. A frame with an unknown message is skipped whole if another
-/// frame follows it; in all other cases one byte is skipped, because a frame may begin at the next one.
+/// Returns the whole frame if it is valid; otherwise counts and skips it. A frame with an unknown message is skipped completely
+/// if another frame follows; in other cases one byte is skipped, because a frame may begin at the next byte.
 std::optional<Frame> FrameReader::checked(const Header& h) {
   const MessageInfo* const message = find_message(h.frame.id);
   if (message == nullptr || !h.readable) {
@@ -107,7 +107,7 @@ std::optional<Frame> FrameReader::checked(const Header& h) {
     return std::nullopt;
   }
   const std::size_t behind = h.before + h.frame.payload_size;
-  // The checksum ends with the CRC_EXTRA of the message: a dialect with another layout under this number fails here.
+  // The checksum ends with the CRC_EXTRA of the message, so a dialect in which this number has another layout fails here.
   const std::uint16_t is = checksum(std::array{std::byte{message->crc_extra}}, checksum(rest_.subspan(1, behind - 1)));
   const auto stated = std::to_integer<unsigned>(rest_[behind]) | std::to_integer<unsigned>(rest_[behind + 1]) << 8;
   if (is != stated) {
@@ -142,7 +142,7 @@ std::optional<Frame> FrameReader::next() {
 
 Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Identity& sender) {
   payload = payload.first(std::min(payload.size(), largest_payload));
-  // MAVLink 2 omits zeros at the end of a payload, but keeps its first byte.
+  // MAVLink 2 omits zeros at the end of a payload, but keeps the first byte.
   while (payload.size() > 1 && payload.back() == std::byte{0}) payload = payload.first(payload.size() - 1);
   Bytes out;
   out.reserve(header_2 + largest_payload + checksum_size);

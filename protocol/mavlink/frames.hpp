@@ -17,10 +17,10 @@ struct Frame {
   int version = 2;
   std::uint8_t sequence = 0, system = 0, component = 0;
   std::uint32_t id = 0;
-  std::size_t payload_size = 0;                      // as sent: version 2 omits trailing zeros
-  std::array<std::byte, largest_payload> payload{};  // zeros beyond
+  std::size_t payload_size = 0;                      // sent size, which in version 2 excludes trailing zeros
+  std::array<std::byte, largest_payload> payload{};  // with zeros after payload_size
 };
-/// The message of a frame; M must be the frame's own.
+/// Returns the message of a frame; M must be the type of that message.
 template <class M>
 M message_in(const Frame& frame) {
   M message;
@@ -55,7 +55,7 @@ class FrameReader {
   FrameCounts counts_;
 };
 
-/// CRC-16/MCRF4XX, which MAVLink calls X.25. `crc`: the checksum of the bytes before these, if there are any.
+/// Returns the CRC-16/MCRF4XX, which MAVLink calls X.25. `crc`: the checksum of earlier bytes, if there are any.
 std::uint16_t checksum(BytesView bytes, std::uint16_t crc = 0xFFFF);
 
 /// System, component and sequence number of a sender.
@@ -63,7 +63,7 @@ struct Identity {
   std::uint8_t system = 1, component = 0;
   std::uint8_t sequence = 0;  // sequence of the next frame
 };
-/// A frame of version 2 with this payload. Increments the sender's sequence.
+/// Makes a frame of version 2 with this payload. Increments the sender's sequence.
 Bytes framed(std::uint32_t id, std::uint8_t crc_extra, BytesView payload, Identity& sender);
 template <class M>
 Bytes framed(const M& message, Identity& sender) {

@@ -11,7 +11,7 @@ using control::ClockDomain;
 using control::RawPose;
 using control::Stamp;
 
-constexpr std::int64_t late_ms = 1000;  // late packets go back less; a clock that goes back further has been restarted
+constexpr std::int64_t late_ms = 1000;  // late packets are less old; a clock that decreases by more has been restarted
 constexpr std::int64_t late_ns = late_ms * 1'000'000;
 constexpr double farthest_m = 100e3;               // distance from the origin up to which the tangent plane is valid
 constexpr double moved_origin_m = 0.01;            // an origin that moves by more causes a jump of the poses
@@ -22,7 +22,7 @@ std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
 
-/// A parameter of a command that is a count. nullopt: it is not a whole number, or it is too large.
+/// Returns a parameter of a command that is a count; nullopt if it is not a whole number, or too large.
 std::optional<std::uint32_t> whole_number(float value) {
   if (!(value >= 0 && value <= 65535) || value != std::floor(value)) return std::nullopt;
   return static_cast<std::uint32_t>(value);
@@ -58,7 +58,7 @@ MavlinkPoses::MavlinkPoses(Settings settings, InjectFailure inject, HasRangeFind
 // ---- selection of the vehicle
 
 void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
-  // All that was received from the previous vehicle is dropped.
+  // Everything that was received from the previous vehicle is dropped.
   system_ = self_.system = system;
   found_at_ = now;
   next_request_ = now;
@@ -75,7 +75,7 @@ void MavlinkPoses::select_vehicle(std::uint8_t system, Time now) {
   clear_histories();
 }
 
-/// Drops what was received, so that messages after a restart are not paired with those before it.
+/// Drops received messages, so that messages before and after a restart are not paired.
 void MavlinkPoses::clear_histories() {
   attitudes_.clear();
   local_.clear();
@@ -85,12 +85,12 @@ void MavlinkPoses::clear_histories() {
   ++resets_;
 }
 
-/// True if the frame is from the selected system. Selects one if there is none: the configured system, or else the first that
-/// sends a pose or the heartbeat of an autopilot. Another one is selected only after the first has been silent for
+/// True if the frame is from the selected system. If none is selected, selects the configured system, or else the first system
+/// that sends a pose or the heartbeat of an autopilot. Another system is selected only after the first has been silent for
 /// system_silence.
 bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   if (frame.system == self_.system && frame.component == own_component)
-    return false;  // sent by this component, returned by a router
+    return false;  // this component sent the frame, and a router returned it
   if (is_excluded(frame)) return false;
   if (settings_.system_id != 0) {
     if (!system_) select_vehicle(frame.system, now);
@@ -103,8 +103,8 @@ bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   return true;
 }
 
-/// Accepts each message from one component only, because two components may send different estimates of the same pose: from the
-/// autopilot, or else from the first one. Heartbeats are accepted from all.
+/// Accepts each message from only one component, the autopilot or else the first that sends it, because two components may send
+/// different estimates of the same pose. Heartbeats are accepted from all components.
 bool MavlinkPoses::is_selected_component(const Frame& frame, Time now) {
   const auto known = received_.find(frame.id);
   const bool other = known != received_.end() && known->second.component != frame.component && frame.id != Heartbeat::id;
@@ -207,7 +207,8 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Heartbeat::id:
       return handle(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
-      // Autopilots send the same attitude in both forms. The one with a quaternion has priority, so that none is used twice.
+      // Autopilots send the same attitude in both forms. The form with a quaternion has priority, so that no attitude is used
+      // twice.
       if (!received_within(AttitudeQuaternion::id, at.now, source_silence)) handle(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:
@@ -233,7 +234,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
   }
 }
 
-/// The autopilot is component 1, or else the first one that names an autopilot, as gimbals and cameras may do too.
+/// Finds the autopilot: component 1, or else the first component that states an autopilot, as gimbals and cameras may do too.
 void MavlinkPoses::handle(const Heartbeat& m, const Frame& frame) {
   if (m.autopilot == Heartbeat::no_autopilot) return;
   if (!has_autopilot_ || frame.component == first_autopilot) autopilot_component_ = frame.component;
@@ -280,8 +281,8 @@ void MavlinkPoses::handle(const GpsGlobalOrigin& m, Moment at) {
   local_in_world_ = *place;
 }
 
-/// The altitude in VFR_HUD is relative to the surface only from ArduSub; other vehicles send it above mean sea level or home. The
-/// message has no time stamp, so the newest boot time is used.
+/// Reads a depth. Only ArduSub sends an altitude relative to the surface in VFR_HUD; other vehicles send it relative to mean sea
+/// level or home. The message has no time stamp, so the newest boot time is used.
 void MavlinkPoses::handle(const VfrHud& m, Moment at) {
   const double altitude_m = static_cast<double>(m.altitude_m);
   if (!is_submarine_ || receives(GlobalPositionInt::id, at.now) || !(std::abs(altitude_m) <= highest_hud_m)) return;
@@ -323,7 +324,7 @@ void MavlinkPoses::join_pairs(Moment at) {
              boot_stamp(pair->place.at_ms), pair->place.enu_in_world, at);
 }
 
-/// Makes a pose of each attitude and the newest depth. Attitudes come more often, and the depth changes slowly.
+/// Makes a pose of each attitude and the newest depth, because attitudes arrive more often and the depth changes slowly.
 void MavlinkPoses::add_pose_of_depth(const AttitudeReading& reading, Moment at) {
   if (!depth_ || at.now - depth_->received > system_silence || received_within(LocalPositionNed::id, at.now, source_silence))
     return;
@@ -334,8 +335,8 @@ void MavlinkPoses::add_pose_of_depth(const AttitudeReading& reading, Moment at) 
   add_pose(Source::depth, raw, boot_stamp(reading.at_ms), Pose{{settings_.held_m.x, settings_.held_m.y, 0}, {}}, at);
 }
 
-/// The ENU axes at the place, in the world. nullopt: there is no world.origin or no fix, or the position is implausible, which is
-/// reported.
+/// Returns the ENU axes at the place, in the world; nullopt if there is no world.origin or no fix, or if the position is
+/// implausible, which is reported.
 std::optional<Pose> MavlinkPoses::placed(std::string_view message, const Result<std::optional<Geodetic>>& place, Moment at) {
   if (!place) {
     refuse(message, place.error().text, at);
@@ -370,7 +371,7 @@ void MavlinkPoses::add_pose(Source source, const RawPose& raw, Stamp stamp, cons
   at.out.poses.push_back({*std::move(pose), "system " + std::to_string(*system_) + " " + std::string(name_of(source))});
 }
 
-/// The stamp of a message, UNIX time or time since boot, both by the clock of the sender. Without a plausible one the pose gets
+/// Returns the stamp of a message: UNIX time or time since boot, of the sender's clock. Without a plausible stamp the pose gets
 /// the time of its arrival.
 Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
   if (time_us == 0 || time_us > control::largest_stamp_ns / 1000) return {};
@@ -382,7 +383,7 @@ Stamp MavlinkPoses::stamp_of(Source source, std::uint64_t time_us) {
 }
 
 void MavlinkPoses::note_boot_time(std::int64_t ms) {
-  // If the clock goes back further than late packets do, the autopilot has restarted.
+  // If the clock decreases by more than late packets explain, the autopilot has restarted.
   if (ms < newest_boot_ms_ - late_ms) clear_histories();
   newest_boot_ms_ = std::max(newest_boot_ms_, ms);
 }

@@ -1,5 +1,5 @@
-// One MAVLink link as a source of poses: it selects the system and its messages, and makes the messages to send. No socket and
-// no clock: its inputs are datagrams and arrival times, its outputs are poses for the daemon's World, reports and replies.
+// One MAVLink link as a source of poses: it selects the system and its messages, and makes the messages to send. The inputs are
+// datagrams and arrival times; the outputs are poses for the daemon's World, reports and replies.
 #pragma once
 
 #include <array>
@@ -26,11 +26,11 @@ std::string_view name_of(Source source);
 struct Settings {
   std::string vehicle;                           // a vehicle of the configuration; empty = the only one
   std::uint8_t system_id = 0, component_id = 0;  // 0 = the first system that sends; its autopilot
-  bool request_rates = false;                    // ask the autopilot for its messages
+  bool request_rates = false;                    // true: requests messages from the autopilot
   double rate_hz = 50;
   std::optional<Geodetic> origin;  // origin of the world; needed for latitudes and longitudes
-  bool needs_time = false;         // messages without a time stamp are not used
-  bool sends_distances = false;    // DISTANCE_SENSOR with every ping of a range finder, until a command changes it
+  bool needs_time = false;         // true: messages without a time stamp are not used
+  bool sends_distances = false;    // true: sends every distance of a range finder, until a command changes that
   Vec3d held_m = {};               // x and y (world, ENU) of a vehicle that sends a depth but no position
 };
 
@@ -57,14 +57,14 @@ using HasOtherPoses = std::function<bool()>;
 
 struct SourcedPose {
   control::PoseSample sample;
-  std::string source;  // "system 1 ODOMETRY"
+  std::string source;  // such as "system 1 ODOMETRY"
 };
 struct Reaction {
   std::vector<SourcedPose> poses;
   std::vector<std::string> refusals;  // errors of messages
   std::vector<std::string> notices;   // lines for the log
-  std::vector<Bytes> replies;         // datagrams: from on_datagram() for its sender, from on_tick() for the vehicle
-  bool from_vehicle = false;          // the datagram contained a frame of the selected system
+  std::vector<Bytes> replies;         // datagrams: of on_datagram() for the sender, of on_tick() for the vehicle
+  bool from_vehicle = false;          // true: the datagram contained a frame of the selected system
 };
 
 class MavlinkPoses {
@@ -82,18 +82,18 @@ class MavlinkPoses {
                         HasOtherPoses has_other_poses = {});
   /// `now` may have any origin, but never goes back.
   Reaction on_datagram(BytesView datagram, Time now);
-  /// Call several times a second. Sends heartbeats and requests. Reports the selected system and the missing parts of a pose:
-  /// when poses start or stop, and at growing intervals while none arrive.
+  /// Call it several times per second. Sends heartbeats and requests. Reports the selected system and the missing parts of a
+  /// pose: when poses start or stop, and at growing intervals while none arrive.
   Reaction on_tick(Time now);
   /// Empty while poses arrive, here or otherwise; else one sentence with everything that is missing.
   std::string health_error(Time now) const;
-  /// Names another vehicle (system) whose messages are ignored, while it sends. Else empty.
+  /// Returns the name of another vehicle (system) that sends messages, which are ignored; else empty.
   std::string rival(Time now) const;
 
-  /// True if distances are wanted: by the settings, or by the last command of the vehicle.
+  /// True if the settings, or the last command of the vehicle, request distances.
   bool wants_distances() const { return distances_.wanted(); }
-  /// The datagram of a distance; nullopt if distances are not wanted, or less than the requested interval has passed since the
-  /// sensor's last one.
+  /// Returns the datagram of a distance; nullopt if distances are not requested, or if less than the requested interval has
+  /// passed since the last datagram of the sensor.
   std::optional<Bytes> distance_message(const DistanceSensor& measured);
 
   const FrameCounts& counts() const { return counts_; }
@@ -106,7 +106,7 @@ class MavlinkPoses {
   };
   struct GlobalPlace {
     std::int64_t at_ms = 0;
-    Pose enu_in_world;  // at the vehicle
+    Pose enu_in_world;  // ENU axes at the vehicle, in the world
     Vec3d ned_mps;
   };
   /// The depth of a vehicle that sends no position, such as a BlueROV2 without DVL.
@@ -116,13 +116,13 @@ class MavlinkPoses {
     Time received{};
     std::uint32_t message = 0;
   };
-  struct Moment {  // context of a message
+  struct Moment {  // context of a message that is being handled
     Time now;
     Reaction& out;
   };
 
   static constexpr std::size_t most_reported = 16;  // ignored systems and components that notices name
-  /// True if only vehicles or their simulators send this message. Ground stations send the others too.
+  /// True if only vehicles or their simulators, not ground stations, send this message.
   static bool contains_pose(std::uint32_t id);
   /// True if only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
   static bool identifies_vehicle(const Frame& frame);
@@ -188,7 +188,7 @@ class MavlinkPoses {
   std::optional<std::pair<int, int>> ignored_;  // system and component of the last ignored message
   /// Text of the notice for each system and component that one has named since the vehicle was selected.
   std::map<std::pair<int, int>, std::string> reported_ignored_;
-  std::pair<int, int> rival_{};  // the last of them that sent, of another system than the vehicle's
+  std::pair<int, int> rival_{};  // the last ignored component of another system than the vehicle's
   Time rival_at_{};
   std::map<std::uint32_t, Arrival> received_;
 
@@ -200,7 +200,7 @@ class MavlinkPoses {
   std::int64_t newest_boot_ms_ = 0;
   std::array<std::int64_t, source_count> newest_ns_{};
   std::array<std::optional<Time>, source_count> last_pose_{};
-  std::array<bool, source_count> timeless_{};  // reported to the log
+  std::array<bool, source_count> timeless_{};  // true: the log has the notice that messages have no time stamp
   std::array<std::optional<std::uint8_t>, source_count> reset_counter_{};
   std::uint32_t resets_ = 0;
 };

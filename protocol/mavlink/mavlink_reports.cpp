@@ -11,8 +11,8 @@ namespace sonar::mavlink {
 namespace {
 
 constexpr std::chrono::nanoseconds heartbeat_period = std::chrono::seconds(1);
-constexpr std::chrono::nanoseconds listen_before_report = std::chrono::seconds(1);   // after a system was found
-constexpr std::chrono::nanoseconds silence_before_report = std::chrono::seconds(5);  // after the start, if no system was found
+constexpr std::chrono::nanoseconds listen_before_report = std::chrono::seconds(1);   // time after a system was found
+constexpr std::chrono::nanoseconds silence_before_report = std::chrono::seconds(5);  // time after the start, without a system
 constexpr std::chrono::nanoseconds request_period = std::chrono::seconds(5);
 constexpr std::chrono::nanoseconds first_reminder = std::chrono::seconds(15), longest_reminder = std::chrono::minutes(10);
 
@@ -31,7 +31,7 @@ std::string name_of_autopilot(std::uint8_t autopilot) {
 Reaction MavlinkPoses::on_tick(Time now) {
   Reaction out;
   if (now >= next_heartbeat_) {
-    // Heartbeats stay in step after a late call. After a longer pause, missed ones are not sent.
+    // After a late call, heartbeats keep their rhythm. After a longer pause, missed heartbeats are not sent.
     const bool in_step = now - next_heartbeat_ < heartbeat_period;
     next_heartbeat_ = (in_step ? next_heartbeat_ : now) + heartbeat_period;
     Heartbeat beat;
@@ -84,7 +84,7 @@ void MavlinkPoses::request_messages(Reaction& out) {
   };
   for (const std::uint32_t message : {Odometry::id, AttitudeQuaternion::id, LocalPositionNed::id})
     ask(message, settings_.rate_hz);
-  ask(GlobalPositionInt::id, settings_.rate_hz);  // gives a position, or the depth alone
+  ask(GlobalPositionInt::id, settings_.rate_hz);  // has a position, or only the depth
   if (!settings_.origin) return;
   ask(SimState::id, settings_.rate_hz);
   ask(GpsGlobalOrigin::id, 1);
@@ -104,7 +104,7 @@ void MavlinkPoses::note_ignored(const Frame& frame, Moment at) {
   if (system_ && !is_excluded(frame) && identifies_vehicle(frame)) report_ignored(frame, at);
 }
 
-/// Each system and component is named once: two vehicles at one port are a mistake that nothing else shows.
+/// Reports each ignored system and component once, because two vehicles at one port are a mistake that is not visible otherwise.
 void MavlinkPoses::report_ignored(const Frame& frame, Moment at) {
   const std::pair<int, int> sender(frame.system, frame.component);
   if (!reported_ignored_.contains(sender) && reported_ignored_.size() >= most_reported) return;
@@ -131,7 +131,7 @@ std::string MavlinkPoses::rival(Time now) const {
   return report != reported_ignored_.end() && now - rival_at_ <= system_silence ? report->second : std::string();
 }
 
-/// The reason why x and y do not change, and the messages that would change them.
+/// Returns the reason why x and y do not change, and the messages that would change them.
 std::string MavlinkPoses::held_text() const {
   std::string why = " has no fix, and there is no LOCAL_POSITION_NED: no DVL or the like";
   if (depth_ && depth_->message == VfrHud::id)
@@ -143,7 +143,7 @@ std::string MavlinkPoses::held_text() const {
   return held.data() + std::string(GlobalPositionInt::name) + why;
 }
 
-/// "system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE; no poses yet: ..."
+/// Returns a text such as "system 1 (ArduPilot) sends HEARTBEAT, ATTITUDE; no poses yet: ...".
 std::string MavlinkPoses::report(Time now) const {
   if (!system_) {
     if (!ignored_) return "no poses yet: no message received; check that the autopilot or its router sends here";

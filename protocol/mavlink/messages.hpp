@@ -177,7 +177,7 @@ struct DistanceSensor {
   std::uint16_t min_cm = 0, max_cm = 0, current_cm = 0;
   std::uint8_t type = ultrasound, sensor = 0, orientation = 0, covariance_cm2 = unknown_covariance;
   float horizontal_fov_rad = 0, vertical_fov_rad = 0;
-  std::array<float, 4> wxyz{};      // for orientation 100 only, else zeros
+  std::array<float, 4> wxyz{};      // only for orientation 100, else zeros
   std::uint8_t signal_percent = 0;  // 0 = unknown, 1 = no valid signal
 };
 constexpr void fields(auto& visit, wire::Like<DistanceSensor> auto& m) {
@@ -217,7 +217,7 @@ struct SimState {
   float roll_rad = 0, pitch_rad = 0, yaw_rad = 0;
   float acceleration_x = 0, acceleration_y = 0, acceleration_z = 0;
   float roll_radps = 0, pitch_radps = 0, yaw_radps = 0;
-  float latitude_deg = 0, longitude_deg = 0, altitude_m = 0;  // floats have steps of 0.4 m: the extensions are better
+  float latitude_deg = 0, longitude_deg = 0, altitude_m = 0;  // floats have steps of 0.4 m; the extensions are better
   float std_dev_horizontal = 0, std_dev_vertical = 0;
   float north_mps = 0, east_mps = 0, down_mps = 0;
   std::int32_t latitude_e7_deg = 0, longitude_e7_deg = 0;
@@ -275,7 +275,7 @@ constexpr void extensions(auto& visit, wire::Like<Odometry> auto& m) {
   visit("reset_counter", m.reset_counter), visit("estimator_type", m.estimator_type), visit("quality", m.quality);
 }
 
-/// Visits the base fields, then the extensions, if the message has some.
+/// Visits the base fields, then the extensions, if the message has any.
 template <class V, class M>
 constexpr void all_fields(V& visit, M& m) {
   fields(visit, m);
@@ -296,9 +296,9 @@ struct MessageInfo {
   std::uint8_t crc_extra = 0;
   std::size_t size = 0, full_size = 0;  // size of the payload without and with extensions
 };
-/// The supported messages, by rising id.
+/// Returns the supported messages, in the order of their ids.
 std::span<const MessageInfo> known_messages();
-/// Null for unsupported messages.
+/// Returns null for unsupported messages.
 const MessageInfo* find_message(std::uint32_t id);
 
 }  // namespace sonar::mavlink

@@ -56,8 +56,8 @@ std::string frame_text(std::uint8_t frame) {
 }
 
 constexpr double highest_m = 1e5;                               // keeps the results finite; no vehicle with a sonar is higher
-const Quatd half_turn_ahead{0, 1, 0, 0};                        // turns FRD into FLU, and back
-const Quatd enu_and_ned{0, std::sqrt(0.5), std::sqrt(0.5), 0};  // turns ENU into NED, and back
+const Quatd half_turn_ahead{0, 1, 0, 0};                        // converts FRD to FLU, and back
+const Quatd enu_and_ned{0, std::sqrt(0.5), std::sqrt(0.5), 0};  // converts ENU to NED, and back
 
 std::array<double, 3> array_of(Vec3d v) { return {v.x, v.y, v.z}; }
 std::array<double, 4> array_of(Quatd q) { return {q.w, q.x, q.y, q.z}; }
@@ -66,7 +66,7 @@ Quatd quat_of(const std::array<float, 4>& wxyz) { return {wxyz[0], wxyz[1], wxyz
 RawPose raw_pose(Vec3d ned_m, Quatd frd_in_ned) {
   return {Frame::ned_frd, array_of(ned_m), array_of(frd_in_ned), std::nullopt, std::nullopt};
 }
-/// Senders set unknown velocities to NaN.
+/// Sets the velocities, unless they are NaN, which means unknown.
 void set_motion(RawPose& pose, Vec3d frd_mps, Vec3d frd_radps) {
   if (is_finite(frd_mps)) pose.velocity_mps = array_of(frd_mps);
   if (is_finite(frd_radps)) pose.angular_velocity_radps = array_of(frd_radps);
@@ -180,7 +180,7 @@ Result<RawPose> raw_pose(const Odometry& m) {
 
 namespace {
 
-/// Interpolates linearly along the shorter way, because attitudes of one vehicle are close to each other.
+/// Interpolates linearly over the smaller angle, because attitudes of one vehicle are close to each other.
 Quatd between(Quatd a, Quatd b, double u) {
   const double sign = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -u : u;
   const double rest = 1 - u;
@@ -201,7 +201,7 @@ Attitudes::Answer Attitudes::at(std::int64_t at_ms, AttitudeReading& out) const 
   if (readings_.empty()) return Answer::later;
   const auto after = std::lower_bound(readings_.begin(), readings_.end(), at_ms,
                                       [](const AttitudeReading& r, std::int64_t t) { return r.at_ms < t; });
-  if (after == readings_.end()) {  // later than the newest reading: extrapolates for a short time
+  if (after == readings_.end()) {  // after the newest reading, extrapolates for a short time
     const AttitudeReading& last = readings_.back();
     const std::int64_t ahead_ms = at_ms - last.at_ms;
     if (ahead_ms > longest_carry_ms) return Answer::later;

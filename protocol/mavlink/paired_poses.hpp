@@ -1,4 +1,4 @@
-// Joins attitudes and positions, which arrive in different messages, into whole poses by the time stamps of the sender.
+// Joins attitudes and positions, which arrive in different messages, to whole poses with the time stamps of the sender.
 // protocol/mavlink/mavlink_poses.hpp has one queue for local and one for satellite positions; both use the same attitudes.
 #pragma once
 
@@ -12,10 +12,10 @@
 
 namespace sonar::mavlink {
 
-// Contents of single messages as control::RawPose: north-east-down world, forward-right-down body.
+// Converts single messages to control::RawPose: north-east-down world, forward-right-down body.
 // protocol/mavlink/mavlink_poses.hpp selects the messages to use.
 
-/// Attitude of the body (FRD) in NED, at a moment of the sender's clock.
+/// Attitude of the body (FRD) in NED, at a time of the sender's clock.
 struct AttitudeReading {
   std::int64_t at_ms = 0;
   Quatd frd_in_ned;
@@ -32,19 +32,19 @@ struct PlaceReading {
 };
 PlaceReading place_of(const LocalPositionNed& m);
 
-/// The position, sent as degrees times 1e7; nullopt for 0, 0, which autopilots send without a fix. Errors: a latitude or
-/// longitude beyond the globe's.
+/// Returns the position, which is sent as degrees times 1e7; nullopt for 0, 0, which autopilots send without a fix. Errors: an
+/// impossible latitude or longitude.
 Result<std::optional<Geodetic>> geodetic_of(const GlobalPositionInt& m);
 Result<std::optional<Geodetic>> geodetic_of(const GpsGlobalOrigin& m);
-/// The position from the integers of the message; if they are 0, from the floats.
+/// Returns the position from the integers of the message; if they are 0, from the floats.
 Result<std::optional<Geodetic>> geodetic_of(const SimState& m);
 
 control::RawPose raw_pose(const AttitudeReading& attitude, const PlaceReading& place);
-/// Attitude and velocities. The position stays 0, because geodetic_of() reads it.
+/// Returns attitude and velocities. The position is 0, because geodetic_of() reads it.
 control::RawPose raw_pose(const SimState& m);
 control::RawPose raw_pose(const AttPosMocap& m);
 control::RawPose raw_pose(const VisionPositionEstimate& m);
-/// Errors: an unsupported frame_id or child_frame_id.
+/// Returns the pose. Errors: an unsupported frame_id or child_frame_id.
 Result<control::RawPose> raw_pose(const Odometry& m);
 
 /// True if the message has its position in the integer extensions, which version 1 cannot contain.
@@ -53,18 +53,19 @@ bool has_exact_position(const SimState& m);
 /// The newest attitudes, in order of the sender's time.
 class Attitudes {
  public:
-  /// Two attitudes further apart than this are not interpolated; a position between them gets no attitude.
+  /// Between two attitudes with a larger difference in time there is no interpolation; a position between them gets no attitude.
   static constexpr std::int64_t longest_gap_ms = 1000;
-  /// The newest attitude is extrapolated by its angular rates for at most this time.
+  /// The newest attitude is extrapolated with its angular rates for at most this time.
   static constexpr std::int64_t longest_carry_ms = 20;
 
-  /// `later`: unknown until a newer reading arrives. `never`: the moment is before the first reading, or in a gap that is too
-  /// long.
+  /// `later`: the attitude is unknown until a newer reading arrives. `never`: the time is before the first reading, or in a gap
+  /// that is too long.
   enum class Answer { known, later, never };
   void put(const AttitudeReading& reading);
   void clear() { readings_.clear(); }
   bool empty() const { return readings_.empty(); }
-  /// The attitude at a moment, interpolated between two readings or extrapolated from the newest. `out` is set only if `known`.
+  /// Finds the attitude at a time, interpolated between two readings or extrapolated from the newest. `out` is set only for the
+  /// result `known`.
   Answer at(std::int64_t at_ms, AttitudeReading& out) const;
 
  private:
@@ -72,7 +73,7 @@ class Attitudes {
   std::deque<AttitudeReading> readings_;
 };
 
-/// Positions that wait for an attitude at their time, the oldest first.
+/// Positions that wait for an attitude at their time, oldest first.
 template <class Place>
 class PairedPlaces {
  public:
@@ -85,7 +86,7 @@ class PairedPlaces {
     if (waiting_.size() > most) waiting_.pop_front();
   }
   void clear() { waiting_.clear(); }
-  /// The next position, in order of arrival, whose attitude is known. Drops positions whose attitude will never be known.
+  /// Returns the next position, in order of arrival, whose attitude is known. Drops positions whose attitude will never be known.
   std::optional<Paired> next(const Attitudes& attitudes) {
     while (!waiting_.empty()) {
       Paired paired;

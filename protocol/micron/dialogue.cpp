@@ -11,12 +11,12 @@ namespace {
 using protocol::Reaction;
 
 constexpr auto alive_period = std::chrono::seconds(1);
-constexpr auto boot_time = std::chrono::seconds(2);  // unknown: hosts wait 2.5 s before they read
+constexpr auto boot_time = std::chrono::seconds(2);  // unknown; assumed, because hosts wait 2.5 s before they read
 constexpr int recentring_alives = 2;                 // signs of life after a restart: 5D, 4D, then 4A (ENS)
 constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size = 14;  // sizes of the payloads; ROCK, ENS
 constexpr std::size_t notices_per_call = 8;                                            // bounds the log output of a hostile host
 
-/// One host's conversation (docs/protocols/micron.md, "Session"):
+/// The dialogue with one host (docs/protocols/micron.md, "Session"):
 /// - After power-up or a reboot the head has no parameters: it sends mtAlive once a second and ignores requests for scan lines.
 /// - mtHeadCommand sets the parameters. The next mtAlive reports that they were received, and the one after it reports that they
 ///   are valid.
@@ -141,7 +141,7 @@ class MicronDialogue final : public protocol::Dialogue {
     const bool centred = recentring_ == 0;
     std::uint8_t info = motor_on | (centred ? head_info::centred : static_cast<std::uint8_t>(recentring | motoring));
     if (recentring_ == recentring_alives || (s.has_parameters && scan_.to_right)) info |= to_right;
-    // ENS waits for both steps: the first mtAlive with parameters still has the bit no_parameters, the second has not.
+    // ENS waits for two messages: the first mtAlive with parameters still has the bit no_parameters, the second does not.
     if (!s.has_parameters || !knows_parameters_) info |= no_parameters;
     if (s.has_parameters) info |= received_parameters;
     knows_parameters_ = s.has_parameters;
@@ -155,8 +155,8 @@ class MicronDialogue final : public protocol::Dialogue {
     return from_head(Id::alive, wire::bytes_of(message));
   }
 
-  /// Ends the ping that was awaited. The head turns on after the samples have been taken and the line has been sent: with a slow
-  /// link (option link_rate) the transfer limits the rate of the scan.
+  /// Ends the ping that was awaited. The head turns further after the samples have been taken and the line has been sent, so a
+  /// slow link (option link_rate) limits the rate of the scan.
   void advance(Time now) {
     --wanted_;
     const HeadCommand command = settings().command;
@@ -186,9 +186,9 @@ class MicronDialogue final : public protocol::Dialogue {
   recording::MessageSplitter splitter_{recording::Origin::client, framing};
   Time next_alive_{}, boots_until_{};
   int recentring_ = 0;     // number of mtAlive messages that still have to report the return of the head to its centre
-  Scan scan_;              // the bearing that the head has, or turns to
-  Time arrives_{};         // when the head has that bearing
-  bool knows_parameters_;  // an mtAlive has reported that parameters were received
+  Scan scan_;              // the bearing that the head has, or to which it turns
+  Time arrives_{};         // time at which the head has that bearing
+  bool knows_parameters_;  // true: an mtAlive has reported that parameters were received
   int wanted_ = 0;         // scan lines that were requested and not sent yet
   protocol::AwaitedPing awaited_;
 };

@@ -19,14 +19,14 @@ constexpr double usual_range_m = 10, sound_mps = 1500;      // bins are interval
 constexpr auto patience = std::chrono::milliseconds(500);   // time after which a request without a scan line is repeated
 constexpr auto learning = std::chrono::milliseconds(2500);  // longest wait for the parameters that the head has
 
-/// Parameters for a scan of the half circle ahead in steps of a grad.
+/// Makes the parameters for a scan of the half circle ahead in steps of a grad.
 HeadCommand command_of(const protocol::SettingsOverride& wanted) {
   HeadCommand c;
   c.control &= static_cast<std::uint16_t>(~control::continuous);
   c.left = ahead - turn / 4;
   c.right = ahead + turn / 4;
   const double range_m = wanted.range_m.value_or(usual_range_m);
-  // The sonar would refuse bins that reach beyond its farthest range by a rounding.
+  // Rounding must not extend the bins beyond the farthest range, because the sonar would refuse them.
   c.interval = static_cast<std::uint16_t>(
       std::clamp<long>(std::lround(2 * range_m / sound_mps / c.bins / bin_unit_s), 1, longest_interval(c.bins)));
   c.range_dm = static_cast<std::uint16_t>(std::clamp(std::lround(10 * range_m), 1L, 16383L));
@@ -130,7 +130,7 @@ class MicronHost final : public protocol::Host {
       actions.emplace_back(protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))});
   }
 
-  /// A scan line. Its direction is counted from astern; an inverted sonar counts bearings counter-clockwise.
+  /// Reads a scan line. Its direction is counted from astern; an inverted sonar counts bearings counter-clockwise.
   std::optional<HostPing> ping_from(BytesView payload) {
     const auto data = read_front<HeadData>(payload);
     if (!data || data->step == 0 || data->bearing >= turn) return std::nullopt;
@@ -146,7 +146,7 @@ class MicronHost final : public protocol::Host {
     ping.facts = {++pings_, 1, rows, eight_bits ? 8u : 4u, row_m, rows * row_m, frequency_hz, 0};
     ping.facts.note = text::format("bearing %.1f deg", (data->bearing - ahead) * 360.0 / turn);
     protocol::Line line;
-    // 17 = 255 / 15: bins of 4 bits get the scale of those of 8.
+    // 17 = 255 / 15 converts bins of 4 bits to the scale of 8 bits.
     for (const std::byte bin : bins) line.push_back(static_cast<float>(std::to_integer<int>(bin) * (eight_bits ? 1 : 17)));
     const auto directions = static_cast<std::size_t>(std::max(turn / data->step, 4));
     if (sweep_.directions() != directions) sweep_ = protocol::Sweep(directions);

@@ -7,7 +7,7 @@
 namespace sonar::micron {
 namespace {
 
-/// The length as four hexadecimal digits, upper case, as all public drivers expect it.
+/// Returns the length as four hexadecimal digits in upper case, which all public drivers expect.
 std::array<std::uint8_t, 4> digits_of(std::uint16_t length) {
   const std::string text = text::format("%04X", static_cast<unsigned>(length));
   std::array<std::uint8_t, 4> digits{};
@@ -35,8 +35,8 @@ bool is_known(Id id) {
   return false;
 }
 
-/// Returns the length of the frame with this header. A frame states its length twice, as digits and as a number. Both have to
-/// agree, so that bytes of an image that look like the start of a frame are seldom mistaken for one.
+/// Returns the length of the frame with this header. A frame states its length twice, as digits and as a number. Both must agree,
+/// so that bytes of an image are seldom mistaken for the start of a frame.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   const auto header = read_front<Header>(bytes);
   if (!header || header->hex_length != digits_of(header->length) || (strict && !is_known(header->id))) return std::nullopt;

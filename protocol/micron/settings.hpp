@@ -29,7 +29,7 @@ struct Settings {
 /// Compares settings without the bearing, which changes with every ping.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
-/// The settings in `held`; if it is null, those of a new device.
+/// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// The longest interval of this many bins that complaint() accepts.

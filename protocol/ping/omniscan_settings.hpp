@@ -18,7 +18,7 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 using HeldSettings = protocol::Held<Settings>;
-/// The settings in `held`; if it is null, those of a new device.
+/// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// The reason if the device refuses the parameters, else an empty text.

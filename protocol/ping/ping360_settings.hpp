@@ -32,7 +32,7 @@ struct Settings {
 /// Compares settings without the angle, which changes with every ping.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
-/// The settings in `held`; if it is null, those of a new device.
+/// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// The reason if the device refuses the request, else an empty text.

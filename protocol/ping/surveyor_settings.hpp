@@ -24,7 +24,7 @@ bool same_settings(const Settings& a, const Settings& b);
 /// Returns the detected points of the ping, as a std::vector<Detection>.
 std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const Ping& ping);
 using HeldSettings = protocol::Held<Settings>;
-/// The settings in `held`; if it is null, those of a new device.
+/// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
 /// The reason if the device refuses the parameters, else an empty text.

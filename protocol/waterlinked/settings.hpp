@@ -67,7 +67,7 @@ struct HeldSettings final : RangeImageSettings {
   Settings settings;
 };
 Settings initial_settings(const protocol::DeviceState& device);
-/// The settings in `held`; if it is null, initial_settings().
+/// Returns the settings in `held`; if it is null, initial_settings().
 Settings settings_from(const VendorSettings* held, const protocol::DeviceState& device);
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
