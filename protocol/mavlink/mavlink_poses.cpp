@@ -207,8 +207,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Heartbeat::id:
       return handle(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
-      // Autopilots send the same attitude in both forms. The form with a quaternion has priority, so that no attitude is used
-      // twice.
+      // Autopilots send the same attitude in both forms. Only the form with a quaternion is used, to use none twice.
       if (!received_within(AttitudeQuaternion::id, at.now, source_silence)) handle(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:
