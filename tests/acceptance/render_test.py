@@ -170,6 +170,18 @@ class Render(unittest.TestCase):
         poses.write_text("t,x,y,z\n0,0,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, "--pose-frame", "ENU_FLU", "--format", "raw", out=self.path / "third"), 0, "1 of 1")
 
+    def test_poses_about_another_origin_are_told(self):
+        poses = self.path / "poses.csv"
+        poses.write_text("# frame: ENU_FLU\n# origin: 47.61,-122.33,0\nt,x,y,z\n0,0,0,-1\n", encoding="utf-8")
+        for lat, notes in ((47.61, 0), (47.6, 1)):
+            origin = f", origin: {{lat: {lat}, lon: -122.33}}}}"
+            self.config.write_text(CONFIG.replace("l-targets.yaml}", "l-targets.yaml" + origin), encoding="utf-8")
+            result = self.render("--poses", poses, "--quiet", "--format", "raw", out=self.path / f"at{notes}")
+            self.expect(result, 0)
+            self.assertEqual(result.stderr.count("poses.csv states an origin that is 1112 m from world.origin"), notes, result.stderr)
+        about = json.loads((self.path / "at1/render.json").read_text(encoding="utf-8"))
+        self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
+
     def test_snapshots_do_not_smear(self):
         """Poses too far apart for a vehicle: the sonar is at rest in each ping, with one note, also in render.json."""
         snapshots = self.path / "snapshots.csv"

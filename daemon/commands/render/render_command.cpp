@@ -17,6 +17,7 @@
 #include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/render_pings.hpp"
 #include "daemon/config/effective_switches.hpp"
+#include "daemon/config/products.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 
 namespace sonar::render {
@@ -94,10 +95,12 @@ Result<RenderInput> input_of(const RenderCommand& command) {
       if (const auto r = follow(job, *file, command.poses, body); !r) return tl::make_unexpected(r.error());
     }
   }
-  std::set<std::string> ranges;  // each note once, although a sweep repeats it for every step
-  for (const RenderJob& job : input->jobs)
-    if (std::string note = note_of_range(job); !note.empty()) ranges.insert(std::move(note));
-  input->notes.insert(input->notes.end(), ranges.begin(), ranges.end());
+  std::set<std::string> once;  // each note once, although a sweep repeats it for every step
+  for (const RenderJob& job : input->jobs) {
+    if (std::string note = note_of_range(job); !note.empty()) once.insert(std::move(note));
+    for (std::string& note : notes_of_config(job.config)) once.insert(std::move(note));
+  }
+  input->notes.insert(input->notes.end(), once.begin(), once.end());
   bool is_noted = false;
   for (RenderJob& job : input->jobs) {
     // Motion that was requested is computed even if the poses look like snapshots.

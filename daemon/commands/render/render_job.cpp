@@ -67,7 +67,9 @@ Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const st
   job.snapshots = are_snapshots(**trajectory);
   job.begins_at = Time{} + file.begins_at;
   // The poses of the file replace the initial pose and the trajectory of the vehicle.
-  job.vehicle() = {.name = job.vehicle().name, .initial_pose = {}, .plan = {.trajectory = *std::move(trajectory)}};
+  job.vehicle() = {.name = job.vehicle().name,
+                   .initial_pose = {},
+                   .plan = {.trajectory = *std::move(trajectory), .file = name, .origin = file.origin}};
   return {};
 }
 
