@@ -48,11 +48,20 @@ std::size_t split_at(char mark, std::string_view line, Line& fields) {
   return count;
 }
 
-/// Splits a line of values. In a table with commas, semicolons or bars, empty fields count too, because a missing value must not
-/// shift the values after it. A line with only empty fields, which spreadsheets write for an empty row, has no values.
-std::size_t split_values(std::string_view line, Line& words) {
-  for (const char mark : {';', '|', ','}) {
-    if (line.find(mark) == line.npos) continue;
+/// True if tabs separate the fields of a table that begins with this line; otherwise they are blanks.
+bool has_tab_marks(std::string_view line) {
+  Line fields;
+  const std::size_t count = line.find('\t') == line.npos ? 0 : split_at('\t', line, fields);
+  return count >= 3 && std::all_of(fields.begin(), fields.begin() + static_cast<std::ptrdiff_t>(count),
+                                   [](auto field) { return !field.empty(); });
+}
+
+/// Splits a line of values. In a table with commas, semicolons, bars or (if `by_tabs`) tabs, empty fields count too, because a
+/// missing value must not shift the values after it. A line with only empty fields, which spreadsheets write for an empty row, has
+/// no values.
+std::size_t split_values(std::string_view line, bool by_tabs, Line& words) {
+  for (const char mark : {';', '|', ',', '\t'}) {
+    if (line.find(mark) == line.npos || (mark == '\t' && !by_tabs)) continue;
     const std::size_t count = split_at(mark, line, words);
     const auto fields = std::span(words).first(count);
     if (std::ranges::all_of(fields, [](std::string_view field) { return field.empty(); })) return 0;
@@ -175,14 +184,15 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
   std::vector<Point> points;
   Line words;
   std::size_t line = 0, first_count = 0;
-  bool has_names = false;
+  bool has_names = false, by_tabs = false;
   std::pair<std::size_t, Order> comment;  // order by the names in a comment, and their number
   const char line_end = text.find('\n') == text.npos ? '\r' : '\n';
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find(line_end, at), text.size());
     const std::string_view this_line = text.substr(at, end - at);
-    const std::size_t count = split_values(this_line, words);
+    if (points.empty()) by_tabs = by_tabs || has_tab_marks(this_line);
+    const std::size_t count = split_values(this_line, by_tabs, words);
     at = end + 1, ++line;
     if (count == 0) continue;
     if (!words[0].empty() && (words[0].find_first_of("#%!>") == 0 || words[0].starts_with("//"))) {

@@ -142,11 +142,15 @@ TEST(XyzGrid, AnEmptyFieldIsAHoleAndShiftsNoOthers) {
   for (const char* text :
        {"x,y,z,id\n0,0,-1,5\n10,0,,5\n0,20,-3,5\n10,20,-4,5\n", "0;0;-1\n10;0;\n0;20;-3\n10;20;-4\n",
         "0, 0, -1\r\n10, 0, \r\n0, 20, -3\r\n10, 20, -4\r\n", "id,x,y,z\n1,0,0,-1\n2,10,0,\n3,0,20,\"-3\"\n4,10,20,-4\n",
-        "y,x,z\n,,\n0,0,-1\n0,10,\n,,\n20,0,-3\n20,10,-4\n,,\n", "# y,x,z\n0,0,-1,\n0,10,,\n20,0,-3,\n20,10,-4,\n"}) {
+        "y,x,z\n,,\n0,0,-1\n0,10,\n,,\n20,0,-3\n20,10,-4\n,,\n", "# y,x,z\n0,0,-1,\n0,10,,\n20,0,-3,\n20,10,-4,\n",
+        "x\ty\tz\tid\n0\t0\t-1\t5\n10\t0\t\t5\n0\t20\t-3\t5\n10\t20\t-4\t5\n",
+        "0\t0\t-1\r\n10\t0\t\r\n0\t20\t-3\r\n10\t20\t-4\r\n"}) {
     const auto grid = read_xyz_heights(files.write("p.csv", text), {});
     ASSERT_TRUE(grid) << text << grid.error().text;
     EXPECT_THAT(grid->z_m, ::testing::ElementsAre(-1, ::testing::IsNan(), -3, -4)) << text;
   }
+  EXPECT_TRUE(read_xyz_heights(files.write("p.csv", "0\t\t0\t\t-1\n10\t\t0\t-2\n0\t20\t-3\n10\t20\t-4\n"), {}))
+      << "tabs as blanks";
   EXPECT_THAT(read_xyz_heights(files.write("p.csv", "0,0,-1\n,0,-2\n"), {}).error().text, HasSubstr("line 2: three numbers"));
 }
 
