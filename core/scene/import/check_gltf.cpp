@@ -274,7 +274,8 @@ MeshFault glb_fault(std::string_view file) {
   if (length < head + chunk_head + number(head))
     return "its head announces " + bytes(length) + ", less than its JSON takes; export it again";
   if (chunk == 1 && file.find("\"uri\"") == file.npos)
-    return "has no binary chunk, so its vertices are missing or in another file; export it with them";
+    return "has no binary chunk behind its JSON (byte " + std::to_string(head + chunk_head + number(head)) +
+           "), where a GLB keeps its vertices; export it again as one .glb file with its buffers";
   return std::nullopt;
 }
 
