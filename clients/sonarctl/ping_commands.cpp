@@ -182,7 +182,6 @@ Run add_record(CLI::App& app) {
     chosen.source = std::move(*source);
     std::erase_if(chosen.files, [](const auto& file) { return file.second.empty(); });
     chosen.status = !arguments->no_status;
-    if (!chosen.source.control.empty()) chosen.control = ControlOptions{chosen.source.control, chosen.source.token_file};
     return record(chosen);
   };
 }

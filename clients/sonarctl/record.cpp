@@ -23,30 +23,21 @@ using recording::RecordedMessage;
 
 constexpr int most_status_at_once = 32;
 
-/// The sonard that serves the device, with the name and profile of the sonar and a subscription to its pings.
-struct Steering {
-  ControlClient client;
-  std::string sonar, profile;
-};
-Result<Steering> ask_sonard(const ControlOptions& options, const Endpoint& device) {
-  auto client = ControlClient::open(options);
-  if (!client) return tl::unexpected(client.error());
-  const auto status = client->status();
-  if (!status) return tl::unexpected(status.error());
-  for (const v1::SonarStatus& sonar : (*status)->sonars()) {
-    if (sonar.listens() != text_from(device) && sonar.advertised() != device.host) continue;
-    control::Subscribe subscription;
-    subscription.pings = true;
-    if (auto answer = client->request(subscription); !answer) return tl::unexpected(answer.error());
-    return Steering{std::move(*client), sonar.name(), sonar.profile()};
-  }
-  return failure(ErrorKind::usage, "the sonard at " + text_from(client->at()) + " serves no sonar at " + text_from(device));
+/// The sonard that serves the device, and a subscription to its pings.
+Result<Served> ask_sonard(const SourceOptions& source, const Make* make, const Endpoint& device) {
+  const std::chrono::milliseconds patience = source.control.empty() ? 300ms : ControlOptions().connect_patience;
+  auto served = served_at({source.control, source.token_file, patience}, make, device);
+  if (!served) return served;
+  control::Subscribe subscription;
+  subscription.pings = true;
+  if (auto answer = served->control.request(subscription); !answer) return tl::unexpected(answer.error());
+  return served;
 }
 
 /// Records one device up to its limits.
 class Recorder {
  public:
-  Recorder(const RecordOptions& options, OpenedStream opened, std::optional<Socket> status, std::optional<Steering> steering,
+  Recorder(const RecordOptions& options, OpenedStream opened, std::optional<Socket> status, std::optional<Served> served,
            RecordFiles& files)
       : options_(options),
         waits_(options.source, opened.stream, opened.observes),
@@ -54,7 +45,7 @@ class Recorder {
         stream_(std::move(opened.stream)),
         device_ip_(stream_.conversation().device.address),
         status_(std::move(status)),
-        steering_(std::move(steering)),
+        served_(std::move(served)),
         files_(files) {}
 
   Result<void> run() {
@@ -121,15 +112,15 @@ class Recorder {
   }
 
   Result<void> take_poses() {
-    while (steering_) {
-      const auto event = steering_->client.next_event(0ms);
+    while (served_) {
+      const auto event = served_->control.next_event(0ms);
       if (!event) {
         std::fprintf(stderr, "sonarctl: poses are no longer recorded: %s\n", event.error().text.c_str());
-        steering_.reset();
+        served_.reset();
         return {};
       }
       if (!*event) return {};
-      if (!(*event)->has_ping() || (*event)->ping().sonar() != steering_->sonar) continue;
+      if (!(*event)->has_ping() || (*event)->ping().sonar() != served_->sonar) continue;
       const v1::PingEvent& ping = (*event)->ping();
       const Time fired(std::chrono::nanoseconds(ping.fired_at_ns()));
       if (Result<void> written = files_.write_pose(last_, fired, control::pose_of(ping)); !written) return written;
@@ -143,7 +134,7 @@ class Recorder {
   PingStream stream_;
   std::uint32_t device_ip_;
   std::optional<Socket> status_;
-  std::optional<Steering> steering_;
+  std::optional<Served> served_;
   RecordFiles& files_;
   NoticeLog notices_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -172,23 +163,30 @@ Result<void> record_device(RecordOptions options) {
   source.keeps_messages = true;
   const Result<Endpoint> device = find_device(source, true);
   if (!device) return tl::unexpected(device.error());
-  std::optional<Steering> steering;
-  if (options.control) {
-    auto asked = ask_sonard(*options.control, *device);
+  std::optional<Served> served;
+  if (!source.control.empty()) {
+    auto asked = ask_sonard(source, source.make, *device);
     if (!asked) return tl::unexpected(asked.error());
-    steering = std::move(*asked);
+    served = *std::move(asked);
   }
   auto opened = open_stream(source, *device);
   if (!opened) return tl::unexpected(opened.error());
   const PingStream& stream = opened->stream;
   const std::string at = text_from(stream.device());
+  if (!served && !options.mcap.empty()) {  // the sonar is there now, and so is its sonard, if it has one on this computer
+    auto asked = ask_sonard(source, &stream.make(), stream.device());
+    if (asked)
+      served = *std::move(asked);
+    else
+      std::fprintf(stderr, "sonarctl: no poses will be recorded: %s\n", asked.error().text.c_str());
+  }
   auto status = listen_to_status(options, stream.make());
-  auto files = RecordFiles::create(options, stream.make(), stream.conversation(), steering ? steering->sonar : "sonar",
-                                   steering ? steering->profile : "");
+  auto files = RecordFiles::create(options, stream.make(), stream.conversation(), served ? served->sonar : "sonar",
+                                   served ? served->profile : "");
   if (!files) return tl::unexpected(files.error());
   std::printf("connected to %s\n", at.c_str());
   std::fflush(stdout);
-  Recorder recorder(options, *std::move(opened), std::move(status), std::move(steering), *files);
+  Recorder recorder(options, *std::move(opened), std::move(status), std::move(served), *files);
   const Result<void> ran = recorder.run();
   const double took_s = recorder.seconds();
   print_notices(recorder.rest_of_notices());

@@ -26,8 +26,7 @@ struct RecordOptions {
   double seconds = 0;                                       // 0 = no limit
   std::uint64_t pings = 0;                                  // 0 = no limit
   bool status = true;                                       // also record the status datagrams of the device
-  std::string status_on;                  // address for receiving status: HOST:PORT; empty = 0.0.0.0 and the make's port
-  std::optional<ControlOptions> control;  // the sonard that reports the sonar's name and poses, for the MCAP file
+  std::string status_on;  // address for receiving status: HOST:PORT; empty = 0.0.0.0 and the make's port
 };
 
 class RecordFiles {

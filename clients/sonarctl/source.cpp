@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <thread>
 
-#include "clients/sonarctl/control_client.hpp"
 #include "clients/sonarctl/elapsed.hpp"
 #include "clients/sonarctl/waiting.hpp"
 #include "core/text/format.hpp"
@@ -54,18 +53,20 @@ struct Observed {
   const Make* make = nullptr;
   bool has_client = false, has_observer = false;
 };
-/// The only sonar at the device's address, as reported by the sonard that serves it.
-Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device) {
+struct ServedStatus {
+  ControlClient control;
+  v1::SonarStatus sonar;
+};
+Result<ServedStatus> status_at(const ControlOptions& options, const Make* make, const Endpoint& device) {
   const std::string place = device.port != 0 ? text_from(device) : device.host;
-  auto control = ControlClient::open({source.control, source.token_file});
+  auto control = ControlClient::open(options);
   if (!control) return tl::unexpected(control.error());
   const auto status = control->status();
   if (!status) return tl::unexpected(status.error());
   std::vector<const v1::SonarStatus*> found;
   for (const v1::SonarStatus& s : (*status)->sonars())
-    if (is_at(s, device) && (source.make == nullptr || source.make == &protocol::make_of_profile(s.profile())))
-      found.push_back(&s);
-  const std::string of_make = source.make != nullptr ? " of the make " + std::string(source.make->name()) : "";
+    if (is_at(s, device) && (make == nullptr || make == &protocol::make_of_profile(s.profile()))) found.push_back(&s);
+  const std::string of_make = make != nullptr ? " of the make " + std::string(make->name()) : "";
   if (found.empty())
     return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar" + of_make + " at " +
                                                place + "; --control names another");
@@ -74,7 +75,14 @@ Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device
     for (const v1::SonarStatus* s : found) all += (all.empty() ? "" : ", ") + own_address(*s) + " (" + s->name() + ")";
     return failure(ErrorKind::usage, "several sonars are at " + place + ": name one with its port: " + all);
   }
-  const v1::SonarStatus& s = *found.front();
+  return ServedStatus{*std::move(control), *found.front()};
+}
+
+/// As reported by the sonard that serves the device.
+Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device) {
+  const auto found = status_at({source.control, source.token_file}, source.make, device);
+  if (!found) return tl::unexpected(found.error());
+  const v1::SonarStatus& s = found->sonar;
   const Make& make = protocol::make_of_profile(s.profile());
   if (s.observers().empty()) return tl::unexpected(no_observers(s, make));
   const auto at = parse_endpoint(s.observers(), device);
@@ -147,6 +155,12 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
 }
 
 }  // namespace
+
+Result<Served> served_at(const ControlOptions& options, const Make* make, const Endpoint& device) {
+  auto found = status_at(options, make, device);
+  if (!found) return tl::unexpected(found.error());
+  return Served{std::move(found->control), found->sonar.name(), found->sonar.profile()};
+}
 
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device) {
   if (source.observe) return observe(source, device);

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "clients/sonarctl/commands.hpp"
+#include "clients/sonarctl/control_client.hpp"
 
 namespace sonar::clients {
 
@@ -28,6 +29,15 @@ struct OpenedStream {
 /// Connects as an observer if source.observe is set. It also does so, with a note on standard error, if the sonar has no free
 /// client slot and its sonard reports an address for observers.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
+
+/// A sonard, and name and profile of one of its sonars.
+struct Served {
+  ControlClient control;
+  std::string sonar, profile;
+};
+/// The only sonar at the device's address (port 0: any port) of the sonard at `control`. `make`: null = any. Error usage: there
+/// are several; unavailable: there is none.
+Result<Served> served_at(const ControlOptions& control, const Make* make, const Endpoint& device);
 
 /// Calls find_device() and open_stream().
 Result<OpenedStream> connect(const SourceOptions& source, bool say);

@@ -179,6 +179,7 @@ class Recorded(Files):
             process.send_signal(signal.SIGINT)
             said = process.communicate(timeout=60)[0]
         self.assertEqual(process.returncode, 0, said)
+        self.assertRegex(said, "no poses will be recorded: no sonard answers on the control stream, tcp 127.0.0.1:14770")
         sent = split(self.read("raw"))
         self.assertEqual(oculus_log_messages(self.read("oculus")), sent)
         topics = [(topic, data) for topic, _, data in mcap_checker.check(self.read("mcap")).messages]

@@ -12,6 +12,7 @@ import urllib.request
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
+import mcap_checker  # noqa: E402
 from browser import Browser  # noqa: E402
 from demos_test import DEMOS, HTTP, SONAR, UNCOVERED, demo, product_of  # noqa: E402
 from foxglove_viewer import Refused, Viewer  # noqa: E402
@@ -119,7 +120,16 @@ class Recordings(PageChecks, unittest.TestCase):
             done = run(SONARCTL, "listen", f"{replay.address}:51200", "--wait", "100", "--quiet", "--pings", 2)
             self.assertIn("pings 2", done.stdout, done.stderr)
 
-    def test_only_files_of_the_folder_are_played(self):
+    def test_recordings_of_sonarctl_have_name_and_poses_of_the_sonar(self):
+        """They come from the sonard of this computer, although no --control names it."""
+        with demo("oculus"):
+            done = run(SONARCTL, "record", "--mcap", "run.mcap", "--wait", 100, "--pings", 20)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertNotIn("no poses", done.stderr)
+        topics = {topic for topic, _, _ in mcap_checker.check(pathlib.Path("run.mcap").read_bytes()).messages}
+        self.assertLessEqual({"/front/image", "/front/pose"}, topics)
+
+    def test_only_files_of_the_folder(self):
         pathlib.Path("sonard-recordings").mkdir()
         pathlib.Path("sonard-recordings/broken.mcap").write_bytes(b"nothing")
         pathlib.Path("secret.mcap").write_bytes(b"nothing")
