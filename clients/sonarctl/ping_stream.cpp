@@ -222,6 +222,10 @@ void PingStream::carry_out(protocol::HostActions actions) {
         carry_out(host_->on_reply(of_device, now()));
       }
     } else if (auto* ping = std::get_if<HostPing>(&action)) {
+      std::string limits;
+      for (const std::string& limit : ping->limited) limits += (limits.empty() ? "" : "; ") + limit;
+      if (limits != limits_ && !limits.empty()) notices.push_back("the sonar limits what was asked: " + limits);
+      limits_ = std::move(limits);
       items_.push_back({Wait::data, std::move(*ping), std::exchange(notices, {}), std::exchange(kept_, {}), {}});
     } else if (auto* notice = std::get_if<protocol::Notice>(&action)) {
       notices.push_back(std::move(notice->text));

@@ -105,6 +105,7 @@ class PingStream {
   std::chrono::milliseconds answer_patience_{};
   std::chrono::steady_clock::time_point probe_at_{};  // if no datagram arrives before
   std::deque<Item> items_;                            // items that next() has not returned yet
+  std::string limits_;                                // HostPing::limited of the last ping
   std::optional<Error> ended_;                        // set when the conversation has ended; empty text: the sonar closed it
   bool has_answered_ = false;                         // at the first port
   bool is_turned_away_ = false;                       // the sonar closed the connection before it answered

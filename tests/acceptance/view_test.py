@@ -2,6 +2,7 @@
 import os
 import pathlib
 import pty
+import re
 import select
 import signal
 import socket
@@ -164,6 +165,15 @@ class View(unittest.TestCase):
                     waits.terminate()
                     waits.stderr.read()
                     self.assertRegex(said, rf"connected to {daemon.address}:52100, .*; requested pings; waiting for the first one, at most 10 s")
+
+    def test_a_value_that_the_sonar_limits_is_told_once(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for command in (("view", "--png", f"{folder}/a.png"), ("view", "--live", "--pings", "3", "--png", f"{folder}/b.png"),
+                            ("record", "--pings", "3", "--raw", f"{folder}/c"), ("listen", "--pings", "3"), ("stats",)):
+                result = self.daemon.ctl(*command, "--range", "15")
+                self.assertEqual(result.returncode, 0, result.stderr)
+                told = re.findall(r"the sonar limits what was asked: range (?:9\.99|10\.00) m, not 15 m", result.stderr)
+                self.assertEqual(len(told), 1, (command, result.stderr))
 
     def test_contradictions_are_named(self):
         for arguments, word in [((), "--term"), (("--term", "--live", "--from-raw", "x"), "--ping"),
