@@ -31,7 +31,6 @@ class M3Vendor final : public protocol::PushingVendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return m3::gain_percent(settings_from(device.settings.get()));
   }
-  bool keeps_settings() const override { return true; }  // API: they are those of the maker's program, not of a driver
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port&, const protocol::DeviceState&, Time) const override {
     return std::make_unique<SilentDialogue>();
   }

@@ -72,14 +72,14 @@ class Talk {
     host = std::move(next);
     const std::vector<std::uint16_t> own(make.ports.size(), 40000);
     carry_out(host->on_open(own, now));
+    tick();
   }
 
   /// Steps of a tenth of a second, with a ping in each unless the device pings on request.
   void run(int steps) {
     for (int i = 0; i < steps && !error; ++i) {
       now += 100ms;
-      for (Line& line : lines_)
-        while (line.dialogue->next_tick() <= now) react(line, line.dialogue->on_tick(now, false));
+      tick();
       carry_out(host->on_tick(now));
       carry_out(host->on_demand(now));
       const bool by_request = make.each_ping_requested || make.scans;
@@ -125,6 +125,10 @@ class Talk {
     const Port* port;
     std::unique_ptr<Dialogue> dialogue;
   };
+  void tick() {
+    for (Line& line : lines_)
+      while (line.dialogue->next_tick() <= now) react(line, line.dialogue->on_tick(now, false));
+  }
   void react(const Line& line, const Reaction& reaction) {
     for (const Bytes& reply : reaction.replies) deliver(line.host_port, reply);
     apply(reaction.events);
@@ -203,6 +207,9 @@ class Talk {
 
 inline constexpr double range_m = 3;
 inline std::size_t model_of(const Make& make) { return make.name() == "aris" ? 2 : 0; }  // an ARIS 3000 shows 3 m
+
+/// Steps of a Talk; a head that turns may report its parameters, for which its host waits, once a second.
+inline int steps(const Make& make, int usual) { return usual + (make.scans ? 10 : 0); }
 
 class Hosts : public testing::TestWithParam<Make> {};
 

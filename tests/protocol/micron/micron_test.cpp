@@ -234,14 +234,23 @@ TEST(Micron, AnOverrideIsWhatAHostWouldSet) {
 
 TEST(MicronHost, SendsParametersAgainToAHeadThatHasRestarted) {
   const auto host = *make_host({});
-  EXPECT_EQ(host->on_open({}, at_s(0)).size(), 2u);
+  EXPECT_TRUE(host->on_open({}, at_s(0)).empty()) << "the head may have parameters, which are to be put back";
   Talk talk;
   talk.run_to(1);
-  const auto actions = host->on_bytes(0, talk.take().at(0), at_s(1));
+  const Bytes alive = talk.take().at(0);
+  EXPECT_EQ(host->on_bytes(0, alive, at_s(1)).size(), 2u) << "parameters and a request";
+  const auto actions = host->on_bytes(0, alive, at_s(1.1));
   ASSERT_EQ(actions.size(), 1u);
   EXPECT_EQ(read_frame(std::get<protocol::HostSend>(actions[0]).bytes)->header.id, Id::head_command);
-  EXPECT_TRUE(host->on_tick(at_s(0.4)).empty());
-  EXPECT_EQ(host->on_tick(at_s(0.6)).size(), 1u) << "a request may be lost";
+  EXPECT_TRUE(host->on_tick(at_s(1.4)).empty());
+  EXPECT_EQ(host->on_tick(at_s(1.6)).size(), 1u) << "a request may be lost";
+}
+
+TEST(MicronHost, SendsParametersToAHeadThatSaysNothing) {
+  const auto host = *make_host({});
+  host->on_open({}, at_s(0));
+  EXPECT_TRUE(host->on_tick(at_s(2)).empty());
+  EXPECT_EQ(host->on_tick(*host->next_tick()).size(), 2u);
 }
 
 }  // namespace

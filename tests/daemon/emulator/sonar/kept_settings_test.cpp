@@ -42,7 +42,7 @@ TEST(KeptSettings, StayAfterTheLastClientOnlyForMakesThatKeepThem) {
     EXPECT_TRUE(sonar.state().settings->equals(*initial)) << "as after a restart";
     time.close(next);
   }
-  EXPECT_THAT(keepers, ::testing::ElementsAre("dvl", "m3", "micron", "norbit"));
+  EXPECT_THAT(keepers, ::testing::ElementsAre("dvl", "micron", "norbit"));
 }
 
 TEST(KeptSettings, ASonarThatStartsToPingByItselfUsesThePresentOnes) {
