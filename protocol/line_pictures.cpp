@@ -15,6 +15,13 @@ constexpr float silent_db = -std::numeric_limits<float>::infinity();
 
 }  // namespace
 
+PolarImage empty_fan(double half_rad, double range_m) {
+  constexpr std::size_t rows = 300, beams = 100;  // a picture shows half a beam outside of the outermost ones
+  PolarImage image{rows, beams, range_m / rows, {}, std::vector<float>(rows * beams)};
+  for (std::size_t i = 0; i < beams; ++i) image.azimuth_rad.push_back(half_rad * (1 - 2 * static_cast<double>(i) / (beams - 1)));
+  return image;
+}
+
 /// The strongest sample between two ranges, so that a thin echo stays in the picture when the newest line has larger rows.
 float Waterfall::level_between(const Row& row, double from_m, double to_m) {
   if (!(row.row_m > 0)) return silent_db;

@@ -12,6 +12,7 @@
 #include "core/base/geometry.hpp"
 #include "core/text/format.hpp"
 #include "protocol/limits.hpp"
+#include "protocol/line_pictures.hpp"
 #include "protocol/norbit/norbit.hpp"
 #include "protocol/norbit/settings.hpp"
 
@@ -22,7 +23,6 @@ using protocol::HostActions;
 using protocol::HostPing;
 using text::format;
 
-constexpr std::size_t empty_rows = 500;
 constexpr std::size_t longest_reply = 512;
 constexpr double usual_range_m = 10, usual_rate_hz = 10;
 constexpr auto patience = std::chrono::seconds(2);  // wait for a silent port after the other port has sent its packet
@@ -89,12 +89,6 @@ PolarImage with_samples(PolarImage fan, const Column& column) {
 
 /// Where the fan looks: mode 0 is that of a forward-looking sonar.
 double elevation_of(int sonar_mode) { return sonar_mode == 0 ? 0 : -pi / 2; }
-
-/// A fan without samples. Points are drawn on it if there is no water column.
-PolarImage empty_fan(double range_m) {
-  const double half_rad = rad_from_deg(swath_deg / 2);
-  return {empty_rows, 2, range_m / empty_rows, {half_rad, -half_rad}, std::vector<float>(2 * empty_rows)};
-}
 
 /// The two packets of a ping arrive at two ports, at each port in the order of the pings. The packets of a slow connection may
 /// arrive long after those of the other.
@@ -276,7 +270,7 @@ class NorbitHost final : public protocol::Host {
     last_ = ping.facts.number;
     if (fan) shown_m_ = ping.facts.range_m;
     seen.column = fan ? SonarPicture::Column::sent : SonarPicture::Column::none;
-    if (!fan) seen.image = empty_fan(std::max(ping.facts.range_m, shown_m_));
+    if (!fan) seen.image = protocol::empty_fan(rad_from_deg(swath_deg / 2), std::max(ping.facts.range_m, shown_m_));
     ping.picture = [kept, fan]() -> Result<PolarImage> {
       if (fan) return with_samples(*fan, *kept->column);
       return failure(ErrorKind::usage, "a picture needs the water column, port 2211: sonarctl listen prints the points");

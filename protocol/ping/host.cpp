@@ -92,7 +92,7 @@ HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
   HostPing found;
   SonarPicture seen{.kind = PictureKind::points, .image = {}, .elevation_rad = -pi / 2};
   const double half_rad = static_cast<double>(surveyor::vendor().models().front()->modes.front().horizontal_aperture_rad) / 2;
-  seen.image = {point_rows, 2, end_m / point_rows, {half_rad, -half_rad}, std::vector<float>(2 * point_rows)};
+  seen.image = protocol::empty_fan(half_rad, end_m);
   std::sort(polar.begin(), polar.end(), std::greater<>());
   polar.erase(std::unique(polar.begin(), polar.end(), [](auto a, auto b) { return a.first == b.first; }), polar.end());
   PolarImage image;

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/base/geometry.hpp"
+#include "core/image/draw_picture.hpp"
+
 namespace sonar::protocol::line_pictures_test {
 namespace {
 
@@ -36,6 +39,13 @@ TEST(Waterfall, ShowsTheDecibelsThatItsSamplesHave) {
   HostPing ping;
   waterfall.add({0, -24, -48, -68}, 0, 1, Time{}, ping);
   EXPECT_THAT(ping.drawing().image.samples, testing::ElementsAre(255, 127.5, 0, 0));
+}
+
+TEST(EmptyFan, APictureShowsNothingBesideIt) {
+  SonarPicture points{.kind = PictureKind::points, .image = empty_fan(pi / 4, 10)};
+  const Raster seen = *PicturePainter({360, *find_colour_map("gray"), false}).draw(points);  // it opens downwards
+  EXPECT_EQ(seen.at(180, seen.height / 2).r, 0) << "no echo";
+  for (const int x : {20, 340}) EXPECT_EQ(seen.at(x, 60).r, outside_colour.r) << x;
 }
 
 TEST(Waterfall, RowsHaveTheirAgesAndNoneIsInTheFuture) {
