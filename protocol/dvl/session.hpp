@@ -28,7 +28,7 @@ protocol::Bytes response_line(const std::string& to, const Outcome& outcome);
 /// acoustics disabled it pings only for triggers, of which each client has its own queue.
 class Session : public protocol::Dialogue {
  public:
-  /// `device` must outlive it.
+  /// `device` must outlive the object.
   Session(const protocol::DeviceState& device, Time now) : device_(device), due_(next_report_after(now)) {}
 
   protocol::Reaction on_tick(Time now, bool ping_pending) override;

@@ -47,7 +47,8 @@ DistanceSensor distance_sensor_of(const Measured& measured) {
       std::find_if(axes.begin(), axes.end(), [&](const auto& axis) { return dot(looks, axis.first) >= axis_tolerance; });
   m.orientation = along != axes.end() ? along->second : custom;
   if (m.orientation == custom) {
-    // The message has the rotation between FRD axes. Half turns about x, before and after it, change the signs of y and z.
+    // The message has the rotation between FRD axes. Half turns about x, before and after the rotation, change the signs of y and
+    // z.
     const Quatd& q = measured.sensor_in_body;
     m.wxyz = {static_cast<float>(q.w), static_cast<float>(q.x), static_cast<float>(-q.y), static_cast<float>(-q.z)};
   }

@@ -191,7 +191,7 @@ Quatd between(Quatd a, Quatd b, double u) {
 }  // namespace
 
 void Attitudes::put(const AttitudeReading& reading) {
-  if (!readings_.empty() && reading.at_ms < readings_.back().at_ms) return;  // it arrived late; the readings are in order of time
+  if (!readings_.empty() && reading.at_ms < readings_.back().at_ms) return;  // late; readings are in the order of time
   if (!readings_.empty() && reading.at_ms == readings_.back().at_ms) readings_.pop_back();
   readings_.push_back(reading);
   if (readings_.size() > most) readings_.pop_front();

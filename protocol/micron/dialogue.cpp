@@ -161,7 +161,7 @@ class MicronDialogue final : public protocol::Dialogue {
     --wanted_;
     const HeadCommand command = settings().command;
     const auto after = listening(command) + transfer(command, device_.options);
-    // After a late ping the scan does not catch up: the next one is due now at the earliest.
+    // After a late ping the scan does not catch up; the next ping is due now at the earliest.
     arrives_ = std::max(awaited_.fired_at() + after + turning(scan_.advance(command)), now);
   }
   void forget_pings() {
@@ -170,7 +170,7 @@ class MicronDialogue final : public protocol::Dialogue {
   }
 
   Settings settings() const { return settings_from(device_.settings.get()); }
-  /// The settings after the changes of this call, which the daemon has not made yet.
+  /// Returns the settings after the changes of this call, which the daemon has not made yet.
   Settings settings_after(const Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }

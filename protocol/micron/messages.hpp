@@ -34,17 +34,17 @@ enum class Id : std::uint8_t {
 
 inline constexpr std::uint8_t line_feed = 0x0A, host_node = 255, usual_node = 2;
 inline constexpr std::size_t frame_size = 14;       // size of a message without payload
-inline constexpr std::size_t uncounted = 6;         // bytes that `length` leaves out: the first 5 and the last
-inline constexpr std::size_t longest_frame = 4096;  // the longest real one, head data, has 1545
+inline constexpr std::size_t uncounted = 6;         // bytes that `length` does not count: the first 5 and the last
+inline constexpr std::size_t longest_frame = 4096;  // the longest real frame, head data, has 1545 bytes
 
 struct Header {
   std::uint8_t start = '@';
-  std::array<std::uint8_t, 4> hex_length{};  // digits
+  std::array<std::uint8_t, 4> hex_length{};  // hexadecimal digits of the length
   std::uint16_t length = 0;
   std::uint8_t source = 0, destination = 0;
   std::uint8_t count = 0;  // length - 5; 0 in head data that is not split
   Id id{};
-  std::uint8_t sequence = 0x80;  // the last piece
+  std::uint8_t sequence = 0x80;  // 0x80 = the last packet of the message
   std::uint8_t node = 0;
 };
 constexpr void fields(auto& visit, wire::Like<Header> auto& m) {
@@ -115,7 +115,7 @@ inline constexpr std::uint8_t whole_command = 0x01, long_command = 0x1D, reverse
 
 /// Followed by `size` bytes of bins.
 struct HeadData {
-  std::uint16_t total = 0;  // bytes up to the last bin
+  std::uint16_t total = 0;  // number of bytes up to the last bin
   std::uint8_t device_type = 0, head_status = 0, sweep = 0;
   std::uint16_t control = 0, range_dm = 0;
   std::uint32_t carrier = 0;
@@ -149,7 +149,7 @@ constexpr void fields(auto& visit, wire::Like<HeadData> auto& m) {
 static_assert(wire::wire_size<HeadData>() == 31);
 
 struct Alive {
-  std::uint8_t lacks_parameters = 0;  // 0x80 without
+  std::uint8_t lacks_parameters = 0;  // 0x80 = the head has no parameters
   std::uint32_t time_ms = 0;
   std::uint16_t bearing = 0;
   std::uint8_t head_info = 0;
@@ -183,7 +183,7 @@ constexpr void fields(auto& visit, wire::Like<VersionData> auto& m) {
 }
 static_assert(wire::wire_size<Alive>() == 8 && wire::wire_size<VersionData>() == 11);
 
-/// The whole frame. `source` or `destination` must be host_node.
+/// Returns the whole frame. `source` or `destination` must be host_node.
 Bytes framed(Id id, std::uint8_t source, std::uint8_t destination, BytesView payload);
 inline Bytes from_head(Id id, BytesView payload) { return framed(id, usual_node, host_node, payload); }
 inline Bytes from_host(Id id, BytesView payload) { return framed(id, host_node, usual_node, payload); }
@@ -192,9 +192,9 @@ struct Message {
   Header header;
   BytesView payload;  // payload of the frame that was read
 };
-/// nullopt if the bytes are not a whole frame.
+/// Reads a frame; returns nullopt if the bytes are not a whole frame.
 std::optional<Message> read_frame(BytesView frame);
-/// Reads a message off the front of the payload.
+/// Reads a message from the front of the payload.
 template <class M>
 std::optional<M> read_front(BytesView payload) {
   M message;
@@ -205,7 +205,7 @@ std::optional<M> read_front(BytesView payload) {
 
 extern const recording::Framing framing;
 
-/// Bins of 4 bits, two in a byte, the nearer one in the upper half if `upper_first`. A single last bin is padded with a 0.
+/// Packs bins of 4 bits, two in a byte, the nearer bin in the upper half if `upper_first`. A single last bin is padded with a 0.
 Bytes packed(BytesView bins, bool upper_first);
 Bytes unpacked(BytesView bytes);
 

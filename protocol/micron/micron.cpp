@@ -16,8 +16,8 @@ class MicronVendor final : public protocol::Vendor {
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return micron::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return micron::options(); }
-  int default_max_clients() const override { return 1; }  // a serial line
-  bool keeps_settings() const override { return true; }   // at its serial line the head cannot know that a host has left
+  int default_max_clients() const override { return 1; }  // a serial line has one host
+  bool keeps_settings() const override { return true; }   // on a serial line the head cannot detect that a host has left
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {
@@ -26,7 +26,7 @@ class MicronVendor final : public protocol::Vendor {
   double gain_percent(const protocol::DeviceState& device) const override {
     return 100.0 * settings_from(device.settings.get()).command.gain / most_gain;
   }
-  /// Scans the half circle ahead to and fro, in steps of a grad.
+  /// Scans the half circle ahead, back and forth, in steps of a grad.
   std::optional<ScanStep> scan_step(std::uint32_t number, const protocol::DeviceState& device) const override {
     constexpr std::uint32_t steps = 200;
     Settings s = settings_from(device.settings.get());

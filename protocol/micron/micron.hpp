@@ -1,5 +1,5 @@
-// The Micron, a mechanically scanning sonar: its head turns one beam. A host requests each scan line over a serial line, here
-// over TCP. The device, the driver, and the codec for recordings.
+// The Micron, a mechanically scanning sonar, whose head turns one beam. A host requests each scan line over a serial line, here
+// over TCP. This folder has the device, the driver, and the codec for recordings.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 namespace sonar::micron {
 
 const protocol::Vendor& vendor();
-/// A host's conversation: keep-alives, reboot, parameters, and one scan line for each request.
+/// Makes the dialogue with a host: keep-alives, reboot, parameters, and one scan line for each request.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now);
 
 inline constexpr std::uint16_t tcp_port = 4001;  // usual for serial-to-TCP converters

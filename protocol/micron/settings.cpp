@@ -45,10 +45,10 @@ SonarModel make_model() {
 
 int wrapped(int bearing) { return (bearing % turn + turn) % turn; }
 bool is_continuous(const HeadCommand& c) { return (c.control & control::continuous) != 0; }
-/// Width of the sector. If both limits are equal, it is a full turn.
+/// Returns the width of the sector. If both limits are equal, it is a full turn.
 int width_of(const HeadCommand& c) { return c.left == c.right ? turn - 1 : wrapped(c.right - c.left); }
 
-/// Level of an 8-bit value of ADSpan or ADLow: 255 is 80 dB.
+/// Returns the level of an 8-bit value of ADSpan or ADLow: 255 is 80 dB.
 float db_of(int value) { return static_cast<float>(receiver_db * value / 255); }
 
 }  // namespace
@@ -71,7 +71,7 @@ bool same_settings(const Settings& a, const Settings& b) {
   return a.command == b.command && a.has_parameters == b.has_parameters;
 }
 
-// 750 m/s is half of the nominal sound speed, because the sound travels there and back.
+// 750 m/s is half of the nominal sound speed, because the sound travels out and back.
 int longest_interval(int bins) { return static_cast<int>(farthest_m / (bins * bin_unit_s * 750)); }
 
 std::string complaint(const HeadCommand& c) {
@@ -87,8 +87,8 @@ std::string complaint(const HeadCommand& c) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const HeadCommand& c = settings.command;
-  // The device samples at intervals of time and has no setting for the sound speed. So each row
-  // has the range from which the sound came at the true speed.
+  // The device samples at intervals of time and has no setting for the sound speed. So the range of each row follows from the
+  // true sound speed.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;
@@ -143,8 +143,8 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   return change_to(s, device);
 }
 
-// Bearings grow clockwise from above; 3200 is ahead (ROCK, MCG). The head of an inverted sonar hangs upside down; in its own
-// frame bearings grow counter-clockwise.
+// Seen from above, bearings increase clockwise; 3200 is ahead (ROCK, MCG). The head of an inverted sonar hangs upside down, so in
+// its own frame bearings increase counter-clockwise.
 double head_rad(const Settings& settings) {
   const double to_starboard = (settings.bearing - ahead) * 2 * pi / turn;
   return (settings.command.control & control::inverted) != 0 ? to_starboard : -to_starboard;
@@ -160,15 +160,15 @@ std::chrono::nanoseconds transfer(const HeadCommand& c, const protocol::OptionVa
 
 std::chrono::nanoseconds turning(int sixteenths) { return std::abs(sixteenths) * turn_of_a_sixteenth; }
 
-// A head outside of the sector goes first to the limit from which it scans. Within the sector, or with a full turn, it scans from
-// its present bearing. With `stare` it goes to the left limit and stays there.
+// A head outside the sector first turns to the limit from which it scans. Within the sector, or with a full turn, it scans from
+// its present bearing. With `stare` it turns to the left limit and stays there.
 int Scan::begin(const HeadCommand& c) {
   to_right = (c.control & control::to_right) != 0;
   const bool stares = (c.control & control::stare) != 0;
   if (!stares && (is_continuous(c) || wrapped(bearing - c.left) <= width_of(c))) return 0;
   const int way = wrapped((to_right || stares ? c.left : c.right) - bearing);
   bearing = wrapped(bearing + way);
-  // The head takes the shorter way.
+  // The head turns by the smaller angle.
   return way <= turn / 2 ? way : way - turn;
 }
 

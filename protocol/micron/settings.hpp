@@ -1,4 +1,4 @@
-// The Micron: its product, the checks of its settings, the scan of its head, and the message of a ping. Pure functions; sources:
+// The Micron: the model, the checks of the settings, the scan of the head, and the message of a ping. Sources:
 // docs/protocols/micron.md.
 #pragma once
 
@@ -23,7 +23,7 @@ inline constexpr int most_gain = 210;
 
 struct Settings {
   HeadCommand command;
-  bool has_parameters = false;    // a host has sent the command since the last reboot
+  bool has_parameters = false;    // true: a host has sent the command since the last reboot
   std::uint16_t bearing = ahead;  // bearing of the present ping
 };
 /// Compares settings without the bearing, which changes with every ping.
@@ -32,34 +32,34 @@ using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The longest interval of this many bins that complaint() accepts.
+/// Returns the longest interval that complaint() accepts for this number of bins.
 int longest_interval(int bins);
-/// The reason if the device ignores the command, else an empty text.
+/// Returns the reason if the device ignores the command, else an empty text.
 std::string complaint(const HeadCommand& command);
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device);
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// Angle by which the sonar is rotated to port, so that it looks in the direction of its head [rad].
+/// Returns the angle [rad] by which the sonar is rotated to port, so that it points in the direction of the head.
 double head_rad(const Settings& settings);
-/// listening(): duration of a ping's bins. transfer(): time to send the scan line on the link.
+/// listening() returns the duration of a ping's bins, transfer() the time to send the scan line over the link.
 std::chrono::nanoseconds listening(const HeadCommand& command);
 std::chrono::nanoseconds transfer(const HeadCommand& command, const protocol::OptionValues& options);
 std::chrono::nanoseconds turning(int sixteenths);
 
-/// The bearing of the head in a scan, and its direction. A sector is the part from the left limit clockwise to the right one.
+/// The bearing of the head in a scan, and its direction. A sector is the part from the left limit clockwise to the right limit.
 struct Scan {
   int bearing = ahead;
   bool to_right = true;
   /// Turns the head into the sector of a new command. Returns the rotation in 1/16 grad, positive to the right.
   int begin(const HeadCommand& command);
-  /// Turns the head to the bearing of the next ping. Returns the rotation likewise.
+  /// Turns the head to the bearing of the next ping. Returns the rotation in 1/16 grad, positive to the right.
   int advance(const HeadCommand& command);
 };
-/// HeadData::sweep: 0 within a scan, 1 at its left limit, 2 at its right one.
+/// Returns HeadData::sweep: 0 within a scan, 1 at its left limit, 2 at its right limit.
 std::uint8_t sweep_code(const HeadCommand& command, int bearing);
 
-/// The message mtHeadData for a ping.
+/// Makes the message mtHeadData for a ping.
 Bytes encode(const Ping& ping, const protocol::DeviceState& device);
 
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView frame);

@@ -20,9 +20,9 @@ using text::format;
 
 constexpr std::size_t longest_line = 512;
 constexpr std::size_t events_per_call = 32;                  // limits the events that a hostile host can cause
-constexpr auto end_of_line = std::chrono::milliseconds(20);  // ROS sends no end of line
+constexpr auto end_of_line = std::chrono::milliseconds(20);  // silence that ends a line, because ROS sends no line end
 
-/// A setting with its arguments. They are read before and written after the settings change.
+/// A command with arguments: reads or changes a setting.
 struct Command {
   std::string_view name;
   std::string (*values)(const Settings&);
@@ -49,7 +49,7 @@ constexpr std::array<Command, 6> commands{{
      [](Settings& s, const std::vector<double>& a) { s.sound_mps = a[0]; }, 1, "m/s, -1: measured"},
 }};
 
-/// The values of a command that never change, or are only read; empty: there is no such command.
+/// Returns the values of a command that never change, or can only be read; empty if there is no such command.
 std::string fixed_values(std::string_view name, const DeviceState& device) {
   const int mode = mode_of(*device.model);
   if (name == "set_mode" || name == "set_flip") return std::to_string(mode);
@@ -83,7 +83,7 @@ std::vector<std::string_view> words_of(std::string_view line) {
   return words;
 }
 
-/// nullopt if a word is not a finite number.
+/// Returns the numbers; nullopt if a word is not a finite number.
 std::optional<std::vector<double>> numbers_of(std::span<const std::string_view> words) {
   std::vector<double> numbers;
   for (const std::string_view word : words) {
@@ -109,7 +109,7 @@ class CommandDialogue final : public protocol::Dialogue {
       else if (line_.size() < longest_line)
         line_ += c;
     }
-    // Simulated time may stand still while a host waits for the reply.
+    // Simulated time may not advance while a host waits for the reply.
     ends_at_ = line_.empty() ? Time::max() : now + end_of_line;
     if (device_.simulated_time) end_line(reaction);
     return reaction;

@@ -25,7 +25,7 @@ using text::format;
 
 constexpr std::size_t longest_reply = 512;
 constexpr double usual_range_m = 10, usual_rate_hz = 10;
-constexpr auto patience = std::chrono::seconds(2);  // wait for a silent port after the other port has sent its packet
+constexpr auto patience = std::chrono::seconds(2);  // time for which a packet waits for the packet of the other port
 constexpr std::size_t most_waiting = 1024, most_waiting_bytes = 64u << 20;
 
 constexpr std::array<std::string_view, 4> set_by_us{"set_range", "set_gain", "set_rate", "set_power"};
@@ -56,8 +56,8 @@ std::vector<std::pair<double, double>> points_of(const Bathymetry& bathymetry) {
   return points;
 }
 
-/// The picture of a water column without its samples. nullopt: the angles do not rise from port to starboard, or the samples have
-/// no range.
+/// Makes the picture of a water column, without samples. Returns nullopt if the angles do not increase from port to starboard, or
+/// if the samples have no range.
 std::optional<PolarImage> fan_of(const Column& column) {
   PolarImage fan;
   fan.rows = column.front.samples;
@@ -91,7 +91,7 @@ PolarImage with_samples(PolarImage fan, const Column& column) {
 double elevation_of(int sonar_mode) { return sonar_mode == 0 ? 0 : -pi / 2; }
 
 /// The two packets of a ping arrive at two ports, at each port in the order of the pings. The packets of a slow connection may
-/// arrive long after those of the other.
+/// arrive much later than those of the other connection.
 class NorbitHost final : public protocol::Host {
  public:
   explicit NorbitHost(std::optional<Bytes> request) : request_(std::move(request)) {}
@@ -174,7 +174,7 @@ class NorbitHost final : public protocol::Host {
     Kind missing() const { return bathymetry ? of_column : of_bottom; }
   };
 
-  /// The ping to which a packet belongs. Null if it was shown without the packet.
+  /// Returns the ping to which a packet belongs; null if the ping was shown without the packet.
   Parts* place_for(std::uint32_t number, Kind kind, std::size_t bytes, Time now, HostActions& actions) {
     ++counts_.messages;
     heard_at_[kind] = now;
@@ -197,15 +197,16 @@ class NorbitHost final : public protocol::Host {
     return &*ping;
   }
 
-  /// The time at which a ping is shown without its other packet. A port that has never sent anything may be closed on purpose, so
-  /// only the first pings wait for it.
+  /// Returns the time at which a ping is shown without its other packet. A port that has never sent a packet may be closed on
+  /// purpose, so only the first pings wait for it.
   Time given_up_at(const Parts& ping) const {
     const std::optional<Time>& heard = heard_at_[ping.missing()];
     return (heard ? std::max(*heard, ping.since) : begun_.value_or(ping.since)) + patience;
   }
 
-  /// Shows the complete pings. If a port has already sent the packet of a later ping, the earlier ping counts as missing: a slow
-  /// reader loses different pings at each port. If the port is silent at `now`, the ping is shown incomplete.
+  /// Shows the complete pings. If a port has already sent the packet of a later ping, the packet of the earlier ping counts as
+  /// missing, because a slow reader loses different pings at each port. If the port is silent at `now`, the ping is shown
+  /// incomplete.
   void show(std::optional<Time> now, HostActions& actions) {
     while (!waiting_.empty()) {
       Parts& ping = waiting_.front();
@@ -288,7 +289,7 @@ class NorbitHost final : public protocol::Host {
   std::map<std::string_view, std::string> before_;  // settings that the sonar had, by the name of their command
   static recording::MessageSplitter splitter() { return {recording::Origin::device, framing}; }
   std::array<recording::MessageSplitter, 3> splitters_{splitter(), splitter(), splitter()};
-  std::deque<Parts> waiting_;  // the first ping of the queue lacks a packet
+  std::deque<Parts> waiting_;  // begins with a ping that lacks a packet
   std::size_t waiting_bytes_ = 0;
   std::optional<Time> begun_;
   std::array<std::optional<Time>, kinds> heard_at_;
@@ -304,7 +305,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (auto accepted = protocol::accept_settings(wanted, "a Norbit", {"range", "rate", "gain", "mode"}); !accepted)
     return tl::unexpected(accepted.error());
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a Norbit has one mode only");
-  // The sonar would not change its settings, and ping with them.
+  // These settings are refused here, because the sonar would ignore them and ping with its present settings.
   for (const std::string& why :
        {protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Norbit", shortest_m, farthest_m),
         protocol::rate_complaint(wanted.settings, "a Norbit", models().front()->max_rate_hz)})

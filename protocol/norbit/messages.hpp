@@ -24,7 +24,7 @@ inline constexpr std::uint32_t preamble = 0xDEADBEEF, version = 4;
 struct Header {
   std::uint32_t start = preamble;
   Type type{};
-  std::uint32_t size = 0;  // size of the packet, this header included
+  std::uint32_t size = 0;  // size of the packet, including this header
   std::uint32_t version = norbit::version, reserved = 0;
   std::uint32_t crc = 0;  // checksum of everything after the header
 };
@@ -39,11 +39,11 @@ constexpr void fields(auto& visit, wire::Like<Header> auto& m) {
 
 inline constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
 
-/// Angles are in radians and rise from port to starboard.
+/// Start of a bathymetry packet. Angles are in radians and increase from port to starboard.
 struct BathymetryFront {
   float sound_mps = 0, sample_hz = 0;
   std::uint32_t beams = 0, ping = 0;
-  double time_s = 0, network_time_s = 0;  // Unix time of the transmission
+  double time_s = 0, network_time_s = 0;  // UNIX time of the transmission
   float rate_hz = 0;
   std::uint16_t kind = 4;
   std::uint8_t beam_mode = 2, sonar_mode = 1;  // 2: 256 beams, equally spaced in angle
@@ -80,7 +80,7 @@ inline constexpr std::uint8_t signal_to_noise = 1, no_flyer = 2;
 }
 
 struct Beam {
-  std::uint32_t sample = 0;  // 0: no bottom
+  std::uint32_t sample = 0;  // sample number of the bottom; 0 = no bottom
   float angle_rad = 0;
   std::uint16_t upper_gate = 0, lower_gate = 0;  // samples
   float intensity = 0;                           // without the gain

@@ -16,7 +16,7 @@ class NorbitVendor final : public protocol::Vendor {
   std::string_view name() const override { return "norbit"; }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return norbit::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
-  int default_max_clients() const override { return 12; }  // four drivers, each on all three ports
+  int default_max_clients() const override { return 12; }  // four drivers that each use all three ports
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
   Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
                                                   const protocol::DeviceState& device) const override {

@@ -13,7 +13,7 @@
 namespace sonar::norbit {
 
 const protocol::Vendor& vendor();
-/// The conversation at a port: commands as lines of text, or none at ports that only send. `device` must outlive it.
+/// Makes the dialogue at a port: lines of text with commands, or nothing at ports that only send. `device` must outlive it.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::Port& port, const protocol::DeviceState& device, Time now);
 
 inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, bathymetry_port},
@@ -45,9 +45,9 @@ struct Column {
   BytesView pixels, directions;  // pixels: row by row, near first; each row in the order of the directions
   double sample_m() const;
 };
-/// nullopt if `packet` is not a whole packet of this type, or its checksum is wrong.
+/// Returns nullopt if `packet` is not a whole packet of this type, or if its checksum is wrong.
 std::optional<Bathymetry> read_bathymetry(BytesView packet);
-/// Also nullopt if its pixels do not have 16 bits.
+/// Returns nullopt like read_bathymetry(), and if the pixels do not have 16 bits.
 std::optional<Column> read_column(BytesView packet);
 
 /// Corrects the checksums of packets whose bytes were changed.

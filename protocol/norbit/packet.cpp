@@ -42,7 +42,7 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin from, bo
   return header.size;
 }
 
-/// The bytes that follow the header of a whole packet of that type.
+/// Returns the bytes after the header of a whole packet of that type; nullopt for other bytes.
 std::optional<BytesView> body_of(BytesView packet, Type type) {
   Header header;
   wire::Reader reader(packet);
@@ -53,7 +53,7 @@ std::optional<BytesView> body_of(BytesView packet, Type type) {
   return recording::crc32(body) == header.crc ? std::optional(body) : std::nullopt;
 }
 
-/// Power of each code re full scale, with the analog gain at range 0.
+/// Returns the power of each code re full scale, with the analog gain at range 0.
 const std::vector<float>& powers_of_codes() {
   static const std::vector<float> all = [] {
     const double span = static_cast<double>(sample_format.ceiling_db) - static_cast<double>(sample_format.floor_db);
@@ -70,7 +70,7 @@ double power_at(const Ping& ping, int row, int beam) {
   return static_cast<double>(powers_of_codes()[sample_code(ping.samples, at, 2)]);
 }
 
-/// The parts that both packets have.
+/// Fills in the fields that both packets have.
 template <class Front>
 Front front_of(const Ping& ping, const protocol::DeviceState& device) {
   Front front;
@@ -90,7 +90,7 @@ Grid grid_in(const Ping& ping) {
                  static_cast<double>(ping.request.settings.device_sound_speed_mps));
 }
 
-/// The pixels of the water column in the order of its packet.
+/// Returns the pixels of the water column in the order of the packet.
 Bytes column_pixels(const Ping& ping) {
   const Settings settings = settings_from(ping.request.vendor_settings.get());
   const Grid grid = grid_in(ping);
@@ -116,7 +116,7 @@ Bytes column_pixels(const Ping& ping) {
   return pixels;
 }
 
-/// The parts of the packets that take long to make. They are made with the ping, off the I/O thread.
+/// The parts of the packets that take long to make. They are made with the ping, not on the I/O thread.
 struct Findings {
   std::vector<Detection> bottom;
   Bytes pixels;
@@ -128,7 +128,7 @@ std::shared_ptr<const Findings> find(const Ping& ping) {
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 
-/// nullopt if the bytes do not begin with a header.
+/// Reads a header; returns nullopt if the bytes do not begin with one.
 std::optional<Header> header_of(BytesView bytes) {
   Header header;
   wire::Reader reader(bytes);

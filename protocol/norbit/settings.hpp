@@ -1,4 +1,4 @@
-// The settings that commands change, and the grids of samples that follow from them. Pure functions.
+// The settings that commands change, and the resulting grids of samples.
 #pragma once
 
 #include <memory>
@@ -21,9 +21,9 @@ inline constexpr double shortest_m = 1;                           // of the rang
 inline constexpr double frequency_khz = 400, bandwidth_khz = 80;  // DFD
 inline constexpr int amplitude = 15, pulse_us = 500;              // DFD
 
-/// Two products: one looks down, the other ahead.
+/// Returns two products: one points down, the other ahead.
 std::span<const std::shared_ptr<const SonarModel>> models();
-/// 0: forward, 1: bathymetry; as the sonar is mounted.
+/// Returns the mode, which depends on the mounting of the sonar: 0 = forward, 1 = bathymetry.
 int mode_of(const SonarModel& model);
 
 inline constexpr double most_gain_db = 40;          // DFD
@@ -36,18 +36,18 @@ inline constexpr SampleFormat sample_format{
 struct Settings {
   bool power = false;
   double start_m = 0, stop_m = 10;  // chosen; DFD: 50, or the product's value
-  double rate_hz = -1;              // -1: as fast as the range permits
+  double rate_hz = -1;              // -1 = the highest rate that the range permits
   double gain_db = 20;
   int samples = 256, beams = 128;  // size of the water column; the number of samples is approximate
-  double sound_mps = -1;           // -1: as measured
+  double sound_mps = -1;           // -1 = the measured sound speed
   bool operator==(const Settings&) const = default;
 };
-/// The bottom and the pixels of the water column (packet.cpp).
+/// Finds the bottom and the pixels of the water column (packet.cpp).
 std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const Ping& ping);
 using HeldSettings = protocol::Held<Settings>;
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The reason why a sonar cannot have these settings; empty if it can.
+/// Returns the reason why a sonar cannot have these settings; empty if it can.
 std::string complaint(const Settings& settings);
 
 /// Sample numbers count at sample_hz from the transmission. A row of the ping has `step` samples; a row of the water column has
@@ -55,7 +55,7 @@ std::string complaint(const Settings& settings);
 struct Grid {
   int first = 0, step = 1, rows = 0;  // first: a multiple of step * thin
   int thin = 1;
-  double sample_m = 0;  // range per sample
+  double sample_m = 0;  // difference in range of two samples
   int column_rows() const { return (rows + thin - 1) / thin; }
 };
 Grid grid_of(const Settings& settings, double sound_mps);

@@ -28,15 +28,15 @@ bool is_known(MessageType type) {
   return false;
 }
 
-/// Length of the message with this header. The magic number has only two bytes, so samples may contain it: `strict` also demands
-/// a known type of message.
+/// Returns the length of the message with this header. The magic number has only two bytes, so samples may contain it; `strict`
+/// also requires a known type of message.
 std::optional<std::size_t> length_of(wire::BytesView header, Origin from, bool strict) {
   const MessageHeader read = header_of(header);
   if (strict && !is_known(read.type)) return std::nullopt;
   return message_length(read, from == Origin::device ? Sender::device : Sender::client);
 }
 
-/// The sender of a message. Only a status message has the model.
+/// Returns the sender of a message. Only a status message states the model.
 std::optional<recording::Sender> sender_of(const RecordedMessage& message) {
   if (!framing.begins_message(message.bytes, Origin::device)) return std::nullopt;
   const MessageHeader header = header_of(message.bytes);
@@ -47,7 +47,7 @@ std::optional<recording::Sender> sender_of(const RecordedMessage& message) {
   return recording::Sender{is_named ? *found : models().front(), header.source, is_named};
 }
 
-/// The samples of a ping result without the row gains that lie between them.
+/// Returns the samples of a ping result without the row gains between them.
 std::optional<recording::Samples> samples_of(wire::BytesView message) {
   if (message.size() < header_size || header_of(message).type != MessageType::ping_result) return std::nullopt;
   const auto ping = decode_ping(message);

@@ -33,14 +33,14 @@ std::size_t row_bytes(const DecodedPing& ping) {
   return gain_bytes(ping.head.fixed) + std::size_t{ping.head.fixed.beam_count} * ping.bytes_per_sample();
 }
 
-/// An unsigned number of 1 to 4 bytes; the caller has checked that the bytes are there.
+/// Returns an unsigned number of 1 to 4 bytes; the caller must check that the bytes exist.
 std::uint32_t unsigned_at(const wire::Bytes& bytes, std::size_t offset, std::size_t size) {
   std::uint32_t value = 0;
   for (std::size_t i = 0; i < size; ++i) value |= std::to_integer<std::uint32_t>(bytes[offset + i]) << (8 * i);
   return value;
 }
 
-// A ping that states more than it holds is decoded as far as possible, so that identity_violations() can report the mistake.
+// A ping that states more data than it has is decoded as far as possible, so that identity_violations() can report the mistake.
 void read_bearings(DecodedPing& ping, wire::Reader& reader) {
   const std::size_t count = std::min<std::size_t>(ping.head.fixed.beam_count, reader.remaining() / 2);
   ping.bearings_cdeg.resize(count);

@@ -1,5 +1,5 @@
-// The driver's side: an incremental decoder for the messages of a device, and the checks that real drivers make. The host of the
-// make (host.cpp), its codec and tests use them; make_fire (fire.hpp) makes the fire messages.
+// The driver's side: an incremental decoder for the messages of a device, and the checks that real drivers make, for the host of
+// the make (host.cpp), the codec and tests. make_fire (fire.hpp) makes the fire messages.
 #pragma once
 
 #include <optional>
@@ -26,13 +26,13 @@ struct DecodedPing {
   std::size_t rows() const { return has_image ? head.fixed.row_count : 0; }
   std::size_t beams() const { return has_image ? head.fixed.beam_count : 0; }
   std::size_t bytes_per_sample() const;
-  /// Row 0 nearest, beam 0 the first bearing. row < rows(), beam < beams().
+  /// Returns a sample; row 0 is nearest, beam 0 has the first bearing. row < rows(), beam < beams().
   std::uint32_t sample(std::size_t row, std::size_t beam) const;
-  /// The bytes of the row's samples in the message.
+  /// Returns the bytes of the row's samples in the message.
   wire::BytesView row_samples(std::size_t row) const;
-  /// Positive to port, sonard's convention.
+  /// Returns the azimuth of a beam, positive to port (the convention of sonard).
   double azimuth_rad(std::size_t beam) const;
-  /// Range of a row's centre [m], as the device computes it.
+  /// Returns the range of a row's centre [m], as the device computes it.
   double row_range_m(std::size_t row) const;
 };
 
@@ -40,7 +40,7 @@ struct LogText {
   MessageHeader header;
   std::string text;
 };
-struct OtherMessage {  // a type that drivers ignore, or a known type too short to read
+struct OtherMessage {  // a message of a type that drivers ignore, or one too short to read
   MessageHeader header;
   std::size_t size = 0;
   std::string why;
@@ -49,17 +49,17 @@ using Received = std::variant<DecodedPing, DummyMessage, UserConfigMessage, LogT
 
 /// Decodes a framed message of at least 16 bytes.
 Received decode_message(wire::BytesView message);
-/// nullopt if the message is shorter than the fixed part.
+/// Decodes a ping; returns nullopt if the message is shorter than the fixed part.
 std::optional<DecodedPing> decode_ping(wire::BytesView message);
 /// Decodes a status datagram. Errors: bad_data for fewer than 142 bytes or a wrong magic.
 Result<StatusMessage> decode_status(wire::BytesView datagram);
 
-/// Decodes the TCP stream of a device, in chunks of any size. Lengths above reply_limit are junk; nothing is allocated for
-/// them.
+/// Decodes the TCP stream of a device, in chunks of any size. Bytes that state a length above reply_limit are junk, for which
+/// nothing is allocated.
 class Decoder {
  public:
   void append(wire::BytesView received) { framer_.append(received); }
-  /// Drain until empty before the next append.
+  /// Call it until it returns nullopt, before the next append.
   std::optional<Received> next();
   std::uint64_t skipped_bytes() const { return framer_.skipped_bytes(); }
   std::size_t buffered_bytes() const { return framer_.buffered_bytes(); }
@@ -68,14 +68,14 @@ class Decoder {
   Framer framer_{Sender::device};
 };
 
-/// The identities between fields that drivers check and this ping result violates (identities.cpp).
+/// Returns the identities between fields that drivers check, and that this ping result violates (identities.cpp).
 std::vector<std::string> identity_violations(const DecodedPing& ping);
-/// The differences between a request and its echo that drivers check. `gain_echo` as the option.
+/// Returns the differences between a request and its echo that drivers check. `gain_echo`: value of the option.
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo = "auto");
-/// The violations of a status datagram: length, type, device id, addresses, status bits.
+/// Returns the violations of a status datagram: length, type, device id, addresses, status bits.
 std::vector<std::string> status_violations(const StatusMessage& status, std::size_t datagram_size);
 
-/// Checks between pings: one device id, rising ping ids. Skipped ids are counted, not reported as violations.
+/// Checks that all pings have one device id, and that ping ids increase. Skipped ids are counted, not reported as violations.
 class PingSequence {
  public:
   std::vector<std::string> add(const DecodedPing& ping);

@@ -20,7 +20,7 @@ using protocol::StoreAddress;
 constexpr std::size_t notices_per_call = 8;               // bounds the log output that a hostile client can cause
 constexpr auto greeting_after = std::chrono::seconds(2);  // known drivers send their first fire message within a second
 
-/// One client's conversation (docs/protocols/oculus.md, section 1). Three states:
+/// The dialogue with one client (docs/protocols/oculus.md, section 1), which has three states:
 /// - Before the first valid fire message the device sends a dummy after each period of silence. A client that stays silent gets
 ///   the log text of section 6.1.
 /// - While the device pings it sends no dummy, however long a ping takes. With network trigger it sends dummies while no ping
@@ -39,8 +39,8 @@ class OculusDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // The daemon carries out the events of this call after the call has returned. `stored_` lets a read see a write that is in
-    // the same bytes.
+    // The daemon carries out the events of this call after the call has returned. With `stored_`, a read gets the result of a
+    // write in the same bytes.
     stored_ = device_.stored_address;
     const std::uint64_t skipped_before = framer_.skipped_bytes();
     framer_.append(received);
@@ -123,9 +123,9 @@ class OculusDialogue final : public protocol::Dialogue {
     }
   }
 
-  /// A client that waits for pings is sent no dummy, however long they take: ENSTA's driver interprets a dummy as the
-  /// acknowledgement of standby, and then stores standby as its ping rate. With network trigger the device waits for the client,
-  /// so dummies are sent. Fire messages of an observer change nothing.
+  /// True if the client waits for pings. It then gets no dummy, however long a ping takes, because ENSTA's driver interprets a
+  /// dummy as the acknowledgement of standby, and then stores standby as its ping rate. With network trigger the device waits for
+  /// the client, so dummies are sent. Fire messages of an observer change nothing.
   bool expects_pings() const {
     const auto* held = dynamic_cast<const HeldFire*>(device_.settings.get());
     if (!is_heard() || held == nullptr || table_rate_hz(held->fire.settings.ping_rate) <= 0) return false;
@@ -151,10 +151,10 @@ class OculusDialogue final : public protocol::Dialogue {
       stored_ = {config.ip_address, config.ip_mask, config.dhcp_enable != 0};
       reaction.events.emplace_back(StoreAddress{stored_});
     }
-    // By default a write is not answered, because the vendor's viewer reads the values back itself.
+    // By default a write is not answered, because the vendor's viewer reads the values afterwards.
     if (write && text_option(device_.options, option_name::user_config_write) != "reply") return;
     reaction.replies.push_back(make_user_config(device_.id, stored_, device_));
-    postpone_dummy(now);  // VND reads the first 28 bytes after its request as the reply, so no dummy may precede it
+    postpone_dummy(now);  // VND reads the first 28 bytes after its request as the reply, so no dummy may precede the reply
   }
 
   void notice(Reaction& reaction, std::string text) {
@@ -176,10 +176,10 @@ class OculusDialogue final : public protocol::Dialogue {
   protocol::StoredAddress stored_;  // copied from the device at each call, then changed by writes in that call
   Time dummy_at_{};
   std::shared_ptr<const VendorSettings> fired_;  // settings of the last fire message
-  bool is_heard_ = false;                        // the device has used settings of this client at some time
-  bool requested_ping_ = false;                  // a network trigger requested a ping, which is not sent yet
+  bool is_heard_ = false;                        // true: the device has used settings of this client
+  bool requested_ping_ = false;                  // true: a network trigger requested a ping that is not sent yet
   std::optional<Time> greeting_at_;
-  bool greets_silent_ = false;  // a fire message, or a ping to the client, cancels the greeting
+  bool greets_silent_ = false;  // true: a greeting is due; a fire message, or a ping to the client, cancels it
   std::size_t notices_ = 0;
 };
 

@@ -39,7 +39,7 @@ PingResultV1 version_1(const PingHead& head) {
   return to;
 }
 
-/// Appends the rows, the nearest first. A row is its gain, if gains were requested, and its samples from port to starboard.
+/// Appends the rows, nearest first. A row has a gain, if gains were requested, and the samples from port to starboard.
 void append_image(wire::Bytes& out, const PingBlocks& blocks, std::size_t rows) {
   const std::size_t row_bytes = rows == 0 ? 0 : blocks.samples.size() / rows;
   wire::Writer write(out);
@@ -67,7 +67,7 @@ std::uint16_t reply_version(const FireRequest& fire, std::string_view option) {
   if (option == "0") return 0;
   if (option == "1") return 1;
   if (option == "2") return 2;
-  // MRG reads only the short form, BLU only the long one, so a ping has the version of the fire message.
+  // MRG reads only the short form, BLU only the long form, so a ping has the version of the fire message.
   return std::min<std::uint16_t>(fire.version, 2);
 }
 
@@ -84,22 +84,22 @@ void set_environment(PingResultV2& fixed, const PingRequest& request) {
   set_attitude(fixed, request.vehicle_in_world.orientation);
 }
 
-/// Sets the time since power-up as both versions state it. CAP's 32-bit counter rises by 62 502 100 a ping at 16 Hz, so its unit
-/// is a nanosecond and it overflows every 4.3 s; option ping_start_time_unit also allows microseconds.
+/// Sets the time since power-up in the fields of both versions. CAP's 32-bit counter increases by 62 502 100 per ping at 16 Hz,
+/// so its unit is a nanosecond and it overflows every 4.3 s; option ping_start_time_unit also allows microseconds.
 void set_start_time(PingHead& head, std::chrono::nanoseconds since_power_up, std::string_view unit) {
   const auto microseconds = std::chrono::floor<std::chrono::microseconds>(since_power_up).count();
   head.fixed.ping_start_time_s = static_cast<double>(microseconds) * 1e-6;
   head.ping_start_counter = static_cast<std::uint32_t>(unit == "microseconds" ? microseconds : since_power_up.count());
 }
 
-/// The sound speed that the device used. PingSettings hold it as a float; if the request was applied unchanged, the ping must
+/// Returns the sound speed that the device used. PingSettings have a float; if the request was applied unchanged, the ping must
 /// state the client's double exactly.
 double sound_speed_used(const FireSettings& asked, const PingSettings& settings) {
   const bool as_asked = static_cast<float>(asked.sound_speed_mps) == settings.device_sound_speed_mps;
   return as_asked ? asked.sound_speed_mps : static_cast<double>(settings.device_sound_speed_mps);
 }
 
-/// For an empty `ping` it returns the layout with the most fields, which is that of version 2.
+/// True for version 2, and for an empty `ping`, which stands for the layout with the most fields.
 bool has_long_form(wire::BytesView ping) {
   MessageHeader header{.version = 2};
   wire::Reader reader(ping);
@@ -162,11 +162,12 @@ std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad) {
 FireSettings echo_of(const FireSettings& asked, std::string_view gain_echo, double sound_speed_used_mps) {
   FireSettings echo = asked;
   echo.gain_percent = echoed_gain_percent(asked, gain_echo);
-  if (asked.sound_speed_mps == 0) echo.sound_speed_mps = sound_speed_used_mps;  // 0 leaves the choice to the device
+  if (asked.sound_speed_mps == 0) echo.sound_speed_mps = sound_speed_used_mps;  // for 0 the device chooses
   return echo;
 }
 
-// Everything in a ping comes from the request under which it was made, not from the present settings: drivers compare both.
+// Everything in a ping is from the request with which it was made, not from the present settings, because drivers compare request
+// and ping.
 wire::Bytes encode_ping(const Ping& ping, const protocol::DeviceState& device, const FireRequest& fire) {
   const PingSettings& settings = ping.request.settings;
   PingHead head;

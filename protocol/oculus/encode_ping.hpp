@@ -26,10 +26,11 @@ struct PingBlocks {
   wire::BytesView samples;                      // [rows][beams], little-endian
 };
 
-/// Fills in payload size, image offset, image size and message size; no trailing bytes. row_count and beam_count must be set.
+/// Encodes a ping without trailing bytes, and fills in payload size, image offset, image size and message size. row_count and
+/// beam_count must be set.
 wire::Bytes encode_ping(PingHead head, const PingBlocks& blocks);
 
-/// Bearing in 0.01 deg, positive to starboard, truncated towards 0 as in the captured pings.
+/// Returns the bearing in 0.01 deg, positive to starboard, truncated towards 0 as in the captured pings.
 std::int16_t bearing_cdeg_from_azimuth(double azimuth_rad);
 
 /// Returns the fire settings that the ping states (docs/protocols/oculus.md, 5.5). `sound_speed_used_mps` replaces a requested 0.

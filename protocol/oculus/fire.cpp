@@ -24,7 +24,7 @@ std::optional<FireRequest> parse_fire(wire::BytesView message) {
   return fire;
 }
 
-// The version in the header decides the length: 89 bytes from version 2 on, else 53.
+// The version in the header determines the length: 89 bytes from version 2 on, else 53.
 wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination, bool payload_size_zero) {
   const std::size_t length = fire.version >= 2 ? fire_v2_size : fire_v1_size;
   MessageHeader header;
@@ -45,7 +45,7 @@ FireRequest stored_fire() {
   return fire;
 }
 
-// Fire messages are compared as bytes: a client sees a difference in any field, also in those that the device only echoes.
+// Fire messages are compared as bytes, because every field is visible to a client, even if the device only echoes it.
 bool HeldFire::equals(const VendorSettings& other) const {
   const auto* held = dynamic_cast<const HeldFire*>(&other);
   return held != nullptr && make_fire(fire) == make_fire(held->fire);

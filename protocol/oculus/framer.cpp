@@ -3,7 +3,7 @@
 namespace sonar::oculus {
 namespace {
 
-/// Length of a client's message that states a payload size of 0.
+/// Returns the length of a client's message that states a payload size of 0.
 std::size_t natural_length(const MessageHeader& header) {
   switch (header.type) {
     case MessageType::fire:
@@ -55,7 +55,7 @@ std::optional<wire::BytesView> Framer::next() {
       begin_ += *length;
       return waiting.first(*length);
     }
-    // Only one byte is skipped, because a header may begin at the next one.
+    // Only one byte is skipped, because a header may begin at the next byte.
     ++begin_;
     ++skipped_;
   }

@@ -12,7 +12,7 @@ namespace sonar::oculus {
 /// The sender of a stream. Some clients send payload_size 0 (docs/protocols/oculus.md, 2); devices send the true size.
 enum class Sender { client, device };
 
-/// Total length of the message with this header; nullopt for a header that this sender never sends.
+/// Returns the total length of the message with this header; nullopt for a header that this sender never sends.
 std::optional<std::size_t> message_length(const MessageHeader& header, Sender sender);
 
 class Framer {
@@ -21,10 +21,10 @@ class Framer {
 
   /// Adds received bytes. Call next() until it returns nullopt before the next append, so that less than one message remains.
   void append(wire::BytesView received);
-  /// The next whole message, header included; valid until the next call of append or next.
+  /// Returns the next whole message, including the header; it is valid until the next call of append or next.
   std::optional<wire::BytesView> next();
 
-  /// Junk bytes skipped so far.
+  /// Returns the number of junk bytes skipped so far.
   std::uint64_t skipped_bytes() const { return skipped_; }
   std::size_t buffered_bytes() const { return buffer_.size() - begin_; }
 

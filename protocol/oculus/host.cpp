@@ -26,7 +26,7 @@ Result<PolarImage> picture_of(const DecodedPing& ping) {
   for (std::size_t row = 0; row < image.rows; ++row)
     for (std::size_t beam = 0; beam < image.beams; ++beam) image.samples.push_back(static_cast<float>(ping.sample(row, beam)));
   image.full_scale = 254;  // samples of 8 bits saturate there
-  // Wider samples seldom come near their maximum: scaled to it, the picture would be black.
+  // Wider samples are seldom near their maximum, so with that scale the picture would be black.
   if (ping.bytes_per_sample() > 1) image.full_scale = image.brightest(999);
   return image;
 }
@@ -43,7 +43,7 @@ protocol::PingFacts facts_of(const DecodedPing& ping) {
           ping.message.size()};
 }
 
-/// The sonar echoes what was requested, and makes its pings with the nearest values that it has.
+/// Returns the requested values that the sonar could not use. It echoes the request, and pings with its nearest values.
 std::vector<std::string> limits_of(const FireSettings& asked, const protocol::PingFacts& made) {
   std::vector<std::string> limits;
   constexpr double whole_rows = 1.5;  // a range ends with a whole row
@@ -53,8 +53,9 @@ std::vector<std::string> limits_of(const FireSettings& asked, const protocol::Pi
   return limits;
 }
 
-/// Sends a fire message when the connection is open, and again on each ping until the settings that pings state agree with it, as
-/// ENS does. Nothing else is sent: the device pings by itself. `asked` is absent if the sonar's settings are to stay as they are.
+/// Sends a fire message when the connection is open, and again after each ping until the echoed settings agree with it, as ENS
+/// does. Nothing else is sent, because the device then pings without requests. `asked` is absent if the sonar must keep its
+/// settings.
 class OculusHost final : public protocol::Host {
  public:
   OculusHost(std::optional<FireRequest> asked, bool triggered) : asked_(std::move(asked)), triggered_(triggered) {}
@@ -107,7 +108,7 @@ class OculusHost final : public protocol::Host {
     is_satisfied_ = is_satisfied_ || out.echo_mismatches.empty();
     out.picture = [kept = std::make_shared<const DecodedPing>(std::move(ping))] { return picture_of(*kept); };
     actions.emplace_back(std::move(out));
-    // With network trigger each ping needs a request of its own.
+    // With network trigger each ping needs a request.
     if (triggered_ || !is_satisfied_) ask(actions);
   }
 

@@ -8,7 +8,7 @@
 namespace sonar::oculus {
 namespace {
 
-constexpr double tolerated_difference = 0.1;  // gain, sound speed and salinity, as the strictest public driver compares them
+constexpr double tolerated_difference = 0.1;  // limit of the strictest public driver, for gain, sound speed and salinity
 
 std::string number(double value) {
   char text[40];
@@ -42,7 +42,7 @@ class Check {
   std::vector<std::string> violations_;
 };
 
-/// VND, BAS and MRG drop a ping with trailing bytes; APL drops one whose image size contradicts the echoed flags
+/// Checks sizes. VND, BAS and MRG drop a ping with trailing bytes; APL drops a ping whose image size contradicts the echoed flags
 /// (docs/protocols/oculus.md, 5.1).
 void check_sizes(Check& check, const DecodedPing& ping) {
   const PingResultV2& fixed = ping.head.fixed;
@@ -63,7 +63,7 @@ void check_sizes(Check& check, const DecodedPing& ping) {
   check.holds(ping.has_image, "the image does not lie inside the message");
 }
 
-/// ENS divides samples by the root of the row gain, so a gain of 0 is a violation.
+/// Checks the image. ENS divides samples by the root of the row gain, so a gain of 0 is a violation.
 void check_image(Check& check, const DecodedPing& ping) {
   const PingResultV2& fixed = ping.head.fixed;
   check.holds(fixed.row_count >= 1, "there is no row");
@@ -101,7 +101,8 @@ std::vector<std::string> identity_violations(const DecodedPing& ping) {
   return check.violations();
 }
 
-/// ENS and BLU compare these fields of request and echo, and repeat the request until they agree (docs/protocols/oculus.md, 5.5).
+/// Compares the fields of request and echo that ENS and BLU compare; these drivers repeat the request until both agree
+/// (docs/protocols/oculus.md, 5.5).
 std::vector<std::string> echo_violations(const FireRequest& sent, const DecodedPing& ping, std::string_view gain_echo) {
   Check check;
   const FireSettings& asked = sent.settings;
@@ -137,7 +138,7 @@ std::vector<std::string> status_violations(const StatusMessage& status, std::siz
   return check.violations();
 }
 
-// Numbers rise across clients, so a gap may be a ping for another client. It is counted and not a violation.
+// Ping numbers increase across clients, so a gap may be a ping for another client. It is counted, but is not a violation.
 std::vector<std::string> PingSequence::add(const DecodedPing& ping) {
   Check check;
   const std::uint32_t id = ping.head.fixed.ping_id;

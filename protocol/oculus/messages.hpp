@@ -57,12 +57,12 @@ constexpr void fields(auto& visit, wire::Like<MessageHeader> auto& m) {
 struct FireSettings {
   std::uint8_t mode = 1;  // 1 low frequency, 2 high frequency
   PingRate ping_rate = PingRate::hz10;
-  std::uint8_t network_speed = 0xFF;  // Mbit/s, 0 or 255 no limit
+  std::uint8_t network_speed = 0xFF;  // Mbit/s; 0 and 255 = no limit
   std::uint8_t gamma = 0x7F;          // gamma = value / 255; 0 means 1.0
   std::uint8_t flags = 0;
   double range = 0;  // m or per cent of the mode's maximum
   double gain_percent = 0;
-  double sound_speed_mps = 0;  // 0: the device computes it
+  double sound_speed_mps = 0;  // 0 = the device computes the sound speed
   double salinity_ppt = 0;
 };
 constexpr void fields(auto& visit, wire::Like<FireSettings> auto& m) {
@@ -190,7 +190,7 @@ struct PingResultV2 {
   double frequency_hz = 0, temperature_c = 0, pressure_bar = 0;
   double heading_deg = 0, pitch_deg = 0, roll_deg = 0;
   double sound_speed_mps = 0;
-  double ping_start_time_s = 0;  // since power-up, microsecond resolution
+  double ping_start_time_s = 0;  // time since power-up, with a resolution of a microsecond
   DataSize data_size{};
   double range_resolution_m = 0;
   std::uint16_t row_count = 0, beam_count = 0;
@@ -232,7 +232,7 @@ constexpr void fields(auto& visit, wire::Like<UserConfigMessage> auto& m) {
   visit("dhcpEnable", m.dhcp_enable);
 }
 
-/// Keep-alive: a header only.
+/// Keep-alive, which has only a header.
 struct DummyMessage {
   MessageHeader header;
 };

@@ -25,12 +25,12 @@ constexpr float m370s = 2.2e10f, c550d_low = 1.9e10f, c550d_high = 1.4e10f, m750
 constexpr float m1200d_low = 1.5e10f, m1200d_high = 3.5e10f, m3000d_low = 1.4e10f, m3000d_high = 3.3e10f;
 }  // namespace fitted_full_scale_upa
 
-constexpr float source_level_db = 200;  // unknown: assumed; Choi et al. 2025 fitted 170 dB to an M1200d, with gains of their own
+constexpr float source_level_db = 200;  // unknown: assumed; Choi et al. 2025 fitted 170 dB to an M1200d, with other gains
 constexpr float tvg_ceiling_db = 80;    // unknown: assumed
 
 // unknown: fitted to the captured M1200d ping (docs/acoustics.md, section 9), and used for all products, because they share their
-// electronics, as far as is known. The law comes from the noise, which is the part of the picture that changes from ping to ping.
-// The noise rises by 35 dB from 0.1 to 1.9 m, and hardly below 0.25 m. The leak is in rows 0 to 6 and ends within the range of
+// electronics, as far as is known. The law was found from the noise, the part of the picture that changes between pings. The
+// noise increases by 35 dB from 0.1 to 1.9 m, but hardly below 0.25 m. The leak is in rows 0 to 6 and ends within the range of
 // one pulse.
 constexpr float tvg_slope_db = 35, tvg_minimum_range_m = 0.25f;
 constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
@@ -38,13 +38,13 @@ constexpr float leak_upa = 4.2e5f, leak_decay_db_per_m = 2000;
 // m is 30 dB above the noise. Other modes: assumed.
 constexpr float noise_figure_db = 10, m1200d_high_noise_figure_db = 14.6f;
 
-/// unknown: fitted to the first two captured M1200d pings; of several fits the one that a comparison with all three judged best
-/// was kept (docs/acoustics.md, section 9). They are used for the mode of these pings only.
+/// unknown: fitted to the first two captured M1200d pings. Of several fits, the one that agrees best with all three pings was
+/// kept (docs/acoustics.md, section 9). The values are used only for the mode of these pings.
 void fit_to_recording(ReceiverModel& receiver) {
   // Small echoes within 0.5 m are 3 beams wide at half their amplitude ahead, 5 to 7 at 20 degrees.
   receiver.defocus = 0.4f;
-  // Noise across the fan. `noise_db` is that of rows 620 to 702, which have a stripe in the middle, `near_noise_db` that of rows
-  // 20 to 150.
+  // The noise across the fan. `noise_db` is from rows 620 to 702, which have a stripe in the middle, `near_noise_db` from rows 20
+  // to 150.
   receiver.profile.noise_db = {-5.6f, -6.2f, -3.9f, -2.3f, -1.7f, 0.3f,  -0.1f, 0.7f, 2.6f,
                                0.7f,  0.1f,  -0.1f, -1.0f, -2.7f, -3.2f, -5,    -5.3f};
   receiver.profile.near_noise_db = {-9.9f, -9.9f, -9.9f, -8.7f, -8.7f, -8.7f, -8.7f, -6.4f, -4.1f,
@@ -67,8 +67,8 @@ void fit_to_recording(ReceiverModel& receiver) {
 
 constexpr double usual_pulse_rows = 0.9;  // chosen so that a point between two rows is visible
 // unknown: in the captured M1200d ping the echoes fit 0.66 rows, and the noise fits 0.71 (it is uncorrelated in neighbouring
-// rows). Both pass the same filter, so one width is used. At 0.66 the surface cells, whose width is a power of two, would be half
-// as wide, and a ping at 2 m would take twice as long.
+// rows). Echoes and noise pass the same filter, so one width is used. At 0.66 the surface cells, whose width is a power of two,
+// would be half as wide, and a ping at 2 m would take twice as long.
 constexpr double recorded_pulse_rows = 0.71;
 
 struct ModeRow {
@@ -81,7 +81,7 @@ struct FamilyRow {
   double min_range_m = 0.1;  // BAS
   ModeRow low, high;         // high.centre_hz 0: one mode only
 };
-/// A product. Several have the same electronics, so they share a family.
+/// A product. Products with the same electronics share a family.
 struct ProfileRow {
   std::string_view profile, name;
   std::uint16_t part_number = 0;
@@ -89,7 +89,7 @@ struct ProfileRow {
 };
 
 // 370 kHz and 200 m: VND, ENS; aperture and minimum range: BAS; elevation 20: VND; azimuth width 2.0: CAT; an array as long as
-// the M750d's (1.0 at 750 kHz) has the same.
+// the M750d's (1.0 at 750 kHz) has the same width.
 constexpr FamilyRow m370s{0.2, {370e3, 130, 2.0, 20, 200, fitted_full_scale_upa::m370s}, {}};
 // Frequencies and ranges: VND; apertures, elevation, minimum range: CAT; unknown: azimuth widths 1.0 and 0.7.
 constexpr FamilyRow c550d{0.2,
@@ -98,7 +98,7 @@ constexpr FamilyRow c550d{0.2,
 // Frequencies, ranges, azimuth widths: APL, VND; aperture 130 in both modes: BAS, TID, CAT; elevation 20 in both: CAT.
 constexpr ModeRow m750d_low{750e3, 130, 1.0, 20, 120, fitted_full_scale_upa::m750d_low};
 constexpr FamilyRow m750d{0.1, m750d_low, {1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m750d_high}};
-// Older hardware: 12 deg elevation in the high mode (APL); unknown: aperture 70, which none of our sources states for it.
+// Older hardware: 12 deg elevation in the high mode (APL); unknown: aperture 70, which no source states for this hardware.
 constexpr FamilyRow m750d_old{0.1, m750d_low, {1.2e6, 70, 0.6, 12, 40, fitted_full_scale_upa::m750d_high}};
 // Low: BAS, APL, VND. High: frequency 140.625 MHz / 67 and aperture 60 from CAP, widths and range APL.
 constexpr ModeRow m1200d_low{1.2e6, 130, 0.6, 20, 40, fitted_full_scale_upa::m1200d_low};
@@ -112,7 +112,7 @@ constexpr FamilyRow m3000d{0.1,
                            {1.2e6, 130, 0.6, 20, 30, fitted_full_scale_upa::m3000d_low},
                            {3.0e6, 40, 0.25, 20, 5, fitted_full_scale_upa::m3000d_high}};
 
-// Part numbers: older list ENS, BAS; newer list APL, VND, BLU. 1032, 1041 and 1042 are known to every client.
+// Part numbers: older list ENS, BAS; newer list APL, VND, BLU. All clients accept 1032, 1041 and 1042.
 constexpr ProfileRow profiles[] = {
     {"oculus-m370s", "Oculus M370s", 1041, &m370s},
     {"oculus-m750d", "Oculus M750d", 1032, &m750d},

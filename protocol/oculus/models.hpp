@@ -8,10 +8,10 @@
 
 namespace sonar::oculus {
 
-/// All profiles, the plain product of each family first. Built once, never changed.
+/// Returns all profiles, the plain product of each family first. They are built once and never change.
 std::span<const std::shared_ptr<const SonarModel>> models();
 
-/// -3 dB width of the pulse in row spacings, with option `pulse: rows`; `mode` is an index into the model's modes.
+/// Returns the -3 dB width of the pulse in row spacings, with option `pulse: rows`; `mode` is an index into the model's modes.
 double pulse_rows(const SonarModel& model, int mode);
 
 }  // namespace sonar::oculus

@@ -10,7 +10,7 @@ namespace {
 using namespace std::chrono_literals;
 
 using PortKind = protocol::Port::Kind;
-// Status once a second: without it, the public viewer gives up after 2 s, another driver after 5 s.
+// The status is sent once per second, because without it the public viewer gives up after 2 s, another driver after 5 s.
 constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::tcp_stream, .number = tcp_port, .carries = "settings, pings"},
      {.kind = PortKind::udp_beacon, .number = status_port, .carries = "address, state", .period = 1000ms}}};

@@ -10,13 +10,13 @@
 namespace sonar::oculus {
 
 const protocol::Vendor& vendor();
-/// One client's connection. The state must outlive it.
+/// Makes the dialogue with one client. `device` must outlive it.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device, Time now);
 
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
-/// The fire message for the wanted settings. Defaults: high frequency, 10 m, 10 Hz, 50 %, 512 beams, 8 bits. The rate is the
-/// nearest one that a fire message can request. Error usage: a fire message does not have the mode or setting.
+/// Makes the fire message for the requested settings. Defaults: high frequency, 10 m, 10 Hz, 50 %, 512 beams, 8 bits. The rate is
+/// the nearest that a fire message can request. Error usage: a fire message does not have the mode or setting.
 Result<FireRequest> fire_from(const protocol::Wanted& wanted);
 
 /// Reads a status message.
@@ -24,7 +24,7 @@ std::optional<protocol::Announcement> announced(wire::BytesView datagram);
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);
 
-/// The framing of an Oculus's stream.
+/// The framing of the stream of an Oculus.
 extern const recording::Framing framing;
 recording::Codec codec();
 

@@ -19,8 +19,8 @@ M read_as(BytesView bytes) {
   return message;
 }
 
-/// The time of an item's header. A double holds today's UNIX seconds exactly to 0.25 us, so items of type 1010 give the exact
-/// time. An invalid time becomes 1970.
+/// Returns the time in an item's header. A double has present UNIX seconds with a precision of 0.25 us, so items of type 1010
+/// state the exact time. An invalid time becomes 1970.
 Time time_of(double unix_s) {
   if (!std::isfinite(unix_s) || std::abs(unix_s) > 4e9) return {};
   return Time(nanoseconds_from(unix_s));
@@ -32,7 +32,7 @@ Time time_of(const OculusLogTime& t) {
 
 bool is_item(const OculusLogItem& item) { return item.magic == OculusLogItem{}.magic && item.size == item_bytes; }
 
-/// Reads item by item. After a damaged item it searches for the magic number of the next one; items of other types are skipped.
+/// Reads item by item. After a damaged item it searches for the magic number of the next item; items of other types are skipped.
 class LogReader final : public RecordingReader {
  public:
   explicit LogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_, file_header_bytes) {}
@@ -75,7 +75,7 @@ class LogReader final : public RecordingReader {
     return std::nullopt;
   }
 
-  /// Searches for the next item after foreign or damaged bytes. False: there is none.
+  /// Searches for the next item after foreign or damaged bytes. Returns false if there is none.
   bool find_item(std::uint64_t at) {
     for (std::uint64_t from = at + 1; from + item_bytes <= source_->size(); ++from) {
       scan_.seek(from);
@@ -87,7 +87,8 @@ class LogReader final : public RecordingReader {
     return false;
   }
 
-  /// Reads the message in an item. nullopt: it is damaged, which is noted; the reader then continues with the next item.
+  /// Reads the message in an item. Returns nullopt if it is damaged, which is noted; the reader then continues with the next
+  /// item.
   std::optional<RecordedMessage> read_message(const OculusLogItem& item, std::uint64_t at) {
     const auto refuse = [&](const std::string& why) {
       damages_.add("the message at byte " + std::to_string(at) + " " + why);
@@ -117,7 +118,8 @@ class LogReader final : public RecordingReader {
     return message;
   }
 
-  /// The exact time of the message, if the next item has it. The position stays, because next() skips such items.
+  /// Returns the exact time of the message, if the next item has it. The position does not change, because next() skips such
+  /// items.
   std::optional<Time> exact_time() {
     constexpr std::size_t whole = item_bytes + wire::wire_size<OculusLogTime>();
     const BytesView front = scan_.peek(whole);
@@ -155,7 +157,7 @@ class LogWriter final : public RecordingWriter {
     return written;
   }
   Result<void> close() override {
-    if (!begun_) {  // no message: still a valid file
+    if (!begun_) {  // a file without a message must be valid too
       Bytes header;
       append_header(header, {});
       if (Result<void> written = sink_->append(header); !written) return written;

@@ -1,6 +1,6 @@
 // The vendor's log files, .oculus version 1 (protocol/oculus/README.md, "Oculus log files"): a file header, then items, each a
-// header of 40 bytes and a payload. Type 10 is a whole message; type 1010 is the exact time of the item before it. The layout
-// is that of the open-source readers.
+// header of 40 bytes and a payload. An item of type 10 is a whole message; an item of type 1010 is the exact time of the previous
+// item. The layout is that of the open-source readers.
 #pragma once
 
 #include <memory>
@@ -32,10 +32,10 @@ constexpr void fields(auto& visit, wire::Like<OculusLogHeader> auto& m) {
 struct OculusLogItem {
   std::uint32_t magic = 0xAABBCCDD, size = 40;
   std::uint16_t type = 0;
-  std::uint16_t version = 0;  // unknown: value of the vendor; readers ignore it
+  std::uint16_t version = 0;  // unknown: the vendor's value; readers ignore it
   std::uint32_t pad0 = 0;
   double at_unix_s = 0;
-  std::uint16_t compression = 0, pad1 = 0;  // 1 = zlib behind a 4-byte big-endian length
+  std::uint16_t compression = 0, pad1 = 0;  // 1 = zlib after a 4-byte big-endian length
   std::uint32_t original_size = 0, payload_size = 0, pad2 = 0;
 };
 constexpr void fields(auto& visit, wire::Like<OculusLogItem> auto& m) {
@@ -52,9 +52,9 @@ constexpr void fields(auto& visit, wire::Like<OculusLogItem> auto& m) {
   visit("pad2", m.pad2);
 }
 
-/// The exact time of the item before this one.
+/// The exact time of the previous item.
 struct OculusLogTime {
-  std::uint64_t seconds = 0, nanoseconds = 0;  // since 1970
+  std::uint64_t seconds = 0, nanoseconds = 0;  // time since 1970
 };
 constexpr void fields(auto& visit, wire::Like<OculusLogTime> auto& m) {
   visit("seconds", m.seconds);

@@ -112,7 +112,7 @@ std::string options_table() {
   return text;
 }
 
-// A product of one frequency has only the lf_ options. An hf_ option would be ignored without a word, so it is an error.
+// A product of one frequency has only the lf_ options. An hf_ option, which would have no effect, is an error.
 Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model, const protocol::OptionValues& options) {
   SonarModel changed = *model;
   bool any = false;

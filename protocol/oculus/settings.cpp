@@ -18,7 +18,7 @@ constexpr double surface_pressure_bar = 1.013;
 
 constexpr int most_samples_per_row = 32;  // our choice: bounds the computing time of a row at long ranges
 
-/// Clamps a value and adds a message if that changed it: "range 20 m is outside 0.1..10 m, 10 m is used".
+/// Clamps a value. If this changes the value, adds a message such as "range 20 m is outside 0.1..10 m, 10 m is used".
 double clamped(double value, double low, double high, const char* what, const char* unit, std::vector<std::string>& messages) {
   const double used = std::clamp(value, low, high);
   if (used != value) {
@@ -30,20 +30,20 @@ double clamped(double value, double low, double high, const char* what, const ch
   return used;
 }
 
-/// Returns the range of row 0 in row spacings. The device's value is unknown: each of these is assumed by some driver (option
-/// `row_origin`).
+/// Returns the range of row 0 in row spacings. unknown: the value of the device; each of these values is assumed by a driver
+/// (option `row_origin`).
 double row_centre(const protocol::OptionValues& options) {
   const std::string_view origin = text_option(options, option_name::row_origin);
   return origin == "near_edge" ? 0 : origin == "far_edge" ? 1 : 0.5;
 }
 
-/// Sets the pulse width and the number of samples whose mean power makes a row (option `pulse`). Needs the mode.
+/// Sets the pulse width and the number of samples whose mean power is a row (option `pulse`). The mode must be set already.
 void set_pulse(PingSettings& settings, double spacing_m, const protocol::DeviceState& device) {
   const bool native = text_option(device.options, option_name::pulse) == "native";
   settings.pulse_width_m = static_cast<float>(native ? native_pulse_m : pulse_rows(*device.model, settings.mode) * spacing_m);
   if (!native) return;
-  // Sampling rate 2 b for the bandwidth b = 0.5887 c / pulse. At long ranges the pulse is made longer, so that the number of
-  // samples stays bounded.
+  // The sampling rate is 2 b for the bandwidth b = 0.5887 c / pulse. At long ranges the pulse is longer, so that the number of
+  // samples is limited.
   constexpr double samples_per_pulse = 4 * 0.5887;
   const double pulse_m = std::max(native_pulse_m, spacing_m * samples_per_pulse / most_samples_per_row);
   settings.pulse_width_m = static_cast<float>(pulse_m);
@@ -51,7 +51,8 @@ void set_pulse(PingSettings& settings, double spacing_m, const protocol::DeviceS
       std::clamp(static_cast<int>(std::ceil(spacing_m * samples_per_pulse / pulse_m - 1e-9)), 1, most_samples_per_row);
 }
 
-/// Rates of a fire message are maxima: a ping begins after the echoes of the previous one have come back.
+/// Returns the highest rate. Rates of a fire message are maxima, because a ping begins after the echoes of the previous ping have
+/// returned.
 double highest_rate_hz(const FireSettings& fire, const PingSettings& settings, const protocol::DeviceState& device) {
   double rate = std::min(table_rate_hz(fire.ping_rate), static_cast<double>(device.model->max_rate_hz));
   const double echo_time_s = 2.0 * settings.range_m / static_cast<double>(settings.device_sound_speed_mps);
@@ -72,7 +73,8 @@ void set(FireSettings& fire, std::uint8_t bit, bool on) {
 
 }  // namespace
 
-/// Fits the captured pings exactly; liboculus's authors measured the doubling on an M1200d (docs/protocols/oculus.md, 5.4).
+/// Computes a grid that fits the captured pings exactly; liboculus's authors measured the doubling on an M1200d
+/// (docs/protocols/oculus.md, 5.4).
 RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz) {
   RowGrid law{sound_speed_mps / (2 * rate_hz), 1};
   while (range_m / law.spacing_m > row_limit) law.spacing_m *= 2;
@@ -129,7 +131,7 @@ double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo)
   return high_frequency && mapped ? 40 + 0.6 * fire.gain_percent : fire.gain_percent;
 }
 
-/// The gain used plus 20 log r: close to the row gains that an M750d stated (docs/protocols/oculus.md, 5.2).
+/// Returns the gain used plus 20 log r, which is close to the row gains that an M750d stated (docs/protocols/oculus.md, 5.2).
 std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings) {
   std::vector<std::uint32_t> gains;
   gains.reserve(static_cast<std::size_t>(settings.range_bin_count));
@@ -146,7 +148,7 @@ bool has_non_finite(const FireSettings& fire) {
          !std::isfinite(fire.salinity_ppt);
 }
 
-// The wire counts modes from 1: 1 is the low frequency, 2 the high one. Other values count as 1 (our choice).
+// Messages count modes from 1: 1 is the low frequency, 2 the high. Other values count as 1 (our choice).
 int mode_index(const SonarModel& model, std::uint8_t wire_mode) { return wire_mode == 2 && model.modes.size() > 1 ? 1 : 0; }
 
 double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt) {
@@ -155,7 +157,7 @@ double device_sound_speed_mps(const protocol::DeviceState& device, double salini
                                 std::clamp(gauge_bar, 0.0, 1000.0));
 }
 
-// No request is refused here: values out of range are clamped for use, and echoed as sent (docs/protocols/oculus.md, 3).
+// Refuses no request: values out of range are clamped for use, and echoed as sent (docs/protocols/oculus.md, 3).
 ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& device) {
   ResolvedSettings out;
   PingSettings& settings = out.settings;

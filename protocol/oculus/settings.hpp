@@ -1,5 +1,5 @@
-// Converts a fire message to PingSettings: rows, rates, gain, gamma, limits, the device's own sound speed. Pure functions;
-// encode_ping.hpp converts in the other direction.
+// Converts a fire message to PingSettings: rows, rates, gain, gamma, limits, the device's own sound speed. encode_ping.hpp
+// converts in the other direction.
 #pragma once
 
 #include <memory>
@@ -37,11 +37,11 @@ using protocol::given_number;
 using protocol::number_option;
 using protocol::text_option;
 
-/// The rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.
+/// Returns the rows of the table in docs/protocols/oculus.md, section 7: name, values, default, meaning.
 std::string options_table();
 
-/// The model of a product, whose apertures and beam widths no public source states, with the values of the options; without such
-/// options, the model itself. Error: a value for a mode that the product lacks.
+/// Returns the model with apertures and beam widths, which no public source states, from the options; without such options, the
+/// model itself. Error: a value for a mode that the product lacks.
 Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model, const protocol::OptionValues& options);
 
 /// Sample rate of the rows: 37.5 MHz / 143, exact in the capture (M1200d, mode 2). unknown: the rate of other modes; sonard
@@ -59,29 +59,29 @@ struct RowGrid {
 };
 RowGrid row_grid(double range_m, double sound_speed_mps, double rate_hz = row_rate_hz);
 
-/// The rate of a code [Hz]; 0 = standby. Unknown codes count as 10 Hz (our choice).
+/// Returns the rate of a code [Hz]; 0 = standby. Unknown codes count as 10 Hz (our choice).
 double table_rate_hz(PingRate rate);
-/// Exponent of the samples: value / 255, but 1 for the value 0.
+/// Returns the exponent of the samples: value / 255, but 1 for the value 0.
 float gamma_from_byte(std::uint8_t value);
-/// The format of the samples that a fire message requests: bits, saturation, gamma, row gains.
+/// Returns the format of the samples that a fire message requests: bits, saturation, gamma, row gains.
 SampleFormat sample_format(const FireRequest& fire);
-/// The gain as echoed, per cent (docs/protocols/oculus.md, 5.5): in mode 2 without flag bit 4 a gain of g is echoed as 40 + 0.6
-/// g, see option gain_echo.
+/// Returns the echoed gain in per cent (docs/protocols/oculus.md, 5.5): in mode 2 without flag bit 4 a gain of g is echoed as 40
+/// + 0.6 g, see option gain_echo.
 double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo);
 
 /// True if flag bit 4 leaves the gain to the device; option gain_assist states which value of the bit does, if any.
 bool asks_for_gain_assist(const FireSettings& fire, std::string_view option);
 
-/// Row gains of option `row_gain: digital`: the power gain 10^((gain_db + 20 log r) / 10), r at least row_gain_from_m, in 1 to
-/// 2^32 - 1. 32-bit samples have no time-varied gain: 10^(gain_db / 10).
+/// Returns the row gains of option `row_gain: digital`: the power gain 10^((gain_db + 20 log r) / 10), r at least
+/// row_gain_from_m, in 1 to 2^32 - 1. 32-bit samples have no time-varied gain: 10^(gain_db / 10).
 std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings);
 
-/// True if a double of the message is NaN or infinite. Such a message must be ignored.
+/// True if a double in the message is NaN or infinite. Such a message must be ignored.
 bool has_non_finite(const FireSettings& fire);
-/// Index into the model's modes; unknown modes count as 1.
+/// Returns the index into the model's modes; unknown modes count as 1.
 int mode_index(const SonarModel& model, std::uint8_t wire_mode);
 
-/// The sound speed that the device computes when 0 is requested [m/s].
+/// Returns the sound speed that the device computes if 0 is requested [m/s].
 double device_sound_speed_mps(const protocol::DeviceState& device, double salinity_ppt);
 
 /// The resulting settings, and a text for each clamped value.
@@ -89,21 +89,22 @@ struct ResolvedSettings {
   PingSettings settings;
   std::vector<std::string> clamped;
 };
-/// The fire message must be finite.
+/// Converts a fire message, whose values must be finite.
 ResolvedSettings resolve(const FireRequest& fire, const protocol::DeviceState& device);
 
-/// Size in bytes of a ping result with these settings.
+/// Returns the size in bytes of a ping result with these settings.
 std::size_t ping_size(const PingSettings& settings);
 
-/// A line for the log: "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, sound speed of the device, 512 beams, 8 bits, ...".
+/// Returns a line for the log, such as "mode 2, range 20 m, gain 50 %, gamma 127, rate 10 Hz, sound speed of the device, 512
+/// beams, 8 bits, ...".
 std::string describe(const FireRequest& fire);
 
-/// Converts an override to the fire message by which a driver would request the same settings; pings with them echo that message.
-/// Starts from the current fire message and changes only the fields that are set in `wanted`. Refuses values that the product
-/// does not support.
+/// Converts an override to the fire message with which a driver would request the same settings; pings echo that message. Starts
+/// with the current fire message and changes only the fields that are set in `wanted`. Refuses values that the product does not
+/// support.
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// The nearest of the rates that a fire message can request, without standby.
+/// Returns the nearest of the rates that a fire message can request, except standby.
 PingRate nearest_rate(double rate_hz);
 
 }  // namespace sonar::oculus

@@ -15,7 +15,7 @@ namespace {
 
 using recording::RecordedMessage;
 
-/// True if some device of the family sends or accepts this message.
+/// True if a device of the family sends or accepts this message.
 bool is_known(Id id) {
   switch (id) {
     case Id::ack:
@@ -78,8 +78,8 @@ bool is_known(Id id) {
   return false;
 }
 
-/// Length of the frame with this header. `BR` has only two bytes, and samples may contain it, so `strict` also demands a known
-/// message.
+/// Returns the length of the frame with this header. `BR` has only two bytes, and samples may contain it, so `strict` also
+/// requires a known message.
 std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool strict) {
   Header header;
   wire::Reader reader(bytes);
@@ -88,8 +88,7 @@ std::optional<std::size_t> length_of(BytesView bytes, recording::Origin, bool st
   return reader.ok() ? std::optional(header_size + header.length + sum_size) : std::nullopt;
 }
 
-/// True if the message has a frame with one of these numbers and the right sum. The pings of each product have numbers of their
-/// own, which identify the product.
+/// True if the message has a frame with one of these ids and a correct sum. The ids of the pings identify the product.
 bool holds(const RecordedMessage& message, std::initializer_list<Id> pings) {
   Framer framer(longest_payload, true);
   framer.append(message.bytes);
@@ -101,13 +100,13 @@ std::optional<recording::Sender> one_of(const protocol::Vendor& vendor) { return
 
 constexpr recording::Framing framing{{'B', 'R'}, header_size, length_of};
 
-/// The number of the message. Id{}: it is not a whole frame, or its sum is wrong.
+/// Returns the id of the message; Id{} if it is not a whole frame, or if its sum is wrong.
 Id id_in(BytesView message) {
   const auto frame = whole_frame(message);
   return frame ? frame->header.id : Id{};
 }
 std::optional<recording::PingPart> part_if(bool is_part) { return is_part ? std::optional(recording::PingPart{}) : std::nullopt; }
-/// True if the recorded `message` has a richer result than `poorer`, and `answer` makes `poorer` of it.
+/// True if the recorded `message` has more content than `poorer`, and `answer` converts it to `poorer`.
 template <class ResultsOf, class Answer>
 bool holds_result(BytesView message, BytesView poorer, ResultsOf results_of, Answer answer) {
   const Results result = results_of(id_in(poorer));
@@ -116,12 +115,12 @@ bool holds_result(BytesView message, BytesView poorer, ResultsOf results_of, Ans
   const auto frame = made.size() == 1 ? whole_frame(made.front()) : std::nullopt, recorded = whole_frame(poorer);
   return frame && recorded && frame->payload == recorded->payload;
 }
-/// Messages that a Surveyor sends while pings are enabled. A ping may have several.
+/// Handles the messages that a Surveyor sends while pings are enabled. A ping may have several messages.
 std::optional<recording::PingPart> surveyor_part(BytesView message) {
   const Id id = id_in(message);
   return part_if(id == Id::atof_point_data || id == Id::yz_point_data || id == Id::attitude_report || id == Id::water_stats);
 }
-/// A log may hold the messages of a Surveyor and an Omniscan; each replay serves those of its product.
+/// Handles the messages of an Omniscan. A log may also have those of a Surveyor; each replay serves the messages of its product.
 std::optional<recording::PingPart> omniscan_part(BytesView message) { return part_if(id_in(message) == Id::os_mono_profile); }
 
 constexpr std::array<recording::FileKind, 1> kinds{{{
@@ -152,7 +151,7 @@ recording::Codec ping360::codec() {
             static const auto options = protocol::check_options(vendor(), {});
             return recording::PingPart{.head_rad = head_rad(line->ping.angle, *options)};
           },
-          // A request decides between the two messages of a line; the settings are those of the recording.
+          // The request selects one of the two messages of a line; the settings are those of the recording.
           .answer =
               [](BytesView message, const VendorSettings* request) {
                 Settings s = settings_from(request);

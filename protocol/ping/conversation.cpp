@@ -24,8 +24,8 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   return reaction;
 }
 
-/// The sender of a datagram may be forged, and its answers would then go to another computer. So the answers are one datagram
-/// that is little longer than the received one.
+/// Answers with one datagram that is only a little longer than the received one, because its sender may be forged, and the answer
+/// would then go to another computer.
 protocol::Reaction Conversation::on_datagram(std::size_t size, Time now) {
   protocol::Reaction reaction;
   Bytes answers;
@@ -51,7 +51,7 @@ std::optional<std::chrono::milliseconds> Conversation::longest_silence() const {
   return by_datagrams_ && s > 0 ? std::optional(std::chrono::milliseconds(static_cast<int>(1000 * s))) : std::nullopt;
 }
 
-/// Answers what every device of the family answers, and passes other requests to the product.
+/// Answers the requests that every device of the family answers, and passes other requests to the product.
 void Conversation::on_frame(const Frame& frame, Time now, protocol::Reaction& reaction) {
   if (is_of_device(frame.header.id)) return;  // answering it would let two devices answer each other without end
   if (!frame.sum_is_right) return refuse(frame, "wrong checksum", reaction);
@@ -77,7 +77,7 @@ void Conversation::answer(Id wanted, Time now, protocol::Reaction& reaction) {
     answer = framed_message(wanted, id_, ProtocolVersion{});
   else
     answer = message_now(wanted, now);
-  // The nack has the number of the missing message, because the host waits for that one.
+  // The nack has the id of the missing message, because the host waits for that message.
   reaction.replies.push_back(answer.empty() ? nack(wanted, id_, "unknown message") : std::move(answer));
 }
 

@@ -1,4 +1,4 @@
-// The conversation that all devices of the family share: frames, identity, device ids. A product adds its own requests.
+// The dialogue that all devices of the family share: frames, identity, device ids. A product adds its own requests.
 #pragma once
 
 #include <string_view>
@@ -20,7 +20,7 @@ protocol::Option type_option(std::string_view usual, std::string_view meaning);
 
 class Conversation : public protocol::Dialogue {
  public:
-  /// `device` must outlive it. At a port of kind udp_dialogue, frames do not continue in the next datagram.
+  /// `device` must outlive the object. At a port of kind udp_dialogue, frames do not continue in the next datagram.
   Conversation(const protocol::DeviceState& device, const protocol::Port& port, DeviceInformation identity, std::uint8_t id)
       : device_(device),
         by_datagrams_(port.kind == protocol::Port::Kind::udp_dialogue),
@@ -33,18 +33,18 @@ class Conversation : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 
  protected:
-  /// Handles a request with a valid checksum. False: the product has no such request.
+  /// Handles a request with a valid checksum. Returns false if the product has no such request.
   virtual bool on_request(const Frame& frame, Time now, protocol::Reaction& reaction) = 0;
-  /// The product's message `wanted` with its present values; empty: the product has no such message.
+  /// Returns the product's message `wanted` with the present values; empty if the product has no such message.
   virtual Bytes message_now(Id wanted, Time now) = 0;
   /// True if the message is sent with every ping and pings are enabled, so that the next ping answers the request for it.
   virtual bool comes_with_pings(Id) const { return false; }
-  /// True if the product answers the request for this message itself.
+  /// Answers the request for this message if the product does so itself; then returns true.
   virtual bool on_wanted(Id /*wanted*/, Time /*now*/, protocol::Reaction& /*reaction*/) { return false; }
   /// Called when a host has set id_.
   virtual void on_new_id(protocol::Reaction&) {}
 
-  /// Reads the payload of a request as a message. False: it is too short, and the request was refused.
+  /// Reads the payload of a request as a message. If it is too short, refuses the request and returns false.
   template <class M>
   bool read(const Frame& frame, M& message, protocol::Reaction& reaction) const {
     wire::Reader reader(frame.payload);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double full = 255;
 
-/// The amplitudes of the samples, of linear and of logarithmic codes, on a scale of 0 to `full`.
+/// Returns the amplitudes of the samples, of linear or logarithmic codes, on a scale of 0 to `full`.
 std::vector<double> amplitudes_of(const Ping& ping) {
   const SampleFormat& format = ping.request.settings.format;
   const auto width = static_cast<std::size_t>(format.bits / 8);
@@ -29,7 +29,7 @@ std::vector<double> amplitudes_of(const Ping& ping) {
 Echo find_echo(const Ping& ping) {
   constexpr double least_snr_db = 10;  // unknown: assumed; the highest of 200 points of noise seldom reaches it
   constexpr double certain_snr_db = 30;
-  constexpr int longest_gap = 2;  // points within an echo that may be weak because of speckle
+  constexpr int longest_gap = 2;  // number of successive points in an echo that speckle may weaken
   const PingSettings& s = ping.request.settings;
   const std::vector<double> amplitudes = amplitudes_of(ping);
   const auto amplitude = [&](int row) { return amplitudes[static_cast<std::size_t>(row)]; };
@@ -45,15 +45,15 @@ Echo find_echo(const Ping& ping) {
   Echo echo{.peak = amplitude(top)};
   if (echo.peak == 0) return echo;
   const double half = echo.peak / 2;
-  // The echo reaches from the peak back towards the sonar, across short gaps. Its first point is the front.
+  // The echo extends from the peak towards the sonar, across short gaps. Its first point is the front.
   int front = top;
   for (int row = top - 1; row >= first && front - row <= longest_gap + 1; --row)
     if (amplitude(row) >= half) front = row;
   // The crossing of half the peak, interpolated between the point before the front and the front.
   const double below = front > 0 ? amplitude(front - 1) : half;
   const double part = front > 0 && below < half ? (amplitude(front) - half) / (amplitude(front) - below) : 0;
-  // The amplitude of an even bed reaches half its peak at its distance, that of a mirror 0.7 pulses before. Half a pulse is a
-  // compromise between both.
+  // The amplitude of an even bed reaches half its peak at its distance, that of a mirror 0.7 pulses earlier. Half a pulse is a
+  // compromise.
   echo.range_m = s.range_of_row(front - part) + static_cast<double>(s.pulse_width_m) / 2;
   // A linear code of 0 may hide any noise below one code, so the noise counts as at least one code.
   const double least_noise = s.format.scale == SampleFormat::Scale::linear ? full / s.format.max_code : 1e-9;
@@ -65,9 +65,9 @@ Echo find_echo(const Ping& ping) {
 
 Reach adjusted(const Reach& made_with, const Echo& echo, const ReachLimits& limits) {
   constexpr int sure = 50;      // least confidence of a valid distance, per cent
-  constexpr double loud = 250;  // from this amplitude on the peak may be cut off
+  constexpr double loud = 250;  // with this amplitude or more, the peak may be limited
   constexpr double loudest_wanted = 200;
-  // Shares of the range; the echo is to lie between them.
+  // Fractions of the range, between which the echo should be.
   constexpr double nearest_part = 0.35, farthest_part = 0.85, wanted_part = 0.6;
   constexpr std::uint32_t length_step_mm = 500, first_length_mm = 5000;
   const auto gain_of = [&](int index) { return limits.gains[static_cast<std::size_t>(index)]; };
@@ -78,7 +78,7 @@ Reach adjusted(const Reach& made_with, const Echo& echo, const ReachLimits& limi
   else
     while (next.gain < most_gain && echo.peak * gain_of(next.gain + 1) / gain_of(made_with.gain) <= loudest_wanted) ++next.gain;
   const double length_mm = next.length_mm, at = 1000 * echo.range_m / length_mm;
-  if (echo.confidence < sure) {  // searches: the range is doubled; after the longest it begins again with the first
+  if (echo.confidence < sure) {  // searches: doubles the range, and after the longest begins again with the first
     next.length_mm = length_mm >= limits.most_mm ? first_length_mm : std::min(2 * next.length_mm, limits.most_mm);
   } else if (at < nearest_part || at > farthest_part) {
     const auto steps = static_cast<std::uint32_t>(std::ceil(1000 * echo.range_m / wanted_part / length_step_mm));

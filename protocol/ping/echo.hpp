@@ -1,5 +1,5 @@
-// Finds the strongest echo in a ping of one beam, and derives from it the range and gain of the next ping, for the family's
-// range finders. Pure functions. The algorithms of real devices are unknown: all of this is assumed (docs/protocols/ping1d.md).
+// Finds the strongest echo in a ping of one beam, and derives from it the range and gain of the next ping, for the family's range
+// finders. unknown: the algorithms of real devices; all of this is assumed (docs/protocols/ping1d.md).
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,8 @@ inline constexpr std::uint32_t shortest_range_mm = 1000;
 /// The messages to be made from a ping, as bits.
 using Results = unsigned;
 inline constexpr Results no_result = 0;
-/// The messages for the results `wanted`, in order, made from a recorded message of the result `own`. no_result: the recorded
-/// message alone. `make` makes the message of another result.
+/// Returns the messages for the results `wanted`, in order, made from a recorded message of the result `own`; for no_result, only
+/// the recorded message. `make` makes the message of another result.
 template <class Make>
 std::vector<wire::Bytes> messages_for(Results wanted, wire::BytesView recorded, Results own, Make make) {
   if (wanted == no_result) wanted = own;
@@ -30,13 +30,13 @@ std::vector<wire::Bytes> messages_for(Results wanted, wire::BytesView recorded, 
 }
 
 struct Echo {
-  double range_m = 0;  // as the device computes it
+  double range_m = 0;  // range that the device computes
   double peak = 0;     // the highest amplitude; 255 is full scale
   int confidence = 0;  // per cent
 };
-/// Finds the strongest echo of a profile, and the range at which it begins.
+/// Finds the strongest echo of a profile, and the range where the echo begins.
 Echo find_echo(const Ping& ping);
-/// The echo among the findings of the ping; computed if there is none.
+/// Returns the echo among the findings of the ping; computes it if there is none.
 inline Echo echo_in(const Ping& ping) { return protocol::found_in(ping, find_echo); }
 
 /// The range of a ping, counted from the sonar, and its gain.
@@ -45,10 +45,10 @@ struct Reach {
   int gain = 0;  // index of a gain
 };
 struct ReachLimits {
-  std::span<const double> gains;  // amplification factors, rising
+  std::span<const double> gains;  // amplification factors in increasing order
   std::uint32_t most_mm = 0;
 };
-/// Range and gain of the next ping, after a ping with `made_with` in which `echo` was found.
+/// Returns range and gain of the next ping, after a ping with `made_with` in which `echo` was found.
 Reach adjusted(const Reach& made_with, const Echo& echo, const ReachLimits& limits);
 
 }  // namespace sonar::ping

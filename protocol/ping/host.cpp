@@ -20,7 +20,7 @@ constexpr int grads = 400, sector = 201, first_grad = 300;  // a scan covers the
 constexpr int astern = 200;                                 // angle at which the beams of a Sweep begin
 constexpr std::size_t point_rows = 300;                     // rows of a picture of points
 
-/// The request for points as y, z pairs (3011): one pair of numbers per point suffices for the picture.
+/// Makes the request for points as y, z pairs (yz_point_data, 3011), which suffice for the picture.
 Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   PingParameters p{.end_mm = static_cast<std::int32_t>(std::lround(1000 * wanted.range_m.value_or(usual_range_m))),
                    .enable = static_cast<std::uint8_t>(wanted.rate_hz == 0.0 ? 0 : 1),
@@ -31,8 +31,8 @@ Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
   return framed_message(Id::set_ping_parameters, 0, p);
 }
 
-/// The request for a scan of the half circle ahead. At short ranges the sample period is the shortest, and the number of samples
-/// is less; at long ranges there are 1000 samples.
+/// Makes the request for a scan of the half circle ahead. At short ranges the sample period is the shortest, and there are fewer
+/// samples; at long ranges there are 1000 samples.
 Bytes ping360_request(const protocol::SettingsOverride& wanted) {
   const double range_m = wanted.range_m.value_or(usual_range_m);
   AutoTransmit t;
@@ -47,9 +47,9 @@ Bytes ping360_request(const protocol::SettingsOverride& wanted) {
   return framed_message(Id::auto_transmit, 0, t);
 }
 
-using Points = std::vector<std::pair<double, double>>;  // azimuth, range
+using Points = std::vector<std::pair<double, double>>;  // azimuth and range of each point
 
-/// The points up to the first invalid one, or to the end of the message.
+/// Returns the points before the first invalid one, or to the end of the message.
 Points points_in(const YzPointData& data, BytesView rest) {
   Points polar;
   wire::Reader reader(rest);
@@ -78,16 +78,16 @@ Points points_in(const AtofPointData& data, BytesView rest) {
 }
 
 double end_m(const YzPointData& data, const Points&) { return static_cast<double>(data.end_m); }
-/// The message does not state the far end of the range. A lower bound is the time for which the sonar listened, which begins at
-/// the near end.
+/// Returns a lower bound of the far end of the range, which the message does not state, from the time for which the sonar
+/// listened, which begins at the near end.
 double end_m(const AtofPointData& data, const Points& polar) {
   double far_m = static_cast<double>(data.listening_s) * static_cast<double>(data.speed_mps) / 2;
   for (const auto& point : polar) far_m = std::max(far_m, point.second);
   return far_m;
 }
 
-/// A ping of points. Its picture has one beam for each point, with the point in the row of its range; the drawing has the points
-/// themselves.
+/// Makes a ping of points. The picture has one beam for each point, with the point in the row of its range; the drawing has the
+/// points themselves.
 HostPing ping_of(std::uint32_t number, double end_m, Points polar) {
   HostPing found;
   SonarPicture seen{.kind = PictureKind::points, .image = {}, .elevation_rad = -pi / 2};
@@ -144,8 +144,8 @@ class SurveyorHost final : public PingHost {
   std::pair<std::optional<std::uint32_t>, Id> newest_{};  // number of the newest ping, and the message from which it is read
 };
 
-/// First requests the protocol version, which changes nothing. UDP has no connection, so the answer shows that a sonar is there;
-/// then the host requests a scan. A datagram may be lost, so the first request is repeated until it is answered.
+/// First requests the protocol version, which changes nothing. UDP has no connection, so only the answer shows that there is a
+/// sonar; then the host requests a scan. A datagram may be lost, so the first request is repeated until it is answered.
 class Ping360Host final : public PingHost {
  public:
   using PingHost::PingHost;
@@ -155,7 +155,7 @@ class Ping360Host final : public PingHost {
   }
   HostActions on_tick(Time now) override { return !is_open_ && now >= ask_again_at_ ? on_open({}, now) : HostActions{}; }
   std::optional<Time> next_tick() const override { return is_open_ ? std::nullopt : std::optional(ask_again_at_); }
-  /// Stops the scan that this host has requested. It does not stop that of another driver.
+  /// Stops the scan that this host has requested, but not the scan of another driver.
   HostActions on_leave() override {
     if (!is_open_ || !asks()) return {};
     return {protocol::HostSend{0, framed(Id::motor_off, 0, {})}};
@@ -163,7 +163,7 @@ class Ping360Host final : public PingHost {
   bool is_open() const override { return is_open_; }
 
  private:
-  /// Any frame shows that the sonar is there.
+  /// Handles a frame; any frame shows that there is a sonar.
   void on_frame(const Frame&, HostActions& actions) override {
     if (!std::exchange(is_open_, true)) ask(actions);
   }
@@ -179,7 +179,7 @@ class Ping360Host final : public PingHost {
     return frame.header.id == Id::device_data ? line_of(DeviceData{}) : std::nullopt;
   }
 
-  /// A scan line. The device does not state a sound speed; 1500 m/s is assumed.
+  /// Makes a ping of a scan line. The device does not state a sound speed; 1500 m/s is assumed.
   HostPing line(std::uint16_t angle, unsigned period, unsigned khz, BytesView samples) {
     const double row_m = period * sample_unit_s * sound_mps / 2;
     Line line;

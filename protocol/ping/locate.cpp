@@ -25,8 +25,8 @@ bool is_of(Id id, BytesView frame) {
   return reader.ok() && header.id == id;
 }
 
-/// Offset of the frame with that message among the frames of a ping. nullopt: there is none. If `frames` is empty, only the
-/// layout is requested, and the offset is 0.
+/// Returns the offset of the frame with that message among the frames of a ping; nullopt if there is none. If `frames` is empty,
+/// only the layout is requested, and the offset is 0.
 std::optional<std::size_t> frame_of(Id id, BytesView frames) {
   std::size_t at = 0;
   while (!frames.empty() && at < frames.size() && !is_of(id, frames.subspan(at))) {
@@ -39,7 +39,7 @@ std::optional<std::size_t> frame_of(Id id, BytesView frames) {
   return frames.empty() || at < frames.size() ? std::optional(at) : std::nullopt;
 }
 
-/// A region of a frame whose payload is fields and then samples.
+/// Returns a region of a frame whose payload is fields and then samples.
 std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields_size) {
   if (region == Region::bearings) return std::nullopt;
   if (frame.empty()) return Place{};
@@ -49,7 +49,7 @@ std::optional<Place> one_beam(Region region, BytesView frame, std::size_t fields
   return region == Region::metadata ? Place{header_size, fields_size} : Place{data, frame.size() - sum_size - data};
 }
 
-/// A region of the frame with that message among the frames of a ping. Its payload is the fields M and then samples.
+/// Returns a region of the frame with that message among the frames of a ping. The payload is the fields M and then samples.
 template <class M>
 std::optional<Place> samples_among(Id id, Region region, BytesView frames) {
   const auto at = frame_of(id, frames);
@@ -61,8 +61,8 @@ std::optional<Place> samples_among(Id id, Region region, BytesView frames) {
 
 constexpr std::size_t attitude_size = header_size + wire::wire_size<AttitudeReport>() + sum_size;
 
-/// Offset of the frame of points (3012). By TCP it follows the attitude report (504); by UDP it is a datagram of its own, offset
-/// 0.
+/// Returns the offset of the frame of points (3012). Over TCP the frame follows the attitude report (504); over UDP it is a
+/// separate datagram, with offset 0.
 std::optional<std::size_t> atof_frame(BytesView frames) {
   const std::size_t at = frames.empty() || is_of(Id::attitude_report, frames) ? attitude_size : 0;
   const bool there = frames.empty() || (frames.size() > at && is_of(Id::atof_point_data, frames.subspan(at)));

@@ -10,15 +10,15 @@ namespace sonar::ping {
 
 using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 
-/// `frame` must be a ping, 2300 or 2301.
+/// `frame` must be a ping: device_data (2300) or auto_device_data (2301).
 std::optional<protocol::Field> locate_ping360(protocol::FieldName name, protocol::BytesView frame);
 std::optional<Place> locate_ping360(protocol::Region region, protocol::BytesView frame);
 
-/// `frames` must be those of a ping over TCP, of which the first is 504.
+/// `frames` must be the frames of a ping over TCP, which begin with attitude_report (504).
 std::optional<protocol::Field> locate_surveyor(protocol::FieldName name, protocol::BytesView frames);
 std::optional<Place> locate_surveyor(protocol::Region region, protocol::BytesView frames);
 
-/// `frame` must be a ping, 2198.
+/// `frame` must be a ping: os_mono_profile (2198).
 std::optional<protocol::Field> locate_omniscan(protocol::FieldName name, protocol::BytesView frame);
 std::optional<Place> locate_omniscan(protocol::Region region, protocol::BytesView frame);
 

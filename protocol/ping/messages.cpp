@@ -25,8 +25,8 @@ Bytes framed(Id id, std::uint8_t source, BytesView payload) {
   return out;
 }
 
-// The lengths are those of `before`, because a fault may have changed them. Only frames that differ get a new sum, so that a sum
-// that a fault made wrong stays wrong.
+// The lengths are read from `before`, because a fault may have changed them. Only frames that differ get a new sum, so that a sum
+// that a fault made wrong is not corrected.
 void reseal(BytesView before, Bytes& frames) {
   for (BytesView left = before; left.size() >= header_size + sum_size;) {
     const std::size_t at = before.size() - left.size();
@@ -118,7 +118,7 @@ std::optional<Frame> whole_frame(BytesView message) {
   return frame && frame->sum_is_right ? std::move(frame) : std::nullopt;
 }
 
-// A datagram that only looks like the protocol must not take the dialogue away from the host that has it.
+// A datagram that only resembles the protocol must not transfer the dialogue from its host to another.
 bool holds_frame(BytesView datagram) {
   Framer framer(longest_request, true);
   framer.append(datagram);

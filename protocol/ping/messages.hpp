@@ -94,7 +94,7 @@ constexpr void fields(auto& visit, wire::Like<Header> auto& m) {
   visit("dst_device_id", m.destination, means::destination_id);
 }
 
-/// The whole frame of a message, addressed to any host. `source`: id of the device.
+/// Returns the whole frame of a message, addressed to any host. `source`: id of the device.
 Bytes framed(Id id, std::uint8_t source, BytesView payload);
 template <class M>
 Bytes framed_message(Id id, std::uint8_t source, const M& message) {
@@ -111,11 +111,11 @@ struct Frame {
   bool sum_is_right = true;
 };
 
-/// Finds the frames of a byte stream, which may arrive in pieces of any size. A header with a payload longer than `longest`
-/// does not begin a frame. After a wrong checksum the search continues one byte after the start of that frame. So at most one
+/// Finds the frames of a byte stream, which may arrive in pieces of any size. A header with a payload longer than `longest` does
+/// not begin a frame. After a wrong checksum the search continues one byte after the start of that frame, so at most one
 /// incomplete frame waits. In a datagram (`all_is_there`) the search also continues after the start of an incomplete frame. The
-/// work is proportional to the number of bytes, even for hostile input: sums_ has the sum of all bytes before each position, so
-/// a frame's checksum is the difference of two of them.
+/// work is proportional to the number of bytes, even for hostile input: sums_ has the sum of all bytes before each position, so a
+/// frame's checksum is the difference of two such sums.
 class Framer {
  public:
   explicit Framer(std::size_t longest = longest_request, bool all_is_there = false)
@@ -124,12 +124,12 @@ class Framer {
   /// Call it when no more bytes will come.
   void end() { all_is_there_ = true; }
   std::optional<Frame> next();
-  /// The bytes of the last valid frame; valid until append().
+  /// Returns the bytes of the last valid frame, which are valid until append().
   BytesView bytes() const { return BytesView(buffer_).subspan(begin_ - last_size_, last_size_); }
   /// Drops an incomplete frame.
   void drop_rest();
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
-  /// Number of bytes that have been searched, counted from the first that was ever appended.
+  /// Returns the number of searched bytes since the start of the stream.
   std::uint64_t passed() const { return erased_ + begin_; }
 
  private:
@@ -142,10 +142,10 @@ class Framer {
   std::uint64_t erased_ = 0;
 };
 
-/// The first frame of a message that is all there. nullopt: there is none, or its sum is wrong.
+/// Returns the first frame of a complete message; nullopt if there is none, or if its sum is wrong.
 std::optional<Frame> whole_frame(BytesView message);
 
-/// Messages that only devices send. They are not answered: two devices would answer each other without end.
+/// True for messages that only devices send. They are not answered, because two devices would answer each other without end.
 constexpr bool is_of_device(Id id) { return id == Id::ack || id == Id::nack || id == Id::ascii_text; }
 
 /// True if a datagram contains a valid frame of a host.
@@ -179,7 +179,7 @@ struct Transducer {
   std::uint8_t mode = 1, gain = 0;
   std::uint16_t angle = 0;         // grad
   std::uint16_t transmit_us = 32;  // duration of the pulse
-  std::uint16_t period = 80;       // period of samples, 25 ns
+  std::uint16_t period = 80;       // period of samples, in units of 25 ns
   std::uint16_t khz = 740;
   std::uint16_t samples = 1024;
   std::uint8_t transmit = 0, reserved = 0;
@@ -256,7 +256,7 @@ constexpr void fields(auto& visit, wire::Like<AutoDeviceData> auto& m) {
 // ---- Surveyor 240
 
 struct PingParameters {
-  std::int32_t start_mm = 0, end_mm = 0;  // end 0: follow the bottom
+  std::int32_t start_mm = 0, end_mm = 0;  // end 0 = the range follows the bottom
   float speed_mps = 1500;
   std::int16_t gain = -1, period_ms = 100;
   std::uint16_t reserved0 = 0;
@@ -308,7 +308,7 @@ constexpr void fields(auto& visit, wire::Like<AtofPointData> auto& m) {
   visit("reserved", m.reserved);
 }
 struct AtofPoint {
-  float angle_rad = 0, two_way_s = 0;  // from straight down, positive to port
+  float angle_rad = 0, two_way_s = 0;  // angle from straight down, positive to port; two-way travel time
   std::array<std::uint32_t, 2> reserved{};
 };
 constexpr void fields(auto& visit, wire::Like<AtofPoint> auto& m) {

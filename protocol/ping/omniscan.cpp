@@ -12,14 +12,15 @@ using protocol::Reaction;
 constexpr auto port_table = streaming_ports(51200, "settings, profiles");
 
 class OmniscanDialogue final : public StreamingConversation<Settings, settings_from> {
-  /// ping-python sends nothing while it reads an Omniscan. A Surveyor asks its hosts for the time, so they do send.
+  /// True while pings are enabled, because ping-python sends nothing while it reads an Omniscan. (Hosts of a Surveyor send,
+  /// because it requests the time.)
   bool hosts_fall_silent() const override { return settings().parameters.enable != 0; }
 
  public:
   using StreamingConversation::StreamingConversation;
 
  protected:
-  /// Requests that are accepted get no ack. It is unknown if a real device sends one.
+  /// Handles a request. Accepted requests get no ack. unknown: whether a real device sends one.
   bool on_request(const Frame& frame, Time, Reaction& reaction) override {
     if (frame.header.id == Id::os_ping_params) {
       OsPingParams parameters;

@@ -6,9 +6,9 @@
 namespace sonar::ping {
 
 struct OsPingParams {
-  std::uint32_t start_mm = 0, length_mm = 5000, period_ms = 0;  // period 0: as fast as the range allows
+  std::uint32_t start_mm = 0, length_mm = 5000, period_ms = 0;  // period 0 = the shortest that the range allows
   std::array<float, 2> reserved0{};
-  float pulse_part = 0.002f, filter_part = 0.0015f;  // fractions of the duration of a ping
+  float pulse_part = 0.002f, filter_part = 0.0015f;  // as fractions of the duration of a ping
   std::int16_t gain = -1;
   std::uint16_t results = 600;
   std::uint8_t enable = 0, reserved1 = 0;  // newer definitions add two bytes without meaning

@@ -19,11 +19,11 @@ constexpr double db_per_gain = 6;  // unknown: assumed, as are full scale and th
 constexpr int most_gain = 7;
 constexpr double longest_m = 150;
 constexpr std::uint32_t least_length_mm = 100;
-constexpr double processing_s = 0.0018;  // from the last echo to the next ping (REC)
+constexpr double processing_s = 0.0018;  // time from the last echo to the next ping (REC)
 
-constexpr double fastest_mps = 2000;  // highest speed of sound that a host can set
+constexpr double fastest_mps = 2000;  // highest sound speed that a host can set
 
-/// From one ping to the next.
+/// Returns the shortest time from one ping to the next.
 double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
 
 SonarModel make_model() {
@@ -35,7 +35,7 @@ SonarModel make_model() {
   mode.source_level_db = 205;
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
-  // Along the track: as the maker states it for the Omniscan 3D 450 SS. Across it: recalled.
+  // The width along the track is that of the Omniscan 3D 450 SS, which the maker states. The width across is recalled.
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(0.8));
   mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(50));
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
@@ -48,7 +48,7 @@ SonarModel make_model() {
   return model;
 }
 
-/// The powers of a ping, scaled so that its own lowest is 0 and its highest 65535 (REC).
+/// The powers of a ping, scaled so that the lowest is 0 and the highest 65535 (REC).
 struct Powers {
   float lowest_db = 0, highest_db = 0;
   Bytes codes;
@@ -73,7 +73,7 @@ Powers scaled(BytesView samples, const SampleFormat& format) {
   return powers;
 }
 
-/// Heading of the middle of the beam, clockwise from north.
+/// Returns the heading of the middle of the beam, clockwise from north.
 double heading_deg(const Pose& sonar_in_world) {
   const Vec3d ahead = rotate(sonar_in_world.orientation, Vec3d{1, 0, 0});
   const double deg = deg_from_rad(std::atan2(ahead.x, ahead.y));
@@ -149,7 +149,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   return change_to(s);
 }
 
-// "Heading" of the transducer is the bearing of the beam; that of the vehicle is 0 (unknown: what a real device sends).
+// The transducer's heading is the bearing of the beam; the vehicle's heading is 0 (unknown: the value of a real device).
 Bytes profile_of(const Ping& ping, const protocol::DeviceState& device) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingSettings& made = ping.request.settings;

@@ -1,5 +1,4 @@
-// The Omniscan 450: its product, the checks of its settings, and the frame of a ping. Pure functions; sources:
-// docs/protocols/ping.md.
+// The Omniscan 450: the model, the checks of the settings, and the frame of a ping. Sources: docs/protocols/ping.md.
 #pragma once
 
 #include "protocol/held_settings.hpp"
@@ -10,9 +9,9 @@ namespace sonar::ping::omniscan {
 
 std::span<const std::shared_ptr<const SonarModel>> models();
 
-/// The settings that a host has made.
+/// The settings that a host has set.
 struct Settings {
-  std::uint8_t id = 0;  // id of the device; its value in a new device is unknown
+  std::uint8_t id = 0;  // id of the device; unknown: the id of a new device
   OsPingParams parameters;
   float speed_mps = 1500;
   bool operator==(const Settings&) const = default;
@@ -21,7 +20,7 @@ using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The reason if the device refuses the parameters, else an empty text.
+/// Returns the reason if the device refuses the parameters, else an empty text.
 std::string complaint(const OsPingParams& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);

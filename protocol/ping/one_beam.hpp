@@ -8,8 +8,8 @@
 
 namespace sonar::ping {
 
-/// The reason if a sonar of one beam, one mode and samples of `bits` does not have these settings, else an empty text. `sonar`:
-/// its name, such as "a Ping360".
+/// Returns the reason if a sonar with one beam, one mode and samples of `bits` does not have these settings, else an empty text.
+/// `sonar`: name of the sonar, such as "a Ping360".
 inline std::string one_beam_complaint(const protocol::SettingsOverride& wanted, std::string_view sonar, unsigned bits) {
   const std::string name(sonar);
   if (wanted.mode && *wanted.mode != 0) return name + " has one mode, 0";

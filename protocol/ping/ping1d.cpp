@@ -12,7 +12,7 @@ using protocol::Reaction;
 constexpr std::uint16_t firmware_major = 3, firmware_minor = 29, supply_mv = 5000;
 constexpr double housing_above_water_c = 8;  // assumed
 
-/// One host's conversation. Each setting has a message of its own; SoundingConversation fires the pings that the host requests or
+/// The dialogue with one host. Each setting has its own message; SoundingConversation fires the pings that the host requests or
 /// streams.
 class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
  public:
@@ -55,13 +55,13 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
       case Id::ping1d_goto_bootloader:
         refuse(frame, "it has no bootloader", reaction);
         return true;
-      default:  // older hosts request a message by its number, without a payload (CLI)
+      default:  // older hosts request a message with its id, without a payload (CLI)
         if (frame.payload.empty()) answer(id, now, reaction);
         return frame.payload.empty();
     }
   }
 
-  /// Results come with the next ping; other values are sent at once.
+  /// Sends results with the next ping, and other values at once.
   bool on_wanted(Id wanted_id, Time now, Reaction& reaction) override {
     const Settings s = settings_after(reaction);
     if (const Results result = results_of(wanted_id); result != no_result) {
@@ -77,7 +77,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
   }
 
  private:
-  /// In automatic mode the device sets range and gain itself, so these requests are refused.
+  /// Refuses the request in automatic mode, in which the device determines range and gain.
   bool is_manual(const Frame& frame, Reaction& reaction) const {
     const bool manual = settings_after(reaction).parameters.mode_auto == 0;
     if (!manual) refuse(frame, "the mode is automatic", reaction);
@@ -152,7 +152,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
   }
 };
 
-// The port of the bridge by which vehicles serve the serial line.
+// The port of the bridge with which vehicles serve the serial line.
 constexpr auto port_table = streaming_ports(9090, "settings, distances, profiles");
 
 class Ping1DVendor final : public StreamingVendor {

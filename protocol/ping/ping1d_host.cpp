@@ -19,7 +19,7 @@ void add_value(Bytes& to, Id id, T value) {
   to.insert(to.end(), frame.begin(), frame.end());
 }
 
-/// The requests of this host: each setting in a message of its own, then a stream of profiles. Without range and gain the mode is
+/// Makes the requests of this host: one message per setting, then a stream of profiles. Without range and gain the mode is
 /// automatic, and the sonar chooses both.
 Bytes request(const protocol::SettingsOverride& wanted) {
   Bytes all;

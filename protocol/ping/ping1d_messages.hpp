@@ -5,7 +5,7 @@
 
 namespace sonar::ping {
 
-/// The range, set by a host and reported by the device.
+/// The range, which a host sets and the device reports.
 struct ScanRange {
   std::uint32_t start_mm = 0, length_mm = 0;
 };

@@ -37,7 +37,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "ping1d";
   model.name = "Ping1D";
-  model.max_rate_hz = 1000;  // the shortest interval; sound takes longer
+  model.max_rate_hz = 1000;  // the rate of the shortest interval; the travel time of sound limits it further
   model.modes = {mode};
   return model;
 }
@@ -159,7 +159,7 @@ std::vector<Bytes> frames_of(const Ping& ping) {
   profile.distance_mm = static_cast<std::uint32_t>(std::lround(1000 * echo.range_m));
   profile.confidence = static_cast<std::uint16_t>(echo.confidence);
   profile.ping = static_cast<std::uint32_t>(ping.request.number);
-  // Range, pulse and gain are those under which the ping was made; the present ones may differ.
+  // Range, pulse and gain are those with which the ping was made; the present values may differ.
   profile.start_mm = static_cast<std::uint32_t>(std::lround(1000 * made.range_start_m));
   profile.length_mm = static_cast<std::uint32_t>(std::lround(1000 * (made.range_m - made.range_start_m)));
   profile.transmit_us = static_cast<std::uint16_t>(

@@ -43,7 +43,7 @@ struct Settings {
   Parameters parameters;
   Results results = no_result;  // results that hosts requested; no_result: no host did, and the profile is sent
 };
-/// Compares settings without the results, which differ from ping to ping.
+/// Compares settings without the results, which differ between pings.
 bool same_settings(const Settings& a, const Settings& b);
 /// Finds the echo.
 inline std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) {
@@ -53,7 +53,7 @@ using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The reason if the device refuses the parameters, else an empty text.
+/// Returns the reason if the device refuses the parameters, else an empty text.
 std::string complaint(const Parameters& parameters);
 /// Duration of the pulse with these parameters.
 std::uint16_t transmit_us(const Parameters& parameters);
@@ -63,7 +63,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 using ping::Echo;
 using ping::find_echo;
-/// The automatic mode: range and gain after a ping in which `echo` was found.
+/// Returns range and gain of the automatic mode after a ping in which `echo` was found.
 Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
 /// The frames for Settings::results, in the order of their message ids.

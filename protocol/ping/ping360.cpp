@@ -25,9 +25,9 @@ DeviceInformation identity(const protocol::OptionValues& options) {
   return info;
 }
 
-/// One host's conversation: a request starts a task (`Task`), which replaces the one in progress. Each ping of a task has two
-/// waits: until the head has turned (`due_`), then until the ping is computed (`awaited_`). on_tick() ends the first, on_ping()
-/// the second.
+/// The dialogue with one host. A request starts a task (`Task`), which replaces the task in progress. Each ping of a task has two
+/// waits: until the head has turned (`due_`), then until the ping is computed (`awaited_`). on_tick() ends the first wait,
+/// on_ping() the second.
 class Ping360Dialogue final : public Conversation {
  public:
   Ping360Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
@@ -37,13 +37,13 @@ class Ping360Dialogue final : public Conversation {
     Reaction reaction;
     if (now < next_tick()) return reaction;
     if (awaited_.is_under_way()) {
-      if (awaited_.lose(ping_pending, now)) advance(now);  // the ping is late: the scan continues without it
+      if (awaited_.lose(ping_pending, now)) advance(now);  // the scan continues without the late ping
       return reaction;
     }
     Settings s = settings();
     s.id = id_;
     s.ping.angle = head_.target();
-    // The head has arrived. A request without transmission is answered by message 2300 without samples.
+    // The head has reached its angle. The answer to a request without transmission is device_data (2300) without samples.
     if (task_ == Task::turn) {
       reaction.replies.push_back(state_message(now));
       task_ = Task::none;
@@ -72,7 +72,7 @@ class Ping360Dialogue final : public Conversation {
   }
 
  protected:
-  /// 2601 and 2602 begin a task and are answered by its pings; the others are acknowledged.
+  /// transducer (2601) and auto_transmit (2602) begin a task, whose pings are the answer; other requests are acknowledged.
   bool on_request(const Frame& frame, Time now, Reaction& reaction) override {
     switch (frame.header.id) {
       case Id::transducer: {
@@ -105,20 +105,20 @@ class Ping360Dialogue final : public Conversation {
   Bytes message_now(Id wanted, Time now) override { return wanted == Id::device_data ? state_message(now) : Bytes{}; }
 
  private:
-  /// turn: sends 2300 without samples when the head has arrived. ping: fires one ping then. scan: pings and turns until another
-  /// request.
+  /// turn: turns the head, then sends device_data (2300) without samples. ping: turns the head, then fires one ping. scan: pings
+  /// and turns until another request.
   enum class Task { none, turn, ping, scan };
 
   Settings settings() const { return settings_from(device_.settings.get()); }
 
-  /// Message 2300 without samples: the settings and the present angle of the head.
+  /// Makes device_data (2300) without samples: the settings and the present angle of the head.
   Bytes state_message(Time now) const {
     const Transducer t = settings().ping;
     return framed_message(Id::device_data, id_,
                           DeviceData{t.mode, t.gain, head_.angle_at(now), t.transmit_us, t.period, t.khz, t.samples, 0});
   }
 
-  /// A valid request replaces the one in progress. A refused request has no effect on it.
+  /// Begins the task of a valid request, which replaces the task in progress. A refused request has no effect.
   template <class Request>
   void begin(const Frame& frame, const Request& request, Time now, Reaction& reaction) {
     if (const std::string why = complaint(request); !why.empty()) return refuse(frame, why, reaction);
@@ -131,7 +131,7 @@ class Ping360Dialogue final : public Conversation {
     reaction.events.emplace_back(change_to(s, device_));
   }
 
-  /// The head stops where it is, also in the middle of a turn. A ping that still comes is not sent.
+  /// Stops the head at once, also during a turn. A ping that still arrives is not sent.
   void stop(Time now) {
     task_ = Task::none;
     awaited_.forget();
@@ -150,13 +150,13 @@ class Ping360Dialogue final : public Conversation {
     const Time turns_at = awaited_.fired_at() + after;
     const bool oscillates = text_option(device_.options, option_name::sector_scan) != "wrap";
     head_.turn_to(next_angle(head_.target(), s, back_, oscillates), turns_at);
-    // After a late ping the scan does not catch up: the next one is due now at the earliest.
+    // After a late ping the scan does not catch up; the next ping is due now at the earliest.
     due_ = std::max(head_.arrives(), now);
   }
 
   Head head_;
   Task task_ = Task::none;
-  bool back_ = false;  // a scan that oscillates is on its way back to the start angle
+  bool back_ = false;  // true: an oscillating scan returns to the start angle
   Time due_{};
   protocol::AwaitedPing awaited_;
 };
@@ -173,8 +173,8 @@ std::string text_of(protocol::BytesView bytes) {
   return text;
 }
 
-/// The answer to "Discovery": four lines, each ended by CR LF, in one datagram to the host that asked. The numbers of the address
-/// have three digits.
+/// Makes the answer to "Discovery": four lines that end with CR LF, in one datagram to the requesting host. The numbers of the
+/// address have three digits.
 protocol::Bytes discovery_answer(const protocol::DeviceState& device) {
   const auto& m = device.mac;
   const auto& ip = device.advertise_ip;
@@ -188,7 +188,7 @@ protocol::Bytes discovery_answer(const protocol::DeviceState& device) {
   return bytes;
 }
 
-/// The address in "SetSS1IP 192.168.002.010". An address of zeros selects DHCP.
+/// Returns the address in a text such as "SetSS1IP 192.168.002.010". An address of zeros selects DHCP.
 std::optional<protocol::StoredAddress> address_in(const std::string& text) {
   unsigned a = 0, b = 0, c = 0, d = 0;
   if (std::sscanf(text.c_str(), "SetSS1IP %3u.%3u.%3u.%3u", &a, &b, &c, &d) != 4 || std::max({a, b, c, d}) > 255) return {};
@@ -203,7 +203,7 @@ class Ping360Vendor final : public protocol::Vendor {
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return ping360::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return ping360::options(); }
-  int default_max_clients() const override { return 1; }  // the host that sent last
+  int default_max_clients() const override { return 1; }  // the only client is the last sender
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(Settings{}, device);
   }
@@ -215,7 +215,7 @@ class Ping360Vendor final : public protocol::Vendor {
     return 50.0 * settings_from(device.settings.get()).ping.gain;
   }
   protocol::PingsBy pings_by() const override { return protocol::PingsBy::datagrams; }
-  /// Scans the half circle ahead to and fro, with a range of 10 m unless a host or the configuration has set another.
+  /// Scans the half circle ahead, back and forth, with a range of 10 m unless a host or the configuration has set another.
   std::optional<ScanStep> scan_step(std::uint32_t number, const protocol::DeviceState& device) const override {
     Settings s = settings_from(device.settings.get());
     if (HeldSettings(s).equals(HeldSettings(Settings{})))
@@ -230,7 +230,7 @@ class Ping360Vendor final : public protocol::Vendor {
                     ping_settings(s, device)};
   }
   bool is_request(const protocol::Port&, protocol::BytesView datagram) const override { return holds_frame(datagram); }
-  /// The discovery port has a text protocol of its own. SetSS1IP changes the address of a real device; here it is stored only.
+  /// Handles the text protocol of the discovery port. SetSS1IP changes the address of a real device; here it is only stored.
   protocol::Reaction on_datagram(const protocol::Port&, protocol::BytesView datagram, const protocol::DeviceState& device,
                                  Time) const override {
     protocol::Reaction reaction;

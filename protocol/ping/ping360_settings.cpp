@@ -22,7 +22,7 @@ constexpr auto turn_of_a_grad = std::chrono::milliseconds(6);  // a full turn ta
 constexpr double db_per_gain = 6;                              // unknown: assumed
 constexpr double fastest_hz = 1000;                            // no limit: hosts request each line, or the head limits the scan
 
-/// The reason for the first value outside its limits, else an empty text.
+/// Returns the reason for the first value outside its limits, else an empty text.
 std::string out_of_range(std::initializer_list<std::tuple<const char*, int, int, int>> values) {
   for (const auto& [name, value, low, high] : values)
     if (value < low || value > high) {
@@ -117,15 +117,15 @@ Settings settings_of(const AutoTransmit& t) {
 
 PingSettings ping_settings(const Settings& settings, const protocol::DeviceState& device) {
   const Transducer& t = settings.ping;
-  // The device samples at intervals of time and has no setting for the sound speed. Each row lies at the range from which the
-  // sound came at the true speed.
+  // The device samples at intervals of time and has no setting for the sound speed. So the range of each row follows from the
+  // true sound speed.
   const double speed = true_sound_speed_mps(device.water, device.depth_m);
   PingSettings s;
   s.beam_count = 1;
   s.range_bin_count = t.samples;
   s.range_bin_m = t.period * sample_unit_s * speed / 2;
   s.range_m = s.range_bin_count * s.range_bin_m;
-  s.row_centre = 1;  // sample i is taken i + 1 periods after the pulse
+  s.row_centre = 1;  // sample i is taken i + 1 sample periods after the pulse
   s.pulse_width_m = static_cast<float>(std::max(t.transmit_us * 1e-6 * speed / 2, s.range_bin_m / 2));
   s.rate_hz = fastest_hz;
   s.triggered = true;
@@ -202,7 +202,7 @@ std::optional<Line> line_in(BytesView message) {
 }
 
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options) {
-  // Angles grow clockwise seen from above, as in Ping Viewer (protocol/ping/README.md, "Direction of a Ping360").
+  // Seen from above, angles increase clockwise, as in Ping Viewer (protocol/ping/README.md, "Direction of a Ping360").
   return -(angle + number_option(options, option_name::mount_grad)) * 2 * pi / grads;
 }
 
@@ -215,7 +215,7 @@ std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionVal
 
 Time Head::arrives() const { return since + std::abs(to - from) * turn_of_a_grad; }
 
-// Whole grads: the head stops at grads only, and messages have no finer angle.
+// Returns whole grads, because the head stops only at grads, and messages have no finer angle.
 std::uint16_t Head::angle_at(Time at) const {
   const int way = std::abs(to - from);
   const auto gone = static_cast<int>(std::clamp<std::int64_t>((at - since) / turn_of_a_grad, 0, way));
@@ -224,14 +224,14 @@ std::uint16_t Head::angle_at(Time at) const {
 
 void Head::turn_to(std::uint16_t angle, Time at) {
   from = angle_at(at);
-  // The head takes the shorter way. `to` may lie outside of 0 to 399; angle_at() takes it modulo a turn.
+  // The head turns by the smaller angle. `to` may lie outside of 0 to 399; angle_at() takes it modulo a turn.
   const int ahead = ((angle - from) % grads + grads) % grads;
   to = from + (ahead <= grads / 2 ? ahead : ahead - grads);
   since = at;
 }
 
-/// A scan of a sector without angle 0 starts again at its beginning. A sector that holds angle 0 turns around at its ends, or
-/// goes back to its start (option sector_scan).
+/// Returns the next angle. In a sector without angle 0, the scan starts again at the beginning. In a sector with angle 0, it
+/// reverses at the ends, or returns to the start (option sector_scan).
 std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates) {
   if (scan.start <= scan.stop) {
     const int next = angle + scan.steps;

@@ -1,5 +1,5 @@
-// The Ping360: its product, the checks of its settings, their conversion to PingSettings, and the turning of its head. Pure
-// functions; sources: docs/protocols/ping.md.
+// The Ping360: the model, the checks of the settings, their conversion to PingSettings, and the turning of the head. Sources:
+// docs/protocols/ping.md.
 #pragma once
 
 #include <memory>
@@ -21,11 +21,11 @@ inline constexpr std::string_view firmware = "firmware", mount_grad = "mount_gra
 std::span<const protocol::Option> options();
 std::span<const std::shared_ptr<const SonarModel>> models();
 
-/// The settings that a host has made; pings echo them. `ping.angle` is the direction of the head.
+/// The settings that a host has set; pings echo them. `ping.angle` is the direction of the head.
 struct Settings {
   std::uint8_t id = 2;  // id of the device
   Transducer ping;
-  bool scans = false;  // true: the request was 2602, whose other fields follow
+  bool scans = false;  // true: the request was auto_transmit (2602), whose other fields follow
   std::uint16_t start = 0, stop = 399;
   std::uint8_t steps = 1, delay_ms = 0;
 };
@@ -35,7 +35,7 @@ using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The reason if the device refuses the request, else an empty text.
+/// Returns the reason if the device refuses the request, else an empty text.
 std::string complaint(const Transducer& t);
 std::string complaint(const AutoTransmit& t);
 Settings settings_of(const Transducer& t);
@@ -45,26 +45,26 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// The message of a ping under these settings: auto_device_data in a scan, else device_data.
+/// Makes the message of a ping with these settings: auto_device_data in a scan, else device_data.
 Bytes encode(const Settings& settings, BytesView samples);
-/// The scan line in such a message. nullopt: another message, an incomplete one, or a wrong checksum.
+/// The scan line in such a message.
 struct Line {
   Transducer ping;
   Bytes samples;
 };
 std::optional<Line> line_in(BytesView message);
 
-/// Angle by which the sonar is rotated to port, so that it looks in the direction of its head [rad]. Angles of the head grow to
-/// starboard.
+/// Returns the angle [rad] by which the sonar is rotated to port, so that it points in the direction of the head. Angles of the
+/// head increase to starboard.
 double head_rad(std::uint16_t angle, const protocol::OptionValues& options);
-/// Duration of the samples of a ping.
+/// Returns the duration of the samples of a ping.
 std::chrono::nanoseconds listening(const Transducer& t);
-/// Time to send a ping's answer on the link.
+/// Returns the time to send a ping's answer over the link.
 std::chrono::nanoseconds transfer(const Transducer& t, const protocol::OptionValues& options);
 
-/// The position of the head while it turns. It turns the shorter way, at 6 ms per grad.
+/// The position of a turning head. It turns by the smaller angle, at 6 ms per grad.
 struct Head {
-  int from = 0, to = 0;  // grad; `to` may lie beyond a turn
+  int from = 0, to = 0;  // grad; `to` may be beyond a turn
   Time since{};
   Time arrives() const;
   std::uint16_t target() const { return static_cast<std::uint16_t>((to % grads + grads) % grads); }
@@ -73,8 +73,8 @@ struct Head {
   void turn_to(std::uint16_t angle, Time at);
 };
 
-/// The angle after `angle` in a scan. `back`: the scan is on its way back; the caller keeps it between calls. `oscillates`:
-/// option sector_scan.
+/// Returns the angle after `angle` in a scan. `back`: true while the scan returns; the caller keeps it between calls.
+/// `oscillates`: option sector_scan.
 std::uint16_t next_angle(std::uint16_t angle, const Settings& scan, bool& back, bool oscillates);
 
 }  // namespace sonar::ping::ping360

@@ -16,7 +16,7 @@ using protocol::HostPing;
 
 namespace {
 
-/// The number of the request that a nack refuses.
+/// Returns the id of the request that a nack refuses.
 Id refused_in(const Frame& nack) {
   Id id{};
   wire::Reader reader(nack.payload);
@@ -73,7 +73,7 @@ HostActions PingHost::on_bytes(std::size_t, BytesView received, Time now) {
     if (!frame->sum_is_right) continue;
     on_frame(*frame, actions);
     if (frame->header.id == Id::nack) {
-      std::string text;  // after the number of the request
+      std::string text;  // the text after the id of the request
       for (std::size_t i = 2; i < frame->payload.size(); ++i) text += static_cast<char>(frame->payload[i]);
       if (const auto why = on_nack(refused_in(*frame), std::move(text), actions))
         actions.emplace_back(Error{ErrorKind::usage, about() + " refuses a request: " + *why});

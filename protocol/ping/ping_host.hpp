@@ -16,10 +16,10 @@ using protocol::Waterfall;
 
 inline constexpr double usual_range_m = 10;
 
-/// The period for the wanted rate [ms]. 0: no rate is wanted, so the device chooses it.
+/// Returns the period for the requested rate [ms]; 0 if no rate is requested, so that the device chooses it.
 double period_ms_of(const protocol::SettingsOverride& wanted);
 
-/// Asks for a message; the device's settings stay as they are.
+/// Makes a request for a message, which does not change the device's settings.
 Bytes request_for(Id wanted);
 
 /// Reads a message from the front of the payload; returns the rest.
@@ -51,8 +51,7 @@ class PingHost : public protocol::Host {
   /// Tells the user if the gain of the ping, `step` of 0 to `most`, is not the wanted one, because a gain has few steps.
   void compare_gain(int step, int most, protocol::HostPing& ping) const;
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
-  /// The reason of the error; nullopt: none, because the host sends another request in place of the refused one. `why`: what the
-  /// sonar says.
+  /// Returns the reason of the error; nullopt = no error, because the host sends another request. `why`: text from the sonar.
   virtual std::optional<std::string> on_nack(Id /*refused*/, std::string why, protocol::HostActions&) { return why; }
   virtual std::optional<protocol::HostPing> ping_from(const Frame& frame, Time now) = 0;
 

@@ -21,13 +21,13 @@ bool is_answer(ping::Id id) {
   return ping::is_of_device(id) || id == device_information || id == protocol_version;
 }
 
-/// The JSON text with which the maker's programs begin a log, without the parts that describe their computer.
+/// Returns the JSON text with which the maker's programs begin a log, without the parts that describe a computer.
 std::string beginning(ping::Id first) {
   return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") +
          (first == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
 }
 
-/// The time since power-up in a message. nullopt: messages of this kind do not have it.
+/// Returns the time since power-up in a message; nullopt if messages of this kind do not have it.
 std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   const auto of = [&](auto message) -> std::optional<std::uint32_t> {
     wire::Reader reader(frame.payload);
@@ -55,8 +55,8 @@ class PingLogReader final : public RecordingReader {
  public:
   explicit PingLogReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
 
-  /// The next frame. Frames without a time of their own get that of the frame before. The JSON text at the start is not a
-  /// message of the device and is left out.
+  /// Returns the next frame. Frames without a time get the time of the previous frame. The JSON text at the start is not a
+  /// message of the device, and is left out.
   std::optional<RecordedMessage> next() override {
     while (const auto frame = next_frame()) {
       const BytesView bytes = framer_.bytes();
@@ -80,7 +80,7 @@ class PingLogReader final : public RecordingReader {
   }
 
  private:
-  /// The next frame with the right checksum.
+  /// Returns the next frame with a correct checksum.
   std::optional<ping::Frame> next_frame() {
     for (bool ended = false;;) {
       while (auto frame = framer_.next())
@@ -106,7 +106,7 @@ class PingLogReader final : public RecordingReader {
   Damages damages_;
 };
 
-/// Writes the frames of the device behind a JSON text, which is made when the first message shows which product sends.
+/// Writes a JSON text, which is made when the first message identifies the product, and then the frames of the device.
 class PingLogWriter final : public RecordingWriter {
  public:
   explicit PingLogWriter(std::unique_ptr<Sink> sink) : sink_(std::move(sink)) {}
@@ -114,7 +114,7 @@ class PingLogWriter final : public RecordingWriter {
   Result<void> write(const RecordedMessage& message) override {
     if (message.from != Origin::device || message.by != Carrier::stream) return {};
     Bytes record;
-    if (!begun_) {  // the first message names the product
+    if (!begun_) {  // the first message identifies the product
       if (is_answer(first_id(message.bytes))) return {};
       const std::string text = beginning(first_id(message.bytes));
       record = ping::framed(ping::Id::json_wrapper, 0, std::as_bytes(std::span(text)));

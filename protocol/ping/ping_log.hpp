@@ -11,7 +11,7 @@ namespace sonar::recording {
 
 /// Reads each frame, except the JSON text, as a message of the stream. Times count from the device's power-up.
 std::unique_ptr<RecordingReader> read_ping_log(std::unique_ptr<Source> source);
-/// Accepts messages that a Surveyor, an Omniscan or an S500 sends over TCP; others are ignored.
+/// Accepts messages that a Surveyor, an Omniscan or an S500 sends over TCP; ignores others.
 std::unique_ptr<RecordingWriter> write_ping_log(std::unique_ptr<Sink> sink);
 
 }  // namespace sonar::recording

@@ -28,7 +28,7 @@ Bytes omniscan_request(const protocol::SettingsOverride& wanted) {
   return framed_message(Id::os_ping_params, 0, p);
 }
 
-/// A range or gain that is not wanted is automatic: the sonar chooses it.
+/// Makes the request of an S500. If range or gain is not requested, the sonar chooses it.
 Bytes s500_request(const protocol::SettingsOverride& wanted) {
   SetPingParams p{.length_mm = 0, .gain = -1, .period_ms = 100, .report = wanted.rate_hz == 0.0 ? Id{} : Id::s500_profile6};
   if (wanted.range_m) p.length_mm = static_cast<std::uint32_t>(std::lround(std::max(1000 * *wanted.range_m, 1.0)));
@@ -50,7 +50,7 @@ constexpr Product s500_product{"an S500", Id::s500_set_ping_params, Id::s500_pro
 constexpr Id only_s500_has = Id::ping1d_range;           // an Omniscan refuses the request for this message
 constexpr std::chrono::milliseconds answer_within{500};  // our choice
 
-/// A ping of `rows` powers; its note, such as the distance, is not set yet.
+/// Makes a ping of `rows` powers, without the note, such as the distance.
 HostPing ping_of(std::uint32_t number, std::uint32_t start_mm, double row_m, std::size_t rows, double hz,
                  std::string_view title) {
   const double start_m = 1e-3 * start_mm;
@@ -122,8 +122,8 @@ class PowerHost final : public PingHost {
     if (ask_at_ && (id == only_s500_has || id == s500_product.ping_id)) return switch_to_other(actions);
     if (id == omniscan_product.ping_id) keep_product(actions);
   }
-  /// The request was refused: the sonar is perhaps the other product. Its request is sent once; a second refusal is an error. A
-  /// recording holds refusals of another host's request, which are ignored.
+  /// Called when the request was refused, perhaps because the sonar is the other product. The request of that product is sent
+  /// once; a second refusal is an error. A recording has refusals of another host's requests, which are ignored.
   std::optional<std::string> on_nack(Id refused, std::string why, HostActions& actions) override {
     if (refused == only_s500_has) return keep_product(actions), std::nullopt;
     if (refused != product_->request_id && refused != other_->request_id) return why;

@@ -1,4 +1,4 @@
-// The products of the ping protocol (docs/protocols/ping.md): of each the device, its driver, and the codec of its recordings.
+// The products of the ping protocol (docs/protocols/ping.md), each with device, driver and codec of recordings.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +24,8 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
 recording::Codec codec();
 }  // namespace surveyor
 
-/// Omniscan 450: a side-scan sonar with one beam, narrow along the track and wide across it. TCP and UDP; it pings as soon as a
-/// host enables pings.
+/// Omniscan 450: a side-scan sonar with one beam, narrow along the track and wide across it, over TCP and UDP. It pings as soon
+/// as a host enables pings.
 namespace omniscan {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 51200}}};
 const protocol::Vendor& vendor();
@@ -33,7 +33,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
 recording::Codec codec();
 }  // namespace omniscan
 
-/// Ping1D: an altimeter with one wide beam. TCP and UDP; a host requests single measurements or a stream of them.
+/// Ping1D: an altimeter with one wide beam, over TCP and UDP. A host requests single measurements or a stream of measurements.
 namespace ping1d {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 9090}}};
 const protocol::Vendor& vendor();
@@ -41,7 +41,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
 recording::Codec codec();
 }  // namespace ping1d
 
-/// S500: an echo sounder with one narrow beam. TCP and UDP; a host requests single pings or a stream of them.
+/// S500: an echo sounder with one narrow beam, over TCP and UDP. A host requests single pings or a stream of pings.
 namespace s500 {
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, 51200}}};
 const protocol::Vendor& vendor();
@@ -51,7 +51,7 @@ recording::Codec codec();
 
 // Converts a ping rate to a period, which devices and hosts of the family use.
 
-/// The period for a rate above 0 [ms], limited to 1 to 30000.
+/// Returns the period for a rate above 0 [ms], limited to 1 to 30000.
 inline double period_ms(double rate_hz) { return std::clamp(1000 / rate_hz, 1.0, 30000.0); }
 
 }  // namespace sonar::ping

@@ -14,7 +14,8 @@ constexpr auto port_table = streaming_ports(51200, "settings, profiles");
 constexpr std::uint16_t firmware_major = 2, firmware_minor = 2;
 constexpr double processor_above_water_c = 20;  // assumed
 
-/// One host's conversation. One message (1015) sets everything and starts or ends the pings; SoundingConversation fires them.
+/// The dialogue with one host. One message, set_ping_params (1015), sets everything and starts or ends the pings;
+/// SoundingConversation fires the pings.
 class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
  public:
   S500Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
@@ -45,7 +46,7 @@ class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, s
       reaction.replies.push_back(ack(frame.header.id, id_));
       return true;
     }
-    // The maker's description allows requests by the number of the wanted message, without a payload.
+    // The maker's description allows requests with the id of the requested message, without a payload.
     if (frame.payload.empty()) answer(frame.header.id, now, reaction);
     return frame.payload.empty();
   }

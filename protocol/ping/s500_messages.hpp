@@ -8,7 +8,7 @@ namespace sonar::ping {
 struct SetPingParams {
   std::uint32_t start_mm = 0, length_mm = 5000;  // length 0: automatic
   std::int16_t gain = -1, period_ms = -1;        // gain -1: automatic; period -1: a single ping
-  std::uint16_t pulse_us = 0;                    // ignored: the device chooses it
+  std::uint16_t pulse_us = 0;                    // ignored, because the device chooses it
   Id report{};                                   // message that the device sends for each ping; 0: no pings
   std::uint16_t reserved = 0;
   std::uint8_t chirp = 0, decimation = 0;

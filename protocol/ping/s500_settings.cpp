@@ -24,7 +24,7 @@ constexpr double shortest_pulse_us = 20;    // unknown: assumed
 constexpr double db_per_gain = 4;           // unknown: assumed, as are the level and full scale
 constexpr std::size_t averaged_pings = 20;  // DEF
 
-/// The amplification of each gain_index.
+/// Returns the amplification of each gain_index.
 const std::array<double, 14>& gains() {
   static const auto all = [] {
     std::array<double, 14> made{};
@@ -56,7 +56,7 @@ SonarModel make_model() {
   return model;
 }
 
-/// The mean distance of the pings with an echo, and the mean confidence of all.
+/// Returns the mean distance of the pings with an echo, and the mean confidence of all pings.
 Echo average(std::span<const Echo> echoes) {
   Echo mean;
   int sure = 0, confidence = 0;
@@ -93,7 +93,7 @@ bool same_settings(const Settings& a, const Settings& b) {
   return all(a) == all(b);
 }
 
-// A length of 0 and a gain of -1 select the automatic ones (DEF).
+// A length of 0 selects the automatic range, a gain of -1 the automatic gain (DEF).
 std::string complaint(const SetPingParams& p) {
   if ((p.length_mm != 0 && p.length_mm < shortest_range_mm) || p.length_mm > most_mm || p.start_mm > most_mm ||
       p.start_mm + p.length_mm > most_mm)
@@ -105,7 +105,7 @@ std::string complaint(const SetPingParams& p) {
   return p.chirp > 1 ? "chirp must be 0 or 1" : "";
 }
 
-// An automatic range or gain starts from the value in force.
+// An automatic range or gain starts from the present value.
 Parameters requested(const Parameters& before, const SetPingParams& wanted) {
   Parameters p = before;
   p.ping = wanted;
@@ -174,14 +174,14 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 double gain_percent(const Parameters& p) { return 100.0 / most_gain() * p.reach.gain; }
 
-// The echo is kept for the mean of the distances in any case; range and gain follow it only where they are automatic.
+// The echo is always kept, for the mean of the distances; range and gain depend on it only if they are automatic.
 Settings after(const Ping& ping, const Settings& now) {
   const Echo echo = echo_in(ping);
   Settings next = now;
   next.earlier = with(now.earlier, echo);
   Parameters& p = next.parameters;
   const Reach made_with = settings_from(ping.request.vendor_settings.get()).parameters.reach;
-  // If a host has changed range or gain since, the ping does not show whether the new ones fit.
+  // If a host has changed range or gain since, the ping does not show whether the new values fit.
   if (made_with.length_mm != p.reach.length_mm || made_with.gain != p.reach.gain) return next;
   const Reach chosen = adjusted(made_with, echo, {gains(), most_mm});
   if (p.ping.length_mm == 0)

@@ -1,5 +1,5 @@
-// The S500: its product, the checks of its settings, the mean of its distances, and the frames of a ping. Pure functions;
-// sources: protocol/ping/README.md.
+// The S500: the model, the checks of the settings, the mean of the distances, and the frames of a ping. Sources:
+// protocol/ping/README.md.
 #pragma once
 
 #include <string>
@@ -15,8 +15,8 @@ namespace sonar::ping::s500 {
 std::span<const std::shared_ptr<const SonarModel>> models();
 
 struct Parameters {
-  SetPingParams ping;              // as requested
-  Reach reach{.length_mm = 5000};  // in use: as requested, or chosen by the device
+  SetPingParams ping;              // requested parameters
+  Reach reach{.length_mm = 5000};  // present range and gain, requested or chosen by the device
   std::uint32_t speed_mm_per_s = 1500000;
   std::uint8_t enable = 1;
 };
@@ -30,12 +30,12 @@ inline Results results_of(Id id) {
 }
 
 struct Settings {
-  std::uint8_t id = 0;  // id of the device; its value in a new device is unknown
+  std::uint8_t id = 0;  // id of the device; unknown: the id of a new device
   Parameters parameters;
   Results results = no_result;  // results that hosts requested; no_result: no host did, and the profile is sent
   std::vector<Echo> earlier;    // the newest is the last
 };
-/// Compares settings without the results and the echoes, which differ from ping to ping.
+/// Compares settings without the results and the echoes, which differ between pings.
 bool same_settings(const Settings& a, const Settings& b);
 /// Finds the echo.
 inline std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) {
@@ -45,22 +45,23 @@ using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// The reason if the device refuses the request, else an empty text.
+/// Returns the reason if the device refuses the request, else an empty text.
 std::string complaint(const SetPingParams& wanted);
-/// The parameters in use after the request.
+/// Returns the parameters after the request.
 Parameters requested(const Parameters& before, const SetPingParams& wanted);
-/// Shortest interval between pings.
+/// Returns the shortest interval between pings.
 int interval_ms(const Parameters& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 double gain_percent(const Parameters& parameters);
 
-/// The settings `now`, changed by the automatic range and gain after a ping. The ping may have been made under earlier settings.
+/// Returns the settings `now`, changed by the automatic range and gain after a ping. The ping may have been made with earlier
+/// settings.
 Settings after(const Ping& ping, const Settings& now);
 /// The frames for Settings::results, in the order of their numbers.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
-/// As ping1d::answer().
+/// Does the same as ping1d::answer().
 std::vector<Bytes> answer(BytesView recorded, Results wanted);
 
 }  // namespace sonar::ping::s500

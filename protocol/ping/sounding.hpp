@@ -1,5 +1,5 @@
-// The part that the conversations with range finders (Ping1D, S500) share: each ping is fired for results that a host requests
-// or streams.
+// The part that the dialogues with range finders (Ping1D, S500) share: each ping is fired for results that a host requests or
+// streams.
 #pragma once
 
 #include <cmath>
@@ -10,13 +10,13 @@
 
 namespace sonar::ping {
 
-/// A ping is fired when results are wanted (`once_`, `streamed_`) and the interval is over (`due_`). The next one is fired only
-/// after the ping has arrived or two seconds have passed. `Settings`: as for StreamingConversation, and with `results`, for
-/// which a ping is fired. `Held` holds them.
+/// A ping is fired when results are requested (`once_`, `streamed_`) and the interval is over (`due_`). The next ping is fired
+/// only after this ping has arrived or two seconds have passed. `Settings`: as for StreamingConversation, and with `results`, for
+/// which a ping is fired. `Held` has the settings.
 template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*)>
 class SoundingConversation : public StreamingConversation<Settings, settings_from> {
   using Base = StreamingConversation<Settings, settings_from>;
-  static constexpr auto longest_wait = std::chrono::seconds(2);  // after that a ping counts as lost
+  static constexpr auto longest_wait = std::chrono::seconds(2);  // time after which a ping counts as lost
 
  public:
   SoundingConversation(const protocol::DeviceState& device, const protocol::Port& port, DeviceInformation identity, Time now)
@@ -60,7 +60,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   void want_once(Results result, Time now, protocol::Reaction& reaction) { want(once_, result, now, reaction); }
   void stream(Results result, Time now, protocol::Reaction& reaction) { want(streamed_, result, now, reaction); }
   void stop_stream(Results result) { streamed_ &= ~result; }
-  /// The ping that is being computed no longer serves a request.
+  /// Call it if the ping that is being computed must no longer serve a request.
   void forget_ping(Time now) {
     fired_.reset();
     due_ = now;
@@ -72,7 +72,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
     write("value", value);
     return framed(id, this->id_, payload);
   }
-  /// The temperature of the water plus `above_c`, in hundredths of a degree.
+  /// Returns the temperature of the water plus `above_c`, in hundredths of a degree.
   std::uint16_t centidegrees(double above_c) const {
     return static_cast<std::uint16_t>(std::lround(std::max(100 * (this->device_.water.temperature_c + above_c), 0.0)));
   }
@@ -86,7 +86,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
     results |= result;
   }
 
-  Results once_ = no_result, streamed_ = no_result;  // results that the host waits for
+  Results once_ = no_result, streamed_ = no_result;  // results for which the host waits
   Time due_{};                                       // time of the next requested ping, if none is being computed
   std::shared_ptr<const Held> fired_;                // the ping that is being computed
   Time fired_at_{};

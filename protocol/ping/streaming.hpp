@@ -1,4 +1,4 @@
-// The part that Surveyor, Omniscan, Ping1D and S500 share: they send pings by TCP or UDP while a host enables them.
+// The part that Surveyor, Omniscan, Ping1D and S500 share: they send pings over TCP or UDP while a host enables pings.
 #pragma once
 
 #include <array>
@@ -16,12 +16,12 @@ constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number, st
            {.kind = protocol::Port::Kind::udp_dialogue, .number = number, .carries = carries}}};
 }
 
-/// The conversation of a product that pings while a host enables it. Its `Settings` have `id` and `parameters.enable`; its
-/// change_to() converts them to PingSettings.
+/// The dialogue of a product that pings while a host enables pings. `Settings` have `id` and `parameters.enable`; change_to()
+/// converts them to PingSettings.
 template <class Settings, Settings (*settings_from)(const VendorSettings*)>
 class StreamingConversation : public Conversation {
  public:
-  /// The type in `identity` is ignored: an option sets it.
+  /// Ignores the type in `identity`, because an option sets it.
   StreamingConversation(const protocol::DeviceState& device, const protocol::Port& port,
                         DeviceInformation identity = {.major = 1})
       : Conversation(device, port, typed(identity, device), settings_from(device.settings.get()).id) {}
@@ -38,7 +38,7 @@ class StreamingConversation : public Conversation {
     change(reaction, [](Settings&) {});
   }
   Settings settings() const { return settings_from(device_.settings.get()); }
-  /// The settings after the changes of this call, which the daemon has not made yet.
+  /// Returns the settings after the changes of this call, which the daemon has not made yet.
   Settings settings_after(const protocol::Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
@@ -74,7 +74,7 @@ class StreamingVendor : public protocol::Vendor {
   void reseal(protocol::BytesView before, protocol::Bytes& ping) const override { sonar::ping::reseal(before, ping); }
 
  protected:
-  /// The frames of a ping, in the order of sending.
+  /// Returns the frames of a ping, in the order of sending.
   virtual std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) const = 0;
 };
 

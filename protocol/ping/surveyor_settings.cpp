@@ -24,9 +24,9 @@ constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with
 constexpr double longest_m = 200, least_m = 0.01;  // highest end of the range; least length of the range
 constexpr double db_per_gain = 0.4;                // unknown: assumed
 constexpr double processing_s = 0.01;
-constexpr double fastest_mps = 2000;  // highest speed of sound that a host can set
+constexpr double fastest_mps = 2000;  // highest sound speed that a host can set
 
-/// From one ping to the next.
+/// Returns the shortest time from one ping to the next.
 double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
 
 SonarModel make_model() {
@@ -57,8 +57,8 @@ std::uint64_t milliseconds_of(std::chrono::nanoseconds t) {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::milliseconds>(t).count());
 }
 
-/// The upward direction of the world in the axes of the device: ahead, to port, up. The fan looks down, so the device's up is
-/// opposite to the sonar's x axis.
+/// Returns the upward direction of the world in the axes of the device: ahead, to port, up. The fan points down, so the device's
+/// up is opposite to the sonar's x axis.
 std::array<float, 3> up_of(const Pose& sonar_in_world) {
   const Vec3d up = rotate(conjugate(sonar_in_world.orientation), Vec3d{0, 0, 1});
   return {static_cast<float>(up.z), static_cast<float>(up.y), static_cast<float>(-up.x)};
@@ -82,7 +82,7 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
   return all;
 }
 
-// Each answer to the time request gives a slightly different offset; it must not count as a change of settings every 10 s.
+// Each answer to the time request gives a slightly different offset, which must not count as a change of settings every 10 s.
 bool same_settings(const Settings& a, const Settings& b) {
   if (a.id != b.id || a.parameters != b.parameters || a.utc_ahead.has_value() != b.utc_ahead.has_value()) return false;
   return !a.utc_ahead || std::chrono::abs(*a.utc_ahead - *b.utc_ahead) < std::chrono::milliseconds(1);
@@ -162,7 +162,7 @@ WaterStats water_stats(const protocol::DeviceState& device) {
 
 std::shared_ptr<const PingFindings> findings_of(const Settings&, const Ping& ping) { return protocol::found(points_of(ping)); }
 
-// Both messages have the same points: 3012 as angle and time, 3011 as y and z.
+// Both messages have the same points: atof_point_data (3012) as angle and time, yz_point_data (3011) as y and z.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) {
   const Settings s = settings_from(ping.request.vendor_settings.get());
   const PingParameters& p = s.parameters;
@@ -212,7 +212,7 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
     data.points = static_cast<std::uint16_t>(yz.size());
     frames.push_back(framed(Id::yz_point_data, s.id, payload_of(data, yz)));
   }
-  // The water's temperature and pressure follow the first ping of each second.
+  // After the first ping of each second, the temperature and pressure of the water are sent.
   const auto period_ms = static_cast<std::uint32_t>(std::lround(1000 / std::max(static_cast<double>(made.rate_hz), 1e-3)));
   if (power_up_ms % 1000 < period_ms) frames.push_back(framed_message(Id::water_stats, s.id, water));
   return frames;

@@ -42,7 +42,7 @@ class FileSource final : public Source {
     while (done < into.size()) {
       const ssize_t n = ::pread(file_.fd(), into.data() + done, into.size() - done, static_cast<off_t>(offset + done));
       if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) break;  // the end, or an error: the caller sees fewer bytes
+      if (n <= 0) break;  // at the end, or after an error, the caller gets fewer bytes
       done += static_cast<std::size_t>(n);
     }
     return done;
@@ -72,7 +72,7 @@ class MemorySource final : public Source {
   Bytes bytes_;
 };
 
-/// Appends whole records to a file. After an error every call fails with it, until try_again().
+/// Appends whole records to a file. After an error every call fails with that error, until try_again().
 class FileSink final : public Sink {
  public:
   FileSink(std::string name, int fd) : name_(std::move(name)), file_(fd) {}
@@ -97,7 +97,7 @@ class FileSink final : public Sink {
 
   void try_again() override { broken_.reset(); }
 
-  /// The kernel reports neither a file that was removed or replaced nor one that another program cut.
+  /// Closes the file, and checks whether it was removed, replaced or cut, which the kernel does not report.
   Result<void> close() override {
     struct stat about {};
     const bool is_file = ::fstat(file_.fd(), &about) == 0 && S_ISREG(about.st_mode) && !broken_;
@@ -172,8 +172,8 @@ Result<std::unique_ptr<Sink>> sink_to(const std::filesystem::path& file, int mor
   Descriptor opened(fd);
   struct stat about {};
   if (::fstat(fd, &about) == 0 && S_ISREG(about.st_mode)) {
-    // The file is emptied only after its lock was obtained, so that no other program is writing it. File systems without locks
-    // have no check.
+    // The file is emptied only when it is locked, so that no other program is writing it. On file systems without locks there is
+    // no check.
     if (::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
       return failure(ErrorKind::io, file.string() + " is being written by another program: give another name");
     if (::ftruncate(fd, 0) != 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(errno));
@@ -190,7 +190,7 @@ Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file)
 
 std::unique_ptr<Sink> sink_into(Bytes& bytes) { return std::make_unique<MemorySink>(bytes); }
 
-// Reads blocks, so that records of a few bytes do not cost a system call each.
+// Reads blocks, so that not every record of a few bytes needs a system call.
 BytesView Scan::peek(std::size_t count) {
   count = static_cast<std::size_t>(std::min<std::uint64_t>(count, left()));
   const bool buffered = position_ >= buffered_from_ && position_ + count <= buffered_from_ + buffer_.size();

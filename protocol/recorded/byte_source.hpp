@@ -18,7 +18,7 @@ using wire::BytesView;
 class Source {
  public:
   virtual ~Source() = default;
-  /// For error texts.
+  /// Returns the name for error texts.
   virtual const std::string& name() const = 0;
   virtual std::uint64_t size() const = 0;
   /// Fills `into` from `offset` on. Returns the number of bytes; it is smaller only if the source ends or cannot be read.
@@ -31,21 +31,21 @@ std::unique_ptr<Source> source_from(std::string name, Bytes bytes);
 class Sink {
  public:
   virtual ~Sink() = default;
-  /// Appends all bytes or none: a partial write on a full disk is undone, so that the file ends with a whole record. Error io;
-  /// later calls then fail likewise.
+  /// Appends all bytes or none: a partial write on a full disk is undone, so that the file ends with a whole record. After an
+  /// error (io), later calls fail too.
   virtual Result<void> append(BytesView record) = 0;
   /// Replaces bytes that were appended before. Errors: io.
   virtual Result<void> overwrite(std::uint64_t offset, BytesView bytes) = 0;
-  /// After a failure: lets the next call try again, with a smaller record.
+  /// After a failure, lets the next call try again with a smaller record.
   virtual void try_again() {}
   /// Closes the file, and reports late errors of the file system. Errors: io.
   virtual Result<void> close() = 0;
 };
 /// Creates the file, or empties an existing one. Errors: io.
 Result<std::unique_ptr<Sink>> create_sink(const std::filesystem::path& file);
-/// Creates a new file; an existing one is an error and stays unchanged. Errors: io.
+/// Creates a new file. Errors: io, also if the file exists, which is then not changed.
 Result<std::unique_ptr<Sink>> create_new_sink(const std::filesystem::path& file);
-/// A sink that appends to `bytes`, which must outlive it.
+/// Makes a sink that appends to `bytes`, which must outlive it.
 std::unique_ptr<Sink> sink_into(Bytes& bytes);
 
 /// Reads a source from start to end, through a buffer.
@@ -55,8 +55,8 @@ class Scan {
 
   std::uint64_t position() const { return position_; }
   std::uint64_t left() const { return source_.size() > position_ ? source_.size() - position_ : 0; }
-  /// The next `count` bytes, fewer at the end; the position moves past them. Valid until the next call. It allocates no more
-  /// than the size of the source, but the caller must bound `count`, because sources can be large.
+  /// Returns the next `count` bytes (fewer at the end), which are valid until the next call, and moves the position past them. It
+  /// allocates no more than the size of the source, but the caller must limit `count`, because sources can be large.
   BytesView read(std::size_t count);
   /// Like read(), but the position does not move.
   BytesView peek(std::size_t count);

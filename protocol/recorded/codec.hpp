@@ -29,9 +29,9 @@ inline bool begins_with(BytesView front, std::initializer_list<unsigned> bytes) 
 
 /// A file format of a make.
 struct FileKind {
-  std::string_view ending;              // extension: ".aris"
-  std::string_view name;                // ".aris file"
-  std::string_view holds;               // "frames of an ARIS"
+  std::string_view ending;              // extension, such as ".aris"
+  std::string_view name;                // such as ".aris file"
+  std::string_view holds;               // content, such as "frames of an ARIS"
   bool (*begins)(BytesView) = nullptr;  // true if a file with these first 16 bytes (fewer if the file is shorter) has this format
   Result<std::unique_ptr<RecordingReader>> (*read)(std::unique_ptr<Source>) = nullptr;
   std::unique_ptr<RecordingWriter> (*write)(std::unique_ptr<Sink>) = nullptr;
@@ -42,7 +42,7 @@ struct FileKind {
 struct Sender {
   std::shared_ptr<const SonarModel> model;
   std::uint32_t serial = 0;  // 0: unknown
-  bool names_model = true;   // false: `model` is the first of the make, because this message names none
+  bool names_model = true;   // false: the message states no model, and `model` is the first of the make
 };
 
 /// The samples of a message: row 0 nearest, column 0 farthest to port, little-endian.
@@ -61,7 +61,8 @@ struct PingPart {
 struct Codec {
   const Framing* framing = nullptr;  // framing of its TCP stream; null: messages have no delimiters
   std::span<const FileKind> files = {};
-  /// The sender of a device's message or datagram; nullopt: another make's message, or one that does not identify its sender.
+  /// Returns the sender of a device's message or datagram; nullopt for another make's message, or one that does not identify its
+  /// sender.
   std::optional<Sender> (*sender)(const RecordedMessage&) = nullptr;
   /// Reads the samples of a message that contains a whole picture. Null: the make has no such message.
   std::optional<Samples> (*samples)(BytesView message) = nullptr;

@@ -12,7 +12,7 @@ bool begins_with(wire::BytesView bytes, const std::array<std::uint8_t, 2>& magic
 
 constexpr std::size_t longest_line = 1 << 16;
 
-/// Length of the line with its end. 0: its end has not come yet. nullopt: it is too long for a line.
+/// Returns the length of the line with its end; 0 if the end has not arrived yet; nullopt if the bytes are too long for a line.
 std::optional<std::size_t> length_of_line(wire::BytesView waiting) {
   const auto end = std::find(waiting.begin(), waiting.end(), std::byte{'\n'});
   if (end != waiting.end()) return static_cast<std::size_t>(end - waiting.begin()) + 1;
@@ -47,16 +47,17 @@ void MessageSplitter::lose(std::size_t count) {
   lost_bytes_ += count;
 }
 
-// Bytes are missing after the waiting ones, so the incomplete message is lost, and the next bytes may be in the middle of another
-// message.
+// After the waiting bytes others are missing, so the incomplete message is lost, and the next bytes may be in the middle of
+// another message.
 void MessageSplitter::break_off() {
   if (waiting_bytes() > 0) ++losses_;
   lose(waiting_bytes());
   lost_ = strict_ = true;
 }
 
-/// Length of the message that begins here. 0: it is not known yet. nullopt: no message begins here. After lost bytes (strict_)
-/// only headers of known types count, because the two bytes of the magic number often occur in an image by chance.
+/// Returns the length of the message that begins here; 0 if it is not known yet; nullopt if no message begins here. After lost
+/// bytes (strict_) only headers of known types count, because the two bytes of the magic number often occur in an image by
+/// chance.
 std::optional<std::size_t> MessageSplitter::length_at_front(wire::BytesView waiting) const {
   if (!starts_like_header(waiting)) return std::nullopt;
   if (waiting.size() < framing_->header_size) return 0;
@@ -73,8 +74,7 @@ std::optional<RecordedMessage> MessageSplitter::next() {
         return cut(*length);
       }
       if (!finished_) return std::nullopt;
-      // The stream ends within this message. The search continues inside it, because its start may have been recognised by
-      // mistake.
+      // The stream ends within this message. The search continues inside the message, because it may be a false start.
       if (!lost_) ++losses_;
       lost_ = strict_ = true;
       lose(1);
@@ -94,7 +94,7 @@ void MessageSplitter::finish() { finished_ = true; }
 
 namespace {
 
-/// Length of the message that begins here; 0 if none does, or if its end is missing.
+/// Returns the length of the message that begins here; 0 if none begins here, or if its end is missing.
 std::size_t message_at_front(wire::BytesView bytes, const Framing& framing) {
   if (bytes.size() < std::max<std::size_t>(framing.header_size, 2)) return 0;
   if (bytes[0] != std::byte{framing.magic[0]} || bytes[1] != std::byte{framing.magic[1]}) return 0;

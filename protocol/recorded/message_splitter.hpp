@@ -14,7 +14,8 @@ namespace sonar::recording {
 struct Framing {
   std::array<std::uint8_t, 2> magic{};  // first bytes of every message
   std::size_t header_size = 0;
-  /// Total length of the message with this header; nullopt: not a header. `strict`: unknown types are not headers either.
+  /// Returns the total length of the message with this header; nullopt if the bytes are not a header. `strict`: unknown types are
+  /// not headers either.
   std::optional<std::size_t> (*length)(wire::BytesView header, Origin from, bool strict) = nullptr;  // null: messages are lines
 
   /// True if `bytes` begin with a header of a known type.
@@ -23,7 +24,7 @@ struct Framing {
 
 class MessageSplitter {
  public:
-  /// `framing` must outlive it.
+  /// `framing` must outlive the object.
   MessageSplitter(Origin from, const Framing& framing) : from_(from), framing_(&framing) {}
 
   /// Call next() until it returns nullopt before the next append, so that less than one message remains.
@@ -34,10 +35,10 @@ class MessageSplitter {
   /// Ends the stream. next() returns remaining bytes that do not begin a message; an incomplete message is lost.
   void finish();
 
-  /// Bytes of incomplete messages, and the number of such places.
+  /// Return the number of bytes of incomplete messages, and the number of such places.
   std::uint64_t lost_bytes() const { return lost_bytes_; }
   std::uint64_t losses() const { return losses_; }
-  /// Number of received bytes of the incomplete message.
+  /// Returns the number of received bytes of the incomplete message.
   std::size_t waiting_bytes() const { return buffer_.size() - begin_; }
 
  private:
@@ -60,7 +61,7 @@ class MessageSplitter {
 /// Takes the stream of a device in order, and reports each run of bytes outside messages as one damage.
 class JunkReport {
  public:
-  /// `framing` must outlive it. Null: the stream has no boundaries, so nothing is reported.
+  /// `framing` must outlive the object. Null: the stream has no boundaries, so nothing is reported.
   explicit JunkReport(const Framing* framing) : framing_(framing) {}
 
   /// Takes the next messages, or bytes between messages. `place` returns "byte 17", the place of these bytes.

@@ -40,7 +40,7 @@ class RawReader final : public RecordingReader {
   bool knows_times() const override { return false; }
 
  private:
-  /// The next message of the bytes that were read, or bytes between messages. A run of these may come in several parts.
+  /// Returns the next message of the bytes that were read, or bytes between messages, which may come in several parts.
   std::optional<RecordedMessage> next_of_block() {
     auto next = splitter_.next();
     if (!next) return next;
@@ -70,7 +70,7 @@ class RawReader final : public RecordingReader {
   bool ended_ = false, reported_ = false;
 };
 
-/// Writes the bytes of the device as they are. Times and the client's messages are lost.
+/// Writes the bytes of the device unchanged. Times and the client's messages are lost.
 class RawWriter final : public RecordingWriter {
  public:
   RawWriter(std::unique_ptr<Sink> sink, Carrier by) : sink_(std::move(sink)), by_(by) {}

@@ -1,5 +1,5 @@
 // The unit of a recording: one message between a sonar and its client, with its time and direction. The readers of every format
-// return them, the writers accept them, and replay sends them again.
+// return such messages, the writers accept them, and replay sends them again.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 namespace sonar::recording {
 
 enum class Origin { device, client };
-enum class Carrier { stream, datagram };  // TCP; UDP (status)
+enum class Carrier { stream, datagram };  // TCP; UDP
 
 /// A whole message, or bytes between messages; never a part of a message.
 struct RecordedMessage {
@@ -29,30 +29,32 @@ class RecordingReader {
   virtual ~RecordingReader() = default;
   /// nullopt at the end.
   virtual std::optional<RecordedMessage> next() = 0;
-  /// An error of kind bad_data whose text names the first damage and counts the others. It is complete once next() has returned
-  /// nullopt.
+  /// Returns an error of kind bad_data whose text names the first damage and counts further ones. It is complete once next() has
+  /// returned nullopt.
   virtual std::optional<Error> damage() const = 0;
   /// Starts again at the beginning and clears the damage.
   virtual void rewind() = 0;
-  /// False if the format stores no times; all are then 0.
+  /// False if the format stores no times; all times are then 0.
   virtual bool knows_times() const { return true; }
-  /// The profile of the sonar, such as "oculus-m1200d", if the file states it; else empty. Known once next() has returned a
-  /// message.
+  /// Returns the profile of the sonar, such as "oculus-m1200d", if the file states it; else empty. It is known once next() has
+  /// returned a message.
   virtual std::string profile() const { return {}; }
-  /// Names the parts of the recording that were skipped, such as other sonars in the same file; empty: nothing was skipped.
+  /// Returns a text about the parts of the recording that were skipped, such as other sonars in the same file; empty if nothing
+  /// was skipped.
   virtual std::string note() const { return {}; }
 };
 
 class RecordingWriter {
  public:
   virtual ~RecordingWriter() = default;
-  /// Times must not decrease. After an error (io) the file does not contain this message, and later calls write nothing.
+  /// Writes a message. Times must not decrease. After an error (io) the file does not contain this message, and later calls write
+  /// nothing.
   virtual Result<void> write(const RecordedMessage& message) = 0;
   /// Finishes and closes the file. Errors are of kind io.
   virtual Result<void> close() = 0;
 };
 
-/// Remembers the first damage and counts the others.
+/// Stores the first damage and counts further ones.
 class Damages {
  public:
   void add(std::string where_and_what) {

@@ -19,7 +19,7 @@ std::optional<wire::Bytes> inflate(wire::BytesView stream, std::size_t limit) {
   wire::Bytes out;
   std::array<std::byte, 32768> block;
   int status = Z_OK;
-  while (status == Z_OK && out.size() <= limit) {  // a small stream can hold gigabytes: it is read only up to the limit
+  while (status == Z_OK && out.size() <= limit) {  // reads up to the limit, because a small stream can hold gigabytes
     state.next_out = static_cast<Bytef*>(static_cast<void*>(block.data()));
     state.avail_out = static_cast<uInt>(block.size());
     status = ::inflate(&state, Z_NO_FLUSH);

@@ -8,10 +8,10 @@
 
 namespace sonar::recording {
 
-/// The decompressed stream; nullopt when it is damaged or decompresses to more than `limit` bytes.
+/// Returns the decompressed stream; nullopt if it is damaged or has more than `limit` bytes.
 std::optional<wire::Bytes> inflate(wire::BytesView stream, std::size_t limit);
 
-/// CRC-32 of the bytes. `crc`: the CRC of preceding bytes, to continue it.
+/// Returns the CRC-32 of the bytes. `crc`: the CRC of preceding bytes, to continue it.
 std::uint32_t crc32(wire::BytesView bytes, std::uint32_t crc = 0);
 
 }  // namespace sonar::recording

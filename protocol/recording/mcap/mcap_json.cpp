@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Names of scenes may contain bytes that are not UTF-8. They are replaced, so that no name makes a recording fail.
+/// Writes JSON. Replaces bytes that are not UTF-8, which names of scenes may contain, so that no name makes a recording fail.
 std::string text_of(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 Json json_of(Time at) {
@@ -24,7 +24,7 @@ Json json_of(const Pose& pose) {
   return {{"position", {{"x", p.x}, {"y", p.y}, {"z", p.z}}}, {"orientation", {{"x", q.x}, {"y", q.y}, {"z", q.z}, {"w", q.w}}}};
 }
 
-/// The objects that the beams hit, each once.
+/// Returns the objects that the beams hit, each once.
 Json objects_hit(const PingTruth& truth) {
   std::set<std::uint32_t> hit;
   for (const BeamTruth& beam : truth.beams)
@@ -43,7 +43,7 @@ Json moving_bodies(const PingTruth& truth) {
 
 }  // namespace
 
-// Beams refer to objects by number. The names are listed once, which keeps the text of 512 beams short.
+// Beams refer to objects with numbers. The names are listed once, so that the text of 512 beams is short.
 std::string truth_json(const PingTruth& truth) {
   Json ranges_m = Json::array(), objects = Json::array();
   for (const BeamTruth& beam : truth.beams) {
@@ -126,7 +126,7 @@ JsonSchema label_schema() {
 }
 
 JsonSchema fault_schema() {
-  const auto text = type("string");  // 64-bit numbers, too, as in protobuf's JSON
+  const auto text = type("string");  // also the type of 64-bit numbers, as in protobuf's JSON
   return schema("sonard.FaultEntry", "What a fault on purpose did: FaultEntry of control.proto",
                 {{"seq", text},
                  {"utc_ns", text},

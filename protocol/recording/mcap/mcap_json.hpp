@@ -15,9 +15,9 @@ namespace sonar::recording::mcap {
 struct JsonSchema {
   std::string name, text;
 };
-JsonSchema truth_schema();  // sonard.PingTruth
-JsonSchema fault_schema();  // sonard.FaultEntry
-JsonSchema label_schema();  // sonard.PingInstances
+JsonSchema truth_schema();  // schema of sonard.PingTruth
+JsonSchema fault_schema();  // schema of sonard.FaultEntry
+JsonSchema label_schema();  // schema of sonard.PingInstances
 
 struct SceneNames {
   std::vector<std::string> objects;  // names of the objects; BeamTruth::object is an index into them
@@ -38,7 +38,7 @@ struct PingTruth {
   const SceneNames* names = nullptr;           // null: no names and no bodies are written
 };
 std::string truth_json(const PingTruth& truth);
-/// The instances that occur in the labels of a ping.
+/// Writes the instances that occur in the labels of a ping.
 std::string instances_json(const PingTruth& truth, const PingLabels& labels);
 
 }  // namespace sonar::recording::mcap

@@ -12,7 +12,7 @@ constexpr std::size_t most_summary_records = 1 << 20;
 constexpr std::uint64_t most_described_bytes = 16 << 20;  // limit for all schemas and channels that are kept
 
 /// True for records without messages that files may have here. Applications define records from 0x80 on, and later versions of
-/// the format may add the others, also to chunks (https://mcap.dev/spec, "Records").
+/// the format may add others, also to chunks (https://mcap.dev/spec, "Records").
 bool is_skipped(Opcode code, bool in_chunk) { return !in_chunk || code > Opcode::data_end; }
 
 std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
@@ -58,8 +58,8 @@ std::optional<Message> Reader::next() {
   return std::nullopt;
 }
 
-/// Reads one record, which ends before `end`, and returns its message if it is one. After damage inside a chunk the rest of the
-/// chunk is skipped; outside of chunks damage ends the reading, because the start of the next record is unknown.
+/// Reads one record, which ends before `end`; returns the message if the record is one. After damage in a chunk the rest of the
+/// chunk is skipped; outside chunks damage ends the reading, because the start of the next record is unknown.
 std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   const std::uint64_t at = scan_.position();
   const auto give_up = [&](std::string why) {
@@ -77,7 +77,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   RecordReader front(scan_.read(record_front_bytes));
   const auto code = front.number<Opcode>();
   const auto length = front.number<std::uint64_t>();
-  // A program that was killed leaves a cut chunk at the end. Its whole records are still good.
+  // A program that was killed leaves a cut chunk at the end, whose whole records are valid.
   if (code == Opcode::chunk && !in_chunk && length > end - scan_.position()) {
     damages_.add("the chunk" + at_byte(at) + " is cut short by the end of the file");
     enter_chunk(at, end - scan_.position(), true);
@@ -118,8 +118,8 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
   return std::nullopt;
 }
 
-/// `at`: position of the record after all data. Finds the end of the file's summary. Bytes after it, such as a second file, are
-/// not read.
+/// Finds the end of the file's summary. Bytes after it, such as a second file, are not read. `at`: position of the record after
+/// all data.
 void Reader::end_at(std::uint64_t at) {
   ended_ = true;
   for (std::size_t looked_at = 0; looked_at < most_summary_records; ++looked_at) {
@@ -139,7 +139,7 @@ void Reader::end_at(std::uint64_t at) {
   }
 }
 
-/// Keeps a schema or a channel. Files may repeat them in each chunk; the first one applies.
+/// Keeps a schema or a channel. Files may repeat them in each chunk; the first applies.
 void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) {
   bool is_new = false;
   if (code == Opcode::schema) {
@@ -156,7 +156,7 @@ void Reader::take_description(Opcode code, BytesView content, std::uint64_t at) 
   if (is_new) described_bytes_ += content.size();
 }
 
-/// Reads the content of a message record. nullopt: it is damaged, or belongs to a channel that was not read.
+/// Reads the content of a message record. Returns nullopt if it is damaged, or belongs to a channel that was not read.
 std::optional<Message> Reader::take_message(BytesView content, std::uint64_t at) {
   RecordReader record(content);
   Message message;
@@ -202,7 +202,7 @@ void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
   if (begin < end) chunk_end_ = end;
 }
 
-/// Compares the checksum of a chunk block by block, so that a large chunk does not take as much memory.
+/// Compares the checksum of a chunk. Reads it in blocks, to save memory.
 bool Reader::is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc) {
   std::uint32_t found = 0;
   scan_.seek(from);

@@ -12,15 +12,15 @@ namespace sonar::recording::mcap {
 
 class Reader {
  public:
-  /// Errors: bad_data if the magic number is missing.
+  /// Opens a file. Errors: bad_data if the magic number is missing.
   static Result<Reader> open(std::unique_ptr<Source> source);
 
   std::optional<Message> next();
-  /// The channels of the messages returned so far.
+  /// Returns the channels of the messages so far.
   const std::map<std::uint16_t, Channel>& channels() const { return channels_; }
   const std::map<std::uint16_t, Schema>& schemas() const { return schemas_; }
   std::optional<Error> damage() const { return damages_.error(source_->name()); }
-  /// For damage within messages; cleared by rewind().
+  /// Returns the damages, to which callers may add damage in messages; rewind() clears them.
   Damages& damages() { return damages_; }
   void rewind();
 

@@ -43,7 +43,7 @@ void RecordWriter::end() { set_u64(out_, length_at_, out_.size() - length_at_ - 
 
 std::string RecordReader::string() { return text_from(bytes(number<std::uint32_t>())); }
 
-// A map states its length in bytes, not the number of its entries.
+// A map states its length in bytes, not its number of entries.
 std::map<std::string, std::string> RecordReader::strings() {
   RecordReader inside(bytes(number<std::uint32_t>()));
   std::map<std::string, std::string> map;

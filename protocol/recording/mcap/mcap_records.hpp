@@ -1,5 +1,5 @@
-// The records of an MCAP file (mcap.dev, version 0): an opcode, a length, and little-endian fields; strings and maps follow
-// their length. Shared by writer and reader.
+// The records of an MCAP file (mcap.dev, version 0), for writer and reader: an opcode, a length, and little-endian fields;
+// strings and maps follow their length.
 #pragma once
 
 #include <cstdint>
@@ -34,9 +34,9 @@ inline constexpr std::size_t longest_description = 1 << 20;  // limit for a sche
 inline constexpr std::uint64_t latest_time_ns = 4'000'000'000'000'000'000u;  // in 2096; later times are damage
 
 struct Schema {
-  std::uint16_t id = 0;  // not 0
+  std::uint16_t id = 0;  // must not be 0
   std::string name, encoding;
-  Bytes data;  // written, not read back
+  Bytes data;  // only written, not read
 };
 struct Channel {
   std::uint16_t id = 0, schema = 0;  // schema 0 = none
@@ -48,7 +48,7 @@ struct Message {
   std::uint32_t sequence = 0;
   Time logged_at{}, published_at{};
   Bytes data;
-  std::uint64_t at = 0;  // position of its record in the file, in bytes; set by the reader
+  std::uint64_t at = 0;  // offset of its record in the file, which the reader sets
 };
 
 /// Appends fields; a record is closed by end_record.
@@ -84,7 +84,7 @@ class RecordReader {
     reader_("number", value);
     return value;
   }
-  /// A time. An invalid one becomes 1970, so that differences of times never overflow.
+  /// Reads a time. An invalid time becomes 1970, so that differences of times never overflow.
   Time time() {
     const auto since_1970_ns = number<std::uint64_t>();
     return since_1970_ns > latest_time_ns ? Time{} : Time(std::chrono::nanoseconds(static_cast<std::int64_t>(since_1970_ns)));

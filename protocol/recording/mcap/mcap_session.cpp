@@ -11,7 +11,7 @@ namespace sonar::recording {
 namespace {
 
 constexpr std::size_t most_names = 16;
-constexpr const char* world = "world";  // name of the frame in which poses are
+constexpr const char* world = "world";  // name of the frame of poses
 
 Bytes bytes_of(const std::string& text) {
   Bytes bytes(text.size());
@@ -19,8 +19,8 @@ Bytes bytes_of(const std::string& text) {
   return bytes;
 }
 
-/// Reads the channels whose encoding is the name of a make: those with the vendor's bytes. Their metadata state the sonar, the
-/// sender and the carrier of a message.
+/// Reads the channels with the vendor's bytes, whose encoding is the name of a make. Their metadata state the sonar, the sender
+/// and the carrier of a message.
 class McapRecordingReader final : public RecordingReader {
  public:
   McapRecordingReader(mcap::Reader reader, std::string sonar)
@@ -73,7 +73,7 @@ class McapRecordingReader final : public RecordingReader {
   mcap::Reader reader_;
   std::string requested_, sonar_, profile_;
   bool chosen_ = false;
-  std::optional<JunkReport> junk_;  // by the framing of the first message's make
+  std::optional<JunkReport> junk_;  // uses the framing of the first message's make
   std::set<std::string> others_;
 };
 
@@ -139,7 +139,7 @@ Result<void> McapSession::write_image(Time at, const std::shared_ptr<const Ping>
   return writer_.write(image_, at, foxglove::raw_image(at, sonar_, foxglove::image_of(ping)));
 }
 
-/// Messages do not state their full scale, so it is the largest code of their bits.
+/// Writes an image. Messages do not state their full scale, so it is the largest code of their bits.
 Result<void> McapSession::write_image(Time at, const Samples& samples) {
   const auto image =
       foxglove::image_of(samples.beams, samples.rows, samples.bits, 0xFFFFFFFFu >> (32 - samples.bits), samples.codes);

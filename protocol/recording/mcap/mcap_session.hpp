@@ -18,7 +18,7 @@ namespace sonar::recording {
 class McapSession final : public RecordingWriter {
  public:
   /// `make`: the make whose messages are written. Messages that hold samples (Codec::samples) are also written as images.
-  /// `profile`: that of the sonar, for messages that do not name their model; empty: not known.
+  /// `profile`: profile of the sonar, for messages that do not state their model; empty: unknown.
   McapSession(std::unique_ptr<Sink> sink, std::string sonar, const protocol::Make& make = protocol::makes().front(),
               std::string profile = {});
 
@@ -30,9 +30,9 @@ class McapSession final : public RecordingWriter {
   Result<void> write_image(Time at, const Samples& samples);
   /// Writes the ground truth; moving bodies also as the frames object/NAME of /tf.
   Result<void> write_truth(Time at, const mcap::PingTruth& truth);
-  /// Writes the labels of the samples as pictures, and the instances that they name.
+  /// Writes the labels of the samples as pictures, and the instances in the labels.
   Result<void> write_labels(Time at, const mcap::PingTruth& truth, const PingLabels& labels);
-  /// `json`: a FaultEntry of control.proto.
+  /// Writes a fault; `json`: a FaultEntry of control.proto.
   Result<void> write_fault(Time at, const std::string& json) { return write_json(faults_, at, json); }
   Result<void> close() override { return writer_.close(); }
 
@@ -48,7 +48,8 @@ class McapSession final : public RecordingWriter {
   std::uint16_t device_, client_, status_, image_, pose_, tf_, truth_, labels_, share_, caster_, instances_, faults_;
 };
 
-/// Reads the vendor's messages of the named sonar; without a name, of the first one. Errors: bad_data if it is not an MCAP file.
+/// Reads the vendor's messages of the named sonar; without a name, of the first sonar. Errors: bad_data if the source is not an
+/// MCAP file.
 Result<std::unique_ptr<RecordingReader>> read_mcap(std::unique_ptr<Source> source, std::string sonar = {});
 
 }  // namespace sonar::recording

@@ -64,7 +64,7 @@ Result<void> Writer::write(std::uint16_t channel, Time at, BytesView data) {
   if (entries_.empty()) chunk_first_ = chunk_last_ = at;
   chunk_first_ = std::min(chunk_first_, at);
   chunk_last_ = std::max(chunk_last_, at);
-  if (!announced_[channel]) {  // before its first message, as readers need it
+  if (!announced_[channel]) {  // the channel must precede its first message
     std::vector<bool> schemas(schemas_.size());
     for (const Channel& each : channels_)
       if (announced_[each.id] && each.schema != 0) schemas[each.schema - 1u] = true;
@@ -108,7 +108,7 @@ Result<void> Writer::end_chunk() {
   return {};
 }
 
-/// A message index lists time and offset of each message of one channel in the chunk before it.
+/// Appends message indexes. A message index lists time and offset of each message of one channel in the preceding chunk.
 void Writer::append_message_indexes(Bytes& out, ChunkPlace& place) const {
   for (const auto& [channel, entries] : entries_) {
     place.index_offsets[channel] = position_ + out.size();
@@ -125,7 +125,7 @@ void Writer::append_message_indexes(Bytes& out, ChunkPlace& place) const {
   place.index_length = out.size() - place.length;
 }
 
-/// Viewers find the chunks of a time by these records, without reading the others.
+/// Appends the record with which viewers find the chunks of a time without reading other chunks.
 void Writer::append_chunk_index(Bytes& out, const ChunkPlace& place) {
   RecordWriter record(out);
   record.begin(Opcode::chunk_index);
@@ -174,7 +174,7 @@ void Writer::append_statistics(Bytes& out) const {
   record.end();
 }
 
-/// The summary: groups of records, one group for each kind; the position of each group; the footer up to its checksum.
+/// Makes the summary: groups of records, one group for each kind; the position of each group; the footer up to its checksum.
 Bytes Writer::summary() const {
   Bytes out;
   const std::uint64_t start = position_;
@@ -222,7 +222,8 @@ Bytes Writer::summary() const {
 Result<void> Writer::close() {
   if (!broken_)
     if (begin()) static_cast<void>(end_chunk());
-  // After an error, as on a full disk, the chunk that failed is left out. The summary of the others is smaller and may still fit.
+  // After an error, as on a full disk, the chunk that failed is left out. The summary of the other chunks is smaller and may
+  // still fit.
   const std::optional<Error> first_error = broken_;
   if (first_error) sink_->try_again();
   Bytes end;

@@ -17,11 +17,11 @@ class Writer {
 
   std::uint16_t add_schema(std::string name, std::string encoding, Bytes data);
   std::uint16_t add_channel(Channel channel);  // sets its id
-  /// Appends a message; the messages of a channel are numbered from 0. Errors: io; after one, later calls fail, and the file
-  /// stays readable.
+  /// Appends a message; the messages of a channel are numbered from 0. After an error (io) later calls fail, and the file is
+  /// still readable.
   Result<void> write(std::uint16_t channel, Time at, BytesView data);
-  /// Ends the last chunk, adds summary and footer, closes. After an error of write() it tries to add the summary of the written
-  /// chunks, and returns the first error. Errors: io.
+  /// Ends the last chunk, adds summary and footer, and closes the file. After an error of write() it tries to add the summary of
+  /// the written chunks, and returns the first error. Errors: io.
   Result<void> close();
 
  private:
@@ -30,7 +30,7 @@ class Writer {
     std::uint64_t offset = 0, length = 0, index_length = 0, size = 0;
     std::map<std::uint16_t, std::uint64_t> index_offsets;
   };
-  using Entries = std::vector<std::pair<Time, std::uint64_t>>;  // entries of a channel: time, offset in the chunk
+  using Entries = std::vector<std::pair<Time, std::uint64_t>>;  // time and offset in the chunk, for each message of a channel
 
   Result<void> begin();
   Result<void> put(const Bytes& bytes);

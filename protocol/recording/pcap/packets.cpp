@@ -7,7 +7,7 @@ namespace {
 
 constexpr std::uint32_t micro_magic = 0xA1B2C3D4, nano_magic = 0xA1B23C4D, section_magic = 0x0A0D0D0A, order_magic = 0x1A2B3C4D;
 constexpr std::size_t most_interfaces = 1024;
-constexpr std::size_t most_block = PacketReader::longest_packet + 4096;  // a packet with its options
+constexpr std::size_t most_block = PacketReader::longest_packet + 4096;  // limit for a packet with its options
 constexpr std::uint32_t interface_block = 1, simple_block = 3, enhanced_block = 6;
 constexpr std::uint16_t end_option = 0, resolution_option = 9;
 
@@ -18,8 +18,8 @@ Time time_of(std::uint64_t ticks, std::uint64_t ticks_per_s) {
   return Time(std::chrono::seconds(whole_s) + std::chrono::nanoseconds(static_cast<std::int64_t>(rest_ns)));
 }
 
-/// The unit of an interface's times in pcapng: a power of ten, or of two if the top bit is set. A unit finer than 10^-18 s is
-/// damage and counts as a microsecond.
+/// Returns the unit of an interface's times in pcapng: a power of ten, or of two if the top bit is set. A unit finer than 10^-18
+/// s is damage and counts as a microsecond.
 std::uint64_t ticks_per_s(unsigned resolution) {
   const unsigned base = (resolution & 0x80u) != 0 ? 2 : 10, exponent = resolution & 0x7Fu;
   std::uint64_t ticks = 1;
@@ -62,7 +62,7 @@ bool PacketReader::read_front() {
     const BytesView header = scan_.read(24);
     if (header.size() < 24) return false;
     endian_ = endian;
-    // The lower 16 bits are the link type; the upper ones hold the length of the frame checksum.
+    // The lower 16 bits are the link type; the upper bits state the length of the frame checksum.
     interfaces_.push_back({u32_at(header, 20, endian) & 0xFFFFu, found == nano_magic ? 1'000'000'000u : 1'000'000u});
     return true;
   }
@@ -74,8 +74,8 @@ std::optional<Packet> PacketReader::next() {
   return ng_ ? next_block() : next_classic();
 }
 
-// A packet has 16 bytes in front: seconds, micro- or nanoseconds, captured length, length on the wire. There is no mark by which
-// a reader could find the next packet after a damaged length, so reading ends there.
+// The header of a packet has 16 bytes: seconds, micro- or nanoseconds, captured length, length on the wire. There is no mark with
+// which a reader could find the next packet after a damaged length, so reading ends there.
 std::optional<Packet> PacketReader::next_classic() {
   const std::string at = "byte " + std::to_string(scan_.position());
   const BytesView header = scan_.read(16);
@@ -90,7 +90,7 @@ std::optional<Packet> PacketReader::next_classic() {
   return Packet{time_of(whole_s * per_s + rest, per_s), interfaces_.front().link_type, bytes};
 }
 
-/// Reads the byte order of a section, which the number at offset 8 shows. A new section has interfaces of its own.
+/// Reads the byte order of a section, which the number at offset 8 shows. Each section has its own interfaces.
 bool PacketReader::begin_section(std::uint64_t at) {
   scan_.seek(at);
   const BytesView front = scan_.peek(12);
@@ -117,7 +117,7 @@ void PacketReader::add_interface(BytesView body) {
   interfaces_.push_back(made);
 }
 
-/// Reads a packet with interface, time and captured length. nullopt: its numbers contradict each other.
+/// Reads a packet with interface, time and captured length. Returns nullopt if its numbers contradict each other.
 std::optional<Packet> PacketReader::enhanced(BytesView body) const {
   const std::uint32_t interface = u32_at(body, 0, endian_), size = u32_at(body, 12, endian_);
   if (body.size() < 20 || interface >= interfaces_.size() || size > body.size() - 20) return std::nullopt;
@@ -173,7 +173,7 @@ unsigned u8_at(BytesView bytes, std::size_t offset) {
   return offset < bytes.size() ? std::to_integer<unsigned>(bytes[offset]) : 0;
 }
 
-/// The packet in an Ethernet frame, behind any number of VLAN tags.
+/// Returns the packet in an Ethernet frame, after any number of VLAN tags.
 std::optional<BytesView> behind_ethernet(BytesView frame) {
   std::size_t at = 12;
   while (u16_at(frame, at) == vlan_type || u16_at(frame, at) == provider_type) at += 4;

@@ -17,19 +17,19 @@ namespace sonar::recording {
 struct Packet {
   Time at{};
   std::uint32_t link_type = 0;  // LINKTYPE_ number
-  BytesView bytes;              // as captured; valid until the next call
+  BytesView bytes;              // captured bytes, valid until the next call
 };
 
 /// pcap: seconds and micro- or nanoseconds, either byte order. pcapng: sections, interfaces with their own time unit, enhanced
 /// and simple packets; other blocks are skipped.
 class PacketReader {
  public:
-  static constexpr std::size_t longest_packet = 256 << 10;  // tcpdump's own bound
-  /// Errors: bad_data if the source is not a capture file.
+  static constexpr std::size_t longest_packet = 256 << 10;  // limit of tcpdump
+  /// Opens a capture. Errors: bad_data if the source is not a capture file.
   static Result<PacketReader> open(Source& source);
 
   std::optional<Packet> next();
-  /// Skipped blocks, and the position at which the file became unreadable.
+  /// Returns the skipped blocks, and the position at which the file became unreadable.
   const Damages& damages() const { return damages_; }
   void rewind();
 
@@ -76,26 +76,26 @@ inline std::uint32_t u32_at(wire::BytesView bytes, std::size_t offset, wire::End
 // segments.
 
 struct IpEnd {
-  std::uint32_t address = 0;  // 127.0.0.2 = 0x7F000002
+  std::uint32_t address = 0;  // such as 0x7F000002 for 127.0.0.2
   std::uint16_t port = 0;
   auto operator<=>(const IpEnd&) const = default;
 };
-std::string text_of(const IpEnd& end);  // "127.0.0.2:52100"
+std::string text_of(const IpEnd& end);  // returns a text such as "127.0.0.2:52100"
 
 namespace tcp_flag {
 inline constexpr std::uint8_t fin = 0x01, syn = 0x02, rst = 0x04, psh = 0x08, ack = 0x10;
 }
 
 struct Segment {
-  bool tcp = true;  // if false: UDP
+  bool tcp = true;  // false: UDP
   IpEnd source, target;
   std::uint32_t sequence = 0;
   std::uint8_t flags = 0;
-  wire::BytesView payload;  // as far as it was captured
+  wire::BytesView payload;  // captured part of the payload
 };
 
-/// Link types Ethernet (with VLAN tags), raw IP, Linux cooked 1 and 2, BSD loopback. nullopt for other packets: other protocols,
-/// IPv6, fragments, cut headers.
+/// Decodes packets of the link types Ethernet (with VLAN tags), raw IP, Linux cooked 1 and 2, BSD loopback. Returns nullopt for
+/// other protocols, IPv6, fragments, and cut headers.
 std::optional<Segment> parse_packet(std::uint32_t link_type, wire::BytesView packet);
 
 /// True if the packet is the first fragment of an IPv4 datagram.

@@ -13,11 +13,11 @@
 namespace sonar::recording {
 
 struct PcapReading {
-  std::optional<std::uint32_t> device;  // address of the device; unset: the sonar that sent most bytes
+  std::optional<std::uint32_t> device;  // address of the device; nullopt: the sonar that sent most bytes
 };
-/// Reads all connections of one sonar, one after the other, and its status datagrams; if it sends pings by UDP, all its
-/// datagrams. First it reads the file once to find the sonar: the sender of a make's messages at that make's port, else the one
-/// that sent most. Errors: bad_data if there is none.
+/// Reads all connections of one sonar, one after the other, and its status datagrams; if it sends pings over UDP, all its
+/// datagrams. First reads the file once to find the sonar: the sender of a make's messages at that make's port, else the sender
+/// of most bytes. Errors: bad_data if there is none.
 Result<std::unique_ptr<RecordingReader>> read_pcap(std::unique_ptr<Source> source, const PcapReading& reading = {});
 
 struct PcapConversation {
@@ -25,7 +25,7 @@ struct PcapConversation {
   IpEnd status_from{0x7F000002, 52102}, status_to{0xFFFFFFFF, 52102};
   std::uint32_t first_device_sequence = 1'000'000, first_client_sequence = 2'000'000;
 };
-/// Addresses and ports of a sonar of this make and of a usual host.
+/// Returns the addresses and ports of a sonar of this make and of a usual host.
 PcapConversation usual_ends(const protocol::Make& make, std::uint32_t device = 0x7F000002, std::uint32_t client = 0x7F000001);
 /// Writes classic pcap with nanoseconds and raw IP: one connection from its SYN to its FIN, messages in segments of at most
 /// 65,495 bytes.

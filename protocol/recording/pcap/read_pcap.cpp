@@ -26,7 +26,7 @@ struct SenderEnd {
 };
 struct Sent {
   std::uint64_t bytes = 0;
-  const Make* make = nullptr;  // make whose messages it sends; null: not a sonar
+  const Make* make = nullptr;  // make of the messages that this end sends; null: it is not a sonar
 };
 struct Found {
   SenderEnd device;
@@ -34,8 +34,8 @@ struct Found {
   std::string note;
 };
 
-/// The make with whose messages a segment begins; null: there is none. Clients may send such messages too. If several makes
-/// match, it is the one whose usual port is that of the source, else the first.
+/// Returns the make whose message is at the start of a segment; null if there is none. Clients may send such messages too. If
+/// several makes match, returns the make whose usual port is that of the source, else the first.
 const Make* make_of(const Segment& segment) {
   const Make* found = nullptr;
   if (!segment.tcp) {
@@ -47,14 +47,14 @@ const Make* make_of(const Segment& segment) {
     if (framing == nullptr || !framing->begins_message(segment.payload, Origin::device)) continue;
     const std::uint16_t usual = make.ports.front().number;
     if (framing->length == nullptr && usual != segment.source.port && usual != segment.target.port)
-      continue;  // many programs send lines
+      continue;  // lines do not identify a make, because many programs send lines
     if (found == nullptr || usual == segment.source.port) found = &make;
   }
   return found;
 }
 
-/// Reads the whole capture once. An end that sends messages of a make counts as a sonar; the one at the make's usual port comes
-/// first, then the one that sent most bytes. Tables are bounded, because a capture of a port scan has thousands of ends.
+/// Reads the whole capture once. An end that sends messages of a make counts as a sonar; an end at the make's usual port has
+/// priority, then the end that sent most bytes. Tables are limited, because a capture of a port scan has thousands of ends.
 Result<Found> find_device(Source& source, const PcapReading& reading) {
   auto packets = PacketReader::open(source);
   if (!packets) return tl::unexpected(packets.error());
@@ -96,7 +96,7 @@ Result<Found> find_device(Source& source, const PcapReading& reading) {
 
 // ---- second pass: messages of the sonar and its clients
 
-/// A TCP connection of a client with the sonar. Each direction is put in order (TcpStream), then split into messages.
+/// A TCP connection of a client with the sonar. The segments of each direction are ordered (TcpStream), then split into messages.
 struct Connection {
   explicit Connection(const Make& make)
       : device(Origin::device, *make.codec.framing), client(Origin::client, *make.codec.framing), junk(common_framing(make)) {}
@@ -161,7 +161,7 @@ class PcapReader final : public RecordingReader {
     if (segment.target == device) add(at, segment, segment.source, Origin::client);
   }
 
-  /// Adds a datagram of a sonar that sends its pings by UDP, or the status of one that sends them by TCP.
+  /// Adds a datagram of a sonar that sends pings over UDP, or the status of a sonar that sends pings over TCP.
   void add_datagram(Time at, const Segment& segment) {
     const auto take = [&](Origin from) {
       ready_.push_back({at, from, Carrier::datagram, {segment.payload.begin(), segment.payload.end()}});
@@ -179,8 +179,8 @@ class PcapReader final : public RecordingReader {
       take(Origin::device);
   }
 
-  /// Adds a segment to its connection. A SYN with another number on the same ports begins a new one. A connection whose start
-  /// is not in the capture begins with its first bytes.
+  /// Adds a segment to its connection. A SYN with another number on the same ports begins a new connection. A connection whose
+  /// start is not in the capture begins with its first bytes.
   void add(Time at, const Segment& segment, const IpEnd& client, Origin from) {
     const bool syn = (segment.flags & tcp_flag::syn) != 0;
     Place place = connections_.find(client);
@@ -214,7 +214,7 @@ class PcapReader final : public RecordingReader {
     finish(oldest);
   }
 
-  /// Ends a connection: returns the messages that are whole, and notes those that are not.
+  /// Ends a connection: returns the complete messages, and notes the incomplete ones.
   void finish(Place place) {
     for (const Origin from : {Origin::device, Origin::client}) {
       stream_of(place->second, from).finish();
@@ -249,7 +249,7 @@ class PcapReader final : public RecordingReader {
     MessageSplitter& splitter = from == Origin::device ? connection.device : connection.client;
     while (const auto run = stream_of(connection, from).next()) {
       const std::uint64_t lost = splitter.lost_bytes();
-      // After a gap, or at the start of a capture, the bytes may lie within a message.
+      // After a gap, or at the start of a capture, the bytes may be in the middle of a message.
       if (run->missing_before > 0 || run->from_middle) splitter.break_off();
       splitter.append(run->at, run->bytes);
       take_messages(connection, client, from);
@@ -264,7 +264,7 @@ class PcapReader final : public RecordingReader {
   std::unique_ptr<Source> source_;
   PacketReader packets_;
   Found found_;
-  std::uint64_t packet_number_ = 0;  // from 1, as Wireshark counts
+  std::uint64_t packet_number_ = 0;  // counted from 1, as in Wireshark
   std::map<IpEnd, Connection> connections_;
   std::deque<RecordedMessage> ready_;
   Damages damages_;

@@ -26,12 +26,12 @@ void TcpStream::add(Time at, std::uint32_t sequence, wire::BytesView payload, bo
     give(at, payload.subspan(known));
     return give_what_follows();
   }
-  // An early segment waits for those before it. Of two at the same place the longer one is kept.
+  // An early segment waits for the preceding ones. Of two segments at the same place the longer is kept.
   Early& early = waiting_[position_ + static_cast<std::uint32_t>(ahead)];
   if (early.bytes.size() >= payload.size()) return;
   waiting_bytes_ += payload.size() - early.bytes.size();
   early = {at, {payload.begin(), payload.end()}};
-  // Too much waits: the capture lacks the bytes before it.
+  // If too many bytes wait, the capture lacks the preceding bytes.
   if (waiting_bytes_ > most_waiting_bytes || waiting_.size() > most_waiting) {
     skip_to_first_waiting();
     give_what_follows();

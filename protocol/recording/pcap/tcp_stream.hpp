@@ -1,5 +1,5 @@
-// Reassembles one direction of a TCP connection: drops retransmitted bytes, holds early segments, reports lost ones.
-// Third step of reading a capture; its output goes to a MessageSplitter.
+// Reassembles one direction of a TCP connection: drops retransmitted bytes, holds early segments, reports lost segments. Third
+// step of reading a capture; its output goes to a MessageSplitter.
 #pragma once
 
 #include <deque>
@@ -20,7 +20,7 @@ class TcpStream {
     Time at{};
     wire::Bytes bytes;
     std::uint64_t missing_before = 0;  // bytes that the capture lacks here
-    bool from_middle = false;          // the capture began after the connection
+    bool from_middle = false;          // true: the capture began after the start of the connection
   };
 
   /// Adds a segment. `sequence`: the sequence number of its first byte or, in a SYN, of the SYN.
@@ -28,7 +28,7 @@ class TcpStream {
   /// Ends the connection or the capture: releases held segments.
   void finish();
   std::optional<Run> next();
-  /// Memory of early segments, including overhead.
+  /// Returns the memory of early segments, including overhead.
   std::size_t held_bytes() const { return waiting_bytes_ + waiting_.size() * 128; }
   /// True if a SYN with this number begins another connection.
   bool is_other(std::uint32_t syn_sequence) const { return begun_ && (!saw_syn_ || first_ != syn_sequence + 1); }

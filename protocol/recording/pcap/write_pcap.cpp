@@ -25,7 +25,7 @@ constexpr void fields(auto& visit, wire::Like<PcapFileHeader> auto& m) {
   visit("linkType", m.link_type);
 }
 
-/// RFC 791, without options. 0x4000: do not fragment.
+/// The header of RFC 791, without options. 0x4000 = do not fragment.
 struct IpHeader {
   std::uint8_t version_and_length = 0x45, service = 0;
   std::uint16_t total_length = 0, identification = 0, fragment = 0x4000;
@@ -46,7 +46,7 @@ constexpr void fields(auto& visit, wire::Like<IpHeader> auto& m) {
   visit("target", m.target);
 }
 
-/// RFC 9293, 3.1. 0x50: five words without options.
+/// The header of RFC 9293, 3.1. 0x50 = five words, without options.
 struct TcpHeader {
   std::uint16_t source = 0, target = 0;
   std::uint32_t sequence = 0, acknowledged = 0;
@@ -66,7 +66,7 @@ constexpr void fields(auto& visit, wire::Like<TcpHeader> auto& m) {
 }
 static_assert(wire::wire_size<PcapFileHeader>() == 24 && wire::wire_size<IpHeader>() == 20 && wire::wire_size<TcpHeader>() == 20);
 
-/// Sum of 16-bit words, big-endian, for the Internet checksum (RFC 1071). checksum_of() folds the carries into it.
+/// Returns the sum of 16-bit words, big-endian, for the Internet checksum (RFC 1071). checksum_of() adds the carries.
 std::uint64_t word_sum(BytesView bytes, std::uint64_t sum = 0) {
   for (std::size_t i = 0; i < bytes.size(); ++i) sum += std::to_integer<std::uint64_t>(bytes[i]) << (i % 2 == 0 ? 8 : 0);
   return sum;
@@ -97,7 +97,7 @@ class PcapWriter final : public RecordingWriter {
 
   Result<void> write(const RecordedMessage& message) override {
     Bytes packets;
-    // If the sink fails, the next message continues from here, as if this one had not been written.
+    // If the sink fails, the next message continues from here, as if this message had not been written.
     const auto before = std::tuple(device_, client_, identification_, begun_, connected_);
     last_ = message.at;
     begin(packets);
@@ -137,7 +137,7 @@ class PcapWriter final : public RecordingWriter {
     if (!std::exchange(begun_, true)) wire::append(packets, PcapFileHeader{});
   }
 
-  /// The handshake. Wireshark reads the window scale from it.
+  /// Writes the handshake, from which Wireshark reads the window scale.
   void connect(Bytes& packets) {
     if (std::exchange(connected_, true)) return;
     segment(packets, client_, device_, tcp_flag::syn, {});
@@ -223,7 +223,8 @@ class PcapWriter final : public RecordingWriter {
 
 }  // namespace
 
-// Datagrams go where the make's hosts receive them: at the beacon's port, at the port of the dialogue, or in the multicast group.
+// Datagrams are sent to the place where the make's hosts receive them: the beacon's port, the port of the dialogue, or the
+// multicast group.
 PcapConversation usual_ends(const protocol::Make& make, std::uint32_t device, std::uint32_t client) {
   using Kind = protocol::HostPort::Kind;
   PcapConversation ends;
