@@ -19,7 +19,7 @@ std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by) {
   };
   const auto found = std::find_if(make.ports.begin(), make.ports.end(), takes);
   if (found != make.ports.end()) return static_cast<std::size_t>(found - make.ports.begin());
-  // A host that connects by TCP also reads the datagrams of a sonar that serves the same port by UDP.
+  // A host that connects over TCP also reads the datagrams of a sonar that serves the same port over UDP.
   const protocol::Port* const dialogue = make.device->port(protocol::Port::Kind::udp_dialogue);
   const bool by_either = by == Carrier::datagram && dialogue != nullptr && dialogue->number == make.ports.front().number;
   return by_either ? std::optional<std::size_t>(0) : std::nullopt;

@@ -16,7 +16,7 @@ struct SentBy {
 };
 /// Returns the sender of a message; nullopt if a client sent it, or a sonar of an unknown make.
 std::optional<SentBy> sender_of(const RecordedMessage& message);
-/// The index of the port at which a host of the make receives messages of this carrier; nullopt: there is none.
+/// Returns the index of the port at which a host of the make receives messages of this carrier; nullopt if there is none.
 std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by);
 
 /// Returns the framing if all recorded TCP bytes of the device have it. Returns null if the make has no framing, or if several

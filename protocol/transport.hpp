@@ -17,17 +17,17 @@ struct Port {
     tcp_stream,    // listens at `number`; each connection has a Dialogue; observers use the vendor's first such port
     udp_beacon,    // sends Vendor::beacon to `number` of the configured addresses: broadcast, multicast or hosts
     udp_answer,    // passes datagrams that arrive at `number`, including broadcasts, to Vendor::on_datagram
-    udp_stream,    // sends Vendor::datagrams of each ping from `number` (0: any; may be that of a udp_answer) to the receivers
+    udp_stream,    // sends Vendor::datagrams of each ping from `number` (0: any; may equal that of a udp_answer) to the receivers
     http,          // serves Vendor::on_http at `number`
-    udp_dialogue,  // one Dialogue at `number` with the host that sent the last request; it gets Vendor::datagrams of its pings
+    udp_dialogue,  // has one Dialogue at `number`, with the host that sent the last request, which gets Vendor::datagrams
   } kind{};
   std::uint16_t number = 0;
-  std::string_view carries = {};        // what drivers send and get there, for people: "settings, pings"
+  std::string_view carries = {};        // text for users about the data at this port, such as "settings, pings"
   bool has_pings = true;                // tcp_stream: false = its connections get no pings, only answers to commands
   std::chrono::milliseconds period{0};  // period of a beacon
-  bool on_change = false;               // the beacon is also sent when a client connects or leaves
+  bool on_change = false;               // true: the beacon is also sent when a client connects or leaves
   Endpoint group{};                     // receiver of a udp_stream until SetReceivers, often a multicast group; port 0 = none
-  bool any_group = false;               // receivers of a udp_stream may be multicast groups that the configuration does not name
+  bool any_group = false;               // true: receivers of a udp_stream may be groups that are not in the configuration
   /// udp_stream: shortest time between two datagrams of a ping. tcp_stream: pause between the parts of a ping;
   /// Vendor::datagrams returns the parts, Vendor::frame the whole.
   std::chrono::nanoseconds gap{0};
@@ -37,11 +37,11 @@ struct Port {
 struct DriverAddress {
   std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
   Endpoint at;
-  std::string_view carries;         // as Port::carries
-  bool sonar_speaks_first = false;  // false: the driver speaks first
+  std::string_view carries;         // equals Port::carries
+  bool sonar_speaks_first = false;  // false: the driver sends first
 };
 
-/// One request for a resource of the device, its sizes already limited by the server.
+/// One request for a resource of the device. The server has limited its sizes.
 struct ResourceRequest {
   std::string method, path, query, content_type, body;  // path without the query: "/api/v1/speed"
   Ipv4 from{};

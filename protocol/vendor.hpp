@@ -1,5 +1,5 @@
-// The interface between an emulated sonar and a vendor's protocol. A Vendor encodes pings and beacons; its Dialogues are the
-// conversations with clients. All are pure: no sockets, no clock, no log. The daemon has the time and the send buffers.
+// The interface between an emulated sonar and a vendor's protocol. A Vendor encodes pings and beacons; its Dialogues communicate
+// with clients. They use no sockets, clock or log; the daemon has the time and the send buffers.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@
 
 namespace sonar::protocol {
 
-// Options of a sonar in the configuration: those that a make offers, and the values; check_options() adds the defaults.
+// Options of a sonar in the configuration: the options of a make, and their values; check_options() adds the defaults.
 
 /// A property that no source states; users set it under `options:` of a sonar in the configuration.
 struct Option {
@@ -38,10 +38,10 @@ struct Option {
   std::string_view default_value;
   std::string_view meaning;
   double lowest = 0, highest = 0;  // limits of a number, inclusive
-  std::string_view word = {};      // word that is allowed in place of a number, beside the default
+  std::string_view word = {};      // word that is allowed in addition to numbers and the default
   bool whole = false;              // the number has no fraction
 };
-/// A text such as "number from 5 to 170" or "whole number from 0 to 255".
+/// Returns a text such as "number from 5 to 170" or "whole number from 0 to 255".
 inline std::string numbers_of(const Option& option) {
   const std::string kind = option.whole ? "whole number" : "number";
   char text[64];
@@ -55,7 +55,7 @@ inline std::string_view text_option(const OptionValues& values, std::string_view
   return found == values.end() ? std::string_view{} : std::string_view(found->second);
 }
 
-/// The option's number; nothing if it is a word.
+/// Returns the option's number; nullopt if it is a word.
 inline std::optional<double> given_number(const OptionValues& values, std::string_view name) {
   const std::string_view text = text_option(values, name);
   double value = 0;
@@ -64,12 +64,12 @@ inline std::optional<double> given_number(const OptionValues& values, std::strin
   return is_number ? std::optional(value) : std::nullopt;
 }
 
-/// The option's number, or 0 if it is a word.
+/// Returns the option's number, or 0 if it is a word.
 inline double number_option(const OptionValues& values, std::string_view name) { return given_number(values, name).value_or(0); }
 
 using wire::Field;
 
-/// The state of the emulated device that its messages describe. Owned by the daemon's Device; read on the I/O thread only.
+/// The state of the emulated device that its messages describe. The daemon's Device owns it; only the I/O thread reads it.
 struct DeviceState {
   std::string name;
   std::uint16_t id = 0;  // serial number, never 0
@@ -78,24 +78,23 @@ struct DeviceState {
   Ipv4 connected_client{};  // 0.0.0.0 without a client
   std::array<std::uint8_t, 6> mac{};
   Time powered_up_at{};
-  Water water;  // at the device, as measured by its sensors
+  Water water;  // water at the device, as its sensors measure it
   double depth_m = 0;
-  OptionValues options;                            // complete: defaults filled in by check_options
-  std::shared_ptr<const VendorSettings> settings;  // present ones; null = Vendor::initial_settings
+  OptionValues options;                            // all options, with the defaults that check_options adds
+  std::shared_ptr<const VendorSettings> settings;  // present settings; null = Vendor::initial_settings
   std::uint32_t last_ping = 0;                     // number of the last fired ping
   Time framed_at{};                                // stamp of the previously framed ping; Time{} = none
   std::chrono::nanoseconds skipped{0};             // lead of the stamps of pings over the dialogues' time
-  bool simulated_time = false;                     // time may stop while clients wait
+  bool simulated_time = false;                     // true: time may stop while clients wait
   StoredAddress stored_address;
 };
 
-/// The transport of pings to a host: its TCP connection, datagrams (frame() returns null), or either, depending on how it
-/// connects.
+/// The transport of pings to a host: a TCP connection, datagrams (frame() returns null), or the one with which the host connects.
 enum class PingsBy { stream, datagrams, either };
 
 /// The distance that a range finder, such as an altimeter, measures with one ping.
 struct Distance {
-  double range_m = 0;          // as the device computes it
+  double range_m = 0;          // range that the device computes
   int confidence_percent = 0;  // 0 = no echo was found
 };
 
@@ -105,7 +104,7 @@ class Vendor {
   virtual std::string_view name() const = 0;
   virtual std::span<const std::shared_ptr<const SonarModel>> models() const = 0;
   virtual std::span<const Port> ports() const = 0;
-  /// The first port of that kind, or null.
+  /// Returns the first port of that kind, or null.
   const Port* port(Port::Kind kind) const {
     for (const Port& port : ports())
       if (port.kind == kind) return &port;
@@ -115,39 +114,40 @@ class Vendor {
   bool has_several_streams() const { return std::ranges::count(ports(), Port::Kind::tcp_stream, &Port::kind) > 1; }
   virtual std::span<const Option> options() const { return {}; }
   virtual int default_max_clients() const = 0;
-  /// The model that a device with these (complete) options emulates. Called once, when its configuration is read.
+  /// Returns the model that a device with these (complete) options emulates. Called once, when its configuration is read.
   virtual Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model,
                                                           const OptionValues& /*options*/) const {
     return model;
   }
-  /// The settings before any client has sent settings (the device's stored configuration).
+  /// Returns the settings before any client has sent settings (the device's stored configuration).
   virtual ChangeSettings initial_settings(const DeviceState& device) const = 0;
-  /// The present settings (DeviceState::settings) with the override applied, as a client of this vendor would request them. The
-  /// error states the product's limits.
+  /// Applies the override to the present settings (DeviceState::settings), as a client of this vendor would. The error states the
+  /// product's limits.
   virtual Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const = 0;
-  /// The present gain, in the unit of SettingsOverride::gain_percent: per cent of the range that a client can set.
+  /// Returns the present gain, in the unit of SettingsOverride::gain_percent: per cent of the range that a client can set.
   virtual double gain_percent(const DeviceState& device) const = 0;
   virtual bool pings_before_first_request(const DeviceState& /*device*/) const { return false; }
-  /// True if the settings last until the device restarts. False: only until the last client leaves; the next one finds the
-  /// initial settings.
+  /// True if the settings last until the device restarts; false if they last until the last client leaves, so that the next
+  /// client gets the initial settings.
   virtual bool keeps_settings() const { return false; }
-  /// Changes that the device makes itself after a ping, such as an automatic range. nullopt: no change.
+  /// Returns changes that the device makes after a ping, such as an automatic range; nullopt = no change.
   virtual std::optional<ChangeSettings> after_ping(const Ping& /*ping*/, const DeviceState& /*device*/) const {
     return std::nullopt;
   }
-  /// True if its sonars are range finders, which measure one distance with each ping.
+  /// True if the sonars are range finders, which measure one distance with each ping.
   virtual bool measures_distance() const { return false; }
-  /// The distance in a ping, as the device reports it. nullopt: the sonar is not a range finder.
+  /// Returns the distance in a ping that the device reports; nullopt if the sonar is not a range finder.
   virtual std::optional<Distance> distance_in(const Ping& /*ping*/) const { return std::nullopt; }
-  /// The request of a usual host for ping `number` (counted from 1) of a mechanical scan. nullopt: the sonar does not scan.
+  /// The request of a usual host for one ping of a mechanical scan.
   struct ScanStep {
     RequestPing aim;
     PingSettings settings;
   };
+  /// Returns the request for ping `number`, counted from 1; nullopt if the sonar does not scan.
   virtual std::optional<ScanStep> scan_step(std::uint32_t /*number*/, const DeviceState& /*device*/) const {
     return std::nullopt;
   }
-  /// The beacon's datagram. Empty: the vendor has no beacon.
+  /// Returns the beacon's datagram; empty if the vendor has no beacon.
   virtual Bytes beacon(const DeviceState& /*device*/, Time /*now*/) const { return {}; }
   /// Answers a datagram with any content at a port of kind udp_answer; each reply is one datagram to the sender.
   virtual Reaction on_datagram(const Port& /*port*/, BytesView /*datagram*/, const DeviceState& /*device*/, Time /*now*/) const {
@@ -158,40 +158,40 @@ class Vendor {
                                 Time /*now*/) const {
     return {404, "not found\n", "text/plain"};
   }
-  /// True if a datagram at a port of kind udp_dialogue comes from a host that speaks the protocol. Others are dropped, so that
-  /// they neither open a dialogue nor take it over.
+  /// True if a datagram at a port of kind udp_dialogue has the vendor's protocol. Other datagrams are dropped, so that they
+  /// neither open a dialogue nor take it over.
   virtual bool is_request(const Port& /*port*/, BytesView /*datagram*/) const { return false; }
-  /// A new dialogue at a port of kind tcp_stream or udp_dialogue. The state must outlive it.
+  /// Makes a new dialogue at a port of kind tcp_stream or udp_dialogue. `device` must outlive it.
   virtual std::unique_ptr<Dialogue> converse(const Port& port, const DeviceState& device, Time now) const = 0;
   virtual PingsBy pings_by() const { return PingsBy::stream; }
-  /// Time at which the device sends a ping's messages, if it needs time to make them. nullopt: as soon as they are made.
+  /// Returns the time at which the device sends a ping's messages, if it needs time to make them; nullopt = at once.
   virtual std::optional<Time> leaves_at(const Ping& /*ping*/, const DeviceState& /*device*/) const { return std::nullopt; }
-  /// Encodes a ping under its settings (PingRequest::vendor_settings), for all connections, or those of the first of several TCP
-  /// ports. Called once per ping. Null: its pings are datagrams, or the parts of several TCP ports together.
+  /// Encodes a ping with its settings (PingRequest::vendor_settings), for all connections, or for those of the first of several
+  /// TCP ports. Called once per ping. Returns null if pings are datagrams, or consist of the parts of several TCP ports.
   virtual std::shared_ptr<const Bytes> frame(const Ping& /*ping*/, const DeviceState& /*device*/) const { return nullptr; }
-  /// The datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or udp_dialogue.
-  /// For a port of kind tcp_stream: the parts of frame(), between which the device pauses; with several such ports, the bytes
-  /// of this port.
+  /// Returns the datagrams of a ping in order, at most 65,507 bytes each, for a port of kind udp_stream with receivers, or
+  /// udp_dialogue. For a port of kind tcp_stream, returns the parts of frame(), between which the device pauses; with several
+  /// such ports, the bytes of this port.
   virtual std::vector<Bytes> datagrams(const Port& /*port*/, const Ping& /*ping*/, const DeviceState& /*device*/) const {
     return {};
   }
-  /// The place of a field in a message; if `message` is empty, in the vendor's layout with the most fields. nullopt: the message
-  /// has no such field or is too short.
+  /// Returns the place of a field in a message; if `message` is empty, in the vendor's layout with the most fields. Returns
+  /// nullopt if the message has no such field or is too short.
   virtual std::optional<Field> field(Part /*part*/, FieldName /*name*/, BytesView /*message*/) const { return {}; }
-  /// Replaces an integer without a fixed place in the message, such as a varint, by `change(integer)`. False: the message has
-  /// no such integer or, if `message` is empty, no message of this kind has it.
+  /// Replaces an integer without a fixed offset in the message, such as a varint, with `change(integer)`. Returns false if the
+  /// message has no such integer or, if `message` is empty, if no message of this kind has it.
   virtual bool change_integer(Part /*part*/, FieldName /*name*/, const std::function<std::int64_t(std::int64_t)>& /*change*/,
                               Bytes& /*message*/) const {
     return false;
   }
   /// Corrects the checksums of a ping whose fields were changed. `before`: the unchanged ping, of the same size.
   virtual void reseal(BytesView /*before*/, Bytes& /*message*/) const {}
-  /// {offset, size} of a region of a ping. nullopt: the vendor has no such region, or the ping is too short. For an empty `ping`
-  /// it is {0, 0} if the vendor has such a region.
+  /// Returns {offset, size} of a region of a ping; nullopt if the vendor has no such region, or if the ping is too short. For an
+  /// empty `ping` it is {0, 0} if the vendor has such a region.
   virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region /*region*/, BytesView /*ping*/) const { return {}; }
 };
 
-/// A sonar that sends its pings without a request, from power-up on, to every client of one TCP port.
+/// A sonar that sends pings without a request, from power-up on, to every client of one TCP port.
 class PushingVendor : public Vendor {
  public:
   explicit PushingVendor(std::uint16_t tcp_port)
@@ -204,22 +204,24 @@ class PushingVendor : public Vendor {
   std::array<Port, 1> ports_;
 };
 
-/// Checks options and adds the defaults of the missing ones. Unknown names and values are errors that suggest the nearest valid
+/// Checks options and adds the defaults of missing options. Unknown names and values are errors that suggest the nearest valid
 /// one.
 Result<OptionValues> check_options(const Vendor& vendor, const OptionValues& given);
 
-/// The devices of makes() (protocol/host.hpp), in that order.
+/// Returns the devices of makes() (protocol/host.hpp), in that order.
 std::span<const Vendor* const> vendors();
-/// The vendor and model of a profile name, or an error that suggests the nearest name.
+/// The vendor and model of a profile name.
 struct Profile {
   const Vendor* vendor = nullptr;
   std::shared_ptr<const SonarModel> model;
 };
+/// Finds a profile. The error suggests the nearest name.
 Result<Profile> find_profile(std::string_view profile);
 
-/// The addresses of a sonar at `ip`, port by port. `status_to`: the receivers of its status messages; port 0 = the vendor's own.
+/// Returns the addresses of a sonar at `ip`, port by port. `status_to`: the receivers of its status messages; port 0 = the port
+/// of the vendor.
 std::vector<DriverAddress> driver_addresses(const Vendor& vendor, Ipv4 ip, std::span<const Endpoint> status_to);
-/// A line such as "tcp        127.0.0.2:52100            settings, pings; waits for the driver".
+/// Returns a line such as "tcp        127.0.0.2:52100            settings, pings; waits for the driver".
 std::string line_of(std::string_view protocol, std::string_view at, std::string_view carries, bool sonar_speaks_first);
 
 }  // namespace sonar::protocol

@@ -224,7 +224,7 @@ std::uint16_t Head::angle_at(Time at) const {
 
 void Head::turn_to(std::uint16_t angle, Time at) {
   from = angle_at(at);
-  // The head turns by the smaller angle. `to` may lie outside of 0 to 399; angle_at() takes it modulo a turn.
+  // The head turns by the smaller angle. `to` may be outside 0 to 399; angle_at() reduces it modulo a turn.
   const int ahead = ((angle - from) % grads + grads) % grads;
   to = from + (ahead <= grads / 2 ? ahead : ahead - grads);
   since = at;

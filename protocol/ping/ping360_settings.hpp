@@ -47,11 +47,11 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 /// Makes the message of a ping with these settings: auto_device_data in a scan, else device_data.
 Bytes encode(const Settings& settings, BytesView samples);
-/// The scan line in such a message.
 struct Line {
   Transducer ping;
   Bytes samples;
 };
+/// Reads the scan line in such a message; nullopt for another or incomplete message, or a wrong checksum.
 std::optional<Line> line_in(BytesView message);
 
 /// Returns the angle [rad] by which the sonar is rotated to port, so that it points in the direction of the head. Angles of the

@@ -15,14 +15,14 @@ namespace {
 constexpr std::uint64_t most_searched_bytes = 64u << 20;
 
 bool is_mcap(BytesView front) { return begins_with(front, {0x89, 'M', 'C', 'A', 'P'}); }
-/// Magic numbers of pcap, with micro- or nanoseconds in either byte order, and of pcapng.
+/// True for the magic numbers of pcap, with micro- or nanoseconds and any byte order, and of pcapng.
 bool is_capture(BytesView front) {
   return begins_with(front, {0xD4, 0xC3, 0xB2, 0xA1}) || begins_with(front, {0xA1, 0xB2, 0xC3, 0xD4}) ||
          begins_with(front, {0x4D, 0x3C, 0xB2, 0xA1}) || begins_with(front, {0xA1, 0xB2, 0x3C, 0x4D}) ||
          begins_with(front, {0x0A, 0x0D, 0x0D, 0x0A});
 }
 
-/// The address that selects a sonar of a capture; nullopt selects the only one.
+/// Returns the address that selects a sonar of a capture; nullopt selects the only sonar.
 Result<std::optional<std::uint32_t>> address_from(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const auto ip = text::parse_ipv4(text);
@@ -71,7 +71,7 @@ std::string file_endings() {
   return endings;
 }
 
-// The kind of a file is known by its first bytes, never by its name.
+// The first bytes of a file determine its format, never its name.
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar) {
   std::array<std::byte, 16> front{};
   const std::size_t there = source->read_at(0, front);
@@ -97,7 +97,7 @@ std::optional<SentBy> find_sender(RecordingReader& reader) {
     for (const auto& model : by.make->device->models())
       if (model->profile == stated) by.sender.model = model, by.sender.names_model = true;
   };
-  // A later message is better only if it names the model of the same sonar.
+  // A later message is better only if it states the model of the same sonar.
   const auto is_better = [&found](const SentBy& by) {
     return !found || (by.sender.names_model && by.make == found->make && by.sender.serial == found->sender.serial);
   };
@@ -160,7 +160,7 @@ std::optional<RecordedPing> RecordedPings::next() {
 void RecordedPings::rewind() {
   reader_->rewind();
   decoded_.clear();
-  static_cast<void>(make_host());  // succeeds, as it did in open()
+  static_cast<void>(make_host());  // cannot fail, because open() has called it before
 }
 
 }  // namespace sonar::recording

@@ -1,5 +1,5 @@
-// Opens recordings of any format, recognised by their first bytes: captures (pcap, pcapng), MCAP, a make's own format, raw
-// dumps. Used by `sonard replay`, the live view, and `sonarctl` for --from.
+// Opens recordings of any format, recognised by their first bytes: captures (pcap, pcapng), MCAP, a make's own format, raw dumps.
+// `sonard replay`, the live view and `sonarctl --from` use it.
 #pragma once
 
 #include <deque>
@@ -15,36 +15,36 @@
 
 namespace sonar::recording {
 
-/// The extensions of all supported files, such as ".pcap, .mcap, .raw, .oculus".
+/// Returns the extensions of all supported files, such as ".pcap, .mcap, .raw, .oculus".
 std::string file_endings();
 
 struct Recording {
-  std::string_view format;  // ".oculus log", "MCAP", "capture"
+  std::string_view format;  // such as ".oculus log", "MCAP" or "capture"
   std::unique_ptr<RecordingReader> reader;
 };
-/// `sonar`: selects one of several, by IPv4 address in captures, by name in MCAP; empty = the one with most bytes, or the first.
-/// Errors: missing_file, io, bad_data; usage if a file of this format cannot name such a sonar.
+/// `sonar` selects one of several sonars, by IPv4 address in captures, by name in MCAP; empty = the sonar with most bytes, or the
+/// first. Errors: missing_file, io, bad_data; usage if a file of this format cannot name such a sonar.
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
 
-/// Finds the sonar of a recording by the first message that names its model, or else by its first message and the profile that
-/// the file states, within the first 64 MB. Rewinds the reader.
+/// Finds the sonar of a recording within the first 64 MB, from the first message that states its model, or else from its first
+/// message and the profile that the file states. Rewinds the reader.
 std::optional<SentBy> find_sender(RecordingReader& reader);
 
-// Reads the pings of a recording, decoded by the host of their make. Used by `sonarctl` and by the live view.
+// Reads the pings of a recording, which the host of their make decodes, for `sonarctl` and the live view.
 
 struct RecordedPing {
-  Time at{};  // 0 if the format stores no times
+  Time at{};  // time of the ping; 0 if the format stores no times
   protocol::HostPing ping;
 };
 
-/// The pings that `host`, a host of `make`, decodes from the next message of a recording. Null: the recording has ended, so pings
-/// that wait for another part are complete. Actions of the host other than pings are left out.
+/// Returns the pings that `host`, a host of `make`, decodes from the next message of a recording. `message` null: the recording
+/// has ended, so pings that wait for another part are complete. Other actions of the host are ignored.
 std::vector<RecordedPing> decode_next(protocol::Host& host, const protocol::Make& make, const RecordedMessage* message);
 
 class RecordedPings {
  public:
-  /// Errors: bad_data if the recording contains no ping of a known sonar.
+  /// Opens the pings. Errors: bad_data if the recording contains no ping of a known sonar.
   static Result<RecordedPings> open(std::unique_ptr<RecordingReader> reader);
 
   /// nullopt at the end.

@@ -10,7 +10,7 @@
 namespace sonar::waterlinked {
 namespace {
 
-/// The sender of a datagram. Packets do not have the model, so the first model is assumed.
+/// Returns the sender of a datagram. Packets do not state the model, so the first model is assumed.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   if (message.by != recording::Carrier::datagram || rip_length(message.bytes) != message.bytes.size()) return std::nullopt;
   return recording::Sender{models().front()};
@@ -28,7 +28,7 @@ constexpr std::array<recording::FileKind, 1> kinds{{{
       return recording::read_sonar_file(std::move(source));
     },
     .write =
-        [](std::unique_ptr<recording::Sink> sink) {  // its successive datagrams
+        [](std::unique_ptr<recording::Sink> sink) {  // the file has successive datagrams
           return recording::write_raw_dump(std::move(sink), recording::Carrier::datagram);
         },
     .is_raw_dump = true,

@@ -16,11 +16,11 @@ using Json = nlohmann::json;
 using protocol::HostActions;
 
 constexpr std::size_t picture_rows = 300;
-constexpr double darkest = 0.85;  // the farthest pixel of a range image is darker by this fraction than the nearest
+constexpr double darkest = 0.85;  // fraction by which the farthest pixel of a range image is darker than the nearest
 constexpr std::size_t most_pixels = 1 << 20;
 constexpr std::string_view title = "a Sonar 3D-15", api = "/api/v1/integration";
 
-/// The carrier of the shot's mode. The field `frequency` has the rate instead, so the horizontal field of view identifies the
+/// Returns the carrier of the shot's mode. The field `frequency` has the rate, so the horizontal field of view identifies the
 /// mode.
 double centre_hz_of(const Shot& shot) {
   for (const auto& mode : mode_rows())
@@ -87,7 +87,7 @@ std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const St
 
 namespace {
 
-/// Opens the sonar by HTTP requests, one after the other: GET /udp, then a POST for each setting (`posts_`). Images arrive as
+/// Opens the sonar with HTTP requests, one after the other: GET /udp, then a POST for each setting (`posts_`). Images arrive as
 /// datagrams: ranges, then the strengths of the same shot (`half_`).
 class WaterlinkedHost final : public protocol::Host {
  public:
@@ -101,8 +101,8 @@ class WaterlinkedHost final : public protocol::Host {
 
   HostActions on_open(std::span<const std::uint16_t>, Time) override { return {ask("GET", "/udp", "")}; }
 
-  /// The first reply is that of GET /udp. If the output is disabled, the host switches multicast on; if it is unicast to another
-  /// program, the host does not change it and fails. Then it sends the settings.
+  /// Handles a reply, the first of which is that of GET /udp. If the output is disabled, the host switches multicast on; if it is
+  /// unicast to another program, the host does not change it, and fails. Then the host sends the settings.
   HostActions on_reply(const protocol::ResourceReply& reply, Time) override {
     const auto fail = [](ErrorKind kind, std::string text) { return HostActions{Error{kind, std::move(text)}}; };
     if (!std::exchange(knows_output_, true)) {

@@ -23,7 +23,7 @@ constexpr double electronics_warmer_c = 9.5;              // unknown: difference
 
 struct Call {
   const DeviceState& device;
-  Settings settings;  // a POST changes them
+  Settings settings;  // present settings, which a POST changes
   Time now;
   bool synchronised() const { return text_option(device.options, option_name::clock) == "utc"; }
 };
@@ -36,7 +36,7 @@ Outcome malformed(const std::string& why) { return {400, {{"error", why}}}; }
 
 // ---- resources that GET reads
 
-/// A time as "2026-01-31T23:58:15.123Z".
+/// Returns a time such as "2026-01-31T23:58:15.123Z".
 std::string rfc_3339(Time at) {
   const auto day = std::chrono::floor<std::chrono::days>(at);
   const std::chrono::year_month_day date(day);
@@ -64,7 +64,8 @@ Json about(const Call& call) {
 
 double temperature_c(const Call& call) { return call.device.water.temperature_c + electronics_warmer_c; }
 
-/// Release 1.7.0 renamed "severity" to "status" and "calibration" to "systems_check"; 1.7.1 added "time". unknown: the ids.
+/// Makes the status. Release 1.7.0 renamed "severity" to "status" and "calibration" to "systems_check"; 1.7.1 added "time".
+/// unknown: the ids.
 Json status(const Call& call) {
   const std::string_view release = text_option(call.device.options, option_name::release);
   const bool older = release < "1.7.0";
@@ -156,7 +157,7 @@ Outcome set_ntp(Call& call, const Json& posted) {
   return {};
 }
 
-/// The sonar does not ask a time server: the result follows from option `clock`.
+/// The emulated sonar queries no time server; the result depends on option `clock`.
 Outcome force_sync(Call& call, const Json& posted) {
   if (!posted.is_object() || !posted.value("timeout_seconds", Json(0)).is_number())
     return malformed("not {\"timeout_seconds\": number}");
@@ -166,7 +167,7 @@ Outcome force_sync(Call& call, const Json& posted) {
       {{"success", done}, {"message", done ? "Time is synchronized." : "No server answered."}, {"status", time_status(call)}}};
 }
 
-/// Sets the clock of a device that is not synchronised. Its offset counts from power-up, because device_time() counts from there.
+/// Sets the clock of a device that is not synchronised. The offset counts from power-up, as in device_time().
 Outcome set_time(Call& call, const Json& posted) {
   const Json now = posted.is_object() ? posted.value("now", Json()) : Json();
   int year = 0, hour = 0, minute = 0;
@@ -194,7 +195,7 @@ Outcome set_time(Call& call, const Json& posted) {
 }
 
 struct Path {
-  std::string_view name, since;  // release that has it first
+  std::string_view name, since;  // path, and the first release that has it
   Json (*get)(const Call&);
   Outcome (*post)(Call&, const Json&);
 };
@@ -235,7 +236,7 @@ ResourceReply reply_of(unsigned status, const Json& body) {
   return {status, status == 204 ? "" : body.dump(-1, ' ', false, Json::error_handler_t::replace)};
 }
 
-/// The reply to a POST. Settings that are the same as before make no event, so that repeated requests do not restart anything.
+/// Makes the reply to a POST. Unchanged settings cause no event, so that repeated requests restart nothing.
 ResourceReply changed(const Call& call, const Outcome& outcome) {
   ResourceReply reply = reply_of(outcome.status, outcome.body);
   const Settings before = settings_from(call.device.settings.get(), call.device);
@@ -261,8 +262,8 @@ ResourceReply answer(const protocol::ResourceRequest& request, const DeviceState
     return refused;
   }
   if (request.body.size() > longest_body) return reply_of(413, {{"error", "the body is longer than 1024 bytes"}});
-  // A missing body counts as an empty object. That suits force-sync, whose body is optional; other resources refuse it and state
-  // what they need.
+  // A missing body counts as an empty object, which force-sync accepts, because its body is optional; other resources refuse it
+  // and state what they need.
   const Json posted = request.body.empty() ? Json::object() : Json::parse(request.body, nullptr, false);
   if (posted.is_discarded()) return reply_of(400, {{"error", "not JSON"}});
   return changed(call, path->post(call, posted));

@@ -72,7 +72,7 @@ Bytes packet_of(const StrengthMessage& message) {
   return packed(m);
 }
 
-// Vectors of all samples lie one after the other in one list of floats.
+// The vectors of all samples are in one list of floats, one after the other.
 Bytes packet_of(const ImuMessage& message) {
   pb::ImuBatch m;
   m.set_batch_sequence_id(message.sequence);
@@ -85,7 +85,7 @@ Bytes packet_of(const ImuMessage& message) {
   return packed(m);
 }
 
-// A packet holds a google.protobuf.Any, whose type identifies one of the three messages.
+// A packet contains a google.protobuf.Any, whose type identifies one of the three messages.
 Decoded decode(BytesView bytes) {
   Decoded out;
   pb::Packet packet;

@@ -29,7 +29,7 @@ struct Shot {
 struct RangeMessage {
   Shot shot;
   float pixel_scale_m = 0;
-  std::vector<std::uint32_t> pixels;  // row by row, the lowest first
+  std::vector<std::uint32_t> pixels;  // row by row, lowest first
 };
 struct StrengthMessage {
   Shot shot;
@@ -39,7 +39,7 @@ struct ImuMessage {
   std::uint32_t sequence = 0;
   struct Sample {
     Time at{};
-    std::array<float, 3> specific_force_mps2{}, rate_radps{};  // forward, right, down
+    std::array<float, 3> specific_force_mps2{}, rate_radps{};  // axes: forward, right, down
   };
   std::vector<Sample> samples;
 };
@@ -48,7 +48,7 @@ Bytes packet_of(const RangeMessage& message);
 Bytes packet_of(const StrengthMessage& message);
 Bytes packet_of(const ImuMessage& message);
 
-/// The content of a packet: at most one is set; none if the packet is of another kind or unreadable.
+/// The content of a packet: at most one member is set; none if the packet is of another kind or unreadable.
 struct Decoded {
   std::optional<RangeMessage> ranges;
   std::optional<StrengthMessage> strengths;

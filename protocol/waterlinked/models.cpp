@@ -34,8 +34,8 @@ std::span<const std::shared_ptr<const SonarModel>> models() {
       mode.beam_spacing = BeamSpacing::uniform_in_angle;
       mode.min_range_m = 0;
       mode.max_range_m = static_cast<float>(longest_range_m);
-      // unknown: levels. In SMP the level falls with range by about 20 log r less than two-way spreading, so the gain grows by
-      // that.
+      // unknown: levels. In SMP the level falls with range by about 20 log r less than two-way spreading, so the gain increases
+      // by 20 log r.
       mode.source_level_db = 200;
       mode.receiver.tvg_slope_db = 20;
       mode.receiver.tvg_ceiling_db = 60;

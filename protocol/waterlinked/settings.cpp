@@ -7,8 +7,8 @@
 namespace sonar::waterlinked {
 namespace {
 
-constexpr std::uint32_t least_strength = 31;  // the least strength whose pixel is not 0
-constexpr float first_gain_db = 33;           // gain of the first pictures, where the gain assist starts; 2 cm poles show at 8 m
+constexpr std::uint32_t least_strength = 31;  // the lowest strength whose pixel is not 0
+constexpr float first_gain_db = 33;           // initial gain of the gain assist, with which poles of 2 cm are visible at 8 m
 
 }  // namespace
 
@@ -53,7 +53,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.range_start_m = settings.range_min_m;
   s.range_bin_m = (s.range_m - s.range_start_m) / rows;
   s.pulse_width_m = static_cast<float>(mode.range_cell_m);
-  // The device images only while acoustics are enabled and there is a receiver. A rate below that of the mode comes from an
+  // The device makes images only while acoustics are enabled and there is a receiver. A rate below that of the mode is from an
   // override.
   const bool sends = settings.acoustics && settings.udp != disabled;
   s.rate_hz = !sends ? 0 : settings.rate_hz > 0 ? static_cast<float>(settings.rate_hz) : mode.rate_hz;

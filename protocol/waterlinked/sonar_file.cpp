@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t head_bytes = 8;  // magic and length
 
-/// The time in a packet. nullopt: a packet of another kind, or without samples.
+/// Returns the time in a packet; nullopt for a packet of another kind, or without samples.
 std::optional<Time> time_of(BytesView content) {
   const waterlinked::Decoded message = waterlinked::decode(content);
   if (message.ranges) return message.ranges->shot.at;
@@ -18,7 +18,7 @@ std::optional<Time> time_of(BytesView content) {
   return std::nullopt;
 }
 
-/// Reads packet by packet; the CRC of each shows whether it is whole.
+/// Reads packet by packet; the CRC of a packet shows whether it is complete.
 class SonarFileReader final : public RecordingReader {
  public:
   explicit SonarFileReader(std::unique_ptr<Source> source) : source_(std::move(source)), scan_(*source_) {}
@@ -34,7 +34,7 @@ class SonarFileReader final : public RecordingReader {
         scan_.skip(length);
         return message;
       }
-      // A damaged place is reported once; the search continues byte by byte, because a length in it may be wrong.
+      // A damaged place is reported once; the search continues byte by byte, because a length there may be wrong.
       if (!std::exchange(searching, true)) damages_.add(why(at, length, packet.size()));
       scan_.skip(1);
     }

@@ -8,7 +8,7 @@
 
 namespace sonar::recording {
 
-/// Reads each packet with the time that it states; packets without a time get that of the packet before. After damage it
+/// Reads each packet with the time that it states; packets without a time get that of the previous packet. After damage it
 /// searches for the next whole packet.
 std::unique_ptr<RecordingReader> read_sonar_file(std::unique_ptr<Source> source);
 

@@ -6,7 +6,8 @@ namespace sonar::waterlinked {
 namespace {
 
 using PortKind = protocol::Port::Kind;
-// Port::gap is 0: the two images of a shot follow at once, because clients pair images that arrive within 25 ms.
+// Port::gap is 0, so that the two images of a shot follow each other at once, because clients pair images that arrive within 25
+// ms.
 constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::http, .number = 80, .carries = "settings"},
      {.kind = PortKind::udp_stream, .carries = "range images", .group = multicast_group}}};
@@ -17,7 +18,7 @@ class WaterLinkedVendor final : public protocol::Vendor {
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return waterlinked::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return waterlinked::options(); }
-  int default_max_clients() const override { return 1; }  // has no effect: it counts TCP streams, and this sonar has none
+  int default_max_clients() const override { return 1; }  // has no effect, because this sonar has no TCP streams
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(waterlinked::initial_settings(device), device);

@@ -1,5 +1,5 @@
-// The Water Linked Sonar 3D-15 (docs/protocols/waterlinked.md): the device and its client, with settings over HTTP and images by
-// multicast, and the codec for recordings.
+// The Water Linked Sonar 3D-15 (docs/protocols/waterlinked.md): the device and its client, with settings over HTTP and images
+// over multicast, and the codec for recordings.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ inline constexpr std::array<protocol::HostPort, 2> host_ports{
      {protocol::HostPort::Kind::udp_listen, multicast_group.port, multicast_group.ip}}};
 
 /// Builds a top-view ping: each column of pixels becomes a beam with its strengths at their horizontal ranges. Without
-/// `strengths` all returns are equally bright. nullopt: the messages do not describe one image.
+/// `strengths` all returns are equally bright. Returns nullopt if the messages do not describe one image.
 std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const StrengthMessage* strengths);
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

@@ -48,7 +48,7 @@ constexpr unsigned shift_of(std::size_t index, std::size_t size, Endian endian) 
   return static_cast<unsigned>(8 * (endian == Endian::little ? index : size - 1 - index));
 }
 
-/// Base of all visitors: arrays and nested messages by recursion, scalars by the derived class.
+/// Base of all visitors: it visits arrays and nested messages recursively, and the derived class handles scalars.
 template <class Self>
 class Visitor {
  public:
@@ -56,7 +56,7 @@ class Visitor {
   constexpr void operator()(std::string_view name, T& value) {
     visit(name, value);
   }
-  /// `meaning`: a value of an enum, the same for every make; locate() finds fields by it.
+  /// `meaning`: a value of an enum that all makes share, with which locate() finds fields.
   template <class T, class Meaning>
   constexpr void operator()(std::string_view name, T& value, Meaning meaning) {
     self().means(meaning);
@@ -95,7 +95,7 @@ class Visitor {
   }
 };
 
-/// Appends to a byte vector, which must outlive it.
+/// Appends to a byte vector, which must outlive the writer.
 class Writer : public Visitor<Writer> {
  public:
   explicit Writer(Bytes& out, Endian endian = Endian::little) : out_(out), endian_(endian) {}
@@ -112,7 +112,7 @@ class Writer : public Visitor<Writer> {
   Endian endian_;
 };
 
-/// Reads fields from a span. It remembers the first failure; later fields stay unchanged.
+/// Reads fields from a span. It stores the first failure; later fields are not changed.
 class Reader : public Visitor<Reader> {
  public:
   struct Failure {
@@ -131,7 +131,7 @@ class Reader : public Visitor<Reader> {
   std::size_t position() const { return position_; }
   std::size_t remaining() const { return in_.size() - position_; }
 
-  /// The next `count` bytes as they are, or an empty view and a failure.
+  /// Returns the next `count` bytes unchanged, or an empty view after a failure.
   BytesView block(std::string_view name, std::size_t count) {
     if (!has(name, count)) return {};
     const BytesView taken = in_.subspan(position_, count);
@@ -178,16 +178,15 @@ class Counter : public Visitor<Counter> {
   }
 };
 
-/// The position of a field in a message, and its type; little-endian. `bytes`: any other type than an integer or a
-/// floating-point number.
+/// The position and type of a field in a little-endian message. `bytes`: any type except integers and floating-point numbers.
 struct Field {
   enum class Type { integer, number, bytes } type{};
   std::size_t offset = 0, size = 0;
   bool operator==(const Field&) const = default;
 };
 
-/// Finds the field with a meaning: the last such field, joined with the adjacent ones before it that have the same meaning. An
-/// array of bytes is one field; in another array it is the first element.
+/// Finds the field with a meaning: the last such field, joined with the adjacent fields before it that have the same meaning. An
+/// array of bytes is one field; of another array the first element is the field.
 template <class Meaning>
 class Locator : public Visitor<Locator<Meaning>> {
  public:
@@ -199,7 +198,7 @@ class Locator : public Visitor<Locator<Meaning>> {
   constexpr void means(Meaning meaning) { is_wanted_ = meaning == wanted_; }
   constexpr void find(Field::Type type, std::size_t size) {
     if (!std::exchange(is_wanted_, false)) return;
-    const Field before = found.value_or(Field{});  // GCC 14 warns falsely of *found here
+    const Field before = found.value_or(Field{});  // GCC 14 gives a false warning about *found here
     if (found && before.offset + before.size == offset_)
       found = Field{Field::Type::bytes, before.offset, before.size + size};
     else
@@ -220,7 +219,7 @@ class Locator : public Visitor<Locator<Meaning>> {
   std::size_t offset_ = 0;
 };
 
-/// Size in bytes of a message on the wire; a constant.
+/// Returns the size in bytes of an encoded message, which is a constant.
 template <class M>
 constexpr std::size_t wire_size() {
   Counter counter;
@@ -229,8 +228,8 @@ constexpr std::size_t wire_size() {
   return counter.bytes;
 }
 
-/// Finds the field with a meaning (Locator) in bytes in which the message begins at `at`. nullopt: no field has the meaning, or
-/// `bytes` are not empty and end before the field does.
+/// Finds the field with a meaning (Locator) in bytes in which the message begins at `at`. Returns nullopt if no field has the
+/// meaning, or if `bytes` are not empty and end before the end of the field.
 template <class M, class Meaning>
 constexpr std::optional<Field> locate(Meaning meaning, BytesView bytes = {}, std::size_t at = 0) {
   Locator<Meaning> locator(meaning);

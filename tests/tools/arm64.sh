@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds sonard for 64-bit ARM on an amd64 Debian 12 and tests it under qemu-user, which takes about an hour; not part of .ci/run.
 # usage: tests/tools/arm64.sh [--root DIR] [STEP...]
-#   --root DIR  in a Debian 12 system of its own in DIR, made by mmdebstrap if it is missing, on a clone of the last commit.
+#   --root DIR  uses a separate Debian 12 system in DIR, which mmdebstrap makes if it is missing, and a clone of the last commit.
 #               Without it the step setup adds the architecture arm64 to dpkg of this system and installs libraries of arm64. For
 #               these apt may remove libraries of amd64, so use it in a bare system or a container.
 #   STEP        setup, build, test, threads, demo, package; all in this order by default. setup and --root need root.
@@ -32,7 +32,7 @@ if [ -n "$root" ]; then
   exit
 fi
 
-# Programs that run here come from amd64, libraries from arm64; packages for all architectures have one form.
+# Programs that run here are from amd64, libraries from arm64; packages for all architectures have one form.
 setup() {
   [ "$(dpkg --print-architecture)" = amd64 ] || { echo "this script cross-builds on amd64; here ./run.sh builds" >&2; return 69; }
   local name names=(crossbuild-essential-arm64 qemu-user dpkg-dev file)
@@ -48,7 +48,8 @@ setup() {
   DEBIAN_FRONTEND=noninteractive apt-get -q -y --no-install-recommends install "${names[@]}" "${page_packages[@]}" </dev/null
 }
 
-# Core, protocol, the contract of all makes and the emulator, without programs that repeat a stage many times to measure a figure.
+# Lists the tests of core, protocol, all makes and the emulator, without programs that repeat a stage many times to measure a
+# figure.
 tested() {
   awk -v folder="$PWD/$folder/" 'index($2, folder) == 1 && $1 ~ /^GTEST/ && $1 !~ /FIGURES/ {print substr($2, length(folder) + 1)}' \
     "$folder/tests/programs" | grep -E '^tests/(core|protocol|example_make)/|^tests/daemon/daemon_emulator_test$'
@@ -74,7 +75,7 @@ make_commands() {
   done
 }
 
-# Programs that are emulated start the importer of meshes as a command of this machine, too.
+# Emulated programs also start the importer of meshes as a command of this machine.
 export SONARD_IMPORT_MESH=$PWD/$emulated/importer/sonard-import-mesh
 
 # If a program is missing, qemu-user starts nevertheless and ends with code 127.
@@ -96,7 +97,7 @@ run_tests() {
     fi'
 }
 
-# Pings are the same to the byte on one, two and four threads.
+# Checks that pings have the same bytes on one, two and four threads.
 threads() {
   local n
   make_commands

@@ -25,7 +25,7 @@ make_bare_root() {
   tar -C "$dir" -xf "$cache/$suite.tar" && touch "$dir/etc/bare-$suite"
 }
 
-# in_root DIR COMMAND...: runs it as root of that system, with mounts of its own, which end with the command, and with this
+# in_root DIR COMMAND...: runs a command as root of that system, with separate mounts, which end with the command, and with this
 # machine's network.
 in_root() {
   local dir=$1

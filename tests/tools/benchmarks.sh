@@ -34,8 +34,8 @@ if [ -n "$sets_only" ]; then
   python3 tests/bench/write_benchmarks.py --instruction-sets "${sets[@]}" "$build"
 else
   json=$build/benchmarks.json
-  # A ratio that is missed (exit code 1) is shown in the page; any other failure ends the script.
-  # Demos have ports below 1024, which are allowed in a network of their own.
+  # A missed ratio (exit code 1) is shown in the page; any other failure ends the script. Demos have ports below 1024, which are
+  # allowed in a separate network.
   "$build/tests/own_network/in_own_network" "$bench" --scene local-search "${each[@]}" --pings 200 --curves --json "$json" || [ $? -eq 1 ]
   python3 tests/bench/write_benchmarks.py "$json" "${sets[@]}" docs "$build"
 fi

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Runs the demo as a user would and checks it: the daemon on an address of its own, our client over TCP, 20 pings, a picture.
-# usage: check_demo.sh BUILD_FOLDER [PICTURE]     exit code 0, or a sentence about the failure
+# Runs and checks the demo as a user would: the daemon at a separate address, our client over TCP, 20 pings, a picture. usage:
+# check_demo.sh BUILD_FOLDER [PICTURE]     exit code 0, or a sentence about the failure
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 folder=${1:?usage: check_demo.sh BUILD_FOLDER [PICTURE]}
 picture=${2:-out/demo.png}
-# Bare sand, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py judges these figures with 256 beams.
+# The region of bare sand, 5.5 to 7.8 m, 12 degrees to port. tests/acceptance/picture_test.py checks these figures with 256 beams.
 sand=250:350,150:250
 pings=20 memory_limit_mb=300 first_ping_goal_s=1 first_ping_limit_s=20 stop_goal_ms=2000 stop_limit_ms=20000 wait_s=100
-# An emulated processor is slower by this factor, so fewer pings are made; its emulator needs memory of its own.
+# An emulated processor is slower by this factor, so fewer pings are made; the emulator needs additional memory.
 if [ -n "${SONARD_DEMO_SLOWNESS:-}" ]; then
   first_ping_limit_s=$((first_ping_limit_s * SONARD_DEMO_SLOWNESS)) stop_limit_ms=$((stop_limit_ms * SONARD_DEMO_SLOWNESS))
   wait_s=$((wait_s * SONARD_DEMO_SLOWNESS)) memory_limit_mb=$((2 * memory_limit_mb)) pings=5

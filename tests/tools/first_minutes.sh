@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The first five minutes of a new user: types each command and prints its real output. The README quotes it.
+# Shows the first five minutes of a new user: prints each command and its real output, which the README quotes.
 # usage: first_minutes.sh [BUILD_FOLDER]     programs of a build, build/release by default
 #        first_minutes.sh --package          builds the Debian package, installs it (as root) and uses that
 # It uses the usual addresses: 127.0.0.2 and the ports of poses, control and status. Run it where no other program uses them, or
@@ -39,7 +39,7 @@ for ((i = 0; i < 1200; i++)); do grep -q '^ready in' "$scratch/log" && break; ki
 cat "$scratch/log"
 grep -q '^ready in' "$scratch/log" || exit 1
 echo
-sonarctl listen --wait 100 --pings 1 --quiet >/dev/null 2>&1  # the first ping takes longest: too long for doctor on a busy computer
+sonarctl listen --wait 100 --pings 1 --quiet >/dev/null 2>&1  # the first ping takes longest, maybe too long for doctor
 said=$(wc -l <"$scratch/log")
 
 show sonarctl doctor

@@ -25,8 +25,8 @@ export LSAN_OPTIONS="suppressions=$PWD/tests/tools/lsan.supp"
 # figure NAME LOG: prints one number of libFuzzer's final statistics.
 figure() { sed -n "s/^stat::$1: *//p" "$2" | tail -n 1; }
 
-# one NAME PLACE: runs the target, prints its result at once and writes it to NAME.result. Status 1: a fault, or fewer inputs than
-# the bound.
+# one NAME PLACE: runs the target, prints its result at once and writes it to NAME.result. Returns 1 after a fault, or if there
+# were fewer inputs than the bound.
 one() {
   local name=$1 corpus=build/fuzz/corpus/$1 findings=build/fuzz/findings/$1 log=build/fuzz/$1.log
   local result tried status before=$SECONDS
@@ -43,7 +43,7 @@ one() {
   given+=("$corpus")
   [ -d "tests/fuzz/corpus/$name" ] && given+=("tests/fuzz/corpus/$name")
   "build/fuzz/tests/fuzz/${name}_fuzz" "${given[@]}" >"$log" 2>&1 </dev/null &
-  # shellcheck disable=SC2064  # this target's process, now
+  # shellcheck disable=SC2064  # expands $! now, to the process of this target
   trap "kill $! 2>/dev/null; exit 1" TERM
   wait $!
   status=$?

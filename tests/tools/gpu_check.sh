@@ -53,7 +53,7 @@ do_pack() (
   [ "$bytes" -lt 57000000 ] || { echo "gpu_check: more than 57 MB do not travel" >&2; exit 1; }
 )
 
-# Only the pack, the C library and its loader: no /usr, no /proc, no shell.
+# The root has only the pack, the C library and its loader: no /usr, no /proc, no shell.
 do_prove() (
   set -e
   archive=${1:-$default_build/gpu_pack.tar.gz}
@@ -95,8 +95,8 @@ begin_run() {
   failures=0
 }
 
-# limited SECONDS COMMAND...: runs it with the pack's libraries. A command that hangs is ended, so that a part ends within its ten
-# minutes.
+# limited SECONDS COMMAND...: runs a command with the pack's libraries. A command that hangs is ended, so that a part ends within
+# ten minutes.
 limited() {
   local left=$((part_ends - SECONDS)) wanted=$1
   [ "$left" -gt 5 ] || { echo "no time left for: ${*:2}"; return 124; }
@@ -124,8 +124,8 @@ facts() {
 
 smoke() { bench 120 --case P1 --pings 64 --threads 1 || fail "P1 did not run: rc=$?"; }
 
-# Runs the tests that host loops pass, and compares P9 with host loops: the bytes are equal if the device rounds as the processor
-# does.
+# Runs the tests that host loops pass, and compares P9 with host loops: the bytes are equal if device and processor round in the
+# same way.
 check() {
   local test skipped
   for test in cuda_seam_test $device_tests; do
@@ -145,7 +145,7 @@ check() {
   fi
 }
 
-# The rate that the processor allows if the device needs no time.
+# Measures the rate that the processor allows if the device needs no time.
 ceiling() {
   # shellcheck disable=SC2046
   SONARD_TEST_DEVICE_IDLE=1 SONARD_CUDA_MODULE=$pack/bin/libhost_module.so bench 500 --case P10 --pings 128 $(thread_options) |
@@ -192,7 +192,7 @@ soak() {
   done
 }
 
-# A device with too little memory: batches become smaller or one sentence is printed, and no ping is lost.
+# Tests a device with too little memory: batches must become smaller, or one sentence must be printed, and no ping may be lost.
 memory() {
   python3 -c "import torch,time;f=torch.cuda.mem_get_info()[0];x=torch.empty(f-(900<<20),dtype=torch.uint8,device='cuda');time.sleep(90)" &
   local hog=$!
@@ -220,7 +220,7 @@ do_run() {
       facts | smoke | check | ceiling | rates | page | kernels | sanitize | soak | memory) "$part" ;;
       *) fail "no part $part" ;;
     esac > >(tee -a "$found/log.txt") 2>&1
-    tar -czf "$out/found.tar.gz" -C "$out" found  # after every part, so that its results come back even if time runs out
+    tar -czf "$out/found.tar.gz" -C "$out" found  # repeated after every part, so that results are available even if time runs out
   done
   echo "gpu_check: $failures failures in $SECONDS s; $out"
   [ "$failures" -eq 0 ]

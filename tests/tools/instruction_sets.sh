@@ -16,11 +16,11 @@ if [ $# -eq 0 ]; then
   ! grep -qw avx512f /proc/cpuinfo 2>/dev/null || set -- avx2:avx2 "$@"
 fi
 
-# The programs of kind LEVELS (tests/CMakeLists.txt). Left out are those that measure a figure over thousands of pings or over all
-# products, and those that set the instruction set of every case themselves.
+# The programs of kind LEVELS (tests/CMakeLists.txt). They exclude programs that measure a figure over thousands of pings or over
+# all products, and programs whose cases select the instruction set.
 mapfile -t programs < <(tests/tools/run_programs.py "$build" --list LEVELS)
 [ ${#programs[@]} -gt 0 ] || exit 66
-unset SONARD_ORACLES SONARD_RELIABILITY  # recorded figures are those of the full processor
+unset SONARD_ORACLES SONARD_RELIABILITY  # only figures with the full instruction set are recorded
 
 started=$SECONDS
 failed=0

@@ -17,7 +17,7 @@ export SONARD_RELIABILITY=${SONARD_RELIABILITY:-$PWD/build/reliability}
 wished=("$@")
 rows=()
 failures=0
-step() {  # step NAME COMMAND...: runs it if it was requested, and stores how it ended
+step() {  # step NAME COMMAND...: runs the command if the step was requested, and stores the result
   local name=$1 before=$SECONDS result=passed
   shift
   [ ${#wished[@]} -eq 0 ] || [[ " ${wished[*]} " == *" $name "* ]] || return 0
@@ -26,7 +26,7 @@ step() {  # step NAME COMMAND...: runs it if it was requested, and stores how it
   rows+=("$(printf '%-10s %-7s %6d s   %s' "$name" "$result" $((SECONDS - before)) "$*")")
 }
 
-# alone SCRIPT [ARGUMENTS]: runs a script of tests/acceptance with the release build in a network of its own.
+# alone SCRIPT [ARGUMENTS]: runs a script of tests/acceptance with the release build in a separate network.
 alone() {
   SONARD_BUILD=$PWD/build/release build/release/tests/own_network/in_own_network python3 -B "tests/acceptance/$1.py" "${@:2}" </dev/null
 }
@@ -55,7 +55,7 @@ step fuzz tests/tools/fuzz.sh
 
 [ ${#rows[@]} -gt 0 ] || { echo "no such step: ${wished[*]}; there are load, life, mission, page, tsan, asan, fuzz" >&2; exit 64; }
 strict=(--strict)
-[ ${#wished[@]} -eq 0 ] || strict=()  # some steps only: rows are missing
+[ ${#wished[@]} -eq 0 ] || strict=()  # with only some steps, rows are missing
 mkdir -p "$SONARD_RELIABILITY"
 python3 tests/reliability/reliability_table.py "$SONARD_RELIABILITY" "${strict[@]}" >"${SONARD_RELIABILITY}/reliability.md" ||
   failures=$((failures + 1))

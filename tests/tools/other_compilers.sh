@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Reads the whole tree, tests included, with compilers other than the usual one. It generates no code, so it finds errors and only
-# those warnings that need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [--share N] [COMPILER...]
+# Reads the whole tree, tests included, with other compilers than the usual one. It generates no code, so it finds errors, and
+# warnings that need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [--share N] [COMPILER...]
 #   --share N reads one Nth of the files; which one depends on the commit
 #   COMPILER  e.g. g++-11, clang++-14; without one, the commit selects an installed one; if there is none, the check is skipped.
 # Build folders stay in build/other.
@@ -28,7 +28,7 @@ if [ $# -eq 0 ]; then
   set -- "${installed[$((commit % ${#installed[@]}))]}"
 fi
 
-# Prints the compiler's commands of a build folder with -fsyntax-only, each ended by a zero. Generated code is left out.
+# Prints the compiler's commands of a build folder with -fsyntax-only, each followed by a zero, without those for generated code.
 commands() {
   python3 - "$1/compile_commands.json" "$share" "$commit" <<'PYTHON'
 import json, re, sys

@@ -44,7 +44,7 @@ system() {
   cloned[$1]=1
 }
 
-# fresh SUITE: sets root to the root of a bare system in which nothing was built, with a clone for its tools.
+# fresh SUITE: sets root to the root of a bare system in which nothing was built, with a clone of the tree for its tools.
 fresh() {
   root=$roots/check-$1
   rm -rf --one-file-system "$root" && make_bare_root "$1" "$root" && clone_into "$root"
@@ -91,7 +91,7 @@ source_archive() {
   in_root "$root" bash -c 'cd /srv/sonard && . tests/tools/setup.sh && setup_and_build sonar_page_files' || return
   git archive --prefix="$name/clients/web/" --add-file="$root/srv/sonard/$page" --prefix="$name/" HEAD | gzip -9n \
     >"$out/$name.tar.gz" || return
-  # Built without a bundler, the daemon has the same page.
+  # Checks that a daemon built without a bundler has the same page.
   rm -rf "${root:?}/srv/$name" && tar -C "$root/srv" -xf "$out/$name.tar.gz" || return
   in_root "$root" bash -c 'cd "/srv/$0" && cmake --preset release -DSONARD_THREE_DIR=/none | grep "page of the live view as the release" &&
     cmake --build build/release --target sonar_page_files >/dev/null && cmp clients/web/page_files.cpp "/srv/sonard/$1"' "$name" "$page"

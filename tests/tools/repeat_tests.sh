@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Finds tests that fail sometimes: repeats them in random order, 8 at a time, beside a busy loop on each processor.
+# Finds tests that fail sometimes: repeats tests in random order, 8 at a time, with a busy loop on each processor.
 # usage: tests/tools/repeat_tests.sh [RUNS [ctest arguments...]]      3 runs; build/release, or the folder in SONARD_BUILD
 # The last lines name each test that failed in any run, and nothing else. Output of each run: BUILD/repeat/run-N.log.
 # SONARD_BUSY_LOOPS: the number of busy loops; default: one for each processor.

@@ -10,8 +10,8 @@ product_packages=(
 )
 build_packages=("${product_packages[@]}" libeigen3-dev libgtest-dev libgmock-dev)
 
-# Sanitized programs and fuzzers are compiled with the system's own clang (14 on Debian 12, 19 on Debian 13), which needs half to
-# two thirds of g++'s time for them, and linked with lld in a quarter of the time. So a second compiler reads the tree.
+# Sanitized programs and fuzzers are compiled with the system's clang (14 on Debian 12, 19 on Debian 13), which needs half to two
+# thirds of g++'s time, and linked with lld in a quarter of the time. So a second compiler also reads the tree.
 clang_packages=(clang libclang-rt-dev lld)
 
 # Packages for the page of the live view; without them the daemon is built without the page.
@@ -25,7 +25,7 @@ browser_packages=(chromium)
 
 say() { printf '\n== %s\n' "$*"; }
 
-# timed NAME COMMAND...: runs it and appends its duration in seconds to the file that SONARD_SECONDS names, for .ci/run.
+# timed NAME COMMAND...: runs the command and appends its duration in seconds to the file that SONARD_SECONDS names, for .ci/run.
 timed() {
   local name=$1 from=$SECONDS status
   shift
@@ -35,18 +35,18 @@ timed() {
   return $status
 }
 
-# begin_aside LOG COMMAND...: starts it at the lowest priority; it ends with this shell.
+# begin_aside LOG COMMAND...: starts the command at the lowest priority; it ends with this shell.
 begin_aside() {
   local log=$1
   shift
-  set -m  # a process group of its own
+  set -m  # gives the command a separate process group
   nice -n 19 "$@" >"$log" 2>&1 </dev/null &
   aside=$!
   set +m
   trap 'kill -- "-$aside" 2>/dev/null' EXIT
 }
 
-# end_aside: waits for the command of begin_aside, from now on at normal priority where that is allowed; returns its status.
+# end_aside: waits for the command of begin_aside, at normal priority if that is allowed; returns its status.
 end_aside() {
   renice -n 0 -g "$aside" >/dev/null 2>&1
   wait "$aside"
@@ -102,7 +102,8 @@ forget_figures() {
   rm -f "$SONARD_RELIABILITY"/*.json
 }
 
-# Number of parallel compilers: one for each processor, but no more than fit into memory (a large file needs about 1.2 GB).
+# build_jobs: prints the number of parallel compilers: one per processor, but no more than fit into memory (a large file needs 1.2
+# GB).
 build_jobs() {
   local processors memory_kb by_memory
   processors=$(nproc 2>/dev/null || echo 2)
@@ -150,8 +151,8 @@ clang_sanitizes() {
   return $status
 }
 
-# configure_sanitized PRESET: configures with clang, or with the default compiler if clang is not available. Then warnings are no
-# errors, because the code of sanitizers causes false warnings of g++.
+# configure_sanitized PRESET: configures with clang, or with the default compiler if clang is not available. With the default
+# compiler warnings are not errors, because the code of sanitizers causes false warnings of g++.
 configure_sanitized() {
   need_packages "${clang_packages[@]}"
   if clang_sanitizes; then

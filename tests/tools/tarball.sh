@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Builds sonard on Debian 12 as an archive whose programs run in any folder: build/tarball/sonard-VERSION-linux-x86_64.tar.gz.
-# Libraries are linked statically if Debian has static archives of them; the others are stored beside the programs. The system
-# must have glibc 2.35 and libstdc++ of GCC 12 or newer: Debian 12, Ubuntu 22.04. tests/tools/release.sh runs this script in a
-# bare system.
+# Libraries are linked statically if Debian has static archives of them; other libraries are stored beside the programs. The
+# system must have glibc 2.35 and libstdc++ of GCC 12 or newer: Debian 12, Ubuntu 22.04. tests/tools/release.sh runs this script
+# in a bare system.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -14,8 +14,8 @@ folder=build/tarball stage=build/tarball/$name
 archives=/usr/lib/$(g++ -dumpmachine)
 
 # FFTW is left out, because its licence, the GPL, would apply to the programs. The farm is left out, because it needs OpenSSL,
-# whose updates this archive would miss. GeoTIFF is left out, because its libtiff needs libjbig, which has the GPL. An old-style
-# run path also applies when the libraries beside the programs load each other.
+# whose updates this archive would miss. GeoTIFF is left out, because its libtiff needs libjbig, which has the GPL. A run path of
+# the old kind also applies when the libraries beside the programs load each other.
 # shellcheck disable=SC2016
 cmake -S . -B $folder -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF -DSONAR_FFTW=OFF -DSONAR_FARM=OFF -DSONAR_GEOTIFF=OFF -DSONAR_CUDA=OFF \
   -DCMAKE_INSTALL_RPATH='$ORIGIN/../lib/sonard;$ORIGIN/../../lib/sonard' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
@@ -36,7 +36,7 @@ for library in "${bundled[@]}"; do
   strip --strip-unneeded "$stage/lib/sonard/${library% *}"
 done
 
-# Licences of all contents: of libraries, and of all code that was compiled or linked in, found by its packages.
+# Lists the packages of all contents (libraries, and code that was compiled or linked in), whose licences the archive needs.
 packages() {
   local package library
   for library in "${bundled[@]}"; do dpkg-query -S "*/$(basename "$(readlink -f "${library#* }")")"; done | sed 's/:.*//'

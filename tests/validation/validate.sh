@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Writes tables and pictures of the validation into build/validation, and their summary docs/validation.md: builds sonard, renders
-# the experiments. usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...] | --summary
+# Builds sonard, renders the experiments, and writes tables and pictures of the validation into build/validation, and the summary
+# docs/validation.md. usage: tests/validation/validate.sh [--partial] [--only CHAPTER ...] | --summary
 # Chapters: tank pitched-sonar two-cylinders local-search differences coverage cost parts capture tell-apart oracles.
 # Costs need an otherwise idle machine.
-# Takes under fifteen minutes on two cores; --summary rewrites the summary from the tables in a moment. The table of oracles is that
-# of the last ./test.sh, complete unless --partial is given; capture and tell-apart need SONARD_CAPTURES. Chapters without data are
-# kept; the summary is written when there are all, else the exit code is 1.
+# Takes under fifteen minutes on two cores; --summary rewrites the summary from the tables in a moment. The table of oracles is
+# from the last ./test.sh, and must be complete unless --partial is given; capture and tell-apart need SONARD_CAPTURES. Chapters
+# without data are kept; the summary is written if all chapters exist, else the exit code is 1.
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 # shellcheck source=tests/tools/setup.sh
@@ -16,7 +16,7 @@ case "${1:-}" in
   --summary) exec python3 tests/validation/validate.py --summary ;;
 esac
 
-# A Python that comes before the system's in PATH may not find the system's packages.
+# The first Python in PATH may not find the system's packages.
 python_with_matplotlib() {
   local candidate
   for candidate in python3 /usr/bin/python3; do
@@ -28,7 +28,7 @@ if ! python=$(python_with_matplotlib); then
   need_packages python3-matplotlib python3-pil || exit
   python=$(python_with_matplotlib) || { echo "no python3 that finds matplotlib, numpy and PIL" >&2; exit 69; }
 fi
-# Only the classifier needs it. Without it that chapter is skipped.
+# Only the classifier needs sklearn; without it that chapter is skipped.
 if [ -n "${SONARD_CAPTURES:-}" ] && ! "$python" -c 'import sklearn' 2>/dev/null; then
   need_packages python3-sklearn || echo "going on without python3-sklearn"
 fi
