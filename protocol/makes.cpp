@@ -76,7 +76,7 @@ std::vector<Make> product_makes() {
        .codec = ping::surveyor::codec(),
        .own_numbers = true,
        .demo_name = "surveyor",
-       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // points down
        .picture = PictureKind::points},
       {.device = &ping::omniscan::vendor(),
        .title = "an Omniscan",
@@ -100,7 +100,7 @@ std::vector<Make> product_makes() {
        .codec = ping::ping1d::codec(),
        .usual_settings = "--rate 10",
        .own_numbers = true,
-       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // points down
        .picture = PictureKind::waterfall},
       {.device = &ping::s500::vendor(),
        .title = "an S500",
@@ -112,7 +112,7 @@ std::vector<Make> product_makes() {
        .usual_settings = "--rate 10",
        .own_numbers = true,
        .shares_port = true,
-       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // points down
        .picture = PictureKind::waterfall},
       {.device = &dvl::vendor(),
        .title = "a DVL",
@@ -122,7 +122,7 @@ std::vector<Make> product_makes() {
        .host = dvl::make_host,
        .codec = dvl::codec(),
        .own_numbers = true,
-       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // points down
        .picture = PictureKind::waterfall},
       {.device = &m3::vendor(),
        .title = "an M3",
@@ -149,7 +149,7 @@ std::vector<Make> product_makes() {
        .ports = norbit::host_ports,
        .host = norbit::make_host,
        .codec = norbit::codec(),
-       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // it looks down
+       .demo_mount = RollPitchYaw{0, pi / 2, 0},  // points down
        .picture = PictureKind::points,
        .shades = norbit::shades},
   };

@@ -35,7 +35,7 @@ struct Port {
 
 /// An address at which a driver connects to a sonar.
 struct DriverAddress {
-  std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, by UDP
+  std::string_view protocol;  // "tcp", "udp", "http", "multicast", "status": status messages, over UDP
   Endpoint at;
   std::string_view carries;         // equals Port::carries
   bool sonar_speaks_first = false;  // false: the driver sends first

@@ -208,7 +208,7 @@ Reload::Steps App::reload_steps() {
           .end = [this] { notify_.ready(status_line()); }};
 }
 
-/// Runs in one turn of the event loop, so that no request sees half of the new configuration.
+/// Runs in one turn of the event loop, so that no request uses half of the new configuration.
 void App::take_over(Config next) {
   const std::vector<std::string> keys = keep_restart_keys(config_, next);
   const bool other_water = !(config_.water == next.water);

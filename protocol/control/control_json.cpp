@@ -51,7 +51,7 @@ class StrictReader final : public nlohmann::json_sax<nlohmann::json> {
   bool start_array(std::size_t) override { return enter(); }
   bool end_array() override { return leave(); }
   bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception&) override {
-    why = "not JSON: wrong at character " + std::to_string(position);
+    why = "not JSON: error at character " + std::to_string(position);
     return false;
   }
 

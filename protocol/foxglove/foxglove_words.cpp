@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;  // for writing: keeps the order of keys, but a look-up compares all keys
 using Read = nlohmann::json;          // for reading messages of viewers, which may have thousands of keys
-constexpr int deepest = 16;
+constexpr int most_nested = 16;
 
 /// Writes JSON. Replaces bytes that are not UTF-8, which names may contain, so that no name makes a message fail.
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -204,7 +204,7 @@ std::string service_failure(std::uint32_t service, std::uint32_t call, const std
 
 // Ignores unknown fields, so that newer viewers work, but reports one of them in `stray`.
 Result<ViewerWord> word_of_viewer(std::string_view message, std::string* stray) {
-  if (control::nests_deeper(message, deepest)) return refused("JSON nested deeper than 16");
+  if (control::nests_deeper(message, most_nested)) return refused("JSON nested deeper than 16");
   const Read word = Read::parse(message, nullptr, false);
   if (!word.is_object()) return refused("not a JSON object");
   const auto op = word.find("op");

@@ -1,4 +1,4 @@
-// The messages that only an Omniscan 450 has; messages.hpp has the others.
+// The messages that only an Omniscan 450 has; messages.hpp has the common messages.
 #pragma once
 
 #include "protocol/ping/messages.hpp"

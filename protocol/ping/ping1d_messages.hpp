@@ -1,4 +1,5 @@
-// The messages that only a Ping1D has; messages.hpp has the others. Messages that contain a single number have no struct.
+// The messages that only a Ping1D has; messages.hpp has the common messages. Messages that contain a single number have no
+// struct.
 #pragma once
 
 #include "protocol/ping/messages.hpp"

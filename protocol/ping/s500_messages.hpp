@@ -1,4 +1,4 @@
-// The messages that only an S500 has; messages.hpp has the others.
+// The messages that only an S500 has; messages.hpp has the common messages.
 #pragma once
 
 #include "protocol/ping/messages.hpp"

@@ -121,8 +121,8 @@ std::span<const protocol::Option> options() {
        "1.8.0",
        "release of the device's software, which decides the paths of its HTTP API"},
       {option_name::rip, {"2", "1"}, "2", "version of the range image protocol; 1 is without compression"},
-      {option_name::acoustics_at_start, {"disabled", "enabled"}, "disabled", "whether it images before a client enables it"},
-      {option_name::udp_at_start, {"disabled", "multicast"}, "disabled", "where images are sent before a client sets it"},
+      {option_name::acoustics_at_start, {"disabled", "enabled"}, "disabled", "acoustics before a client sets them"},
+      {option_name::udp_at_start, {"disabled", "multicast"}, "disabled", "output of images before a client sets it"},
       {option_name::clock, {"utc", "since_boot"}, "utc", "since_boot: time stamps begin at 1970, as before NTP"},
   }};
   return all;

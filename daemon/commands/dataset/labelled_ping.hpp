@@ -23,7 +23,7 @@
 
 namespace sonar::dataset {
 
-// The contact sheet of a data set: pings as an operator sees them, each beside its labels.
+// Makes the contact sheet of a data set: the picture of each ping beside its labels.
 
 /// Returns the numbers of the pings that the sheet shows, spread over the set.
 std::vector<std::uint64_t> pings_on_sheet(std::uint64_t pings);

@@ -279,7 +279,7 @@ std::string Unmet::sentence() const {
 }
 
 bool meets(const Constraints& constraints, const PingRequest& request, const Scene& scene, Unmet& unmet) {
-  // The first constraint that is not met is counted; the others are not tested.
+  // The first constraint that is not met is counted; further ones are not tested.
   if (!are_in_view(constraints, request, scene)) return ++unmet.in_view, false;
   if (!are_above_bed(constraints, request, scene)) return ++unmet.above_bed, false;
   if (!are_apart(constraints, request, scene)) return ++unmet.no_overlap, false;

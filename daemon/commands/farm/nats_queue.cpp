@@ -35,7 +35,7 @@ natsStatus into(Owner& owner, const Call& call) {
   return status;
 }
 
-/// Each shard is one message with a subject of its own, so that the server itself refuses a second one (ExpectNoMessage).
+/// Each shard is one message with its own subject, so that the server refuses a second message for the shard (ExpectNoMessage).
 std::string subject_of(const std::string& job, const std::string& shard) { return "farm.work." + job + "." + shard; }
 
 class NatsQueue;

@@ -48,7 +48,7 @@ void add_run_options(CLI::App& app, RunCommand& run) {
              ": with such a sonar instead of " + std::string(protocol::makes().front().title))
       ->expected(0, 1)
       ->type_name("TEXT:" +
-                  demo_names("|"));  // complaint() checks the name, so that a file name is not reported as an unknown make
+                  demo_names("|"));  // conflict_in() checks the name, so that a file name is not reported as an unknown make
   app.add_option("--profile", run.profile, "run the demo with this product (docs/configuration.md)");
   app.add_option(
          "--clock", run.clock,
@@ -170,7 +170,7 @@ void add_farm_options(CLI::App& app, FarmCommand& farm) {
 }
 
 /// Returns an error about a missing option or contradictory options; empty = none.
-std::string complaint(const RenderCommand& render) {
+std::string conflict_in(const RenderCommand& render) {
   const bool writes = render.report.empty();
   if (render.config.empty() && render.report.empty()) return "it needs a configuration or render file: sonard render FILE";
   if (writes && render.out.empty()) return "give the folder for the files: --out DIR";
@@ -182,7 +182,7 @@ std::string complaint(const RenderCommand& render) {
   return {};
 }
 
-Leave complain(const std::string& wrong) {
+Leave usage_error(const std::string& wrong) {
   std::fprintf(stderr, "sonard: %s\n", text::printable(wrong).c_str());
   return Leave{exit_code(ErrorKind::usage)};
 }
@@ -193,7 +193,7 @@ bool is_like_a_file(std::string_view word) {
 }
 
 /// Returns an error about contradictory options; empty = none.
-std::string complaint(const RunCommand& run) {
+std::string conflict_in(const RunCommand& run) {
   const bool known = run.demo_of.empty() || find_demo(run.demo_of) != nullptr;
   const std::string file = !known && is_like_a_file(run.demo_of) ? run.demo_of : run.config;
   if (run.demo && !file.empty()) return "--demo runs the built-in demo, not " + file + ": leave out one of the two";
@@ -219,7 +219,7 @@ std::string unknown_command(std::string_view word) {
 /// read them as a configuration file.
 Command parse_command_line(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == "bench")
-    return complain("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");
+    return usage_error("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");
 
   CLI::App app{"sonard: emulates imaging sonars on the network, from a 3D scene", "sonard"};
   app.set_version_flag("--version", [] {  // prints the best level of this processor, independent of SONARD_SIMD
@@ -268,11 +268,11 @@ Command parse_command_line(int argc, char** argv) {
   }
   const std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);
   if (const std::string wrong = bare && argc > 1 ? unknown_command(argv[1]) : ""; !wrong.empty())
-    return complain(wrong + text::where_help_is(app));
+    return usage_error(wrong + text::where_help_is(app));
   try {
     text::parse(app, argc, argv);
   } catch (const CLI::ParseError& e) {
-    if (const std::string wrong = text::complaint_about(app, e, typed); !wrong.empty()) return complain(wrong);
+    if (const std::string wrong = text::complaint_about(app, e, typed); !wrong.empty()) return usage_error(wrong);
     app.exit(e);  // --help and --version
     return Leave{0};
   }
@@ -282,11 +282,11 @@ Command parse_command_line(int argc, char** argv) {
   if (!bare && app.got_subcommand("worker")) return worker;
   if (!bare && app.got_subcommand("farm")) return farm;
   if (!bare && app.got_subcommand("render")) {
-    const std::string wrong = complaint(render);
+    const std::string wrong = conflict_in(render);
     if (wrong.empty()) return render;
-    return complain(wrong + text::where_help_is(app));
+    return usage_error(wrong + text::where_help_is(app));
   }
-  if (const std::string wrong = complaint(run); !wrong.empty()) return complain(wrong + text::where_help_is(app));
+  if (const std::string wrong = conflict_in(run); !wrong.empty()) return usage_error(wrong + text::where_help_is(app));
   if (const protocol::Make* const make = find_demo(run.demo_of); make != nullptr && make != &protocol::makes().front())
     run.profile = make->demo_profile.empty() ? make->device->models().front()->profile : make->demo_profile;
   run.demo = run.demo || !run.profile.empty();

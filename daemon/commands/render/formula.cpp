@@ -55,7 +55,7 @@ class Parser {
     ++at_;
     return true;
   }
-  void complain(std::string what) {
+  void set_error(std::string what) {
     // Only the first error is kept. The parser is moved to the end of the text, so that all loops end.
     if (wrong_.empty()) wrong_ = std::move(what);
     at_ = text_.size();
@@ -88,7 +88,7 @@ class Parser {
   double sign() {
     // Every recursion of the grammar calls this function, so the limit here bounds the stack. A sign binds weaker than a power:
     // -2^2 is -4.
-    if (++depth_ > deepest) return complain("is nested too deeply"), 0;
+    if (++depth_ > most_nested) return set_error("is nested too deeply"), 0;
     const double value = take('-') ? -sign() : power();
     --depth_;
     return value;
@@ -103,13 +103,13 @@ class Parser {
     skip_blanks();
     if (take('(')) {
       value = sum();
-      if (!take(')')) complain("a ) is missing");
+      if (!take(')')) set_error("a ) is missing");
     } else if (at_ < text_.size() && (is_digit(text_[at_]) || text_[at_] == '.')) {
       value = number();
     } else if (at_ < text_.size() && begins_name(text_[at_])) {
       value = named();
     } else {
-      complain("ends where a value is expected");
+      set_error("ends where a value is expected");
     }
     return value;
   }
@@ -122,7 +122,7 @@ class Parser {
       while (end < text_.size() && is_digit(text_[end])) ++end;
     }
     const auto value = text::parse_decimal(text_.substr(at_, end - at_));
-    if (!value) return complain(quoted(text_.substr(at_, end - at_)).append(" is not a number")), 0;
+    if (!value) return set_error(quoted(text_.substr(at_, end - at_)).append(" is not a number")), 0;
     at_ = end;
     return *value;
   }
@@ -134,9 +134,9 @@ class Parser {
     const auto function =
         std::find_if(std::begin(functions), std::end(functions), [&](const Function& f) { return f.name == name; });
     if (function != std::end(functions)) {
-      if (!take('(')) return complain(std::string(name) + " needs its argument in parentheses"), 0;
+      if (!take('(')) return set_error(std::string(name) + " needs its argument in parentheses"), 0;
       const double argument = sum();
-      if (!take(')')) complain("a ) is missing");
+      if (!take(')')) set_error("a ) is missing");
       return function->of(argument);
     }
     if (name == "pi") return pi;
@@ -144,11 +144,11 @@ class Parser {
     if (value != values_.end()) return value->second;
     std::string known;
     for (const auto& [other, ignored] : values_) known += (known.empty() ? "" : ", ") + other;
-    complain("unknown name " + std::string(name) + "; known names: " + (known.empty() ? "none" : known));
+    set_error("unknown name " + std::string(name) + "; known names: " + (known.empty() ? "none" : known));
     return 0;
   }
 
-  static constexpr int deepest = 50;
+  static constexpr int most_nested = 50;
   std::string_view text_;
   const Values& values_;
   std::size_t at_ = 0;

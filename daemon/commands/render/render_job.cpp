@@ -117,10 +117,10 @@ motion::Trajectory thinned(const motion::Points& all) {
 Steps steps_of(const motion::Trajectory& trajectory) {
   Steps steps;
   if (!trajectory.points().velocities_mps.empty()) return steps;
-  const motion::Trajectory way = thinned(trajectory.points());
-  const std::vector<motion::Ns>& times = way.points().times;
+  const motion::Trajectory thin_path = thinned(trajectory.points());
+  const std::vector<motion::Ns>& times = thin_path.points().times;
   for (std::size_t i = 0; i + 1 < times.size(); ++i) {
-    const motion::Motion m = way.at(times[i]).moves;  // the motion from this pose to the next
+    const motion::Motion m = thin_path.at(times[i]).moves;  // the motion from this pose to the next
     const double mps = length(m.velocity_mps), radps = length(m.angular_velocity_radps);
     ++steps.all;
     if (!(mps <= fastest_vehicle_mps && radps <= fastest_vehicle_radps)) ++steps.too_fast;

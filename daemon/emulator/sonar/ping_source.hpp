@@ -43,7 +43,7 @@ class PingSource {
   void run_itself(bool on, Time now);
   /// True while the sonar pings without a client.
   bool runs_itself() const { return runs_itself_ && !audience_.stopping() && !audience_.has_audience(); }
-  /// Starts or stops the pacer: it runs while pings are wanted, at the requested rate times the factor of faults.
+  /// Starts or stops the pacer: it runs while pings are requested, at the requested rate times the factor of faults.
   void update_pacer(Time now);
   const Pacer& pacer() const { return pacer_; }
   std::optional<Time> next_ping() const;

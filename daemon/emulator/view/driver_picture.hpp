@@ -1,5 +1,5 @@
 // Makes the picture of a sonar for viewers. The make's host (protocol/host.hpp), which sonarctl also uses, decodes the messages,
-// so viewers see what a driver sees.
+// so viewers get the picture that a driver would make.
 #pragma once
 
 #include <chrono>

@@ -59,7 +59,7 @@ std::optional<foxglove::PlaybackState> PlaybackWatch::look(const motion::Playbac
     playback_ = *of;
   else if (!playback_.paused())
     playback_.pause(now);
-  // Speed and pause may have changed at any moment since the last look.
+  // Speed and pause may have changed at any time since the last call.
   const double fastest = std::max(before, playback_.rules().speed.factor());
   const Time farthest = sent_.at + nanoseconds_from(fastest * seconds(now - looked_at_)) + slack;
   foxglove::PlaybackState holds = state(now);

@@ -62,10 +62,10 @@ bool follows_course_as_radians(const std::vector<Pose>& poses, const std::vector
   Direction as_read, as_radians, courses;
   std::size_t steps = 0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
-    const Vec3d way = poses[i].position_m - poses[i - 1].position_m;
-    const double step_m = std::hypot(way.x, way.y);
+    const Vec3d moved_m = poses[i].position_m - poses[i - 1].position_m;
+    const double step_m = std::hypot(moved_m.x, moved_m.y);
     if (step_m < least_step_m) continue;
-    const double course_rad = std::atan2(way.y, way.x), heading = turned_deg[i - 1];
+    const double course_rad = std::atan2(moved_m.y, moved_m.x), heading = turned_deg[i - 1];
     courses += std::polar(1.0, course_rad);
     as_read += std::polar(1.0, course_rad - rad_from_deg(heading));
     as_radians += std::polar(1.0, course_rad - heading);

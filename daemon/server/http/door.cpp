@@ -52,7 +52,7 @@ std::optional<HttpAnswer> wrong_handshake(const HttpRequest& request) {
     return answer;
   }
   if (!is_key(request.socket_key)) return socket_refusal(400, "Sec-WebSocket-Key must be 16 bytes in base64");
-  if (request.bytes_behind) return socket_refusal(400, "bytes behind the request, before the answer");
+  if (request.bytes_behind) return socket_refusal(400, "bytes after the request, before the answer");
   return std::nullopt;
 }
 

@@ -20,7 +20,7 @@ constexpr std::size_t work_of_a_turn = 4096;  // bytes processed before other co
 constexpr std::size_t least_work = 64;        // cost of a read or of a line [bytes], in addition to its bytes
 constexpr int most_not_json = 8;  // limit of successive lines that are too long or not JSON, after which the connection ends
 constexpr std::size_t dropped_per_s = 1024u << 20;      // limit of discarded bytes; 32 floods keep 0.1 to 1 GB in the kernel
-constexpr std::chrono::milliseconds between_looks{10};  // pause before the next look for new input
+constexpr std::chrono::milliseconds between_looks{10};  // pause before new input is read
 constexpr std::chrono::milliseconds longest_wait{100};  // limit for poses that wait in the kernel
 constexpr int most_tries = 16;  // for port 0, because the number that the system chooses for TCP may be in use for UDP
 constexpr const char* no_json = "not JSON: this port accepts poses as lines of JSON";
@@ -173,7 +173,7 @@ asio::awaitable<void> PoseServer::receive(Port& port) {
   }
 }
 
-// ---- JSON lines by TCP
+// ---- JSON lines over TCP
 
 /// Checks in this order: the address is allowed, descriptors are available, a slot is free or can be taken from a less active
 /// sender.

@@ -18,8 +18,7 @@ Time SteppedTime::tick_at(Time due) const {
   if (mode_ != ClockMode::follow || !now.then) return due;  // before the first pose nothing can be ahead
   const bool is_waited_for =
       std::any_of(waiting_.begin(), waiting_.end(), [&](const Waiting& w) { return w.until.last_tick >= due; });
-  // Without a waiting request, a ping may lag behind the stamps by at most most_lead; beyond that, time advances and ticks are
-  // skipped.
+  // Without a waiting request, a ping may lag the stamps by at most most_lead; beyond that, time advances and ticks are skipped.
   return is_waited_for ? due : std::max(due, now.last_tick - most_lead);
 }
 

@@ -133,7 +133,7 @@ void Reader::end_at(std::uint64_t at) {
     if (code != Opcode::footer) continue;
     at += magic.size();
     if (at < source_->size())
-      damages_.add(std::to_string(source_->size() - at) + " bytes behind the end of the recording" + at_byte(at) +
+      damages_.add(std::to_string(source_->size() - at) + " bytes after the end of the recording" + at_byte(at) +
                    " are not read: are several files joined in this one?");
     return;
   }

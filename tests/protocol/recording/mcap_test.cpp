@@ -195,7 +195,7 @@ TEST(Mcap, BytesAfterTheEndAreReported) {
     expect_same(read_all(*opened->reader), conversation());
     ASSERT_TRUE(opened->reader->damage());
     EXPECT_THAT(opened->reader->damage()->text,
-                HasSubstr(std::to_string(more.size()) + " bytes behind the end of the recording at byte " +
+                HasSubstr(std::to_string(more.size()) + " bytes after the end of the recording at byte " +
                           std::to_string(whole.size()) + " are not read"));
   }
   auto cut = open_bytes({whole.begin(), whole.end() - 1});
