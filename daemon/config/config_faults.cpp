@@ -74,7 +74,8 @@ std::string why_not(const std::vector<Fault>& faults, const std::vector<SonarCon
 
 }  // namespace
 
-/// Each record is checked like a request; in addition, no two faults may have the same name or change the same part.
+/// Reads the keys. Each record is checked like a request; in addition, no two faults may have the same name or change the same
+/// part.
 FaultConfig read_faults(const Node& node, const std::vector<SonarConfig>& sonars, const std::filesystem::path& directory) {
   FaultConfig config;
   if (!node.present()) return config;

@@ -15,7 +15,7 @@ inline constexpr int ports_an_offset = 10;  // ports per offset; a daemon uses a
 /// first sonar. Error: a moved address equals one of the unmoved configuration. Errors are sentences about the option.
 Result<void> move_addresses(Config& config, int offset, bool first_too);
 
-/// Error config if two listeners of the configuration need the same port. Call it after applying the command line.
+/// Returns an error (config) if two listeners of the configuration need the same port. Call it after applying the command line.
 Result<void> check_ports_apart(const Config& config);
 
 /// True for addresses that clients may request as receivers of a sonar's pings: addresses of single computers, and for broadcast

@@ -10,8 +10,8 @@ namespace {
 
 using protocol::HostActions;
 
-/// Positive angles are to port, as most clients assume (protocol/m3/README.md, "Left and right"). So the beam with the
-/// greatest angle, the last of the packet, is the first of the picture.
+/// Makes the picture. Positive angles are to port, as most clients assume (protocol/m3/README.md, "Left and right"). So the beam
+/// with the largest angle, the last of the packet, is the first of the picture.
 PolarImage picture_of(const Packet& packet) {
   PolarImage image;
   const DataFront& front = packet.header.front;
@@ -66,7 +66,7 @@ class M3Host final : public protocol::Host {
   std::optional<Counts> counts() const override { return counts_; }
 
  private:
-  /// The ping keeps the packet, and computes its picture only on request.
+  /// Makes a ping that keeps the packet, and computes the picture only on request.
   protocol::HostPing ping_from(const Packet& packet, Bytes whole) {
     const DataFront& front = packet.header.front;
     const DataBack& back = packet.header.back;

@@ -15,7 +15,7 @@ constexpr double elements = 64;       // PKT
 // echoes in PKT.
 constexpr float source_level_db = 210, full_scale_upa = 1.5e8f;
 
-/// The mode "Imaging 3" of PKT; other modes are not emulated.
+/// Makes the model with the mode "Imaging 3" of PKT; other modes are not emulated.
 SonarModel make_model() {
   FrequencyMode mode;
   mode.name = "Imaging 3";

@@ -124,7 +124,7 @@ class NorbitHost final : public protocol::Host {
     }
     return actions;
   }
-  /// All ports have been read before a tick, even after a pause of the reader.
+  /// Shows waiting pings. All ports have been read before a tick, even after a pause of the reader.
   HostActions on_tick(Time now) override {
     HostActions actions;
     show(now, actions);
@@ -224,7 +224,7 @@ class NorbitHost final : public protocol::Host {
       waiting_.pop_front();
     }
   }
-  /// The picture is decoded only if the caller asks for it.
+  /// Adds a ping, whose picture is decoded only on request.
   void emit(std::shared_ptr<const Parts> kept, HostActions& actions) {
     const Parts& parts = *kept;
     HostPing ping;

@@ -18,7 +18,7 @@ struct Settings {
   PingParameters parameters;
   std::optional<std::chrono::nanoseconds> utc_ahead;  // offset of the device's clock, once a host has set it
 };
-/// Clock offsets that differ by less than a millisecond count as equal.
+/// Compares settings; clock offsets that differ by less than a millisecond count as equal.
 bool same_settings(const Settings& a, const Settings& b);
 /// Returns the detected points of the ping, as a std::vector<Detection>.
 std::shared_ptr<const PingFindings> findings_of(const Settings& settings, const Ping& ping);

@@ -27,7 +27,7 @@ struct RecordedMessage {
 class RecordingReader {
  public:
   virtual ~RecordingReader() = default;
-  /// nullopt at the end.
+  /// Returns the next message; nullopt at the end.
   virtual std::optional<RecordedMessage> next() = 0;
   /// Returns an error of kind bad_data whose text names the first damage and counts further ones. It is complete once next() has
   /// returned nullopt.

@@ -47,7 +47,7 @@ class RecordedPings {
   /// Opens the pings. Errors: bad_data if the recording contains no ping of a known sonar.
   static Result<RecordedPings> open(std::unique_ptr<RecordingReader> reader);
 
-  /// nullopt at the end.
+  /// Returns the next ping; nullopt at the end.
   std::optional<RecordedPing> next();
   void rewind();
   const SentBy& by() const { return by_; }

@@ -157,7 +157,7 @@ Outcome set_ntp(Call& call, const Json& posted) {
   return {};
 }
 
-/// The emulated sonar queries no time server; the result depends on option `clock`.
+/// Answers force-sync. The emulated sonar queries no time server; the result depends on option `clock`.
 Outcome force_sync(Call& call, const Json& posted) {
   if (!posted.is_object() || !posted.value("timeout_seconds", Json(0)).is_number())
     return malformed("not {\"timeout_seconds\": number}");

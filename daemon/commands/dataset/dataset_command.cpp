@@ -32,7 +32,7 @@ bool read_part(const std::string& text, DatasetOptions& o) {
 std::atomic<bool> stopping{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-/// The second signal ends the program at once.
+/// Stops the run; the second signal ends the program at once.
 extern "C" void on_stop(int signal) {
   stopping = true;
   std::signal(signal, SIG_DFL);

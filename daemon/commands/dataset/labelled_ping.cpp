@@ -26,7 +26,7 @@ constexpr Rgb shadow_colour{70, 130, 230};
 constexpr std::array<Rgb, 6> class_colours{
     {{80, 220, 120}, {240, 90, 160}, {250, 220, 80}, {90, 220, 230}, {190, 130, 250}, {250, 140, 60}}};
 
-/// Each class has a colour, which depends on its position among the names.
+/// Returns the colour of a class, which depends on the position of its name.
 Rgb colour_of(const std::vector<std::string>& classes, const std::string& name) {
   const auto place = std::ranges::lower_bound(classes, name) - classes.begin();
   return class_colours[static_cast<std::size_t>(place) % class_colours.size()];
@@ -180,7 +180,8 @@ Result<Raster> draw(const Ping& ping, int width_px) {
 
 }  // namespace
 
-/// A new scene is put into the existing engine, which keeps the trees and cells of meshes that both scenes share (shapes_).
+/// Computes a ping. A new scene is put into the existing engine, which keeps the trees and cells of meshes that both scenes share
+/// (shapes_).
 Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
   auto drawn = draw_ping(job_, number, known_);
   if (!drawn) return drawn;

@@ -25,7 +25,7 @@ constexpr std::uint64_t pings_a_thread = 4;  // pings of a batch, which wait in 
 
 constexpr std::array<std::string_view, 5> own_names{"job.json", "README.md", "manifest.json", "coco.json", "contact.png"};
 
-/// The file for the pings of an incomplete shard, and for the notes on them.
+/// Returns the file for the pings of an incomplete shard, and for the notes on them.
 path aside_file(const path& out, std::uint64_t shard) { return out / path(shard_name(shard)).replace_extension(".aside"); }
 path aside_note(const path& out, std::uint64_t shard) { return aside_file(out, shard).string() + ".json"; }
 

@@ -46,7 +46,7 @@ bool is_name(std::string_view name) {
          std::all_of(name.begin(), name.end(), letter);
 }
 
-/// Exactly one kind of draw is allowed, so all keys are read before they are counted.
+/// Reads one draw. Exactly one kind is allowed, so all keys are read before they are counted.
 Variation read_one(const std::string& name, const text::Node& node) {
   Variation v;
   v.name = name;

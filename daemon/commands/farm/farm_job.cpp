@@ -136,7 +136,7 @@ Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& inst
   return record;
 }
 
-/// A record comes from the network: the id must be the digest of its contents, and its names must stay inside the folder.
+/// Checks a record from the network: the id must be the digest of its contents, and its names must stay inside the folder.
 Result<FarmJob> parse_farm_job(const std::string& id, const std::string& text) {
   FarmJob record;
   try {

@@ -35,7 +35,8 @@ natsStatus into(Owner& owner, const Call& call) {
   return status;
 }
 
-/// Each shard is one message with its own subject, so that the server refuses a second message for the shard (ExpectNoMessage).
+/// Returns the subject of a shard. Each shard is one message with its own subject, so that the server refuses a second message
+/// for the shard (ExpectNoMessage).
 std::string subject_of(const std::string& job, const std::string& shard) { return "farm.work." + job + "." + shard; }
 
 class NatsQueue;
@@ -223,7 +224,7 @@ class NatsQueue final : public Queue {
                                                "; it needs JetStream: nats-server -js -sd FOLDER");
   }
 
-  /// A notice for listeners. Workers and commands read the table.
+  /// Publishes a notice for listeners. Workers and commands read the table.
   void announce(const std::string& subject, const std::string& words) {
     natsConnection_PublishString(connection_.get(), subject.c_str(), words.c_str());
   }
@@ -231,8 +232,8 @@ class NatsQueue final : public Queue {
   void flush() { natsConnection_FlushTimeout(connection_.get(), patience_ms); }
 
  private:
-  /// js_WorkQueuePolicy: the server removes a message once it is acknowledged, so the stream holds exactly the shards that are
-  /// not made yet.
+  /// Creates the stream. With js_WorkQueuePolicy the server removes an acknowledged message, so the stream has exactly the shards
+  /// that are not made yet.
   Result<void> make_stream() {
     const char* subjects[] = {"farm.work.>"};
     jsStreamConfig config;

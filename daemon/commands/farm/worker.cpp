@@ -74,7 +74,7 @@ class Worker {
  private:
   void say(const std::string& words) const { say_to(c_, words); }
 
-  /// The pause gets longer until a shard is made, so that a thousand idle workers do not overload the server.
+  /// Pauses. The pause gets longer until a shard is made, so that a thousand idle workers do not overload the server.
   void rest() {
     pause_for(rest_);
     rest_ = std::min(2 * rest_, most_rest);
@@ -177,7 +177,7 @@ class Worker {
     return {};
   }
 
-  /// An error means that this worker cannot do any work.
+  /// Makes a shard. An error means that this worker cannot do any work.
   Result<void> work(const FarmJob& record, Task& task) {
     // The last refusal removes a shard from the queue. If it is delivered again, its workers ended without a refusal, so the
     // shard would probably end this worker too.

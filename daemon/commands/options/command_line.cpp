@@ -215,8 +215,8 @@ std::string unknown_command(std::string_view word) {
 
 }  // namespace
 
-/// Without a command, the options are those of `run`. Unknown words are reported before CLI11 parses the line, because it would
-/// read them as a configuration file.
+/// Parses the command line. Without a command, the options are those of `run`. Unknown words are reported before CLI11 parses the
+/// line, because it would read them as a configuration file.
 Command parse_command_line(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == "bench")
     return usage_error("the benchmark is a program of its own, sonard_bench, which is built with the tests (docs/benchmarks.md)");

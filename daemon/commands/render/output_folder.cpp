@@ -137,7 +137,7 @@ OutputFolder::~OutputFolder() {
 
 std::string OutputFolder::stem(std::uint64_t number) const { return (options_.folder / number_text(number)).string(); }
 
-/// The sidecar is the last file written, so a ping whose sidecar exists is complete.
+/// Lists the sidecar last. It is the last file written, so a ping whose sidecar exists is complete.
 std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   const auto with = [&](const char* end) { return path(stem(number) + end); };
   std::vector<path> files;
@@ -152,7 +152,7 @@ std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   return files;
 }
 
-/// The sidecar is the last file written, so a ping is complete if its sidecar names these inputs.
+/// True if the sidecar names these inputs. It is the last file written, so the ping is then complete.
 bool OutputFolder::holds(std::uint64_t number) const {
   std::error_code ec;
   for (const path& file : files_of(number))

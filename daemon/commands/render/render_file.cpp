@@ -234,8 +234,8 @@ Result<RenderInput> parse_render_file(std::string_view text, const std::string& 
   return input;
 }
 
-/// The kind of file depends on a key: `world` is in a configuration, `objects` in a scene, `dataset` in a job; other files are
-/// render files.
+/// Loads a file, whose kind depends on a key: `world` is in a configuration, `objects` in a scene, `dataset` in a job; other
+/// files are render files.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar) {
   const auto text = text_of_file(file);
   if (!text) return tl::make_unexpected(text.error());

@@ -78,9 +78,9 @@ World world_of(const RenderJob& job);
 /// Returns everything on which a ping of the job depends. `world` = world_of(job).
 PingRequest make_request(const RenderJob& job, const World& world, PingNumber number, Time at);
 
-/// Depth of the sonar at time 0 [m]. The scene is not used, so it need not be loaded yet.
+/// Returns the depth of the sonar at time 0 [m]. The scene is not used, so it need not be loaded yet.
 double first_depth_m(const RenderJob& job);
-/// The initial settings of the sonar at first_depth_m(). The sonar must have a profile.
+/// Returns the initial settings of the sonar at first_depth_m(). The sonar must have a profile.
 PingSettings device_settings(const RenderJob& job);
 
 // Detects files of unrelated poses, as in data sets. Such poses are too far apart for a trajectory, so they do not define the

@@ -186,7 +186,8 @@ PingRequest request_of(const RenderJob& job, const World& world, std::uint64_t n
 
 }  // namespace
 
-/// Without --rate, each pose of a file gets a ping; otherwise pings have a constant rate, within the time of the poses.
+/// Returns the times of pings. Without --rate, each pose of a file gets a ping; otherwise pings have a constant rate, within the
+/// time of the poses.
 Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions& o) {
   const std::vector<Time> lines = pose_times(job);
   const std::uint64_t before = o.first - 1;

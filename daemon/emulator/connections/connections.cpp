@@ -45,7 +45,7 @@ std::size_t Connections::count(Role role, State state) const {
       std::count_if(all_.begin(), all_.end(), [&](const Connection& c) { return c.role == role && c.state == state; }));
 }
 
-/// The list is in the order of arrival, so the first served client is the oldest.
+/// Returns the first served client, which is the oldest, because the list is in the order of arrival.
 Connection* Connections::oldest_client() {
   const auto it = std::find_if(all_.begin(), all_.end(),
                                [](const Connection& c) { return c.role == Role::client && c.state == State::served; });

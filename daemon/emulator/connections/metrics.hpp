@@ -20,7 +20,8 @@ class Histogram {
   void add(double seconds);
   std::uint64_t count() const { return count_; }
   double sum_s() const { return sum_s_; }
-  /// Element i counts durations above bounds_s[i - 1] up to bounds_s[i]; the last element counts those beyond all bounds.
+  /// Returns the counts. Element i counts durations above bounds_s[i - 1] up to bounds_s[i]; the last element counts those beyond
+  /// all bounds.
   const std::array<std::uint64_t, bounds_s.size() + 1>& counts() const { return counts_; }
   /// Estimates a quantile, q in [0, 1], with linear interpolation between two bounds; the error is at most a factor of 2.5.
   /// Returns the last bound for a quantile beyond it, and 0 for an empty histogram.

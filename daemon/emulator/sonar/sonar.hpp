@@ -133,7 +133,7 @@ class Sonar {
   bool busy() const { return source_.busy(); }
   bool wants_pings() const { return source_.wants_pings(); }
   DeviceFigures figures() const;
-  /// Number of pings that at least one client received; number of computed pings.
+  /// Return the number of pings that at least one client received, and the number of computed pings.
   std::uint64_t served() const { return data_.figures.served; }
   std::uint64_t pings() const { return data_.figures.pings; }
   /// Returns a request for the ping that a client would get now, but with another number and other noise. The sonar does not

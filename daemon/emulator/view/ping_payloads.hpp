@@ -17,7 +17,7 @@ using PingPointer = std::shared_ptr<const Ping>;
 // The stamp of each message is the time at which the ping was fired; `sonar` is the frame.
 ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& ping);
 ViewPayloadPointer geometry_payload(const Ping& ping);
-/// The ping must have ground truth.
+/// Makes the ground truth of a ping, which must have it.
 ViewPayloadPointer truth_payload(const Ping& ping);
 /// Returns the edges of the volume that the beams cover, to the end of the range.
 ViewPayloadPointer swath_payload(const std::string& sonar, const Ping& ping);

@@ -52,7 +52,7 @@ constexpr std::chrono::milliseconds slack{1};  // tolerance for rounding at a ch
 
 PlaybackWatch::PlaybackWatch(const motion::Playback& of, Time now) : playback_(of), looked_at_(now), sent_(state(now)) {}
 
-/// A position that playback since the last call cannot have reached is a seek.
+/// Detects sudden changes. A position that playback since the last call cannot have reached is a seek.
 std::optional<foxglove::PlaybackState> PlaybackWatch::look(const motion::Playback* of, Time now) {
   const double before = playback_.rules().speed.factor();
   if (of != nullptr)

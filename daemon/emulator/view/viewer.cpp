@@ -55,7 +55,7 @@ void Viewer::on_binary(wire::BytesView frame, Moment now) {
   host_.call(*this, *call);
 }
 
-/// A token bucket: a viewer that sends more than 100 messages per second is disconnected.
+/// False if the viewer has sent more than 100 messages per second (token bucket); it is then disconnected.
 bool Viewer::has_room_for_message(Moment now) {
   if (allowance_at_) allowance_ = std::min(burst, allowance_ + messages_per_s * sonar::seconds(now - *allowance_at_));
   allowance_at_ = now;

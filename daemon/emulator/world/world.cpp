@@ -127,7 +127,7 @@ std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) con
   return {};
 }
 
-/// A late pose is refused and not inserted. A jump clears the history, so that nothing is interpolated across it.
+/// Refuses a late pose, which is not inserted. A jump clears the history, so that nothing is interpolated across it.
 bool World::is_next(Track& track, const PoseSample& sample, Time at, PoseOutcome& out) {
   const bool seq_is_old = sample.seq != 0 && track.seq != 0 && sample.seq <= track.seq;
   if (seq_is_old || at < track.history.newest().at) {

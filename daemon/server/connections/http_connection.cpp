@@ -192,7 +192,7 @@ void HttpConnection::finish_sending() {
 
 // ---- answers
 
-/// read() sets `request_` or `refusal_` and waits while `busy_`; write() answers and wakes read().
+/// Answers requests. read() sets `request_` or `refusal_` and waits while `busy_`; write() answers and wakes read().
 asio::awaitable<void> HttpConnection::write() {
   while (!over() && !all_sent_) {
     if (std::exchange(continue_asked_, false)) {
@@ -219,7 +219,7 @@ bool HttpConnection::has_slot(const HttpRequest& request) {
   return !services_.token.matches(bearer_token(request.authorization)) || claim_slot();
 }
 
-/// An answer is a stream until the client disconnects, a takeover by another protocol, or a document.
+/// Sends an answer: a stream until the client disconnects, a takeover by another protocol, or a document.
 asio::awaitable<void> HttpConnection::answer(HttpRequest request) {
   if (!has_slot(request)) {
     refusal_ = too_many;

@@ -73,9 +73,9 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   Ipv4 peer() const { return peer_; }
   /// Claims a slot for a client whose token the service has checked. Returns false if no slot is free.
   bool claim_slot() { return !claim_slot_ || std::exchange(claim_slot_, nullptr)(); }
-  /// The socket, for an HttpTakeover.
+  /// Returns the socket, for an HttpTakeover.
   tcp::socket& socket() { return socket_; }
-  /// A timer for the service while it makes an answer.
+  /// Returns a timer for the service while it makes an answer.
   asio::steady_timer& wait_timer() { return wake_operation_; }
 
   /// Counts work in addition to the size of the answer.

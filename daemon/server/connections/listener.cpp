@@ -64,7 +64,7 @@ void Listener::try_to_open() {
   if (const Fault taken = std::exchange(taken_, nullptr)) taken(opened.error().text);
 }
 
-/// The accept loop waits here while the port is closed.
+/// Waits while the port is closed; the accept loop calls it.
 asio::awaitable<void> Listener::reopen() {
   while (!stopping_ && !acceptor_.is_open()) {
     if (paused_)

@@ -63,7 +63,7 @@ StreamConnection::StreamConnection(ConnectionServices& services, ControlTargets&
   socket_.set_option(asio::socket_base::receive_buffer_size(receive_buffer), ec);
 }
 
-/// May be called more than once. The coroutines return when their waits are cancelled.
+/// Closes the connection; may be called more than once. The coroutines return when their waits are cancelled.
 void StreamConnection::close() {
   error_code ec;
   socket_.close(ec);

@@ -39,7 +39,8 @@ Simulator::~Simulator() {
   thread_.join();
 }
 
-/// The work guard in the job keeps the loop of the I/O thread running until the answer has been delivered there.
+/// Queues a request. The work guard in the job keeps the loop of the I/O thread running until the answer has been delivered
+/// there.
 void Simulator::submit(PingRequest request, Done done) {
   if (unanswered_++ == 0) begun_ = Steady::now();
   asio::post(queue_, [this, job = Job{std::move(request), std::move(done), {}, {}, asio::make_work_guard(io_)}]() mutable {

@@ -12,8 +12,8 @@ namespace sonar {
 
 using EngineFactory = std::function<std::unique_ptr<PingEngine>(std::shared_ptr<const Scene>)>;
 
-/// Error unavailable: not enough memory, or a processor that the ray tracer does not support. Does not catch std::logic_error,
-/// which is a bug of sonard.
+/// Builds the engine. Error unavailable: not enough memory, or a processor that the ray tracer does not support. Does not catch
+/// std::logic_error, which is a bug of sonard.
 Result<std::unique_ptr<PingEngine>> start_engine(const EngineFactory& make, std::shared_ptr<const Scene> scene);
 
 }  // namespace sonar

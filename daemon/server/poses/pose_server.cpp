@@ -139,7 +139,7 @@ void PoseServer::on_datagram(Encoding encoding, std::span<const std::byte> bytes
     intake_.refuse(sample.error().text, sender);
 }
 
-/// The work of a datagram: its bytes and, for each pose that it may contain, the cost of a line.
+/// Returns the work of a datagram: its bytes and, for each pose that it may contain, the cost of a line.
 std::size_t PoseServer::work_of(Encoding encoding, std::span<const std::byte> datagram) {
   const auto lines = encoding == Encoding::json ? std::count(datagram.begin(), datagram.end(), std::byte{'\n'}) : 0;
   return datagram.size() + (1 + std::min<std::size_t>(static_cast<std::size_t>(lines), most_lines_of_a_datagram)) * least_work;

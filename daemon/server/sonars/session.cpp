@@ -170,7 +170,7 @@ asio::awaitable<bool> Session::write_shaped(protocol::BytesView bytes, const Out
   co_return shape.end != Outbox::Shape::End::reset || co_await deliver();
 }
 
-/// A pause does not count as a stall, because `progress_at_` is set to its end. finish() and over() end the pause.
+/// Pauses. A pause does not count as a stall, because `progress_at_` is set to its end. finish() and over() end the pause.
 asio::awaitable<bool> Session::pause_writing(std::chrono::nanoseconds length) {
   if (length.count() > 0 && !finishing_ && !hurries_) {
     progress_at_ = Steady::now() + length;

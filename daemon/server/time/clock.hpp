@@ -18,7 +18,7 @@ class Clock {
       : stepped_(stepped), wall_(wall), started_(std::chrono::steady_clock::now()), origin_(stepped ? Time{} : wall()) {}
 
   bool stepped() const { return stepped_; }
-  /// Stepped time begins at the epoch, so that two runs send the same packets.
+  /// Returns the time. Stepped time begins at the epoch, so that two runs send the same packets.
   Time now() const { return stepped_ ? origin_ : origin_ + (std::chrono::steady_clock::now() - started_); }
   /// Returns the lead of now() over the wall clock; about 0 until that clock is set. Call it only in real time.
   std::chrono::nanoseconds ahead_of_wall() const { return now() - wall_(); }

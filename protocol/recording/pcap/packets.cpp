@@ -208,7 +208,8 @@ std::optional<BytesView> ip_packet(std::uint32_t link_type, BytesView frame) {
   }
 }
 
-/// RFC 9293, 3.1: sequence number at offset 4, length of the header in words in the upper half of byte 12, flags in byte 13.
+/// Reads a TCP header (RFC 9293, 3.1): sequence number at offset 4, length of the header in words in the upper half of byte 12,
+/// flags in byte 13.
 std::optional<Segment> tcp_segment(Segment found, BytesView body) {
   const std::size_t header = (u8_at(body, 12) >> 4) * std::size_t{4};
   if (header < 20 || body.size() < header) return std::nullopt;
@@ -218,7 +219,7 @@ std::optional<Segment> tcp_segment(Segment found, BytesView body) {
   return found;
 }
 
-/// RFC 768: length at offset 4, payload from offset 8. The capture may have cut the payload.
+/// Reads a UDP header (RFC 768): length at offset 4, payload from offset 8. The capture may have cut the payload.
 std::optional<Segment> udp_datagram(Segment found, BytesView body) {
   const std::size_t size = u16_at(body, 4);
   if (body.size() < 8 || size < 8) return std::nullopt;
