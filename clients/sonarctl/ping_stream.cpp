@@ -213,19 +213,15 @@ void PingStream::carry_out(protocol::HostActions actions) {
         keep(send->port, recording::Origin::client, send->bytes);
     } else if (const auto* ask = std::get_if<protocol::ResourceRequest>(&action)) {
       const auto reply = http_ask(device_, ask->method, ask->path, ask->body, answer_patience_);
-      if (!reply) {
+      if (!reply)
         ended_ = reply.error();
-      } else {
-        protocol::ResourceReply of_device;
-        of_device.status = reply->status;
-        of_device.body = reply->body;
-        carry_out(host_->on_reply(of_device, now()));
-      }
+      else
+        carry_out(host_->on_reply({.status = reply->status, .body = reply->body}, now()));
     } else if (auto* ping = std::get_if<HostPing>(&action)) {
       std::string limits;
       for (const std::string& limit : ping->limited) limits += (limits.empty() ? "" : "; ") + limit;
-      if (limits != limits_ && !limits.empty()) notices.push_back("the sonar limits what was asked: " + limits);
-      limits_ = std::move(limits);
+      if (limits != std::exchange(limits_, limits) && !limits.empty())
+        notices.push_back("the sonar limits the request: " + limits);
       items_.push_back({Wait::data, std::move(*ping), std::exchange(notices, {}), std::exchange(kept_, {}), {}});
     } else if (auto* notice = std::get_if<protocol::Notice>(&action)) {
       notices.push_back(std::move(notice->text));

@@ -172,7 +172,7 @@ class View(unittest.TestCase):
                             ("record", "--pings", "3", "--raw", f"{folder}/c"), ("listen", "--pings", "3"), ("stats",)):
                 result = self.daemon.ctl(*command, "--range", "15")
                 self.assertEqual(result.returncode, 0, result.stderr)
-                told = re.findall(r"the sonar limits what was asked: range (?:9\.99|10\.00) m, not 15 m", result.stderr)
+                told = re.findall(r"the sonar limits the request: range (?:9\.99|10\.00) m, not 15 m", result.stderr)
                 self.assertEqual(len(told), 1, (command, result.stderr))
 
     def test_contradictions_are_named(self):

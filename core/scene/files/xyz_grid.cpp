@@ -57,8 +57,8 @@ bool has_tab_marks(std::string_view line) {
 }
 
 /// Splits a line of values. In a table with commas, semicolons, bars or (if `by_tabs`) tabs, empty fields count too, because a
-/// missing value must not shift the values after it. A line with only empty fields, which spreadsheets write for an empty row, has
-/// no values.
+/// missing value must not shift the values after it. A line with only empty fields, which spreadsheets write for an empty row,
+/// has no values.
 std::size_t split_values(std::string_view line, bool by_tabs, Line& words) {
   for (const char mark : {';', '|', ',', '\t'}) {
     if (line.find(mark) == line.npos || (mark == '\t' && !by_tabs)) continue;
