@@ -89,12 +89,21 @@ TEST(StatusText, NamesEverything) {
         "sonar     front  oculus-m1200d  2.1 MHz  10 m  standby  gain 0 dB  512 beams x 437 rows  transmitter off\n",
         "tcp        0.0.0.0:52100              settings, pings\n",
         "status     10.0.0.255:52102           sends without a request\n", "advertised as 10.0.0.5\n",
-        "place   -6.00 0.00 -3.00 m, heading 90.0, pitch -10.0, roll 0.0 deg\n",
+        "place   -6.00 0.00 -3.00 m, heading 90.0, bow-up pitch -10.0, roll 0.0 deg\n",
         "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n",
         "from trajectory dive.tum  at 12.3 of 60.0 s x2.5 looped paused\n",
         "from trajectory way.csv  at 60.0 of 60.0 s x1 ended\n", "moving  hidden\n",
         "mavlink   udpin:127.0.0.1:14551  rov  7 distances sent, 2 dropped\n"})
     EXPECT_THAT(text, HasSubstr(part));
+}
+
+TEST(StatusText, OfManyObjectsTheFirstAndThoseThatMoveAreListed) {
+  v1::DaemonStatus status;
+  for (int i = 0; i < 20; ++i) status.add_objects()->set_name("stone" + std::to_string(i));
+  EXPECT_THAT(text_from(status),
+              testing::AllOf(HasSubstr("stone11 "), testing::Not(HasSubstr("stone12 ")), HasSubstr("8 more, which do not move")));
+  status.mutable_objects(19)->set_moving(true);
+  EXPECT_THAT(text_from(status), testing::AllOf(HasSubstr("stone19 "), HasSubstr("7 more, which do not move")));
 }
 
 TEST(StatusText, ASonarWaitsOnlyWhileNoDriverIsConnected) {

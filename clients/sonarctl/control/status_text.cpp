@@ -125,6 +125,8 @@ Error wrong(const char* option, const std::string& given, const std::string& why
   return {ErrorKind::usage, std::string(option) + " " + given + ": " + why};
 }
 
+constexpr int most_still_objects = 12;  // in the status, so that the sonars stay in sight
+
 std::string parameter_text(const v1::FaultParameter& p) {
   std::string values;
   for (const std::string& word : p.words()) values += (values.empty() ? "" : "|") + word;
@@ -135,7 +137,7 @@ std::string parameter_text(const v1::FaultParameter& p) {
 
 std::string place_text(const Pose& pose) {
   const RollPitchYaw flu = rpy_from_quat(pose.orientation);  // pitch bow down, roll port up
-  return format("%.2f %.2f %.2f m, heading %.1f, pitch %.1f, roll %.1f deg", pose.position_m.x, pose.position_m.y,
+  return format("%.2f %.2f %.2f m, heading %.1f, bow-up pitch %.1f, roll %.1f deg", pose.position_m.x, pose.position_m.y,
                 pose.position_m.z, deg_from_rad(heading_rad(pose.orientation)), 0.0 - deg_from_rad(flu.pitch_rad),
                 0.0 + deg_from_rad(flu.roll_rad));
 }
@@ -175,7 +177,11 @@ std::string text_from(const v1::DaemonStatus& s) {
                             format("  %llu distances sent, %llu dropped", wide(l.distances_sent()), wide(l.distances_dropped())));
   for (const v1::Note& n : s.notes()) text += line("note", n.text() + (n.cure().empty() ? "" : "; " + n.cure()));
   for (const v1::RecordingStatus& r : s.recordings()) text += line("recording", recording_text(r));
-  for (const v1::ObjectStatus& o : s.objects()) text += line("object", text_from(o));
+  int still = 0;
+  for (const v1::ObjectStatus& o : s.objects())
+    if (o.moving() || ++still <= most_still_objects) text += line("object", text_from(o));
+  if (const int more = still - most_still_objects; more > 0)
+    text += line("object", std::to_string(more) + " more, which do not move: sonarctl status --json");
   return text;
 }
 
