@@ -52,7 +52,7 @@ std::vector<HostPing> read_back(const Make& make, Bytes file) {
 TEST_P(Hosts, ReadTheSamePingsFromEveryKindOfFile) {
   const Make& make = GetParam();
   Talk talk(make, all_that_is_known(make, range_m), 0, model_of(make));
-  talk.run(hosts_test::steps(make, 6));
+  talk.run(6);
   ASSERT_FALSE(talk.pings.empty());
   const bool by_tcp = make.device->pings_by() != PingsBy::datagrams;
   const recording::PcapConversation ends = recording::usual_ends(make);

@@ -66,6 +66,7 @@ class Talk {
     if (sets_nothing(of)) apply({*device.apply_override(wanted.settings, state)});
     for (const auto& [at, port] : test::conversations_of(make)) lines_.push_back({at, port, device.converse(*port, state, now)});
     open(std::move(host));
+    if (make.scans) run(10);  // the host may wait for what the head reports once a second
   }
   /// The host takes the place of the present one.
   void open(std::unique_ptr<Host> next) {
@@ -207,9 +208,6 @@ class Talk {
 
 inline constexpr double range_m = 3;
 inline std::size_t model_of(const Make& make) { return make.name() == "aris" ? 2 : 0; }  // an ARIS 3000 shows 3 m
-
-/// Steps of a Talk; a head that turns may report its parameters, for which its host waits, once a second.
-inline int steps(const Make& make, int usual) { return usual + (make.scans ? 10 : 0); }
 
 class Hosts : public testing::TestWithParam<Make> {};
 
