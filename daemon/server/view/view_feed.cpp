@@ -17,7 +17,7 @@ using ChannelKind = ViewChannel::Kind;
 using std::chrono::milliseconds;
 
 constexpr milliseconds tick_period{100}, status_period{1000}, after_change{200};
-constexpr double image_hz = 30, fan_hz = 10, cloud_hz = 5, places_hz = 30, ping_hz = 50;
+constexpr double image_hz = 30, fan_hz = 10, cloud_hz = 5, places_hz = 30;
 constexpr std::size_t most_advertised = 100;  // number of channels in one message
 
 const Sender ourselves{"live view", "live view"};
@@ -231,17 +231,17 @@ void ViewFeed::sync_sonars() {
     SonarView sonar{name};
     sonar.image = add_channel("/" + name + "/image", "foxglove.RawImage", ChannelKind::picture, image_hz);
     sonar.geometry = add_channel("/" + name + "/geometry", "sonar.v1.PingGeometry", ChannelKind::last_value);
-    sonar.ping = add_channel("/" + name + "/ping", "sonar.v1.PingEvent", ChannelKind::event, ping_hz);
+    sonar.ping = add_channel("/" + name + "/ping", "sonar.v1.PingEvent", ChannelKind::event);
     sonar.fan = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
     sonar.about = add_channel("/" + name + "/picture", "sonar.v1.Picture", ChannelKind::last_value, fan_hz);
     const bool by_lines = device.sonar().settings().beam_count == 1;
     sonar.cloud = add_channel("/" + name + "/cloud", "foxglove.PointCloud", by_lines ? ChannelKind::event : ChannelKind::picture,
-                              by_lines ? ping_hz : cloud_hz);
+                              by_lines ? 0 : cloud_hz);
     sonar.drawn.channels = {sonar.fan, sonar.about};
     sonar.points.channels = {sonar.cloud};
     sonar.points.threshold = "/" + name + "/view/cloud_threshold";
     sonar.truth = add_channel("/" + name + "/truth", "sonar.v1.PingTruth", ChannelKind::last_value, image_hz);
-    sonar.figures = add_channel("/" + name + "/figures", "", ChannelKind::event, ping_hz);
+    sonar.figures = add_channel("/" + name + "/figures", "", ChannelKind::event);
     channels_.at(sonar.figures).advertised.encoding = "cdr";
     channels_.at(sonar.figures).advertised.schema = foxglove::figures_schema();
     sonars_.push_back(std::move(sonar));
