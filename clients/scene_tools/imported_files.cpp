@@ -57,7 +57,7 @@ bool FileResolver::resolve(PlacedShape& placed) {
   const std::string what = std::string(mesh ? "mesh " : "heightmap ") + plain(placed.shape.uri, 200);
   const std::string fetch = fetch_command(placed.shape.uri);
   if (skip_missing_)
-    findings_.leave_out(placed.at, what + ": not found" + (fetch.empty() ? "" : "; fetch its model: " + fetch));
+    findings_.leave_out_missing(placed.at, what, fetch);
   else if (std::none_of(missing_.begin(), missing_.end(), [&](const Missing& known) { return known.what == what; }))
     missing_.push_back({placed.at, what, fetch});
   return false;

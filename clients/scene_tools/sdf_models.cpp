@@ -4,6 +4,7 @@
 
 #include "clients/scene_tools/read_parts.hpp"
 #include "clients/scene_tools/resource_paths.hpp"
+#include "core/base/letters.hpp"
 #include "core/text/nearest.hpp"
 
 namespace sonar::scene_tools {
@@ -72,8 +73,7 @@ void SdfTree::report_missing() {
     const std::string uri = plain(m.uri, 200);
     const std::string fetch = fetch_command(m.uri);
     const std::string times = m.includes > 1 ? " (" + std::to_string(m.includes) + " includes)" : "";
-    if (options_.skip_missing)
-      findings_.leave_out(m.at, "include of " + uri + times + ": not found" + (fetch.empty() ? "" : "; fetch it: " + fetch));
+    if (options_.skip_missing) findings_.leave_out_missing(m.at, "include of " + uri, fetch, m.includes);
     list += (list.empty() ? " " : "; ") + (fetch.empty() ? uri : fetch) + times;
   }
   if (options_.skip_missing) return;
@@ -176,7 +176,7 @@ void SdfTree::add_include(SdfModel& parent, const Element& include, int include_
   const std::filesystem::path path = library_.find(uri, include.file()->path);
   if (path.empty()) {
     if (const std::string kind = probable_kind_without_echo(name); !kind.empty()) return leave_out_kind(kind);
-    const auto known = std::find_if(missing_.begin(), missing_.end(), [&](const Missing& m) { return m.uri == uri; });
+    const auto known = std::find_if(missing_.begin(), missing_.end(), [&](const Missing& m) { return same_letters(m.uri, uri); });
     if (known != missing_.end())
       ++known->includes;
     else

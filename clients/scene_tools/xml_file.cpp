@@ -110,6 +110,12 @@ std::vector<std::string> Findings::left_out() const {
     if (!names.empty()) counts += " (" + names + (found.more_names ? ", .." : "") + ")";
   }
   std::vector<std::string> all;
+  for (const Missing& m : missing_) {
+    std::string times = m.times > 1 ? std::to_string(m.times) + " times" : "";
+    if (m.names.size() > 1) times += ", " + std::to_string(m.names.size()) + " files";
+    all.push_back(m.place + ": " + m.what + (times.empty() ? "" : " (" + times + ")") + ": not found" +
+                  (m.fetch.empty() ? "" : "; fetch it: " + m.fetch));
+  }
   if (!counts.empty()) all.push_back(counts + ": without an echo");
   all.insert(all.end(), left_out_.begin(), left_out_.end());
   return all;
@@ -124,6 +130,18 @@ void Findings::leave_out_of_no_echo(const std::string& kind, std::string_view na
     found.names.insert(shown);
   else
     found.more_names = true;
+}
+
+void Findings::leave_out_missing(const Place& at, const std::string& what, const std::string& fetch, std::size_t times) {
+  constexpr std::size_t most = 1000;
+  auto known = std::find_if(missing_.begin(), missing_.end(),
+                            [&](const Missing& m) { return fetch.empty() ? m.what == what : same_letters(m.fetch, fetch); });
+  if (known == missing_.end()) {
+    if (missing_.size() >= most) return;
+    known = missing_.insert(known, {at.short_text(), what, fetch});
+  }
+  known->times += times;
+  known->names.insert(small_letters(what));
 }
 
 void Findings::leave_out(const Place& at, const std::string& what) {

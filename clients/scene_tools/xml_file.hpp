@@ -73,14 +73,23 @@ class Findings {
   void leave_out(const Place& at, const std::string& what);  // lists each place and sentence once
   /// Counts an omitted element, such as a "light". The names of models, if any, are listed with the count.
   void leave_out_of_no_echo(const std::string& kind, std::string_view name = {});
+  /// Lists what the file names and is not found, once, with the number of times. `fetch`: the command that gets it; may be empty.
+  /// Names that the same command gets are listed once.
+  void leave_out_missing(const Place& at, const std::string& what, const std::string& fetch, std::size_t times = 1);
   bool failed() const { return error_.has_value(); }
   const std::optional<Error>& error() const { return error_; }
-  /// Returns the list. Its first line has the counts of elements without an echo.
+  /// Returns the list: what is missing, the counts of elements without an echo, the rest.
   std::vector<std::string> left_out() const;
 
  private:
   std::optional<Error> error_;
   std::vector<std::string> left_out_;
+  struct Missing {
+    std::string place, what, fetch;  // those of the first
+    std::size_t times = 0;
+    std::set<std::string> names = {};
+  };
+  std::vector<Missing> missing_;
   struct Counted {
     std::size_t count = 0;
     std::set<std::string> names = {};  // the first few names

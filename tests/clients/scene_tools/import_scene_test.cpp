@@ -220,7 +220,7 @@ TEST_F(ImportScene, AnEmptySceneIsAnErrorThatSaysWhatIsMissing) {
   const std::string world =
       sdf("<light name='l'/><include><uri>https://fuel.gazebosim.org/1.0/hmoyen/models/Sand Heightmap</uri></include>");
   EXPECT_THAT(error(world),
-              ::testing::AllOf(HasSubstr("w.sdf: nothing in it has a shape"), HasSubstr("left out: 1 light"),
+              ::testing::AllOf(HasSubstr("w.sdf: nothing in it has a shape"), HasSubstr("; 1 light: without an echo"),
                                HasSubstr("gz fuel download --url 'https://fuel.gazebosim.org/1.0/hmoyen/models/Sand "
                                          "Heightmap'")));
   EXPECT_FALSE(std::filesystem::exists(options.out));
@@ -386,9 +386,22 @@ TEST_F(ImportScene, MissingMeshesOfFuelComeWithTheCommandThatFetchesTheirModel) 
   const auto done = run(sdf(model("a", mesh(fuel + "Coral01/1/files/meshes/c.stl")) + model("b", mesh("https://x.org/c.stl")) +
                             model("e", link("l"))));
   ASSERT_TRUE(done) << done.error().text;
-  EXPECT_THAT(done->left_out, ElementsAre(::testing::EndsWith("c.stl: not found; fetch its model: gz fuel download --url '" +
-                                                              fuel + "Coral01/1'"),
-                                          ::testing::EndsWith("https://x.org/c.stl: not found")));
+  EXPECT_THAT(done->left_out,
+              ElementsAre(::testing::EndsWith("c.stl: not found; fetch it: gz fuel download --url '" + fuel + "Coral01/1'"),
+                          ::testing::EndsWith("https://x.org/c.stl: not found")));
+  const auto many =
+      run(sdf("<light name='l'/>" + model("p", "<plugin name='p' filename='x.so'/>" + link("l")) +
+              model("a", mesh(fuel + "Coral01/1/files/meshes/c.stl")) + model("b", mesh("gone.stl")) +
+              model("c", mesh(fuel + "Coral01/1/files/meshes/d.stl")) + model("d", mesh("gone.stl")) + "<include><uri>" + fuel +
+              "Kelp</uri></include><include><uri>" + fuel + "kelp</uri><name>k</name></include>"));
+  ASSERT_TRUE(many) << many.error().text;
+  EXPECT_THAT(
+      many->left_out,
+      ElementsAre(
+          "w.sdf:3: include of " + fuel + "Kelp (2 times): not found; fetch it: gz fuel download --url '" + fuel + "Kelp'",
+          ::testing::EndsWith("c.stl (2 times, 2 files): not found; fetch it: gz fuel download --url '" + fuel + "Coral01/1'"),
+          ::testing::EndsWith("mesh gone.stl (2 times): not found"), "1 light: without an echo",
+          ::testing::EndsWith("plugin \"p\"")));
 }
 
 TEST_F(ImportScene, MovingModelsAreBodiesWhereTheModelStands) {

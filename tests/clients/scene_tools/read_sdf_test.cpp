@@ -254,7 +254,7 @@ TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
   r.options.skip_missing = true;
   ASSERT_TRUE(r.read(world));
   EXPECT_THAT(r.findings.left_out(), ElementsAre("w.sdf:3: include of " + rock +
-                                                     " (2 includes): not found; fetch it: gz fuel "
+                                                     " (2 times): not found; fetch it: gz fuel "
                                                      "download --url '" +
                                                      rock + "'",
                                                  "w.sdf:5: include of model://gone: not found"));
