@@ -22,18 +22,19 @@ void append(std::string& out, double v) {
 }
 
 /// Gazebo and RViz use the coordinates of every mesh unchanged: z is up, even if the file states another axis.
-MeshFile mesh_at(const fs::path& file) {
+MeshFile mesh_at(const fs::path& file, const std::string& part = {}) {
   MeshFile request;
   request.file = file;
+  request.part = part;
   request.up = UpAxis::z;
   return request;
 }
 
 /// Returns an OBJ text of the mesh, scaled about its origin by a factor for each axis.
-std::string stretched_obj(const CentredMesh& centred, Vec3d scale) {
-  std::string out = "# stretched by sonarctl scene import\n";
+std::string converted_obj(const CentredMesh& centred, Vec3d scale, bool is_centred) {
+  std::string out = "# made by sonarctl scene import\n";
   for (const Vec3& v : centred.mesh.vertices) {
-    const Vec3d p = to_double(v) + centred.centre_m;
+    const Vec3d p = to_double(v) + (is_centred ? Vec3d{} : centred.centre_m);
     out += "v ";
     append(out, scale.x * p.x), out += ' ';
     append(out, scale.y * p.y), out += ' ';
@@ -82,7 +83,7 @@ bool FileResolver::resolve_mesh(PlacedShape& placed, const fs::path& file) {
   Shape& shape = placed.shape;
   const Vec3d s = shape.scale;
   const bool even = s.x > 0 && std::abs(s.y - s.x) <= 1e-9 * s.x && std::abs(s.z - s.x) <= 1e-9 * s.x;
-  if (!even) return convert(placed, file);
+  if (!even || !shape.part.empty()) return convert(placed, file);
   shape.uri = path_to_write(file);
   return true;
 }
@@ -103,13 +104,17 @@ bool FileResolver::convert(PlacedShape& placed, const fs::path& file) {
   Shape& shape = placed.shape;
   std::string key = file.string();
   for (const double s : {shape.scale.x, shape.scale.y, shape.scale.z}) key += "|", append(key, s);
+  key += (shape.is_centred ? "|centred|" : "|") + shape.part;
   auto [known, is_new] = known_conversions_.try_emplace(key);
   if (is_new) {
-    const auto loaded = load_mesh(mesh_at(file));
-    if (!loaded) return findings_.leave_out(placed.at, std::string("mesh ") + plain(loaded.error().text, 300)), false;
+    const auto loaded = load_mesh(mesh_at(file, shape.part));
+    if (!loaded) {
+      known_conversions_.erase(known);
+      return findings_.leave_out(placed.at, std::string("mesh ") + plain(loaded.error().text, 300)), false;
+    }
     const std::string folder = scene_.stem().string() + "-meshes";
     const std::string name = file.stem().string() + "-" + std::to_string(converted_.size() + 1) + ".obj";
-    converted_[scene_.parent_path() / folder / name] = stretched_obj(loaded->centred, shape.scale);
+    converted_[scene_.parent_path() / folder / name] = converted_obj(loaded->centred, shape.scale, shape.is_centred);
     known->second = folder + "/" + name;
   }
   shape.uri = known->second;

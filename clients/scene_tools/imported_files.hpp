@@ -1,5 +1,6 @@
 // Finds the mesh and heightmap files that an imported world names, and tests whether the scene's loader can read them. A scene
-// file has one positive scale for a mesh, so meshes with other scales are written again, scaled. import_scene uses this class.
+// file has whole meshes with one positive scale, so parts of files and meshes with other scales are written again. import_scene
+// uses this class.
 #pragma once
 
 #include <filesystem>
@@ -40,7 +41,7 @@ class FileResolver {
   };
   std::vector<Missing> missing_;
   std::map<std::filesystem::path, std::string> tried_;      // why a mesh cannot be used; empty if it can
-  std::map<std::string, std::string> known_conversions_;    // by file and scale: the path of the scaled mesh
+  std::map<std::string, std::string> known_conversions_;    // by file, part and scale: the path of the new mesh
   std::map<std::filesystem::path, std::string> converted_;  // file to write, its text
 };
 

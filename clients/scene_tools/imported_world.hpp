@@ -20,6 +20,8 @@ struct Shape {
   double radius_m = 0, length_m = 0;
   std::string uri = {};     // mesh, heightmap: as the file has it; later the path to write
   Vec3d scale = {1, 1, 1};  // mesh
+  std::string part = {};    // mesh: the submesh that is shown; empty: the whole file
+  bool is_centred = false;  // the middle of that part lies at the origin
 };
 
 struct PlacedShape {

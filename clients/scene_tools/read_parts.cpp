@@ -89,11 +89,15 @@ Shape read_mesh(const Element& element, GeometryReader& in) {
     const auto s = in.numbers("scale", 3);
     shape.scale = {s[0], s[1], s[2]};
   }
+  if (const Element submesh = element.child("submesh")) {
+    shape.part = plain(submesh.child("name").text(), 500);
+    const std::string_view centred = submesh.child("center").text();
+    shape.is_centred = centred == "true" || centred == "1";
+    if (shape.part.empty()) in.refuse("its submesh has no name");
+  }
   const double least = std::min({std::abs(shape.scale.x), std::abs(shape.scale.y), std::abs(shape.scale.z)});
   if (shape.uri.empty()) in.refuse("names no file");
   if (!(least > 0)) in.refuse("its scale is 0");
-  if (element.child("submesh"))
-    in.refuse(std::string("only a part (submesh) of ") + plain(shape.uri, 200) + " is referenced; save it as a separate file");
   return shape;
 }
 

@@ -40,7 +40,7 @@ Result<void> import_one(const ImportOptions& options) {
   if (!done) return tl::unexpected(done.error());
   std::printf("%s: %s of %s", options.out.c_str(), text::counted(done->shapes, "shape").c_str(),
               text::counted(done->models, "model").c_str());
-  if (done->converted_meshes > 0) std::printf(", %zu stretched meshes written beside it", done->converted_meshes);
+  if (done->converted_meshes > 0) std::printf(", %zu converted meshes written beside it", done->converted_meshes);
   std::printf("\n");
   for (const std::string& what : done->left_out) std::printf("left out: %s\n", what.c_str());
   return options.check ? check(options.out.string(), false) : Result<void>{};

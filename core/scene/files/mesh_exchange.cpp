@@ -12,7 +12,7 @@
 namespace sonar {
 namespace {
 
-constexpr const char* version = "sonard-mesh-3";
+constexpr const char* version = "sonard-mesh-4";
 constexpr std::uint64_t magic = 0x3168'7365'6d64'7273;
 constexpr std::uint64_t most_text = std::uint64_t{256} << 20;  // limit in bytes of an error or of the names of materials
 
@@ -87,11 +87,12 @@ std::vector<std::string> arguments_of(const ImportRequest& request) {
           request.on_disk ? "file" : "input",
           mesh.folder ? "in" + mesh.folder->string() : "",
           request.readable.string(),
-          request.memory_root.string()};
+          request.memory_root.string(),
+          mesh.part};
 }
 
 std::optional<ImportRequest> request_from(const std::vector<std::string>& arguments) {
-  if (arguments.size() != 9 || arguments[0] != version) return std::nullopt;
+  if (arguments.size() != 10 || arguments[0] != version) return std::nullopt;
   ImportRequest request;
   request.parent = std::atoi(arguments[1].c_str());
   request.mesh.file = arguments[2];
@@ -101,6 +102,7 @@ std::optional<ImportRequest> request_from(const std::vector<std::string>& argume
   if (!arguments[6].empty()) request.mesh.folder = arguments[6].substr(2);
   request.readable = arguments[7];
   request.memory_root = arguments[8];
+  request.mesh.part = arguments[9];
   return request;
 }
 

@@ -22,6 +22,7 @@ struct MeshFile {
   double scale = 1;              // file units to metres
   std::optional<UpAxis> up{};    // axis of the file that is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
   std::string_view in_memory{};  // the contents of the file, if not read from disk; `file` then gives only name and format
+  std::string part{};            // name of a node or mesh of the file, or its only part under any name; empty: all parts
   std::optional<std::filesystem::path> folder{};  // folder of the scene; a mesh may refer to files in it, and in its own folder
 };
 

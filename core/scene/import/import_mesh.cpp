@@ -41,6 +41,36 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
   return triangles;
 }
 
+/// Leaves only the part of that name in the nodes: the meshes of nodes with this name, and meshes with it; if the file has only
+/// one part, that one. Otherwise returns the names of its parts, for an error.
+std::string keep_part(aiScene& scene, const std::string& wanted) {
+  std::vector<aiNode*> holders;  // nodes that show meshes
+  const auto walk = [&](const auto& self, aiNode& node, unsigned depth) -> void {
+    if (node.mNumMeshes > 0) holders.push_back(&node);
+    for (unsigned c = 0; depth < NodeGraph::deepest && c < node.mNumChildren; ++c) self(self, *node.mChildren[c], depth + 1);
+  };
+  walk(walk, *scene.mRootNode, 0);
+  const auto is_wanted = [&](const aiNode& node, unsigned mesh) {
+    return node.mName.C_Str() == wanted || scene.mMeshes[mesh]->mName.C_Str() == wanted;
+  };
+  const auto has_wanted = [&](const aiNode* node) {
+    return std::any_of(node->mMeshes, node->mMeshes + node->mNumMeshes, [&](unsigned m) { return is_wanted(*node, m); });
+  };
+  if (std::any_of(holders.begin(), holders.end(), has_wanted)) {
+    for (aiNode* node : holders) {
+      const auto* end =
+          std::stable_partition(node->mMeshes, node->mMeshes + node->mNumMeshes, [&](unsigned m) { return is_wanted(*node, m); });
+      node->mNumMeshes = static_cast<unsigned>(end - node->mMeshes);
+    }
+    return {};
+  }
+  if (holders.size() == 1) return {};
+  std::string names = "none";
+  for (std::size_t i = 0; i < std::min<std::size_t>(holders.size(), 20); ++i)
+    names = (i == 0 ? "" : names + ", ") + std::string(holders[i]->mName.C_Str()).substr(0, 64);
+  return names;
+}
+
 // Transforms of nodes are in double, so that vertices far from the origin are exact to millimetres.
 // A face with missing vertices is left out.
 void each_triangle(const aiScene& scene, const std::vector<std::vector<Vec3d>>& skins, const aiNode& node,
@@ -184,6 +214,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
     if (!with_floats) return bad_mesh(request, with_floats.error().text);
     in_memory = held = *std::move(with_floats), kind = "glb";
   }
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, !request.part.empty());
   const aiScene* scene =  // without post-processing, whose asserts fail on unusual files
       in_memory.empty() ? importer.ReadFile(files->mesh(), 0)
                         : importer.ReadFileFromMemory(in_memory.data(), in_memory.size(), 0, std::string(kind).c_str());
@@ -192,6 +223,9 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
     return bad_mesh(request, "cannot be read: " + better_reason(request, extension, first_line(importer.GetErrorString())));
   }
   hooks.imported();
+  if (!request.part.empty())
+    if (const std::string parts = keep_part(*const_cast<aiScene*>(scene), request.part); !parts.empty())
+      return bad_mesh(request, "has no part \"" + request.part.substr(0, 64) + "\"; its parts: " + parts);
   std::vector<std::string> names;
   for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
     aiString label;
@@ -210,7 +244,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
                     take(p, material);
                   });
   });
-  if (mesh && listed > taken) mesh->lost = listed - taken;
+  if (mesh && request.part.empty() && listed > taken) mesh->lost = listed - taken;
   if (mesh) mesh->hidden = faces.hidden;
   return mesh;
 }

@@ -247,6 +247,34 @@ TEST_F(ImportScene, MeshesAreNamedByRelativePathsAndUnevenOnesConverted) {
   EXPECT_NEAR(described->objects[1].in_world.size_m().x, 2, 1e-5);
 }
 
+TEST_F(ImportScene, APartOfAFileIsWrittenBesideTheScene) {
+  const std::string hull = "o Hull\nv 0 0 0\nv 4 0 0\nv 0 1 0\nf 1 2 3\n";
+  write("boat.obj", hull + "o Mast.1\nv 1 0 0\nv 3 0 0\nv 1 0 6\nf 4 5 6\n");
+  write("one.obj", hull);
+  const auto part = [](const std::string& name, const std::string& shown, const std::string& centre = "") {
+    return model(name, std::string("<link name='l'><visual name='v'><geometry><mesh><uri>") +
+                           (name == "d" ? "one.obj" : "boat.obj") + "</uri><submesh><name>" + shown + "</name>" + centre +
+                           "</submesh></mesh></geometry></visual></link>");
+  };
+  const auto done =
+      run(sdf(part("a", "Mast.1") + part("b", "Mast.1", "<center>true</center>") + part("c", "Hull", "<center>0</center>") +
+              part("d", "Other") + part("e", "Gone") + part("f", "Gone") + part("g", "") + part("h", "Hull")));
+  ASSERT_TRUE(done) << done.error().text;
+  EXPECT_EQ(done->shapes, 5u);
+  EXPECT_EQ(done->converted_meshes, 4u);
+  EXPECT_THAT(done->left_out, ElementsAre(HasSubstr("its submesh has no name"),
+                                          HasSubstr("mesh boat.obj: has no part \"Gone\"; its parts: Hull, Mast.1")));
+  const auto described = describe_scene(options.out);
+  ASSERT_TRUE(described) << described.error().text;
+  const auto& objects = described->objects;
+  EXPECT_NEAR(objects[0].in_world.low_m.x, 1, 1e-5);
+  EXPECT_NEAR(objects[0].in_world.high_m.z, 6, 1e-5);
+  EXPECT_NEAR(objects[1].in_world.low_m.x, -1, 1e-5);
+  EXPECT_NEAR(objects[1].in_world.high_m.z, 3, 1e-5);
+  EXPECT_NEAR(objects[2].in_world.size_m().x, 4, 1e-5);
+  EXPECT_NEAR(objects[3].in_world.size_m().y, 1, 1e-5);
+}
+
 TEST_F(ImportScene, FilesThatASceneCannotReadAreLeftOut) {
   write("a.fbx", "?");
   write("bad.stl", "solid nothing\nendsolid nothing\n");
