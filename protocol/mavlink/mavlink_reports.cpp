@@ -199,10 +199,14 @@ std::string MavlinkPoses::missing_inputs(Time now) const {
   } else {
     if (!attitude) missing.emplace_back("an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE)");
     if (!local && !global)
-      missing.push_back(std::string("a position is missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT") +
-                        (settings_.origin ? ")" : " with world.origin or depth alone)"));
-    missing.emplace_back(settings_.request_rates ? "requested (request_rates) but not received"
-                                                 : "set its stream rates, or request_rates: true");
+      missing.push_back(std::string("a position or depth is missing (LOCAL_POSITION_NED; GLOBAL_POSITION_INT") +
+                        (settings_.origin ? "" : " with world.origin or depth alone") + "; of a submarine also VFR_HUD)");
+    if (!local && !global && receives(VfrHud::id, now))
+      missing.emplace_back(
+          "VFR_HUD gives a depth only if HEARTBEAT says that the vehicle is a submarine, and behind a message with time_boot_ms");
+    missing.emplace_back(settings_.request_rates
+                             ? "requested (request_rates) but not received"
+                             : "set its stream rates (ArduPilot: SR0_POSITION, SR0_EXTRA1), or request_rates: true");
   }
   std::string text;
   for (const std::string& l : missing) text.append(text.empty() ? "" : "; ").append(l);

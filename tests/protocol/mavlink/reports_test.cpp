@@ -108,16 +108,21 @@ TEST(MavlinkReports, TheFirstLineNamesMissingMessages) {
   origin.origin = Geodetic{rad_from_deg(47.6), rad_from_deg(-122.33), 0};
 
   EXPECT_THAT(report_of({}, beat),
-              EndsWith("no poses yet: an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE); a position is "
-                       "missing (LOCAL_POSITION_NED, or GLOBAL_POSITION_INT with world.origin or depth alone); set its stream "
-                       "rates, or request_rates: true"));
+              EndsWith("no poses yet: an attitude is missing (ATTITUDE_QUATERNION or ATTITUDE); a position or depth is "
+                       "missing (LOCAL_POSITION_NED; GLOBAL_POSITION_INT with world.origin or depth alone; of a submarine also "
+                       "VFR_HUD); set its stream rates (ArduPilot: SR0_POSITION, SR0_EXTRA1), or request_rates: true"));
   EXPECT_THAT(report_of({}, beat + v(attitude(1, 0)) + v(global)),
               HasSubstr("no poses yet: GLOBAL_POSITION_INT needs world.origin"));
   EXPECT_THAT(report_of({}, beat + v(sim)), HasSubstr("SIM_STATE needs world.origin"));
   EXPECT_THAT(report_of({}, v(local(1, 0, 0, 0))),
-              AllOf(HasSubstr("no poses yet: an attitude is missing"), Not(HasSubstr("a position is missing"))));
+              AllOf(HasSubstr("no poses yet: an attitude is missing"), Not(HasSubstr("a position or depth is missing"))));
   EXPECT_THAT(report_of({}, v(attitude(1, 0))),
-              AllOf(HasSubstr("no poses yet: a position is missing"), Not(HasSubstr("an attitude is missing"))));
+              AllOf(HasSubstr("no poses yet: a position or depth is missing"), HasSubstr("of a submarine also VFR_HUD"),
+                    Not(HasSubstr("an attitude is missing")), Not(HasSubstr("VFR_HUD gives"))));
+  Heartbeat boat = autopilot_heartbeat();
+  boat.type = 11;  // MAV_TYPE_SURFACE_BOAT
+  EXPECT_THAT(report_of({}, v(boat) + v(attitude(1, 0)) + v(VfrHud{})),
+              HasSubstr("VFR_HUD gives a depth only if HEARTBEAT says that the vehicle is a submarine"));
   EXPECT_THAT(report_of({}, v(global)), AllOf(HasSubstr("GLOBAL_POSITION_INT needs world.origin; an attitude is missing")));
   EXPECT_THAT(report_of(origin, v(global)), AllOf(HasSubstr("an attitude is missing"), Not(HasSubstr("no fix"))));
   Settings asks;
@@ -174,8 +179,9 @@ TEST(MavlinkReports, WhatIsMissingIsSaidAgainEverMoreSeldomAndWhenItIsThere) {
   EXPECT_THAT(poses.health_error(at_s(120)), HasSubstr("an attitude is missing"));
 
   const auto tilts = [&](int s) { poses.on_datagram(v(attitude(static_cast<std::uint32_t>(1000 * s), 0)), at_s(s)); };
-  EXPECT_THAT(notices_of(poses, 121, 230, tilts),
-              ElementsAre(Pair(226, AllOf(HasSubstr("a position is missing"), Not(HasSubstr("an attitude is missing"))))))
+  EXPECT_THAT(
+      notices_of(poses, 121, 230, tilts),
+      ElementsAre(Pair(226, AllOf(HasSubstr("a position or depth is missing"), Not(HasSubstr("an attitude is missing"))))))
       << "the attitude, which has come, is not reported as missing";
   const auto poses_come = [&](int s) { poses.on_datagram(v(odometry(1'000'000ull * static_cast<unsigned>(s), 1)), at_s(s)); };
   EXPECT_THAT(notices_of(poses, 230, 900, poses_come), ElementsAre(Pair(230, HasSubstr("poses from ODOMETRY"))));

@@ -444,7 +444,8 @@ TEST(MavlinkNotes, ALinkIsInTheStatusUntilUsablePosesCome) {
   mavlink::Attitude attitude;
   attitude.boot_ms = 1000;
   send_udp(daemon.address(), port, framed(attitude, autopilot));
-  EXPECT_TRUE(eventually([&] { return note().text().find("a position is missing (LOCAL_POSITION_NED") != std::string::npos; }));
+  EXPECT_TRUE(
+      eventually([&] { return note().text().find("a position or depth is missing (LOCAL_POSITION_NED") != std::string::npos; }));
   mavlink::LocalPositionNed place;
   place.boot_ms = 1000, place.down_m = 3;
   send_udp(daemon.address(), port, framed(place, autopilot));
