@@ -194,6 +194,9 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (auto known = protocol::accept_settings(wanted, "an ARIS", {"range", "rate", "gain", "mode"}); !known)
     return tl::unexpected(known.error());
   if (wanted.settings.rate_hz == 0.0) return failure(ErrorKind::usage, "an ARIS has no standby: its least rate is 1 Hz");
+  const double fastest_hz = static_cast<double>(models().front()->max_rate_hz), rate_hz = wanted.settings.rate_hz.value_or(1);
+  if (rate_hz > fastest_hz)
+    return failure(ErrorKind::usage, text::format("the rate of an ARIS is 1 to %g Hz, not %g Hz", fastest_hz, rate_hz));
   const auto fits = [&wanted](const auto& model) { return choice_for(*model, wanted.settings).refusal.empty(); };
   if (!wanted.as_it_is && std::none_of(models().begin(), models().end(), fits))
     return failure(

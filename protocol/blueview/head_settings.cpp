@@ -108,6 +108,10 @@ Result<void> set_rate(SonarSettings& all, double rate_hz, const protocol::Device
   if (rate_hz < 0) return refused(text::format("the rate of a BlueView must be above 0 Hz, not %g Hz", rate_hz));
   if (rate_hz == 0)
     return refused("BlueView sonars have no standby: they ping when a host asks; to silence one, set transmit: false");
+  protocol::SettingsOverride wanted;
+  wanted.rate_hz = rate_hz;
+  const std::string why = protocol::rate_complaint(wanted, device.model->name, device.model->max_rate_hz);
+  if (!why.empty()) return refused(why);
   return set(all, Key::ping_interval, ping_interval_ms(rate_hz), device);
 }
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <deque>
 
@@ -6,6 +7,7 @@
 #include "protocol/blueview/encode_ping.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
+#include "protocol/limits.hpp"
 
 namespace sonar::blueview {
 namespace {
@@ -251,6 +253,9 @@ class BlueViewHost final : public protocol::Host {
                std::to_string(std::lround(head.longest_m)) + " m: give a --range within it";
       settings_.emplace_back(Key::stop_range, range_m);
     }
+    for (const auto& model : models())
+      if (model->name == greeting_.model)
+        if (std::string why = protocol::rate_complaint(wanted_, greeting_.model, model->max_rate_hz); !why.empty()) return why;
     if (wanted_.gain_percent) settings_.emplace_back(Key::gain, gain_db_from(*wanted_.gain_percent));
     if (wanted_.rate_hz.value_or(0) > 0) settings_.emplace_back(Key::ping_interval, ping_interval_ms(*wanted_.rate_hz));
     return {};
@@ -312,6 +317,10 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
     return tl::unexpected(known.error());
   if (wanted.settings.rate_hz == 0.0)
     return failure(ErrorKind::usage, "a BlueView sonar has no standby: it pings when it is asked");
+  float fastest_hz = 0;
+  for (const auto& model : models()) fastest_hz = std::max(fastest_hz, model->max_rate_hz);
+  if (const std::string why = protocol::rate_complaint(wanted.settings, "a BlueView sonar", fastest_hz); !why.empty())
+    return protocol::refused(why);
   return std::make_unique<BlueViewHost>(wanted);
 }
 

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/text/format.hpp"
+#include "protocol/limits.hpp"
 #include "protocol/oculus/decode.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/settings.hpp"
@@ -134,6 +135,8 @@ Result<FireRequest> fire_from(const protocol::Wanted& wanted) {
     return usual;
   };
   const protocol::SettingsOverride& from = wanted.settings;
+  if (const std::string why = protocol::rate_complaint(from, title, models().front()->max_rate_hz); !why.empty())
+    return protocol::refused(why);
   FireRequest fire;
   // 32-bit samples and the time in seconds need the long form of version 2.
   fire.version = static_cast<std::uint16_t>(from.sample_bits == 32u ? 2 : number("version", wanted.stamped ? 2 : 0));

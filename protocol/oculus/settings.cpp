@@ -264,7 +264,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     set(asked, flag::range_in_metres, true);
     asked.range = *wanted.range_m;
   }
-  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  if (const std::string why = protocol::rate_complaint(wanted, model.name, model.max_rate_hz); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
     asked.ping_rate = *wanted.rate_hz == 0 ? PingRate::standby : nearest_rate(*wanted.rate_hz);
   }

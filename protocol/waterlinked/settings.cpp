@@ -102,11 +102,12 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
     if (!why.empty()) return refused(why);
     s.range_max_m = *wanted.range_m;
   }
-  if (const std::string why = protocol::rate_complaint(wanted); !why.empty()) return refused(why);
+  const auto most_hz = static_cast<float>(mode_rows()[s.mode].rate_hz);
+  const std::string in_mode = "a Sonar 3D-15 in mode " + std::string(mode_rows()[s.mode].name);
+  if (const std::string why = protocol::rate_complaint(wanted, in_mode, most_hz); !why.empty()) return refused(why);
   if (wanted.rate_hz) {
-    const double most = static_cast<double>(mode_rows()[s.mode].rate_hz);
     s.acoustics = *wanted.rate_hz > 0;
-    s.rate_hz = *wanted.rate_hz < most ? *wanted.rate_hz : 0;
+    s.rate_hz = *wanted.rate_hz < static_cast<double>(most_hz) ? *wanted.rate_hz : 0;
   }
   if (wanted.gain_percent) return refused("a Sonar 3D-15 sets its own gain");
   if (wanted.beams && *wanted.beams != columns) return refused("a Sonar 3D-15 has 256 columns");

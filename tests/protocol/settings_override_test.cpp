@@ -92,7 +92,12 @@ TEST(Overrides, RefuseARateAboveThatOfTheProduct) {
   EXPECT_EQ(why("omniscan-450", 5000), "the rate of an Omniscan is 0 to 526.3 Hz, not 5000 Hz (msec_per_ping)");
   EXPECT_EQ(why("norbit-wbms", 5000), "the rate of a Norbit is 0 to 60 Hz, not 5000 Hz (set_rate)");
   EXPECT_EQ(why("m3", 5000), "the rate of an M3 is 0 to 40 Hz, not 5000 Hz");
-  for (const char* profile : {"ping1d", "s500", "surveyor-240", "omniscan-450", "norbit-wbms", "m3"})
+  EXPECT_EQ(why("oculus-m1200d", 41), "the rate of Oculus M1200d is 0 to 40 Hz, not 41 Hz");
+  EXPECT_EQ(why("blueview-p900-90", 16), "the rate of BlueView P900-90 is 0 to 15 Hz, not 16 Hz");
+  EXPECT_THAT(why("waterlinked-3d15", 21),
+              testing::MatchesRegex("the rate of a Sonar 3D-15 in mode .* is 0 to .* Hz, not 21 Hz"));
+  for (const char* profile :
+       {"oculus-m1200d", "blueview-p900-90", "ping1d", "s500", "surveyor-240", "omniscan-450", "norbit-wbms", "m3"})
     EXPECT_EQ(why(profile, static_cast<double>(device_of(profile).model->max_rate_hz)), "");
 }
 
