@@ -164,7 +164,7 @@ Result<void> record_device(RecordOptions options) {
   const Result<Endpoint> device = find_device(source, true);
   if (!device) return tl::unexpected(device.error());
   std::optional<Served> served;
-  if (!source.control.empty()) {
+  if (!source.control.empty() && !options.mcap.empty()) {
     auto asked = ask_sonard(source, source.make, *device);
     if (!asked) return tl::unexpected(asked.error());
     served = *std::move(asked);
