@@ -12,7 +12,7 @@ namespace sonar::blueview {
 namespace {
 
 constexpr int most_bins = 2400;     // in a ping; longer ranges get longer bins (our choice)
-constexpr float base_gain_db = 48;  // unknown: gain at an adjustment of 0 dB
+constexpr float base_gain_db = 48;  // unknown: the real gain at an adjustment of 0 dB
 constexpr float longest_interval_ms = 3600e3f;
 
 const FrequencyMode& mode_of(const protocol::DeviceState& device, int head) {
@@ -238,12 +238,12 @@ PingSettings ping_settings(const SonarSettings& all, const protocol::DeviceState
   Water believed = device.water;
   if (head.fluid == 0) believed.salinity_psu = std::max(believed.salinity_psu, 30.0);
   if (head.fluid == 1) believed.salinity_psu = 0;
-  // The absorption applies to the path out and to the path back, but the slope applies once to each metre of range. So half of
-  // the slope is added to the absorption.
+  // The absorption applies to the path out and to the path back, but tvg_db_per_m applies once to each metre of range. So half of
+  // tvg_db_per_m is added to the absorption.
   s.device_absorption_db_per_m =
       static_cast<float>(absorption_db_per_m(believed, device.depth_m, static_cast<double>(mode.centre_hz)) +
                          0.5 * static_cast<double>(head.tvg_db_per_m));
-  s.format.bits = 16;  // unknown: BlueView images carry 16-bit samples
+  s.format.bits = 16;  // unknown: the device's sample width; BlueView images have 16-bit samples
   s.format.max_code = 65535;
   return s;
 }
@@ -281,8 +281,8 @@ float gain_db_from(double percent) { return static_cast<float>(half_gain_db * (p
 
 double gain_percent_from(double gain_db) { return 50 * (gain_db / half_gain_db + 1); }
 
-// SET clamps a range that is not possible. An override refuses such a range, and the error states the limits of the product
-// (Vendor::apply_override).
+// By default (option strict_range) SET clamps a range that is not possible. An override always refuses such a range, and the
+// error states the limits of the product (Vendor::apply_override).
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   SonarSettings all = settings_from(device.settings.get(), device);
   if (wanted.mode) {

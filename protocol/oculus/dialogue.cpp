@@ -21,8 +21,8 @@ constexpr std::size_t notices_per_call = 8;               // bounds the log outp
 constexpr auto greeting_after = std::chrono::seconds(2);  // known drivers send their first fire message within a second
 
 /// The dialogue with one client (docs/protocols/oculus.md, section 1), which has three states:
-/// - Before the first valid fire message the device sends a dummy after each period of silence. A client that stays silent gets
-///   the log text of section 6.1.
+/// - Before the first valid fire message the device sends a dummy whenever it has sent nothing for a period. By default (option
+///   boot_text) a client that sends no fire message gets the log text of section 6.1.
 /// - While the device pings it sends no dummy, however long a ping takes. With network trigger it sends dummies while no ping
 ///   is requested.
 /// - In standby (ping rate 5) it sends a dummy at once, then one after each period of silence.
@@ -39,8 +39,8 @@ class OculusDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // The daemon carries out the events of this call after the call has returned. With `stored_`, a read gets the result of a
-    // write in the same bytes.
+    // The daemon carries out the events of this call after the call has returned. So `stored_` lets a read request see a write
+    // request that arrived before it in the same call.
     stored_ = device_.stored_address;
     const std::uint64_t skipped_before = framer_.skipped_bytes();
     framer_.append(received);
@@ -125,7 +125,8 @@ class OculusDialogue final : public protocol::Dialogue {
 
   /// True if the client waits for pings. It then gets no dummy, however long a ping takes, because ENSTA's driver interprets a
   /// dummy as the acknowledgement of standby, and then stores standby as its ping rate. With network trigger the device waits for
-  /// the client, so dummies are sent. Fire messages of an observer change nothing.
+  /// the client, so dummies are sent. An observer's fire messages never become the settings of the device, so an observer does
+  /// not count as waiting.
   bool expects_pings() const {
     const auto* held = dynamic_cast<const HeldFire*>(device_.settings.get());
     if (!is_heard() || held == nullptr || table_rate_hz(held->fire.settings.ping_rate) <= 0) return false;
@@ -179,7 +180,7 @@ class OculusDialogue final : public protocol::Dialogue {
   bool is_heard_ = false;                        // true: the device has used settings of this client
   bool requested_ping_ = false;                  // true: a network trigger requested a ping that is not sent yet
   std::optional<Time> greeting_at_;
-  bool greets_silent_ = false;  // true: a greeting is due; a fire message, or a ping to the client, cancels it
+  bool greets_silent_ = false;  // boot_text is if_silent: a fire message, or a ping to the client, cancels the greeting
   std::size_t notices_ = 0;
 };
 

@@ -274,7 +274,7 @@ class Render(unittest.TestCase):
         self.expect(self.render("--first", "999999", "--pings", "2", out=third), 64, "999999")
         sweep = self.path / "sweep.yaml"
         sweep.write_text("scene: l-targets.yaml\nsweep: {r: [5, 6]}\nsonar: {ping: {range_m: $r}}\n", encoding="utf-8")
-        self.expect(self.render("--first", "2", config=sweep, out=self.path / "sweep"), 64, "--first", "sweeps")
+        self.expect(self.render("--first", "2", config=sweep, out=self.path / "sweep"), 64, "--first", "has a sweep")
 
     def test_pictures_without_rings(self):
         self.expect(self.render("--format", "png"), 0)

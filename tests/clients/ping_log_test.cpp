@@ -55,8 +55,9 @@ TEST(PingLog, ReportsSettingsThatTheSonarLimited) {
   const PingSummary s = log.summary(std::nullopt);
   EXPECT_THAT(
       text_from(s, true, "Hz"),
-      HasSubstr("\nsettings echoed as asked: ping 1, but the sonar limits them: its pings have range 40.00 m, not 1000 m; 256 "
-                "beams, not 512"));
+      HasSubstr(
+          "\nsettings echoed as requested: ping 1, but the sonar limits them: its pings have range 40.00 m, not 1000 m; 256 "
+          "beams, not 512"));
   EXPECT_THAT(text_from(s, false, "Hz"), HasSubstr("\nthe sonar's pings have range 40.00 m, not 1000 m"));
   EXPECT_THAT(json_from(s, true), HasSubstr("\"limited\":[\"range 40.00 m, not 1000 m\""));
   EXPECT_THAT(complaints(s, true), ElementsAre()) << "the settings were echoed";

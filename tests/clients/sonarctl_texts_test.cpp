@@ -88,7 +88,7 @@ TEST(StatusText, NamesEverything) {
         "water     12 C, 30 psu, pH 8, sound speed computed\n",
         "sonar     front  oculus-m1200d  2.1 MHz  10 m  standby  gain 0 dB  512 beams x 437 rows  transmitter off\n",
         "tcp        0.0.0.0:52100              settings, pings\n",
-        "status     10.0.0.255:52102           sends without a request\n", "advertised as 10.0.0.5\n",
+        "status     10.0.0.255:52102           sent without a request\n", "advertised as 10.0.0.5\n",
         "place   -6.00 0.00 -3.00 m, heading 90.0, bow-up pitch -10.0, roll 0.0 deg\n",
         "10.0.0.9:4000  12 pings, 1 dropped, 2.5 MB, 2 min\n", "from json 127.0.0.1  stale\n",
         "from trajectory dive.tum  at 12.3 of 60.0 s x2.5 looped paused\n",

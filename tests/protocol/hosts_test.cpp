@@ -402,7 +402,7 @@ TEST(Makes, NameWhatEachAddressCarries) {
 TEST(Makes, AddressLinesOfAnOlderDaemonHaveNoContent) {
   EXPECT_EQ(line_of("tcp", "127.0.0.2:52100", "", false), "tcp        127.0.0.2:52100            waits for the driver");
   EXPECT_EQ(line_of("tcp", "127.0.0.2:52100", "pings", true),
-            "tcp        127.0.0.2:52100            pings; sends without a request");
+            "tcp        127.0.0.2:52100            pings; sent without a request");
 }
 
 }  // namespace

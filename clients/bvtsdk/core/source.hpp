@@ -34,8 +34,9 @@ class Source {
   virtual int set(int /*head*/, RangeLimits&) { return success; }
   virtual int get(int /*head*/, RangeLimits&) { return success; }
 
-  /// A recording gives ping n, or the next one if n < 0. A live sonar makes a new ping for every n; the call waits `patience`
-  /// longer than the sonar needs. `settings`: in, those of the head; out, those that the ping was recorded with.
+  /// A recording gives ping n, or the next one if n < 0. A live sonar makes a new ping, whatever n is; the sonar waits at most
+  /// `patience` for it, and the link 5 s longer. `settings` holds the settings of the head; a recording replaces them by those
+  /// with which the ping was recorded.
   virtual int get_ping(int /*head*/, int /*n*/, std::chrono::milliseconds /*patience*/, PolarPing&,
                        HeadDescription& /*settings*/) {
     return not_implemented;

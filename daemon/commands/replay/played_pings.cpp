@@ -53,8 +53,8 @@ std::optional<PlayedPings::Part> PlayedPings::read() {
   }
 }
 
-/// Reads the messages of a ping and returns the one with the most content. From each message to the next the content grows, or
-/// from each to the next it shrinks.
+/// Reads the messages of a ping and returns the one with the most content. The messages of a ping come in order of content,
+/// either growing or shrinking; a message that breaks the order begins the next ping.
 recording::Bytes PlayedPings::take_richest() {
   recording::Bytes richest = std::move(ahead_->bytes);
   ahead_ = read();

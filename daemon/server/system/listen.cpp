@@ -32,7 +32,8 @@ Error explain(const error_code& ec, Endpoint at) {
       text += "; it lies in the ephemeral range " + std::to_string(low) + "-" + std::to_string(high) +
               ", so an outgoing connection may hold it. Reserve the port: sysctl net.ipv4.ip_local_reserved_ports=" + port;
   } else if (ec.value() == EADDRNOTAVAIL) {
-    text += "address not on this host. Add it: ip addr add " + text_of(at.ip) + "/24 dev eth0 (or use 127.0.0.2)";
+    text += "address not on this host. Add it: ip addr add " + text_of(at.ip) +
+            "/24 dev eth0 (or listen on 127.0.0.2: --bind, for a replay --ip)";
   } else if (ec == asio::error::access_denied) {
     const std::string port = std::to_string(at.port);
     text += "ports below 1024 need a right. Give it to all programs: sysctl net.ipv4.ip_unprivileged_port_start=" + port +

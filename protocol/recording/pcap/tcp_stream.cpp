@@ -31,7 +31,7 @@ void TcpStream::add(Time at, std::uint32_t sequence, wire::BytesView payload, bo
   if (early.bytes.size() >= payload.size()) return;
   waiting_bytes_ += payload.size() - early.bytes.size();
   early = {at, {payload.begin(), payload.end()}};
-  // If too many bytes wait, the capture lacks the preceding bytes.
+  // If too many bytes or segments wait, the preceding bytes are assumed to be missing from the capture, and are skipped.
   if (waiting_bytes_ > most_waiting_bytes || waiting_.size() > most_waiting) {
     skip_to_first_waiting();
     give_what_follows();
@@ -43,7 +43,7 @@ void TcpStream::give(Time at, wire::BytesView bytes) {
   position_ += bytes.size();
 }
 
-/// Returns early segments that now continue the stream, without bytes that are already known.
+/// Moves early segments that now continue the stream to `ready_`, without the bytes that are already known.
 void TcpStream::give_what_follows() {
   while (!waiting_.empty() && waiting_.begin()->first <= position_) {
     const Early early = std::move(waiting_.begin()->second);

@@ -232,7 +232,7 @@ TEST_F(GeoTiff, TheFirstOfSeveralBandsIsTheHeightAndAnAlphaBandMarksHoles) {
   EXPECT_FALSE(read(TiffFile::of(3, 2, std::vector<std::uint8_t>(12)).at(0, 100, 10, 10).bands({2}))) << "a picture";
   EXPECT_FALSE(read(TiffFile::of(3, 2, pairs).at(0, 100, 10, 10).bands(std::vector<std::uint16_t>(40)))) << "too short";
   TiffFile planes = TiffFile::of(3, 2, pairs).at(0, 100, 10, 10).bands({2}).shorts(284, {2});
-  EXPECT_THAT(read(planes).error().text, HasSubstr("band of its own; write them as a value: gdalwarp -dstnodata"));
+  EXPECT_THAT(read(planes).error().text, HasSubstr("separate band; write them as a value: gdalwarp -dstnodata"));
 }
 
 TEST_F(GeoTiff, ASystemThatIsOnlyCitedIsRead) {
