@@ -115,7 +115,7 @@ class Doctor(unittest.TestCase):
             done = run(SONARCTL, "set", "sonar", "--rate", 2, "--control", f"{daemon.address}:14770")
             self.assertEqual(done.returncode, 0, done.stderr)
             _, findings, _ = doctor(daemon.address, *PATIENT)
-        self.assertIn("(asked 2)", findings["rate"][0]["text"])
+        self.assertIn("(requested 2)", findings["rate"][0]["text"])
 
     def test_a_busy_sonar_is_left_alone(self):
         with Sonard() as daemon, socket.create_connection((daemon.address, 52100), 10) as driver:
