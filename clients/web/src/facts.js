@@ -3,7 +3,7 @@ import { Counter, Counters } from './rates.js';
 
 const log_lines = 500;
 const replayed_lines = 100;  // limit of the repeated lines of a new connection; the daemon's lines_kept
-const recent_pings = 64;
+const recent_pings = 1024;  // about 2 s of the fastest sonar
 const history_s = 60;
 const preview_stalls_s = 3;  // time without a preview after which the rate of previews is 0
 

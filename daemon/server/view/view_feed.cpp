@@ -17,7 +17,7 @@ using ChannelKind = ViewChannel::Kind;
 using std::chrono::milliseconds;
 
 constexpr milliseconds tick_period{100}, status_period{1000}, after_change{200};
-constexpr double image_hz = 30, fan_hz = 10, cloud_hz = 5, places_hz = 30;
+constexpr double image_hz = 30, fan_hz = 10, places_hz = 30;
 constexpr std::size_t most_advertised = 100;  // number of channels in one message
 
 const Sender ourselves{"live view", "live view"};

@@ -110,6 +110,7 @@ class ViewFeed final : public ViewerHost {
   bool previews_by_itself(const Device& device);
   void drive_previews();
   void on_preview(const std::string& sonar, const PingOutcome& outcome);
+  static constexpr double cloud_hz = 5;  // limit for clouds of fans
   void make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make);
   void begin_slow_ones(SonarView& sonar);
   bool clouds_are_lines(const SonarView& sonar) const;

@@ -87,7 +87,7 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   Slow& slow = sonar.*which;
   const auto now = Steady::now();
   const Time at = sonar.last->request.fired_at;
-  const double most_hz = channels_.at(slow.channels.front()).most_hz;
+  const double limit_hz = channels_.at(slow.channels.front()).most_hz, most_hz = limit_hz > 0 ? limit_hz : cloud_hz;
   if (slow.under_way || now < slow.begun_at + nanoseconds_from(1 / most_hz)) return;
   decltype(slow.made) made;
   each([&](const ViewConnection& c) {
