@@ -128,12 +128,13 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
 
 /// Waits until the sonar closes the connection too: a close with unread bytes would reset it, and lose the last messages.
 PingStream::~PingStream() {
-  if (host_ == nullptr || !is_started_ || ended_) return;
+  if (host_ == nullptr || !is_started_) return;
   protocol::HostActions last = host_->on_leave();
   if (last.empty()) return;
+  ended_.reset();  // the connection may be usable although the command has failed
   carry_out(std::move(last));
   const auto until = Clock::now() + leave_patience;
-  for (std::size_t port = 0; port < sockets_.size(); ++port) {
+  for (std::size_t port = 0; port < sockets_.size() && !ended_; ++port) {
     if (make_->ports[port].kind != Kind::tcp || !sockets_[port]) continue;
     ::shutdown(sockets_[port]->fd(), SHUT_WR);
     for (pollfd ready{sockets_[port]->fd(), POLLIN, 0}; Clock::now() < until;) {
@@ -234,10 +235,7 @@ void PingStream::carry_out(protocol::HostActions actions) {
 }
 
 bool PingStream::receive(milliseconds patience) {
-  if (const auto tick = host_->next_tick()) {
-    const auto until_tick = std::chrono::ceil<milliseconds>(*tick - now());
-    patience = std::clamp(until_tick, 0ms, patience);
-  }
+  if (const auto tick = host_->next_tick()) patience = std::clamp(std::chrono::ceil<milliseconds>(*tick - now()), 0ms, patience);
   if (make_->is_by_udp()) patience = std::min(patience, left_until(probe_at_));
   std::vector<pollfd> ready;
   for (const auto& socket : sockets_) ready.push_back({socket ? socket->fd() : -1, POLLIN, 0});

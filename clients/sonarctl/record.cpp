@@ -174,7 +174,9 @@ Result<void> record_device(RecordOptions options) {
   const PingStream& stream = opened->stream;
   const std::string at = text_from(stream.device());
   if (!served && !options.mcap.empty()) {  // the sonar is there now, and so is its sonard, if it has one on this computer
-    auto asked = ask_sonard(source, &stream.make(), stream.device());
+    auto asked = listen_udp({stream.device().host, 0}).has_value()
+                     ? ask_sonard(source, &stream.make(), stream.device())
+                     : failure(ErrorKind::unavailable, "the sonar is not on this computer; --control names its sonard");
     if (asked)
       served = *std::move(asked);
     else

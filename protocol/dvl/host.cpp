@@ -77,7 +77,7 @@ class DvlHost final : public protocol::Host {
     const Line line = read_line(line_);
     if (line.velocity) actions.emplace_back(ping_from(line.velocity->measured, now));
     if (line.response && request_ && line.response->to == "get_config" && !before_) before_ = line.response;
-    if (line.response && !line.response->success)
+    if (line.response && !line.response->success && line.response->to != "get_config")
       actions.emplace_back(Error{ErrorKind::usage, "the DVL refuses " + line.response->to + ": " + line.response->error});
   }
 
