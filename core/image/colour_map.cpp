@@ -11,7 +11,7 @@ std::uint8_t byte_from(float unit) { return static_cast<std::uint8_t>(std::lroun
 const std::vector<ColourMap>& all_maps() {
   static const std::vector<ColourMap> maps{
       {"gray", {{0, 0, 0, 0}, {1, 1, 1, 1}}},
-      // Red rises first and saturates at four fifths, like the colour of light on metal.
+      // Red rises fastest and saturates at four fifths, like the colour of light on copper.
       {"copper", {{0, 0, 0, 0}, {0.8f, 1, 0.62f, 0.4f}, {1, 1, 0.78f, 0.5f}}},
       // Colours of a black body: red rises first, then green, then blue.
       {"hot", {{0, 0, 0, 0}, {0.375f, 1, 0, 0}, {0.75f, 1, 1, 0}, {1, 1, 1, 1}}},

@@ -21,7 +21,8 @@ std::string read_text(wire::Reader& reader, std::string_view name) {
   return text;
 }
 
-// The kind precedes the value, so that a host can read the value of an unknown key.
+// The kind precedes the value, so that a host can read the value of an unknown key. Exception: Key::range has two floats after
+// the kind `number`.
 void put_value(wire::Bytes& out, const Value& value) {
   const Put write(out);
   const auto kind = [&](Kind k) { write("kind", k); };

@@ -1,4 +1,5 @@
-// Checks the head settings of one sonar (shared by its hosts) and converts them to PingSettings. The device keeps them.
+// Checks the settings of a sonar's heads and converts them to PingSettings. All hosts of a sonar share one set, which the device
+// stores.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +22,9 @@ struct HeadSettings {
   float tvg_db_per_m = 0;
   std::int32_t fluid = 0;  // 0 salt, 1 fresh, 2 other
   std::int32_t transmit = 1;
-  std::int32_t ping_interval_ms = 0;  // 0 = pings at the rate of the requests
-  std::int32_t dynamic_power = 0;
-  float source_level_db = 0;  // stored and returned; no effect
+  std::int32_t ping_interval_ms = 0;  // 0 = a ping whenever a host requests it
+  std::int32_t dynamic_power = 0;     // stored and returned; no effect
+  float source_level_db = 0;          // stored and returned; no effect
   bool operator==(const HeadSettings&) const = default;
 };
 
@@ -32,7 +33,7 @@ struct SonarSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
 
   std::int32_t active_head = 0;  // index of the head that last pinged or was last requested
-  std::int32_t local_clock = 0;
+  std::int32_t local_clock = 0;  // stored and returned; no effect
   std::string name;
   std::vector<HeadSettings> heads;
 };
@@ -48,7 +49,8 @@ struct Applied {
   std::optional<Value> value;
   Refusal refusal;  // set if there is no value
 };
-/// Sets one key of a head and returns the applied value, which is the nearest valid value.
+/// Sets one key of a head and returns the applied value, which is the nearest valid one. Refuses an unusable value and, with
+/// strict_range, a range outside the limits.
 Applied apply(SonarSettings& settings, int head, Key key, const Value& value, const protocol::DeviceState& device);
 std::optional<Value> read_back(const SonarSettings& settings, int head, Key key);
 

@@ -1,5 +1,6 @@
 // The Teledyne BlueView products as SonarModel rows, one frequency mode per head, and the default settings of a head.
-// Each number is marked as verified or recalled (docs/protocols/blueview-link.md, "Products").
+// `HeadPreset::verified` marks the heads whose main figures have a source (protocol/blueview/README.md); other figures are
+// recalled.
 #pragma once
 
 #include <memory>

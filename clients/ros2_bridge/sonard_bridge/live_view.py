@@ -16,7 +16,7 @@ from .polling import WANTS_TOKEN
 
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 LONGEST = 64 << 20   # limit for a message [bytes]
-SILENCE_S = 30.0     # after such a silence the connection is lost: sonard sends a message every second
+SILENCE_S = 30.0     # after such a silence the connection counts as lost, because sonard sends a message every second
 RETRY_S = 1.0
 
 

@@ -112,7 +112,7 @@ class Bridge(Node):
         def guarded(*arguments):
             try:
                 call(*arguments)
-            except Exception as error:  # rclpy's own classes differ between releases
+            except Exception as error:  # any class, because the exceptions of rclpy differ between its releases
                 self.warn(f"not published: {error!r}")
         return guarded
 
@@ -144,7 +144,7 @@ class Bridge(Node):
             self.warn(f"no transform yet: {error}")
             return
         stamp = found.header.stamp.sec, found.header.stamp.nanosec
-        if stamp == (0, 0):  # only static transforms; with the present time the pose does not become stale
+        if stamp == (0, 0):  # a chain of static transforms has no stamp; with the present time the pose does not become stale
             set_stamp(found.header.stamp, self.get_clock().now().nanoseconds)
         elif stamp == self.last_tf:  # already sent
             return
@@ -281,7 +281,7 @@ def main() -> int:
     except Exception:
         if rclpy.ok():
             raise
-        # The signal came while rclpy created the node or prepared to wait; both then fail with different exceptions.
+        # The signal came while rclpy created the node or prepared to wait. Either can then raise various exceptions; none is an error.
     finally:
         if node is not None:
             node.close()

@@ -42,8 +42,7 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
-  /// Draws with the graphics processor from now on. It is not used with a software renderer, because the table is many times
-  /// faster.
+  /// Draws with the graphics processor from now on. Not for a software renderer: LookupPainter, which draws from a table, is then many times faster.
   useGraphics() {
     const canvas = this.canvas.cloneNode();  // a canvas keeps the kind of its first context
     const painter = this.exact ? null : makeFanPainter(canvas);
@@ -54,7 +53,7 @@ export class Fan {
     this.redraw();
   }
 
-  /// True if sonard draws the picture, because it is not a fan of one ping.
+  /// True if sonard, not this page, draws the picture: while a recording is played, and if the picture is not a fan of one ping.
   get drawn() {
     return Boolean(this.facts.recording) || this.facts.pictureKind !== 'fan';
   }
@@ -93,7 +92,7 @@ export class Fan {
     this.redraw();
   }
 
-  /// Shows a new ping, or the present one again if its shades have become known; null if none was received yet.
+  /// Shows a ping. The present ping is drawn again only if its shades have become known since. `ping` is null if none was received yet.
   show(ping) {
     const again = ping === this.ping;
     if (this.frozen || (again && (!this.samples || this.per_mille === this.shades.per_mille))) return;
@@ -195,7 +194,7 @@ export class Fan {
   }
   painted = 0;
 
-  /// Reduces the quality on slow machines: first to one sample per pixel, then also to half of the pixels.
+  /// Reduces the quality on slow machines: first to one sample per pixel, then also to half the resolution (a quarter of the pixels).
   adapt(ms) {
     this.cost_ms = this.cost_ms ? 0.6 * this.cost_ms + 0.4 * ms : ms;
     const worst = this.quality === 2 ? slow_ms : very_slow_ms;

@@ -8,7 +8,7 @@ const rows = '.setting, #troubles > button, .row, .panel > header';
 export class Refusals {
   constructor() {
     this.box = $('refusal');
-    this.asked = new Map();  // id of a request -> its control, and the place of the control
+    this.asked = new Map();  // id of a request -> the row of its control, and the place of the control
     for (const kind of ['pointerdown', 'keydown', 'click'])
       document.addEventListener(kind, (event) => {
         this.touched = event.target;
@@ -24,7 +24,7 @@ export class Refusals {
 
   /// Remembers the place of the control that was touched last, which caused request `id`.
   note(id) {
-    this.hide();  // that of an earlier request
+    this.hide();  // hides the refusal of an earlier request
     const control = this.touched?.closest?.('button, input, select') ?? document.activeElement;
     this.asked.set(id, { row: control.closest(rows), place: control.getBoundingClientRect() });
   }
