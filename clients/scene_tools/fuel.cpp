@@ -4,16 +4,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "core/base/letters.hpp"
+
 namespace sonar::scene_tools {
-namespace {
-
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
-  return out;
-}
-
-}  // namespace
 
 int version_number(std::string_view text) {
   const bool digits =
@@ -28,13 +21,19 @@ std::optional<FuelAddress> fuel_address(std::string_view address) {
   const auto is_api = [](const std::string& part) { return part.find_first_not_of("0123456789.") == std::string::npos; };
   if (parts.size() > 1 && is_api(parts[1])) parts.erase(parts.begin() + 1);
   if (parts.size() > 3 && parts[2] == "fuel" && parts[3] == "models") parts.erase(parts.begin() + 2);  // the form of web pages
-  if (parts.size() < 4 || lower(parts[2]) != "models") return std::nullopt;
+  if (parts.size() < 4 || !same_letters(parts[2], "models")) return std::nullopt;
   FuelAddress out{parts[0], parts[1], parts[3], "", {}};
   std::size_t next = 4;
   if (parts.size() > next && (version_number(parts[next]) >= 0 || parts[next] == "tip")) out.version = parts[next++];
   if (parts.size() > next && parts[next] == "files") ++next;
   out.inside.assign(parts.begin() + static_cast<std::ptrdiff_t>(next), parts.end());
   return out;
+}
+
+std::string folded_name(std::string_view name) {
+  std::string folded = small_letters(name);
+  std::replace(folded.begin(), folded.end(), '_', ' ');
+  return folded;
 }
 
 std::string model_name(std::string_view uri) {
@@ -44,8 +43,7 @@ std::string model_name(std::string_view uri) {
   while (uri.find('/') != std::string_view::npos &&
          (last() == "tip" || last().find_first_not_of("0123456789") == std::string_view::npos))
     uri.remove_suffix(last().size() + 1);
-  std::string name(uri.substr(uri.find_last_of('/') + 1));
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c == '_' ? ' ' : c;
+  std::string name = folded_name(last());
   for (std::size_t at = 0; (at = name.find("%20")) != std::string::npos;) name.replace(at, 3, " ");
   return name;
 }

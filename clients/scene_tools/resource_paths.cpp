@@ -40,24 +40,17 @@ std::vector<fs::path> versions_in(const fs::path& folder) {
   return found;
 }
 
-/// In small letters, and with a blank for "_".
-std::string folded(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c == '_' ? ' ' : c;
-  return out;
-}
-
-/// Looks for the exact name, then compares folded names: Gazebo stores downloads in small letters, and folders in repositories
-/// are often named sand_bed for the model "Sand Bed" on Fuel.
+/// Looks for the exact name, then compares folded names.
 fs::path child_of(const fs::path& folder, const std::string& name) {
   std::error_code error;
   if (name.empty() || name == "." || name == "..") return {};
   if (fs::exists(folder / name, error)) return folder / name;
+  const std::string wanted = folded_name(name);
   int seen = 0;
   fs::path first;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (++seen > most_looked_at) break;
-    if (folded(entry.path().filename().string()) == folded(name) && (first.empty() || entry.path() < first)) first = entry.path();
+    if (folded_name(entry.path().filename().string()) == wanted && (first.empty() || entry.path() < first)) first = entry.path();
   }
   return first;
 }

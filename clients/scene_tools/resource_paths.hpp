@@ -25,6 +25,10 @@ std::optional<FuelAddress> fuel_address(std::string_view address);
 /// Returns the number if the whole text is one, else -1.
 int version_number(std::string_view text);
 
+/// Returns the name in small letters, with a blank for "_". Names of models are compared in this form, because Gazebo stores
+/// downloads in small letters, and repositories often name the folder of the model "Sand Bed" sand_bed.
+std::string folded_name(std::string_view name);
+
 /// Returns the name of a model in small letters: "coast water" for ".../models/Coast%20Water/2".
 std::string model_name(std::string_view uri);
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "core/base/letters.hpp"
 #include "core/scene/files/mesh_steps.hpp"
 
 namespace sonar::scene_tools {
@@ -33,9 +34,8 @@ std::string yaml_text(std::string_view text) {
     return is_letter(c) || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '/' || c == '.';
   };
   static const std::set<std::string> words{"true", "false", "yes", "no", "on", "off", "null", "y", "n", "inf", "nan"};
-  std::string low(text);
-  for (char& c : low) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c | 32) : c;
-  if (!text.empty() && is_letter(text[0]) && std::all_of(text.begin(), text.end(), is_plain) && !words.contains(low))
+  if (!text.empty() && is_letter(text[0]) && std::all_of(text.begin(), text.end(), is_plain) &&
+      !words.contains(small_letters(text)))
     return std::string(text);
   std::string out = "\"";
   for (const char c : text) {

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string_view>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/letters.hpp"
 #include "core/text/format.hpp"
 #include "daemon/commands/dataset/shards.hpp"
 #include "daemon/commands/options/sonar_version.hpp"
@@ -27,8 +27,7 @@ std::string license_lines(const std::string& license) {
       "cc0-1.0",    "cc-by-4.0",    "cc-by-sa-4.0", "cc-by-nc-4.0", "cc-by-nd-4.0", "cc-by-nc-sa-4.0", "cc-by-nc-nd-4.0", "mit",
       "apache-2.0", "bsd-3-clause", "gpl-3.0",      "odbl",         "pddl",         "unlicense"};
   if (license == "not stated") return "license: unknown\n";
-  std::string small = license;
-  std::ranges::transform(small, small.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string small = small_letters(license);
   if (std::ranges::find(known, small) != known.end()) return "license: " + small + "\n";
   return "license: other\nlicense_name: " + quoted(license) + "\n";
 }
