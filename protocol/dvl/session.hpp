@@ -46,7 +46,7 @@ class Session : public protocol::Dialogue {
   Settings settings_after(const protocol::Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
-  /// Carries out a command, and adds the resulting events. Returns nullopt if there is no such command.
+  /// Executes a command and adds its events. Returns nullopt if the command is unknown.
   std::optional<Outcome> execute(const std::string& command, const Json& parameters, Time now, protocol::Reaction& reaction);
 
  private:

@@ -203,7 +203,7 @@ std::string MavlinkPoses::missing_inputs(Time now) const {
                         (settings_.origin ? "" : " with world.origin or depth alone") + "; of a submarine also VFR_HUD)");
     if (!local && !global && receives(VfrHud::id, now))
       missing.emplace_back(
-          "VFR_HUD gives a depth only if HEARTBEAT says that the vehicle is a submarine, and behind a message with time_boot_ms");
+          "VFR_HUD gives a depth only if HEARTBEAT says that the vehicle is a submarine, and after a message with time_boot_ms");
     missing.emplace_back(settings_.request_rates
                              ? "requested (request_rates) but not received"
                              : "set its stream rates (ArduPilot: SR0_POSITION, SR0_EXTRA1), or request_rates: true");

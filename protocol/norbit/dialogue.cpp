@@ -49,7 +49,7 @@ constexpr std::array<Command, 6> commands{{
      [](Settings& s, const std::vector<double>& a) { s.sound_mps = a[0]; }, 1, "m/s, -1: measured"},
 }};
 
-/// Returns the values of a command that never change, or can only be read; empty if there is no such command.
+/// Returns the constant or read-only values of a command; empty if the command is unknown or has none.
 std::string fixed_values(std::string_view name, const DeviceState& device) {
   const int mode = mode_of(*device.model);
   if (name == "set_mode" || name == "set_flip") return std::to_string(mode);

@@ -344,7 +344,7 @@ class Page(PageChecks, unittest.TestCase):
         self.assertEqual(page.run("[...new Set(window.outside)]"), [])
 
     def test_the_browser_draws_changes_in_each_corner(self):
-        """It skips frames that change only what lies outside of its window. Clicks there would seem slow."""
+        """The browser draws no frame if only pixels outside its window change, so a click there would seem slow."""
         page = self.opened(self.browser.open("about:blank", 1600, 1000))
         events = []
         page.note = lambda word: events.append(word)

@@ -1,8 +1,8 @@
 // Serves a recording as the recorded sonar would: sends the messages byte for byte over TCP, to one client at a time, and status
 // datagrams. A sonar that sends pings on request answers its host, and sends pings once the host requests them: an ARIS as
 // datagrams to the receivers that its controller sets, a Sonar 3D-15 as datagrams to the receivers that were set over HTTP, as if
-// one client stayed connected. There is no scene and no engine. RequestedReplay serves the sonars whose hosts decide which pings
-// they get.
+// one client stayed connected. It uses no scene and no engine. RequestedReplay serves the sonars whose hosts select the
+// pings.
 #pragma once
 
 #include <functional>

@@ -15,7 +15,7 @@ from websocket import TEXT, WebSocket
 
 KEY_NUMBERS = {"Backspace": 8, "Home": 36, "ArrowLeft": 37, "ArrowRight": 39, "Tab": 9, "Enter": 13, "Escape": 27, "ArrowUp": 38, "ArrowDown": 40}
 
-WINDOW = "1640,1100"  # larger than all pages of the tests: frames that change only what lies outside of it are not drawn
+WINDOW = "1640,1100"  # larger than all pages of the tests, because the browser draws no frame if only pixels outside change
 
 
 def program():
