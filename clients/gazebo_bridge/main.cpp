@@ -1,5 +1,5 @@
 // gazebo_bridge: follows models of a Gazebo world and sends their poses to sonard, as JSON over UDP.
-// Built with SONAR_GAZEBO where Ignition Transport 11 is installed. model_poses.hpp converts the messages.
+// It is built with SONAR_GAZEBO where Ignition Transport 11 is installed. model_poses.hpp converts the messages.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>

@@ -29,7 +29,7 @@ inline Result<FollowedModel> parse_followed(const std::string& text) {
   return followed;
 }
 
-/// The line of a pose, in ENU and FLU axes, with the simulation's time; nullopt if the pose is not finite or not a rotation.
+/// Returns the line of a pose, in ENU and FLU axes, with the simulation's time; nullopt if it is not finite or not a rotation.
 inline std::optional<std::string> json_line(const Pose& body_in_world, std::int64_t stamp_ns, const std::string& vehicle) {
   const Vec3d& p = body_in_world.position_m;
   const Quatd& q = body_in_world.orientation;
@@ -43,9 +43,9 @@ inline std::optional<std::string> json_line(const Pose& body_in_world, std::int6
   return line.dump() + "\n";
 }
 
-/// The lines of one message; `Message` is ignition.msgs.Pose_V, or a type with the same members. If several poses have one name,
-/// the first is used: models precede their links, whose poses are relative to the model. Skips a repeated time: Gazebo repeats
-/// the last message while paused.
+/// Returns the lines of one message; `Message` is ignition.msgs.Pose_V, or a type with the same members. If several poses have
+/// one name, the first is used: models precede their links, whose poses are relative to the model. Skips a repeated time: Gazebo
+/// repeats the last message while paused.
 template <class Message>
 std::vector<std::string> lines_from(const Message& message, std::vector<FollowedModel>& followed) {
   std::vector<std::string> lines;

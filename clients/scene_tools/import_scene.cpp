@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Names of the materials that every scene has.
+/// Returns the names of the materials that every scene has.
 std::set<std::string> material_names() {
   std::set<std::string> names;
   if (const auto library = text::parse_yaml(material_library_yaml, "materials.yaml"))

@@ -34,20 +34,20 @@ struct Imported {
 /// on disk, so that the user can inspect it.
 Result<Imported> import_scene(const ImportOptions& options);
 
-// The functions below describe the content of a scene file in numbers that its author can check. `sonarctl scene info` prints
-// them, and `sonarctl scene check` uses them. The loader is that of the daemon.
+// The declarations below describe the content of a scene file in numbers that its author can check. `sonarctl scene info` prints
+// the numbers, and `sonarctl scene check` uses them. The loader is that of the daemon.
 
 // Numbers, lengths and sizes of a scene as text. Only the scene tools use these functions.
 
-/// 139000 -> "139 000"
+/// Returns "139 000" for 139000.
 std::string grouped(std::size_t number);
-/// Three significant digits: "12.3 m", "4.5 mm".
+/// Returns three significant digits, such as "12.3 m" or "4.5 mm".
 std::string length_text(double length_m);
-/// "12.3 x 4 x 0.5"
+/// Returns "12.3 x 4 x 0.5".
 std::string size_text(Vec3d size_m);
-/// "(1, -2.5, 0)"
+/// Returns "(1, -2.5, 0)".
 std::string place_text(Vec3d place_m);
-/// "3.2 MB"
+/// Returns "3.2 MB".
 std::string bytes_text(std::size_t bytes);
 
 struct DescribedObject {
@@ -68,7 +68,7 @@ struct DescribedMaterial {
 
 struct SceneDescription {
   std::string name;
-  std::vector<DescribedObject> objects;  // points among them
+  std::vector<DescribedObject> objects;  // including points
   std::vector<DescribedMaterial> materials;
   std::vector<std::string> unused_materials;  // unused ones among the scene's own materials
   std::vector<std::string> moving;
@@ -77,10 +77,10 @@ struct SceneDescription {
   bool sea_surface = false;
   double volume_db = -200;
   Extent in_world;
-  std::vector<std::string> notes;  // the loader's
+  std::vector<std::string> notes;  // notes of the loader
 };
 
-/// Its errors are those of the daemon. `file` may also name a built-in scene.
+/// Loads a scene and describes it. Errors are those of the daemon. `file` may also name a built-in scene.
 Result<SceneDescription> describe_scene(const std::filesystem::path& file);
 
 /// Remarks on a valid scene for its author.
@@ -90,9 +90,9 @@ struct Remarks {
 };
 Remarks remarks_on(const SceneDescription& scene);
 
-/// "ok: 12 objects (2 moving), 5 materials, 139 000 triangles, 3.2 MB of meshes, x -20..20 y -20..20 z -10..0 m"
+/// Returns "12 objects (2 moving), 5 materials, 139 000 triangles, 3.2 MB of meshes, x -20..20, y -20..20, z -10..0 m".
 std::string summary_of(const SceneDescription& scene);
-/// The tables of `info`, and the same as JSON.
+/// Return what `info` prints, as tables and as JSON.
 std::string table_of(const SceneDescription& scene);
 std::string json_of(const SceneDescription& scene);
 

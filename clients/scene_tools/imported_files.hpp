@@ -1,6 +1,6 @@
 // Finds the mesh and heightmap files that an imported world names, and tests whether the scene's loader can read them. A scene
-// file has whole meshes with one positive scale, so parts of files and meshes with other scales are written again. import_scene
-// uses this class.
+// file has whole meshes with one positive scale, so parts of files and meshes with other scales are converted to new files.
+// import_scene uses this class.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // The content of a Gazebo or URDF file that a scene can hold: shapes placed in the world, and their models.
-// Filled by read_world, completed by import_scene (files found, materials chosen), written by scene_text.
+// read_world fills it, import_scene completes it (finds files, chooses materials), and scene_text writes it.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +28,7 @@ struct PlacedShape {
   Shape shape;
   Pose in_world;
   std::size_t model = 0;              // index into ImportedWorld::models
-  std::string link = {}, label = {};  // names of the visual or collision
+  std::string link = {}, label = {};  // names of the link, and of its visual or collision
   std::string material = {};  // before import_scene: name of the appearance in the file; after it: a material of the scene
   Place at = {};
 };

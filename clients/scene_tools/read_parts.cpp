@@ -57,7 +57,7 @@ class GeometryReader {
   std::string why_not_;
 };
 
-/// The shortest rotation from z to `direction`.
+/// Returns the shortest rotation from z to `direction`.
 Quatd turned_to(Vec3d direction) {
   const Vec3d n = (1 / length(direction)) * direction;
   if (n.z < -1 + 1e-12) return {0, 1, 0, 0};

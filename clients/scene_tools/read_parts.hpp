@@ -1,4 +1,4 @@
-// The parts that SDF and URDF share: geometry, and adding it to the world. Only the readers use it.
+// Functions that the readers of SDF and URDF share: they read geometry and add shapes to the world.
 #pragma once
 
 #include <optional>
@@ -18,7 +18,7 @@ std::optional<Shape> read_geometry(const Element& geometry, Findings& findings, 
 /// Adds a shape; more than max_shapes are an error.
 void add_shape(ImportedWorld& world, PlacedShape shape, Findings& findings);
 
-/// The name of an element in the list of omissions, such as: sensor "camera".
+/// Returns the name of an element for the list of omissions, such as: sensor "camera".
 std::string called(const Element& element);
 
 Result<ImportedWorld> read_sdf(std::shared_ptr<const XmlFile> file, const Library& library, const ReadOptions& options,

@@ -13,7 +13,7 @@ bool is_one_of(std::string_view name, std::span<const std::string_view> names) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-// Elements without shapes, which do not affect a sonar image.
+// Elements that are not listed as left out: they do not affect a sonar image, or are read elsewhere.
 constexpr std::array<std::string_view, 12> quiet_in_world{
     "physics", "scene", "gravity", "magnetic_field", "atmosphere", "wind", "audio", "gui", "name", "joint", "frame", "include"};
 constexpr std::array<std::string_view, 9> quiet_in_model{

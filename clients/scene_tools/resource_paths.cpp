@@ -60,7 +60,7 @@ fs::path descendant_of(fs::path folder, const fs::path& wanted) {
   return folder;
 }
 
-/// "1.10" is later than "1.9".
+/// Parses a version, so that "1.10" is later than "1.9".
 std::pair<int, int> sdf_version(std::string_view text) {
   const std::size_t dot = std::min(text.find('.'), text.size());
   return {version_number(text.substr(0, dot)), dot < text.size() ? version_number(text.substr(dot + 1)) : 0};
@@ -92,7 +92,7 @@ bool is_package(const fs::path& folder, std::string_view name) {
   return file && (*file)->root().child("name").text() == name;
 }
 
-/// The file itself, or the model in a folder, or the newest version in the folder; if a version is given (not -1), only that one.
+/// Returns the file itself, the model in a folder, or the newest version in the folder; only version `named` unless it is -1.
 fs::path file_at(const fs::path& place, int named = -1) {
   if (!is_folder(place)) return is_file(place) ? place : fs::path();
   if (fs::path model = model_in(place); !model.empty()) return model;
@@ -168,7 +168,7 @@ fs::path find_in_packages(const fs::path& wanted, const std::vector<fs::path>& f
   return {};
 }
 
-/// The folders in an environment variable, separated by colons.
+/// Returns the folders in an environment variable, which colons separate.
 std::vector<fs::path> folders_of(const char* variable) {
   std::vector<fs::path> folders;
   const char* value = std::getenv(variable);
@@ -181,7 +181,7 @@ std::vector<fs::path> folders_of(const char* variable) {
   return folders;
 }
 
-/// The folders in which both generations of Gazebo keep downloads.
+/// Returns the folders in which both generations of Gazebo keep downloads.
 std::vector<fs::path> fuel_caches() {
   std::vector<fs::path> caches;
   for (const char* variable : {"GZ_FUEL_CACHE_PATH", "IGN_FUEL_CACHE_PATH"})

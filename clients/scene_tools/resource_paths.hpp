@@ -32,25 +32,25 @@ std::string folded_name(std::string_view name);
 /// Returns the name of a model in small letters: "coast water" for ".../models/Coast%20Water/2".
 std::string model_name(std::string_view uri);
 
-/// The shell command that fetches the model of this address, or the model with the file of this address. Empty for addresses
-/// without a server, and for those that a shell could read as something else.
+/// Returns the shell command that fetches the model of this address, or the model with the file of this address. Returns an empty
+/// text for addresses without a server, and for those with characters that a shell could interpret.
 std::string fetch_command(std::string_view uri);
 
-/// Folders to search, in this order: `given`, then those of GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH, IGN_GAZEBO_RESOURCE_PATH
-/// and, for packages, ROS_PACKAGE_PATH; last ~/.gazebo/models.
+/// Returns the folders to search, in this order: `given`, those of GZ_SIM_RESOURCE_PATH, GAZEBO_MODEL_PATH,
+/// IGN_GAZEBO_RESOURCE_PATH, ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and ~/.gazebo/models.
 std::vector<std::filesystem::path> resource_folders(const std::vector<std::filesystem::path>& given);
 
 /// Finds the file that `uri` names in `from_file`; returns an empty path if there is none. It searches the folders, the folder
-/// of `from_file`, and up to eight levels above it. For a Fuel address it first searches GZ_FUEL_CACHE_PATH,
+/// of `from_file`, and seven levels above it. For a Fuel address it first searches GZ_FUEL_CACHE_PATH,
 /// IGN_FUEL_CACHE_PATH, ~/.gz/fuel and ~/.ignition/fuel. For a folder it returns the SDF that model.config names, or model.sdf,
 /// of the newest version.
 std::filesystem::path find_resource(std::string_view uri, const std::filesystem::path& from_file,
                                     const std::vector<std::filesystem::path>& folders);
 
-/// Reads at most max_xml_bytes of a file.
+/// Reads a file. Errors: more than max_xml_bytes, or not readable.
 Result<std::string> read_text(const std::filesystem::path& path);
 
-/// File access for the readers.
+/// Returns the file access for the readers.
 Library library_on_disk(const std::vector<std::filesystem::path>& given);
 
 }  // namespace sonar::scene_tools

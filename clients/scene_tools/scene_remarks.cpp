@@ -8,8 +8,8 @@ namespace {
 
 constexpr double far_m = 1000, tiny_m = 0.005, wide_m = 5;
 constexpr double tiny_ground_m = 1, steepest_ground = 10;  // width of the ground; its height over its width
-constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // the same limits for mesh ground, of any length
-constexpr double at_surface_m = 0.001;                     // a height that is rounded to 0
+constexpr double flat_ground = 0.1, huge_ground_m = 5000;  // flat meshes, such as ground: height over width; longest length
+constexpr double at_surface_m = 0.001;                     // heights up to this count as 0
 constexpr std::size_t many_triangles = 2'000'000;
 
 std::string list_of(const std::vector<std::string>& names) {

@@ -15,7 +15,7 @@ constexpr std::size_t most_models = 4096, most_elements = 5'000'000;
 
 bool is_true(std::string_view text) { return text == "true" || text == "1"; }
 
-/// Returns the kind of a well-known model that has no echo, which is omitted even if it is found. Empty for all others.
+/// Returns the kind of a well-known model that has no echo, which is omitted even if it is found; empty for all others.
 std::string known_kind_without_echo(std::string_view name) {
   if (name == "sun") return "light";
   if (name == "sky" || name == "skybox") return "sky";
@@ -24,7 +24,7 @@ std::string known_kind_without_echo(std::string_view name) {
   return {};
 }
 
-/// Returns the kind of a model that was not found and probably has no echo. Empty for all others.
+/// Returns the kind of a model that was not found and probably has no echo; empty for all others.
 std::string probable_kind_without_echo(std::string_view name) {
   if (name == "axes" || name.ends_with(" frame")) return "coordinate frame";
   return name == "ocean" ? "drawn water surface" : "";
@@ -231,8 +231,8 @@ std::string nearest_frame(const SdfModel& model, const std::string& name) {
   return text::suggestion(name, views, "there are");
 }
 
-/// Returns the model that has a frame of that name: this one, or one that was merged into it, perhaps through others. Null if
-/// none has it.
+/// Returns the model that has a frame of that name: this one, or one that was merged into it, perhaps through others. Returns
+/// null if none has it.
 SdfModel* holder_of(SdfModel& model, const std::string& name) {
   if (model.frames.contains(name)) return &model;
   const auto found = std::find_if(model.nested.begin(), model.nested.end(),

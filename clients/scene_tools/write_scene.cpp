@@ -27,7 +27,7 @@ std::string precise(double v) {
 }
 std::string triple(Vec3d v) { return std::string("[") + number(v.x) + ", " + number(v.y) + ", " + number(v.z) + "]"; }
 
-/// A YAML scalar that parses to this text: without quotes where that is safe, else in double quotes.
+/// Returns a YAML scalar that parses to this text: without quotes where that is safe, else in double quotes.
 std::string yaml_text(std::string_view text) {
   const auto is_letter = [](char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; };
   const auto is_plain = [&](char c) {
@@ -96,7 +96,7 @@ class SceneWriter {
     if (left_out.size() > most) comment(std::string("  and ") + std::to_string(left_out.size() - most) + " more");
   }
 
-  /// Index of the innermost moving model that is m or contains m; the number of models if there is none.
+  /// Returns the index of the innermost moving model that is m or contains m; the number of models if there is none.
   std::size_t carrier_of(std::size_t m) const {
     std::size_t best = world_.models.size(), length = 0;
     for (const auto& [c, unused] : carriers_) {
@@ -129,7 +129,7 @@ class SceneWriter {
     return length(in_model.position_m) < 1e-9 && std::abs(std::abs(in_model.orientation.w) - 1) < 1e-12;
   }
 
-  /// Poses address a body by the name of an object. This object is invisible, so it has no echo.
+  /// Writes an invisible object without an echo, because poses address a body by the name of an object.
   void write_carrier(std::size_t m) {
     out_ += std::string("  - {name: ") + yaml_text(carriers_[m].name) +
             ", type: sphere, radius_m: 0.01, segments: 8, material: plastic, visible: false, "

@@ -11,7 +11,7 @@ namespace sonar::scene_tools {
 struct WriteOptions {
   std::vector<std::string> moving;  // paths of models; models attached to them move with them
   Vec3d offset_m = {};              // added to every position
-  std::string command;              // the command that made the scene, for the first comment
+  std::string command;              // name of the source file, for the first comment
 };
 
 /// Returns the paths in `moving` that no model has.

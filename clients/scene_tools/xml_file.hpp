@@ -24,7 +24,7 @@ namespace sonar::scene_tools {
 
 struct XmlFile;
 
-/// A line of a file, for errors (`file`) and for the comments of a written scene (`short_name`).
+/// A line of a file, for errors (text()) and for the comments of a written scene (short_text()).
 struct Place {
   const XmlFile* in = nullptr;
   int line = 0;
@@ -73,8 +73,8 @@ class Findings {
   void leave_out(const Place& at, const std::string& what);  // lists each place and sentence once
   /// Counts an omitted element, such as a "light". The names of models, if any, are listed with the count.
   void leave_out_of_no_echo(const std::string& kind, std::string_view name = {});
-  /// Lists what the file names and is not found, once, with the number of times. `fetch`: the command that gets it; may be empty.
-  /// Names that the same command gets are listed once.
+  /// Lists a file that is named but not found, once, with the number of times. `fetch`: the command that fetches it; may be
+  /// empty. Files that the same command fetches are listed once.
   void leave_out_missing(const Place& at, const std::string& what, const std::string& fetch, std::size_t times = 1);
   bool failed() const { return error_.has_value(); }
   const std::optional<Error>& error() const { return error_; }

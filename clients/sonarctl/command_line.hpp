@@ -1,4 +1,4 @@
-// For each command, a function that adds its options to the parser and returns the function that executes it. run() lists them.
+// Each command has a function here that adds its options to the parser and returns a function that executes it.
 #pragma once
 
 #include <cstdint>
@@ -71,7 +71,7 @@ struct SettingArguments {
   protocol::SettingsOverride settings;
   std::map<std::string, std::string> more;  // options that only some makes have
 
-  /// The command must outlive this object.
+  /// This object must exist until the command line is parsed.
   void add_to(CLI::App& app);
   /// Returns the options that the user gave.
   protocol::Wanted wanted() const;

@@ -20,9 +20,9 @@ namespace sonar::clients {
 struct SourceOptions {
   Endpoint device{"127.0.0.2", 0};  // port 0: the make's port
   const Make* make = nullptr;       // null: that of the port, or the first make that answers at the host of `device`
-  bool discover = false;            // take the device from its status broadcast
+  bool discover = false;            // use the address in the status broadcast of the device
   std::filesystem::path recording;  // instead of a device
-  std::string sonar;                // selects one of several in a recording
+  std::string sonar;                // selects one of several sonars in a recording
   Wanted wanted;
   double connect_patience_s = 2;
   double silence_limit_s = 10;  // limit of the time without a byte
@@ -75,8 +75,8 @@ struct PoseOptions {
   bool confirm = false;                            // sends over the TCP control stream, where the daemon answers each pose
   std::filesystem::path token_file;                // for a control stream that requires one
   control::Frame frame = control::Frame::enu_flu;  // frame of the positions and angles below, and of the sent poses
-  std::string vehicle, object;                     // at most one of them; both empty = the only vehicle. Objects use TCP
-  double rate_hz = 20, seconds = 0;                // seconds 0 = one turn, or one line
+  std::string vehicle, object;                     // at most one is set; none = the only vehicle. Poses of objects use TCP
+  double rate_hz = 20, seconds = 0;                // seconds = 0: one pose, one turn or one line
   std::vector<double> position_m{0, 0, 0}, rpy_deg{0, 0, 0};  // for "once"
   std::vector<double> centre_m{0, 0, 0};                      // for "circle"
   double radius_m = 5, period_s = 60;

@@ -11,7 +11,7 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// UNIX time by the computer's clock at construction, and the steady clock since then.
+/// Computes UNIX time from the computer's clock at construction and the steady clock since then.
 class UnixTime {
  public:
   Time now() const { return began_at_ + (std::chrono::steady_clock::now() - began_); }

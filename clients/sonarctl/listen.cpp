@@ -12,7 +12,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Time until the end of the run or of the permitted silence; short enough to react to Ctrl-C.
+/// Returns the time until the end of the run or of the permitted silence, at most 0.5 s, so that Ctrl-C is noticed soon.
 std::chrono::milliseconds patience(const ListenOptions& options, double elapsed_s, double left_s) {
   if (options.seconds > 0) left_s = std::min(left_s, options.seconds - elapsed_s);
   return milliseconds_from(std::clamp(left_s, 0.0, 0.5));
@@ -34,7 +34,7 @@ class Listener {
   }
 
   PingSummary summary() const { return log_.summary(counts()); }
-  /// True if settings were sent that pings echo.
+  /// True if pings echo the sent settings.
   bool asked() const { return asked_; }
   std::string_view rate_unit() const { return rate_unit_; }
   const std::optional<HostPing>& last_ping() const { return last_ping_; }
@@ -85,7 +85,7 @@ class Listener {
     return {};
   }
 
-  /// Counts of all connections so far, reconnections included.
+  /// Returns the summed counts of all connections so far.
   std::optional<protocol::Host::Counts> counts() const {
     if (!opened_) return before_;
     auto all = opened_->stream.host().counts();

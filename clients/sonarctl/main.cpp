@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   sigaction(SIGTERM, &on_interrupt, nullptr);
   struct sigaction on_hangup {};
   sigaction(SIGHUP, nullptr, &on_hangup);
-  if (on_hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &on_interrupt, nullptr);  // nohup ignores it
+  if (on_hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &on_interrupt, nullptr);  // nohup makes it ignored
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a write beyond the limit of file sizes (ulimit -f) fails, and does not end the program
   sonar::open_closed_standard_streams();

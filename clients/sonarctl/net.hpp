@@ -28,8 +28,8 @@ Result<Endpoint> parse_endpoint(const std::string& text, const Endpoint& fallbac
 using Lookup = std::function<Result<in_addr>(const std::string& host)>;
 /// Looks up a name in the hosts file and by DNS, which may take many seconds and ignores signals. Error usage: no address.
 Result<in_addr> look_up(const std::string& host);
-/// The first IPv4 address of a host. A name is looked up in a thread, which is abandoned when `interrupted` is set; if
-/// none can be started, in this one. Errors: usage (no address), io (interrupted).
+/// Returns the first IPv4 address of a host. A name is looked up in another thread, which is abandoned when `interrupted` is set,
+/// or in this one if no thread can be started. Errors: usage (no address), io (interrupted).
 Result<sockaddr_in> resolve(const Endpoint& endpoint, const Lookup& lookup = look_up);
 
 /// Owns a file descriptor.
@@ -48,17 +48,17 @@ class Socket {
   int fd_ = -1;
 };
 
-/// The address of one end of a socket; port 0 if it has none.
+/// Return the address of our end, or of the other end, of a socket; port 0 if that end has none.
 sockaddr_in own_address(const Socket& socket);
 sockaddr_in peer_address(const Socket& socket);
 
 /// Retries until `patience` is over, because the daemon may still be starting.
 Result<Socket> connect_tcp(const Endpoint& to, std::chrono::milliseconds patience);
-/// Tries several addresses in turn. Returns the socket of the first that accepts, and its index.
 struct Connected {
   Socket socket;
-  std::size_t which = 0;
+  std::size_t which = 0;  // index of the address
 };
+/// Tries several addresses in turn. Returns the first that accepts.
 Result<Connected> connect_first(const std::vector<Endpoint>& places, std::chrono::milliseconds patience);
 Result<Socket> connect_udp(const Endpoint& to);
 /// Binds with address reuse, so that other listeners on this computer still receive broadcasts.
@@ -85,10 +85,10 @@ Datagram receive_from(const Socket& socket, std::span<std::byte> into, std::chro
 bool ends_without_a_byte(const Socket& socket, std::span<const int> others, std::chrono::milliseconds patience);
 Result<void> write_all(const Socket& socket, std::span<const std::byte> bytes);
 
-/// Ctrl-C and SIGTERM set it. Commands then end as at a time-out and make no connections.
+/// Ctrl-C, SIGTERM and SIGHUP set it. Commands then end as at a time-out and make no connections.
 extern std::atomic<int> interrupted;
 static_assert(std::atomic<int>::is_always_lock_free, "handlers of signals set it");
-/// Waits are cut into steps of this length: a signal that comes between a check of `interrupted` and the wait is noticed soon.
+/// Waits are cut into steps of this length, so that a signal between a check of `interrupted` and the wait is noticed soon.
 constexpr std::chrono::milliseconds longest_step{100};
 
 /// The answer to one request over HTTP.

@@ -23,8 +23,8 @@ struct PingSummary {
   std::uint64_t pings = 0, bytes = 0, identity_errors = 0;
   std::optional<protocol::Host::Counts> of_wire;   // nullopt: the protocol does not number messages
   std::optional<std::uint64_t> echo_satisfied_at;  // number of the first ping with the requested settings, from 1; nullopt =
-                                                   // none, or nothing was requested
-  std::uint64_t echo_lost = 0;                     // pings after that one whose echo differed
+                                                   // none; 1 if nothing was requested
+  std::uint64_t echo_lost = 0;                     // later pings whose echo differed
   std::vector<std::string> limited;                // HostPing::limited of the last ping with the requested settings
   double rate_hz = 0;
   double interval_p50_ms = 0, interval_p99_ms = 0, interval_max_ms = 0;
@@ -46,7 +46,7 @@ class PingLog {
 class NoticeLog {
  public:
   std::vector<std::string> kept(const std::vector<std::string>& notices);
-  /// Call it at the end. For each kind of which some notices were not kept, it returns the last one, with their number.
+  /// Call it at the end. Returns the last notice of each kind, with the number of notices of the kind, unless it was kept.
   std::vector<std::string> rest() const;
 
  private:
@@ -58,13 +58,13 @@ class NoticeLog {
   std::map<std::string, Kind> kinds_;  // by text without digits
 };
 
-/// The value below which the fraction `share` (0..1) of the values lies; 0 if there are none.
+/// Returns the value below which the fraction `share` (0..1) of the values lies; 0 if there are none.
 double percentile(std::vector<double> values, double share);
 
 /// Describes the faults of the stream that a driver would notice; empty = none.
 std::vector<std::string> complaints(const PingSummary& summary, bool asked);
 
-std::string line_from(const HostPing& ping);  // returns one line per ping
+std::string line_from(const HostPing& ping);  // one line, and one for each error or difference of the echo
 /// `rate_unit`: that of the sonar's make.
 std::string text_from(const PingSummary& summary, bool asked, std::string_view rate_unit);
 std::string json_from(const HostPing& ping, Seconds at);

@@ -26,13 +26,13 @@ using Kind = protocol::HostPort::Kind;
 constexpr auto probe_patience = 300ms;         // for each make, while the make is unknown
 constexpr auto answer_patience = 3000ms;       // minimum once a sonar has answered, because it may be computing
 constexpr auto connect_patience = 2000ms;      // for streams, before other kinds of ports are tried
-constexpr auto probe_after = 500ms;            // without a datagram; sonard takes longer to start again
+constexpr auto probe_after = 500ms;            // without a datagram; a restart of sonard takes longer
 constexpr auto longest_pause = 160ms;          // between attempts
 constexpr auto leave_patience = 1000ms;        // for the sonar to close the connection too
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
 
-/// The time in the form that hosts expect.
+/// Returns the time in the form that hosts expect.
 Time now() { return Time(std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch())); }
 
 milliseconds left_until(Clock::time_point deadline) {
@@ -118,10 +118,10 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
         within = std::max(patience, answer_patience);
       }
       auto stream = searched(candidate, within);
-      if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search, it may be another web server
+      if (is_over(stream) || (by_http && make != nullptr)) return stream;  // in a search, this may be another web server
       if (streams.empty()) failed = stream.error();
     }
-    ::poll(nullptr, 0, static_cast<int>(pause.count()));  // no busy loop: a port that refuses answers at once
+    ::poll(nullptr, 0, static_cast<int>(pause.count()));  // because a port that refuses answers at once
     pause = std::min(2 * pause, longest_pause);
   }
 }
@@ -346,7 +346,7 @@ PingStream::Item PingStream::next(milliseconds patience) {
 
 bool PingStream::is_rejected(milliseconds patience) const {
   if (make_->ports.front().kind != Kind::tcp || has_answered_) return false;
-  std::vector<int> others;  // other ports, which alone have the pings of some sonars
+  std::vector<int> others;  // some sonars send their pings only to these ports
   for (std::size_t port = 1; port < sockets_.size(); ++port)
     if (sockets_[port]) others.push_back(sockets_[port]->fd());
   return ends_without_a_byte(*sockets_.front(), others, patience);
@@ -368,7 +368,7 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (make_->each_ping_requested)  // a recording would begin after the greeting, without which its pings are not readable
     return failure(ErrorKind::usage, "only sonars that send pings without a request are recorded as raw bytes; this is " +
                                          about() + ": sonarctl record keeps the messages of both ends");
-  const int opened = open_to_write(file, O_CREAT);  // a stream would wait for the reader of a pipe
+  const int opened = open_to_write(file, O_CREAT);  // std::ofstream would wait for the reader of a pipe
   const int error = errno;
   if (opened < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(file, error));
   record_.open(file, std::ios::binary | std::ios::trunc);

@@ -40,8 +40,8 @@ class PingStream {
  public:
   /// Connects and opens the conversation. `make`: null = the first make that answers at its usual port. `patience`: for the
   /// connection and for answers. Errors: usage (settings that the sonar does not have), io (closed), unavailable (no answer),
-  /// bad_data (another service). `keeps_messages`: for Item::messages. `rejection`: set if
-  /// the sonar closed the connection before it answered.
+  /// bad_data (another service). `keeps_messages`: fills Item::messages. `rejection`: set if the sonar closed the connection
+  /// before it answered.
   static Result<PingStream> open(const Endpoint& device, const Make* make, const Wanted& wanted,
                                  std::chrono::milliseconds patience, bool keeps_messages = false, Rejection* rejection = nullptr);
   PingStream(PingStream&&) = default;
@@ -49,30 +49,30 @@ class PingStream {
 
   struct Item {
     Wait what = Wait::timed_out;
-    std::optional<HostPing> ping;      // set only with Wait::data; unset: another message
+    std::optional<HostPing> ping;      // set only with Wait::data; unset then: another message
     std::vector<std::string> notices;  // notices of the host
-    /// All messages sent and received up to this ping, if they are kept.
+    /// All messages sent and received since the previous item, if they are kept.
     std::vector<recording::RecordedMessage> messages = {};
     std::string error;
     ErrorKind kind = ErrorKind::io;  // kind of the error
   };
-  /// The next ping or message, or the event that occurred instead within `patience`. Requests a ping if the make requires that.
+  /// Returns the next ping or message, or what happened instead within `patience`. Requests a ping if the make requires that.
   Item next(std::chrono::milliseconds patience);
   /// Waits at most `patience` for the first byte. Returns true if the sonar closes the connection before this byte.
   bool is_rejected(std::chrono::milliseconds patience) const;
   /// Also writes every byte received over TCP to this file. Error usage: the sonar does not send its pings over TCP.
   Result<void> record_to(const std::filesystem::path& file);
 
-  /// The clock of the times of Item::messages.
+  /// Returns the time by the clock of Item::messages.
   Time unix_now() const { return unix_time_.now(); }
   const protocol::Host& host() const { return *host_; }
   const Make& make() const { return *make_; }
   const Endpoint& device() const { return device_; }
-  /// Addresses and ports of its connection and datagrams, for the headers of a capture.
+  /// Returns the addresses and ports of the connection and the datagrams, for the headers of a capture.
   recording::PcapConversation conversation() const;
-  /// "127.0.0.1:41022", our address at the first port; empty for HTTP.
+  /// Returns our address at the first port, such as "127.0.0.1:41022"; empty for HTTP.
   std::string own() const;
-  /// "127.0.0.2:14750, a BlueView P900-90, serial 7001"
+  /// Returns "127.0.0.2:14750, a BlueView P900-90, serial 7001".
   std::string about() const;
 
  private:
@@ -92,24 +92,24 @@ class PingStream {
   /// Returns false if a signal ended the wait.
   bool receive(std::chrono::milliseconds patience);
   void read_port(std::size_t port);
-  /// UDP has no connection whose end would show that a silent sonar has gone, but a closed port refuses a datagram. An empty one
-  /// is not a request, so it does not take the sonar from another driver.
+  /// UDP has no connection whose end would show that a silent sonar has gone, but a closed port refuses a datagram. An
+  /// empty datagram is not a request, so it does not take the sonar from another driver.
   void probe(bool is_silent);
   std::string place() const;  // "tcp 127.0.0.2:14750"
 
   const Make* make_;
   Endpoint device_;
   std::unique_ptr<protocol::Host> host_;
-  std::vector<std::optional<Socket>> sockets_;  // by port; none of kind http
+  std::vector<std::optional<Socket>> sockets_;  // by port; nullopt for HTTP
   std::uint32_t device_ip_ = 0;                 // in network order
   std::chrono::milliseconds answer_patience_{};
-  std::chrono::steady_clock::time_point probe_at_{};  // if no datagram arrives before
+  std::chrono::steady_clock::time_point probe_at_{};  // time of the next probe
   std::deque<Item> items_;                            // items that next() has not returned yet
   std::string limits_;                                // HostPing::limited of the last ping
   std::optional<Error> ended_;                        // set when the conversation has ended; empty text: the sonar closed it
-  bool has_answered_ = false;                         // at the first port
+  bool has_answered_ = false;                         // a byte arrived at the first port
   bool is_turned_away_ = false;                       // the sonar closed the connection before it answered
-  bool is_started_ = false;                           // the host must send what on_leave() returns
+  bool is_started_ = false;                           // the destructor must send what on_leave() returns
   std::ofstream record_;
   bool keeps_ = false;
   std::vector<recording::RecordedMessage> kept_;  // messages since the last item
@@ -119,7 +119,7 @@ class PingStream {
   std::vector<std::byte> chunk_ = std::vector<std::byte>(1 << 16);
 };
 
-/// The result of waiting for the beacon of a device. Only makes whose beacons contain the address for hosts can be waited for.
+/// A device whose beacon discover() received. It waits only for the first make whose beacons contain the address for hosts.
 struct Discovered {
   Endpoint device;
   protocol::Announcement announced;

@@ -71,7 +71,7 @@ PoseSample sample_of(const PoseOptions& options, const Moment& moment, std::uint
   return sample;
 }
 
-/// Uses the keys of ArduPilot's JSON; its frame is the default, so the line does not name it.
+/// Uses the keys of ArduPilot's JSON. Its frame (NED/FRD) is the default, so the line names only the other frame.
 std::string json_line(const PoseSample& sample) {
   const bool ned = sample.sent_in == Frame::ned_frd;
   const Pose pose = ned ? enu_flu_from_ned_frd(sample.pose) : sample.pose;  // the conversion is its own inverse

@@ -1,4 +1,4 @@
-// pose on the command line: once, circle, line.
+// Command line of `sonarctl pose once|circle|line`.
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <memory>

@@ -12,7 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder of the package: share/sonard/python if installed, or clients/python of the source tree around the build folder.
+/// Returns the folder of the package: share/sonard/python if installed, or clients/python of the source tree around the build
+/// folder.
 fs::path package_near(const fs::path& program) {
   for (fs::path folder = program.parent_path(); folder.has_relative_path(); folder = folder.parent_path())
     for (const char* place : {"share/sonard/python", "clients/python"})
@@ -20,7 +21,7 @@ fs::path package_near(const fs::path& program) {
   return {};
 }
 
-/// sonard itself, installed beside sonarctl or in the same build folder.
+/// Returns the path of sonard, installed beside sonarctl or in the same build folder.
 fs::path sonard_near(const fs::path& program) {
   const fs::path folder = program.parent_path();
   for (const fs::path& place : {folder / "sonard", folder.parent_path() / "daemon/sonard"})
@@ -28,7 +29,7 @@ fs::path sonard_near(const fs::path& program) {
   return {};
 }
 
-/// Returns only if there is no such program.
+/// Returns only if the program cannot be executed.
 void execute(std::vector<std::string>& words) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());

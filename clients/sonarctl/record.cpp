@@ -23,7 +23,7 @@ using recording::RecordedMessage;
 
 constexpr int most_status_at_once = 32;
 
-/// The sonard that serves the device, and a subscription to its pings.
+/// Connects to the sonard that serves the device, and subscribes to its pings.
 Result<Served> ask_sonard(const SourceOptions& source, const Make* make, const Endpoint& device) {
   const std::chrono::milliseconds patience = source.control.empty() ? 300ms : ControlOptions().connect_patience;
   auto served = served_at({source.control, source.token_file, patience}, make, device);
@@ -147,7 +147,7 @@ void report(const RecordFiles& files, double seconds) {
               files.sizes().c_str());
 }
 
-/// Opens the socket for the status datagrams of a make that has them. nullopt, with a note, if that fails.
+/// Opens the socket for status datagrams. Returns nullopt if none are to be recorded or, with a note, if that fails.
 std::optional<Socket> listen_to_status(const RecordOptions& options, const Make& make) {
   const protocol::Port* const beacon = make.device->port(protocol::Port::Kind::udp_beacon);
   if (!options.status || beacon == nullptr || (options.pcap.empty() && options.mcap.empty())) return std::nullopt;
@@ -199,7 +199,7 @@ Result<void> record_device(RecordOptions options) {
   return ran ? closed : ran;
 }
 
-/// Makes times of ten messages a second, because raw dumps have no times.
+/// Returns times at intervals of 0.1 s, because raw dumps have no times.
 Time made_up_time(std::uint64_t number) { return Time(number * 100ms); }
 
 Result<void> convert(const RecordOptions& options) {

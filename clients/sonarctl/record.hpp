@@ -32,16 +32,16 @@ struct RecordOptions {
 class RecordFiles {
  public:
   /// Creates all files that the options name. `profile`: that of the sonar; empty: unknown. Errors: io; usage for a kind of file
-  /// that only another make has.
+  /// that cannot hold the messages of the make.
   static Result<RecordFiles> create(const RecordOptions& options, const Make& make,
                                     const recording::PcapConversation& conversation, const std::string& sonar,
                                     const std::string& profile);
 
-  /// Writes to every file. The first failure ends all of them. Errors: io.
+  /// Writes to the files one after the other, until one fails. Errors: io.
   Result<void> write(const recording::RecordedMessage& message);
   /// Counts the ping whose last message was written; its picture goes to the MCAP file, if any.
   Result<void> write_ping(Time at, const HostPing& ping);
-  /// Writes to the MCAP file, if any.
+  /// Writes the pose to the MCAP file, if any.
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
   /// Finishes every file, even after a failure. Returns the first error: io.
   Result<void> close();
@@ -49,7 +49,7 @@ class RecordFiles {
   std::uint64_t pings() const { return pings_; }
   std::uint64_t messages() const { return messages_; }
   std::uint64_t bytes() const { return bytes_; }
-  /// "run.pcap 1.2 MB, run.mcap 3.4 MB"
+  /// Returns "run.pcap 1.2 MB, run.mcap 3.4 MB".
   std::string sizes() const;
 
  private:

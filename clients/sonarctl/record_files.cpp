@@ -9,7 +9,7 @@ namespace sonar::clients {
 
 namespace {
 
-/// The codes of a picture, of 8 or 16 bits.
+/// Converts a picture to codes of 8 or 16 bits.
 recording::Samples samples_of(const PolarImage& image, unsigned bits) {
   const auto codes = std::make_shared<wire::Bytes>();
   const std::uint32_t most = bits == 8 ? 0xFF : 0xFFFF;

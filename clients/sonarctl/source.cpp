@@ -15,12 +15,12 @@ namespace {
 
 /// This many pings with older settings may still arrive after ours were sent.
 constexpr int stale_pings = 4;
-constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot closes at once
+constexpr std::chrono::milliseconds first_byte_within{500};  // a sonar without a free slot disconnects at once
 
 /// False for a destination of the sonar's datagrams.
 bool is_own(const v1::SonarAddress& of) { return of.protocol() != "status" && of.protocol() != "multicast"; }
 
-/// The first address at which the sonar accepts clients.
+/// Returns the first address at which the sonar accepts clients.
 const std::string& own_address(const v1::SonarStatus& s) {
   const auto first = std::ranges::find_if(s.addresses(), is_own);
   return first != s.addresses().end() ? first->address() : s.listens();
@@ -78,7 +78,7 @@ Result<ServedStatus> status_at(const ControlOptions& options, const Make* make, 
   return ServedStatus{*std::move(control), *found.front()};
 }
 
-/// As reported by the sonard that serves the device.
+/// Requests the addresses from the sonard that serves the device.
 Result<Observed> observed_at(const SourceOptions& source, const Endpoint& device) {
   const auto found = status_at({source.control, source.token_file}, source.make, device);
   if (!found) return tl::unexpected(found.error());
@@ -119,7 +119,7 @@ Result<HostPing> fetch_live(const SourceOptions& source, bool of_samples) {
   PictureProgress progress(source.picture_limit_s);
   std::optional<HostPing> last;
   FirstPingWait waits(source, *stream, opened->observes, true);
-  bool received = !stream->host().counts();  // without counts, other messages look like junk
+  bool received = !stream->host().counts();  // without counts, only pings give items
   for (int stale = 0; interrupted == 0;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(give_up - std::chrono::steady_clock::now());
     PingStream::Item item =
@@ -234,8 +234,8 @@ std::chrono::milliseconds milliseconds_from(double s) { return std::chrono::mill
 
 namespace {
 
-/// The reason why a sonar with the requested settings sends nothing; empty if it should send pings. An observer sends no
-/// settings.
+/// Returns the reason why a sonar with the requested settings sends nothing; empty if it should send pings, and for observers,
+/// which send no settings.
 std::string reason_for_silence(const SourceOptions& source, bool observes) {
   const std::optional<double> rate_hz = source.wanted.settings.rate_hz;
   if (!rate_hz || source.wanted.as_it_is || observes) return {};

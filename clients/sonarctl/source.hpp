@@ -19,7 +19,7 @@ Result<void> check_output(const SourceOptions& source, const std::filesystem::pa
 /// Returns the given address, or that of a status broadcast; `say` prints the result.
 Result<Endpoint> find_device(const SourceOptions& source, bool say);
 
-/// Pings of a device: as a client with the requested settings, or as an observer.
+/// A connection to a device, as a client with the requested settings or as an observer.
 struct OpenedStream {
   PingStream stream;
   std::chrono::steady_clock::time_point connected_at;
@@ -30,13 +30,13 @@ struct OpenedStream {
 /// client slot and its sonard reports an address for observers.
 Result<OpenedStream> open_stream(const SourceOptions& source, const Endpoint& device);
 
-/// A sonard, and name and profile of one of its sonars.
+/// A connection to a sonard, and name and profile of one of its sonars.
 struct Served {
   ControlClient control;
   std::string sonar, profile;
 };
-/// The only sonar at the device's address (port 0: any port) of the sonard at `control`. `make`: null = any. Error usage: there
-/// are several; unavailable: there is none.
+/// Finds the only sonar that the sonard at `control` serves at the device's address (port 0: any port). `make`: null = any.
+/// Error usage: there are several; unavailable: there is none.
 Result<Served> served_at(const ControlOptions& control, const Make* make, const Endpoint& device);
 
 /// Calls find_device() and open_stream().
@@ -48,16 +48,16 @@ class Silence {
   /// Keeps a reference to `source`.
   Silence(const SourceOptions& source, const OpenedStream& opened);
   void ends() { since_ = std::chrono::steady_clock::now(); }
-  double left_s() const;  // until the limit; not above 0: is_over() decides
-  /// True after source.silence_limit_s. The time of an observer then begins again if sonard answers that it serves the
-  /// connection, because the sonar may have no client.
+  double left_s() const;  // time until the limit; if it is 0 or less, is_over() decides
+  /// Returns true after source.silence_limit_s. An observer may get no pings because the sonar has no client: if sonard answers
+  /// that it serves the connection, the time begins again.
   bool is_over();
 
  private:
   const SourceOptions& source_;
   bool observes_;
   Endpoint device_;     // as OpenedStream::again
-  std::uint16_t port_;  // that the stream is connected to
+  std::uint16_t port_;  // to which the stream is connected
   std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
 };
 
@@ -68,8 +68,8 @@ class Outage {
 
   void begins();  // no effect during an outage
   void ends() { since_.reset(); }
-  double left_s(const SourceOptions& source) const;  // until source.return_limit_s is over
-  /// When the next attempt may begin. A device that ends each connection at once is tried at most once a second.
+  double left_s(const SourceOptions& source) const;  // time until source.return_limit_s is over
+  /// Returns when the next attempt may begin: at most once a second, also if the device ends each connection at once.
   Clock::time_point next_attempt() { return last_attempt_ = std::max(Clock::now(), last_attempt_ + std::chrono::seconds(1)); }
 
  private:
@@ -85,15 +85,15 @@ Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& dev
 /// Writes to standard error.
 void print_notices(const std::vector<std::string>& notices);
 
-/// The error if the connection was closed (`item`) after `pings` pings. Kind usage: the sonar, or the host, refuses a setting.
+/// Returns the error for a connection that was closed (`item`) after `pings` pings. Kind usage: sonar or host refuse a setting.
 Error closed(const PingStream::Item& item, std::uint64_t pings);
 
-/// The error if `what` did not arrive within source.silence_limit_s. `received`: some message of the make arrived.
+/// Returns the error if `what` did not arrive within source.silence_limit_s. `received`: some message of the make arrived.
 Error silence(const SourceOptions& source, const OpenedStream& opened, bool received, const std::string& what,
               const std::string& hint);
 
-/// Ping `number` (from 0) of a recording; nullopt: the first complete one, else the last. `sonar`: selects one of several.
-/// Returns error usage if there are fewer pings.
+/// Returns ping `number` (from 0) of a recording; nullopt: the first complete ping, else the last. `sonar`: selects one of
+/// several sonars. Error usage: there are fewer pings.
 Result<HostPing> read_ping(const std::filesystem::path& file, std::optional<std::size_t> number, const std::string& sonar = {});
 
 /// Returns read_ping() of a recording, or the first ping of a device with the requested settings. If a picture consists of many

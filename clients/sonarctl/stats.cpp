@@ -9,7 +9,7 @@
 namespace sonar::clients {
 namespace {
 
-/// The lowest saturated code. An Oculus with 8 bits stops at 254.
+/// Returns the lowest saturated code. An Oculus with 8 bits stops at 254.
 float saturation_of(const PingFacts& ping) { return ping.bits == 8 ? 254.0f : std::ldexp(1.0f, static_cast<int>(ping.bits)) - 1; }
 
 nlohmann::json speckle_stats(const PolarImage& image, const Window& w, float saturation) {

@@ -28,7 +28,7 @@ TerminalColours choose_colours(const TerminalFacts& facts);
 struct TerminalSize {
   int columns = 80, lines = 24;
 };
-/// COLUMNS and LINES of the environment, else the terminal's own, else 80 x 24.
+/// Returns COLUMNS and LINES of the environment, else the terminal's own size, else 80 x 24.
 TerminalSize terminal_size();
 
 /// Uses the alternate screen during its lifetime; the destructor restores the previous content and the cursor. If output is not
@@ -55,7 +55,7 @@ class ViewCaption {
   /// `of_wire`: counts of the host after the ping, if it has any.
   void add(const HostPing& ping, const std::optional<protocol::Host::Counts>& of_wire, Seconds at);
   std::uint64_t pings() const { return pings_; }
-  /// "ping 123 10.00 m 2.1 MHz 512 beams x 437 rows 10.0 Hz no gaps"; with the rate from the second ping on.
+  /// Returns "ping 123 10.00 m 2.1 MHz 512 beams x 437 rows 10.0 Hz no gaps"; rate and gaps from the second ping on.
   std::string text() const;
 
  private:

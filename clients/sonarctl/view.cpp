@@ -48,7 +48,7 @@ std::string size_of(const SonarPicture& picture) {
   return picture.column == SonarPicture::Column::none ? points : points + ", " + cells;
 }
 
-/// An empty picture could be mistaken for a failure.
+/// Adds a note to an empty picture, because it could be mistaken for a failure.
 std::string caption_of(std::string text, const SonarPicture& picture) {
   return picture.nothing_detected() ? text + text::format("  nothing detected within %g m", picture.range_m()) : text;
 }
@@ -123,7 +123,7 @@ class LiveView {
  private:
   Result<void> draw(const LiveScreen& screen, bool has_screen) {
     Silence quiet(options_.source, *opened_);
-    bool received = !opened_->stream.host().counts();  // without counts, other messages look like junk
+    bool received = !opened_->stream.host().counts();  // without counts, only pings give items
     while (interrupted == 0 && (options_.pings == 0 || figures_.pings() < options_.pings)) {
       PingStream::Item item = opened_->stream.next(waits_.patience(std::chrono::milliseconds(500)));
       waits_.look(item.ping.has_value());

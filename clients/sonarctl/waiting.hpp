@@ -15,7 +15,7 @@ class FirstPingWait {
   using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds moment{300};
 
-  /// `observes` is true if the command only observes and has requested nothing; it is then patient, unless it `is_limited`.
+  /// `observes`: the command has requested nothing. The line then names no limit of the wait, unless the wait `is_limited`.
   FirstPingWait(const SourceOptions& source, const PingStream& stream, bool observes, bool is_limited = false,
                 Clock::time_point now = Clock::now());
   /// Returns how long to wait: `most`, or less if the line is due before.
@@ -34,7 +34,7 @@ class PictureProgress {
   using Clock = std::chrono::steady_clock;
 
   explicit PictureProgress(double limit_s) : limit_s_(limit_s) {}
-  /// A line to print: with the first ping, then every two seconds. `ping` is not whole.
+  /// Returns a line to print with the first ping, then every two seconds. `ping` is not whole.
   std::optional<std::string> line_at(const HostPing& ping, Clock::time_point now);
   /// True if the time for completing the picture is over.
   bool is_over(Clock::time_point now) const;

@@ -53,10 +53,10 @@ enum Code : int {
   trigger_not_present = 18000,
 };
 
-/// The name of a return code (BVTError_GetName), also for numbers that are not return codes. Returns a name of the SDK's
-/// constants such as "BVT_SUCCESS", and "BVT_UNKNOWN_ERROR" for an unknown number. The pointer is never null and always valid.
+/// Returns the name of a return code (BVTError_GetName): that of the SDK's constant, such as "BVT_SUCCESS", and
+/// "BVT_UNKNOWN_ERROR" for any other number. The pointer is never null and always valid.
 const char* error_name(int code);
-/// The text of a return code (BVTError_GetString). The texts are ours: one sentence with the cause and the remedy.
+/// Returns the text of a return code (BVTError_GetString). The texts are ours.
 const char* error_text(int code);
 
 }  // namespace sonar::bvt

@@ -46,7 +46,7 @@ class ColourMapper {
   Code load(const std::string& path);
   void use(ColourMap map);
 
-  /// Returns bad_parameter if 0 <= bottom < top <= 65535 does not hold, and always in auto mode (verified: the SDK refuses it).
+  /// Returns bad_parameter unless 0 <= bottom < top <= 65535, and always in auto mode (verified: the SDK refuses it).
   Code set_thresholds(int top, int bottom);
   /// Returns bad_parameter unless 0 < gamma <= 100.
   Code set_gamma(float gamma);

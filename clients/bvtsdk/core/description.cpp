@@ -96,7 +96,7 @@ in_addr_t ipv4_of(const sockaddr* address) {
   return in.sin_addr.s_addr;
 }
 
-/// The addresses are in network byte order.
+/// Returns the addresses to which the question is sent, in network byte order.
 std::vector<in_addr_t> addresses_to_ask() {
   std::vector<in_addr_t> out{htonl(INADDR_LOOPBACK), htonl(loopback_broadcast), htonl(INADDR_BROADCAST)};
   ifaddrs* list = nullptr;

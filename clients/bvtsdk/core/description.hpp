@@ -39,7 +39,7 @@ struct SonarDescription {
   bool strict_heads() const { return (capabilities & 1) != 0; }
   /// True for a simulator whose time may stop; silence is then no fault.
   bool may_be_silent() const { return (capabilities & 2) != 0; }
-  /// The head with this number; a sonar with one head and non-strict numbers accepts 0 and 1.
+  /// Returns the head with this number, or null; a sonar with one head and non-strict numbers accepts 0 and 1.
   const HeadDescription* head(int number) const;
 };
 
@@ -52,7 +52,7 @@ Bytes encode_description(const SonarDescription& sonar);
 
 class DiscoveryAgent {
  public:
-  /// Clears the results and sends the question again: by broadcast on every network and on loopback, and to every address in the
+  /// Clears the results and sends the question: by broadcast on every network and on loopback, and to every address in the
   /// environment variable BVE_DISCOVERY (separated by commas or spaces). Returns failed if there is no socket.
   Code start();
   /// Reads the answers that have arrived, and closes the socket.

@@ -26,7 +26,7 @@ class Handles {
   std::shared_ptr<T> find(const void* handle) {
     return std::dynamic_pointer_cast<T>(find_any(handle));
   }
-  /// Invalidates the handle and returns its object; null in the same cases.
+  /// Invalidates the handle and returns its object; null where find() returns null.
   template <class T>
   std::shared_ptr<T> remove(const void* handle) {
     return find<T>(handle) ? std::dynamic_pointer_cast<T>(remove_any(handle)) : nullptr;

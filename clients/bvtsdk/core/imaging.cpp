@@ -30,8 +30,8 @@ Extent extent_of(const PolarPing& ping, int sound_speed_override_mps) {
           scale * static_cast<double>(ping.bin_m)};
 }
 
-/// Number of rows when no size was requested. The rows show `shown_m` of range; `columns_per_row` is width / height, not used if
-/// `fixed_columns` gives the width.
+/// Returns the number of rows when no size was requested. The rows show `shown_m` of range; `columns_per_row` is width / height,
+/// not used if `fixed_columns` gives the width.
 int rows_by_resolution(const Extent& extent, const ImageSettings& settings, double shown_m, double columns_per_row,
                        double fixed_columns) {
   double rows = 0;
@@ -57,10 +57,10 @@ int rows_by_resolution(const Extent& extent, const ImageSettings& settings, doub
 
 /// Verified with a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m
 /// requested, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows short of the sonar,
-/// and the distances of pixels from it are whole numbers of rows and columns. Inferred: the bottom passes through the sector's
-/// nearest corners, at start * cos(half angle); the top is at the stop range, and the sides touch the widest points of the
-/// sector. Unknown: sector and stop range of that ping. With a half angle of 20.9 to 21 degrees and stop 14.54 m, rounding down
-/// the number of rows below the image gives both 70 rows and 197 columns. With rounding to nearest, no sector gives both.
+/// and the distances of pixels from the sonar are whole numbers of rows and columns. Inferred: the bottom passes through the
+/// sector's nearest corners, at start * cos(half angle); the top is at the stop range, and the sides touch the widest points of
+/// the sector. Unknown: sector and stop range of that ping. With a half angle of 20.9 to 21 degrees and stop 14.54 m, rounding
+/// down the number of rows below the image gives both 70 rows and 197 columns. With rounding to nearest, no sector gives both.
 void plan_xy(const Extent& extent, const ImageSettings& settings, ImageGeometry& g) {
   const double half_deg = std::max(std::abs(static_cast<double>(g.fov_min_deg)), std::abs(static_cast<double>(g.fov_max_deg)));
   const double half_rad = std::min(half_deg, 90.0) / degrees;
@@ -131,8 +131,8 @@ struct Window {
   int above, below, left, right;
 };
 
-/// A sliding window: a row is added to `sums` when the window reaches it, and subtracted when the window has left it. `sums` has
-/// zeros on both sides, so that the inner loop needs no tests.
+/// Moves the window over the rows: a row is added to `sums` when the window reaches it, and subtracted when the window has left
+/// it. `sums` has zeros on both sides, so that the inner loop needs no tests.
 void mean_over(const Window& window, int height, int columns, std::vector<std::uint16_t>& pixels) {
   const auto width = static_cast<std::size_t>(columns);
   const auto margin = static_cast<std::size_t>(window.left + window.right);

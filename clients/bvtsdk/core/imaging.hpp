@@ -17,7 +17,7 @@ namespace sonar::bvt {
 enum class ImageType { xy = 0, r_theta = 1 };
 
 /// Rows of an image (our choice). low: 256; medium: 512; high: 1000. automatic: as many as the ping has bins, but from 200 to
-/// 1000, and for XY images fewer if they would have over a million pixels, because clients keep whole images on their stack.
+/// 1000, and fewer if the image would have over a million pixels, because clients keep whole images on their stack.
 /// off: the same as automatic.
 enum class ImageRes { off = 0, low = 1, medium = 2, high = 3, automatic = 4 };
 

@@ -22,7 +22,7 @@ std::string default_port() {
   return port && *port ? port : std::to_string(blueview::tcp_port);
 }
 
-/// The code of an error reply. The text of the reply is logged.
+/// Returns the code of an error reply, and logs its text.
 int refusal(const Bytes& payload) {
   Reader reader(payload);
   const auto code = reader.read<std::int32_t>();

@@ -76,7 +76,7 @@ class Link {
   std::mutex send_mutex_;
   Deadline last_sent_;
 
-  // Only the reader thread uses this.
+  // Only the reader thread uses the next two members.
   Deadline last_received_;
   Bytes received_;
   std::thread reader_;  // the last member, because it uses all others

@@ -17,7 +17,7 @@ struct Place {
   std::uint16_t weight;
 };
 
-/// The two of n samples between whose centres `index` lies; beyond the outermost centres, the outermost sample counts.
+/// Returns the two of n samples between whose centres `index` lies; beyond the outermost centres, the outermost sample counts.
 Place place_of(double index, int n) {
   const double inside = std::clamp(index, 0.0, static_cast<double>(n - 1));
   const int low = std::min(static_cast<int>(inside), n - 2);
@@ -134,7 +134,7 @@ Bytes bytes_of(const std::vector<std::uint16_t>& samples, Packing packing) {
   return out;
 }
 
-/// Inflates exactly `size` bytes; fails if the stream is shorter or longer.
+/// Inflates exactly `size` bytes. Returns none if the stream is shorter or longer.
 Bytes inflated(BytesView body, std::size_t size) {
   if (size > deflate_at_best * body.size + 64) return {};
   Bytes out(size);
@@ -151,7 +151,7 @@ Bytes inflated(BytesView body, std::size_t size) {
   return out;
 }
 
-/// Compresses runs of equal bytes only (Z_RLE): in noise, a search for other repetitions gains too little. Empty on failure.
+/// Compresses runs of equal bytes only (Z_RLE): in noise, other repetitions are rare. Returns no bytes on failure.
 Bytes deflated(BytesView body) {
   z_stream stream{};
   if (deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, Z_RLE) != Z_OK) return {};

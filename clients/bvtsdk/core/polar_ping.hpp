@@ -11,15 +11,14 @@
 
 namespace sonar::bvt {
 
-// A table of the samples from which each pixel of an XY image is interpolated. All angles and square roots are computed
-// once for a geometry; the table then serves all pings of that geometry.
-
 /// The samples of a ping, beam after beam; at least 2 beams and 2 bins.
 struct PolarGrid {
   const std::uint16_t* samples = nullptr;
   int beams = 0, bins = 0;
 };
 
+/// A table of the samples from which each pixel of an XY image is interpolated. All angles and square roots are computed
+/// once for a geometry; the table then serves all pings of that geometry.
 class PolarLookup {
  public:
   struct Key {
@@ -40,7 +39,7 @@ class PolarLookup {
   /// May throw std::bad_alloc.
   explicit PolarLookup(const Key& key);
   const Key& key() const { return key_; }
-  /// Writes the pixels inside the sector by bilinear interpolation in bearing and range; does not change the others.
+  /// Writes the pixels inside the sector, interpolated in bearing and range; does not change other pixels.
   /// `grid` must have the beams and bins of the key, `pixels` its height x width.
   void apply(const PolarGrid& grid, std::uint16_t* pixels) const;
 
@@ -130,9 +129,9 @@ void put_nav(Bytes& out, const NavData& nav);
 /// count as absent.
 NavData decode_nav(Reader& reader);
 
-/// The factor for ranges: override / the ping's sound speed, or 1 without an override (0).
+/// Returns the factor for ranges: override / the ping's sound speed, or 1 without an override (0).
 double range_scale(const PolarPing& ping, int sound_speed_override_mps);
-/// The smallest sample that a noise threshold, a fraction of full scale, does not set to 0.
+/// Returns the smallest sample that a noise threshold, a fraction of full scale, does not set to 0.
 std::uint16_t lowest_significant(float noise_threshold);
 
 /// A ping's samples made ready for imaging: thresholds applied, bins pooled, at least two beams of two bins. If none of this is
@@ -146,7 +145,7 @@ class SampleGrid {
   SampleGrid& operator=(const SampleGrid&) = delete;
 
   const PolarGrid& view() const { return view_; }
-  /// Samples of the view. A single beam or bin appears twice; with a single bin the view is half as long.
+  /// Returns the length of a bin of the view in bins of the ping: the pool, or half of it if a single bin appears twice.
   double pooled() const { return pooled_; }
 
  private:

@@ -37,8 +37,8 @@ struct RangeList {
   int count() const { return static_cast<int>(range_m.size()); }
   bool valid(int i) const { return range_m[static_cast<std::size_t>(i)] < 999; }
   int valid_count() const;
-  /// Position in metres; all 0 without a range. The vendor's axes are unknown; ours are those of XY images: x to starboard, y
-  /// ahead.
+  /// Return the position in metres, 0 without a range. The vendor's axes are unknown; ours are those of XY images: x to
+  /// starboard, y ahead.
   float x_m(int i) const;
   float y_m(int i) const;
 };

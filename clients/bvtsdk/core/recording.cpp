@@ -123,7 +123,7 @@ Code RecordingWriter::close() {
   }
   put(index, size_);
   Code code = put_frame(FrameType::index, index, 0, 0);
-  if (code == bad_parameter) code = success;  // no index of over about three million frames: readers scan the file
+  if (code == bad_parameter) code = success;  // more than about three million frames: no index, readers scan the file
   if (file_ && std::fclose(file_.release()) != 0) code = file_write;
   return code;
 }

@@ -4,8 +4,8 @@
 // File: "BVER", u16 version = 2 (1: samples are not packed), u16 0; then frames (frame.hpp), each followed by the CRC-32 of its
 // header and payload. The first frame is HELLO_OK. PING_DATA, NAV_DATA (u16 bitmap, values, f64 time) and EVENT_MARK (f64 time,
 // text key, text) follow in order of arrival. Another HELLO_OK precedes each ping with other settings than the ping before. A
-// closed file ends with an index frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at
-// last the u64 offset of the index frame itself. Without the index, readers scan the file up to the last whole frame.
+// closed file ends with an index frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at the
+// end the u64 offset of the index frame itself. Without the index, readers scan the file up to the last whole frame.
 #pragma once
 
 #include <cstdint>
@@ -72,7 +72,7 @@ class RecordingReader {
   Code open(File file, std::string* why = nullptr);
 
   const Bytes& hello() const { return hello_; }  // payload of the first HELLO_OK
-  /// Payload of the description that is valid at ping n of a head; the first one if none was written before it.
+  /// Returns the payload of the description that is valid at ping n of a head, or the first one.
   Bytes hello_of_ping(std::int32_t head, int n);
   std::uint64_t size_bytes() const { return size_; }
   /// False if the writer did not close the file, or if its end is damaged.
@@ -90,7 +90,7 @@ class RecordingReader {
   Code read_event(int n, EventMark& mark);
 
  private:
-  struct Lane {  // the frames of one type, pings of one head
+  struct Lane {  // the frames of one type; pings: also of one head
     FrameType type{};
     std::int32_t head = 0;
     std::vector<std::uint64_t> offsets;

@@ -56,7 +56,7 @@ class Sonar : public Object {
   int head(int number, std::shared_ptr<Head>& head) const;
 
   const Source* source() const { return source_.get(); }  // null: not open
-  /// The sonar's description, with the current settings. Blocks until running calls on its heads have ended. Call it only while
+  /// Returns the description with the current settings. Blocks until running calls on its heads have ended. Call it only while
   /// the sonar is open.
   SonarDescription description() const;
   int put_event(const std::string& key, const std::string& text);

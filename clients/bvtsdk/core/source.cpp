@@ -120,7 +120,7 @@ class PlayedSource : public Source {
   std::mutex mutex_;
   const std::string path_;
   const std::unique_ptr<RecordingReader> reader_;
-  std::map<int, int> next_;  // per head
+  std::map<int, int> next_;  // number of the next ping of each head
 };
 
 class WrittenSource : public Source {

@@ -35,8 +35,8 @@ class Source {
   virtual int get(int /*head*/, RangeLimits&) { return success; }
 
   /// A recording gives ping n, or the next one if n < 0. A live sonar makes a new ping, whatever n is; the sonar waits at most
-  /// `patience` for it, and the link 5 s longer. `settings` holds the settings of the head; a recording replaces them by those
-  /// with which the ping was recorded.
+  /// `patience` for it, and the link 5 s longer. `settings` holds the settings of the head; a recording replaces them with those
+  /// of the recorded ping.
   virtual int get_ping(int /*head*/, int /*n*/, std::chrono::milliseconds /*patience*/, PolarPing&,
                        HeadDescription& /*settings*/) {
     return not_implemented;

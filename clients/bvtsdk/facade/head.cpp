@@ -1,4 +1,4 @@
-// The functions BVTHead_* of both interfaces, 3.x and 4.x (BVT_ABI). clients/bvtsdk/README.md describes each function.
+// The functions BVTHead_* of both interfaces, 3.x and 4.x (BVT_ABI). clients/bvtsdk/README.md describes their behaviour.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"
@@ -63,7 +63,7 @@ RetVal BVTHead_PutPing(BVTHead self, BVTPing ping) {
   return on<Head>(self, [&](Head& o) -> int { return on<PingObject>(ping, [&](PingObject& p) { return o.put_ping(p); }); });
 }
 
-// These set how images of later pings are made; the sonar does not get them.
+// The next functions set how images of later pings are made; the settings are not sent to the sonar.
 RetVal BVTHead_SetImageRes(BVTHead self, int resolution) {
   return on<Head>(self, [&](Head& o) -> int {
     if (resolution < 0 || resolution > 4) return invalid_resolution;

@@ -1,4 +1,4 @@
-// The functions BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. clients/bvtsdk/README.md describes each function.
+// The functions BVTMagImage_*, BVTColorImage_* and BVTColorMapper_*. clients/bvtsdk/README.md describes their behaviour.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;
@@ -15,7 +15,7 @@ namespace {
 using MagPixel = unsigned short;
 using ColourPixel = unsigned int;
 
-/// The first pixel of a row, or null.
+/// Returns the first pixel of a row, or null.
 template <class Image>
 auto* row_of(Image& image, int row) {
   return inside(image, row, 0) ? image.pixels.data() + place(image, row, 0) : nullptr;
@@ -44,7 +44,7 @@ auto* row_of(Image& image, int row) {
 BVT_IMAGE(MagImage, MagImageObject, MagPixel)
 BVT_IMAGE(ColorImage, ColourImageObject, ColourPixel)
 
-// For a row or pixel outside the image these return null or 0, and the code index_out_of_bounds if they return a code.
+// The next functions give null or 0 for a row or pixel outside the image; in 4.x they return the code index_out_of_bounds.
 #if BVT_ABI == 3
 #define BVT_PIXELS(Class, Kind, Pixel)                                                                                           \
   Pixel* BVT##Class##_GetRow(BVT##Class self, int row) {                                                                         \

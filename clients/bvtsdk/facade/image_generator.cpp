@@ -1,5 +1,5 @@
-// The functions BVTImageGenerator_* of 4.x, which make images and range profiles. clients/bvtsdk/README.md describes each
-// function.
+// The functions BVTImageGenerator_* of 4.x, which make images and range profiles. clients/bvtsdk/README.md describes their
+// behaviour.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

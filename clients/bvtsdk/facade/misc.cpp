@@ -1,4 +1,4 @@
-// The functions for discovery, error texts, version and log. clients/bvtsdk/README.md describes each function.
+// The functions for discovery, error texts, version and log. clients/bvtsdk/README.md describes their behaviour.
 #include "clients/bvtsdk/core/codes.hpp"
 #include "clients/bvtsdk/facade/getter.hpp"
 

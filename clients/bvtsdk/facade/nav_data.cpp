@@ -1,5 +1,5 @@
-// The functions BVTNavData_* (navigation data) of both interfaces; 3.x has no time. clients/bvtsdk/README.md describes each
-// function.
+// The functions BVTNavData_* (navigation data) of both interfaces; 3.x has no time. clients/bvtsdk/README.md describes their
+// behaviour.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

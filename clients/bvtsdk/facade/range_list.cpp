@@ -1,4 +1,4 @@
-// The functions BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x). clients/bvtsdk/README.md describes each function.
+// The functions BVTRangeData_* (3.x) and BVTRangeProfile_* (4.x). clients/bvtsdk/README.md describes their behaviour.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

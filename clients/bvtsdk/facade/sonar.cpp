@@ -1,4 +1,4 @@
-// The functions BVTSonar_* of both interfaces. clients/bvtsdk/README.md describes each function.
+// The functions BVTSonar_* of both interfaces. clients/bvtsdk/README.md describes their behaviour.
 #include "clients/bvtsdk/facade/getter.hpp"
 
 using namespace sonar::bvt;

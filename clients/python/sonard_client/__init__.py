@@ -14,6 +14,6 @@ from .status import SonarFound, discover
 from .stream import Message, MessageReader
 
 __version__ = "0.1.0"
-DEFAULT_PROFILE = "oculus-m1200d"  # product of programs that make a configuration
+DEFAULT_PROFILE = "oculus-m1200d"  # product in the configurations that these programs make
 __all__ = ["Control", "ControlError", "Daemon", "DaemonFailed", "Events", "Fault", "FireSettings", "Message", "MessageReader",
            "OculusClient", "Peak", "Ping", "PoseSender", "SonarFound", "discover"]

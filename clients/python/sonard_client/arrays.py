@@ -20,7 +20,7 @@ _CODES = {1: "B", 2: "H", 4: "I"}
 
 
 def grid(little_endian: bytes, rows: int, columns: int, width: int) -> Grid:
-    """Unsigned samples of `width` bytes, row by row; read-only. 3-byte samples become 4 bytes wide."""
+    """Returns a read-only grid of unsigned samples of `width` bytes, row by row. 3-byte samples become 4 bytes wide."""
     if width == 3:
         wide = bytearray(len(little_endian) // 3 * 4)
         for place in range(3):

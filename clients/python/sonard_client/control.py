@@ -85,7 +85,7 @@ class Control:
 
     # ---- state
     def status(self) -> Json:
-        """The DaemonStatus of control.proto: sonars with clients and figures, vehicles, objects, poses, environment."""
+        """Returns the DaemonStatus of control.proto: sonars with clients and figures, vehicles, objects, poses, environment."""
         return dict(_read_json(self._get("/api/v1/status")))
 
     def health(self) -> str:
@@ -96,7 +96,7 @@ class Control:
         return text.strip()
 
     def metrics(self) -> Dict[str, float]:
-        """All metrics by Prometheus name and labels: 'sonard_pings_total{sonar="front"}'."""
+        """Returns all metrics by Prometheus name and labels: 'sonard_pings_total{sonar="front"}'."""
         lines = self._get("/metrics").splitlines()
         pairs = (line.rsplit(" ", 1) for line in lines if line and not line.startswith("#"))
         return {name: float(value) for name, value in pairs}
@@ -205,7 +205,7 @@ class Control:
 
     # ---- injected faults, of a daemon that runs with --faults
     def fault(self, what: str, **record: Any) -> Fault:
-        """with control.fault("L05", seconds=6) as fault: ...       Arguments as add_fault()."""
+        """with control.fault("L05", seconds=6) as fault: ...       The arguments are those of add_fault()."""
         return Fault(self, what, record)
 
     def add_fault(self, what: str, name: str = "", sonar: str = "", client: str = "", at: Optional[Mapping[str, Any]] = None,
@@ -230,12 +230,12 @@ class Control:
         return list(_read_json(self._get(f"/api/v1/faults?after={_LATEST}"))["faults"])
 
     def fault_kinds(self) -> Json:
-        """The catalogue: {"kinds": [...], "troubles": [...]}."""
+        """Returns the catalogue: {"kinds": [...], "troubles": [...]}."""
         report = _read_json(self._get(f"/api/v1/faults/kinds?after={_LATEST}"))
         return {"kinds": report["kinds"], "troubles": report["troubles"]}
 
     def fault_journal(self, after: int = 0) -> List[Json]:
-        """Entries of the journal after the number `after`, at most the latest 1000."""
+        """Returns the entries of the journal after the number `after`, at most the latest 1000."""
         return list(_read_json(self._get(f"/api/v1/faults/journal?after={after}"))["journal"])
 
     # ---- time

@@ -14,7 +14,7 @@ ADDRESS_IN_USE = 69  # sonard's exit code
 
 
 def free_address() -> str:
-    """A random loopback address, which other programs are unlikely to use."""
+    """Returns a random loopback address, which other programs are unlikely to use."""
     return f"127.{random.randint(64, 126)}.{random.randint(0, 255)}.{random.randint(1, 254)}"
 
 
@@ -35,7 +35,7 @@ class Daemon:
     sonars: [{name: front, profile: PRODUCT, bind_ip: ADDRESS, status_to: [ADDRESS]}]
     """) as sonard: drive(sonard.address)
 
-    ADDRESS is replaced by a random loopback address (sonard.address), so that several daemons can run at a time. None: the demo.'''
+    ADDRESS is replaced by a random loopback address (sonard.address), so that several daemons can run at once. None runs the demo.'''
 
     def __init__(self, config: Union[str, "os.PathLike[str]", None], program: str = "sonard", arguments: Sequence[str] = (),
                  timeout_s: float = 60.0) -> None:
@@ -73,11 +73,11 @@ class Daemon:
         return pathlib.Path(self._folder.name if self._folder else "") / "log"
 
     def log(self) -> str:
-        """Output of sonard so far."""
+        """Returns the output of sonard so far."""
         return self._log_path.read_text(encoding="utf-8", errors="replace")
 
     def ended(self) -> str:
-        """How sonard ended: "killed by SIGSEGV", "with exit code 70"; empty while it runs."""
+        """Returns how sonard ended: "killed by SIGSEGV", "with exit code 70"; empty while it runs."""
         code = self.process.poll()
         if code is None:
             return ""

@@ -44,15 +44,15 @@ class Fault:
             self._stop_reading()
 
     def status(self) -> List[Json]:
-        """The entries of sonard's list: one for each sonar, and for a trouble one for each of its kinds."""
+        """Returns the entries of sonard's list: one for each sonar, and for a trouble one for each of its kinds."""
         return [fault for fault in self._control.faults() if self._is_ours(fault["name"])]
 
     def injections(self) -> int:
-        """How often the fault has acted so far."""
+        """Returns how often the fault has acted so far."""
         return sum(fault["injections"] for fault in self.status())
 
     def journal(self) -> List[Json]:
-        """The entries of this fault among the latest 1000 of the journal."""
+        """Returns the entries of this fault among the latest 1000 of the journal."""
         return [entry for entry in self._control.fault_journal() if self._is_ours(entry["fault"])]
 
     def noticed_within(self, seconds: float) -> bool:

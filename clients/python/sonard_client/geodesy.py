@@ -39,7 +39,7 @@ def parse_origin(text: str) -> Geodetic:
 
 
 def ecef(place: Geodetic) -> Vector3:
-    """Earth-centred, Earth-fixed coordinates [m]: axes to 0 N 0 E, 0 N 90 E and the north pole."""
+    """Returns Earth-centred, Earth-fixed coordinates [m]: axes to 0 N 0 E, 0 N 90 E and the north pole."""
     latitude, longitude = math.radians(place.latitude_deg), math.radians(place.longitude_deg)
     normal_m = EQUATOR_M / math.sqrt(1 - _E2 * math.sin(latitude) ** 2)
     radius_m = (normal_m + place.altitude_m) * math.cos(latitude)

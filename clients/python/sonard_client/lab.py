@@ -159,7 +159,7 @@ def read_request(text: str) -> Tuple[str, Dict[str, str]]:
 
 
 class Lab:
-    """The two namespaces. The caller must be inside the device's: enter() first.
+    """The two namespaces. The caller must be inside the device's namespace: call enter() first.
 
     device, host: prefixes of commands that run there."""
 
@@ -173,7 +173,7 @@ class Lab:
 
     @property
     def host_pid(self) -> int:
-        """The number of a process in the host's namespace."""
+        """The id of a process in the host's namespace."""
         return self._holder.pid if self._holder else 0
 
     def __enter__(self) -> "Lab":
@@ -197,7 +197,7 @@ class Lab:
         return self
 
     def add_route(self) -> None:
-        """Adds a route for drivers that join a multicast group without naming an interface; computers have a default route."""
+        """Adds a route for drivers that join a multicast group without naming an interface; here they have no default route."""
         _run(*self.host, "ip", "route", "replace", "224.0.0.0/4", "dev", _HOST_LINK)
 
     def __exit__(self, *_: object) -> None:
@@ -249,8 +249,8 @@ def enter(module: str, arguments: Sequence[str]) -> None:
 
 def lab_config(profile: str, address: str = DEVICE, more: Optional[Dict[str, object]] = None,
                sonar: Optional[Mapping[str, object]] = None) -> str:
-    """A configuration for tests of drivers: a small scene and a model that costs little. It is JSON, which is also YAML. `sonar`:
-    further keys of the sonar."""
+    """Returns a configuration for tests of drivers, with a small scene and little computing. It is JSON, which is also YAML.
+    `sonar`: further keys of the sonar."""
     config: Dict[str, object] = {
         "world": {"scene": "tank-rod.yaml", "seed": 1}, "vehicles": [{"name": "rov", "trajectory": "none"}],
         "sonars": [{"name": "front", "profile": profile, "bind_ip": address, **(sonar or {})}],
@@ -287,7 +287,7 @@ def _say(text: str) -> None:
 
 
 class _Timed:
-    """Applies faults for their time; each has a thread."""
+    """Applies each fault for its time, in a thread of its own."""
 
     def __init__(self, lab: Lab) -> None:
         self._lab, self._lock, self._stopped = lab, threading.Lock(), threading.Event()

@@ -103,7 +103,7 @@ class PingFields(NamedTuple):
 
 
 def ping_head_bytes(version: int) -> int:
-    """Bytes from the start of the message to the bearings."""
+    """Returns the number of bytes from the start of the message to the bearings."""
     if version == 2:
         return HEADER_BYTES + _FIRE.size + _FIRE_TAIL.size + _LONG_PING.size
     return HEADER_BYTES + _FIRE.size + _SHORT_PING.size
@@ -119,7 +119,7 @@ def read_ping_fields(data: bytes, version: int) -> PingFields:
 
 
 def ping_fault(data: bytes, header: Header) -> str:
-    """The reason why these bytes are not the start of a ping; empty if all lengths are consistent."""
+    """Returns the reason why these bytes are not the start of a ping; empty if all lengths are consistent."""
     if header.version > 2:
         return f"ping of version {header.version}"
     head = ping_head_bytes(header.version)

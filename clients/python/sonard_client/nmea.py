@@ -31,7 +31,7 @@ class Sentence(NamedTuple):
 
 
 def checksum(body: str) -> int:
-    """Checksum of the text between $ and *."""
+    """Returns the checksum of the text between $ and *."""
     value = 0
     for byte in body.encode("latin-1", "replace"):
         value ^= byte
@@ -77,7 +77,7 @@ def _angle(text: str, half: str, degrees: int) -> Optional[float]:
 
 
 def _true_heading(fields: Tuple[str, ...]) -> Optional[float]:
-    """The true heading of HDG: magnetic heading, deviation and variation. None without a variation."""
+    """Returns the true heading of HDG: magnetic heading, deviation and variation; None without a variation."""
     if len(fields) < 5:
         return None
     magnetic, deviation, variation = _number(fields[0]), _number(fields[1] or "0"), _number(fields[3])
@@ -208,7 +208,7 @@ class NmeaPoses:
         return changed
 
     def pose(self) -> "Optional[Tuple[Vector3, Vector3]]":
-        """Position north, east, down [m] and roll, pitch, yaw [rad]; None while position or heading is unknown."""
+        """Returns position north, east, down [m] and roll, pitch, yaw [rad]; None while position or heading is unknown."""
         now, assumed = self.instruments, self.assumed
         heading = now.heading_deg if now.heading_deg is not None else assumed.heading_deg
         if heading is None:

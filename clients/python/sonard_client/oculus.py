@@ -80,7 +80,7 @@ class OculusClient:
         return self.settings
 
     def again(self) -> None:
-        """Sends the last fire message again, which triggers one ping with triggered=True."""
+        """Sends the last fire message again. If it had triggered=True, this triggers one ping."""
         if not self._last_fire:
             raise ValueError("no settings were sent: call fire() first")
         self._send(self._last_fire)

@@ -63,24 +63,24 @@ class Ping:
         return arrays.vector(-a for a in self.azimuths_rad)
 
     def row(self, row: int) -> Tuple[int, ...]:
-        """The samples of one row, beam 0 first."""
+        """Returns the samples of one row, beam 0 first."""
         return tuple(int(self.samples[row, beam]) for beam in range(self.beams))
 
     def amplitudes(self) -> Any:
-        """Samples divided by the root of their row's gain, so that rows are comparable. Floats, rows x beams (without numpy a
-        list of lists)."""
+        """Returns the samples divided by the root of their row's gain, so that rows are comparable: floats, rows x beams (without
+        numpy a list of lists)."""
         gains = self.row_gains or (1,) * self.rows
         if arrays.numpy is not None:
             return self.samples / arrays.numpy.sqrt(arrays.numpy.array(gains, dtype=float))[:, None]
         return [[value / math.sqrt(gain) for value in row] for row, gain in zip(self.samples.tolist(), gains)]
 
     def xy(self, row: int, beam: int) -> Tuple[float, float]:
-        """Metres ahead of the sonar and to port, in the plane of the image."""
+        """Returns metres ahead of the sonar and to port, in the plane of the image."""
         r, a = float(self.ranges_m[row]), float(self.azimuths_rad[beam])
         return r * math.cos(a), r * math.sin(a)
 
     def fan_xy(self) -> Tuple[Any, Any]:
-        """Metres ahead and to port of every sample, two grids of rows x beams, as a colour mesh needs."""
+        """Returns metres ahead and to port of every sample, two grids of rows x beams, as a colour mesh needs."""
         if arrays.numpy is not None:
             outer, a = arrays.numpy.outer, self.azimuths_rad
             return outer(self.ranges_m, arrays.numpy.cos(a)), outer(self.ranges_m, arrays.numpy.sin(a))
@@ -88,8 +88,8 @@ class Ping:
         return [[r * c for c in ahead] for r in self.ranges_m], [[r * s for s in port] for r in self.ranges_m]
 
     def strongest(self, beyond_m: float = 0.0) -> Peak:
-        """The strongest sample; of equal ones the nearest, then the outermost to port. `beyond_m` excludes the first rows, which
-        contain the transmitter's leak."""
+        """Returns the strongest sample; of equal ones the nearest, then the outermost to port. `beyond_m` excludes the first
+        rows, which contain the transmitter's leak."""
         first = min(max(math.ceil(beyond_m / self.row_m - 0.5), 0), self.rows - 1)
         if arrays.numpy is not None:
             place = int(self.amplitudes()[first:].argmax())

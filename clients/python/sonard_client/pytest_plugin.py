@@ -1,4 +1,4 @@
-"""pytest: the fixture `sonard`, a daemon with armed faults for one test. Installed with the package (entry point pytest11).
+"""pytest: the fixture `sonard`, a daemon with armed faults for one test. It is installed with the package (entry point pytest11).
 
     def test_my_driver(sonard):
         with start_my_driver(sonard.address), sonard.control.fault("silent-open", seconds=6) as fault:
@@ -23,7 +23,7 @@ _HTTP = re.compile(r"^control .*\bhttp http://([\d.]+):(\d+)", re.M)  # a line o
 
 
 class RunningSonard:
-    """`address` of the first sonar, `addresses` of all by name, `control`, `daemon`."""
+    """A running sonard. `address` is that of the first sonar, `addresses` are those of all sonars by name."""
 
     def __init__(self, daemon: Daemon) -> None:
         self.daemon = daemon

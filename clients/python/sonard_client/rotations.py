@@ -36,7 +36,7 @@ def unit(values: Sequence[float]) -> Quaternion:
 
 
 def orientation(quaternion: "Sequence[float] | None", rpy: "Sequence[float] | None") -> Quaternion:
-    """The given quaternion or the one of rpy; no rotation if neither is given."""
+    """Returns the given quaternion, or that of rpy; no rotation if neither is given."""
     if quaternion is not None and rpy is not None:
         raise ValueError("give quaternion or rpy, not both")
     if quaternion is not None:
@@ -52,7 +52,7 @@ def to_body(q: Quaternion, v: Vector3) -> Vector3:
 
 
 def between(a: Quaternion, b: Quaternion, u: float) -> Quaternion:
-    """Spherical linear interpolation from a (u = 0) to b (u = 1) along the shorter arc."""
+    """Returns the spherical linear interpolation from a (u = 0) to b (u = 1) along the shorter arc."""
     cosine = sum(p * q for p, q in zip(a, b))
     sign = -1.0 if cosine < 0 else 1.0
     angle = math.acos(min(1.0, abs(cosine)))

@@ -29,7 +29,7 @@ class SonarFound:
 
 
 def read_status(data: bytes, sender: str = "") -> Optional[SonarFound]:
-    """Parses a status datagram; None if it is not one of exactly 142 bytes."""
+    """Parses a status datagram. Returns None for other datagrams; a status has exactly 142 bytes."""
     if len(data) != layouts.HEADER_BYTES + _BODY.size or data[:2] != layouts.MAGIC:
         return None
     header = layouts.read_header(data[:layouts.HEADER_BYTES])

@@ -94,7 +94,7 @@ class MessageReader:
 
 
 def _header_fault(header: Header) -> str:
-    """The reason why a header is invalid, or empty. Limits the length before the reader waits for the payload."""
+    """Returns the reason why a header is invalid, or an empty text. Limits the length before the reader waits for the payload."""
     if header.type == layouts.PING:
         if header.version > 2:
             return f"ping of version {header.version}"

@@ -13,7 +13,7 @@ namespace sonar::clients {
 namespace {
 
 constexpr std::chrono::minutes scene_patience{6};  // the daemon's limit is five minutes
-constexpr std::chrono::hours step_patience{24};    // limit until the pings are computed; Ctrl-C ends it
+constexpr std::chrono::hours step_patience{24};    // until the pings are computed; Ctrl-C ends the wait
 
 std::vector<std::string> lines_of(const std::string& text, int most) {
   std::vector<std::string> lines;

@@ -34,10 +34,11 @@ struct StepOptions {
   std::uint64_t count = 1;
   bool json = false;
 };
-/// Steps the time until interrupted; prints the time and the number of pings of each step.
+/// Steps the time `count` times, or until interrupted; prints the time after each step and the number of its pings.
 Result<void> step_time(const StepOptions& options);
 
-/// Returns the path to send to the daemon: absolute if the file exists here, because the daemon has another working directory.
+/// Returns the path to send. If daemon and file are on this computer, it is absolute, for a daemon with another working
+/// directory.
 std::string scene_path_for(const Endpoint& daemon, const std::string& path);
 Result<void> load_scene(const ControlOptions& control, const std::string& path);
 

@@ -25,7 +25,7 @@ struct FaultArguments {
   std::function<Result<void>()> what;
 };
 
-/// The report is kept as long as the Response that carries it.
+/// The returned pointer keeps the Response that contains the report.
 Result<std::shared_ptr<const v1::FaultReport>> report_of(ControlClient& client, const control::GetFaults& wanted) {
   const auto answer = client.request(wanted);
   if (!answer) return tl::unexpected(answer.error());
@@ -46,7 +46,7 @@ Result<void> print_report(const FaultArguments& a, bool kinds, std::string (*tex
   return {};
 }
 
-/// The kinds that this version knows, without a daemon.
+/// Prints the kinds of this sonarctl, without a daemon.
 Result<void> print_own_kinds(const FaultArguments& a) {
   v1::FaultReport report;
   for (const FaultKind& kind : fault_kinds()) fill(*report.add_kinds(), kind);

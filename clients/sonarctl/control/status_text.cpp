@@ -31,7 +31,7 @@ std::string duration_text(double seconds) {
 
 std::string line(const char* name, const std::string& text) { return format("%-9s ", name) + text + "\n"; }
 
-/// The requested rate, and the measured rate of pings or of the preview.
+/// Returns the requested rate, and the measured rate of pings or of the preview.
 std::string rate_text(const v1::SonarStatus& s) {
   std::string text = s.rate_hz() <= 0 ? "standby" : s.on_request() ? "on request" : format("%g Hz", s.rate_hz());
   const double made_hz = s.figures().made_hz();
@@ -55,7 +55,7 @@ std::string client_text(const v1::ClientStatus& c) {
   return text + (c.silent_s() >= reported_silence_s ? format(", last heard %.0f s ago", c.silent_s()) : "");
 }
 
-/// The line of the banner. The sonar waits for the driver only while no client or receiver gets its pings.
+/// Returns the line of the banner. It says that the sonar waits for a driver only while no client or receiver gets its pings.
 std::string address_text(const v1::SonarAddress& a, bool is_listened) {
   if (is_listened && !a.sonar_speaks_first())
     return format("%-10s %-26s %s", a.protocol().c_str(), a.address().c_str(), a.carries().c_str());
@@ -255,7 +255,7 @@ std::string fault_kinds_text(const v1::FaultReport& report) {
 }
 
 std::string fault_support_text(const v1::FaultReport& report) {
-  std::set<std::string> vendors;  // all vendors, taken from the faults that a daemon cannot inject, which name each of them
+  std::set<std::string> vendors;  // all vendors: each has a kind of fault without effect
   for (const v1::FaultKind& k : report.kinds())
     for (const auto& [vendor, why] : k.without_effect()) vendors.insert(vendor);
   std::string text = "| code | name | tier |", rule = "|---|---|---|";

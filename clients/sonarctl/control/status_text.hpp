@@ -23,7 +23,7 @@ std::string text_from(const v1::DaemonStatus& status);
 /// Returns one line without newline.
 std::string text_from(const v1::ObjectStatus& object);
 std::string text_from(const v1::Event& event);
-/// Returns "-6.00 0.00 -3.00 m, heading 90, pitch -15, roll 0 deg": east, north, up; compass; bow up; starboard down.
+/// Returns "-6.00 0.00 -3.00 m, heading 90.0, bow-up pitch -15.0, roll 0.0 deg": east, north, up; compass; starboard down.
 std::string place_text(const Pose& body_in_world);
 
 /// Returns one line without newline.

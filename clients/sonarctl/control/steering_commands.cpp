@@ -1,4 +1,4 @@
-// Command lines of status, events, set, load and object, which use the control stream.
+// Command lines of status, events, set, step, load and object, which use the control stream.
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <utility>
@@ -39,7 +39,7 @@ struct PlaceArguments {
   }
 };
 
-/// Sets `value` only when the option was given.
+/// Adds an option that sets `value` only if it is given.
 template <class T>
 CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optional<T>& value, const std::string& help) {
   return command.add_option_function<T>(
@@ -48,7 +48,7 @@ CLI::Option* add_optional(CLI::App& command, const std::string& name, std::optio
 
 std::string name_or_its(const std::string& name) { return name.empty() ? "the sonar" : name; }
 
-/// The sub-commands share one ControlOptions; the selected one sets `what`.
+/// All sub-commands share the ControlOptions; the selected sub-command sets `what`.
 struct Steering {
   ControlOptions control;
   std::function<Result<void>()> what;
@@ -182,7 +182,7 @@ void add_set_trajectory(CLI::App& set, const std::shared_ptr<Steering>& steering
   });
 }
 
-/// `what` refers to the Steering that contains it; it is moved out, to avoid a cycle of owners.
+/// Executes `what`, which owns the Steering that contains it: moving it out ends this cycle of owners.
 Run run_of(const std::shared_ptr<Steering>& steering) {
   return [steering] { return std::exchange(steering->what, {})(); };
 }

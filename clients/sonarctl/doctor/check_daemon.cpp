@@ -62,13 +62,13 @@ void check_http(const Facts& facts, std::vector<Finding>& findings) {
   }
 }
 
-/// If one address was given, the other sonars were not examined.
+/// Returns false if the user gave only the address of another sonar.
 bool was_examined(const Facts& facts, const v1::SonarStatus& sonar) {
   return !facts.address_given || std::any_of(facts.sonars.begin(), facts.sonars.end(),
                                              [&sonar](const SonarFacts& s) { return s.at.host == sonar.advertised(); });
 }
 
-/// True if nothing answers at the address of the sonar. Another finding says so and names it.
+/// True if nothing answers at the address of the sonar, which another finding reports.
 bool is_missing(const Facts& facts, const v1::SonarStatus& sonar) {
   return std::any_of(facts.sonars.begin(), facts.sonars.end(), [&](const SonarFacts& s) {
     const bool is_there =

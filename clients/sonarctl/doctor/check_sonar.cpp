@@ -207,7 +207,7 @@ class SonarChecks {
                 : "its client requested standby or single pings; sonarctl status shows the settings");
   }
 
-  /// Clients that connected while this check waited.
+  /// Lists the clients that connected while this check waited, and got pings.
   std::string clients_beside_us() const {
     std::vector<std::string> rivals;
     if (sonar_.reported)
@@ -216,7 +216,7 @@ class SonarChecks {
     return joined(rivals);
   }
 
-  /// The clock mode that the daemon reports: "realtime", "stepped", ...; empty without a daemon.
+  /// Returns the clock mode that the daemon reports, such as "realtime"; empty without a daemon.
   std::string clock() const { return facts_.control.status ? facts_.control.status->clock() : std::string(); }
 
   /// Names an address at which a sonar listens.
@@ -271,14 +271,14 @@ class SonarChecks {
     return {};
   }
 
-  /// The computing time of a ping: the median of those just received, else the mean since the daemon started; 0 = unknown.
+  /// Returns the computing time of a ping: the median of the received pings, else the mean since the daemon's start; 0 = unknown.
   double computing_ms() const {
     if (sonar_.stream.computing_ms) return *sonar_.stream.computing_ms;
     return sonar_.reported ? sonar_.reported->figures().simulation_ms() : 0;
   }
   bool too_slow_for(double rate_hz) const { return computing_ms() * rate_hz > 1000; }
 
-  /// The rate that another, connected client requested.
+  /// Checks the rate that another, connected client requested.
   void check_rate_of_others() {
     if (!sonar_.reported || sonar_.make->scans || !sonar_.reported->pinging() || clock() != "realtime" ||
         !too_slow_for(sonar_.reported->rate_hz()))
@@ -332,7 +332,7 @@ class SonarChecks {
     return found == in.sonars().end() ? nullptr : &*found;
   }
 
-  /// The latest status without our own connection; clients that left or were refused are taken from the first status.
+  /// Returns the latest status without our own connection, and the clients that left or were refused from the first status.
   v1::DaemonStatus without_us() const {
     const v1::DaemonStatus& first = *facts_.control.status;
     v1::DaemonStatus now = facts_.control.latest ? *facts_.control.latest : first;
@@ -350,7 +350,7 @@ class SonarChecks {
     return now;
   }
 
-  /// The time in which a correct driver receives its first ping.
+  /// Returns the time within which a correct driver receives its first ping.
   static double first_ping_within_s(const v1::ClientStatus& client, const v1::SonarStatus& of) {
     if (client.requests() == 0 || of.rate_hz() <= 0) return soon_s;
     return std::max(soon_s, 2 / of.rate_hz() + 2e-3 * of.figures().simulation_ms());

@@ -20,7 +20,7 @@ void check_sonar(const Facts& facts, const SonarFacts& sonar, std::vector<Findin
 void check_daemon(const Facts& facts, std::vector<Finding>& findings);
 void check_ports(const Facts& facts, std::vector<Finding>& findings);
 void check_networks(const Facts& facts, std::vector<Finding>& findings);
-/// The sonar that the daemon serves at this address; null: it serves none there.
+/// Returns the sonar that the daemon serves at this address; null if it serves none there.
 const v1::SonarStatus* served_at(const v1::DaemonStatus& status, const SonarFacts& sonar);
 /// Returns "tcp 127.0.0.2:52100 (settings, pings), status 127.255.255.255:52102 (state)"; empty from an older daemon.
 std::string addresses_of(const v1::SonarStatus& sonar);

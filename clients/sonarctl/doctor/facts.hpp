@@ -99,7 +99,7 @@ inline bool is_replay(const HttpFacts& http) { return http.text.starts_with(cont
 /// A sonar that answered a search.
 struct FoundSonar {
   const protocol::Make* make = nullptr;
-  std::string at, about;  // "BlueView head P900-90 (7001)"
+  std::string at, about;  // about: "BlueView head P900-90 (7001)"
 };
 /// True if drivers control the sonar over HTTP and receive its images over UDP. Such a sonar has no client connections.
 inline bool is_by_http(const SonarFacts& sonar) { return sonar.make->ports.front().kind == protocol::HostPort::Kind::http; }

@@ -11,12 +11,12 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto status_patience = 2500ms;  // status messages come every second
-constexpr auto first_status = 1300ms;     // for the status with the connected clients
+constexpr auto first_status = 1300ms;     // for the first status, which names the connected client
 const Endpoint usual_http{"127.0.0.1", 8088};
 constexpr auto short_patience = 700ms, own_patience = 200ms;
 constexpr auto search_patience = 400ms, search_patience_here = 100ms;  // for an answer to discovery
 
-/// Port of the sonars that announce themselves by status messages.
+/// Port of the sonars that announce themselves with status messages.
 const std::uint16_t usual_port = protocol::makes().front().ports.front().number;
 
 class Gathering {
@@ -92,7 +92,7 @@ class Gathering {
     facts_.http = ask_health(at, given, until(at.host.starts_with("127.") ? own_patience : short_patience));
   }
 
-  /// The sonard processes that listen on ports of sonars.
+  /// Lists the sonard processes that listen on ports of sonars.
   void note_daemons(const std::vector<SocketLine>& sockets, const std::vector<SocketLine>& by_udp,
                     const std::map<std::uint64_t, Program>& programs) {
     const auto note = [&](const SocketLine& socket) {
@@ -124,7 +124,7 @@ class Gathering {
   }
 
   /// Adds the sonars that a sonard of this computer serves without a control stream, such as a recording. `usual`: the address
-  /// to examine if it serves all addresses.
+  /// to examine if that sonard listens at every address.
   void add_daemons_sonars(const std::string& usual) {
     for (const PortHolder& daemon : facts_.daemons) {
       auto at = parse_endpoint(daemon.at, {});
@@ -234,7 +234,7 @@ class Gathering {
   }
 
   void listen_to_all() {
-    for (const SonarFacts& sonar : facts_.sonars)  // the other sonars have no such message
+    for (const SonarFacts& sonar : facts_.sonars)  // the other sonars send no such message
       if (sends_status(sonar, status_.facts())) status_.listen(sonar.at.host, no_later_than(start_ + status_patience));
     status_.finish();
     facts_.status = status_.facts();

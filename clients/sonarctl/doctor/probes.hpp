@@ -46,7 +46,7 @@ class StatusListener {
   StatusFacts facts_;
 };
 
-/// Searches for sonars of every make with a search message, on this computer and its networks, or only at `hosts` (IPv4).
+/// Searches for sonars of all makes that have a search message, on this computer and its networks, or only at `hosts` (IPv4).
 /// receive_answers() reads the answers.
 class DiscoveryQuestion {
  public:
@@ -64,7 +64,7 @@ HttpFacts ask_health(const Endpoint& at, bool given, std::chrono::milliseconds p
 KernelPorts kernel_ports();
 
 /// Measures delay, size, rate and latency of a sonar's pings as a driver would: connects, requests pings unless another client is
-/// connected, reads about 15 of them and disconnects. `control`: a client subscribed to pings, for transmission times; may be
+/// connected, reads at most 15 of them and disconnects. `control`: a client subscribed to pings, for transmission times; may be
 /// null. `clocks` is set to the difference of the clocks.
 void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point deadline, ControlFacts& clocks);
 /// Sets the latency if it is 0 to 2 s, and the difference of the clocks. `delays_s`: times of receipt by this computer's clock

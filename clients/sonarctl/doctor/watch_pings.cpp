@@ -42,7 +42,7 @@ class Watch {
     conclude(of_wire.missing_pings);
   }
 
-  /// From the events of the control stream, for each ping: the delay from transmission to arrival, and the computing time.
+  /// The delay from transmission to arrival and the computing time of each ping, from events of the control stream.
   struct DaemonTimes {
     std::vector<double> delays_s, computing_ms;
   };
@@ -78,7 +78,7 @@ class Watch {
     log_.add(ping, at_s);
     ++facts_.pings;
     if (!ping.errors.empty() && ++facts_.broken == 1) facts_.first_complaint = ping.errors.front();
-    if (facts_.pings == 1) return;  // the first ping includes the initial setup: reported separately
+    if (facts_.pings == 1) return;  // the first ping includes the initial setup, and is reported separately
     arrived_unix_s_[seen.number] = unix_now_s();
     if (ping.fired_s) behind_stamp_s_.push_back(at_s - *ping.fired_s);
   }
@@ -100,7 +100,7 @@ class Watch {
   std::vector<double> behind_stamp_s_;
 };
 
-/// Records the outcome of a failed connection or greeting.
+/// Returns the outcome of a failed connection or greeting.
 Outcome outcome_of(const Error& error, const SonarFacts& sonar) {
   using Kind = protocol::HostPort::Kind;
   const Kind first = sonar.make->ports.front().kind;
@@ -126,7 +126,7 @@ void set_latency(SonarFacts& sonar, std::vector<double> delays_s, ControlFacts& 
 
 namespace {
 
-/// The rate with which the sonar pings for us, by its daemon; 0: unknown.
+/// Returns the rate at which the sonar pings for us, as its daemon reports it; 0: unknown.
 double present_rate_hz(ControlClient& control, const std::string& sonar) {
   const auto status = control.status(500ms);
   if (!status) return 0;
@@ -156,7 +156,7 @@ void watch_pings(SonarFacts& sonar, ControlClient* control, Steady::time_point d
   facts.own = stream->own();
   facts.asked_hz = stream->host().expects_echo() ? usual_hz : 0;
   watch.run(*stream);
-  // Some sonars forget their rate when we leave.
+  // Some sonars drop our rate when we disconnect.
   if (facts.asked_hz == 0 && control != nullptr && !sonar.make->scans) facts.asked_hz = present_rate_hz(*control, sonar.name);
   stream = failure(ErrorKind::io, "closed");
   if (control == nullptr || sonar.make->own_numbers) return;

@@ -86,7 +86,7 @@ BVT_API RetVal BVTHead_SetImageReqSize(BVTHead self, int height, int width);
 BVT_API RetVal BVTHead_SetRangeResolution(BVTHead self, float metres);
 BVT_API RetVal BVTHead_SetRangeDataThreshold(BVTHead self, unsigned short threshold);
 
-/* Ping: seconds since 1970 UTC; may be used and destroyed in another thread. */
+/* Ping: times are seconds since 1970 UTC. Another thread may use and destroy it. */
 BVT_API void BVTPing_Destroy(BVTPing self);
 BVT_API RetVal BVTPing_GetImage(BVTPing self, BVTMagImage* out);
 BVT_API RetVal BVTPing_GetImageXY(BVTPing self, BVTMagImage* out);
@@ -98,7 +98,7 @@ BVT_API int BVTPing_GetPingNumber(BVTPing self);
 BVT_API RetVal BVTPing_PutNavData(BVTPing self, BVTNavData nav);
 BVT_API RetVal BVTPing_GetNavDataCopy(BVTPing self, BVTNavData* out);
 
-/* MagImage: 16 bits a pixel, row after row, 65535 is full scale; angles in degrees clockwise from ahead. */
+/* MagImage: 16 bits per pixel, row after row, 65535 is full scale; angles in degrees clockwise from ahead. */
 BVT_API void BVTMagImage_Destroy(BVTMagImage self);
 BVT_API int BVTMagImage_GetHeight(BVTMagImage self);
 BVT_API int BVTMagImage_GetWidth(BVTMagImage self);
@@ -116,7 +116,7 @@ BVT_API double BVTMagImage_GetPixelRelativeBearing(BVTMagImage self, int row, in
 BVT_API RetVal BVTMagImage_CopyBits(BVTMagImage self, unsigned short* buffer, unsigned int pixels);
 BVT_API RetVal BVTMagImage_SavePGM(BVTMagImage self, const char* file_name);
 
-/* ColorImage: 32 bits a pixel, in memory blue, green, red, 255. */
+/* ColorImage: 32 bits per pixel, in memory blue, green, red, 255. */
 BVT_API void BVTColorImage_Destroy(BVTColorImage self);
 BVT_API int BVTColorImage_GetHeight(BVTColorImage self);
 BVT_API int BVTColorImage_GetWidth(BVTColorImage self);
@@ -134,7 +134,7 @@ BVT_API double BVTColorImage_GetPixelRelativeBearing(BVTColorImage self, int row
 BVT_API RetVal BVTColorImage_CopyBits(BVTColorImage self, unsigned int* buffer, unsigned int pixels);
 BVT_API RetVal BVTColorImage_SavePPM(BVTColorImage self, const char* file_name);
 
-/* ColorMapper: magnitudes to colours through a map of 4096 entries. */
+/* ColorMapper: converts magnitudes to colours through a map of 4096 entries. */
 BVT_API BVTColorMapper BVTColorMapper_Create(void);
 BVT_API void BVTColorMapper_Destroy(BVTColorMapper self);
 BVT_API RetVal BVTColorMapper_Load(BVTColorMapper self, const char* file_name);

@@ -108,7 +108,7 @@ BVT_API RetVal BVTHead_SetImageType(BVTHead self, int type);
 BVT_API RetVal BVTHead_SetImageReqSize(BVTHead self, int height, int width);
 BVT_API RetVal BVTHead_SetRangeResolution(BVTHead self, float metres);
 
-/* Ping: seconds since 1970 UTC; may be used and destroyed in another thread. */
+/* Ping: times are seconds since 1970 UTC. Another thread may use and destroy it. */
 BVT_API void BVTPing_Destroy(BVTPing self);
 BVT_API RetVal BVTPing_GetImage(BVTPing self, BVTMagImage* out);
 BVT_API RetVal BVTPing_GetImageXY(BVTPing self, BVTMagImage* out);
@@ -124,7 +124,7 @@ BVT_API RetVal BVTPing_HasNavData(BVTPing self, int* out);
 BVT_API RetVal BVTPing_SetNavData(BVTPing self, BVTNavData nav);
 BVT_API RetVal BVTPing_GetNavDataCopy(BVTPing self, BVTNavData* out);
 
-/* ImageGenerator: makes images and range profiles of pings; needs a head first. Thresholds are fractions of full scale. */
+/* ImageGenerator: makes images and range profiles of pings. Call SetHead first. Noise and clipping thresholds are fractions. */
 BVT_API BVTImageGenerator BVTImageGenerator_Create(void);
 BVT_API void BVTImageGenerator_Destroy(BVTImageGenerator self);
 BVT_API RetVal BVTImageGenerator_SetHead(BVTImageGenerator self, BVTHead head);
@@ -152,7 +152,7 @@ BVT_API RetVal BVTImageGenerator_GetRangeProfileStartRange(BVTImageGenerator sel
 BVT_API RetVal BVTImageGenerator_SetXYImageSize(BVTImageGenerator self, int width, int height);
 BVT_API RetVal BVTImageGenerator_GetXYImageSize(BVTImageGenerator self, int* width, int* height);
 
-/* MagImage: 16 bits a pixel, row after row, 65535 is full scale; angles in degrees clockwise from ahead. */
+/* MagImage: 16 bits per pixel, row after row, 65535 is full scale; angles in degrees clockwise from ahead. */
 BVT_API void BVTMagImage_Destroy(BVTMagImage self);
 BVT_API RetVal BVTMagImage_GetHeight(BVTMagImage self, int* out);
 BVT_API RetVal BVTMagImage_GetWidth(BVTMagImage self, int* out);
@@ -170,7 +170,7 @@ BVT_API RetVal BVTMagImage_GetPixelRelativeBearing(BVTMagImage self, int row, in
 BVT_API RetVal BVTMagImage_CopyBits(BVTMagImage self, unsigned short* buffer, unsigned int pixels);
 BVT_API RetVal BVTMagImage_SavePGM(BVTMagImage self, const char* file_name);
 
-/* ColorImage: 32 bits a pixel, in memory blue, green, red, 255. */
+/* ColorImage: 32 bits per pixel, in memory blue, green, red, 255. */
 BVT_API void BVTColorImage_Destroy(BVTColorImage self);
 BVT_API RetVal BVTColorImage_GetHeight(BVTColorImage self, int* out);
 BVT_API RetVal BVTColorImage_GetWidth(BVTColorImage self, int* out);
@@ -188,7 +188,7 @@ BVT_API RetVal BVTColorImage_GetPixelRelativeBearing(BVTColorImage self, int row
 BVT_API RetVal BVTColorImage_CopyBits(BVTColorImage self, unsigned int* buffer, unsigned int pixels);
 BVT_API RetVal BVTColorImage_SavePPM(BVTColorImage self, const char* file_name);
 
-/* ColorMapper: magnitudes to colours through a map of 4096 entries. */
+/* ColorMapper: converts magnitudes to colours through a map of 4096 entries. */
 BVT_API BVTColorMapper BVTColorMapper_Create(void);
 BVT_API void BVTColorMapper_Destroy(BVTColorMapper self);
 BVT_API RetVal BVTColorMapper_Load(BVTColorMapper self, const char* file_name);

@@ -1,5 +1,5 @@
 /* The C++ classes of 4.x: each holds one handle and shares it when copied; a call that fails throws SdkException. C++11; part of
- * bvt_sdk.h. A method does what the C function of its name does; its last out-parameter is returned. */
+ * bvt_sdk.h. A method calls the C function of its name and returns the last out-parameter. */
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace BVTSDK {
 
-/* Not a std::exception, as hosts expect. */
+/* Hosts expect that this is not a std::exception. */
 class SdkException {
  public:
   explicit SdkException(int code) : code_(code) {}

@@ -58,8 +58,8 @@ def _pose(reader: Reader) -> Pose:
 
 
 def decode(kind: str, data: bytes, ros1: bool) -> List[Tuple[str, float, str, Pose]]:
-    """Returns for each pose of a message: suffix of the topic's name; timestamp [s], 0 if it has none; name of the frame that it
-    is in; pose."""
+    """Returns for each pose of a message: suffix of the topic's name; timestamp [s], 0 if it has none; name of the frame to
+    which the pose refers; pose."""
     reader = Reader(data, ros1)
     if kind == "Path":
         _header(reader, ros1)
@@ -90,11 +90,11 @@ PACKAGES = ("nav_msgs", "geometry_msgs", "tf2_msgs", "tf")
 
 
 def is_path(schema: str) -> bool:
-    """Whether each message contains a whole track, so that only the last one is used."""
+    """Returns whether each message contains a whole track, so that only the last message is used."""
     return kind_of(schema) == "Path"
 
 
 def kind_of(schema: str) -> str:
-    """The type name in "nav_msgs/msg/Odometry" or "nav_msgs/Odometry"; empty for unsupported types."""
+    """Returns the type name in "nav_msgs/msg/Odometry" or "nav_msgs/Odometry"; empty for unsupported types."""
     parts = schema.split("/")
     return parts[-1] if parts[0] in PACKAGES and parts[-1] in KINDS else ""

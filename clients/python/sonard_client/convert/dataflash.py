@@ -145,7 +145,7 @@ class _Gathered:
             self.positions.setdefault(key, []).append((t, place))
 
     def cores(self, key: str) -> "Dict[str, int]":
-        """The cores of a filter that the autopilot used, as sources, most used first; empty if the log does not name them."""
+        """Returns the cores of a filter that the autopilot used, as sources, most used first; empty if the log names none."""
         used = sorted(self._in_use.get(key.split(":")[0], {}).items(), key=lambda core: -core[1])
         return {f"{key.split(':')[0]}:{core}" if core else key.split(":")[0]: count for core, count in used}
 

@@ -20,7 +20,7 @@ from .track import ConvertError, Place2, Track, Warn
 from .ulog import read_ulog
 
 FORMATS = ("dataflash", "tlog", "mcap", "rosbag", "db3", "ulog", "nmea")
-RECORDINGS = ("mcap", "rosbag", "db3")  # their positions are metres in an unknown frame
+RECORDINGS = ("mcap", "rosbag", "db3")  # their positions are metres from an unknown origin
 _HEAD_BYTES = 4096
 _SENTENCE = re.compile(rb"\$(P[A-Z]{3,4}|[A-Z]{2}[A-Z0-9]{3}),")
 _WRITE = "write poses as CSV, in metres: sonard_client.geodesy converts degrees (docs/poses.md)"

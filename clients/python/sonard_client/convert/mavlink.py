@@ -59,7 +59,7 @@ FRD_BODIES = tuple(map(FRAMES.index, ("BODY_NED", "BODY_OFFSET_NED", "BODY_FRD")
 
 
 def frame_text(frame: float) -> str:
-    """A MAV_FRAME with its name: "12 (BODY_FRD)"."""
+    """Returns a MAV_FRAME with its name: "12 (BODY_FRD)"."""
     return f"{frame:.0f}" + (f" ({FRAMES[int(frame)]})" if frame < len(FRAMES) else "")
 
 
@@ -73,7 +73,7 @@ _CRCS = tuple(map(_crc_of_byte, range(256)))
 
 
 def crc(data: bytes, seed: int) -> int:
-    """CRC-16/MCRF4XX over all bytes after the magic byte, then over the seed."""
+    """Returns the CRC-16/MCRF4XX over `data`, which begins after the magic byte, and the seed."""
     value = 0xFFFF
     for byte in data:
         value = value >> 8 ^ _CRCS[(value ^ byte) & 0xFF]
@@ -90,7 +90,7 @@ class Frame(NamedTuple):
 
 
 def frame_length(data: bytes, at: int) -> Optional[int]:
-    """Length of the frame at `at`, or None if no frame begins there. The frame may exceed the data."""
+    """Returns the length of the frame at `at`, or None if no frame begins there. The frame may exceed the data."""
     if at + 3 > len(data):
         return None
     if data[at] == V1:
@@ -118,8 +118,8 @@ def read_frame(data: bytes, at: int) -> Optional[Frame]:
 
 
 def fields_of(frame: Frame) -> "Optional[Dict[str, float]]":
-    """Fields of a known message; extensions that were not sent are 0, as MAVLink requires. None for unknown messages and for
-    payloads that are too long."""
+    """Returns the fields of a known message; extensions that were not sent are 0, as MAVLink requires. Returns None for unknown
+    messages and for payloads that are too long."""
     known = MESSAGES.get(frame.message_id)
     if known is None:
         return None

@@ -18,7 +18,7 @@ _NED = re.compile(r"(?<![a-z])ned(?![a-z])", re.IGNORECASE)
 
 
 def axes_of(frame_id: str) -> str:
-    """The axes of a named frame: those of ROS, except for names such as world_ned (Stonefish, MAVROS, UUV Simulator)."""
+    """Returns the axes of a named frame: those of ROS, except for names such as world_ned (Stonefish, MAVROS, UUV Simulator)."""
     return "NED_FRD" if _NED.search(frame_id) else "ENU_FLU"
 
 
@@ -35,7 +35,7 @@ class Found(NamedTuple):
 def may_hold_poses(encoding: str, schema: str) -> bool:
     if encoding in ("cdr", "ros1"):
         return bool(kind_of(schema))
-    if encoding == "json":  # other schemas of these two are large and have no poses
+    if encoding == "json":  # other schemas of foxglove and sonard are large, without poses
         return schema in FOXGLOVE or not schema.startswith(("foxglove.", "sonard."))
     return encoding == "protobuf" and schema in FOXGLOVE
 

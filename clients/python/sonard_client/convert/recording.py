@@ -52,7 +52,7 @@ class _Topic:
 
 
 def _others(seen: Mapping[str, str]) -> str:
-    """The topics of a recording without poses, with their types."""
+    """Lists the topics of a recording without poses, with their types."""
     most = 20
     listed = [f"{topic!r} ({kind or 'no type'})" for topic, kind in sorted(seen.items())]
     return ", ".join(listed[:most]) + (f" and {len(listed) - most} more" if len(listed) > most else "") or "none"
@@ -75,7 +75,7 @@ def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str, seen: M
 
 
 def _clock_reset(rows: Stream[Found]) -> str:
-    """Advice if the clock jumped back, after which all poses are omitted until it has caught up."""
+    """Returns advice if the clock jumped back; all later poses are omitted until the clock has caught up."""
     back_s, number = max(((a[0] - b[0], i) for i, (a, b) in enumerate(zip(rows, rows[1:]), 1)), default=(0.0, 0))
     return "" if back_s < CLOCK_RESET_S else f"; the clock went back by {back_s:.1f} s at pose {number + 1}: split the recording there"
 

@@ -19,14 +19,14 @@ METADATA = "metadata.yaml"
 COLUMNS = {"topics": ("id", "name", "type", "serialization_format"), "messages": ("id", "topic_id", "timestamp", "data")}
 MOST_TOPICS = 500  # limit for topics that may hold poses
 ROW_BYTES = 8  # minimum overhead of a stored message
-STEPS_PER_BYTE = 10  # instructions of SQLite; a scan takes about 20 a row
+STEPS_PER_BYTE = 10  # instructions of SQLite; a scan needs about 20 per row
 _STEPS_AT_ONCE = 100_000
 _PARTS_NAMED = 20
 _PART = re.compile(r"^[ \t]*-[ \t]+[\"']?([^\"'\s:]+\.(?:db3|mcap)(?:\.zstd)?)[\"']?[ \t\r]*$", re.MULTILINE)
 
 
 def _unmerged(path: pathlib.Path) -> Optional[pathlib.Path]:
-    """The file beside a database with its last changes, left if the writer did not end regularly."""
+    """Returns the file beside a database that has its last changes, which exists if the writer did not end regularly."""
     beside = (path.with_name(path.name + end) for end in ("-wal", "-journal"))
     return next((p for p in beside if p.is_file() and p.stat().st_size), None)
 
@@ -83,7 +83,7 @@ class _Base:
                 topics[number] = topic, encoding, schema
             if len(topics) > MOST_TOPICS:
                 raise sqlite3.DatabaseError(f"more than {MOST_TOPICS} topics with poses")
-        # Without ORDER BY, which makes SQLite copy all rows before the first.
+        # There is no ORDER BY, because with it SQLite copies all rows before it returns the first.
         select = ("SELECT id, topic_id, timestamp, CASE WHEN typeof(data) = 'blob' AND length(data) <= ? THEN data END FROM "
                   f"messages WHERE topic_id IN ({','.join('?' * len(topics))})")
         odd: Dict[str, int] = {}
@@ -149,7 +149,7 @@ def _warn_of_missing(folder: pathlib.Path, there: List[pathlib.Path], listed: Li
 
 
 def files_of(folder: pathlib.Path, warn: Warn = lambda text: None) -> List[pathlib.Path]:
-    """The files of a recording's folder in the order of time: as its metadata lists them, else by name."""
+    """Returns the files of a recording's folder in the order of time: as the metadata lists them, else by name."""
     there = sorted(p for p in folder.iterdir() if p.suffix in (".db3", ".mcap") and p.is_file())
     try:
         with (folder / METADATA).open("rb") as file:
@@ -168,7 +168,7 @@ def files_of(folder: pathlib.Path, warn: Warn = lambda text: None) -> List[pathl
 
 
 def recording_at(path: pathlib.Path) -> pathlib.Path:
-    """The recording that a path names; the path of its metadata file means its folder."""
+    """Returns the recording that a path names; the path of a metadata file means its folder."""
     return path.parent if path.name == METADATA and path.is_file() else path
 
 

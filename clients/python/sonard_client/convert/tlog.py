@@ -30,7 +30,7 @@ class Logged(NamedTuple):
 
 
 def _is_plausible(data: bytes, at: int, frame: Frame) -> bool:
-    """Whether a record begins here: an intact frame, or an unknown message followed by another record or the end."""
+    """Returns whether a record begins here: an intact frame, or an unknown message followed by another record or the end."""
     if frame.intact is not None:
         return frame.intact
     following = at + STAMP_BYTES + frame.length
@@ -63,7 +63,7 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
 
 
 def _is_supported(f: Dict[str, float]) -> bool:
-    """Whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns only velocity; the body is FRD."""
+    """Returns whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns only velocity; the body is FRD."""
     bodies = (*FRD_BODIES, BODY_FLU)
     if f["frame_id"] in (*NED_WORLDS, LOCAL_FRD):
         return f["child_frame_id"] in (*bodies, f["frame_id"])
@@ -71,7 +71,7 @@ def _is_supported(f: Dict[str, float]) -> bool:
 
 
 def _of_frd(q: Quaternion) -> Quaternion:
-    """Attitude of the FRD body from that of the FLU body: q (0, 1, 0, 0), half a turn about the forward axis."""
+    """Returns the attitude of the FRD body from that of the FLU body: q (0, 1, 0, 0), half a turn about the forward axis."""
     return -q[1], q[0], q[3], -q[2]
 
 
@@ -115,7 +115,7 @@ class _Vehicle:
         self.depths: Dict[str, Stream[float]] = {}  # down [m], of messages without a fix
         self.pressures: Dict[str, Stream[float]] = {}  # [hPa]
         self.is_submarine = False
-        self.autopilot: Optional[int] = None  # its component, from its first heartbeat on
+        self.autopilot: Optional[int] = None  # component of the autopilot, known from its first heartbeat on
         self._homes_m: Dict[int, float] = {}  # by component: altitude of the home; for submarines, of the surface
         self._origins: Dict[int, Geodetic] = {}  # by component
         self.unsupported: "Dict[Tuple[float, float], int]" = {}  # ODOMETRY, by frame_id and child_frame_id

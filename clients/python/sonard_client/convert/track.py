@@ -75,7 +75,7 @@ def chosen(sources: Sequence[Source], wanted: Optional[str], name: str) -> Sourc
 
 
 def paired(attitudes: Stream[Quaternion], positions: Stream[Vector3]) -> List[Row]:
-    """Poses at the times of the more frequent stream; the other one is interpolated, never extrapolated."""
+    """Returns poses at the times of the more frequent stream; the other stream is interpolated, never extrapolated."""
     by_attitude = len(attitudes) >= len(positions)
     times_of_other = [t for t, _ in (positions if by_attitude else attitudes)]
     rows = []
@@ -95,7 +95,7 @@ def paired(attitudes: Stream[Quaternion], positions: Stream[Vector3]) -> List[Ro
 
 def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] = None,
              own_origin: Optional[Geodetic] = None, at: Optional[Place2] = None, surface_m: Optional[float] = None) -> Track:
-    """Makes a track in NED_FRD. origin: as requested. own_origin: origin of the file's metres, if it contains one. at: north and
+    """Makes a track in NED_FRD. origin: the requested one. own_origin: origin of the file's metres, if it contains one. at: north and
     east of a vehicle that has no horizontal position. surface_m: altitude of z = 0 if no origin is requested (default: that of
     the first fix)."""
     attitudes, positions = rising(source.attitudes), rising(source.positions)

@@ -41,7 +41,7 @@ class Layout(NamedTuple):
 
 
 def _layout(text: str) -> Union[Layout, str]:
-    """The fields of _READ in a format such as "uint64_t timestamp;float[4] q;", or the reason why it cannot be read."""
+    """Returns the fields of _READ in a format such as "uint64_t timestamp;float[4] q;", or the reason why it cannot be read."""
     codes, fields, at, size, read = "<", {}, 0, 0, 1
     for part in filter(None, text.split(";")):
         match = _FIELD.fullmatch(part)
@@ -148,7 +148,7 @@ class _Log:
             [depth_source(ATTITUDE, attitudes(ATTITUDE), self.depths.get(_lowest(self.depths, LOCAL), []))]
 
     def further_instances(self, source: Source) -> List[str]:
-        """The instances that the source uses, where it is not the first."""
+        """Returns the instances that the source uses, except the first ones."""
         used = [_lowest(values, name) for values, name in
                 [(self.attitudes, name) for name in source.name.split("+")] +
                 [(self.depths, LOCAL)] * source.held + [(self.positions, name) for name in source.name.split("+")]]

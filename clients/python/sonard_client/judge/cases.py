@@ -87,7 +87,7 @@ class Case:
         return "MUST" + (", also of " + ", ".join(sorted(self.must)) if self.must else "") + "; SHOULD"
 
     def until(self) -> Dict[str, float]:
-        """The duration as a field of a fault record."""
+        """Returns the duration as a field of a fault record."""
         count, _, unit = self.duration.replace("once", "1 times").partition(" ")
         return {{"s": "seconds", "pings": "pings", "times": "count"}[unit]: float(count) if unit == "s" else int(count)}
 
@@ -108,7 +108,7 @@ class Case:
         return float(self.given["seconds"]) if self.kind == "S06" else 0.0
 
     def record(self) -> Dict[str, Any]:
-        """The fault record for sonard."""
+        """Returns the fault record for sonard."""
         return {"name": "case", "do": self.kind, "with": dict(self.given), "at": self.begin(), "for": self.until()}
 
 

@@ -1,4 +1,4 @@
-"""Runs the driver under test as its user would. Measures its processes by /proc. Splits its output into log lines and lines of
+"""Runs the driver under test as its user would. Measures its processes with /proc. Splits its output into log lines and lines of
 the tap: JSON about published pings and the state of the link (docs/judge.md)."""
 from __future__ import annotations
 

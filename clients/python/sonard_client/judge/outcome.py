@@ -11,7 +11,7 @@ from .wire import Connection, hex_around
 
 
 def result_of(scene: Scene, case: Case, seen: Observation, verdict: Verdict) -> Dict[str, Any]:
-    """Returns the content of case.json. `wall_clock` has the values that depend on time; the others are equal in equal runs."""
+    """Returns the content of case.json. `wall_clock` has the values that depend on time; other values are equal in equal runs."""
     comment = f"sonard judge, case {case.number} {case.name}: {case.sentence}"
     capture_packets = scene.capture.write_pcapng(scene.folder / "case.pcapng", comment) if scene.capture else 0
     connections: List[Connection] = scene.capture.connections if scene.capture else []

@@ -3,7 +3,7 @@
     python3 -m sonard_client.judge.ros_tap ros1|ros2 TOPIC -- COMMAND...
 
 The type of the message must have a number (ping_id, ping_number or header.seq) and samples (ping_data, image.data, intensities or
-data), or a velocity and an altitude, also as vx, vy, vz and altitude of its report.
+data), or a velocity and an altitude, also as vx, vy, vz and altitude in its field `report`.
 """
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class WholeMessages:
         raise NotImplementedError
 
     def pings(self, message: bytes, begin: int) -> Iterator[TruePing]:
-        """The pings in a whole message. begin: its offset in the stream."""
+        """Yields the pings in a whole message. begin: its offset in the stream."""
         raise NotImplementedError
 
     def is_damaged(self, message: bytes) -> bool:
@@ -75,7 +75,7 @@ class WholeMessages:
         self._data += received
         found: List[TruePing] = []
         still_open: List[int] = []
-        done = 0  # no message begins before
+        done = 0  # no message begins before this offset
         for begin in self._begins():
             if begin < done:
                 continue
@@ -99,7 +99,7 @@ class WholeMessages:
         return found
 
     def unnumbered(self) -> int:
-        """Pings without a number get numbers from -1 downwards, which no driver prints."""
+        """Returns the number of a ping that has none: from -1 downwards, which no driver prints."""
         self._unnumbered -= 1
         return self._unnumbered
 

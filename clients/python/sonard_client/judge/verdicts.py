@@ -17,7 +17,7 @@ WORDS = {"notice_s": "notices within {:g} s", "recover_s": "is back within {:g} 
 
 @dataclasses.dataclass
 class Observation:
-    """What the capture, the tap and the journal observed in one run of a case. Times are monotonic seconds."""
+    """Observations of the capture, the tap and the journal in one run of a case. Times are monotonic seconds."""
     began: float
     ended: float                  # end of the fault
     watched_until: float
@@ -58,7 +58,7 @@ class Verdict:
         return all(check["holds"] for check in self.should)
 
     def classes(self) -> Tuple[str, str, bool, bool]:
-        """The part of a verdict that must be equal in all runs of a case. Figures are left out, because they vary."""
+        """Returns the part of a verdict that must be equal in all runs of a case. Figures are left out, because they vary."""
         return self.data, self.recovery, self.must_holds, self.should_holds
 
     def words(self) -> Tuple[str, str]:

@@ -17,7 +17,7 @@ from .truth import Make, Reader, TruePing
 _ALL_PROTOCOLS, _OUTGOING = 0x0003, 4
 _FIN, _SYN, _RST, _PSH, _ACK = 1, 2, 4, 8, 16
 _STREAM_KEPT = 48 << 20   # bytes of a connection kept for the hex view
-_BEFORE, _AFTER = 512 << 10, 1280 << 10  # bytes of packets kept before and after the fault
+_BEFORE, _AFTER = 512 << 10, 1280 << 10  # bytes of packets kept before and after the start of the fault
 _WRAP = 1 << 32
 _MOST_FRAGMENTED = 64     # datagrams whose fragments are kept at once
 
@@ -99,8 +99,8 @@ class Connection:
 
 
 class DatagramFlow(Connection):
-    """Datagrams between the sonar and one port of the driver, or of a group. It begins with the driver's first one, or with the
-    first of a ping that the sonar pushes; its end is not visible. Data on the wire count as delivered, because UDP has no
+    """Datagrams between the sonar and one port of the driver, or of a group. It begins with the driver's first datagram, or with
+    the first of a ping that the sonar pushes; its end is not visible. Data on the wire count as delivered, because UDP has no
     acknowledgement."""
 
     def __init__(self, number: int, peer: str, mono: float, reader: Reader) -> None:

@@ -11,5 +11,5 @@ MAKES = (oculus.OCULUS, blueview.BLUEVIEW, ping.NUMBERED, ping.UNNUMBERED, ping.
 
 
 def make_of(profile: str) -> Optional[Make]:
-    """The make of a product; None if its data cannot be judged."""
+    """Returns the make of a product; None if its data cannot be judged."""
     return next((make for make in MAKES if profile.startswith(make.profiles)), None)

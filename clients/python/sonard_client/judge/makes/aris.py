@@ -1,5 +1,5 @@
 """ARIS: frames in several datagrams, sent to the receiver that a command names. Accepted samples: those of all parts in the order of
-sending, or in the order of the picture (sample by sample, each from beam 0)."""
+their offsets, or in the order of the picture (sample by sample, each from beam 0)."""
 from __future__ import annotations
 
 import zlib

@@ -16,7 +16,7 @@ _NAVIGATION_BYTES = (8, 8, 8, 4, 4, 4, 4, 4, 4, 4)  # of each field; the next on
 
 
 def _samples(payload: bytes, navigation: int, is_deflated: int, size: int) -> Optional[bytes]:
-    """The samples, if their size is right; else None. The size field itself may be wrong."""
+    """Returns the samples if their size is right; else None. The size field itself may be wrong."""
     at = _NAVIGATION_AT + sum(wide for bit, wide in enumerate(_NAVIGATION_BYTES) if navigation >> bit & 1)
     if navigation >> len(_NAVIGATION_BYTES) & 1:
         at += 2 + int.from_bytes(payload[at:at + 2], "little")

@@ -13,7 +13,7 @@ _VALUES = ("vx", "vy", "vz", "altitude")
 
 
 def _velocity(line: str) -> Optional[Tuple[FrozenSet[int], bool]]:
-    """CRCs of the values, and whether the values are valid; None for any other line."""
+    """Returns CRCs of the values, and whether the values are valid; None for any other line."""
     try:
         report = json.loads(line)
         if not isinstance(report, dict) or report.get("type") != "velocity":

@@ -12,7 +12,7 @@ _HEAD, _SIZE_AT = 31, 29  # of the payload before its bins
 
 
 def _lengths(data: "bytes | bytearray", begin: int) -> Tuple[bytes, bytes]:
-    """The two lengths of a frame, as hexadecimal digits."""
+    """Returns the two lengths of a frame, as hexadecimal digits."""
     return bytes(data[begin + 1:begin + 5]), b"%04X" % int.from_bytes(data[begin + 5:begin + 7], "little")
 
 

@@ -15,7 +15,7 @@ _FEWEST_SAMPLES, _MOST_SAMPLES = 4, 1 << 22  # limits for an image: no sonar has
 
 
 def sample_crcs(image: bytes, rows: int, row_bytes: int, has_gains: bool) -> FrozenSet[int]:
-    """CRC-32 of an image as sent; with row gains also of the samples without them."""
+    """Returns the CRC-32 of an image as sent; with row gains also of the samples without them."""
     found = {zlib.crc32(image)}
     if has_gains:
         crc, stride = 0, row_bytes + 4

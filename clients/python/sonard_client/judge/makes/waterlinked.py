@@ -15,7 +15,7 @@ _LARGEST = 1 << 20  # content of a datagram, unpacked
 
 
 def unpacked(block: bytes) -> bytes:
-    """The content of a block of Snappy. Raises ValueError."""
+    """Returns the content of a block of Snappy. Raises ValueError."""
     size, at = protobuf.varint(block, 0)
     out = bytearray()
     while at < len(block) and len(out) < size <= _LARGEST:
@@ -40,7 +40,7 @@ def unpacked(block: bytes) -> bytes:
 
 
 def content_of(datagram: bytes) -> Optional[bytes]:
-    """The packet in a datagram; None if it is damaged or something else."""
+    """Returns the packet in a datagram; None if it is damaged or something else."""
     if datagram[:4] not in (b"RIP1", b"RIP2") or len(datagram) < 12 or int.from_bytes(datagram[4:8], "little") != len(datagram) or \
             zlib.crc32(datagram[:-4]) != int.from_bytes(datagram[-4:], "little"):
         return None
