@@ -272,7 +272,7 @@ Result<HttpReply> http_ask(const Endpoint& at, const std::string& method, const 
   if (answer.starts_with("HTTP/1.") && answer.size() > 12) std::from_chars(answer.data() + 9, answer.data() + 12, reply.status);
   const std::size_t end = answer.find("\r\n\r\n");
   if (reply.status == 0 || end == std::string::npos)
-    return failure(ErrorKind::bad_data, "no answer of HTTP came from tcp " + text_from(at));
+    return failure(ErrorKind::bad_data, "no HTTP answer came from tcp " + text_from(at));
   reply.body = answer.substr(end + 4);
   return reply;
 }

@@ -4,7 +4,7 @@
 usage: bundle.py ESBUILD THREE_DIR GENERATED_DIR OUT_DIR
 
 THREE_DIR holds three.module.js, GENERATED_DIR generated/colour-maps.js. OUT_DIR gets index.html, icon.svg
-and app-HASH.js, scene-HASH.js, graphics-HASH.js, app-HASH.css as they are served, page_files.cpp with their gzip bytes, and sizes.txt. The hash is of the content: names change with it.
+and app-HASH.js, scene-HASH.js, graphics-HASH.js, app-HASH.css as they are served, page_files.cpp with their gzip bytes, and sizes.txt. The hash is that of the content, so names change with it.
 """
 import gzip
 import hashlib
@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-# Served file -> source file where it begins. The scene has a separate script, which is loaded after the first picture.
+# Served file -> its main source file. The scene has a separate script, which is loaded after the first picture.
 SOURCES = {"app.js": "src/main.js", "scene.js": "src/scene/scene.js", "graphics.js": "src/graphics.js", "app.css": "style/app.css"}
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
          ".svg": "image/svg+xml"}
@@ -22,7 +22,7 @@ TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=u
 
 def bundled(esbuild, source, three, generated, *options):
     # three.js is found by its name, so that any release of it can be bundled.
-    # es2021: esbuild 0.14 of Ubuntu 22.04 supports no later one.
+    # es2021: esbuild 0.14 of Ubuntu 22.04 supports no later language version.
     command = [esbuild, str(source), "--bundle", "--minify", "--target=es2021", "--legal-comments=inline", *options]
     environment = dict(os.environ, NODE_PATH=os.pathsep.join([str(three), str(generated)]))
     return subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout

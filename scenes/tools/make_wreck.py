@@ -12,7 +12,7 @@ STATIONS, RIBS = 44, 12
 
 
 def half_breadth(t, h):
-    """Half width at station t (-1 stern .. 1 bow) and height h (0 keel .. 1 gunwale)."""
+    """Returns the half width at station t (-1 stern .. 1 bow) and height h (0 keel .. 1 gunwale)."""
     plan = (1 - max(t, 0) ** 2.2) if t > 0 else (1 - 0.25 * t * t)
     section = h ** (0.35 + 0.45 * max(t, 0))
     return 0.5 * BEAM * max(plan, 0.02) * section
@@ -60,7 +60,7 @@ def hull_point(i, j, side):
 
 
 def torn(i, j, side):
-    """The hole amidships on the port side, with a ragged edge."""
+    """Returns whether a face lies in the hole amidships on the port side, which has a ragged edge."""
     if side < 0:
         return False
     ragged = 1.3 * math.sin(2.1 * i) + 0.9 * math.sin(4.7 * j + i)

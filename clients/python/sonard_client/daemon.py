@@ -35,7 +35,7 @@ class Daemon:
     sonars: [{name: front, profile: PRODUCT, bind_ip: ADDRESS, status_to: [ADDRESS]}]
     """) as sonard: drive(sonard.address)
 
-    ADDRESS is replaced by a random loopback address (sonard.address), so that several daemons can run at once. None runs the demo.'''
+    ADDRESS is replaced by a random loopback address (sonard.address), so several daemons can run at once. None runs the demo.'''
 
     def __init__(self, config: Union[str, "os.PathLike[str]", None], program: str = "sonard", arguments: Sequence[str] = (),
                  timeout_s: float = 60.0) -> None:

@@ -30,7 +30,7 @@ def config(scene="l-targets.yaml", more=""):
 
 
 def made_ping(version=0, width=1, rows=3, beams=4, gains=None, samples=None, number=7, bearings=None, row_m=0.5):
-    """A synthetic ping message."""
+    """Returns a synthetic ping message."""
     flags = 0x09 | (0x04 if gains else 0)
     fire = struct.pack("<5B4d", 2, 0, 255, 127, flags, 10.0, 50.0, 1500.0, 0.0) + (bytes(36) if version == 2 else b"")
     samples = samples or [[16 * row + beam for beam in range(beams)] for row in range(rows)]

@@ -29,7 +29,7 @@ def quaternion(roll, pitch, yaw):
 
 
 def degrees_at(north, east, down):
-    """Position near ORIGIN, by the two radii of curvature; accurate to a millimetre within 100 m."""
+    """Returns a position near ORIGIN, computed with the two radii of curvature; accurate to a millimetre within 100 m."""
     latitude, a, e2 = math.radians(ORIGIN[0]), 6378137.0, 6.69437999014e-3
     w = 1 - e2 * math.sin(latitude) ** 2
     meridian, across = a * (1 - e2) / w ** 1.5, a / math.sqrt(w)
@@ -64,7 +64,7 @@ def _centidegrees(angle):
 
 
 def dataflash_log(kinds=("ATT", "POS"), steps=50):
-    """A log with the given messages; POS at every second step."""
+    """Returns a log with the given messages; POS at every second step."""
     out = b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", 128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
     out += b"".join(map(dataflash_format, DATAFLASH))
     out += dataflash_message("ORGN", 0, 0, round(1e7 * ORIGIN[0]), round(1e7 * ORIGIN[1]), round(100 * ORIGIN[2]))
@@ -184,7 +184,7 @@ class Cdr:
 
 
 def enu_moment(step):
-    """The same moment as in ROS: time, east, north, up; x, y, z, w."""
+    """Returns the moment in ROS's axes: time; east, north, up; x, y, z, w."""
     t, north, east, down, roll, pitch, yaw = moment(step)
     w, x, y, z = quaternion(roll, -pitch, math.pi / 2 - yaw)
     return t, (east, north, -down), (x, y, z, w)
@@ -202,7 +202,7 @@ def pose_stamped(step, t0=100, frame="map", **how):
 
 
 def path(steps, t0=100, stamped=True, **how):
-    """nav_msgs/Path: a header, and poses with headers."""
+    """Returns nav_msgs/Path: a header, and poses with headers."""
     cdr = Cdr(**how).header(t0 + len(steps), "map").put("I", len(steps))
     for step in steps:
         t, position, xyzw = enu_moment(step)
@@ -363,7 +363,7 @@ ROS2_TOPICS = [("/odom", "nav_msgs/msg/Odometry", [(100 + i, odometry(i)) for i 
 
 
 def telemetry_without_place(kinds, submarine=True, steps=20):
-    """A tlog of messages of these kinds; positions have the depth only."""
+    """Returns a tlog of messages of these kinds; positions have the depth only."""
     log = bytearray()
     for step in range(steps):
         t, _, _, down, *angles = moment(step)

@@ -125,7 +125,7 @@ class Ros:
 
     @contextlib.contextmanager
     def module(self):
-        """Returns sonard_bridge.node in this environment."""
+        """Provides sonard_bridge.node in this environment."""
         with mock.patch.dict(sys.modules, self.modules):
             sys.modules.pop("sonard_bridge.node", None)
             try:

@@ -68,7 +68,7 @@ class Refused(unittest.TestCase):
 
 
 class WideFields(unittest.TestCase):
-    def test_all_that_answers_hold_are_known(self):
+    def test_all_wide_fields_of_answers_are_listed(self):
         text = re.sub(r"//[^\n]*", "", (PACKAGE.parents[1] / "protocol/control/control.proto").read_text(encoding="utf-8"))
         bodies = dict(re.findall(r"^message (\w+) \{(.*?)^\}", text, re.M | re.S))
         reached, waiting = set(), ["DaemonStatus", "Event", "FaultEntry"]
@@ -174,7 +174,7 @@ class Requests(unittest.TestCase):
             self.control.load_scene("demo.yaml")
         self.assertEqual((caught.exception.status, caught.exception.code), (502, ""))
 
-    def test_requests_have_their_bytes(self):
+    def test_each_request_has_its_path_and_body(self):
         at = {"frame": "NED_FRD", "position": {"x": 1, "y": 2, "z": 3}, "orientation": {"w": 1, "x": 0, "y": 0, "z": 0}}
         placed = dict(position=(1, 2, 3), frame="NED_FRD")
         for call, path, body in (

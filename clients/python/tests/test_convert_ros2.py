@@ -95,7 +95,7 @@ class RecordingsOfRos2(WithFolder):
         convert(folder, warn=self.warned.append)
         self.assertEqual(len([text for text in self.warned if "parts of the recording" in text]), 2)
 
-    def test_metadata_of_blank_lines_take_little_time(self):
+    def test_metadata_of_blank_lines_takes_little_time(self):
         folder = self.folder_of()
         made.db3(folder / "r_0.db3", made.ROS2_TOPICS)
         for text in ("\n" * (1 << 20), " " * (1 << 20), "- " + " " * (1 << 20), "- a.db3" * (1 << 17) + " x", "- \n" * (1 << 18)):
@@ -147,7 +147,7 @@ class RecordingsOfRos2(WithFolder):
                     convert(path)
 
     def repeating(self, topic_id):
-        """A file of some kB whose tree of messages lists the same pages again and again."""
+        """Writes a file of some kB whose tree of messages lists the same pages again and again; returns its path."""
         path = self.folder / "log"
         with contextlib.closing(sqlite3.connect(path)) as base:
             base.execute("PRAGMA page_size=512")

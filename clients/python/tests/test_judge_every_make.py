@@ -37,7 +37,7 @@ class EveryMake(unittest.TestCase):
         for make in makes.MAKES:
             with self.subTest(make.profiles):
                 self.assertEqual([prefix for prefix in make.profiles if not any(name.startswith(prefix) for name in every)], [],
-                                 "no product begins so")
+                                 "no product has this prefix")
 
     def test_the_files_exist(self):
         for place in (READERS, DRIVERS):

@@ -39,7 +39,7 @@ class Bathymetry(judge_makes.StreamChecks, unittest.TestCase):
             damaged[at] ^= 1
             self.assertFalse(self.shows(self.found(bytes(damaged), bytes(300)), [message]), at)
 
-    def test_a_number_of_beams_that_contradicts_the_size(self):
+    def test_a_number_of_beams_that_contradicts_the_size_is_refused(self):
         body = struct.pack("<ffII", 1500, 78125, BEAMS + 1, 7).ljust(88, b"\0") + DETECTIONS[0]
         self.assertEqual(self.found(packet(1, body)), [])
 

@@ -77,7 +77,7 @@ class SonardEnds(unittest.TestCase):
 
 
 class TapEnds(unittest.TestCase):
-    def test_as_the_driver_did(self):
+    def test_the_tap_ends_as_the_driver_did(self):
         for script, code in (("kill -ABRT $$", -signal.SIGABRT), ("kill -KILL $$", -signal.SIGKILL), ("exit 3", 3), ("exit 0", 0)):
             # The subscription never becomes ready: only the driver ends.
             tap = ("import sys, time; from sonard_client.judge import ros_tap; ros_tap._subscribe_ros2 = lambda topic: time.sleep(1000); "

@@ -54,7 +54,7 @@ class Reader(judge_makes.DatagramChecks, unittest.TestCase):
         near = struct.unpack("<f", struct.pack("<f", 0.1))[0]
         self.assertIn(zlib.crc32(struct.pack(f"<{WIDTH * HEIGHT}f", *(n * near for n in RANGES[0]))), ping.crcs)
 
-    def test_what_is_no_ping(self):
+    def test_other_datagrams_are_no_pings(self):
         good = literals(range_image(7, RANGES[0]))
         for other in (datagram(good, crc=1), datagram(literals(strengths(7, kind=1))), datagram(literals(packet(b"ImuBatch", b""))),
                       datagram(literals(range_image(7, RANGES[0], width=17))), datagram(good[:-1]), datagram(good + b"\0a"),

@@ -113,7 +113,7 @@ class Proof(Judging):
 @unittest.skipUnless(os.environ.get("SONARD_JUDGE_CASES"), LONG)
 @unittest.skipIf(lab.missing(), lab.missing())
 class InTheLaboratory(Judging):
-    """Faults of the network do not need sonard's faults."""
+    """Faults of the network do not need sonard's fault engine."""
     CHOSEN = ("--case", "N00.1", "--case", "L06.1", "--case", "L17.2")
 
     def test_right_drivers_pass_and_wrong_drivers_fail(self):

@@ -17,7 +17,7 @@ PROTOC = shutil.which("protoc")
 
 
 def decoded_by_protoc(data):
-    """{"position.x": 1.0, ...} of a PoseUpdate, decoded by protoc."""
+    """Returns {"position.x": "1.5", ...} of a PoseUpdate, decoded by protoc."""
     command = [PROTOC, f"--proto_path={ROOT}/protocol/control", "--decode=sonar.v1.PoseUpdate", "control.proto"]
     text = subprocess.run(command, input=data, capture_output=True, timeout=60, check=True).stdout.decode()
     fields, path = {}, []

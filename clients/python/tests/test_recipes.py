@@ -85,7 +85,7 @@ class Axes(unittest.TestCase):
 
     def test_the_table_of_axes_is_right(self):
         quarter = (HALF, 0, 0, HALF)
-        rows = {  # name: place, quaternion; and ahead, port, up of a body in its own axes there
+        rows = {  # name: place, quaternion; ahead, port, up of a body in its own axes; words of the page
             "glTF": (lambda x, y, z: (x, -z, y), lambda w, x, y, z: self.product((w, x, -z, y), quarter),
                      ((0, 0, -1), (-1, 0, 0), (0, 1, 0)), "(w, x, -z, y) times (0.70711, 0, 0, 0.70711)"),
             "Unreal": (lambda x, y, z: (x, -y, z), lambda w, x, y, z: (w, -x, y, -z),

@@ -42,7 +42,7 @@ def transform(sec, nanosec):
 
 
 class SlowServer:
-    """Answers the status when the test allows it; counts requests and answers, and stores the last request's header."""
+    """Answers the status when the test allows it; counts requests and answers, and stores the last request's headers."""
 
     def __init__(self, may_answer=True):
         outer = self
@@ -282,7 +282,7 @@ class Mounts(WithNode):
         self.assertEqual((front.transform.translation.x, front.transform.rotation.w, front.transform.rotation.x), (0.3, 1, 0))
         self.assertEqual((front.header.stamp.sec, front.header.stamp.nanosec), (2, 500000000))
         ros.node.on_mounts([world, self.mount(x=0.4, turn=(HALF, 0.0, HALF, 0.0)), self.mount("left")])
-        self.assertEqual([m.child_frame_id for m in ros.static[1]], ["front", "left"])  # all: latched is the last message alone
+        self.assertEqual([m.child_frame_id for m in ros.static[1]], ["front", "left"])  # all: only the last one is latched
         self.assertEqual(ros.static[1][0].transform.rotation.y, HALF)
 
     def test_heads_that_turn_are_sent_each_time(self):

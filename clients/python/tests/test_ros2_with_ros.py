@@ -141,7 +141,7 @@ class WithRos(unittest.TestCase):
             self.addCleanup(host.terminate)
 
             def at_the_target():
-                """Points of clouds whose transform has come, in the vehicle's frame; the target is 4 m away, 20 degrees to port."""
+                """Returns points near the target (4 m away, 20 degrees to port), of clouds whose transform has come."""
                 for cloud in list(clouds):
                     try:
                         at = buffer.lookup_transform("rov", cloud.header.frame_id, cloud.header.stamp).transform

@@ -106,7 +106,7 @@ class Running(unittest.TestCase):
         with PoseSender(self.address, "protobuf", clock="wall", vehicle="rov") as poses:
             poses.send((0, 0, -9), angular_velocity=(0, 0, 0.1), timestamp=time.time())
             self.eventually(lambda: self.vehicle()["position"]["z"] == -9)
-            self.eventually(lambda: self.vehicle()["orientation"]["z"] > 0.004)  # 0.1 rad/s for some of 0.2 s
+            self.eventually(lambda: self.vehicle()["orientation"]["z"] > 0.004)  # 0.1 rad/s for a part of 0.2 s
 
     def test_discovery_finds_the_sonar(self):
         (sonar,) = discover(60, listen=self.address, enough=1)

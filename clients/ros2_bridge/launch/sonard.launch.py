@@ -23,13 +23,13 @@ def start(context):
     for name in ("autopilot", "driver"):
         if value(name):
             then.append(ExecuteProcess(cmd=shlex.split(value(name)), name=name, output="screen"))
-    heard = bytearray()
+    received = bytearray()
 
     def on_output(event):
         if not then:
             return []
-        heard.extend(event.text)
-        if READY not in heard:
+        received.extend(event.text)
+        if READY not in received:
             return []
         started = list(then)
         then.clear()

@@ -78,7 +78,7 @@ _NED = re.compile(r"(?<![a-z])ned(?![a-z])", re.IGNORECASE)
 
 
 def axes_of(frame_id: str) -> str:
-    """The axes of a named frame: those of ROS, except for names such as world_ned (Stonefish, MAVROS, UUV Simulator)."""
+    """Returns the axes of a named frame: those of ROS, except for names such as world_ned (Stonefish, MAVROS, UUV Simulator)."""
     return "NED_FRD" if _NED.search(frame_id) else "ENU_FLU"
 
 
@@ -144,8 +144,8 @@ class Scan(NamedTuple):
 
 
 def scan_of(azimuth_rad: Sequence[float], range_m: Sequence[float]) -> Scan:
-    """Gives each angle of the scan the range of the nearest beam. The beams are ordered from port to starboard; their range is 0
-    where they hit nothing."""
+    """Returns the scan: each angle has the range of the nearest beam. The beams are ordered from port to starboard; their
+    range is 0 where they hit nothing."""
     if not 2 <= len(azimuth_rad) == len(range_m):
         raise Unusable(f"{len(range_m)} ranges of {len(azimuth_rad)} beams are not a scan")
     beams = sorted(zip(azimuth_rad, range_m))

@@ -242,14 +242,14 @@ class LiveView(threading.Thread):
 
     def _look(self, connection: Connection) -> None:
         topics: Dict[int, str] = {}
-        heard = time.monotonic()
+        received_s = time.monotonic()
         while not self.over.is_set():
             message = connection.receive()
             if message is None:
-                if time.monotonic() - heard > SILENCE_S:
+                if time.monotonic() - received_s > SILENCE_S:
                     raise ConnectionError(f"sonard's live view is silent for {SILENCE_S:g} s")
                 continue
-            heard = time.monotonic()
+            received_s = time.monotonic()
             opcode, payload = message
             if opcode == TEXT:
                 self._on_word(json.loads(payload), topics, connection)

@@ -100,7 +100,7 @@ class Bridge(Node):
         self.socket.close()
 
     def warn(self, text: str) -> None:
-        """Logs a warning, at most one in 5 s of a kind. The text up to the first colon is the kind."""
+        """Logs a warning, at most one of each kind in 5 s. The text up to the first colon is the kind."""
         kind, now = text.partition(":")[0], time.monotonic()
         if self.context.ok() and now - self.warned.get(kind, -math.inf) >= 5:
             self.warned[kind] = now

@@ -27,7 +27,7 @@ export function make(tag, options = {}, ...children) {
 
 const nameOf = (control) => control.href || control.name || control.textContent;
 
-/// Calls build() for new children of the element only when `content` (anything JSON can hold) is not what was shown last. The
+/// Calls build() for new children of the element only when `content` (any JSON value) differs from that shown last. The
 /// control that has the focus keeps it.
 export function showList(element, content, build) {
   const key = JSON.stringify(content);

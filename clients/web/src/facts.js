@@ -48,12 +48,12 @@ export class Facts {
     this.clientPings = new Counters();
     this.clientBytes = new Counters();
     this.drawn = new Counter();
-    this.numbered = new Counter();  // numbers of the pings: the rate at which they are made
+    this.numbered = new Counter();  // numbers of the pings, for the rate at which they are made
     this.drawnPings = 0;
     this.received = new Counter();
     this.receivedBytes = 0;
     this.missed = 0;
-    this.lastNumber = Infinity;  // number of the ping before
+    this.lastNumber = Infinity;  // number of the previous ping
     this.history = [];  // {time_s, made, rate} of the sonar's pings in the last minute
     this.droppedAt = new Map();  // client -> time (now_s) of the last increase of its drops
     this.drops = new Map();
@@ -119,8 +119,8 @@ export class Facts {
   get rateUnit() {
     return this.linesByPing ? 'lines/s' : 'Hz';
   }
-  /// True if the engine is too slow: pings come at a lower rate than wanted, and computing takes at least 30 % of the time. If the
-  /// host requests each ping, no rate is expected.
+  /// True if the engine is too slow: pings come at less than 90 % of the requested rate, and computing takes at least 30 % of
+  /// the time. If the host requests each ping, no rate is expected.
   get isSlow() {
     const sonar = this.sonarStatus;
     const wanted = this.wantedRate;

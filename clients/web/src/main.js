@@ -176,7 +176,7 @@ async function beginScene() {
   choose();
 }
 
-/// The picture takes the place of the scene; on a phone each has the whole screen.
+/// Shows the picture in place of the scene, which cannot be drawn; on a phone each pane has the whole screen.
 function missScene() {
   setHidden($('no-scene'), false);
   setHidden($('scene'), true);

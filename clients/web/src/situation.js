@@ -61,7 +61,7 @@ export function situationOf(facts, connection) {
     return {
       kind: 'standby',
       picture: 'dim',
-      text: facts.asker ? `Standby: ${host(facts.asker)} set the rate to 0.` : 'Standby: no driver has asked for pings yet.',
+      text: facts.asker ? `Standby: ${host(facts.asker)} set the rate to 0.` : 'Standby: no driver has requested pings yet.',
       button: facts.parameters.has(`/${sonar.name}/rate_hz`) && { label: 'Ask for 10 Hz', parameter: `/${sonar.name}/rate_hz`, value: 10 },
     };
   }

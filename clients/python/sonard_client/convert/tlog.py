@@ -63,7 +63,7 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
 
 
 def _is_supported(f: Dict[str, float]) -> bool:
-    """Returns whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns only velocity; the body is FRD."""
+    """Returns whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns velocity; the body is FRD."""
     bodies = (*FRD_BODIES, BODY_FLU)
     if f["frame_id"] in (*NED_WORLDS, LOCAL_FRD):
         return f["child_frame_id"] in (*bodies, f["frame_id"])
@@ -332,7 +332,7 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
     if wanted.name == "ODOMETRY" and vehicle.heading_is_local:
         warn("ODOMETRY is in a local frame that may not point north; x is used as north")
     if vehicle.restarts:
-        warn(f"the vehicle restarted ({vehicle.restarts} x); its clock was continued by the times of receipt")
+        warn(f"the vehicle restarted ({vehicle.restarts} x); its clock was continued with the times of receipt")
     local = not isinstance(wanted.positions[0][1], Geodetic)
     surface_m = vehicle.home_m if vehicle.is_submarine and wanted.name.endswith("GLOBAL_POSITION_INT") else None
     of_local = vehicle.origin if local and wanted.name.endswith("LOCAL_POSITION_NED") else None

@@ -95,7 +95,7 @@ def paired(attitudes: Stream[Quaternion], positions: Stream[Vector3]) -> List[Ro
 
 def track_of(source: Source, name: str, warn: Warn, origin: Optional[Geodetic] = None,
              own_origin: Optional[Geodetic] = None, at: Optional[Place2] = None, surface_m: Optional[float] = None) -> Track:
-    """Makes a track in NED_FRD. origin: the requested one. own_origin: origin of the file's metres, if it contains one. at: north and
+    """Makes a track in NED_FRD. origin: the requested one. own_origin: origin of the file's metres, if it has one. at: north and
     east of a vehicle that has no horizontal position. surface_m: altitude of z = 0 if no origin is requested (default: that of
     the first fix)."""
     attitudes, positions = rising(source.attitudes), rising(source.positions)

@@ -1,7 +1,7 @@
 """Reads logs of PX4 (.ulg): attitude with local or global position, the simulator's ground truth first.
 
 The code follows PX4's description of ULog. A message has a size of two bytes, its type and content; F describes formats, A gives
-a format a number, D is data. A truncated log is read up to its last complete message.
+a number to a format, D is data. A truncated log is read up to its last complete message.
 """
 from __future__ import annotations
 

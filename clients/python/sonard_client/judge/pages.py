@@ -125,7 +125,7 @@ def _card(column: Json) -> str:
     facts = [("command", column["command"]), ("version", column["version"] or "not given"), ("tap", column["tap"]),
              ("profile", column["profile"]), ("sonard", column["sonard"]), ("seed", column["seed"]), 
              ("computer", column["machine"]),
-             ("run", f"{clock['date']}, {clock['seconds']:.0f} s, runs a case: {column['repeat']}")]
+             ("run", f"{clock['date']}, {clock['seconds']:.0f} s, runs per case: {column['repeat']}")]
     return (f'<section class="card" aria-label="{_e(column["name"])}"><h2>{_e(column["name"])}</h2>'
             f'{_score("MUST", n["must"], n["of"])}{_score("SHOULD", n["should"], n["of"])}<p class="soft">{", ".join(rest)}</p>'
             f'<dl class="facts">{"".join(f"<dt>{_e(k)}</dt><dd>{_e(v)}</dd>" for k, v in facts)}</dl></section>')

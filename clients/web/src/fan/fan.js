@@ -42,7 +42,7 @@ export class Fan {
     this.marks.addEventListener('pointerleave', () => this.point(null));
   }
 
-  /// Draws with the graphics processor from now on. Not for a software renderer: LookupPainter, which draws from a table, is then many times faster.
+  /// Draws with the graphics processor from now on. Not for a software renderer: LookupPainter, which draws from a table, is many times faster with one.
   useGraphics() {
     const canvas = this.canvas.cloneNode();  // a canvas keeps the kind of its first context
     const painter = this.exact ? null : makeFanPainter(canvas);

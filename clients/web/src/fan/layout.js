@@ -1,6 +1,6 @@
 // Converts between a ping's metres and the picture's pixels, and between directions and beams, as core/image/draw_fan.cpp does.
 
-/// The layout of an image from its geometry message: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
+/// Returns the layout of an image from its geometry message: {rows, beams, spacing_m, start_m, range_m, azimuth_rad, full_scale}.
 export function polarOf(image, geometry) {
   const spacing_m = geometry.row_spacing_m;
   const start_m = geometry.range_start_m ?? 0;
@@ -14,7 +14,7 @@ export function polarOf(image, geometry) {
   };
 }
 
-/// The layout that `sonarctl view --png` has with that width; margin 4 without rings. `polar.up` -1: the fan opens downwards.
+/// Returns the layout that `sonarctl view --png` has with that width; margin 4 without rings. `polar.up` -1: the fan opens down.
 export function exactLayout(polar, width, margin) {
   const half = Math.max(Math.abs(polar.azimuth_rad[0]), Math.abs(polar.azimuth_rad.at(-1)));
   const metres_per_pixel = Math.max((2 * polar.range_m * Math.sin(Math.min(half, Math.PI / 2))) / (width - 2 * margin), polar.range_m / (4 * width));
@@ -25,7 +25,7 @@ export function exactLayout(polar, width, margin) {
   return { width, height: Math.ceil(margin + ahead + behind + margin), apex_x: width / 2, apex_y, up, metres_per_pixel };
 }
 
-/// The largest fan that fits between the margins {left, right, top, bottom} of a pane.
+/// Returns the layout of the largest fan that fits between the margins {left, right, top, bottom} of a pane.
 export function fittedLayout(polar, width, height, margins) {
   const half = Math.min(Math.PI / 2, Math.max(Math.abs(polar.azimuth_rad[0]), Math.abs(polar.azimuth_rad.at(-1))));
   const wide = width - margins.left - margins.right;
@@ -35,7 +35,7 @@ export function fittedLayout(polar, width, height, margins) {
   return { width, height, apex_x: margins.left + wide / 2, apex_y: margins.top + tall / 2 + used / 2, up: 1, metres_per_pixel };
 }
 
-/// The place between the margins of a picture that sonard has drawn, and its polar layout if it has one.
+/// Returns the place between the margins of a picture that sonard has drawn, and its polar layout if it has one.
 export function drawnLayout(image, polar, width, height, margins) {
   const scale = Math.min((width - margins.left - margins.right) / image.width, (height - margins.top - margins.bottom) / image.height);
   const box = { width: image.width * scale, height: image.height * scale };
@@ -46,14 +46,14 @@ export function drawnLayout(image, polar, width, height, margins) {
   return { width, height, box, scale, apex_x: box.left + apex_x * scale, apex_y: box.top + apex_y * scale, up, metres_per_pixel: metres_per_pixel / scale };
 }
 
-/// Distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
+/// Returns the distance between range rings: 1, 2 or 5 times a power of ten, four to ten rings.
 export function ringSpacing_m(range_m) {
   const decade = 10 ** Math.floor(Math.log10(range_m));
   for (const step of [0.1, 0.2, 0.5, 1]) if (range_m / (step * decade) <= 10) return step * decade;
   return 2 * decade;
 }
 
-/// Place in the beam table, fractional; beam k spans [k - 0.5, k + 0.5]. Outside the fan: below -0.5 or above beams - 0.5.
+/// Returns the fractional place in the beam table; beam k spans [k - 0.5, k + 0.5]. Outside: below -0.5 or above beams - 0.5.
 export function beamAt(azimuth_rad, azimuth) {
   let low = 0;
   let high = azimuth_rad.length;
@@ -67,7 +67,7 @@ export function beamAt(azimuth_rad, azimuth) {
   return right - 1 + (a - azimuth) / (a - azimuth_rad[right]);
 }
 
-/// The place under a pixel: {range_m, azimuth_rad, row, beam}, or null outside the fan.
+/// Returns the place under a pixel: {range_m, azimuth_rad, row, beam}, or null outside the fan.
 export function under(polar, layout, x, y) {
   const x_m = (x - layout.apex_x) * layout.metres_per_pixel;
   const y_m = layout.up * (layout.apex_y - y) * layout.metres_per_pixel;
@@ -80,7 +80,7 @@ export function under(polar, layout, x, y) {
 }
 
 export const table_entries = 1024;
-/// Azimuth -> beam in equal steps from `first` to `last` [rad], which lie half a beam beyond the outermost beams' middles.
+/// Returns the beams at azimuths in equal steps from `first` to `last` [rad], half a beam beyond the outermost beams' middles.
 export function beamTable(azimuth_rad) {
   const n = azimuth_rad.length;
   const first = azimuth_rad[0] + (azimuth_rad[0] - azimuth_rad[1]) / 2;
@@ -90,8 +90,8 @@ export function beamTable(azimuth_rad) {
   return { first, last, beams };
 }
 
-/// Samples of the image as a typed array, and the code that is drawn brightest, as in `sonarctl view`. If samples have more than
-/// 8 bits, `per_mille` of a thousand samples do not exceed this code.
+/// Returns the samples of the image as a typed array, and the code that is drawn brightest, as in `sonarctl view`. If samples
+/// have more than 8 bits, `per_mille` of a thousand samples do not exceed this code.
 export function samplesOf(image, per_mille) {
   const { data, encoding } = image;
   const at = data.byteOffset;

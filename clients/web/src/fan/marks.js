@@ -13,7 +13,7 @@ const place = (layout, range_m, azimuth) => [
   layout.apex_x - (range_m / layout.metres_per_pixel) * Math.sin(azimuth),
   layout.apex_y - layout.up * (range_m / layout.metres_per_pixel) * Math.cos(azimuth),
 ];
-/// An arc about the sonar, from one side of the fan to the other.
+/// Adds an arc about the sonar to the path, from one side of the fan to the other.
 const arc = (g, layout, range_m, port, starboard) => {
   const ends = layout.up > 0 ? [-Math.PI / 2 - port, -Math.PI / 2 - starboard] : [Math.PI / 2 + starboard, Math.PI / 2 + port];
   g.arc(layout.apex_x, layout.apex_y, range_m / layout.metres_per_pixel, ...ends);
@@ -117,7 +117,7 @@ export function drawMarks(canvas, polar, layout, { rings, cursor, ratio, head_ra
   if (cursor) drawCursor(g, polar, layout, cursor, port, starboard);
 }
 
-/// Axes of a rectangle: bearings above and elevations beside a range image, ranges above and times beside a waterfall.
+/// Draws the axes of a rectangle: bearings above and elevations beside a range image, ranges above and times beside a waterfall.
 export function drawAxes(canvas, about, { box, width, height }, { rings, ratio }) {
   const g = cleared(canvas, { width, height }, ratio);
   if (!rings) return;

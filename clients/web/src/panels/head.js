@@ -15,7 +15,7 @@ function rateOf(facts) {
   return { word: 'pinging', dot: facts.isSlow ? 'warning' : 'ok', rate: measured(facts.madeRate) };
 }
 
-/// The product as people name it. Older daemons send only the name in a configuration.
+/// Returns the trade name of a product. Older daemons send only the name in a configuration.
 const product = (facts, profile) => facts.info?.metadata?.[`sonard.product.${profile}`] ?? profile;
 
 /// Returns the time in UTC, or a dash for files without times.
@@ -36,7 +36,7 @@ export function drawHead(facts) {
   const sonar = facts.sonarStatus;
   setHidden($('frequency-chip'), !sonar?.frequency_hz);  // some recordings do not state it
   setText($('frequency'), frequency(sonar?.frequency_hz));
-  const latency = facts.listened ? sonar?.figures?.latency_ms_p50 : 0;  // without a driver it would be that of the last one
+  const latency = facts.listened ? sonar?.figures?.latency_ms_p50 : 0;  // without a driver, it would be that of the last driver
   setText($('latency'), latency > 0 ? `${fixed(latency, 0)} ms` : dash);
   const faults = new Set(facts.faults.map((f) => f.do + f.sonar)).size;
   setHidden($('chip-faults'), faults === 0);

@@ -6,7 +6,7 @@ const running = (facts) => facts.status?.recordings.find((r) => r.running && r.s
 
 const nameOf = (recording) => recording.file.replace(/^.*\//, '');  // the name with which it was started
 
-/// The name of a new file, with the present time: "front-20261128-010203.mcap".
+/// Returns the name of a new file, with the present time: "front-20261128-010203.mcap".
 function newName(sonar) {
   const digits = new Date().toISOString().replace(/\D/g, '');
   return `${sonar}-${digits.slice(0, 8)}-${digits.slice(8, 14)}.mcap`;

@@ -12,7 +12,7 @@ export class Refusals {
     for (const kind of ['pointerdown', 'keydown', 'click'])
       document.addEventListener(kind, (event) => {
         this.touched = event.target;
-        // Pointerdown must not hide it: the controls below would move away from the pointer before the click.
+        // Pointerdown must not hide the refusal: the controls below would move away from the pointer before the click.
         if (kind === 'click' || event.key === 'Escape') this.hide();
       }, true);
   }

@@ -58,7 +58,7 @@ function rowsOf(facts, steering) {
 
 const plainRow = (label, value) => make('div', { class: 'setting' }, make('span', {}, label), value);
 
-/// Without parameters (an older daemon, or none yet): the values of the status, read only.
+/// Makes the rows if there are no parameters (an older daemon, or none yet): read-only values of the status.
 function plainRows(sonar) {
   const rows = [['range', `${short(sonar?.range_m)} m`], ['rate', `${short(sonar?.rate_hz)} Hz`], ['gain', `${fixed(sonar?.gain_db, 0)} dB`]];
   return rows.map(([label, text]) => plainRow(label, make('b', {}, sonar ? text : dash)));

@@ -85,7 +85,7 @@ export class Camera {
     event.stopPropagation();
   }
 
-  /// `place`: that of the vehicle, or null; `heading`: its direction ahead, counter-clockwise from east.
+  /// `place`: position of the vehicle, or null; `heading`: its direction ahead, counter-clockwise from east.
   update(place, heading, aspect) {
     if (place && (this.mode !== 'orbit' || !this.placed)) {
       this.target.copy(place);

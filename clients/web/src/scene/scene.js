@@ -14,7 +14,7 @@ const rest_ms = 100;  // pause after the press of a button or key, so that its e
 const click_px = 4;
 
 export class Scene {
-  /// `software` is true without a graphics processor. Smooth edges take two thirds of a frame's time there, and clicks wait for
+  /// `software` is true without a graphics processor. Smooth edges need two thirds of a frame's time there, and clicks wait for
   /// frames.
   constructor(facts, fan, software) {
     this.facts = facts;
@@ -142,7 +142,7 @@ export class Scene {
     this.stale = true;
   }
 
-  /// Places the frames by the poses of the last ping.
+  /// Places the frames at the latest poses received.
   place() {
     for (const [name, { translation: t, rotation: r }] of this.facts.frames) {
       const group = this.frame(name);
