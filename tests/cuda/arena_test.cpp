@@ -1,4 +1,4 @@
-// Memory of a batch: every byte that is copied back was written before, also between the pieces.
+// Memory of a batch: each byte that is copied back was written or cleared before, also those between the pieces.
 #include "cuda/arena.hpp"
 
 #include <gtest/gtest.h>

@@ -43,7 +43,7 @@ struct Agreement {
   int rays = 0, hits = 0, other_object = 0;
   double worst_range = 0;
 };
-/// Rays from points above to points around.
+/// Compares 20,000 rays. They go from points near `middle` to points within `spread` of it.
 Agreement compare(const Tracers& t, Vec3d middle, double spread, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> any(-1, 1);
@@ -99,7 +99,7 @@ TEST(DeviceRays, HitBodiesAtAnyPlace) {
   }
 }
 
-// A closed surface seen from inside. Of a hundred thousand rays, most of them at edges and corners, none may miss it.
+// The rays start inside a closed surface and go to points on its edges and corners. None may miss the surface.
 TEST(DeviceRays, NeverSlipThroughAnEdge) {
   SceneMaker maker;
   const Mesh mesh = test::sphere(2, 4);
@@ -143,7 +143,7 @@ TEST(DeviceRays, HitOneOrManyTrianglesInOnePlace) {
   const Vec3d o = flat.origin();
   const RayHit hit = trace_ray(host_view(flat, places), ray_to(Vec3d{0.2, 0.2, 1} - o, Vec3d{0.2, 0.2, -1} - o), 10);
   EXPECT_EQ(hit.object, 0u);
-  EXPECT_EQ(hit.triangle, 0u);  // if many triangles have the same range, always the first
+  EXPECT_EQ(hit.triangle, 0u);  // the first of the triangles with the same range
   EXPECT_NEAR(hit.range_m, 1, 1e-6);
 }
 

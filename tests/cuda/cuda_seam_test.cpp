@@ -26,7 +26,7 @@ const std::string built_module = [] {
   return std::string(given ? given : SONARD_CUDA_MODULE);
 }();
 #endif
-void look_at(const char* module) { setenv("SONARD_CUDA_MODULE", module, 1); }
+void use_module(const char* module) { setenv("SONARD_CUDA_MODULE", module, 1); }
 
 void expect_no_engine() {
   Parallel pool;
@@ -37,22 +37,22 @@ void expect_no_engine() {
 }
 
 TEST(CudaSeam, SaysThatThereIsNoModule) {
-  look_at("/nowhere/libsonard_cuda.so");
+  use_module("/nowhere/libsonard_cuda.so");
   EXPECT_EQ(cuda_status(), "not installed");
   EXPECT_EQ(cuda_presence(), "not installed");
   expect_no_engine();
 }
 
 TEST(CudaSeam, SaysThatAFileIsNotAModule) {
-  look_at(SONARD_SOURCE_DIR "/LICENSE");
+  use_module(SONARD_SOURCE_DIR "/LICENSE");
   EXPECT_THAT(cuda_status(), StartsWith("not loadable: "));
-  EXPECT_EQ(cuda_presence(), "not used");  // it did not try to load the module
+  EXPECT_EQ(cuda_presence(), "not used");  // cuda_presence() does not load the module
   expect_no_engine();
 }
 
 TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
 #ifdef SONARD_CUDA_MODULE
-  look_at(built_module.c_str());
+  use_module(built_module.c_str());
   EXPECT_THAT(cuda_status(), AnyOf(StartsWith("no device"), HasSubstr("GiB, compute ")));
   if (cuda_status().starts_with("no device")) expect_no_engine();
 #else
@@ -60,7 +60,7 @@ TEST(CudaSeam, NamesTheDeviceOrSaysThatThereIsNone) {
 #endif
 }
 
-// Only the library: it names its cuFFT, or the missing file, without a device.
+// Loads only the module. Without a device too, the module names the cuFFT that it uses, or the missing file.
 TEST(CudaSeam, FindsCufftOrSaysWhichFileIsMissing) {
 #ifdef SONARD_CUDA_MODULE
   void* library = dlopen(built_module.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -76,8 +76,8 @@ TEST(CudaSeam, FindsCufftOrSaysWhichFileIsMissing) {
 #endif
 }
 
-TEST(CudaSeam, TakesTheDeviceOfAModule) {
-  look_at(SONARD_HOST_MODULE);
+TEST(CudaSeam, UsesTheDeviceOfAModule) {
+  use_module(SONARD_HOST_MODULE);
   EXPECT_EQ(cuda_status(), "host loops");
   Parallel pool;
   const auto engine = make_cuda_engine(std::make_shared<const Scene>(), pool);
@@ -85,8 +85,8 @@ TEST(CudaSeam, TakesTheDeviceOfAModule) {
   EXPECT_THAT((*engine)->description(), StartsWith("cuda, host loops, "));
 }
 
-TEST(CudaSeam, SaysThatADeviceWasLostAtOnce) {
-  look_at(SONARD_HOST_MODULE);
+TEST(CudaSeam, ReportsADeviceThatIsLostDuringTheStart) {
+  use_module(SONARD_HOST_MODULE);
   setenv("SONARD_TEST_DEVICE_LASTS", "2", 1);
   Parallel pool;
   const auto engine = make_cuda_engine(std::make_shared<const Scene>(), pool);

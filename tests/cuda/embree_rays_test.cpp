@@ -9,7 +9,7 @@
 namespace sonar::test {
 namespace {
 
-/// Relief with a ball and a rotated, moving box: many shadows.
+/// Makes a relief with a ball and a rotated body, which cast many shadows.
 std::shared_ptr<const Scene> sea_bed() {
   SceneMaker maker;
   maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
@@ -34,7 +34,7 @@ PingRequest looking(double yaw_rad) {
   return r;
 }
 
-TEST(DeviceEngineBesideEmbree, DiffersByTheRimsOfShadowsAlone) {
+TEST(DeviceEngineBesideEmbree, DiffersOnlyAtTheEdgesOfShadows) {
   SKIP_WITHOUT_A_MACHINE();
   BothEngines both(sea_bed());
   double worst = 0, all = 0;
@@ -59,7 +59,7 @@ TEST(DeviceEngineBesideEmbree, DiffersByTheRimsOfShadowsAlone) {
   RecordProperty("mean", std::to_string(all / pings));
 }
 
-// Without an object that casts a shadow, both give the same samples.
+// Without an object that casts a shadow, the samples of both engines differ by 1 at most.
 TEST(DeviceEngineBesideEmbree, IsTheSameWhereThereAreNoShadows) {
   SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;

@@ -16,10 +16,10 @@ class FailingMachine final : public cuda::Machine {
  public:
   /// If set, transforms fail with this reason.
   std::string no_transforms;
-  /// Memory of the device [bytes]. Larger requests cause DeviceMemoryFull. `tells_bytes`: the number of free bytes that it
+  /// Memory of the device [bytes]. A request that exceeds the rest causes DeviceMemoryFull. `tells_bytes`: free bytes that it
   /// reports at the start.
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
-  /// A fault of the program instead of a lost device: std::logic_error at the call `last`, and at no call after it.
+  /// Simulates an error of the program instead of a lost device: only the call `last` throws std::logic_error.
   bool has_fault = false;
   /// `calls` counts the calls and must outlive this object. The call number `last` and all later calls fail.
   FailingMachine(int& calls, int last) : calls_(calls), last_(last) {}

@@ -128,10 +128,10 @@ TEST_F(LostDevice, LosesNoPingOfCallsThatAreUnderWay) {
     const auto end = engine(last, false);
     EXPECT_THROW(pipelined(*end, requests_), EngineUnavailable) << last;
   }
-  EXPECT_GE(most, 4u) << "two calls of two were not collected before the last was";
+  EXPECT_GE(most, 4u) << "two calls of two pings were never collected before the failure";
 }
 
-TEST_F(LostDevice, IsTheEndWhereNothingMayTakeItsPlace) {
+TEST_F(LostDevice, IsAnErrorIfTheCpuMayNotReplaceIt) {
   const int first = (engine(never, false), calls_);
   for (const int last : {first, first + 1, first + 20}) {
     const auto lost = engine(last, false);
@@ -210,12 +210,12 @@ TEST_F(LostDevice, AFullDeviceIsNotLost) {
       all_fit = said_.empty();
       any_full = any_full || !all_fit;
     } catch (const EngineUnavailable&) {
-      EXPECT_FALSE(any_full) << "with less room there was enough: " << room_bytes;
-      EXPECT_EQ(said_.size(), 3u) << "4, 2, 1 pings, and one batch at a time";
+      EXPECT_FALSE(any_full) << "a device with less memory was large enough: " << room_bytes;
+      EXPECT_EQ(said_.size(), 3u) << "the engine tries batches of 4, 2 and 1 pings, then one batch at a time";
     }
     for (const std::string& what : said_) EXPECT_THAT(what, StartsWith("CUDA: the device's memory is full; from here on "));
   }
-  EXPECT_TRUE(any_full) << "no room was too small";
+  EXPECT_TRUE(any_full) << "no device was too small";
 }
 
 TEST_F(LostDevice, ADeviceWithoutMemoryForAPingCountsAsLost) {

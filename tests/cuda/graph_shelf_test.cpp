@@ -1,4 +1,4 @@
-// Launches that become graphs: those that occur twice, up to a small number, even if they differ by a few cells.
+// Tests how a repeated launch is found, even if the number of cells differs a little, and which graph is dropped.
 #include "cuda/graph_shelf.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST(BlocksOfALaunch, NeverReachAnIndexBeyond32Bits) {
     EXPECT_EQ(blocks_for(n) * std::uint64_t{threads_a_block}, std::uint64_t{1} << 32) << n;
 }
 
-TEST(BlocksOfALaunch, AreTheSameForNeighbours) {
+TEST(BlocksOfALaunch, AreTheSameForSimilarSizes) {
   EXPECT_EQ(blocks_for(170000), blocks_for(170900));
   for (const std::uint32_t points : {1u, 2u}) EXPECT_EQ(blocks_for(512 * points), blocks_for(1)) << points << " points";
 }

@@ -94,9 +94,9 @@ TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   machine.release_host(back);
 }
 
-// Cells that are evicted and sent again, more sets of settings than are kept, batches of every size. Late steps must find their
-// data.
-TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
+// Cells are evicted and sent again, there are more sets of settings than the engine keeps, and batches have two sizes. Steps that
+// run late must find their data.
+TEST(DeferringDevice, FindsItsDataAsTheyWereQueued) {
   const auto scene = basin();
   std::vector<PingRequest> all;
   const PingRequest wide = requests().at(0);
@@ -113,8 +113,8 @@ TEST(DeferringDevice, FindsEverythingAsItWasQueued) {
     expect_same(there, pings_of(std::make_unique<DeferringMachine>(), scene, all, options));
 }
 
-// Pings of several sonars in calls of every size: one call after the other, and each submitted before the previous one is
-// collected.
+// Pings of several sonars, in calls of one and of three. Either each call runs alone, or it is submitted while up to two earlier
+// calls are not collected yet.
 class Grouped : public ::testing::TestWithParam<std::size_t> {};
 
 TEST_P(Grouped, MakesTheSameBytes) {
@@ -154,7 +154,7 @@ TEST_P(Grouped, MakesTheSameBytes) {
 }
 INSTANTIATE_TEST_SUITE_P(BySize, Grouped, ::testing::Values(1, 3), ::testing::PrintToStringParamName());
 
-TEST(DeviceEngine, TakesPingsOfOneSizeTogether) {
+TEST(DeviceEngine, ComputesPingsOfOneSizeTogether) {
   Parallel two(2), many(16);
   const auto scene = basin();
   const auto most = [&](Parallel& pool, const PingRequest& a, const PingRequest& b, int batch = 4) {
@@ -169,7 +169,7 @@ TEST(DeviceEngine, TakesPingsOfOneSizeTogether) {
   EXPECT_EQ(most(many, a, b, 0), 16u);
   EXPECT_EQ(make_cpu_engine(scene, two)->most_together(a, b), 1u);
   b.settings.beam_count *= 3;
-  EXPECT_EQ(most(many, a, b), 1u) << "one would wait for the other";
+  EXPECT_EQ(most(many, a, b), 1u) << "the small ping would wait for the large one";
   b = a;
   b.switches.fixed_fan = 40;
   EXPECT_EQ(most(many, a, b), 1u) << "the CPU computes it";
@@ -178,7 +178,7 @@ TEST(DeviceEngine, TakesPingsOfOneSizeTogether) {
   EXPECT_EQ(most(many, a, b), 1u);
 }
 
-TEST(DeferringDevice, AnswersACallBesideThoseThatAreUnderWay) {
+TEST(DeferringDevice, RunsACallWhileOthersAreSubmitted) {
   const auto scene = basin();
   const std::vector<PingRequest> all = requests();
   const std::span<const PingRequest> first(all.data(), 2), second(all.data() + 2, 3);

@@ -12,7 +12,7 @@ struct Waited {
   int code = 0, asked = 0, rested = 0;
   double s = 0;
 };
-/// Waits by a clock that advances by a millisecond at every query and every rest.
+/// Waits with a clock that advances by a millisecond whenever it is read and at every rest.
 Waited wait(double answers_after_s, int answer) {
   Waited w;
   w.code = wait_for(
@@ -21,26 +21,26 @@ Waited wait(double answers_after_s, int answer) {
   return w;
 }
 
-TEST(Patience, TakesAnAnswerThatIsThere) {
+TEST(Patience, ReturnsAnAnswerThatIsThereAtOnce) {
   EXPECT_EQ(wait(0, 0).code, 0);
   EXPECT_EQ(wait(0, 0).asked, 1);
   EXPECT_EQ(wait(0, 0).s, 0);
 }
 
-TEST(Patience, DoesNotRestWhileAPingTakesItsTime) {
+TEST(Patience, DoesNotRestDuringTheTimeOfAPing) {
   const Waited w = wait(busy_wait_s / 2, 0);
   EXPECT_EQ(w.code, 0);
   EXPECT_EQ(w.rested, 0);
   EXPECT_LT(w.s, busy_wait_s);
 }
 
-TEST(Patience, RestsWhileItTakesLonger) {
+TEST(Patience, RestsIfTheAnswerTakesLonger) {
   const Waited w = wait(longest_wait_s / 2, 0);
   EXPECT_EQ(w.code, 0);
   EXPECT_GT(w.rested, 100);
 }
 
-TEST(Patience, EndsWithWhatWentWrong) { EXPECT_EQ(wait(0.5, 719).code, 719); }
+TEST(Patience, ReturnsTheCodeOfAFailure) { EXPECT_EQ(wait(0.5, 719).code, 719); }
 
 TEST(Patience, EndsAfterTheLongestWait) {
   const Waited w = wait(1e9, 0);

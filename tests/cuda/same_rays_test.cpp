@@ -1,5 +1,5 @@
 // Compares the device engine with the CPU engine if both have the same rays (flat_ray_scene.cpp). The rest is arithmetic, which
-// must be the same. All parts of the model, alone and together, in batches and one by one.
+// must be the same. The tests use all parts of the model, alone and together, in batches and ping by ping.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -13,7 +13,7 @@ namespace sonar::test {
 namespace {
 
 // The goal is 1e-4 and 1 LSB. With the same rays, on a processor that rounds like the device, there is no difference, except
-// for the last bit of a library's sine and for a transform instead of a band across the beams.
+// for the last bit of a library's sine, and where one engine uses a transform and the other a band across the beams.
 constexpr double most_apart = 5e-6;
 
 void expect_same(const Ping& cpu, const Ping& device, const std::string& what) {
@@ -68,11 +68,11 @@ TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
   EXPECT_TRUE(both.said.empty());
 }
 
-// Exact tones, and a measured complex pulse: from echoes to a grid, two transforms, and to samples.
-TEST(DeviceEngine, SumsPulsesByWayOfTheSpectrumAsTheCpuDoes) {
+// Exact tones and a measured complex pulse: the engines put echoes on a grid, transform it twice, and take samples.
+TEST(DeviceEngine, SumsPulsesInTheSpectrumAsTheCpuDoes) {
   SKIP_WITHOUT_A_MACHINE();
   if (const std::string why = spectral::have_transform ? test_machine().value()->why_no_transforms() : "no FFTW"; !why.empty())
-    GTEST_SKIP() << why << ": exact pulses are the CPU's";
+    GTEST_SKIP() << why << ": the CPU computes exact pulses";
   SonarModel measured;
   measured.name = "measured";
   measured.modes = {p900()};
@@ -110,7 +110,7 @@ TEST(DeviceEngine, SumsPulsesByWayOfTheSpectrumAsTheCpuDoes) {
   for (std::size_t i = 0; i < single.size(); ++i) EXPECT_EQ(batched[i].samples, single[i].samples) << i;
 }
 
-TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
+TEST(DeviceEngine, MakesTheSameBytesInBatchesOfOneAndThree) {
   SKIP_WITHOUT_A_MACHINE();
   std::vector<PingRequest> requests;
   for (auto& [what, request] : on_device_turns())
@@ -129,7 +129,7 @@ TEST(DeviceEngine, IsTheSameBytesInBatchesOfAnySize) {
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// A repeated launch may be a captured graph, a timed launch never is one. A batch may end because memory is full, and cells may
+// A repeated launch may be a captured graph; a timed launch never is. A batch may end because memory is full, and cells may
 // be sent again.
 TEST(DeviceEngine, MakesTheSameBytesForEveryKindOfLaunch) {
   SKIP_WITHOUT_A_MACHINE();
@@ -190,9 +190,9 @@ std::vector<Case> cases() {
   return {{"P1", p900(), default_rows(10, 394)}, {"P3a", oculus_high(), default_rows(10, 437)}, {"P3c", oculus_high(), near}};
 }
 
-// The sizes of the benchmark, over relief with objects, at rest and in motion. Also compared with the CPU's widest
-// instructions.
-TEST(DeviceEngine, DoesTheBenchmarksCases) {
+// Pings of the benchmark's sizes over a relief with objects, at rest and in motion. The device is also compared with the CPU's
+// widest instructions.
+TEST(DeviceEngine, ComputesPingsOfTheBenchmarkAsTheCpuDoes) {
   SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;
   maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
@@ -236,7 +236,7 @@ TEST(DeviceEngine, DoesTheBenchmarksCases) {
 }
 
 // Side-lobe cells of different seeds differ only in their phases, and memory of dropped cells is reused.
-TEST(DeviceEngine, TakesNoCellsOfAnotherSeed) {
+TEST(DeviceEngine, UsesNoCellsOfAnotherSeed) {
   SKIP_WITHOUT_A_MACHINE();
   SceneMaker maker;
   maker.add(height_field(-1, 12, -10, 10, 0.5, [](double, double) { return 0.0; }), -25, {0, 0, -2});

@@ -1,4 +1,4 @@
-// Replay on loopback, with files of makes other than Oculus. Their hosts first request pings, and get answers.
+// Replay on loopback, with files of makes other than Oculus. Their hosts must send requests before they get pings.
 #include <gmock/gmock.h>
 
 #include "protocol/aris/aris_file.hpp"
@@ -55,7 +55,7 @@ class Controller {
     command.acoustics = {1, 5, 300, 2000, 20000, 4, 6, 1, true, aris::Frequency::high, true, 12};
     asio::write(commands_, asio::buffer(aris::framed(command)));
   }
-  /// The next frame; empty if no datagram comes within `wait`.
+  /// Returns the next frame; nullopt if no datagram comes within `wait`.
   std::optional<aris::DecodedFrame> next(milliseconds wait = patience) {
     Bytes datagram(2000);
     while (true) {
@@ -89,7 +89,7 @@ TEST(ReplayOfAris, FramesComeInOrderAndPaceAfterSettings) {
     EXPECT_EQ(frame->index, i + 1);
     EXPECT_EQ(frame->header.frame_index, static_cast<std::uint32_t>(i));
     EXPECT_EQ(frame->header.serial, 70001u);
-    EXPECT_EQ(frame->header.applied_cookie, 42u) << "of the recording";
+    EXPECT_EQ(frame->header.applied_cookie, 42u) << "the cookie of the recording";
     EXPECT_EQ(frame->picture, aris_picture(i));
   }
   EXPECT_GE(Steady::now() - begin, milliseconds(390));
@@ -178,7 +178,7 @@ Bytes sonar_file(std::uint32_t shots, milliseconds period) {
 class Host {
  public:
   explicit Host(const Replay& replay) : at_(replay.at()), images_(io_, udp::endpoint(asio::ip::address_v4::loopback(), 0)) {}
-  /// The status line of the answer.
+  /// Returns the begin of the answer: HTTP version and status.
   std::string post(const std::string& path, const std::string& body) {
     tcp::socket socket(io_);
     socket.connect(at_);
@@ -226,7 +226,7 @@ TEST(ReplayOf3d15, ImagesComeAtTheirPaceToTheReceiverSetOverHttp) {
   for (int i = 0; i < 8; ++i) {
     const Bytes datagram = host.next();
     ASSERT_TRUE(waterlinked::rip_content(datagram));
-    EXPECT_EQ(host.from.address(), replay.at().address()) << "hosts drop images from elsewhere";
+    EXPECT_EQ(host.from.address(), replay.at().address()) << "hosts drop images from other addresses";
     received.insert(received.end(), datagram.begin(), datagram.end());
   }
   EXPECT_EQ(received, file);

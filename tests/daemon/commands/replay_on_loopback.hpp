@@ -45,7 +45,7 @@ class Replay {
   }
   bool ends() { return done_.wait_for(patience) == std::future_status::ready; }
   tcp::endpoint at() const { return {asio::ip::address_v4(server_->at().ip), server_->at().port}; }
-  /// After the end.
+  /// Call it only after the end of the replay.
   const ReplayServer::Figures& figures() const { return server_->figures(); }
 
  private:
@@ -61,7 +61,7 @@ class Replay {
   std::future<void> done_;
 };
 
-/// Waits with a time limit, which Asio's receive does not have. Returns true if bytes or the end can be received.
+/// Waits with a time limit, which Asio's receive does not have. Returns true if bytes came or the stream ended.
 template <class Socket>
 bool readable(Socket& socket) {
   pollfd waited{socket.native_handle(), POLLIN, 0};
@@ -77,7 +77,7 @@ class Driver {
     error_code ec;
     while (!ec && bytes.size() < most) {
       if (!readable(socket_)) {
-        ADD_FAILURE() << "not a byte from the replay for " << patience.count() << " ms";
+        ADD_FAILURE() << "no byte from the replay for " << patience.count() << " ms";
         break;
       }
       const std::size_t n = socket_.read_some(asio::buffer(block.data(), std::min(block.size(), most - bytes.size())), ec);

@@ -86,18 +86,18 @@ TEST(ReplayBesideStrangers, AHostThatReadsNoAnswersIsClosedAndFillsNoLog) {
   error_code ec;
   for (int i = 0; i < 1000 && !ec; ++i) asio::write(host, asio::buffer(refused), ec);
   pollfd closed{host.native_handle(), POLLRDHUP, 0};
-  EXPECT_GT(::poll(&closed, 1, static_cast<int>(patience.count())), 0) << "all requests were taken, and their answers kept";
+  EXPECT_GT(::poll(&closed, 1, static_cast<int>(patience.count())), 0) << "the replay accepts all requests and keeps the answers";
   replay.stop();
   EXPECT_EQ(replay.server->figures().greedy, 1u);
   EXPECT_LT(replay.lines, 100) << "of 200,000 messages that were refused";
 }
 
-/// A recording of Oculus pings of 64 kB without end, on a disk that stops while the test requests it.
+/// An endless recording of Oculus pings of 64 kB. With `goes_on`, its disk blocks until that has a value.
 class SlowDisk final : public recording::RecordingReader {
  public:
   explicit SlowDisk(std::shared_future<void> goes_on = {}) : goes_on_(std::move(goes_on)) {}
   std::optional<recording::RecordedMessage> next() override {
-    if (rewound_ && goes_on_.valid()) goes_on_.wait();  // the search for the sonar comes before
+    if (rewound_ && goes_on_.valid()) goes_on_.wait();  // the search for the sonar, before rewind(), does not block
     recording::RecordedMessage message;
     oculus::MessageHeader header;
     header.type = oculus::MessageType::ping_result;
@@ -121,7 +121,7 @@ bool ends(tcp::socket& socket) {
   return ::poll(&closed, 1, static_cast<int>(patience.count())) > 0;
 }
 
-TEST(ReplayBesideStrangers, AClientThatReadsNothingLosesItsPlace) {
+TEST(ReplayBesideStrangers, AClientThatReadsNothingIsDisconnected) {
   ReplayOptions options;
   options.stall = milliseconds(200);
   Replay replay(std::make_unique<SlowDisk>(), options);
@@ -130,7 +130,7 @@ TEST(ReplayBesideStrangers, AClientThatReadsNothingLosesItsPlace) {
   stalled.open(tcp::v4());
   stalled.set_option(asio::socket_base::receive_buffer_size(2048));
   stalled.connect(replay.at());
-  EXPECT_TRUE(ends(stalled)) << "it keeps its place without reading";
+  EXPECT_TRUE(ends(stalled)) << "a client that reads nothing stays connected";
   tcp::socket next(io);
   next.connect(replay.at());
   std::array<char, 16> header{};
@@ -140,7 +140,7 @@ TEST(ReplayBesideStrangers, AClientThatReadsNothingLosesItsPlace) {
   EXPECT_EQ(replay.server->figures().stalled, 1u);
 }
 
-TEST(ReplayBesideStrangers, ADiskThatStandsStillDelaysNoOtherClient) {
+TEST(ReplayBesideStrangers, ADiskThatBlocksDelaysNoOtherClient) {
   std::promise<void> goes_on;
   Replay replay(std::make_unique<SlowDisk>(goes_on.get_future().share()));
   asio::io_context io;
@@ -198,7 +198,7 @@ TEST(ReplayBesideStrangers, NoFramesGoToABroadcastAddress) {
   ASSERT_EQ(receive_at("127.0.0.1"), "HTTP/1.1 204");
   io.restart();
   io.run_for(patience);
-  EXPECT_TRUE(any) << "a computer gets frames";
+  EXPECT_TRUE(any) << "no frame at the address of a computer";
 }
 
 }  // namespace

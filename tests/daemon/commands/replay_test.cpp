@@ -92,7 +92,7 @@ TEST(Replay, TheNextClientGetsTheRecordingFromItsStart) {
     Driver first(replay);
     EXPECT_EQ(first.read(1000).size(), 1000u);
     Driver second(replay);
-    EXPECT_TRUE(second.read(1).empty()) << "one at a time, as the device";
+    EXPECT_TRUE(second.read(1).empty()) << "like the device, the replay serves one client at a time";
     EXPECT_EQ(first.read(1000).size(), 1000u);
     first.reset();
   }
@@ -104,7 +104,7 @@ TEST(Replay, TheNextClientGetsTheRecordingFromItsStart) {
     EXPECT_TRUE(std::equal(begin.begin(), begin.end(), expected.begin()));
     return;
   }
-  FAIL() << "no client was served any more";
+  FAIL() << "no further client was served";
 }
 
 TEST(Replay, StopsWithAClientThatDoesNotRead) {
@@ -136,7 +136,7 @@ TEST(Replay, StatusLeadsDriversHere) {
     ReplayOptions options;
     options.status_to = {{address, listener.local_endpoint().port()}};
     Replay replay(file_of(pcap, messages), options);
-    ASSERT_TRUE(readable(listener)) << "no status datagram for " << patience.count() << " ms; one a second is sent";
+    ASSERT_TRUE(readable(listener)) << "no status datagram for " << patience.count() << " ms; expected one per second";
     Bytes datagram(2000);
     datagram.resize(listener.receive(asio::buffer(datagram)));
     const auto status = oculus::decode_status(datagram);
@@ -185,18 +185,18 @@ TEST(Replay, NeedsAMessageOfADevice) {
   EXPECT_EQ(device.error().text, "f holds no message of a sonar");
 }
 
-TEST(ReplayPace, GapsAreScaledBoundedAndNotMadeUpFor) {
+TEST(ReplayPace, GapsAreScaledAndBoundedAndLongDelaysAreNotMadeUpFor) {
   const auto start = Steady::now();
   const auto at = [](int ms) { return Time(milliseconds(ms)); };
   ReplayPace pace(2, {});
   EXPECT_EQ(pace.due(at(1000), start), start);
   EXPECT_EQ(pace.due(at(1100), start), start + milliseconds(50));
-  EXPECT_EQ(pace.due(at(1050), start), start + milliseconds(50)) << "a recording whose time goes back";
+  EXPECT_EQ(pace.due(at(1050), start), start + milliseconds(50)) << "a recording whose time goes back has no gap";
   EXPECT_EQ(pace.due(at(61050), start), start + milliseconds(50 + 2500));
   pace.begin_again();
   EXPECT_EQ(pace.due(at(1000), start), start + milliseconds(50 + 2500 + 50));
   EXPECT_EQ(pace.due(at(1100), start + milliseconds(9000)), start + milliseconds(9000));
-  EXPECT_EQ(pace.due(at(1200), start + milliseconds(9100)), start + milliseconds(9050)) << "a little late is made up for";
+  EXPECT_EQ(pace.due(at(1200), start + milliseconds(9100)), start + milliseconds(9050)) << "a short delay is made up for";
   ReplayPace untimed(1, milliseconds(100));
   EXPECT_EQ(untimed.due({}, start), start);
   EXPECT_EQ(untimed.due({}, start), start + milliseconds(100));

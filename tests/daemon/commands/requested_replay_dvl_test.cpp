@@ -1,4 +1,4 @@
-// Replay of a DVL at both of its ports: JSON as recorded, and the sentences of its serial line, made of it.
+// Replay of a DVL at both of its ports: JSON as recorded, and the sentences of the serial protocol, made of this JSON.
 #include <gtest/gtest.h>
 
 #include "protocol/dvl/dvl.hpp"
@@ -28,7 +28,7 @@ const std::string response =
     R"({"response_to":"get_config","success":true,"error_message":"","result":null,"format":"json_v3.1",)"
     R"("type":"response"})"
     "\r\n";
-// Typed from the table of the serial protocol; checksums by another program.
+// Sentences typed from the table of the serial protocol, with checksums computed by another program.
 const std::string old_sentences =
     "wrx,200.00,0.500,-0.250,0.125,0.002,2.50,y,1*a9\r\n"
     "wrt,2.70,2.71,2.72,-1.00*91\r\n";
@@ -59,7 +59,7 @@ struct ReplayOfDvl : ::testing::Test {
     }
     return text;
   }
-  std::promise<void> goes_on;  // the disk of the recording stands still until then
+  std::promise<void> goes_on;  // the disk of the recording blocks until this has a value
 };
 
 TEST_F(ReplayOfDvl, BothPortsGetEachReportAndTheDeviceItselfAnswers) {
@@ -81,12 +81,12 @@ TEST_F(ReplayOfDvl, ADriverSelectsTheSentences) {
   EXPECT_EQ(answer(serial, "wcp,3\r\n", "\r\n").substr(0, 3), "wra");
   goes_on.set_value();
   const std::string all = text_of(serial.read_to_end());
-  // The first report was requested before the command.
+  // The first report was read from the recording before the command came.
   EXPECT_EQ(all.substr(all.size() - (new_sentences + position_sentence).size()), new_sentences + position_sentence);
   EXPECT_EQ(all.find("wrx", old_sentences.size()), std::string::npos);
 }
 
-/// The same as an MCAP file that states a profile, five messages a second.
+/// Returns an MCAP file of these lines, five per second, that states a profile.
 Bytes mcap_file(const std::string& profile, std::initializer_list<std::string> lines) {
   Bytes file;
   recording::McapSession writer(recording::sink_into(file), "dvl", *protocol::find_make("dvl"), profile);
@@ -99,7 +99,7 @@ Bytes mcap_file(const std::string& profile, std::initializer_list<std::string> l
   return file;
 }
 
-/// The conversations of the device report a position five times a second; the recording lasts longer.
+/// An emulated device reports its position five times a second. The longer replay must send only the recorded position.
 TEST_F(ReplayOfDvl, OnlyRecordedPositionsAreSent) {
   const auto lines = {velocity, velocity, velocity, position};
   for (const Bytes& file : {dump(lines), mcap_file("dvl-a50", lines), mcap_file("dvl-a125", lines)}) {
@@ -125,9 +125,10 @@ TEST_F(ReplayOfDvl, DisabledAcousticsHoldTheRecordingAndATriggerGetsTheNextRepor
   EXPECT_NE(answer(json, R"({"command":"set_config","parameters":{"acoustic_enabled":false}})", "}\r\n").find("true"),
             std::string::npos);
   goes_on.set_value();
-  EXPECT_EQ(answer(json, "", "\r\n"), velocity) << "was requested before";
+  EXPECT_EQ(answer(json, "", "\r\n"), velocity) << "this report was read before the command";
   std::string after = answer(json, R"({"command":"trigger_ping"})", "}\r\n");
-  EXPECT_EQ(after.find(R"({"response_to":"trigger_ping","success":true)"), 0u) << "held until then: " << after;
+  EXPECT_EQ(after.find(R"({"response_to":"trigger_ping","success":true)"), 0u)
+      << "the recording is held until the trigger: " << after;
   if (!after.ends_with(position)) after += answer(json, "", "}\r\n");
   EXPECT_TRUE(after.ends_with(position)) << after;
 }

@@ -34,7 +34,7 @@ M message_in(const ping::Frame& frame) {
   EXPECT_TRUE(reader.ok());
   return message;
 }
-/// A message that names another one.
+/// Returns a message whose content is the number of another kind of message.
 Bytes about(ping::Id request, ping::Id id) {
   const auto number = static_cast<unsigned>(id);
   return ping::framed(request, 0, Bytes{static_cast<std::byte>(number & 0xFF), static_cast<std::byte>(number >> 8)});
@@ -45,15 +45,15 @@ TEST(ReplayOfPing1D, AHostByUdpGetsTheResultsThatItRequestsOneByOne) {
   Replay replay(file_of(raw_dump, {ping1d_profile(1), ping1d_profile(2), ping1d_profile(3), ping1d_profile(4)}));
   Udp host(9090);
   host.send(wanted(ping::Id::ping1d_general_info));
-  EXPECT_EQ(host.next_id(), ping::Id::ping1d_general_info) << "the device answers by itself";
+  EXPECT_EQ(host.next_id(), ping::Id::ping1d_general_info) << "the emulated device answers, not the recording";
   host.send(wanted(ping::Id::ping1d_profile));
   auto frame = host.read();
   ASSERT_TRUE(frame && frame->header.id == ping::Id::ping1d_profile);
   EXPECT_EQ(message_in<ping::Profile>(*frame).ping, 1u);
-  EXPECT_EQ(frame->payload.back(), std::byte{1}) << "with its samples";
+  EXPECT_EQ(frame->payload.back(), std::byte{1}) << "a profile has its samples";
   host.send(wanted(ping::Id::ping1d_distance));
   frame = host.read();
-  ASSERT_TRUE(frame && frame->header.id == ping::Id::ping1d_distance) << "made of the recorded profile";
+  ASSERT_TRUE(frame && frame->header.id == ping::Id::ping1d_distance) << "the distance is made of the recorded profile";
   const auto distance = message_in<ping::Distance>(*frame);
   EXPECT_EQ(distance.distance_mm, 1002u);
   EXPECT_EQ(distance.length_mm, 4000u);
@@ -91,7 +91,7 @@ Bytes ping1d_distance(std::uint32_t number) {
 Bytes ping1d_simple(std::uint32_t number) {
   return ping::framed_message(ping::Id::ping1d_distance_simple, 1, ping::DistanceSimple{1000 + number, 90});
 }
-/// The messages with which PlayedPings represents the pings of a recording.
+/// Returns the message with which PlayedPings represents each ping of a recording.
 std::vector<Bytes> played(const std::vector<Bytes>& messages, const recording::Codec& of) {
   std::vector<RecordedMessage> all;
   for (const Bytes& message : messages) all.push_back({{}, Origin::device, Carrier::datagram, message});
@@ -112,7 +112,7 @@ TEST(ReplayOfPing1D, TheMessageWithTheMostContentIsUsed) {
   EXPECT_THAT(played({simple(1), distance(1), profile(1), simple(2), distance(2)}, of), ElementsAre(profile(1), distance(2)));
   EXPECT_THAT(played({simple(1), profile(2), distance(3), simple(4)}, of),
               ElementsAre(simple(1), profile(2), distance(3), simple(4)))
-      << "four pings";
+      << "the numbers are those of four pings";
   EXPECT_THAT(played({simple(1), simple(1), profile(1), profile(1)}, of), ElementsAre(simple(1), profile(1), profile(1)))
       << "a ping has one message of each kind";
 }
@@ -182,7 +182,7 @@ Bytes enabling(bool enable) {
   settings.enable = enable ? 1 : 0;
   return ping::framed_message(ping::Id::set_ping_parameters, 0, settings);
 }
-/// The next frame that is not of the conversation.
+/// Returns the next frame except acknowledgements and requests for the time.
 std::optional<ping::Frame> next_measured(Udp& host) {
   while (auto frame = host.read())
     if (frame->header.id != ping::Id::utc_request && frame->header.id != ping::Id::ack) return frame;
@@ -198,9 +198,9 @@ TEST(ReplayOfSurveyor, AHostByUdpGetsEveryMessageAtTheRecordedPace) {
   Replay replay(file_of(ping_log, messages));
   Udp host(62312);
   host.send(wanted(ping::Id::device_information));
-  ASSERT_EQ(next_measured(host)->header.id, ping::Id::device_information) << "and no ping before";
+  ASSERT_EQ(next_measured(host)->header.id, ping::Id::device_information) << "no ping comes before it";
   const auto begin = std::chrono::steady_clock::now();
-  host.send(enabling(true));  // enables once a second; the recording has five pings a second
+  host.send(enabling(true));  // with a period of a second; the recording has five pings per second
   for (std::uint32_t i = 1; i <= 4; ++i)
     for (const ping::Id id : {ping::Id::attitude_report, ping::Id::atof_point_data}) {
       const auto frame = next_measured(host);
@@ -233,7 +233,7 @@ TEST(ReplayOfSurveyor, AHostByTcpIsAnsweredAndGetsPingsWhileItEnablesThem) {
     }
   };
   host.send(enabling(true));
-  for (int i = 0; i < 7; ++i) EXPECT_EQ(next(), ping::Id::atof_point_data) << "again and again";
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(next(), ping::Id::atof_point_data) << "the recording of three pings is repeated";
   host.send(ping::framed(ping::Id::set_device_id, 0, Bytes{std::byte{9}}));
   host.send(enabling(false));
   host.send(wanted(ping::Id::protocol_version));

@@ -17,9 +17,9 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-// ---- which ping
+// ---- which ping is sent
 
-/// Messages of two bytes: the first is a port, or 0 and the second a direction in degrees; 99: no ping.
+/// Messages of two bytes, one per second: a port and any number, or 0 and a direction in degrees. Port 99: not a ping.
 Messages recorded(const std::vector<std::pair<int, int>>& messages) {
   std::vector<RecordedMessage> all;
   for (const auto& [port, number] : messages)
@@ -39,7 +39,7 @@ const recording::Codec codec{.ping_part = part_of};
 
 int second_of(const PlayedPing& ping) { return static_cast<int>(seconds(ping.at.time_since_epoch())); }
 
-TEST(PlayedPings, TheNearestLineOfAScanIsTheNextInTime) {
+TEST(PlayedPings, OfTheNearestLinesOfAScanTheNextInTimeIsUsed) {
   Messages reader = recorded({{0, 10}, {99, 0}, {0, 20}, {0, 30}, {0, 20}, {0, 10}});
   PlayedPings pings(reader, codec);
   ASSERT_TRUE(pings.open("f"));
@@ -47,11 +47,11 @@ TEST(PlayedPings, TheNearestLineOfAScanIsTheNextInTime) {
   const auto at = [&](double deg) { return second_of(pings.nearest(deg * pi / 180)); };
   EXPECT_EQ(at(20), 2);
   EXPECT_EQ(at(20), 4) << "the next pass of the head";
-  EXPECT_EQ(at(20), 2) << "and around again";
+  EXPECT_EQ(at(20), 2) << "the recording begins again";
   EXPECT_EQ(at(31), 3);
   EXPECT_EQ(at(11), 5);
-  EXPECT_EQ(at(-350), 0) << "the same direction, a turn away";
-  EXPECT_EQ(at(200), 3) << "nothing was recorded there: the nearest";
+  EXPECT_EQ(at(-350), 0) << "the same direction, less a full turn";
+  EXPECT_EQ(at(200), 3) << "the nearest, as nothing was recorded there";
 }
 
 TEST(PlayedPings, PartsOfPortsMakeUpAPing) {
@@ -92,7 +92,7 @@ Bytes micron_line(int bearing, char bin) {
   return *micron::vendor().frame(ping, state);
 }
 
-/// A driver requests scan lines that are to port of ahead; the head turns by one grad after each.
+/// A driver requests scan lines. The head turns by one grad (16 units) after each line.
 TEST(ReplayOfMicron, ASendDataGetsTheRecordedLineOfItsDirection) {
   std::vector<Bytes> lines;
   for (int bearing = 2400; bearing <= 4000; bearing += 16) lines.push_back(micron_line(bearing, static_cast<char>(bearing / 16)));
@@ -111,7 +111,7 @@ TEST(ReplayOfMicron, ASendDataGetsTheRecordedLineOfItsDirection) {
         const auto message = micron::read_frame(whole->bytes);
         ASSERT_TRUE(message);
         if (message->header.id != micron::Id::head_data) continue;
-        EXPECT_THAT(lines, ::testing::Contains(whole->bytes)) << "byte for byte";
+        EXPECT_THAT(lines, ::testing::Contains(whole->bytes)) << "the line has other bytes than the recording";
         bearings.push_back(micron::read_front<micron::HeadData>(message->payload)->bearing);
         came = true;
       }
@@ -144,8 +144,8 @@ TEST(ReplayOfPing360, ARequestGetsTheRecordedLineOfItsAngle) {
     ping::DeviceData data;
     wire::Reader reader(frame->payload);
     fields(reader, data);
-    EXPECT_EQ(data.angle, angle == 28 ? 30 : angle) << "the nearest, under its own angle";
-    EXPECT_EQ(data.samples, 3) << "settings of the recording";
+    EXPECT_EQ(data.angle, angle == 28 ? 30 : angle) << "the message has the angle of the nearest line";
+    EXPECT_EQ(data.samples, 3) << "the recording's number of samples";
     EXPECT_EQ(frame->payload.back(), static_cast<std::byte>(data.angle));
   }
 }
@@ -190,23 +190,23 @@ TEST_F(NorbitReplay, PacketsThatWereRecordedInPiecesAreWhole) {
 TEST_F(NorbitReplay, EachPortSendsItsPacketsOnceTheDriverTurnsItOn) {
   Replay replay(file_of(raw_dump, messages));
   Tcp points(norbit::bathymetry_port), pictures(norbit::column_port), commands(norbit::command_port);
-  ASSERT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "it greets: the other two are served by then";
+  ASSERT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "no greeting; after it, the other two ports are served";
   commands.send(std::string_view("set_power 1\r\n"));
   auto received = std::async(std::launch::async, [&] { return pictures.read_to_end(); });
   EXPECT_EQ(points.read_to_end(), bathymetry);
   EXPECT_EQ(received.get(), column);
-  EXPECT_THAT(commands.read_to_end(), ::testing::Not(IsEmpty())) << "its replies";
-  EXPECT_TRUE(replay.ends()) << "the driver has received everything";
+  EXPECT_THAT(commands.read_to_end(), ::testing::Not(IsEmpty())) << "no replies";
+  EXPECT_TRUE(replay.ends()) << "the driver has received everything, so the replay ends";
   EXPECT_EQ(replay.figures().messages, 5u);
   EXPECT_EQ(replay.figures().clients, 3u);
 }
 
 /// While pings wait for the disk, the driver's messages are answered, and no ping is cut or lost.
-TEST_F(NorbitReplay, ADiskThatStandsStillDelaysNoConversation) {
+TEST_F(NorbitReplay, ADiskThatBlocksDelaysNoReplies) {
   std::promise<void> goes_on;
   Replay replay(file_of(raw_dump, messages), 1000, goes_on.get_future().share());
   Tcp points(norbit::bathymetry_port), pictures(norbit::column_port), commands(norbit::command_port);
-  EXPECT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "it greets";
+  EXPECT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "no greeting";
   for (int asked = 0; asked < 3; ++asked) {
     commands.send(std::string_view("set_power 1\r\n"));
     EXPECT_THAT(commands.read(), ::testing::Not(IsEmpty())) << "the event loop waits for the disk";
@@ -219,7 +219,7 @@ TEST_F(NorbitReplay, ADiskThatStandsStillDelaysNoConversation) {
   EXPECT_EQ(replay.figures().messages, 5u);
 }
 
-TEST_F(NorbitReplay, AFaultOfTheDiskEndsItWithItsText) {
+TEST_F(NorbitReplay, AnErrorOfTheDiskEndsTheReplayWithItsText) {
   std::promise<void> goes_on;
   goes_on.set_exception(std::make_exception_ptr(std::runtime_error("the disk is gone")));
   Replay replay(file_of(raw_dump, messages), 1000, goes_on.get_future().share());

@@ -75,7 +75,7 @@ class SlowDisk final : public recording::RecordingReader {
   std::shared_future<void> goes_on_;
 };
 
-/// A replay in a thread of its own. After it is open, its disk blocks until `goes_on`, if given.
+/// A replay in a thread of its own. If `goes_on` is given, the disk blocks after open() until that has a value.
 class Replay {
  public:
   explicit Replay(Bytes file, double rate_hz = 1000, std::shared_future<void> goes_on = {})
@@ -112,7 +112,7 @@ class Replay {
     done_.wait();
   }
   bool ends() { return done_.wait_for(patience) == std::future_status::ready; }
-  /// After the end.
+  /// Call figures() and outcome() only after the end of the replay.
   ReplayServer::Figures figures() const { return server_->figures(); }
   const Result<void>& outcome() const { return server_->outcome(); }
 
@@ -129,12 +129,12 @@ class Tcp {
   explicit Tcp(std::uint16_t port) : socket_(io_) { socket_.connect({asio::ip::address_v4({127, 0, 0, 2}), port}); }
   void send(const Bytes& bytes) { asio::write(socket_, asio::buffer(bytes)); }
   void send(std::string_view text) { asio::write(socket_, asio::buffer(text)); }
-  /// The next bytes; empty at the end of the stream.
+  /// Returns the next bytes; none at the end of the stream.
   Bytes read() {
     Bytes bytes(1 << 16);
     pollfd waited{socket_.native_handle(), POLLIN, 0};
     if (::poll(&waited, 1, static_cast<int>(patience.count())) <= 0) {
-      ADD_FAILURE() << "not a byte for " << patience.count() << " ms";
+      ADD_FAILURE() << "no byte for " << patience.count() << " ms";
       return {};
     }
     error_code ec;
@@ -153,7 +153,7 @@ class Tcp {
   tcp::socket socket_;
 };
 
-/// A host by UDP.
+/// A host that uses UDP.
 class Udp {
  public:
   explicit Udp(std::uint16_t port)
@@ -166,7 +166,7 @@ class Udp {
     datagram.resize(socket_.receive(asio::buffer(datagram)));
     return ping::whole_frame(datagram);
   }
-  /// The number of the next frame; Id{}: none came.
+  /// Returns the id of the next frame; Id{} if none came.
   ping::Id next_id() {
     const auto frame = read();
     return frame ? frame->header.id : ping::Id{};

@@ -23,7 +23,7 @@ std::string two_sonars(const std::string& first, const std::string& second_ip) {
          (second_ip == "0.0.0.0" ? ", advertise_ip: 10.0.0.9}\n" : "}\n");
 }
 
-TEST(Rebind, WhatIsDerivedFromTheAddressFollowsIt) {
+TEST(Rebind, ValuesDerivedFromTheAddressChangeWithIt) {
   auto config = parse(two_sonars("", "192.168.2.5"));
   ASSERT_TRUE(config) << config.error().text;
   EXPECT_EQ(text_of(config->sonars[0].status_to.at(0).ip), "192.168.2.255");
@@ -40,7 +40,7 @@ TEST(Rebind, WhatIsDerivedFromTheAddressFollowsIt) {
   EXPECT_EQ(text_of(moved.status_to.at(0).ip), "10.1.2.255");
 }
 
-TEST(Rebind, WhatTheFileSaysStays) {
+TEST(Rebind, ValuesOfTheFileStay) {
   auto config = parse(two_sonars(", netmask: 255.255.0.0, status_to: [192.168.2.7]", "192.168.2.5"));
   ASSERT_TRUE(config) << config.error().text;
   ASSERT_TRUE(rebind(*config, "10.1.2.3"));
@@ -51,7 +51,7 @@ TEST(Rebind, WhatTheFileSaysStays) {
   EXPECT_EQ(text_of(with_mask->sonars[0].status_to.at(0).ip), "10.1.255.255");
 }
 
-TEST(Rebind, RefusesWhatCannotServe) {
+TEST(Rebind, RefusesAddressesThatCannotServe) {
   const auto refusal = [](const std::string& second_ip, const char* address) {
     auto config = parse(two_sonars("", second_ip));
     if (!config) return config.error().text;
@@ -62,7 +62,7 @@ TEST(Rebind, RefusesWhatCannotServe) {
   EXPECT_THAT(refusal("192.168.2.5", "192.168.2.5"), HasSubstr("already used by sonar \"b\""));
   EXPECT_THAT(refusal("0.0.0.0", "192.168.2.9"), HasSubstr("already used by sonar \"b\""));
   EXPECT_THAT(refusal("192.168.2.5", "localhost"), HasSubstr("not an IPv4 address"));
-  EXPECT_EQ(refusal("192.168.2.5", "192.168.2.4"), "accepted") << "its own";
+  EXPECT_EQ(refusal("192.168.2.5", "192.168.2.4"), "accepted") << "the sonar's own address";
 }
 
 TEST(ConfigControl, DefaultsAreOnLoopbackAndGiveWay) {

@@ -1,4 +1,4 @@
-// Common mistakes in a configuration: the error names the probable intention, not only the fault.
+// Common mistakes in a configuration: the error names the probable intention, not only the mistake.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -148,10 +148,10 @@ TEST(ConfigMistakes, UnknownOptionsAreRefusedWithTheKnownOnes) {
   EXPECT_THAT(with("before_frist_fire: pings"),
               ::testing::AllOf(HasSubstr("sonars[0].options.before_frist_fire: unknown key"), HasSubstr("heads_base")));
   EXPECT_THAT(with("strict_rnage: on"), HasSubstr("did you mean \"strict_range\"?"));
-  EXPECT_THAT(with("before_first_fire: pigns"), HasSubstr("did you mean \"pings\"?"));  // this place is wrong for it, too
+  EXPECT_THAT(with("before_first_fire: pigns"), HasSubstr("did you mean \"pings\"?"));  // a key that is also in the wrong section
 }
 
-TEST(ConfigMistakes, TheDemoTakesAnyProduct) {
+TEST(ConfigMistakes, TheDemoAcceptsAnyProduct) {
   for (const protocol::Vendor* vendor : protocol::vendors())
     for (const auto& model : vendor->models()) {
       auto config = demo_config();
@@ -192,7 +192,7 @@ TEST(ConfigMistakes, AScenePassedAsConfigurationIsNamed) {
   EXPECT_EQ(config.error().kind, ErrorKind::config);
   EXPECT_THAT(config.error().text, HasSubstr("tank-rod.yaml: this looks like a scene, not a configuration"));
   EXPECT_THAT(config.error().text, HasSubstr("world: {scene: FILE}"));
-  EXPECT_THAT(why(vehicles + sonar + "objects: []\n"), HasSubstr("world: required key"));  // a configuration that lacks one
+  EXPECT_THAT(why(vehicles + sonar + "objects: []\n"), HasSubstr("world: required key"));  // a configuration without a scene
 }
 
 }  // namespace

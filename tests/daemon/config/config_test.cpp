@@ -291,7 +291,7 @@ TEST(Config, EveryErrorHasTheMistakeAndTheLine) {
   EXPECT_THAT(why(world + "vehicles: [{name: a, trajectory: path.csv}]\n" + sonar), HasSubstr("vehicles[0].trajectory"));
 }
 
-TEST(Config, ATimeThatWouldStandForEverIsRefused) {
+TEST(Config, AClockThatNobodyCanAdvanceIsRefused) {
   const auto with = [](const std::string& more) {
     const auto config = parse(world + vehicles + sonar + more);
     if (!config) return config.error().text;
@@ -389,7 +389,7 @@ TEST(FindConfig, UsesTheGivenFileUnlessTheDemoIsRequested) {
 }
 
 /// A service or `sudo -u` may keep the HOME of a user whose folders are closed to the new user.
-TEST(FindConfig, PassesOverAHomeThatIsClosedToThisUser) {
+TEST(FindConfig, IgnoresAHomeThatThisUserMayNotEnter) {
   tests::TemporaryFiles files;
   const auto home = files.folder();
   const char* const home_before = std::getenv("HOME");

@@ -1,4 +1,4 @@
-// docs/faults.md lists the faults that the code has.
+// docs/faults.md names every trouble (a named group of faults) with the duration that the code has.
 #include <gtest/gtest.h>
 
 #include <algorithm>

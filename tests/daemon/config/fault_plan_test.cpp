@@ -1,4 +1,4 @@
-// An invalid plan of faults is refused with file, line and the remedy.
+// An invalid plan of faults is refused. The error has file and line and says what to do.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

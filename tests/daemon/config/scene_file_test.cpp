@@ -89,13 +89,13 @@ TEST(SceneFile, OnlyTheConfigurationsFolderAndTheShippedScenesMayBeQuoted) {
   std::filesystem::create_symlink(elsewhere.path / "secret.yaml", here.path / "link.yaml");
   std::filesystem::current_path(here.path);
   EXPECT_TRUE(may_be_quoted({here.path / "mine.yaml"}, here.path));
-  EXPECT_TRUE(may_be_quoted({"mine.yaml"}, {})) << "the working directory, of a configuration named without a folder";
+  EXPECT_TRUE(may_be_quoted({"mine.yaml"}, {})) << "a configuration named without a folder is in the working directory";
   EXPECT_TRUE(may_be_quoted({scenes / "tank-rod.yaml"}, here.path));
   EXPECT_TRUE(may_be_quoted({"demo.yaml", true}, here.path));
   EXPECT_FALSE(may_be_quoted({elsewhere.path / "secret.yaml"}, here.path));
   EXPECT_FALSE(may_be_quoted({here.path / "link.yaml"}, here.path));
   EXPECT_FALSE(may_be_quoted({here.path / ".." / elsewhere.path.filename() / "secret.yaml"}, here.path));
-  EXPECT_FALSE(may_be_quoted({elsewhere.path / "secret.yaml"}, "/")) << "a service's working directory";
+  EXPECT_FALSE(may_be_quoted({elsewhere.path / "secret.yaml"}, "/")) << "a file below /, the working directory of a service";
 }
 
 TEST(SceneFile, NamesOfScenesEndInYamlOrYml) {

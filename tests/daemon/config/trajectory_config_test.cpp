@@ -99,7 +99,8 @@ TEST(TrajectoryConfig, EveryKeyIsRead) {
 }
 
 TEST(TrajectoryConfig, BodiesOfOneFileAreFoundByName) {
-  EXPECT_EQ(vehicle("fleet.csv").plan.trajectory->points().poses.at(0).position_m.x, 1) << "by the vehicle's own name";
+  EXPECT_EQ(vehicle("fleet.csv").plan.trajectory->points().poses.at(0).position_m.x, 1)
+      << "without `body`, the vehicle's own name is used";
   EXPECT_EQ(vehicle("{file: fleet.csv, body: auv}").plan.trajectory->points().poses.at(0).position_m.x, 2);
   const auto config = parse("fleet.csv", "objects:\n  - {name: auv, trajectory: fleet.csv}\n");
   ASSERT_TRUE(config) << config.error().text;

@@ -1,5 +1,5 @@
 // Common parts of the daemon's loopback tests: a daemon with a fake engine in a thread, and a driver-side client with deadlines.
-// Programs that use it link own_network: the ports are those of the products.
+// Test programs that use these parts link own_network, because the ports are those of the products.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -56,14 +56,14 @@ class FakeEngine final : public PingEngine {
   ScenePointer scene_;
 };
 
-/// Holds the engine until the test allows a ping, so that the daemon is never ahead of a client that reads slowly. Ticks that
+/// Blocks the engine until the test allows a ping, so that the daemon is never ahead of a client that reads slowly. Ticks that
 /// pass meanwhile are skipped; numbers of pings do not count them.
 class PingGate {
  public:
   void allow(int pings = 1);
   /// From now on allows every ping.
   void open();
-  /// Called by the engine before each ping.
+  /// The engine calls this before each ping; it blocks until the ping is allowed.
   void pass();
 
  private:
@@ -73,9 +73,10 @@ class PingGate {
   bool open_ = false;
 };
 
-/// A few triangles: enough to be an object.
+/// Returns a mesh of a few triangles.
 std::shared_ptr<const Mesh> small_mesh();
-/// Objects "floor" and "box" of materials "mud" and "steel"; with `moving_object` also "crate", which moves.
+/// Returns a scene of the objects "floor" and "box" (materials "mud" and "steel"), with `moving_object` also "crate", which
+/// moves.
 std::shared_ptr<Scene> small_scene(bool moving_object = false);
 
 struct DaemonSetup {
@@ -87,12 +88,12 @@ struct DaemonSetup {
   AppOptions options;
   milliseconds engine_takes{0};
   FakeEngine::Before engine_before;
-  std::shared_ptr<PingGate> gate;  // null: each ping is made when it is due. The daemon opens the gate when it stops
+  std::shared_ptr<PingGate> gate;  // null: each ping is made when it is due. stop() opens the gate
   bool moving_object = false;
-  ScenePointer scene;                               // instead of small_scene()
-  std::function<void(const Scene&)> before_engine;  // on the thread that makes an engine for a later scene
+  ScenePointer scene;                               // if set, used instead of small_scene()
+  std::function<void(const Scene&)> before_engine;  // called on the thread that makes an engine for a later scene
   bool config_file = false;                         // the configuration is in a file and can be read again
-  std::function<void(Config&)> edit_config;         // before the daemon starts
+  std::function<void(Config&)> edit_config;         // called before the daemon starts
 };
 /// The configuration with which Daemon starts.
 std::string yaml_of(const DaemonSetup& setup);
@@ -108,7 +109,7 @@ class Daemon {
   App& app() { return *app_; }
   const std::string& address() const { return address_; }
   std::vector<PingRequest> requests() { return record_->all(); }
-  /// The scene of each of these requests.
+  /// Returns the scene of each of requests().
   std::vector<ScenePointer> scenes();
   /// Performs an operation on the I/O thread and waits for its answer.
   OperationResult ask(const control::Operation& operation);
@@ -116,10 +117,10 @@ class Daemon {
   v1::DaemonStatus status();
   /// Runs `work` on the I/O thread and waits for its end.
   void on_io_thread(const std::function<void()>& work);
-  /// Writes setup.config_file, which the next reload reads.
+  /// Writes the configuration file (setup.config_file), which the next reload reads.
   void write_config(const std::string& yaml) const;
   std::string log_text();
-  /// Only after stop() or wait().
+  /// Call it only after stop() or wait().
   DeviceFigures figures() const { return app_->devices().front().figures(); }
 
  private:
@@ -134,7 +135,7 @@ class Daemon {
   std::optional<int> code_;
 };
 
-/// A plain TCP client that decodes what it reads. Everything has a deadline.
+/// A plain TCP client that decodes the bytes that it reads. All its waits have a deadline.
 class Client {
  public:
   /// `receive_buffer`: a small one makes a client stall sooner.
@@ -146,15 +147,15 @@ class Client {
   void send(const std::vector<std::byte>& bytes);
   void send(const std::string& text);
   void fire(const oculus::FireRequest& fire) { send(oculus::make_fire(fire)); }
-  /// The next message, or nothing at the deadline or the end of the stream.
+  /// Returns the next message; nullopt at the deadline or the end of the stream.
   std::optional<oculus::Received> next(milliseconds timeout = patience);
-  /// Skips everything but pings.
+  /// Returns the next ping and skips other messages.
   std::optional<oculus::DecodedPing> next_ping(milliseconds timeout = patience);
   /// Reads to the end of the stream; true = FIN, false = reset or deadline. Bytes are decoded after the end: a daemon that stops
   /// gives a client less than a second to receive its last message, and decoding may take longer on a busy machine.
   bool read_to_end(milliseconds timeout = patience);
   std::vector<std::byte> read_raw(std::size_t at_least, milliseconds timeout = patience);
-  void reset();           // RST
+  void reset();           // closes the connection with an RST
   void finish_sending();  // sends a FIN, but continues to read
   /// From now on the client is like a computer without power: not even its kernel receives or acknowledges.
   void die();
@@ -170,7 +171,7 @@ class Client {
   int fd_ = -1;
 };
 
-/// Defaults of a driver: mode 2, 10 Hz, metres, 8 bit, 256 beams, 2 m.
+/// Returns a fire message with a driver's defaults (mode 2, metres, 8 bit, 256 beams) and this rate and range.
 oculus::FireRequest fire_at(oculus::PingRate rate, double range_m = 2);
 
 void send_udp(const std::string& address, std::uint16_t port, const std::vector<std::byte>& bytes);

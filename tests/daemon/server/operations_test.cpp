@@ -45,7 +45,8 @@ TEST(Status, HasModelAddressAndState) {
   Daemon daemon(setup);
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40, 3));
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(sees_range(client, 3));  // the first is counted when the second is written
+  for (int i = 0; i < 2; ++i)
+    ASSERT_TRUE(sees_range(client, 3));  // the first ping is counted as served when the second is written
   const v1::DaemonStatus s = daemon.status();
   EXPECT_FALSE(s.version().empty());
   EXPECT_EQ(s.config(), "test.yaml");
@@ -98,11 +99,11 @@ TEST(SetSonar, AffectsTheNextPingAndIsEchoedAsAFireMessage) {
   asked.beams = 512;
   asked.sonar = "front";
   EXPECT_EQ(daemon.ask(asked).code, Code::done);
-  const std::size_t asked_by_now = daemon.requests().size() + 1;  // one may be on its way to the engine
+  const std::size_t asked_by_now = daemon.requests().size() + 1;  // a request may be on its way to the engine
   ASSERT_TRUE(sees(client, [](const oculus::DecodedPing& p) {
     return p.head.fixed.fire.range == 5.5 && p.head.fixed.fire.gain_percent != 50 && p.beams() == 512 &&
            p.head.fixed.fire.gamma == 77;
-  })) << "and what was not asked for is the client's";
+  })) << "settings that control did not change are those of the client";
   const auto requests = daemon.requests();
   for (std::size_t i = asked_by_now; i < requests.size(); ++i) EXPECT_EQ(requests[i].settings.range_m, 5.5);
   EXPECT_THAT(daemon.log_text(), HasSubstr("client=\"control test\""));
@@ -144,7 +145,7 @@ TEST(SetSonar, MovesTheSonarOnItsVehicle) {
   control::SetSonar tilt;
   tilt.mount = control::MountChange{Vec3d{0.5, 0, 0}, quat_from_rpy({0, rad_from_deg(30), 0})};
   ASSERT_EQ(daemon.ask(tilt).code, Code::done);
-  const std::size_t by_now = daemon.requests().size() + 1;  // one may be on its way to the engine
+  const std::size_t by_now = daemon.requests().size() + 1;  // a request may be on its way to the engine
   ASSERT_TRUE(eventually([&] { return daemon.requests().size() > by_now; }));
   const Pose sonar = daemon.requests().back().sonar_in_world;
   EXPECT_NEAR(sonar.position_m.x, 0.5, 1e-12);
@@ -188,7 +189,7 @@ TEST(SetEnvironment, IsTheWaterOfTheNextPing) {
   ASSERT_TRUE(sees(client, [](const oculus::DecodedPing& p) { return p.head.fixed.temperature_c == 25; }));
   const PingRequest last = daemon.requests().back();
   EXPECT_EQ(last.water.temperature_c, 25);
-  EXPECT_EQ(last.water.salinity_psu, 30) << "what is not given stays";
+  EXPECT_EQ(last.water.salinity_psu, 30) << "values that are not given stay";
   EXPECT_GT(last.settings.device_sound_speed_mps, speed_before + 20) << "the device's own sound speed follows its thermometer";
   EXPECT_EQ(daemon.status().environment().temperature_c().value(), 25);
 }
@@ -206,7 +207,7 @@ TEST(SetEnvironment, HoldsTheRulesOfTheConfiguration) {
   EXPECT_EQ(daemon.status().environment().temperature_c().value(), 12);
 }
 
-TEST(PosesByControl, AreTakenAsAnyOthers) {
+TEST(PosesByControl, AreAcceptedAsAllOtherPoses) {
   Daemon daemon;
   control::PoseSample sample;
   sample.name = "rov";

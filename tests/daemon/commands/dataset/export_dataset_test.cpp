@@ -22,7 +22,7 @@ using nlohmann::json;
 using std::filesystem::path;
 using ::testing::HasSubstr;
 
-// Beds, coats and radii alternate, so parts of scenes are repeated, and whole scenes.
+// Beds, coats and radii alternate, so parts of scenes are repeated, and so are whole scenes.
 const std::string job_text = R"(
 dataset: {pings: 14, shard: 6, seed: 3, negatives: 0.3, targets: [ball], license: CC-BY-4.0}
 vary:
@@ -101,7 +101,7 @@ TEST_F(ExportDataset, EqualScenesHaveEqualNames) {
     EXPECT_EQ(draws.size(), 1u) << scene;
     all.insert(draws.begin(), draws.end());
   }
-  EXPECT_EQ(all.size(), draws_of.size()) << "sonar and counts are no part of the scene";
+  EXPECT_EQ(all.size(), draws_of.size()) << "the name of a scene does not depend on sonar or counts";
   EXPECT_LT(draws_of.size(), job_.pings);
 }
 
@@ -236,7 +236,7 @@ TEST_F(ExportDataset, DamagedArchivesAreRefused) {
   }
 }
 
-TEST_F(ExportDataset, AStoppedRunKeepsItsPingsAndGoesOn) {
+TEST_F(ExportDataset, AStoppedRunKeepsItsPingsAndCanBeContinued) {
   ASSERT_TRUE(make("whole"));
   std::atomic<bool> stop{false};
   const auto stopped = make("set", &stop, [&](const DatasetProgress& p) { stop = p.pings >= 4; });
@@ -250,7 +250,7 @@ TEST_F(ExportDataset, AStoppedRunKeepsItsPingsAndGoesOn) {
   EXPECT_TRUE(done->whole);
   for (const char* name : {"shard-000000.tar", "shard-000000.json", "coco.json", "manifest.json", "contact.png", "README.md"})
     EXPECT_TRUE(contents(path("set") / name) == contents(path("whole") / name)) << name;
-  EXPECT_EQ(files_in("set"), files_in("whole")) << "nothing is left aside";
+  EXPECT_EQ(files_in("set"), files_in("whole")) << "no file of pings that were set aside remains";
 }
 
 TEST_F(ExportDataset, PingsSetAsideThatWereDamagedAreMadeAgain) {

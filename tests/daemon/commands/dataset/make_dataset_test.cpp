@@ -127,17 +127,17 @@ TEST_F(MakeDataset, ContinuesAfterAnInterruption) {
   EXPECT_TRUE(std::filesystem::exists(of_the_user));
 }
 
-TEST_F(MakeDataset, TwoWritersOfOneFileDoNotMeet) {
+TEST_F(MakeDataset, TwoWritersOfOneFileDoNotDisturbEachOther) {
   const std::vector<std::byte> one(700, std::byte{1}), two(2000, std::byte{2});
   auto a = ShardWriter::open(folder_ / "s.tar"), b = ShardWriter::open(folder_ / "s.tar");
   ASSERT_TRUE(a && b);
   ASSERT_TRUE(a->add("one", one));
   ASSERT_TRUE(b->add("two", two));
-  remove_unfinished(folder_, [](const std::string&) { return true; });  // neither belongs to a killed run
+  remove_unfinished(folder_, [](const std::string&) { return true; });  // removes neither: both belong to a live run
   ASSERT_TRUE(a->commit());
   EXPECT_EQ(contents("s.tar").size(), 512u + 1024 + 1024);
   const auto other = b->commit();
-  ASSERT_FALSE(other);  // the first one stays
+  ASSERT_FALSE(other);  // the first file stays
   EXPECT_EQ(other.error().kind, ErrorKind::bad_data);
   EXPECT_THAT(other.error().text, HasSubstr("other bytes"));
   auto equal = ShardWriter::open(folder_ / "s.tar");
@@ -184,7 +184,7 @@ TEST_F(MakeDataset, OneBeamHasNoContactSheet) {
   EXPECT_THAT(contents("a/README.md"), testing::Not(HasSubstr("contact.png")));
 }
 
-TEST_F(MakeDataset, CountsTakeFormulasAndLet) {
+TEST_F(MakeDataset, CountsMayBeFormulasOrNamesOfLet) {
   for (const char* count : {"$(2 * stones)", "$twice"}) {
     const auto job =
         parse_job(with("counts: {stone: $stones}", std::string("let: {twice: 2 * stones}\ncounts: {stone: ") + count + "}"),
@@ -198,7 +198,7 @@ TEST_F(MakeDataset, CountsTakeFormulasAndLet) {
   }
 }
 
-TEST_F(MakeDataset, WhichOfTheCountedStayIsDrawn) {
+TEST_F(MakeDataset, ACountSelectsObjectsAtRandom) {
   const auto job = parse_job(with("counts: {stone: $stones}", "counts: {stone: 1}"), "small.yaml", folder_);
   ASSERT_TRUE(job) << job.error().text;
   std::set<std::size_t> stayed;
@@ -209,7 +209,7 @@ TEST_F(MakeDataset, WhichOfTheCountedStayIsDrawn) {
     for (std::size_t i = 0; i < objects.size(); ++i)
       if (objects[i].label == "stone" && objects[i].visible) stayed.insert(i);
   }
-  EXPECT_EQ(stayed.size(), 2U) << "each of the two in some pings";
+  EXPECT_EQ(stayed.size(), 2U) << "each of the two stones is in some pings";
 }
 
 TEST_F(MakeDataset, LineEndsOfWindowsChangeNoPing) {

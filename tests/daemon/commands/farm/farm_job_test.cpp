@@ -1,4 +1,4 @@
-// Records and files that are sent to workers, without a server.
+// Tests, without a server, the records and files that are sent to workers.
 #include "daemon/commands/farm/farm_job.hpp"
 
 #include <gmock/gmock.h>
@@ -91,7 +91,7 @@ class FarmJobTest : public testing::Test {
   path folder_;
 };
 
-TEST_F(FarmJobTest, IdIsOfAllContents) {
+TEST_F(FarmJobTest, TheIdDependsOnAllContents) {
   const FarmJob a = record();
   EXPECT_EQ(a.id.size(), 64u);
   EXPECT_EQ(a.folder(), "set-" + a.id.substr(0, 12));
@@ -109,7 +109,7 @@ TEST_F(FarmJobTest, FilesArriveAsTheyWere) {
   FarmJob sent = record();
   ASSERT_TRUE(send_files(job(), sent, folder_ / "shared", queue));
   EXPECT_TRUE(sent.in_bucket);
-  EXPECT_EQ(queue.all.size(), 3u);  // the mesh in two pieces
+  EXPECT_EQ(queue.all.size(), 3u);  // the job file, and the mesh in two pieces
   const auto file = receive_files(sent, folder_ / "own", queue);
   ASSERT_TRUE(file) << file.error().text;
   EXPECT_EQ(describe(dataset::load_job(*file).value(), "portable").value().id, sent.id);
@@ -120,7 +120,7 @@ TEST_F(FarmJobTest, FilesArriveAsTheyWere) {
   EXPECT_THAT(receive_files(sent, folder_ / "none", queue).error().text, HasSubstr("8 MiB"));
 }
 
-TEST_F(FarmJobTest, NothingLeadsOutOfTheFolder) {
+TEST_F(FarmJobTest, FilesOutsideTheFolderAreRefused) {
   put("job/set.yaml", "dataset: {pings: 5}\nscene: {objects: [{type: mesh, file: ../else.stl}]}\n");
   put("else.stl", "x");
   EXPECT_THAT(describe(job(), "portable").error().text, HasSubstr("../else.stl is outside the job's folder"));
@@ -143,7 +143,7 @@ TEST_F(FarmJobTest, NothingLeadsOutOfTheFolder) {
   EXPECT_THAT(receive_files(sent, folder_ / "linked", queue).error().text, HasSubstr("by a link"));
 }
 
-TEST_F(FarmJobTest, CountsThatNoJobHasAreRefused) {
+TEST_F(FarmJobTest, ImpossibleCountsAreRefused) {
   const FarmJob is = record();
   using nlohmann::json;
   const std::vector<std::pair<const char*, json>> wrong{
@@ -185,7 +185,7 @@ int work_on_foreign_shards(const path& folder) {
   return queue.ends == std::vector<std::string>{"3 drop", "999999999 drop", "18446744073709551615 drop"} ? 0 : 4;
 }
 
-TEST_F(FarmJobTest, AWorkerRemovesWhatIsNoShardOfTheJob) {
+TEST_F(FarmJobTest, AWorkerDropsTasksOfShardsThatTheJobLacks) {
   put("job/set.yaml",
       "dataset: {pings: 5, shard: 2}\n"
       "scene: {objects: [{name: bed, type: plane, material: sand, size_m: [20, 20], pose: {xyz_m: [5, 0, -12]}}]}\n"
@@ -219,7 +219,7 @@ TEST_F(FarmJobTest, TheStatusShowsNoRawBytesOfTheQueue) {
       << *text;  // only line ends have to be escaped
 }
 
-TEST_F(FarmJobTest, OthersMakeOtherBytes) {
+TEST_F(FarmJobTest, AnotherVersionOrInstructionSetIsUnfit) {
   FarmJob is = record();
   EXPECT_EQ(why_unfit(is), "");
   is.instruction_set = "avx1024";

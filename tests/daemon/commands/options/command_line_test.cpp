@@ -1,4 +1,4 @@
-// The user's options reach the configuration, and win over the file; options that are absent change nothing.
+// The user's options replace values of the configuration file; options that are absent change nothing.
 #include "daemon/commands/options/command_line.hpp"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ Command parse(std::vector<std::string> words) {
   return parse_command_line(static_cast<int>(words.size()), arguments.data());
 }
 
-/// The file's engine section, as overridden.
+/// Returns a configuration with this engine section, changed by the options.
 Config overridden(const std::vector<std::string>& words, const std::string& engine = "{}") {
   auto config = parse_config(
       "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: "
@@ -30,7 +30,7 @@ Config overridden(const std::vector<std::string>& words, const std::string& engi
   return *std::move(config);
 }
 
-/// Overrides a configuration whose controls are off with these options.
+/// Applies these options to a configuration without control interfaces.
 Result<void> deaf_with(const std::string& clock, const std::vector<std::string>& words) {
   auto config = parse_config(
       "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: a, profile: oculus-m1200d, bind_ip: "
@@ -145,7 +145,7 @@ TEST(CommandLine, PartsThatTheModeLeavesOutAreNotSwitchedOn) {
   EXPECT_NO_THROW(overridden({"--mode", "paper"}, "{specular: on}"));  // the file's own setting is logged, not refused
 }
 
-TEST(CommandLine, SwitchesWinOverTheFileOnlyWhenGiven) {
+TEST(CommandLine, OnlyGivenSwitchesReplaceTheFilesValues) {
   const std::string file = "{expected_power: true, noise: off, fixed_fan: 8}";
   const Switches kept = overridden({"--demo"}, file).engine.switches;
   EXPECT_TRUE(kept.expected_power);
@@ -163,7 +163,8 @@ TEST(CommandLine, TheOtherRunOptionsReplaceTheFilesValues) {
   EXPECT_EQ(c.engine.threads, 3);
   EXPECT_EQ(c.seed, 9u);
   EXPECT_EQ(c.engine.simd, SimdLevel::portable);
-  EXPECT_EQ(overridden({"--simd", "auto"}).engine.simd, SimdLevel::avx512) << "the best there is, whatever SONARD_SIMD says";
+  EXPECT_EQ(overridden({"--simd", "auto"}).engine.simd, SimdLevel::avx512)
+      << "the best of the program, even if SONARD_SIMD differs";
   EXPECT_EQ(c.engine.device, EngineDevice::cuda);
   EXPECT_EQ(text_of(c.sonars.at(0).bind_ip), "127.0.0.9");
   EXPECT_EQ(text_of(c.sonars.at(0).advertise_ip), "127.0.0.9");
@@ -197,7 +198,7 @@ Result<Config> moved(const std::vector<std::string>& words, const std::string& b
   return config;
 }
 
-TEST(CommandLine, ClientsAreOfEverySonar) {
+TEST(CommandLine, TheNumberOfClientsIsForEverySonar) {
   EXPECT_EQ(overridden({"--demo"}).sonars.at(0).max_clients, 1);
   const Config c = *moved({"run", "x.yaml", "--clients", "5"}, "127.0.0.2", "{}");
   EXPECT_EQ(c.sonars.at(0).max_clients, 5);

@@ -1,4 +1,4 @@
-// Console lines while a scene loads: none for a short load, then a line from time to time.
+// Console lines while a scene loads: none if a step is short, else one at each interval.
 #include "daemon/commands/options/load_progress.hpp"
 
 #include <gmock/gmock.h>

@@ -46,9 +46,9 @@ TEST_F(OutputFolders, IsHeldByOneRunAtATime) {
     EXPECT_EQ(second.error().kind, ErrorKind::usage);
     EXPECT_THAT(second.error().text, AllOf(HasSubstr("another sonard render is writing"), HasSubstr("output_folder_test")));
     options_.overwrite = true;
-    EXPECT_FALSE(claim("b")) << "not even to replace them";
+    EXPECT_FALSE(claim("b")) << "overwrite does not help while the first run holds the folder";
   }
-  EXPECT_TRUE(claim("b")) << "it has ended";
+  EXPECT_TRUE(claim("b")) << "the first run has ended";
 }
 
 TEST_F(OutputFolders, NeverMixesThePingsOfTwoInputs) {
@@ -59,7 +59,7 @@ TEST_F(OutputFolders, NeverMixesThePingsOfTwoInputs) {
   EXPECT_THAT(claim("b").error().text, HasSubstr("holds pings of other inputs"));
   std::filesystem::remove(options_.folder / "render.json");
   put("000001.json", sidecar_);
-  EXPECT_THAT(claim("a").error().text, HasSubstr("no render.json")) << "their inputs are unknown";
+  EXPECT_THAT(claim("a").error().text, HasSubstr("no render.json")) << "the inputs of the pings are unknown";
   EXPECT_TRUE(std::filesystem::exists(options_.folder / "000001.png"));
   options_.overwrite = true;
   ASSERT_TRUE(claim("b"));
@@ -87,7 +87,7 @@ TEST_F(OutputFolders, FilesOfOthersAreNotRemovedEvenIfTheyHaveNumbers) {
   EXPECT_FALSE(std::filesystem::exists(options_.folder / "000001.png"));
 }
 
-TEST_F(OutputFolders, HoldsAPingWhenAllItsFilesAreThereOfTheseInputs) {
+TEST_F(OutputFolders, HoldsAPingIfItHasAllFilesOfThePingWithTheseInputs) {
   const auto folder = claim("a");
   ASSERT_TRUE(folder);
   EXPECT_FALSE(folder->holds(7));

@@ -159,7 +159,7 @@ TEST(RenderFile, WindowsListedBeamsAndLevelsReachTheSonar) {
               HasSubstr("must be below range_m"));
 }
 
-TEST(RenderFile, AProfileStartsAsTheDeviceAndKeepsItsShares) {
+TEST(RenderFile, WithAProfileBinsAndPulseScaleWithTheRange) {
   const RenderJob whole = parsed(point + "sonar: {profile: oculus-m1200d, ping: {mode: HF}}\n").jobs.at(0);
   const RenderJob half =
       parsed(point + "sonar: {profile: oculus-m1200d, ping: {mode: 2, range_m: " + std::to_string(whole.settings.range_m / 2) +
@@ -172,7 +172,7 @@ TEST(RenderFile, AProfileStartsAsTheDeviceAndKeepsItsShares) {
   EXPECT_NEAR(static_cast<double>(half.settings.pulse_width_m), static_cast<double>(whole.settings.pulse_width_m) / 2, 1e-6);
 }
 
-TEST(RenderFile, ARangeCellIsThatOfTheWire) {
+TEST(RenderFile, ThePulseOfARangeImageIsThatOfTheMode) {
   const auto settings = [](const std::string& ping) {
     return parsed(point + "sonar: {profile: waterlinked-3d15, ping: {" + ping + "}}\n").jobs.at(0).settings;
   };
@@ -184,7 +184,7 @@ TEST(RenderFile, ARangeCellIsThatOfTheWire) {
   EXPECT_FLOAT_EQ(settings("range_m: 8, pulse_width_m: 0.03").pulse_width_m, 0.03f);
 }
 
-TEST(RenderFile, SweepsReadTheFileOnceAStep) {
+TEST(RenderFile, ASweepReadsTheFileOnceForEachStep) {
   const RenderInput input = parsed(R"(
 scene: {objects: [{type: point, target_strength_db: 0, pose: {xyz_m: [$r, 0, $(-2*r)]}}]}
 sonar: {ping: {range_m: $reach}}
@@ -198,7 +198,7 @@ let: {reach: 2*r + 1}
   EXPECT_EQ(input.jobs[1].settings.range_m, 7);
 }
 
-TEST(RenderFile, RefusesWithAPlace) {
+TEST(RenderFile, ErrorsHaveTheLineAndTheKey) {
   EXPECT_THAT(refusal(point + "sonar: {ping: {rnage_m: 4}}\n"), AllOf(HasSubstr("r.yaml:5"), HasSubstr("range_m")));
   EXPECT_THAT(refusal(point + "sonar: {profile: oculus-m1300d}\n"), HasSubstr("oculus-m1200d"));
   EXPECT_THAT(refusal(point + "sonar: {options: {pulse: native}}\n"), HasSubstr("which is not given"));
@@ -222,15 +222,15 @@ TEST(RenderFile, ErrorsInASceneAreBadDataInAnyFile) {
   const std::string rest = "\nsonar: {ping: {range_m: 4}}\nexpect: []\n";
   EXPECT_EQ(kind("scene: {objects: [{type: ball}]}" + rest), ErrorKind::bad_data);
   EXPECT_EQ(kind("scene: {objects: [{type: sphere, radius_m: -1}]}" + rest), ErrorKind::bad_data);
-  EXPECT_EQ(kind("scene: {objects: [], object: 1}" + rest), ErrorKind::bad_data) << "an unknown key, found last";
+  EXPECT_EQ(kind("scene: {objects: [], object: 1}" + rest), ErrorKind::bad_data) << "an unknown key is found last";
   const std::string file = testing::TempDir() + "/render_file_test_scene.yaml";
   std::ofstream(file) << "objects: [{type: ball}]\n";
-  EXPECT_EQ(kind("scene: " + file + rest), ErrorKind::bad_data) << "as load_scene has it";
+  EXPECT_EQ(kind("scene: " + file + rest), ErrorKind::bad_data) << "the kind of error of load_scene()";
   EXPECT_THAT(refusal("scene: " + file + rest), HasSubstr("r.yaml:1:8: scene: "));
-  // A fault of the render file itself is a fault of configuration.
+  // A mistake in the render file itself is an error of configuration.
   EXPECT_EQ(kind("scene: {objects: []}\nsonar: {ping: {range_m: -4}}\n"), ErrorKind::config);
   EXPECT_EQ(kind("scene: {objects: []}\nsonr: {}\n"), ErrorKind::config);
-  EXPECT_EQ(kind("scene: no-such-scene.yaml\n"), ErrorKind::config) << "as world.scene of a configuration";
+  EXPECT_EQ(kind("scene: no-such-scene.yaml\n"), ErrorKind::config) << "as for world.scene of a configuration";
 }
 
 TEST(RenderFile, ThePulseIsThatOfTheMode) {
@@ -250,7 +250,7 @@ TEST(RenderFile, ARangeThatTheProductDoesNotHaveGetsANote) {
   EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: HF, range_m: 25}"),
             "range 25 m: Oculus M1200d in mode HF takes 0.1 to 10 m; rendered all the same, where the device would use 10 m");
   EXPECT_THAT(note("profile: oculus-m370s, ping: {range_m: 0.15}"), HasSubstr("takes 0.2 to 200 m"));
-  EXPECT_EQ(note("ping: {range_m: 600}"), "") << "a plain sonar is no product";
+  EXPECT_EQ(note("ping: {range_m: 600}"), "") << "a sonar without a profile has no limits";
   EXPECT_EQ(note("ping: {range_m: 0.01}"), "");
 }
 
@@ -263,7 +263,7 @@ TEST(Npy, HeadersAreAlignedAndHaveTypeAndShape) {
   EXPECT_EQ(static_cast<unsigned char>(header[8]) + 256u * static_cast<unsigned char>(header[9]), header.size() - 10);
 }
 
-TEST(RenderJob, PutsMovingObjectsWhereTheirFilesHaveThem) {
+TEST(RenderJob, MovesObjectsAlongTheirTrajectories) {
   RenderInput input = parsed(
       "scene: {materials: {a: {lambert_db: -20}}, objects: [{name: ball, type: sphere, moving: true, material: a, "
       "radius_m: 1, pose: {xyz_m: [5, 0, 0]}}]}\n");
@@ -316,7 +316,7 @@ TEST(ResolutionCell, FollowsThePulseInUse) {
   EXPECT_NEAR(energy_per_width("{shape: gaussian}"), std::sqrt(pi / (4 * std::log(2.0))), 1e-6);
   EXPECT_NEAR(energy_per_width("{shape: cw}"), 2.0 / 3 / (2 - std::sqrt(2.0)), 1e-3);
   EXPECT_NEAR(cell_of(job).pulse_width_m, 0.03, 1e-9);
-  // A measured triangle, 20 samples at 100 kHz from foot to peak: the width is its own, not the settings'.
+  // A measured triangle rises in 20 samples of 100 kHz. The cell has the width of this pulse, not that of the settings.
   std::string samples;
   for (int n = -20; n <= 20; ++n) samples += (n > -20 ? ", [" : "[") + std::to_string(1 - std::abs(n) / 20.0) + ", 0]";
   const RenderJob measured =
@@ -330,7 +330,7 @@ TEST(ResolutionCell, FollowsThePulseInUse) {
   EXPECT_NEAR(cell_of(measured).beam_u, cell_of(job).beam_u, 1e-12);
 }
 
-/// Coverage of a level bed at 10 m by the plain sonar.
+/// Returns the coverage of a level bed 2 m below a sonar without a profile.
 Coverage coverage_with(const std::string& waveform) {
   const RenderJob job =
       with_bed_only(parsed("scene: {objects: [{type: plane, material: sand, size_m: [40, 40], pose: {xyz_m: [0, 0, -12]}}]}\n"
@@ -346,7 +346,7 @@ Coverage coverage_with(const std::string& waveform) {
   return *coverage;
 }
 
-TEST(Coverage, TakesTheEnergyOfThePulseInUse) {
+TEST(Coverage, UsesTheEnergyOfThePulseInUse) {
   for (const char* shape : {"{shape: gaussian}", "{shape: cw}", "{shape: lfm}"}) {
     const Coverage c = coverage_with(shape);
     EXPECT_GT(c.bins, 1000u) << shape;

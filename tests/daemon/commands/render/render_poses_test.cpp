@@ -50,13 +50,13 @@ TEST(RenderPoses, InterpolatesBetweenLinesAndHasTheirMotion) {
 
 TEST(RenderPoses, AJumpBetweenLinesIsNoMotion) {
   RenderJob job = job_of("t,x,y,z,yaw\n0,0,0,0,0\n1,29,0,0,0\n2,60,0,0,0\n2.1,60,0,0,90\n3,60,0,0,90\n");
-  job.snapshots = false;  // as by --motion on
+  job.snapshots = false;  // as with --motion on
   expect_near(sonar_twist_at(job, {}, at(0.5)).velocity_mps, {29, 0, 0});
   const Twist far = sonar_twist_at(job, {{1, 0, 0}, {}}, at(1.5)), turned = sonar_twist_at(job, {{1, 0, 0}, {}}, at(2.05));
   expect_near(far.velocity_mps, {0, 0, 0});
   expect_near(turned.velocity_mps, {0, 0, 0});
   expect_near(turned.angular_rate_radps, {0, 0, 0});
-  expect_near(vehicle_at(job, at(1.5)).position_m, {44.5, 0, 0});  // where it is stays what the lines say
+  expect_near(vehicle_at(job, at(1.5)).position_m, {44.5, 0, 0});  // the position is still that of the lines
 }
 
 std::string lines_of(int count, double step_m, double turn_deg, double period_s = 1) {
@@ -66,7 +66,7 @@ std::string lines_of(int count, double step_m, double turn_deg, double period_s 
   return text;
 }
 
-TEST(RenderPoses, PosesFurtherApartThanAVehicleGoesAreSnapshotsAndNoMotion) {
+TEST(RenderPoses, PosesTooFarApartForAVehicleAreSnapshotsWithoutMotion) {
   struct Step {
     double step_m, turn_deg, period_s;
   };
@@ -75,7 +75,7 @@ TEST(RenderPoses, PosesFurtherApartThanAVehicleGoesAreSnapshotsAndNoMotion) {
     EXPECT_TRUE(job.snapshots) << step_m << " " << turn_deg;
     const Twist rests = sonar_twist_at(job, {{1, 0, 0}, {}}, at(2 * period_s));
     EXPECT_EQ(length(rests.velocity_mps) + length(rests.angular_rate_radps), 0) << step_m << " " << turn_deg;
-    expect_near(vehicle_at(job, at(2 * period_s)).position_m, {2 * step_m, 0, 0});  // where it is stays what the lines say
+    expect_near(vehicle_at(job, at(2 * period_s)).position_m, {2 * step_m, 0, 0});  // the position is still that of the lines
   }
   for (const auto& [step_m, turn_deg, period_s] : {Step{14.9, 0, 1}, Step{6.2, 0, 1}, Step{0, 143, 0.5}, Step{1, 45, 1}}) {
     const RenderJob job = job_of(lines_of(5, step_m, turn_deg, period_s));
@@ -84,18 +84,18 @@ TEST(RenderPoses, PosesFurtherApartThanAVehicleGoesAreSnapshotsAndNoMotion) {
   }
 }
 
-TEST(RenderPoses, TheJitterOfAFastLogIsNoRowOfSnapshots) {
+TEST(RenderPoses, AFastLogWithJitterIsNotTreatedAsSnapshots) {
   std::string text = "t,x,y,z,yaw\n";
   for (int i = 0; i <= 100; ++i)
     text += std::to_string(0.01 * i) + "," + std::to_string(0.015 * i + (i % 3 == 0 ? 0.2 : 0)) + ",0,0," +
             std::to_string(i % 2 == 0 ? 6 : 0) + "\n";
-  const RenderJob job = job_of(text);  // line to line 20 m/s and 10 rad/s
+  const RenderJob job = job_of(text);  // from line to line 20 m/s and 10 rad/s
   EXPECT_FALSE(job.snapshots);
   EXPECT_EQ(steps_of(*job.vehicle().plan.trajectory).all, 10u);
-  EXPECT_TRUE(snapshots("t,x,y,z\n0,0,0,0\n0.01,3,0,0\n")) << "a file that is shorter than a step has one";
+  EXPECT_TRUE(snapshots("t,x,y,z\n0,0,0,0\n0.01,3,0,0\n")) << "a file shorter than a step counts as one step";
 }
 
-TEST(RenderPoses, AMissionWithAFewJumpsIsNoRowOfSnapshots) {
+TEST(RenderPoses, AMissionWithAFewJumpsIsNotTreatedAsSnapshots) {
   const std::string slow = lines_of(20, 1, 0);  // 19 steps
   EXPECT_FALSE(snapshots(slow + "20,40,0,0,0\n")) << "1 of 20 steps";
   EXPECT_FALSE(snapshots(slow + "20,40,0,0,0\n21,80,0,0,0\n")) << "2 of 21";
@@ -116,11 +116,11 @@ TEST(RenderPoses, KeepsTheTimesOfItsFile) {
   EXPECT_EQ(times[0].time_since_epoch().count(), 1403636579763555584);
   expect_near(vehicle_at(job, times[0]).position_m, {1, 0, 0});
   expect_near(vehicle_at(job, times[1]).position_m, {3, 0, 0});
-  expect_near(sonar_twist_at(job, {}, times[1]).velocity_mps, {2, 0, 0});  // it arrives moving
+  expect_near(sonar_twist_at(job, {}, times[1]).velocity_mps, {2, 0, 0});  // still moving at the last line
   EXPECT_TRUE(pose_times(RenderJob{}).empty());
 }
 
-TEST(RenderPoses, IsThatOfOneBody) {
+TEST(RenderPoses, OneBodyOfAFileIsFollowed) {
   const std::string two = "body,t,x,y,z\nrov,10,0,0,0\nbuoy,12,5,5,0\nbuoy,14,5,6,0\n";
   const RenderJob buoy = job_of(two, "buoy");
   EXPECT_EQ(pose_times(buoy), (std::vector<Time>{at(12), at(14)}));

@@ -33,7 +33,7 @@ Ping ping_of(const RenderJob& job, Parallel& pool) {
   return make_engine(job.scene, pool, {})->run({&request, 1}).at(0);
 }
 
-/// sinc^4 of x = L_v / lambda sin psi, where half of the power is at half the quoted width: x = 0.3189.
+/// Returns sinc^4(x), x = L_v / lambda sin psi. It is 1/2 at half the width of the data sheet, where x = 0.3189.
 double two_way(const FrequencyMode& mode, double psi_rad) {
   const double x = 0.31888 * std::sin(psi_rad) / std::sin(static_cast<double>(mode.pattern.elevation_width_rad) / 2);
   return x == 0 ? 1 : std::pow(std::sin(pi * x) / (pi * x), 4);
@@ -84,8 +84,8 @@ TEST(SideLobesOfProducts, SwitchedOffAPingHasTheBytesOfTheCanonicalModel) {
 
 // The fan of the main lobe ends where the two-way pattern is at -20 dB, so without side lobes the echo of the bed begins with a
 // step. With side lobes the echo changes across that edge as the closed form does, about 3 dB in 15 cm. Without side lobes the
-// signal before the edge is noise alone; it is subtracted. Speckle has a sigma of 0.2 dB (8 pings, some 800 looks each side): 1
-// dB is five.
+// signal before the edge is noise alone; it is subtracted. Speckle has a standard deviation of 0.2 dB (8 pings, some 800 looks
+// on each side); the tolerance of 1 dB is five times as large.
 TEST(SideLobesOfProducts, ABedBeginsWithoutAStep) {
   const std::string bed = at_depth("{type: plane, material: sand, size_m: [30, 30], pose: {xyz_m: [0, 0, -12]}}", tilt_deg);
   constexpr double nearest_m = 0.04, farthest_m = 0.11;  // from the edge, on either side: three rows
@@ -124,7 +124,7 @@ TEST(SideLobesOfProducts, ABedBeginsWithoutAStep) {
   EXPECT_GT(db(off.behind / off.before), 10);
 }
 
-// A sphere 2.7 m away on the first side lobe's peak (x = 1.43, 26.5 dB below the main lobe), beside the same water without it.
+// Compares a sphere 2.7 m away, at the peak of the first side lobe (x = 1.43, 26.5 dB below the main lobe), with water alone.
 TEST(SideLobesOfProducts, AnObstacleOutsideTheMainLobeIsThere) {
   Parallel pool(2);
   const double width = static_cast<double>(job_of(point + m1200d).mode().pattern.elevation_width_rad);

@@ -27,13 +27,13 @@ TEST(RecentRate, IsThatOfTheLastSecondsAndZeroOnceThePingsHaveStopped) {
   for (int i = 0; i <= 200; ++i) rate.add(begin + i * std::chrono::milliseconds(10));
   const Time quick_end = begin + std::chrono::seconds(2);
   EXPECT_DOUBLE_EQ(rate.hz(quick_end), 100);
-  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::milliseconds(1900)), 100) << "it may be between two pings";
+  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::milliseconds(1900)), 100) << "the next ping may still come";
   EXPECT_EQ(rate.hz(quick_end + std::chrono::milliseconds(2100)), 0);
   for (int i = 1; i <= 10; ++i) rate.add(quick_end + i * std::chrono::seconds(1));
-  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::seconds(10)), 1) << "what was before is forgotten";
+  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::seconds(10)), 1) << "pings before the pause do not count";
   rate.add(quick_end + std::chrono::seconds(40));
   rate.add(quick_end + std::chrono::seconds(60));
-  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::seconds(70)), 0.05) << "pings rarely";
+  EXPECT_DOUBLE_EQ(rate.hz(quick_end + std::chrono::seconds(70)), 0.05) << "rare pings also have a rate";
 }
 
 TEST(Histogram, ATimeOnABoundIsInTheLowerBin) {
@@ -44,7 +44,7 @@ TEST(Histogram, ATimeOnABoundIsInTheLowerBin) {
   h.add(1e9);
   EXPECT_EQ(h.counts()[3], 1u);
   EXPECT_EQ(h.counts()[4], 1u);
-  EXPECT_EQ(h.counts()[0], 1u) << "a clock that went back is no time at all";
+  EXPECT_EQ(h.counts()[0], 1u) << "a negative time counts as 0";
   EXPECT_EQ(h.counts().back(), 1u);
   EXPECT_EQ(h.count(), 4u);
   EXPECT_DOUBLE_EQ(h.sum_s(), 1e9 + 0.0021);

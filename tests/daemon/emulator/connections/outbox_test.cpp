@@ -28,7 +28,7 @@ TEST(Outbox, ReplacesTheOldestWaitingPingAndNeverTheOneBeingWritten) {
   EXPECT_EQ(box.pings_written(), 2u);
 }
 
-// Under the fault latency every ping is held back first; a client that reads too slowly must not collect them without limit.
+// With the fault `latency`, every ping is held back before it is sent. For a slow client their number must stay limited.
 TEST(Outbox, HeldPingsMayPassTheDepthButNotTheirOwnLimit) {
   Outbox box({1, WhenFull::replace_oldest});
   const auto hold = [&](std::uint32_t number, std::size_t bytes) {
@@ -116,17 +116,17 @@ TEST(Outbox, EveryPingOfferedIsWrittenOrDroppedForAReason) {
   for (int i = 2; i <= 5; ++i) push(box, i);  // 4 and 5 wait, 2 and 3 were dropped
   ASSERT_TRUE(box.take());
   EXPECT_EQ(box.pings_waiting(), 1u);
-  box.end(DropReason::gone);  // in the middle of 4
+  box.end(DropReason::gone);  // while 4 is being written
   EXPECT_TRUE(box.idle());
   EXPECT_EQ(box.pings_offered(), 5u);
   EXPECT_EQ(box.pings_written(), 1u);
   EXPECT_EQ(dropped(box, DropReason::slow), 2u);
-  EXPECT_EQ(dropped(box, DropReason::gone), 2u) << "the one being written, and the one waiting";
+  EXPECT_EQ(dropped(box, DropReason::gone), 2u) << "the ping that is being written, and the one that waits";
   EXPECT_EQ(dropped(box, DropReason::stop), 0u);
   EXPECT_EQ(box.pings_offered(), box.pings_written() + box.pings_dropped());
 }
 
-TEST(Outbox, AReplyThatIsCutIsNoDroppedPing) {
+TEST(Outbox, AReplyThatIsCutDoesNotCountAsADroppedPing) {
   Outbox box({1, WhenFull::replace_oldest});
   ASSERT_TRUE(box.push_reply(reply(1)));
   ASSERT_TRUE(box.push_reply(reply(2)));

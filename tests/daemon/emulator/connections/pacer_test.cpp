@@ -1,4 +1,4 @@
-// Ticks lie on a grid computed from its start; late ones are skipped and counted; travel time bounds the rate.
+// Ticks are multiples of the period after a start. Late ticks are skipped and counted. The travel time limits the rate.
 #include "daemon/emulator/connections/pacer.hpp"
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ TEST(Pacer, TicksLieOnAGridWithoutDrift) {
   const auto period = pacer.period();
   for (int i = 0; i < 1000; ++i) {
     ASSERT_EQ(*pacer.next_tick(), t0 + i * period);
-    ASSERT_TRUE(pacer.fire(*pacer.next_tick() + milliseconds(i % 60), false)) << "lateness within a period changes nothing";
+    ASSERT_TRUE(pacer.fire(*pacer.next_tick() + milliseconds(i % 60), false)) << "a delay of less than a period changes nothing";
     ASSERT_EQ(pacer.last_tick(), t0 + i * period);
   }
   EXPECT_EQ(pacer.skipped_ticks(), 0u);
@@ -67,21 +67,21 @@ TEST(Pacer, ATickWaitsForABusySimulationUntilTheNextOneReplacesIt) {
   Pacer pacer;
   pacer.configure(settings(10), t0);
   EXPECT_TRUE(pacer.fire(t0, false));
-  EXPECT_FALSE(pacer.fire_waiting()) << "none waits";
+  EXPECT_FALSE(pacer.fire_waiting()) << "no tick waits";
   EXPECT_FALSE(pacer.fire(t0 + milliseconds(100), true));
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(200));
   EXPECT_EQ(pacer.skipped_ticks(), 0u);
   EXPECT_FALSE(pacer.fire(t0 + milliseconds(200), true));
   EXPECT_EQ(pacer.skipped().busy, 1u);
   ASSERT_TRUE(pacer.fire_waiting());
-  EXPECT_EQ(pacer.last_tick(), t0 + milliseconds(200)) << "its time on the grid";
-  EXPECT_FALSE(pacer.fire_waiting()) << "only once";
+  EXPECT_EQ(pacer.last_tick(), t0 + milliseconds(200)) << "the time of a tick is on the grid";
+  EXPECT_FALSE(pacer.fire_waiting()) << "a tick that waits is fired only once";
   EXPECT_TRUE(pacer.fire(t0 + milliseconds(300), false));
   EXPECT_EQ(pacer.ticks(), 4u);
   EXPECT_EQ(pacer.skipped_ticks(), 1u);
 }
 
-TEST(Pacer, ATickWaitsNoLongerThanItsRhythm) {
+TEST(Pacer, AWaitingTickIsDroppedWhenTheRhythmChanges) {
   const auto waiting = [] {
     Pacer pacer;
     pacer.configure(settings(10), t0);
@@ -117,7 +117,7 @@ TEST(Pacer, PingsThatTakeMoreThanAPeriodFollowEachOther) {
       EXPECT_LT(now - pacer.last_tick(), milliseconds(25)) << "older than the newest tick";
     }
   }
-  EXPECT_EQ(pings, 100) << "30 ms each; one for every second tick would be 60";
+  EXPECT_EQ(pings, 100) << "a ping takes 30 ms; a ping at every second tick would be 60 pings";
 }
 
 TEST(Pacer, TimeThatIsSkippedHasNoTicks) {
@@ -125,7 +125,7 @@ TEST(Pacer, TimeThatIsSkippedHasNoTicks) {
   pacer.configure(settings(10), t0);
   EXPECT_TRUE(pacer.fire(t0, false));
   pacer.skip(std::chrono::hours(1));
-  EXPECT_EQ(*pacer.next_tick(), t0 + std::chrono::hours(1) + milliseconds(100)) << "as long from now as it was";
+  EXPECT_EQ(*pacer.next_tick(), t0 + std::chrono::hours(1) + milliseconds(100)) << "the time to the next tick does not change";
   EXPECT_TRUE(pacer.fire(*pacer.next_tick(), false));
   EXPECT_EQ(pacer.skipped_ticks(), 0u);
 }
@@ -191,7 +191,7 @@ TEST(Pacer, StandbyStopsAndAnyOtherRateResumesAtOnce) {
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(777));
 }
 
-TEST(Pacer, TriggeredMeansOnePingEach) {
+TEST(Pacer, EachTriggerMakesOnePing) {
   Pacer pacer;
   pacer.configure(settings(10, 5, true), t0);
   EXPECT_FALSE(pacer.next_tick());
@@ -202,7 +202,7 @@ TEST(Pacer, TriggeredMeansOnePingEach) {
   pacer.trigger(t0 + milliseconds(6));
   EXPECT_EQ(*pacer.next_tick(), t0 + milliseconds(105)) << "not faster than the rate allows";
   pacer.trigger(t0 + milliseconds(7));
-  EXPECT_EQ(pacer.skipped_ticks(), 1u) << "one waits, more are counted";
+  EXPECT_EQ(pacer.skipped_ticks(), 1u) << "one trigger waits; further ones are counted as skipped";
   EXPECT_FALSE(pacer.fire(t0 + milliseconds(105), true));
   ASSERT_TRUE(pacer.next_tick());
   EXPECT_TRUE(pacer.fire(*pacer.next_tick(), false)) << "a trigger waits for a busy simulation";
@@ -239,9 +239,9 @@ TEST(Pacer, EveryTickIsFiredOrSkippedForAReason) {
   EXPECT_EQ(pacer.skipped().busy, 1u);
   pacer.configure(settings(10, 5, true), t0 + milliseconds(700));
   pacer.trigger(t0 + milliseconds(750));
-  pacer.trigger(t0 + milliseconds(751), true);  // joins the waiting one: no ping of its own
+  pacer.trigger(t0 + milliseconds(751), true);  // joins the waiting trigger, so it makes no ping of its own
   pacer.trigger(t0 + milliseconds(752));
-  pacer.stop();  // the one that waits has no client left
+  pacer.stop();  // the trigger that waits has no client any more
   EXPECT_EQ(pacer.ticks(), 10u);
   EXPECT_EQ(pacer.skipped().trigger, 2u);
   EXPECT_EQ(pacer.ticks(), 3u + pacer.skipped_ticks());

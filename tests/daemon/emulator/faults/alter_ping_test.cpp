@@ -13,7 +13,7 @@ struct Images final : RangeImageSettings {
   bool equals(const VendorSettings&) const override { return true; }
 };
 
-/// Two columns by two rows over 15 m: 100 at 5.00 m, none, 200 at 10.00 m, 50 at 1.00 m; a unit of range is a millimetre.
+/// A range image of 2 x 2 pixels: strength 100 at 5 m, no return, 200 at 10 m, 50 at 1 m. The unit of range is a millimetre.
 Ping range_image() {
   const auto settings = std::make_shared<Images>();
   settings->range_unit_m = 0.001;
@@ -89,7 +89,7 @@ TEST(SignalFaults, SignalsOfBeamsMoveWithTheSamples) {
 TEST(RangeImageFaults, StrengthsChangeAndRangesStay) {
   const Ping louder = altered("gain-step", {{"factor", "2"}, {"fraction", "0"}});
   EXPECT_EQ(at(louder, 0), Pixel(200, 5000));
-  EXPECT_EQ(at(louder, 1), Pixel(0, 0)) << "no return stays none";
+  EXPECT_EQ(at(louder, 1), Pixel(0, 0)) << "a pixel without a return stays without";
   EXPECT_EQ(at(louder, 2), Pixel(400, 10000));
   const Ping softer = altered("gain-step", {{"factor", "0.5"}, {"fraction", "0"}});
   EXPECT_EQ(at(softer, 3), Pixel(25, 1000));

@@ -45,7 +45,7 @@ FaultRecord at_ping(const std::string& what, std::uint64_t ping, std::map<std::s
 
 const std::string two = oculus_sonar("front", "127.0.0.2", "    clients: {max: 4}\n") + oculus_sonar("rear", "127.0.0.3");
 
-/// Two sonars with one client each; the fault is for the first.
+/// A run of two sonars, each with one client. The fault acts on the sonar "front".
 struct Played {
   explicit Played(const std::optional<FaultRecord>& fault, int seed = 1, milliseconds length = milliseconds(3000))
       : time(yaml_of(two, seed), &journal) {
@@ -174,7 +174,7 @@ TEST(FaultRecords, RecordsWithoutEffectAreRefused) {
   EXPECT_EQ(text(r), "accepted");
 }
 
-TEST(FaultRecords, TwoThatWriteTheSamePartAreRefused) {
+TEST(FaultRecords, TwoThatChangeTheSamePartAreRefused) {
   Played run(at_ping("F03", 1000));
   const auto why = [&](const FaultRecord& r) { return run.time.sonar("front").why_no_faults(*check_fault(r, true)).value(); };
   const FaultRefusal same_part = why(record("F05")), no_datagrams = why(record("G01"));
@@ -186,10 +186,10 @@ TEST(FaultRecords, TwoThatWriteTheSamePartAreRefused) {
 
 // ---- every kind
 
-/// A run with the kind alone: offsets, then numbers of pings.
+/// Runs with one kind of fault, which is the parameter.
 class EveryKind : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(EveryKind, ActsTheSameInEveryRunOnOneSonarAloneAndEnds) {
+TEST_P(EveryKind, IsTheSameInEveryRunAndActsOnOneSonarAndEnds) {
   const FaultKind& kind = *find_fault_kind(GetParam());
   FaultRecord fault = record(GetParam());
   fault.at.ping = 5;
@@ -214,7 +214,7 @@ TEST_P(EveryKind, ActsTheSameInEveryRunOnOneSonarAloneAndEnds) {
     EXPECT_EQ(first->journal.entries[i].ping, second->journal.entries[i].ping);
   }
   EXPECT_EQ(first->time.clients[first->rear].received, undisturbed.time.clients[undisturbed.rear].received)
-      << "another sonar's bytes are as without the fault";
+      << "the fault changed the bytes of the other sonar";
 
   ASSERT_FALSE(first->journal.entries.empty());
   EXPECT_EQ(first->journal.entries.front().what, FaultEntry::What::began);

@@ -99,7 +99,7 @@ TEST(ArisInVirtualTime, FramesOfTheReceiverCountForTheController) {
   ASSERT_NE(controller, nullptr);
   EXPECT_EQ(controller->pings_written(), frames.size());
   EXPECT_EQ(controller->streamed_bytes, bytes);
-  EXPECT_EQ(talk.time.sonar("front").figures().served, frames.size()) << "not twice";
+  EXPECT_EQ(talk.time.sonar("front").figures().served, frames.size()) << "no frame is counted twice";
 }
 
 TEST(ArisInVirtualTime, AFrameThatWaitsIsNotSentToTheNextController) {
@@ -110,11 +110,11 @@ TEST(ArisInVirtualTime, AFrameThatWaitsIsNotSentToTheNextController) {
   EXPECT_THAT(talk.run(milliseconds(500)), IsEmpty());
 }
 
-TEST(ArisFaults, NumbersJumpBeginAgainAndStand) {
+TEST(ArisFaults, FrameNumbersJumpRestartOrStayTheSame) {
   Talk talk;
   talk.run(milliseconds(350));
   talk.time.close(talk.client);
-  talk.connect();  // frames are no longer counted as pings are
+  talk.connect();  // frame numbers begin again, numbers of pings do not
   EXPECT_THAT(talk.run(milliseconds(350)), ElementsAre(1, 2, 3, 4));
   const auto during = [&](const std::string& what, std::map<std::string, std::string> with) {
     talk.add_fault(what, std::move(with));
@@ -142,7 +142,7 @@ TEST(ArisFaults, ATroubleUsesOnlyKindsWithEffect) {
       "by datagrams alone)");
   EXPECT_EQ(why("D24"), "fault D24: D24 has no effect on the sonar front (has no standby)");
   talk.add_fault("electrical-noise", {});
-  EXPECT_EQ(talk.time.sonar("front").faults().list().size(), 2u) << "of three";
+  EXPECT_EQ(talk.time.sonar("front").faults().list().size(), 2u) << "two of the trouble's three kinds have an effect";
 }
 
 TEST(ArisFaults, APartIsLostOrLate) {
@@ -203,7 +203,7 @@ TEST(ArisFaults, AKeepAliveIsAnsweredByAReset) {
   ping.type = aris::CommandType::ping;
   talk.add_fault("M09", {{"how", "reset"}});
   talk.time.send(talk.client, aris::framed(ping));
-  EXPECT_FALSE(talk.time.clients[talk.client].reset) << "it asks for no settings";
+  EXPECT_FALSE(talk.time.clients[talk.client].reset) << "a keep-alive changes no settings";
   talk.time.end_faults("front");
   talk.add_fault("M09", {{"how", "reset"}, {"command", "any"}});
   talk.time.send(talk.client, aris::framed(ping));

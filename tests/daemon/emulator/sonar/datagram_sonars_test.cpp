@@ -1,4 +1,4 @@
-// A Sonar 3D-15, a Surveyor and a Ping1D by UDP in virtual time: the datagrams to their receivers, also during faults.
+// A Sonar 3D-15, a Surveyor and a Ping1D over UDP in virtual time: the datagrams to their receivers, also during faults.
 #include <gmock/gmock.h>
 
 #include "protocol/ping/messages.hpp"
@@ -19,7 +19,7 @@ using ::testing::IsEmpty;
 
 constexpr ConnectionId stream = 99;
 
-/// Datagrams of a sonar, ping by ping.
+/// A sonar in virtual time; pings() returns the datagrams of each ping.
 struct Talk {
   explicit Talk(const std::string& profile, const std::string& options = {})
       : time(yaml_of("  - name: front\n    profile: " + profile + "\n    bind_ip: 127.0.0.2\n" + options)) {}
@@ -74,14 +74,14 @@ TEST(Sonar3d15InVirtualTime, TheReceiverIsASetting) {
   EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(host));
   imager.add_fault("D01");
   imager.send_to("10.0.0.6");
-  EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(host)) << "ignored with the rest";
+  EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(host)) << "the device ignores this setting as all others";
   imager.time.end_faults("front");
   imager.post("/udp", R"({"mode":"disabled"})");
   EXPECT_THAT(imager.sonar().receivers(stream), IsEmpty());
   EXPECT_THAT(imager.pings(seconds(1)), IsEmpty());
   imager.send_to("10.0.0.5");
   imager.add_fault("D05");
-  EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(group)) << "forgotten with the rest";
+  EXPECT_THAT(imager.sonar().receivers(stream), ElementsAre(group)) << "the device forgets this setting as all others";
   EXPECT_EQ(imager.pings(seconds(1)).size(), 5u);
 }
 
@@ -99,7 +99,7 @@ TEST(Sonar3d15InVirtualTime, SendsAHundredImuSamplesPerSecondAtAnyRate) {
     ASSERT_TRUE(batch);
     for (const auto& sample : batch->samples) at.push_back(sample.at);
   }
-  EXPECT_NEAR(static_cast<double>(at.size()), 1000, 34) << "up to a shot's at either end";
+  EXPECT_NEAR(static_cast<double>(at.size()), 1000, 34) << "at either end, the samples of a shot may be missing or too many";
   for (std::size_t i = 1; i < at.size(); ++i) ASSERT_EQ(at[i] - at[i - 1], milliseconds(10)) << i;
 }
 
@@ -128,7 +128,7 @@ struct Sounder : Talk {
     send(ping::framed_message(ping::Id::set_ping_parameters, 0, parameters));
   }
   void send(const Bytes& frame) { time.send(stream, frame); }
-  /// The next ping of a connection.
+  /// Returns the next ping that is sent over TCP.
   Outbox::Message ping_by_tcp() {
     for (const Time end = time.now + seconds(2); time.now < end; time.run(milliseconds(10)))
       while (Outbox::Message message = sonar().next_message(stream, time.now)) {
@@ -137,7 +137,7 @@ struct Sounder : Talk {
       }
     throw std::runtime_error("no ping");
   }
-  /// Frames of the next ping: each is a datagram, and its sum is right.
+  /// Returns the frames of the next ping. Checks that each datagram is a frame with the right sum.
   std::vector<ping::Frame> frames() {
     std::vector<ping::Frame> all;
     const auto sent = pings(milliseconds(150));
@@ -160,12 +160,12 @@ struct Sounder : Talk {
   }
 };
 
-TEST(SurveyorInVirtualTime, FieldsOfItsDatagramsFailWithTheRightSum) {
+TEST(SurveyorInVirtualTime, AFrameWithAFaultyFieldHasTheRightSum) {
   Sounder sounder;
   const std::uint32_t before = sounder.atof().ping;
   ASSERT_GT(before, 0u);
   sounder.add_fault("D09", {{"by", "1000"}}, "2");
-  EXPECT_LT(sounder.atof().ping, 1000u) << "of another client";
+  EXPECT_LT(sounder.atof().ping, 1000u) << "the fault is for another client";
   sounder.time.end_faults("front");
   sounder.add_fault("D09", {{"by", "1000"}});
   EXPECT_GT(sounder.atof().ping, 1000u);
@@ -183,13 +183,13 @@ TEST(SurveyorInVirtualTime, MessagesAreWrittenOneByOneOverTcp) {
     ends.push_back(pause.before);
   }
   ends.push_back(message.bytes->size());
-  EXPECT_GE(ends.size(), 3u) << "attitude, points, point data; a request for the time while it does not know it";
+  EXPECT_GE(ends.size(), 3u) << "attitude, points, point data, and a request for the time until the host has sent it";
   for (const std::size_t end : ends) {
     ping::Framer framer(65535, true);
     framer.append(protocol::BytesView(*message.bytes).subspan(begin, end - begin));
     const auto frame = framer.next();
     EXPECT_TRUE(frame && frame->sum_is_right) << begin;
-    EXPECT_FALSE(framer.next()) << "one frame a part";
+    EXPECT_FALSE(framer.next()) << "a part has one frame";
     begin = end;
   }
   // If a fault adds bytes, the messages end at other places.
@@ -212,7 +212,7 @@ TEST(SurveyorInVirtualTime, HasTheTimeOfTheHostAfterSkippedTime) {
 
 // ---- hosts of any make
 
-/// Its port is closed, and the request of the next host arrives before the dialogue has ended.
+/// The port of the previous host is closed, and a request of the next host arrives before on_closed() is called.
 TEST(HostByDatagrams, DoesNotGetTheSettingsOfThePreviousHost) {
   for (const protocol::Vendor* const vendor : protocol::vendors()) {
     const protocol::Port* const port = vendor->port(protocol::Port::Kind::udp_dialogue);
@@ -231,7 +231,7 @@ TEST(HostByDatagrams, DoesNotGetTheSettingsOfThePreviousHost) {
     sonar.finish(1, talk.time.now);
     EXPECT_EQ(sonar.connections().clients(), 0u);
     connect(2);
-    EXPECT_EQ(sonar.settings().range_m, range_m) << "not the setting of the host before";
+    EXPECT_EQ(sonar.settings().range_m, range_m) << "the setting of the previous host is still in use";
     EXPECT_EQ(sonar.state().connected_client, (protocol::Ipv4{10, 0, 0, 2}));
     connect(3);
     sonar.finish(2, talk.time.now);
@@ -239,14 +239,14 @@ TEST(HostByDatagrams, DoesNotGetTheSettingsOfThePreviousHost) {
     EXPECT_EQ(sonar.connections().find(3)->state, Connection::State::served) << "a slot was free";
     connect(5);
     EXPECT_EQ(sonar.connections().clients(), 2u);
-    EXPECT_EQ(sonar.connections().find(3)->state, Connection::State::leaving) << "the oldest that has not left";
+    EXPECT_EQ(sonar.connections().find(3)->state, Connection::State::leaving) << "the oldest host that has not left must leave";
     for (const ConnectionId id : {1ul, 2ul, 3ul}) sonar.on_closed(id, "it has left", talk.time.now);
     EXPECT_EQ(sonar.connections().clients(), 2u);
   }
 }
 
-/// As the daemon carries the fault out: a host by UDP has left while the actions after its end are still to come.
-TEST(HostByDatagrams, EndedByAFaultWithTheClientsThatWait) {
+/// Carries out the actions in the daemon's order: the UDP host leaves, and then the other clients are reset.
+TEST(HostByDatagrams, AFaultEndsItTogetherWithTheClientsThatWait) {
   Talk talk("surveyor-240", "    clients: {max: 1, when_full: queue}\n");
   Sonar& sonar = talk.sonar();
   const auto connect = [&](ConnectionId id, protocol::Port::Kind by) {
@@ -264,7 +264,7 @@ TEST(HostByDatagrams, EndedByAFaultWithTheClientsThatWait) {
     if (const auto* finish = std::get_if<Finish>(&action)) {
       finished.push_back(finish->connection);
       for (const Action& next : sonar.finish(finish->connection, talk.time.now))
-        EXPECT_FALSE(std::holds_alternative<Serve>(next)) << "a client that is then reset";
+        EXPECT_FALSE(std::holds_alternative<Serve>(next)) << "a client is served and then reset";
     } else if (const auto* end = std::get_if<Reset>(&action)) {
       reset.push_back(end->connection);
       sonar.on_closed(end->connection, end->why, talk.time.now);
@@ -322,7 +322,7 @@ TEST(Ping1DInVirtualTime, PingsComeAtTheIntervalUntilTheStreamIsStopped) {
   EXPECT_THAT(altimeter.profiles(seconds(1)), IsEmpty());
 }
 
-/// Pings of virtual time hold zeros.
+/// Pings in virtual time contain only zeros.
 TEST(Ping1DInVirtualTime, AutomaticModeSearchesWithoutAnEcho) {
   Altimeter altimeter;
   altimeter.send(ping::Id::ping1d_continuous_start, ping::Id::ping1d_profile);
@@ -332,7 +332,8 @@ TEST(Ping1DInVirtualTime, AutomaticModeSearchesWithoutAnEcho) {
   for (std::size_t i = 0; i < 7; ++i) lengths.push_back(seen[i].length_mm);
   EXPECT_THAT(lengths, ElementsAre(5000, 10000, 20000, 40000, 80000, 100000, 5000));
   EXPECT_EQ(seen.back().gain, 6u);
-  EXPECT_THAT(altimeter.sonar().asked_by(), ::testing::StartsWith("host")) << "not the sonar itself";
+  EXPECT_THAT(altimeter.sonar().asked_by(), ::testing::StartsWith("host"))
+      << "the settings are those of the host, not of the sonar itself";
   altimeter.send<std::uint8_t>(ping::Id::ping1d_set_mode_auto, 0);
   altimeter.profiles(milliseconds(300));
   const auto manual = altimeter.profiles(seconds(2));

@@ -14,7 +14,7 @@ using ::testing::IsEmpty;
 
 Bytes bytes_of(char c) { return Bytes(3, static_cast<std::byte>(c)); }
 
-/// Two TCP ports: frame() has the bytes of the first, if `frames`.
+/// A make with two TCP ports. If `frames` is set, frame() returns the bytes of the first.
 class TwoPorts final : public protocol::DelegatingVendor {
  public:
   TwoPorts() : DelegatingVendor(testing_daemon::made_up_vendor()) {}
@@ -44,7 +44,7 @@ struct FramedPingAtTwoPorts : ::testing::Test {
 TEST_F(FramedPingAtTwoPorts, TheFrameIsThatOfTheFirstPort) {
   FramedPing framed(vendor, state, ping);
   EXPECT_EQ(*framed.bytes_at(first), bytes_of('a'));
-  EXPECT_EQ(framed.bytes_at(first), framed.bytes()) << "shared, not copied";
+  EXPECT_EQ(framed.bytes_at(first), framed.bytes()) << "the bytes are shared, not copied";
   EXPECT_THAT(vendor.asked, IsEmpty()) << "no client is at the second port";
   EXPECT_EQ(*framed.bytes_at(second), bytes_of('b'));
   EXPECT_EQ(*framed.bytes_at(second), bytes_of('b'));
@@ -70,7 +70,7 @@ TEST_F(FramedPingAtTwoPorts, EachPortHasItsPartsOfARecording) {
   FramedPing part(vendor, state, ping, &one);
   EXPECT_EQ(part.bytes_at(first), nullptr);
   EXPECT_EQ(*part.bytes_at(second), bytes_of('z'));
-  EXPECT_EQ(vendor.framed, 0) << "nothing is made of the ping";
+  EXPECT_EQ(vendor.framed, 0) << "no frame is made of the ping";
   EXPECT_THAT(vendor.asked, IsEmpty());
 }
 

@@ -1,4 +1,4 @@
-// The settings that a client finds after the last one has left: those it set, if the device keeps them, else the initial ones.
+// The settings after the last client has left: if the device keeps settings, those of that client, else the initial ones.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/emulator/sonar/virtual_time.hpp"
@@ -20,7 +20,7 @@ TEST(KeptSettings, StayAfterTheLastClientOnlyForMakesThatKeepThem) {
     SCOPED_TRACE(vendor->name());
     const Port* const port =
         vendor->port(Port::Kind::tcp_stream) ? vendor->port(Port::Kind::tcp_stream) : vendor->port(Port::Kind::udp_dialogue);
-    if (port == nullptr) continue;  // it has no clients that leave
+    if (port == nullptr) continue;  // this make has no clients that leave
     VirtualTime time(one(vendor->models().front()->profile));
     Sonar& sonar = time.sonar("front");
     const auto initial = sonar.state().settings;
@@ -45,7 +45,7 @@ TEST(KeptSettings, StayAfterTheLastClientOnlyForMakesThatKeepThem) {
   EXPECT_THAT(keepers, ::testing::ElementsAre("dvl", "micron", "norbit"));
 }
 
-TEST(KeptSettings, ASonarThatStartsToPingByItselfUsesThePresentOnes) {
+TEST(KeptSettings, ASonarThatStartsToPingByItselfUsesThePresentSettings) {
   VirtualTime time(one("ping1d"));
   Sonar& sonar = time.sonar("front");
   const auto initial = sonar.state().settings;
@@ -95,7 +95,7 @@ TEST_F(Norbit, MayBeConfiguredByAProgramThatLeavesBeforeAReaderConnects) {
 TEST_F(Norbit, MayBeConfiguredByAProgramThatLeavesWhileAReaderWaits) {
   const ConnectionId reader = connect(2210);
   time.run(seconds(1));
-  EXPECT_EQ(time.pings, 0u) << "it is in standby at first";
+  EXPECT_EQ(time.pings, 0u) << "the sonar is initially in standby";
   configure();
   expect_pings(reader);
 }

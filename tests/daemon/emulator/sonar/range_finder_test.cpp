@@ -35,7 +35,7 @@ TEST_F(RangeFinder, PingsAtItsRateWhileItRunsItself) {
   sonar().run_itself(true, time.now);
   EXPECT_NEAR(static_cast<double>(pings_in(seconds(1))), 10, 1);
   sonar().run_itself(true, time.now);
-  EXPECT_NEAR(static_cast<double>(pings_in(seconds(1))), 9, 2) << "the automatic mode lengthens its range: zeros have no echo";
+  EXPECT_NEAR(static_cast<double>(pings_in(seconds(1))), 9, 2) << "without an echo, the automatic mode lengthens the range";
   EXPECT_EQ(distances(), time.pings);
   EXPECT_EQ(time.distances.back()->confidence_percent, 0);
   sonar().run_itself(false, time.now);
@@ -48,7 +48,7 @@ TEST_F(RangeFinder, AClientSetsThePaceAndFindsTheDeviceAsDelivered) {
   EXPECT_GT(sonar().settings().range_m, 5);
   const ConnectionId client = time.connect("front");
   EXPECT_EQ(sonar().settings().range_m, 5);
-  EXPECT_EQ(pings_in(seconds(1)), 0u) << "it has requested none";
+  EXPECT_EQ(pings_in(seconds(1)), 0u) << "the client has requested no ping";
   time.close(client);
   EXPECT_GE(pings_in(seconds(1)), 6u);
   const ConnectionId observer = time.connect("front", Role::observer);
@@ -71,7 +71,7 @@ TEST_F(RangeFinder, AWithheldPingHasNoDistance) {
 TEST_F(RangeFinder, FindsItsDistanceInTheSamplesThatAFaultHasChanged) {
   sonar().run_itself(true, time.now);
   time.run(seconds(1));
-  ASSERT_EQ(time.distances.back()->confidence_percent, 0) << "zeros have no echo";
+  ASSERT_EQ(time.distances.back()->confidence_percent, 0) << "samples of 0 have no echo";
   add_fault("saturated", {{"share", "0.1"}});
   time.run(seconds(1));
   EXPECT_EQ(time.distances.back()->confidence_percent, 100);

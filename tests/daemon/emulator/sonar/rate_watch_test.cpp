@@ -1,4 +1,4 @@
-// A sonar is reported once, with the possible rate, if computing takes too long for its rate, and never otherwise.
+// If computing takes too long for the rate of a sonar, one line reports the possible rate; otherwise there is no line.
 #include "daemon/emulator/sonar/rate_watch.hpp"
 
 #include <gmock/gmock.h>
@@ -9,9 +9,9 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// Runs a sonar whose pings take that long, one after the other; returns the report, if any.
+/// A sonar whose pings are computed one after the other; each takes `ping_s`. `said`: the reports.
 struct Sonar {
-  double rate_hz, ping_s, waits_s;  // for others' pings
+  double rate_hz, ping_s, waits_s;  // waits_s: per ping, for pings of other sonars
   RateWatch watch{};
   std::uint64_t ticks = 0, busy = 0;
   std::string said{};
@@ -33,13 +33,13 @@ TEST(RateWatch, ReportsOnceTheRateThatComputingAllows) {
   EXPECT_EQ(std::count(slow.said.begin(), slow.said.end(), '\n'), 1);
 }
 
-TEST(RateWatch, IsSilentAboutASonarThatKeepsUp) {
+TEST(RateWatch, DoesNotReportASonarThatKeepsItsRate) {
   Sonar quick{40, 0.024, 0};
   quick.ping(500);
   EXPECT_EQ(quick.said, "");
 }
 
-TEST(RateWatch, TheFirstPingsProveNothing) {
+TEST(RateWatch, AFewSlowFirstPingsAreNotReported) {
   Sonar cold{40, 2, 0};
   cold.ping(3);
   cold.ping_s = 0.02;
@@ -53,7 +53,7 @@ TEST(RateWatch, AccountsForOtherSonars) {
   EXPECT_THAT(one_of_three.said, HasSubstr("30 ms a ping, and other sonars are computed in between: 10 Hz at most here"));
 }
 
-TEST(RateWatch, DoesNotBlameOthersWhereThereAreNone) {
+TEST(RateWatch, WithoutOtherSonarsReportsTheSlowestPing) {
   Sonar uneven{20, 0.02, 0};
   for (int i = 0; i < 50; ++i) {
     uneven.ping_s = 0.02;
@@ -64,7 +64,7 @@ TEST(RateWatch, DoesNotBlameOthersWhereThereAreNone) {
   EXPECT_THAT(uneven.said, HasSubstr(" ms a ping, single pings up to 90 ms: 15 Hz at most here, 20 Hz are requested"));
 }
 
-TEST(RateWatch, AnotherRateIsLookedAtAnew) {
+TEST(RateWatch, AnotherRateIsCheckedAnew) {
   Sonar sonar{10, 0.052, 0};
   sonar.ping(100);
   EXPECT_EQ(sonar.said, "");

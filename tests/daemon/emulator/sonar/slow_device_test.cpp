@@ -19,7 +19,7 @@ struct SlowDevice : ::testing::Test {
   static std::int64_t microseconds_of(Time at) {
     return std::chrono::duration_cast<std::chrono::microseconds>(at.time_since_epoch()).count();
   }
-  /// The velocity reports that the client has received since the last call.
+  /// Returns the velocity reports that the client has received since the last call.
   static std::vector<nlohmann::json> reports(VirtualTime& time, ConnectionId client) {
     protocol::Bytes& received = time.clients[client].received;
     std::vector<nlohmann::json> found;
@@ -48,7 +48,7 @@ TEST_F(SlowDevice, AReportLeavesAtTheTimeThatItStates) {
                  valid = report["time_of_validity"].get<std::int64_t>();
       EXPECT_GE(microseconds_of(time.now), sent);
       EXPECT_LE(microseconds_of(time.now) - sent, 1001);
-      EXPECT_GE(sent - valid, 150'000) << "the delay, and the way of the echo";
+      EXPECT_GE(sent - valid, 150'000) << "the delay, and the travel time of the echo";
       EXPECT_LE(sent - valid, 250'000);
       ++count;
     }
@@ -62,7 +62,8 @@ TEST_F(SlowDevice, WithoutADelayAReportLeavesWithItsPing) {
   time.run(milliseconds(1));
   const auto first = reports(time, client);
   ASSERT_EQ(first.size(), 1u);
-  EXPECT_GT(first[0]["time_of_transmission"].get<std::int64_t>(), microseconds_of(time.now)) << "it is only stamped";
+  EXPECT_GT(first[0]["time_of_transmission"].get<std::int64_t>(), microseconds_of(time.now))
+      << "without a delay, only the stamp is later";
 }
 
 /// Waiting reports of a slow device do not accumulate.
@@ -74,7 +75,7 @@ TEST_F(SlowDevice, AClientThatDoesNotReadLosesTheOldestReports) {
   time.clients[client].reads = true;
   time.run(milliseconds(1));
   const std::size_t count = reports(time, client).size();
-  EXPECT_GE(count, 1u) << "the newest ones wait";
+  EXPECT_GE(count, 1u) << "the newest reports wait";
   EXPECT_LE(count, static_cast<std::size_t>(time.sonar("down").config().outbox.depth) + 2);
 }
 
@@ -123,7 +124,7 @@ TEST_F(SlowDevice, AStopCountsItsUnsentReports) {
   EXPECT_GE(sonar.figures().unwanted, 1u);
 }
 
-/// The end of a fault does not release what its device has not sent yet.
+/// The end of a fault does not release reports before the time at which the device sends them.
 TEST_F(SlowDevice, AFaultDelaysAReportFurther) {
   VirtualTime time(dvl("report_delay_ms: 150"));
   const ConnectionId client = time.connect("down");

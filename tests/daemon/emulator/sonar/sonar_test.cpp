@@ -56,7 +56,7 @@ TEST(SonarInVirtualTime, TwoSonarsServeThreeClientsOverAReload) {
   EXPECT_GT(time.clients[host].received.size(), 100u * 1000);
 }
 
-TEST(SonarInVirtualTime, AFullSonarTurnsAwayQueuesOrIsTakenOver) {
+TEST(SonarInVirtualTime, AFullSonarRefusesOrQueuesAClientOrDropsAnother) {
   VirtualTime time(yaml_of(oculus_sonar("close", "127.0.0.2") +
                            oculus_sonar("queue", "127.0.0.3", "    clients: {when_full: queue}\n") +
                            oculus_sonar("take", "127.0.0.4", "    clients: {when_full: take_over}\n")));
@@ -112,7 +112,7 @@ TEST(SonarInVirtualTime, APingWhoseClientLeftIsUnwanted) {
   EXPECT_GT(sonar.figures().offered, 1u);
 }
 
-TEST(SonarInVirtualTime, ATickThatWaitedForThePingBeforeItFollowsAtOnce) {
+TEST(SonarInVirtualTime, ATickThatWaitedForThePreviousPingFollowsAtOnce) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2")));
   Sonar& sonar = time.sonar("front");
   const ConnectionId client = time.connect("front");
@@ -148,7 +148,7 @@ TEST(SonarInVirtualTime, ReceiversAreTheDevicesOwnAndThoseOfItsClients) {
   EXPECT_FALSE(sonar.next_ping()) << "no ping without a receiver";
   sonar.open_stream(11, *streams[1], start);
   EXPECT_THAT(sonar.receivers(11), ::testing::ElementsAre(streams[1]->group));
-  EXPECT_TRUE(sonar.next_ping()) << "the group is one";
+  EXPECT_TRUE(sonar.next_ping()) << "the multicast group is a receiver";
 
   const auto line = [](const std::string& text) {
     const auto bytes = std::as_bytes(std::span(text.data(), text.size()));
@@ -165,10 +165,10 @@ TEST(SonarInVirtualTime, ReceiversAreTheDevicesOwnAndThoseOfItsClients) {
   std::string many = "receivers";
   for (int i = 1; i <= 100; ++i) many += " 10.0.1." + std::to_string(i) + ":1";
   sonar.on_datagram(made_up_vendor().ports()[3], {own.ip, 99}, line(many), start);
-  EXPECT_THAT(sonar.receivers(10), SizeIs(16)) << "a host cannot have the world sent to";
+  EXPECT_THAT(sonar.receivers(10), SizeIs(16)) << "the receivers that a host can set are limited";
 }
 
-/// Throws an exception in place of the datagrams of its first ping.
+/// A make that throws an exception instead of returning the datagrams of ping 1.
 class FaultyDatagrams final : public protocol::DelegatingVendor {
  public:
   using DelegatingVendor::DelegatingVendor;
@@ -204,7 +204,7 @@ TEST(SonarInVirtualTime, AnExceptionInThePingsOfAStreamCostsThatPing) {
   EXPECT_THAT(faulty, ::testing::Not(::testing::Contains(::testing::VariantWith<Reset>(::testing::_))));
   EXPECT_FALSE(sonar.next_message(10, start));
   ping();
-  EXPECT_TRUE(sonar.next_message(10, start)) << "the stream goes on";
+  EXPECT_TRUE(sonar.next_message(10, start)) << "the stream continues";
   sonar.on_not_sent(10);
   const DeviceFigures f = sonar.figures();
   EXPECT_EQ(f.offered, 1u);
@@ -230,7 +230,7 @@ class CountingVendor final : public protocol::DelegatingVendor {
   mutable std::map<const protocol::Port*, int> datagrams_of;
 };
 
-/// A sonar of the made-up make with four clients: two by datagrams and two by TCP, each two at one port.
+/// A sonar of the made-up make with four clients: two at a port for datagrams and two at a TCP port.
 struct FramedPings : ::testing::Test {
   FramedPings() {
     config.profile = {&vendor, vendor.models().front()};
@@ -242,7 +242,7 @@ struct FramedPings : ::testing::Test {
     for (const ConnectionId id : {1u, 2u, 3u, 4u})
       sonar->on_connect(id, Role::client, {"client", {10, 0, 0, static_cast<std::uint8_t>(id)}, 9}, now, id < 3 ? udp : tcp);
   }
-  /// The messages of the next ping, client by client.
+  /// Returns the message of the next ping to each client.
   std::vector<Outbox::Message> ping() {
     for (bool made = false; !made;) {
       now = *sonar->next_tick();
@@ -279,20 +279,20 @@ struct FramedPings : ::testing::Test {
   Time now = start;
 };
 
-TEST_F(FramedPings, AreFramedOnceAPort) {
+TEST_F(FramedPings, AreFramedOncePerPort) {
   const auto messages = ping();
   EXPECT_EQ(vendor.messages, 1);
   EXPECT_EQ(vendor.datagrams_of[tcp], 1);
   EXPECT_EQ(vendor.datagrams_of[udp], 1);
   ASSERT_TRUE(messages[0].datagrams && messages[2].bytes);
-  EXPECT_EQ(messages[0].datagrams, messages[1].datagrams) << "shared, not copied";
+  EXPECT_EQ(messages[0].datagrams, messages[1].datagrams) << "the datagrams are shared, not copied";
   EXPECT_EQ(messages[2].bytes, messages[3].bytes);
 }
 
 TEST_F(FramedPings, ArePartsOfTheTcpPortsWithoutAFrame) {
   vendor.frames = false;
   const auto messages = ping();
-  EXPECT_EQ(vendor.datagrams_of[tcp], 1) << "the parts make up the whole, too";
+  EXPECT_EQ(vendor.datagrams_of[tcp], 1) << "the whole message is made of the same parts";
   ASSERT_TRUE(messages[2].bytes);
   EXPECT_EQ(messages[2].bytes, messages[3].bytes);
 }
@@ -300,7 +300,7 @@ TEST_F(FramedPings, ArePartsOfTheTcpPortsWithoutAFrame) {
 TEST_F(FramedPings, AreSharedAgainAfterAFault) {
   add_fault("part-lost");
   const auto during = ping();
-  EXPECT_NE(during[0].datagrams, during[1].datagrams) << "a fault may differ from client to client";
+  EXPECT_NE(during[0].datagrams, during[1].datagrams) << "during a fault each client has bytes of its own";
   const auto after = ping();
   ASSERT_TRUE(after[0].datagrams);
   EXPECT_EQ(after[0].datagrams, after[1].datagrams) << "the fault has ended";
@@ -352,7 +352,7 @@ TEST(SonarInVirtualTime, LatencyIsMeasuredFromTheTrueTimeOfAPing) {
   const DeviceFigures f = time.sonar("front").figures();
   ASSERT_GE(f.latency.count(), 2u);
   EXPECT_EQ(f.latency.count(), f.sent);
-  EXPECT_LT(f.latency.sum_s(), 1) << "the device's clock is an hour behind";
+  EXPECT_LT(f.latency.sum_s(), 1) << "the latency includes the error of the device's clock, an hour";
 }
 
 /// Stands for a bug in the code of one conversation.
@@ -388,9 +388,9 @@ TEST(SonarInVirtualTime, AnExceptionEndsTheConnectionItHappensIn) {
   EXPECT_EQ(std::get<Report>(of_bytes[0]).line.phrase, "internal fault: no such luck");
   EXPECT_EQ(std::get<Reset>(of_bytes[1]).connection, 1u);
   const Actions of_tick = sonar.on_tick(start + milliseconds(100));
-  ASSERT_THAT(of_tick, SizeIs(2)) << "the other one only";
+  ASSERT_THAT(of_tick, SizeIs(2)) << "only the other connection";
   EXPECT_EQ(std::get<Reset>(of_tick[1]).connection, 2u);
-  EXPECT_THAT(sonar.on_tick(start + milliseconds(200)), SizeIs(0)) << "and once";
+  EXPECT_THAT(sonar.on_tick(start + milliseconds(200)), SizeIs(0)) << "each connection is ended once";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Emulated sonars without sockets, threads or a clock, for tests: time passes from one event to the next, pings take no time.
+// Emulated sonars without sockets, threads or a clock, for tests. Time passes from one event to the next; pings take no time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ inline Config parsed(const std::string& yaml) {
   return *config;
 }
 
-/// The caller of all sonars of a configuration: time passes from one event to the next, pings take no time, and clients read as
+/// Calls all sonars of a configuration. Time passes from one event to the next, pings take no time, and clients read as
 /// much as their test lets them.
 class VirtualTime {
  public:

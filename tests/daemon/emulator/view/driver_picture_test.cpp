@@ -1,4 +1,4 @@
-// The picture of each make's pings that viewers get: the make's own host draws it.
+// The pictures of pings that viewers get. For each make, they are those that the host of the make draws.
 #include "daemon/emulator/view/driver_picture.hpp"
 
 #include <gmock/gmock.h>
@@ -47,14 +47,15 @@ protocol::DeviceState state_of(const protocol::Make& make) {
 
 TEST_P(DriverPictures, PicturesOfOnePingAreMadeOnlyWhenDrawn) {
   const protocol::Make& make = GetParam();
-  if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall) GTEST_SKIP() << "adds up pings";
+  if (make.picture == PictureKind::sweep || make.picture == PictureKind::waterfall)
+    GTEST_SKIP() << "a picture of this make has several pings";
   const protocol::DeviceState state = state_of(make);
   const std::shared_ptr<Ping> ping = ping_of(*make.device, state, 1);
   DriverPicture::Drawing drawing = DriverPicture(make).after(ping, state);
   ASSERT_TRUE(drawing);
   EXPECT_THAT(drawing().image.samples, testing::Contains(testing::Gt(0)));
   std::fill(ping->samples.begin(), ping->samples.end(), std::byte{0});
-  EXPECT_THAT(drawing().image.samples, testing::Each(testing::Le(1))) << "a code of 0 is a level, which may be sent as 1";
+  EXPECT_THAT(drawing().image.samples, testing::Each(testing::Le(1))) << "a sample of 0 may be drawn as 1";
 }
 
 TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
@@ -77,9 +78,9 @@ TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
   PicturePainter painter(view_fan_style());
   EXPECT_NE(fan_payload("front", Time{}, picture, painter), nullptr);
   if (make.picture == PictureKind::sweep) {
-    EXPECT_EQ(picture.image.beams, 201u) << "the half circle ahead";
+    EXPECT_EQ(picture.image.beams, 201u) << "the picture has the half circle ahead";
     EXPECT_NEAR(picture.range_m(), 10, 0.3);
-    EXPECT_NEAR(picture.head_rad, -51 * 2 * pi / 400, 1e-9) << "it came back from starboard";
+    EXPECT_NEAR(picture.head_rad, -51 * 2 * pi / 400, 1e-9) << "the head has turned back from starboard";
     for (std::size_t beam = 0; beam < picture.image.beams; ++beam) EXPECT_GT(picture.image.at(10, beam), 0) << beam;
   }
   if (make.picture == PictureKind::waterfall) {
@@ -89,7 +90,7 @@ TEST_P(DriverPictures, AreOfItsKindAndCanBeDrawn) {
   }
 }
 
-TEST(FanPayload, SilentSamplesAreNotOutsideOfThePicture) {
+TEST(FanPayload, SamplesWithoutSignalAreInsideTheFan) {
   SonarPicture silent;
   silent.image.rows = 100;
   silent.image.beams = 101;
@@ -102,7 +103,8 @@ TEST(FanPayload, SilentSamplesAreNotOutsideOfThePicture) {
   const wire::Bytes& pixels = *payload->pieces.back().bytes;
   const auto inside = std::ranges::count(pixels, std::byte{1}), outside = std::ranges::count(pixels, std::byte{0});
   EXPECT_EQ(static_cast<std::size_t>(inside + outside), pixels.size());
-  EXPECT_NEAR(static_cast<double>(inside) / static_cast<double>(pixels.size()), 0.52, 0.03) << "a sector of 1 rad in its box";
+  EXPECT_NEAR(static_cast<double>(inside) / static_cast<double>(pixels.size()), 0.52, 0.03)
+      << "the share of a sector of 1 rad in its bounding box";
 }
 
 }  // namespace

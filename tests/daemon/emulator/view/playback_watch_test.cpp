@@ -1,4 +1,4 @@
-// Messages to viewers of a trajectory: its time, and changes by steps.
+// Messages to viewers of a trajectory: its playback time, and steps of it such as seeks.
 #include "daemon/emulator/view/recording_player.hpp"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,7 @@ TEST(PlaybackWatch, ReportsStepsOfPlayback) {
   playback.seek(now, seconds(50));
   news = watch.look(&playback, now += milliseconds(100));
   ASSERT_TRUE(news);
-  EXPECT_TRUE(news->did_seek) << "ahead, too";
+  EXPECT_TRUE(news->did_seek) << "a step ahead is a seek, too";
 
   news = watch.look(&playback, now += seconds(60));
   ASSERT_TRUE(news);
@@ -57,7 +57,7 @@ TEST(PlaybackWatch, ReportsStepsOfPlayback) {
   EXPECT_FALSE(watch.look(&playback, now += seconds(1)));
 }
 
-TEST(PlaybackWatch, ARoundOfALoopIsASeek) {
+TEST(PlaybackWatch, ALoopThatBeginsAgainIsASeek) {
   const Playback playback(seconds(10), {.speed = {}, .loop = true, .start = {}}, start);
   PlaybackWatch watch(playback, start + seconds(9));
   EXPECT_FALSE(watch.look(&playback, start + milliseconds(9900)));

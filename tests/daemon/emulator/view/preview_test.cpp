@@ -1,4 +1,4 @@
-// A preview in virtual time: its rate and its end, and that the first driver gets the same bytes with and without one before.
+// A preview in virtual time: its rate, its end, and that a preview does not change the bytes for the first driver.
 #include "daemon/emulator/view/driver_picture.hpp"
 
 #include <gmock/gmock.h>
@@ -46,7 +46,7 @@ Story story_of(bool with_preview) {
 
 TEST(Preview, TheFirstDriverGetsTheSameBytesAsWithoutAPreview) {
   const Story with = story_of(true), without = story_of(false);
-  EXPECT_EQ(with.shown.size(), 25u) << "5 a second, and none beside a driver";
+  EXPECT_EQ(with.shown.size(), 25u) << "5 per second, and none once a driver is connected";
   EXPECT_TRUE(without.shown.empty());
   EXPECT_EQ(with.driver, without.driver);
   EXPECT_EQ(with.pings, without.pings);
@@ -66,7 +66,7 @@ TEST(Preview, HasNumbersAndNoiseOfItsOwn) {
     ASSERT_TRUE(first);
     noise.insert(first->sonar_id);
     EXPECT_EQ(static_cast<std::uint32_t>(first->number), 1u);
-    EXPECT_FALSE(preview.due(sonar, time.now + milliseconds(200))) << "the first is being computed";
+    EXPECT_FALSE(preview.due(sonar, time.now + milliseconds(200))) << "the first ping is being computed";
     preview.done(true);
     EXPECT_FALSE(preview.due(sonar, time.now + milliseconds(199)));
     const auto second = preview.due(sonar, time.now + milliseconds(200));
@@ -92,14 +92,14 @@ TEST(Preview, MeasuresItsRateFromThePingsThatWereMade) {
     }
   };
   run(3, false);
-  EXPECT_EQ(preview.hz(time.now), 0) << "the engine made none";
+  EXPECT_EQ(preview.hz(time.now), 0) << "the engine made no ping";
   run(8, true);
   EXPECT_NEAR(preview.hz(time.now), 4, 1e-9);
   preview.end();
   EXPECT_EQ(preview.hz(time.now), 0);
   time.now += std::chrono::seconds(1);
   run(2, true);
-  EXPECT_NEAR(preview.hz(time.now), 4, 1e-9) << "without the pause";
+  EXPECT_NEAR(preview.hz(time.now), 4, 1e-9) << "the pause does not count";
 }
 
 }  // namespace

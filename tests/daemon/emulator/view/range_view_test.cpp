@@ -1,4 +1,4 @@
-// A range image as viewers see it: from above, and as points in space.
+// The two views of a range image: a picture from above, and points in space.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ void set_pixel(Ping& ping, std::size_t column, std::size_t row, std::uint32_t st
     ping.samples[4 * (256 * row + column) + b] = static_cast<std::byte>(pixel.code() >> (8 * b) & 0xFF);
 }
 
-/// One pixel with a return, at 6 m and full strength.
+/// Returns a range image in which one pixel has a return, at 6 m and full strength.
 Ping ping_with(std::size_t column, std::size_t row) {
   const protocol::Profile profile = *protocol::find_profile("waterlinked-3d15");
   protocol::DeviceState device;
@@ -35,7 +35,7 @@ Ping ping_with(std::size_t column, std::size_t row) {
   return ping;
 }
 
-TEST(RangeView, FromAboveAPixelIsAtItsBearingAndHorizontalRange) {
+TEST(RangeView, InThePictureFromAboveAPixelHasItsBearingAndHorizontalRange) {
   const Ping ping = ping_with(64, 0);  // 20 degrees down
   const PolarImage image = polar_image_of(ping);
   std::size_t bright = 0, at = 0;
@@ -54,7 +54,7 @@ TEST(RangeView, HasOnePointForEachReturn) {
   EXPECT_GT(size(ping_with(200, 60)), size(none));
 }
 
-/// A DVL has no full scale: its echoes are a small part of that of its samples.
+/// The threshold is relative to the strongest pixel, because the echoes of a DVL are far below the full scale of its samples.
 TEST(RangeView, ThePointsAreThoseThatAreNotMuchWeakerThanTheStrongest) {
   Ping ping = ping_with(200, 60);
   const auto size = [&](double threshold) { return cloud_payload("front", ping, threshold)->pieces.front().bytes->size(); };
@@ -62,10 +62,10 @@ TEST(RangeView, ThePointsAreThoseThatAreNotMuchWeakerThanTheStrongest) {
   set_pixel(ping, 200, 60, 0);
   for (std::size_t column = 0; column < 3; ++column) set_pixel(ping, column, 60, 10);
   set_pixel(ping, 3, 60, 1);
-  set_pixel(ping, 4, 60, 400, 0);  // no return has range 0, whatever its strength
+  set_pixel(ping, 4, 60, 400, 0);  // range 0 means no return, whatever the strength is
   const std::size_t all = size(0), strong = size(0.35);
   EXPECT_GT(all, strong);
-  EXPECT_EQ(strong - one, 2 * (all - strong)) << "three of four";
+  EXPECT_EQ(strong - one, 2 * (all - strong)) << "the threshold passes three of four points";
 }
 
 }  // namespace

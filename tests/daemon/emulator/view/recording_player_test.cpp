@@ -19,7 +19,7 @@ void measure(RecordingPlayer& player) {
   }
 }
 
-/// The number of the ping at this moment.
+/// Returns the number of the ping that is shown at this moment.
 std::uint32_t at(RecordingPlayer& player, RecordingPlayer::Ns moment) {
   while (player.approach(moment)) {
   }

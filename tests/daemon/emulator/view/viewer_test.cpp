@@ -71,7 +71,7 @@ struct OneViewer : testing::Test {
     const auto message = viewer.next(now);
     return message && message->is_text ? json::parse(text_of(*message)) : json();
   }
-  /// Payloads of waiting messages, as letters.
+  /// Takes all waiting messages; returns the first byte of each of their pieces.
   std::string rest() {
     std::string letters;
     while (const auto message = viewer.next(now))
@@ -80,7 +80,7 @@ struct OneViewer : testing::Test {
   }
 };
 
-TEST_F(OneViewer, SubscribesAndIsSentWhatIsOffered) {
+TEST_F(OneViewer, GetsMessagesOfSubscribedChannelsOnly) {
   subscribe(1);
   EXPECT_THAT(host.subscribed, ElementsAre(1));
   offer(1, 'a');
@@ -153,7 +153,7 @@ TEST_F(OneViewer, PicturesWithheldForARateAreNotCountedAsLost) {
   EXPECT_EQ(rest(), "");
   EXPECT_EQ(*viewer.next_due(now), now + milliseconds(100));
   now += milliseconds(100);
-  EXPECT_EQ(rest(), "c") << "the last one always";
+  EXPECT_EQ(rest(), "c") << "the last picture is always sent";
   EXPECT_EQ(viewer.dropped().at(4), 0u);
 }
 
@@ -197,7 +197,8 @@ TEST_F(OneViewer, RefusalsForAReadOnlyViewerStayFew) {
                    now);
     const std::string refusal = text_of(*looker.next(now));
     EXPECT_LT(refusal.size(), 700u);
-    EXPECT_EQ(refusal.find("\"id\"") != std::string::npos, i < 64) << "beyond, it does not go by itself";
+    EXPECT_EQ(refusal.find("\"id\"") != std::string::npos, i < 64)
+        << "further messages have no id, so they do not disappear by themselves";
     EXPECT_THAT(text_of(*looker.next(now)), testing::HasSubstr("parameterValues"));
   }
 }
@@ -214,10 +215,10 @@ TEST_F(OneViewer, ReadsThousandsOfKeysInProportionToTheirNumber) {
     }
     return shortest;
   };
-  EXPECT_LT(shortest_s(9600), 24 * shortest_s(1200)) << "64 times where each key is sought among all";
+  EXPECT_LT(shortest_s(9600), 24 * shortest_s(1200)) << "64 times as long if each key is compared with all others";
 }
 
-TEST_F(OneViewer, CallsServicesFourAtATime) {
+TEST_F(OneViewer, MayHaveFourOpenCallsOfServices) {
   for (std::uint32_t call = 1; call <= 5; ++call)
     viewer.on_binary(foxglove::encode(foxglove::ServiceCall{1, call, "json", "{}"}), now);
   EXPECT_EQ(host.calls.size(), 4u);
@@ -275,7 +276,7 @@ TEST_F(OneViewer, OnlyAViewerOfATrajectoryCanPlayIt) {
 TEST_F(OneViewer, SubscriptionsAndParametersAreCounted) {
   for (std::uint32_t id = 1000; id < 1300; ++id) host.channels[id] = {{id, "/x", "protobuf", {}}, Kind::event, 0};
   for (std::uint32_t id = 1000; id < 1256; ++id, now += milliseconds(10)) subscribe(id);
-  EXPECT_EQ(next_word(), json()) << "256 are taken";
+  EXPECT_EQ(next_word(), json()) << "256 are accepted";
   subscribe(1256);
   EXPECT_EQ(next_word()["message"], "more than 256 subscriptions");
   std::string names;

@@ -1,4 +1,4 @@
-// A heading in radians that is counted on over whole turns, as dead reckoning does, is not taken for degrees.
+// A heading in radians that grows beyond whole turns, as in dead reckoning, is not mistaken for degrees.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -20,7 +20,7 @@ std::string line_of(double t_s, double yaw, double roll = 0) {
   return std::to_string(t_s) + ",0,0,-3," + std::to_string(roll) + ",0," + std::to_string(yaw) + "\n";
 }
 constexpr int spiral_steps = 2000;
-/// Turns by 0.5 rad a second, ten poses a second, by default to 100 rad from `begin_rad`.
+/// Returns lines of a turn at 0.5 rad/s, ten poses per second, by default over 100 rad from `begin_rad`.
 std::string spiral(double begin_rad, double roll = 0, double unit = 1, int steps = spiral_steps) {
   std::string lines;
   for (int i = 0; i < steps; ++i) lines += line_of(0.1 * i, unit * (begin_rad + 0.05 * i), roll);
@@ -40,18 +40,18 @@ std::vector<std::string> notes(const std::string& lines) {
   return texts;
 }
 
-TEST(CountedTurns, TurnsCountedInATrajectoryAreNotTakenForDegrees) {
+TEST(CountedTurns, CountedTurnsOfATrajectoryAreNotMistakenForDegrees) {
   EXPECT_THAT(notes(spiral(0)), IsEmpty());
-  EXPECT_THAT(notes(spiral(4.7)), IsEmpty()) << "the sender counts from 0";
+  EXPECT_THAT(notes(spiral(4.7)), IsEmpty()) << "the first angle is below a turn";
   EXPECT_THAT(notes(spiral(-150, 0, 1, 8000)), IsEmpty()) << "the file begins after many turns";
   const auto are_degrees = HasSubstr("were degrees written?");
-  EXPECT_THAT(notes(spiral(-150)), ElementsAre(are_degrees)) << "fewer radians than a turn has degrees";
+  EXPECT_THAT(notes(spiral(-150)), ElementsAre(are_degrees)) << "the file has too few turns for its first angle";
   EXPECT_THAT(notes(spiral(0, 0, deg_from_rad(1))), ElementsAre(are_degrees));
   EXPECT_THAT(notes(line_of(0, 270) + line_of(1, 270)), ElementsAre(are_degrees));
   EXPECT_THAT(notes(spiral(0) + line_of(200, 300)), ElementsAre(are_degrees)) << "a jump";
   std::string wrapped;
   for (int i = 0; i < spiral_steps; ++i) wrapped += line_of(0.1 * i, std::remainder(i, 360));
-  EXPECT_THAT(notes(wrapped), ElementsAre(are_degrees)) << "10 degrees a second";
+  EXPECT_THAT(notes(wrapped), ElementsAre(are_degrees)) << "10 degrees per second";
 }
 
 TEST(CountedTurns, AreNotFoundInASlowTurnInDegrees) {
@@ -62,19 +62,19 @@ TEST(CountedTurns, AreNotFoundInASlowTurnInDegrees) {
     through_north += line_of(0.1 * i, std::fmod(350 + 0.1 * i, 360));
     often += line_of(0.01 * i, 0.04 * i);
   }
-  EXPECT_THAT(notes(slow), ElementsAre(are_degrees)) << "1 degree a second";
+  EXPECT_THAT(notes(slow), ElementsAre(are_degrees)) << "1 degree per second";
   EXPECT_THAT(notes(through_north), ElementsAre(are_degrees));
-  EXPECT_THAT(notes(often), ElementsAre(are_degrees)) << "4 degrees a second, a hundred poses a second";
+  EXPECT_THAT(notes(often), ElementsAre(are_degrees)) << "4 degrees and a hundred poses per second";
 }
 
 TEST(CountedTurns, HideNoOtherNoteOnTheAttitude) {
   const auto is_over = HasSubstr("rov is upside down");
   EXPECT_THAT(notes(spiral(0, 3)), ElementsAre(is_over));
   EXPECT_THAT(notes(line_of(0, 270, 3) + line_of(1, 270, 3)), ElementsAre(HasSubstr("were degrees written?"), is_over));
-  EXPECT_THAT(notes(line_of(0, 270, 170)), ElementsAre(HasSubstr("an angle of 270 rad"))) << "the roll has degrees too";
+  EXPECT_THAT(notes(line_of(0, 270, 170)), ElementsAre(HasSubstr("an angle of 270 rad"))) << "the roll is in degrees too";
 }
 
-TEST(CountedTurns, TurnsCountedByASenderAreNotTakenForDegrees) {
+TEST(CountedTurns, CountedTurnsOfASenderAreNotMistakenForDegrees) {
   const auto config = parse_config(
       "world: {scene: demo.yaml}\nvehicles: [{name: rov}]\nsonars: [{name: front, profile: "
       "oculus-m1200d, bind_ip: 127.0.0.2}]\n",

@@ -1,4 +1,4 @@
-// Scenes made from scenes: unchanged objects keep their places, and a refusal lists the objects and materials of the scene.
+// Edited copies of scenes: unchanged objects keep their positions, and errors list the objects and materials of the scene.
 #include "daemon/emulator/world/edit_scene.hpp"
 
 #include <gmock/gmock.h>
@@ -29,8 +29,8 @@ TEST(EditScene, AnObjectIsAddedAtTheEnd) {
   EXPECT_EQ(buoy.mesh, scene->objects[1].mesh) << "the shape is shared";
   EXPECT_EQ(buoy.in_world.position_m.y, 2);
   EXPECT_EQ(buoy.body, -1);
-  ASSERT_TRUE((*more)->ray_origin) << "rays go by the same floats as before";
-  EXPECT_EQ(scene->objects.size(), 3u) << "the old one is as it was";
+  ASSERT_TRUE((*more)->ray_origin) << "rays have the same coordinates as before";
+  EXPECT_EQ(scene->objects.size(), 3u) << "the first scene is unchanged";
 }
 
 TEST(EditScene, ACopyMayHaveAnotherMaterial) {
@@ -84,7 +84,7 @@ TEST(EditScene, MovingObjectsComeAndGoWithTheirBodies) {
   EXPECT_EQ((*less)->objects[3].body, 0) << "the index of the later body decreases";
 }
 
-TEST(EditScene, ABodyStaysWhileSomethingRidesOnIt) {
+TEST(EditScene, ABodyStaysWhileAnObjectIsAttachedToIt) {
   const auto scene = small_scene(true);
   scene->objects.push_back(Object{.name = "lamp", .mesh = small_mesh(), .in_world = {{5, 0, -2}, {}}, .body = 0});
   const auto less = without_object(*scene, "crate");
@@ -105,7 +105,7 @@ TEST(EditScene, StaticObjectsAreHiddenAndMoved) {
   EXPECT_EQ((*set)->objects[1].in_world.position_m.x, 9);
 }
 
-TEST(EditScene, MistakesAreNamedWithWhatThereIs) {
+TEST(EditScene, ErrorsListTheKnownNames) {
   const auto scene = small_scene(true);
   scene->point_targets.push_back({"ping pong ball", {1, 0, 0}, -40, -1});
   const auto why = [](const Result<ScenePointer>& r) { return r ? "" : r.error().text; };

@@ -44,7 +44,7 @@ Scene bed_scene(std::vector<Object> more = {}) {
   for (Object& o : more) scene.objects.push_back(std::move(o));
   return scene;
 }
-/// A box of these edges about its place.
+/// A box with edges of this size around this position.
 Object box(const std::string& name, Vec3 size_m, Vec3d at_m) {
   auto mesh = std::make_shared<Mesh>();
   mesh->vertices = {-0.5f * size_m, 0.5f * size_m, {0, 0, 0}};
@@ -74,7 +74,7 @@ TEST(Plausibility, IntendedConfigurationsHaveNoNotes) {
   EXPECT_THAT(notes(*demo_config()), IsEmpty());
   EXPECT_THAT(notes(config_with("", "{frame: FRD, xyz_m: [0, 0, 0.1], rpy_deg: [0, -15, 180]}")), IsEmpty()) << "looking aft";
   EXPECT_THAT(notes(config_with("", "{frame: FRD, xyz_m: [0, 0, 0.1], rpy_deg: [90, -90, 0]}")), IsEmpty())
-      << "on its side, down";
+      << "on its side, looking down";
 }
 
 TEST(Plausibility, AVehicleAboveTheWaterIsNoted) {
@@ -86,10 +86,10 @@ TEST(Plausibility, AVehicleAboveTheWaterIsNoted) {
               IsEmpty());
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 0]}", "{frame: FLU, xyz_m: [0, 0, 2]}")),
               ElementsAre(HasSubstr("is 2.0 m above")));
-  EXPECT_THAT(at("xyz_m: [-7, 0, 0.0009]"), IsEmpty()) << "as near as pings take it for the surface";
+  EXPECT_THAT(at("xyz_m: [-7, 0, 0.0009]"), IsEmpty()) << "pings also treat so small a height as the surface";
 }
 
-TEST(Plausibility, ADefaultPlaceIsNotJudged) {
+TEST(Plausibility, ADefaultPositionIsNotChecked) {
   const std::string up = "{frame: FLU, xyz_m: [0, 0, 0.2]}";
   EXPECT_THAT(notes(config_with("", up)), IsEmpty());
   EXPECT_THAT(notes(config_with(", trajectory: orbit", up)), ElementsAre(HasSubstr("is 0.2 m above")));
@@ -133,7 +133,7 @@ TEST(Plausibility, ASceneFarFromTheOriginIsNotedBeforeTheFirstPose) {
                                 HasSubstr("a height map in degrees or UTM without `origin` and `centred`"))));
   EXPECT_THAT(notes(config, bed_scene()), IsEmpty());
   far.objects[0].in_world.position_m = {900, 0, -5};
-  EXPECT_THAT(notes(config, far), IsEmpty()) << "a drive away";
+  EXPECT_THAT(notes(config, far), IsEmpty()) << "900 m can be driven";
 }
 
 TEST(Plausibility, OnlyASonarBelowGroundIsNoted) {
@@ -146,20 +146,21 @@ TEST(Plausibility, OnlyASonarBelowGroundIsNoted) {
   EXPECT_THAT(below(-4, {box("buoy", {1, 1, 1}, {-3, 0, -2}), box("buoy 2", {1, 1, 1}, {3, 0, -2})}), IsEmpty());
   Object shelf = bed_scene().objects[0], bed = shelf;
   shelf.in_world.position_m.z = -2;
-  EXPECT_THAT(below(-4, {shelf, bed}), IsEmpty()) << "under an overhang";
+  EXPECT_THAT(below(-4, {shelf, bed}), IsEmpty()) << "the sonar is under an overhang";
   EXPECT_THAT(below(-6, {shelf, bed}), ElementsAre(HasSubstr("is 1.0 m below the lowest point of the ground (z = -5.0)")));
   bed.in_world.orientation = quat_from_rpy({rad_from_deg(90), 0, 0});
-  EXPECT_THAT(below(-25, {bed}), IsEmpty()) << "a wall";
+  EXPECT_THAT(below(-25, {bed}), IsEmpty()) << "a wall is no ground";
 }
 
-TEST(Plausibility, ASceneThatLiesAboveTheWaterIsTheMistakeItself) {
+TEST(Plausibility, ASceneAboveTheWaterIsNotedInsteadOfTheVehicle) {
   Scene dry = bed_scene();
   dry.sea_surface.present = true;
   dry.objects[0].in_world.position_m = {0, 0, 0};
   EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry),
               ElementsAre(HasSubstr("nothing of the scene lies below the water's surface, z = 0; lower the scene")));
   dry.sea_surface.present = false;
-  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry), IsEmpty()) << "a tank on its floor";
+  EXPECT_THAT(notes(config_with(", initial_pose: {frame: ENU_FLU, xyz_m: [0, 0, 2]}"), dry), IsEmpty())
+      << "a tank that stands on the ground";
 }
 
 TEST(Plausibility, AnUpsideDownMountIsNoted) {
@@ -180,10 +181,10 @@ TEST(Plausibility, AMeshInMillimetresIsNoted) {
   auto relief = std::make_shared<Mesh>(*ridge.mesh);
   relief->vertices = {{-600, -400, 0}, {600, -400, 200}, {600, 400, 0}, {-600, 400, 200}};
   ridge.name = "ridge", ridge.mesh = relief, ridge.in_world.position_m.z = -210;
-  EXPECT_THAT(notes(config, bed_scene({ridge})), IsEmpty()) << "with relief too";
+  EXPECT_THAT(notes(config, bed_scene({ridge})), IsEmpty()) << "ground with relief may be long, too";
   Object quay = box("quay", {1200, 300, 250}, {0, 0, -5});
   quay.primitive.kind = Primitive::Kind::box;
-  EXPECT_THAT(notes(config, bed_scene({quay})), IsEmpty()) << "its size is in the scene file, in metres";
+  EXPECT_THAT(notes(config, bed_scene({quay})), IsEmpty()) << "the scene file gives the size of a box in metres";
 }
 
 // ---- trajectories
@@ -199,8 +200,8 @@ Config playing(const std::string& lines, const std::string& name = "dive.tum") {
   if (!config) throw std::runtime_error(config.error().text);
   return *std::move(config);
 }
-/// A turn of 360 deg on the spot with small pitch changes. The quaternion's w is at the given end. In FRD the body's z is down,
-/// as in NED.
+/// Lines of a turn of 360 deg on the spot with small roll and pitch. The quaternion's w is first or last. In FRD the body's z is
+/// down, as in NED.
 std::string turning(bool w_first, const char* frame, double z_m, const char* comma = " ", const char* unit = "") {
   std::string lines = std::string("# frame: ") + frame + "\n";
   for (int i = 0; i < 36; ++i) {
@@ -227,7 +228,7 @@ TEST(Plausibility, AQuaternionWithWAtTheWrongEndIsNoted) {
   }
 }
 
-/// A camera that turns and looks down by up to 50 deg. Its axes are those of pictures or those of the IMU beside it, as in EuRoC.
+/// Lines of a camera that turns and looks down by up to 50 deg, with the axes of pictures or, as in EuRoC, of an IMU beside it.
 std::string looking_around(Quatd body_in_flu, bool w_first, const char* comma = " ", const char* unit = "") {
   std::string lines = "# frame: ENU_FLU\n";
   for (int i = 0; i < 36; ++i) {
@@ -337,7 +338,7 @@ TEST(Plausibility, SomePosesOfALongTrajectoryAreChecked) {
 
 // ---- a running daemon
 
-TEST(Plausibility, TheLastPoseIsJudgedAgainWhenTheSceneChanges) {
+TEST(Plausibility, TheLastPoseIsCheckedAgainWhenTheSceneChanges) {
   const Config config = config_with("");
   Scene elsewhere = bed_scene();
   elsewhere.objects[0].in_world.position_m.x = 500;
@@ -349,8 +350,8 @@ TEST(Plausibility, TheLastPoseIsJudgedAgainWhenTheSceneChanges) {
   EXPECT_THAT(plausibility.use(config, elsewhere), IsEmpty());
   EXPECT_THAT(plausibility.all(), IsEmpty());
   sample.pose.position_m = {480, 0, -9};
-  EXPECT_EQ(plausibility.use(sample, {}).size(), 1u) << "below that ground";
-  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "the vehicle is far away again, which was reported before";
+  EXPECT_EQ(plausibility.use(sample, {}).size(), 1u) << "below the ground of the other scene";
+  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "that the vehicle is far away was reported before";
   EXPECT_THAT(texts_of(plausibility.all()), ElementsAre(HasSubstr("m from everything in the scene")));
 }
 
@@ -364,7 +365,7 @@ TEST(Plausibility, AboveTheWaterAndBelowTheGroundAreTwoMistakes) {
   EXPECT_THAT(texts_of(plausibility.use(sample, {})), ElementsAre(HasSubstr("above the water's surface")));
 }
 
-TEST(Plausibility, ATrajectoryIsJudgedAgainWhenTheSceneChanges) {
+TEST(Plausibility, ATrajectoryIsCheckedAgainWhenTheSceneChanges) {
   const Config config = playing("# frame: ENU_FLU\n0 480 0 -3 0 0 0 1\n");
   Scene elsewhere = bed_scene();
   elsewhere.objects[0].in_world.position_m.x = 500;
@@ -426,7 +427,7 @@ TEST(StartNotes, NotesOnTheConfigurationEndWithTheFirstPose) {
               AllOf(HasSubstr("sonar front is mounted upside down on rov"), HasSubstr("1.0 m above the water")));
   EXPECT_EQ(daemon.status().notes_size(), 2);
   send_udp(daemon.address(), daemon.app().poses().json().port, bytes_of(R"({"position":[0,0,6],"attitude":[0,0,0]})"));
-  EXPECT_TRUE(eventually([&] { return daemon.status().notes_size() == 1; })) << "the start is no longer judged";
+  EXPECT_TRUE(eventually([&] { return daemon.status().notes_size() == 1; })) << "notes on the initial pose have ended";
 }
 
 TEST(MavlinkNotes, ALinkIsInTheStatusUntilUsablePosesCome) {

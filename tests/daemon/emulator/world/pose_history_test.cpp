@@ -1,4 +1,4 @@
-// Interpolation, extrapolation and holding against closed forms.
+// Compares interpolated, extrapolated and held poses with closed forms.
 #include "daemon/emulator/world/pose_history.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ constexpr std::chrono::nanoseconds limit = milliseconds(200);
 Pose pose(double x, double yaw_deg = 0) { return {{x, 0, -3}, quat_from_rpy({0, 0, rad_from_deg(yaw_deg)})}; }
 double yaw_deg(const Pose& p) { return deg_from_rad(rpy_from_quat(p.orientation).yaw_rad); }
 
-TEST(PoseHistory, InterpolatesPlaceAndTurnBetweenSamples) {
+TEST(PoseHistory, InterpolatesPositionAndOrientation) {
   PoseHistory h;
   h.put({t0, pose(0, 0), {}, {}});
   h.put({t0 + milliseconds(100), pose(1, 40), {}, {}});
@@ -50,7 +50,7 @@ TEST(PoseHistory, ExtrapolatesByTheLastTwoSamplesThenHolds) {
   EXPECT_EQ(later.position_m.x, at_limit.position_m.x);
 }
 
-TEST(PoseHistory, GivenVelocitiesInBodyAxesWinOverDifferences) {
+TEST(PoseHistory, GivenVelocitiesInBodyAxesReplaceDifferences) {
   PoseHistory h;
   h.put({t0, pose(0, 90), {}, {}});
   h.put({t0 + milliseconds(100), pose(1, 90), Vec3d{2, 0, 0}, Vec3d{0, 0, 1}});  // ahead of a body that looks along +y
@@ -124,12 +124,12 @@ TEST(PoseHistory, MotionBelongsToTheReturnedPose) {
   const auto motion = [&](int ms) { return h.motion_at(t0 + milliseconds(ms), limit); };
   EXPECT_NEAR(motion(50).velocity_mps.x, 10, 1e-9);
   EXPECT_NEAR(motion(50).angular_velocity_radps.z, rad_from_deg(100), 1e-9);
-  EXPECT_NEAR(motion(100).velocity_mps.x, 0, 1e-9) << "from that moment on";
+  EXPECT_NEAR(motion(100).velocity_mps.x, 0, 1e-9) << "the motion after that pose";
   EXPECT_NEAR(motion(200).angular_velocity_radps.z, rad_from_deg(200), 1e-9);
   EXPECT_NEAR(motion(390).angular_velocity_radps.z, rad_from_deg(200), 1e-9) << "the rate is extrapolated";
   EXPECT_EQ(length(motion(401).angular_velocity_radps), 0) << "the last pose is held";
-  EXPECT_EQ(length(motion(-1).velocity_mps), 0) << "before the first";
-  // Compares with the poses themselves, in steps.
+  EXPECT_EQ(length(motion(-1).velocity_mps), 0) << "before the first pose";
+  // Compares the motion with the change of the pose in 10 ms.
   for (const int ms : {20, 120, 250}) {
     const Time t = t0 + milliseconds(ms), later = t + milliseconds(10);
     const Vec3d moved = h.at(later, limit).position_m - h.at(t, limit).position_m;
@@ -142,8 +142,8 @@ TEST(PoseHistory, GivenVelocitiesAreTheMotionBeyondTheNewest) {
   h.put({t0, pose(0, 90), Vec3d{2, 0, 0}, Vec3d{0.1, 0, 1}});
   const PoseHistory::Motion m = h.motion_at(t0 + milliseconds(20), limit);
   EXPECT_NEAR(m.velocity_mps.x, 0, 1e-12);
-  EXPECT_NEAR(m.velocity_mps.y, 2, 1e-12) << "world axes";
-  EXPECT_NEAR(m.angular_velocity_radps.x, 0.1, 1e-12) << "body axes";
+  EXPECT_NEAR(m.velocity_mps.y, 2, 1e-12) << "the velocity has world axes";
+  EXPECT_NEAR(m.angular_velocity_radps.x, 0.1, 1e-12) << "the angular velocity has body axes";
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST_F(Follows, TimeDoesNotPassBeforeTheFirstPose) {
   EXPECT_FALSE(world.followed_until()) << "objects do not make time pass";
 }
 
-TEST_F(Follows, TheSlowerOfTwoVehiclesLeads) {
+TEST_F(Follows, TimeFollowsTheSlowerOfTwoVehicles) {
   take("a", seconds(100));
   EXPECT_EQ(now, Time(seconds(100)));
   take("b", seconds(100));
@@ -58,10 +58,10 @@ TEST_F(Follows, AVehicleThatFellSilentDelaysNoOther) {
   EXPECT_FALSE(world.is_stale(0, now));
   take("b", seconds(101) + milliseconds(200), 7);
   EXPECT_EQ(now, Time(seconds(101) + milliseconds(200)));
-  EXPECT_EQ(world.vehicle_at(1, now).position_m.x, 7) << "vehicle b came back by the same clock";
+  EXPECT_EQ(world.vehicle_at(1, now).position_m.x, 7) << "vehicle b continues with the same clock";
 }
 
-TEST_F(Follows, TwoClocksAreBothOurs) {
+TEST_F(Follows, TwoClocksAreBothFollowed) {
   take("a", seconds(1000));
   for (int i = 0; i <= 10; ++i) {
     take("b", seconds(5) + i * milliseconds(100), i);
@@ -71,7 +71,7 @@ TEST_F(Follows, TwoClocksAreBothOurs) {
   EXPECT_EQ(world.vehicle_at(1, Time(seconds(1000) + milliseconds(450))).position_m.x, 4.5);
 }
 
-TEST_F(Follows, ARestartedSimulatorGoesOnForAllItsVehicles) {
+TEST_F(Follows, TimeContinuesForAllVehiclesOfARestartedSimulator) {
   for (const char* name : {"a", "b"}) take(name, seconds(500));
   for (const char* name : {"a", "b"}) EXPECT_EQ(take(name, milliseconds(0)), PoseVerdict::accepted);
   EXPECT_EQ(now, Time(seconds(500)));
@@ -79,7 +79,7 @@ TEST_F(Follows, ARestartedSimulatorGoesOnForAllItsVehicles) {
   EXPECT_EQ(now, Time(seconds(500) + milliseconds(400)));
 }
 
-TEST_F(Follows, ALatePoseIsLateAndNoRestart) {
+TEST_F(Follows, ALatePoseIsNotMistakenForARestart) {
   take("a", seconds(10));
   EXPECT_EQ(take("a", seconds(10) - milliseconds(20)), PoseVerdict::late);
   EXPECT_EQ(now, Time(seconds(10)));
@@ -93,7 +93,7 @@ TEST_F(Follows, ObjectsShareTheVehiclesClock) {
   EXPECT_EQ(world.object_at(0, now).position_m.x, 2);
 }
 
-TEST_F(Follows, OrbitsAndTrajectoriesStandWhileTimeIsSkipped) {
+TEST_F(Follows, OrbitsDoNotMoveWhileTimeIsSkipped) {
   World orbits(rules(), {{"a", {}, false}, {"b", {{5, 0, -3}, {}}, true}}, {}, Time{});
   PoseSample s;
   s.name = "a";

@@ -1,4 +1,4 @@
-// Accepted senders and times of poses, and the daemon's pose for a moment: the rules of docs/poses.md, "Time and order".
+// Which senders and times of poses are accepted, and the pose at a time: the rules of docs/poses.md, "Time and order".
 #include "daemon/emulator/world/world.hpp"
 
 #include <gmock/gmock.h>
@@ -48,7 +48,7 @@ TEST(World, OrbitsTheOriginLookingInwardUntilTheFirstPose) {
     EXPECT_NEAR(std::hypot(p.position_m.x, p.position_m.y), 8, 1e-9);
     EXPECT_EQ(p.position_m.z, -2);
     const Vec3d ahead = rotate(p.orientation, {1, 0, 0});
-    EXPECT_NEAR(ahead.x * p.position_m.x + ahead.y * p.position_m.y, -8, 1e-9) << "looks at the z axis";
+    EXPECT_NEAR(ahead.x * p.position_m.x + ahead.y * p.position_m.y, -8, 1e-9) << "the vehicle looks at the z axis";
   }
   EXPECT_GT(length(w.vehicle_at(0, t0 + seconds(2)).position_m - start.position_m), 0.5);
   const auto outcome = w.accept(at_x(1), json, t0);
@@ -85,7 +85,7 @@ TEST(World, OldSequenceNumbersAreLate) {
   EXPECT_EQ(w.counters().accepted, 3u);
 }
 
-TEST(World, ARestartedSenderIsBelievedFromANewPortOrAfterSilence) {
+TEST(World, ARestartedSenderIsAcceptedFromANewPortOrAfterSilence) {
   World w = one_rov();
   w.accept(at_x(0, 1000), udp, t0);
   EXPECT_EQ(w.accept(at_x(1, 1), udp, t0 + milliseconds(900)).verdict, PoseVerdict::late);
@@ -101,7 +101,7 @@ TEST(World, ANewSenderDoesNotInterpolateWithTheOldOne) {
   w.accept(at_x(0), udp, t0);
   w.accept(at_x(10), json, t0 + milliseconds(100));
   EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 10);
-  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(200)).position_m.x, 10) << "no speed from two different senders";
+  EXPECT_EQ(w.vehicle_at(0, t0 + milliseconds(200)).position_m.x, 10) << "poses of two senders give no speed";
 }
 
 TEST(World, SenderClockIsMappedByTheLeastDelay) {
@@ -109,7 +109,8 @@ TEST(World, SenderClockIsMappedByTheLeastDelay) {
   w.accept(stamped(0, ClockDomain::sim, milliseconds(5000)), json, t0 + milliseconds(40));   // 40 ms under way
   w.accept(stamped(1, ClockDomain::sim, milliseconds(5100)), json, t0 + milliseconds(110));  // 10 ms under way
   w.accept(stamped(2, ClockDomain::sim, milliseconds(5200)), json, t0 + milliseconds(250));  // 50 ms under way
-  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(160)).position_m.x, 1.5, 1e-9) << "sender time 5150 is our 160";
+  EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(160)).position_m.x, 1.5, 1e-9)
+      << "5150 ms of the sender's clock are 160 ms of ours";
 }
 
 TEST(World, TheFarthestStampsOverflowNothing) {  // the undefined-behaviour sanitizer checks this
@@ -202,7 +203,7 @@ TEST(World, AVehicleWithoutNewsRestsAtItsNewestPose) {
   EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(300)).position_m.x, 3, 1e-9) << "earlier times stay as they were";
 }
 
-TEST(World, TwoSendersInTurnsAreReportedOnce) {
+TEST(World, TwoAlternatingSendersAreReportedOnce) {
   const Sender one{"json udp 127.0.0.1:40001", "json 127.0.0.1"}, other{"json udp 127.0.0.1:40002", "json 127.0.0.1"};
   World w = one_rov();
   std::vector<std::string> notices;
@@ -228,10 +229,10 @@ TEST(World, PosesBeyondOneKilohertzReplaceTheNewestAndAreCounted) {
   for (int i = 0; i <= 1000; ++i) {
     const Time now = t0 + std::chrono::microseconds(100 * i);
     EXPECT_EQ(w.accept(sent(i), json, now).verdict, PoseVerdict::accepted);
-    ASSERT_NEAR(w.vehicle_at(0, now).position_m.x, 0.001 * i, 1e-12) << "the newest wins";
+    ASSERT_NEAR(w.vehicle_at(0, now).position_m.x, 0.001 * i, 1e-12) << "the newest pose is used";
   }
   EXPECT_EQ(w.counters().accepted, 1001u);
-  EXPECT_NEAR(static_cast<double>(w.counters().over_rate), 1001 - 4 - 100, 2) << "100 ms at 1 kHz, and the first clump";
+  EXPECT_NEAR(static_cast<double>(w.counters().over_rate), 1001 - 4 - 100, 2) << "100 ms at 1 kHz and the burst are kept";
   EXPECT_NEAR(w.vehicle_at(0, t0 + milliseconds(50)).position_m.x, 0.5, 1e-3) << "the kept poses are still interpolated";
 }
 
@@ -387,7 +388,7 @@ TEST(World, ObjectsHiddenByControlAreShownAgainButNotThoseHiddenByPoses) {
   w.show_again();
   EXPECT_TRUE(w.is_hidden(0));
   EXPECT_FALSE(w.is_hidden(1));
-  EXPECT_FALSE(w.is_hidden(2)) << "control had the last word";
+  EXPECT_FALSE(w.is_hidden(2)) << "the last request was one of control";
 }
 
 }  // namespace

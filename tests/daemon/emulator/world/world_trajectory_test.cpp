@@ -15,7 +15,7 @@ using testing::HasSubstr;
 
 const Time t0 = Time(std::chrono::hours(400000));
 
-/// 10 s to the east at 1 m/s, from x = 0, turning to port by a quarter.
+/// Returns a trajectory of 10 s to the east at 1 m/s from x = 0, with a quarter turn to port.
 motion::Plan east(motion::PlaybackRules rules = {}, double z_m = -3) {
   motion::Points points{{seconds(0), seconds(10)}, {{{0, 0, z_m}, {}}, {{10, 0, z_m}, quat_from_rpy({0, 0, pi / 2})}}, {}, {}};
   return {std::make_shared<const motion::Trajectory>(std::move(points)), rules, "east.tum", "east.tum: 10 s"};
@@ -40,7 +40,7 @@ TEST(WorldTrajectory, IsFollowedWithItsMotion) {
   EXPECT_EQ(speed_at(w, 60), 0) << "the vehicle rests at the end";
 }
 
-TEST(WorldTrajectory, HasTheVelocityOfItsSpeed) {
+TEST(WorldTrajectory, TheVelocityGrowsWithThePlaybackSpeed) {
   const World w = with_rov({*motion::Speed::from(4), true, seconds(2)});
   EXPECT_EQ(x_at(w, 1), 6);
   EXPECT_DOUBLE_EQ(speed_at(w, 1), 4);
@@ -58,7 +58,7 @@ TEST(WorldTrajectory, GivesWayToTheFirstPose) {
   EXPECT_EQ(x_at(w, 30), -5) << "the trajectory does not continue";
 }
 
-TEST(WorldTrajectory, IsSteered) {
+TEST(WorldTrajectory, IsControlledByRequests) {
   World w = with_rov();
   EXPECT_EQ(w.steer(asked(true), t0 + seconds(3)), "");
   EXPECT_EQ(x_at(w, 8), 3);
@@ -101,7 +101,7 @@ TEST(WorldTrajectory, ContinuesAfterAReloadThatDoesNotChangeIt) {
   w.use_vehicles({rov(east({*motion::Speed::from(3), false, seconds(0)}))}, t0 + seconds(4));
   EXPECT_EQ(x_at(w, 5), 3) << "a trajectory with another speed begins anew";
   w.use_vehicles({rov(east({}, -4))}, t0 + seconds(6));
-  EXPECT_EQ(x_at(w, 6), 0) << "another file";
+  EXPECT_EQ(x_at(w, 6), 0) << "the trajectory of another file begins anew";
   w.use_vehicles({{"rov", {{99, 0, 0}, {}}, false}}, t0 + seconds(7));
   EXPECT_EQ(x_at(w, 7), 99);
   EXPECT_EQ(w.source_of(0), "initial pose");

@@ -60,13 +60,14 @@ TEST(ConnectionSlots, AConnectionWithoutARequestIsReplacedFirst) {
   EXPECT_FALSE(idle->closed);
 }
 
-TEST(ConnectionSlots, AnAddressWithFewerConnectionsIsNotKeptOutByBusyOnes) {
+TEST(ConnectionSlots, AnAddressWithFewerConnectionsReplacesABusyOne) {
   ConnectionSlots<Visitor> slots(3, std::chrono::seconds(1), [](const Visitor& v) { return v.owner; });
   for (int i = 0; i < 3; ++i) slots.add(visitor("crowd", -3600));
   EXPECT_FALSE(slots.make_room("crowd", [](const Visitor&) { FAIL(); }));
   EXPECT_TRUE(slots.make_room("alone", [](const Visitor& v) { EXPECT_EQ(v.owner, "crowd"); }));
   slots.add(visitor("alone", -3600));
-  EXPECT_FALSE(slots.make_room("alone", [](const Visitor&) { FAIL(); })) << "two and two would be no gain";
+  EXPECT_FALSE(slots.make_room("alone", [](const Visitor&) { FAIL(); }))
+      << "two connections of one address may not become two of the other";
 }
 
 }  // namespace

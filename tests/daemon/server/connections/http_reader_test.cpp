@@ -1,4 +1,4 @@
-// Reading of HTTP requests: every split of the bytes gives the same, limits hold, and other bytes are refused with a status.
+// Reading of HTTP requests: every split of the bytes gives the same requests, limits hold, other bytes are refused with a status.
 #include "daemon/server/connections/http_reader.hpp"
 
 #include <gmock/gmock.h>
@@ -56,7 +56,7 @@ TEST(HttpReader, JoinsTheHeadersThatBrowsersChooseAFileBy) {
   EXPECT_EQ(t.requests[0].if_none_match, "\"x\"");
 }
 
-TEST(HttpReader, ABodyInAnotherCodingIsNotTakenAsARequest) {
+TEST(HttpReader, ABodyInAnotherCodingIsNotReadAsARequest) {
   const std::string smuggled = "POST /smuggled HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\n\r\n{}";
   for (const std::string coding :
        {"identity", "gzip", "chunked, identity", "gzip, chunked", "nonsense", "chunked\r\nTransfer-Encoding: x"})
@@ -102,9 +102,9 @@ TEST(HttpReader, EverySplitGivesTheSameRequests) {
 
 TEST(HttpReader, LimitsHaveTheirOwnStatus) {
   EXPECT_EQ(take("GET / HTTP/1.1\r\nHost: a\r\nX: " + std::string(9000, 'x') + "\r\n\r\n").refused, 431u);
-  EXPECT_EQ(take("GET /" + std::string(9000, 'x')).refused, 431u) << "before its line has ended";
+  EXPECT_EQ(take("GET /" + std::string(9000, 'x')).refused, 431u) << "the line has not ended yet";
   const std::string post_of = "POST / HTTP/1.1\r\nHost: a\r\nContent-Length: ";
-  EXPECT_EQ(take(post_of + "1048577\r\n\r\n").refused, 413u) << "before a byte of it has come";
+  EXPECT_EQ(take(post_of + "1048577\r\n\r\n").refused, 413u) << "no byte of the body has come yet";
   const Taken longest = take(post_of + "1048576\r\n\r\n" + std::string(1048576, 'x'), 16384);
   ASSERT_EQ(longest.requests.size(), 1u) << longest.why;
   EXPECT_EQ(longest.requests[0].body.size(), 1048576u);

@@ -9,7 +9,7 @@ namespace {
 using Steady = InputRate::Steady;
 using std::chrono::milliseconds;
 
-TEST(InputRate, ReadsOnWithinTheRate) {
+TEST(InputRate, AClientWithinTheRateDoesNotWait) {
   InputRate rate(1000);
   auto now = Steady::time_point(std::chrono::hours(5));
   for (int i = 0; i < 100; ++i, now += milliseconds(100)) EXPECT_EQ(rate.pause_after(100, now).count(), 0);
@@ -25,10 +25,10 @@ TEST(InputRate, HoldsTheRateWhateverTheClientDoes) {
     read += 800;
   }
   EXPECT_GE(read, 19000u);
-  EXPECT_LE(read, 23000u) << "20 s worth, one second at once, and the last read";
+  EXPECT_LE(read, 23000u) << "the bytes of 20 s, of one second at once, and of the last read";
 }
 
-TEST(InputRate, APauseIsNotSavedUpForMoreThanASecond) {
+TEST(InputRate, APauseGivesCreditForASecondAtMost) {
   InputRate rate(1000);
   auto now = Steady::time_point(std::chrono::hours(5));
   rate.pause_after(1, now);
@@ -67,11 +67,11 @@ Shared twenty_seconds(int floods, std::size_t modest) {
 }
 
 TEST(SharedRate, HoldsTheRateAndOnlyThoseAboveTheirShareWait) {
-  const Shared with_modest = twenty_seconds(9, 90);  // 900 bytes a second of 1000
+  const Shared with_modest = twenty_seconds(9, 90);  // 900 bytes per second of 1000
   EXPECT_EQ(with_modest.waited.count(), 0);
   EXPECT_GE(with_modest.of_floods, 150000u);
-  EXPECT_LE(with_modest.of_floods, 240000u) << "20 s worth, a second's and 4 KiB each at once, the last reads";
-  EXPECT_GT(twenty_seconds(9, 500).waited, std::chrono::seconds(1)) << "five times its share";
+  EXPECT_LE(with_modest.of_floods, 240000u) << "the bytes of 20 s and of one second, 4 KiB for each client, and the last reads";
+  EXPECT_GT(twenty_seconds(9, 500).waited, std::chrono::seconds(1)) << "the client sends five times its share";
 }
 
 TEST(SharedRate, ASingleClientHasTheWholeRate) {

@@ -1,4 +1,4 @@
-// Limits of untrusted clients: slots of the whole daemon, bytes a second, and accounts that balance in any case.
+// Limits for untrusted clients: slots of the whole daemon, bytes per second, and counts of pings that balance in any case.
 #include <gmock/gmock.h>
 
 #include <fcntl.h>
@@ -43,7 +43,7 @@ TEST(Limits, SlotsOfTheDaemonIncludeWaitingClients) {
   EXPECT_TRUE(waits.next_ping());
   Client queued(daemon.address());
   EXPECT_FALSE(queued.next(milliseconds(200)));
-  EXPECT_FALSE(queued.ended) << "the place of the one that left is free";
+  EXPECT_FALSE(queued.ended) << "the slot of the client that left is free";
   daemon.stop();
   EXPECT_EQ(daemon.figures().refused_clients, 3u);
 }
@@ -68,7 +68,7 @@ TEST(Limits, AClientThatSendsTooMuchIsReadSlowlyAndLosesNothing) {
     ASSERT_LT(Steady::now() - begin, 3 * patience);
   }
   EXPECT_GT(Steady::now() - begin, milliseconds(2000));
-  EXPECT_EQ(ids.skipped_ids(), 0u) << "the neighbour does not notice";
+  EXPECT_EQ(ids.skipped_ids(), 0u) << "the other client loses no ping";
 }
 
 TEST(Limits, RequestsOfASonarsClientCountAsMoreThanTheirBytes) {
@@ -198,7 +198,7 @@ TEST(Limits, TheLastDescriptorsAreNotForPosesAndHalfOfThemForControl) {
     rlimit low = was;
     low.rlim_cur = static_cast<rlim_t>(next) + 40;
     EXPECT_EQ(setrlimit(RLIMIT_NOFILE, &low), 0);
-    for (int i = 0; i < 20; ++i) {  // two descriptors each: ours and theirs
+    for (int i = 0; i < 20; ++i) {  // each connection needs two descriptors of this process
       visitors.emplace_back(io);
       visitors.back().connect(acceptor.local_endpoint());
       io.restart();
@@ -219,7 +219,7 @@ TEST(Limits, TheLastDescriptorsAreNotForPosesAndHalfOfThemForControl) {
   EXPECT_EQ(count(said, "file descriptors run out"), 1u);
 }
 
-TEST(Threads, ComputingThreadsAndTheirChildrenAreNice) {
+TEST(Threads, ComputingThreadsAndTheirChildrenHaveLowPriority) {
   int own = 0, started = 0;
   const auto niceness = [] { return getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())); };
   const int here = niceness();
@@ -233,7 +233,7 @@ TEST(Threads, ComputingThreadsAndTheirChildrenAreNice) {
   EXPECT_THROW(compute_apart([] { throw std::runtime_error("no"); }), std::runtime_error);
 }
 
-TEST(Threads, GetTheNicenessOfTheFirstAtTheEnd) {
+TEST(Threads, GetTheNicenessOfTheMainThreadAtTheEnd) {
   const int first = getpriority(PRIO_PROCESS, static_cast<id_t>(getpid()));
   const auto own = [] { return static_cast<id_t>(gettid()); };
   bool permitted = false;
@@ -245,7 +245,7 @@ TEST(Threads, GetTheNicenessOfTheFirstAtTheEnd) {
   });
 }
 
-TEST(Threads, RealTimeIsUsedOrTheWarningHasARemedy) {
+TEST(Threads, RealTimeIsUsedOrTheWarningSaysWhatToDo) {
   std::thread([] {  // a separate thread, so that the test's own is not changed
     const std::string why = schedule_in_real_time(1);
     if (why.empty()) {

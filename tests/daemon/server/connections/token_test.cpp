@@ -57,7 +57,8 @@ TEST_F(TokenFile, AFileWithoutASecretIsRefusedWithoutShowingItsText) {
   const auto folder = Token::read(::testing::TempDir(), warning);
   ASSERT_FALSE(folder);
   EXPECT_THAT(folder.error().text, HasSubstr(": is a folder, not a regular file; name a file in it"));
-  EXPECT_EQ(folder.error().text.find("make one"), std::string::npos) << "a file of this name cannot be made";
+  EXPECT_EQ(folder.error().text.find("make one"), std::string::npos)
+      << "a folder has this name, so the advice to make a file would be wrong";
   std::filesystem::create_symlink(file, file);
   const auto circle = Token::read(file, warning);
   std::filesystem::remove(file);
@@ -72,7 +73,7 @@ TEST_F(TokenFile, AFileThatEveryoneCanReadGivesAWarning) {
   EXPECT_THAT(warning, HasSubstr("chmod o-r"));
 }
 
-TEST(Token, NoneLetsEverybodyThrough) {
+TEST(Token, WithoutATokenEverybodyIsAdmitted) {
   EXPECT_FALSE(Token().needed());
   EXPECT_TRUE(Token().matches(""));
   EXPECT_TRUE(Token().matches("anything"));

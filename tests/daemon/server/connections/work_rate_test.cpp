@@ -1,4 +1,4 @@
-// Limit of the work of an address: counted in virtual time. It does not depend on what the address sends or how often it
+// The limit of the work for an address, in virtual time. The limit does not depend on what the address sends or how often it
 // connects.
 #include "daemon/server/connections/port_guard.hpp"
 
@@ -18,7 +18,7 @@ using std::chrono::seconds;
 
 constexpr std::size_t per_s = 1 << 20;
 
-/// Returns how often work of that cost is done within 5 s for a client that always requests more.
+/// Returns how often work of this cost is done within 5 s for a client that always requests more.
 std::size_t done_in_5_s(std::size_t cost) {
   WorkRate rate;
   const auto begin = Steady::time_point(std::chrono::hours(5));
@@ -31,20 +31,21 @@ TEST(WorkRate, WorkBesideBytesIsCounted) {
   EXPECT_LT(done_in_5_s(work::of_request + 60 + 300), 7300u) << "small requests: 70,000 without the count";
   EXPECT_LT(done_in_5_s(work::of_request + 60 + 5000), 1200u) << "status";
   EXPECT_LT(done_in_5_s(work::of_request + 60 + 177000), 40u) << "the page";
-  EXPECT_LT(done_in_5_s(work::of_connection + work::of_request + work::of_upgrade + 200), 190u) << "handshakes: 3866 without";
+  EXPECT_LT(done_in_5_s(work::of_connection + work::of_request + work::of_upgrade + 200), 190u)
+      << "handshakes: 3866 without the count";
 }
 
-TEST(WorkRate, AnAddressPaysForAllItsConnectionsAndForNoOther) {
+TEST(WorkRate, AllConnectionsOfAnAddressShareOneLimit) {
   WorkRate rate;
   const auto now = Steady::time_point(std::chrono::hours(5));
   for (int i = 0; i < 100; ++i) rate.pause_after("flood", per_s, per_s, now);
   EXPECT_EQ(std::chrono::round<milliseconds>(rate.pause_after("flood", 0, per_s, now)), seconds(1))
-      << "a new connection of it waits too, but not for ever";
+      << "a new connection of this address waits, too, but a second at most";
   EXPECT_EQ(rate.pause_after("flood", 0, per_s, now + seconds(1)).count(), 0);
   EXPECT_EQ(rate.pause_after("honest", 10000, per_s, now).count(), 0);
 }
 
-TEST(WorkRate, ThoseWhoWaitTakeTurns) {
+TEST(WorkRate, WaitingConnectionsAreServedOneAfterTheOther) {
   WorkRate rate;
   const auto now = Steady::time_point(std::chrono::hours(5));
   rate.pause_after("a", per_s, per_s, now);
@@ -60,7 +61,7 @@ TEST(WorkRate, TheNumberOfAddressesIsLimited) {
   for (std::size_t i = 0; i < 3 * WorkRate::most_addresses; ++i) {
     now += Steady::duration(1);
     rate.pause_after(std::to_string(i), 1, per_s, now);
-    EXPECT_GT(rate.pause_after("flood", 0, per_s, now).count(), 0) << "the one that was used longest ago is forgotten";
+    EXPECT_GT(rate.pause_after("flood", 0, per_s, now).count(), 0) << "an address that was used recently is forgotten";
   }
 }
 
@@ -88,10 +89,10 @@ TEST(PortGuard, ConnectionsOfOneAddressAreLimitedAndThoseOfOthersAreNot) {
   for (int i = 0; i < 50000; ++i, now += milliseconds(1) / 10) taken += is_taken("storm", now);
   EXPECT_EQ(PortGuard::connections_per_s(per_s), 102u);
   EXPECT_GE(taken, 102u);
-  EXPECT_LE(taken, 6 * 102u) << "10,000 a second for 5 s";
+  EXPECT_LE(taken, 6 * 102u) << "of 10,000 connections per second for 5 s";
   EXPECT_TRUE(is_taken("driver", now));
   EXPECT_LE(guard.pause_before_connection("storm", per_s, now), seconds(1));
-  EXPECT_TRUE(is_taken("storm", now + seconds(2))) << "a driver of that address after its storm";
+  EXPECT_TRUE(is_taken("storm", now + seconds(2))) << "a driver at the same address, 2 s later";
 }
 
 TEST(PortGuard, DatagramsAreLimitedByWorkAndBySocket) {
@@ -99,7 +100,7 @@ TEST(PortGuard, DatagramsAreLimitedByWorkAndBySocket) {
   DatagramRate rate(2048);
   const auto begin = Steady::time_point(std::chrono::hours(5));
   std::size_t read = 0, taken = 0;
-  for (auto now = begin; now < begin + seconds(5); now += milliseconds(1) / 100, ++read) {  // 100,000 a second
+  for (auto now = begin; now < begin + seconds(5); now += milliseconds(1) / 100, ++read) {  // 100,000 per second
     const bool takes = guard.takes_datagram("flood", 12, per_s, now);
     if (takes) guard.count("flood", work::of_reaction, per_s, now);
     taken += takes;

@@ -15,7 +15,8 @@
 
 namespace sonar::testing_daemon {
 
-/// Stores its requests; tests set its answers, and when they come. I/O thread only, except where marked.
+/// Counts requests, keeps the last sender and pose, and answers by the kind of request. Only for the I/O thread, except where
+/// marked.
 class FakeOperations final : public Operations {
  public:
   void perform(const control::Operation& operation, const Sender& sender, Done done, HasLeft = {}) override {
@@ -39,8 +40,8 @@ class FakeOperations final : public Operations {
   std::string metrics() const override { return "# TYPE sonard_up gauge\nsonard_up 1\n"; }
   std::string problem() const override { return in_trouble ? "the engine hangs" : ""; }
 
-  std::atomic<int> asked{0};            // from any thread
-  std::atomic<bool> in_trouble{false};  // likewise
+  std::atomic<int> asked{0};            // any thread may read this
+  std::atomic<bool> in_trouble{false};  // any thread may set this
   std::vector<Done> later;
   Sender last_sender;
   Vec3d last_pose{};

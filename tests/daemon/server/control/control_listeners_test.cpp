@@ -46,7 +46,7 @@ TEST_F(Listeners, DefaultAddressesInUseAreAWarning) {
   server->stop();
 }
 
-TEST_F(Listeners, AddressesInUseThatTheFileGivesAreAnError) {
+TEST_F(Listeners, ConfiguredAddressesInUseAreAnError) {
   tcp::acceptor other(io, {asio::ip::make_address(text_of(config.http.at.ip)), 0});
   config.http.at.port = other.local_endpoint().port();
   config.http_given = true;

@@ -84,7 +84,7 @@ TEST(ControlHttp, ServesManyRequestsOnOneConnection) {
   EXPECT_EQ(client.post("/api/v1/sonar", R"({"range_m":5})").document()["code"], "OK");
   EXPECT_EQ(client.get("/nothing").status, 404);
   EXPECT_EQ(client.get("/api/v1/load").status, 405);
-  EXPECT_EQ(client.get("/healthz").status, 200) << "a refusal does not end the connection";
+  EXPECT_EQ(client.get("/healthz").status, 200) << "an error status does not end the connection";
   EXPECT_EQ(bench.operations.asked, 2);
 }
 
@@ -100,7 +100,8 @@ TEST(ControlHttp, OperationsAnswerWithTheirStatus) {
   EXPECT_EQ(failed.document()["code"], "FAILED");
   const auto pose = client.post("/api/v1/pose", R"({"frame":"ENU_FLU","position":{"x":1},"orientation":{"w":1}})");
   EXPECT_EQ(pose.status, 200) << pose.body;
-  bench.on_io([&] { EXPECT_EQ(bench.operations.last_sender.id, "http 127.0.0.1") << "one history for all curls"; });
+  bench.on_io(
+      [&] { EXPECT_EQ(bench.operations.last_sender.id, "http 127.0.0.1") << "all connections of an address are one sender"; });
   EXPECT_EQ(client.post("/api/v1/pose", "{}").status, 400);
   bench.on_io([&] { EXPECT_EQ(bench.world.counters().refused, 1u); });
   client.send("POST", "/api/v1/load", R"({"path":"later"})");
@@ -146,7 +147,7 @@ TEST(ControlHttp, EventsAreLinesOfJson) {
     EXPECT_EQ(line[line.size() - 3], '\n');
   }
   client.tcp.close();
-  EXPECT_TRUE(eventually([&] {  // its listener is removed with the next event
+  EXPECT_TRUE(eventually([&] {  // the client's listener is removed with the next event
     bool heard = true;
     bench.on_io([&] {
       bench.events.publish(ping_event(9));
@@ -229,7 +230,7 @@ TEST(ControlHttp, Http10AndExpectContinueAreServed) {
   {
     HttpClient client(bench);
     client.tcp.send("GET /healthz HTTP/1.0\r\n\r\n");
-    EXPECT_EQ(client.next().body, "ok\n") << "1.0 has no Host";
+    EXPECT_EQ(client.next().body, "ok\n") << "HTTP 1.0 needs no Host";
   }
   for (const std::string request : {"GET /healthz HTTP/1.1\r\n\r\n", "GET /healthz HTTP/1.0\r\nHost: evil.example\r\n\r\n",
                                     "GET /api/v1/status HTTP/1.0\r\nOrigin: http://evil.example\r\n\r\n"}) {
@@ -264,7 +265,7 @@ TEST(ControlHttp, ConnectionsBeyondTheLimitGet503AndSilentOnesAreReplaced) {
   EXPECT_TRUE(a.tcp.ended);
 }
 
-/// As many clients as there are slots send requests that never end, a byte from time to time.
+/// As many clients as there are slots send endless requests, byte by byte.
 TEST(ControlHttp, SlowSendersReplaceNoOtherClient) {
   ControlBench bench;
   std::list<Client> slow;
@@ -295,7 +296,7 @@ TEST(ControlHttp, RequestsCostMoreThanTheirBytes) {
   std::this_thread::sleep_for(milliseconds(500));
   EXPECT_LT(bench.operations.asked, most(512));
   const int before = bench.operations.asked;
-  for (int i = 0; i < 40; ++i) {  // connecting again gains nothing
+  for (int i = 0; i < 40; ++i) {  // a new connection has no new limit
     HttpClient again(bench);
     EXPECT_EQ(again.get("/api/v1/status").status, 200);
   }
@@ -323,7 +324,7 @@ TEST(ControlHttp, UntrustedClientsEvictNoTrustedOne) {
     EXPECT_TRUE(asks.tcp.read_to_end());
   }
   bench.on_io([&] { bench.events.publish(ping_event(1)); });
-  EXPECT_FALSE(events.until("\r\n").empty()) << "it keeps its place";
+  EXPECT_FALSE(events.until("\r\n").empty()) << "the subscriber keeps its slot";
 }
 
 TEST(ControlHttp, RefusedClientsReadTheReason) {
@@ -336,13 +337,13 @@ TEST(ControlHttp, RefusedClientsReadTheReason) {
     HttpClient newcomer(bench);
     newcomer.send("POST", "/api/v1/load", std::string(20000, ' '));
     const auto answer = newcomer.next();
-    if (answer.status == 400) break;  // likewise
-    ASSERT_EQ(answer.status, 503) << "an answer, not a reset";
+    if (answer.status == 400) break;  // busy has lost its slot
+    ASSERT_EQ(answer.status, 503) << "the client gets an answer, not a reset";
     EXPECT_THAT(answer.body, HasSubstr("too many connections"));
   }
 }
 
-TEST(ControlHttp, AFaultEndsItsConnectionOnly) {
+TEST(ControlHttp, AnExceptionEndsItsConnectionOnly) {
   ControlBench bench;
   HttpClient unlucky(bench);
   unlucky.send("POST", "/api/v1/load", R"({"path":"throw"})");
@@ -352,7 +353,7 @@ TEST(ControlHttp, AFaultEndsItsConnectionOnly) {
   EXPECT_THAT(bench.log_text(), HasSubstr("internal fault: no such luck"));
 }
 
-TEST(ControlHttp, StopsWithStreamsAndWorkUnderWay) {
+TEST(ControlHttp, StopsDuringStreamsAndRequests) {
   ControlBench bench;
   HttpClient idle(bench), events(bench), waiting(bench), half(bench);
   events.send("GET", "/api/v1/events");
@@ -365,15 +366,15 @@ TEST(ControlHttp, StopsWithStreamsAndWorkUnderWay) {
   EXPECT_TRUE(events.tcp.ended);
 }
 
-TEST(ControlHttp, StopsWithoutWaitingForThoseWhoSentTooMuch) {
+TEST(ControlHttp, StopsWithoutWaitingForClientsThatSentTooMuch) {
   LimitConfig limits;
-  limits.input_bytes_per_s = 1024;  // the next bytes need a quarter of a minute
+  limits.input_bytes_per_s = 1024;  // the next bytes are read only after a quarter of a minute
   ControlBench bench({}, limits);
   HttpClient talks(bench);
   talks.tcp.send("POST /api/v1/pose HTTP/1.1\r\nContent-Length: 100000\r\n\r\n" + std::string(30000, ' '));
   Client streams(bench.address, bench.stream_port());
   streams.send(std::string("\x04\x12\x02\x08\x01\xa0\x8d\x06") + std::string(30000, ' '));
-  ASSERT_FALSE(streams.read_raw(1).empty()) << "the answer to its Hello";
+  ASSERT_FALSE(streams.read_raw(1).empty()) << "no answer to Hello";
   std::this_thread::sleep_for(milliseconds(200));
   const auto begin = Steady::now();
   bench.stop();

@@ -1,4 +1,4 @@
-// The control stream over loopback: greeting, token, answers in any order, events, limits, faults.
+// The control stream over loopback: greeting, token, answers in any order, events, limits, exceptions.
 #include <gmock/gmock.h>
 
 #include <list>
@@ -23,7 +23,7 @@ struct StreamClient {
     ASSERT_EQ(answer->status().code(), v1::Status::OK) << answer->status().text();
     ASSERT_TRUE(answer->has_hello());
   }
-  /// The next answer; empty at the deadline or the end of the stream.
+  /// Returns the next answer; null at the deadline or the end of the stream.
   std::shared_ptr<const v1::Response> next(milliseconds timeout = patience) {
     const auto deadline = Steady::now() + timeout;
     while (true) {
@@ -93,7 +93,7 @@ TEST(ControlStream, PosesWithoutAnIdAreNotAnswered) {
   bench.on_io([&] { EXPECT_EQ(bench.world.counters().refused, 1u); });
 }
 
-TEST(ControlStream, AFloodOfPosesIsReadSlowlyAndANeighbourIsNot) {
+TEST(ControlStream, AFloodOfPosesIsReadSlowlyButOtherClientsAreNot) {
   LimitConfig limits;
   limits.pose_bytes_per_s = 65536;
   ControlBench bench({}, limits);
@@ -110,7 +110,7 @@ TEST(ControlStream, AFloodOfPosesIsReadSlowlyAndANeighbourIsNot) {
   }
   std::this_thread::sleep_for(milliseconds(500));
   const auto seconds = std::chrono::duration<double>(Steady::now() - begin).count();
-  EXPECT_LT(bench.operations.asked, (1 + seconds) * 65536 / 64 + 4 * 4096 / 20.) << "each counts 64 bytes at least";
+  EXPECT_LT(bench.operations.asked, (1 + seconds) * 65536 / 64 + 4 * 4096 / 20.) << "each pose counts as 64 bytes at least";
   StreamClient neighbour(bench);
   neighbour.greet();
   for (std::uint64_t id = 2; id < 20; ++id) {
@@ -119,7 +119,7 @@ TEST(ControlStream, AFloodOfPosesIsReadSlowlyAndANeighbourIsNot) {
   }
 }
 
-TEST(ControlStream, PosesBeyondTheRateAreSkippedButForTheNewestAndNoneActsLater) {
+TEST(ControlStream, OfPosesBeyondTheRateOnlyTheNewestIsUsed) {
   LimitConfig limits;
   limits.pose_bytes_per_s = 65536;
   ControlBench bench({}, limits);
@@ -136,7 +136,7 @@ TEST(ControlStream, PosesBeyondTheRateAreSkippedButForTheNewestAndNoneActsLater)
     StreamClient flood(bench);
     flood.greet();
     flood.tcp.send(poses);
-  }  // and gone
+  }  // the client has left
   EXPECT_TRUE(eventually([&] {
     double x = 0;
     bench.on_io([&] { x = bench.operations.last_pose.x; });
@@ -163,7 +163,8 @@ TEST(ControlStream, AnswersCostMoreThanTheirRequests) {
   client.tcp.send(requests);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(client.next());
   const double seconds = std::chrono::duration<double>(Steady::now() - begin).count();
-  EXPECT_LT(bench.operations.asked, (1 + seconds) * 16384 / 128 + 4096. / 6) << "128 bytes each, and the last read";
+  EXPECT_LT(bench.operations.asked, (1 + seconds) * 16384 / 128 + 4096. / 6)
+      << "each answer counts as 128 bytes, and the last read is allowed";
 }
 
 TEST(ControlStream, WithoutTheTokenNoRequestIsServed) {
@@ -187,7 +188,7 @@ TEST(ControlStream, WithoutTheTokenNoRequestIsServed) {
   EXPECT_EQ(friendly.next()->status().code(), v1::Status::OK);
   EXPECT_EQ(bench.operations.asked, 1);
   EXPECT_THAT(bench.log_text(), HasSubstr("token"));
-  EXPECT_EQ(bench.log_text().find("0123456789"), std::string::npos) << "no secret in the log, be it ours or theirs";
+  EXPECT_EQ(bench.log_text().find("0123456789"), std::string::npos) << "the log must show neither our token nor the client's";
 }
 
 TEST(ControlStream, EventsComeToSubscribersAndLossIsReported) {
@@ -215,7 +216,7 @@ TEST(ControlStream, EventsComeToSubscribersAndLossIsReported) {
   ASSERT_EQ(client.next()->id(), 3u);
   bench.on_io([&] { bench.events.publish(ping_event(101)); });
   client.send({4, control::GetStatus{}});
-  EXPECT_EQ(client.next()->id(), 4u) << "nothing is told after that";
+  EXPECT_EQ(client.next()->id(), 4u) << "no event comes after the subscription has ended";
 }
 
 TEST(ControlStream, AClientThatReadsNothingIsReadNoFurtherAndClosed) {
@@ -259,7 +260,7 @@ TEST(ControlStream, HalfClosedClientsGetTheirLateAnswers) {
   EXPECT_TRUE(client.tcp.read_to_end());
 }
 
-TEST(ControlStream, AFaultEndsItsConnectionOnly) {
+TEST(ControlStream, AnExceptionEndsItsConnectionOnly) {
   ControlBench bench;
   StreamClient unlucky(bench), lucky(bench);
   unlucky.greet();
@@ -277,7 +278,8 @@ TEST(ControlStream, BeforeTheHelloFourKilobytesAreReadAndBusyClientsKeepTheirSlo
   limits.control_clients = 2;
   ControlBench bench({}, limits);
   Client chatter(bench.address, bench.stream_port());
-  chatter.send(std::vector<std::byte>{std::byte{0xff}, std::byte{0xff}, std::byte{0x20}});  // half a megabyte is announced
+  chatter.send(std::vector<std::byte>{std::byte{0xff}, std::byte{0xff},
+                                      std::byte{0x20}});  // states the size of a message of half a megabyte
   chatter.send(std::string(6000, 'x'));
   chatter.read_to_end();
   EXPECT_TRUE(chatter.ended);
@@ -290,7 +292,7 @@ TEST(ControlStream, BeforeTheHelloFourKilobytesAreReadAndBusyClientsKeepTheirSlo
   StreamClient c(bench);
   c.greet();
   a.tcp.read_to_end();
-  EXPECT_TRUE(a.tcp.ended) << "longest idle";
+  EXPECT_TRUE(a.tcp.ended) << "the client that was idle longest is evicted";
   b.send({3, control::GetStatus{}});
   EXPECT_TRUE(b.next());
 }
@@ -300,7 +302,7 @@ TEST(ControlStream, BytesThatAreNoProtobufEndTheConnection) {
   StreamClient client(bench);
   client.greet();
   client.send({2, control::RemoveObject{}});
-  EXPECT_EQ(client.next()->status().code(), v1::Status::REFUSED) << "wrong, but protobuf: it costs the answer only";
+  EXPECT_EQ(client.next()->status().code(), v1::Status::REFUSED) << "an invalid request does not end the connection";
   client.tcp.send(control::delimited(bytes_of("\xff\xff\xff")));
   client.send({3, control::GetStatus{}});
   const auto last = client.next();
@@ -309,10 +311,10 @@ TEST(ControlStream, BytesThatAreNoProtobufEndTheConnection) {
   EXPECT_EQ(last->status().text(), "message is not a Request");
   EXPECT_FALSE(client.next());
   EXPECT_TRUE(client.tcp.ended);
-  EXPECT_EQ(bench.operations.asked, 0) << "nothing after them counts";
+  EXPECT_EQ(bench.operations.asked, 0) << "later requests on the connection are ignored";
 }
 
-TEST(ControlStream, HttpIsKnownAndEnds) {
+TEST(ControlStream, AnHttpRequestIsRecognisedAndEndsTheConnection) {
   ControlBench bench;
   for (const std::string begins : {"POST /", "GET /%08%01"}) {
     Client page(bench.address, bench.stream_port());
@@ -353,14 +355,14 @@ TEST(ControlStream, UntrustedClientsEvictNoTrustedOne) {
   for (StreamClient& s : subscribers) EXPECT_TRUE(s.next()) << "they keep their slots";
 }
 
-TEST(ControlStream, AClientWithATokenIsToldThatAllSlotsAreInUse) {
+TEST(ControlStream, AClientWithATokenGetsTheErrorThatAllSlotsAreInUse) {
   const TokenFile file;
   ControlConfig config;
   config.token_file = file.path;
   LimitConfig limits;
   limits.control_clients = 1;
   ControlBench bench(config, limits);
-  for (int i = 0; i < 50; ++i) {  // on a slow machine it may already have been silent for a second
+  for (int i = 0; i < 50; ++i) {  // on a slow machine `busy` may already have been silent for a second
     StreamClient busy(bench);
     const auto in = [&busy] {
       busy.send({1, control::Hello{1, "test", TokenFile::text}});
@@ -378,10 +380,10 @@ TEST(ControlStream, AClientWithATokenIsToldThatAllSlotsAreInUse) {
     EXPECT_TRUE(late.tcp.read_to_end());
     return;
   }
-  FAIL() << "everybody was let in";
+  FAIL() << "every client was admitted";
 }
 
-TEST(ControlStream, StopsWithClientsSubscribersAndWorkUnderWay) {
+TEST(ControlStream, StopsDuringSubscriptionsAndRequests) {
   ControlBench bench;
   StreamClient idle(bench), subscriber(bench), waiting(bench);
   subscriber.greet();

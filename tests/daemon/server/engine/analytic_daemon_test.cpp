@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A wall 0.2 m thick, square to the sonar's axis, and a ball behind the sonar.
+/// A wall 0.2 m thick, perpendicular to the sonar's axis, and a ball behind the sonar.
 ScenePointer wall_at(double x_m) {
   auto scene = parse_scene(
       "objects:\n  - {name: wall, type: box, material: concrete, size_m: [0.2, 2, 2], pose: {xyz_m: [" + std::to_string(x_m) +
@@ -109,7 +109,7 @@ double nearest_m(const oculus::DecodedPing& ping) {
   double last_m = 0;
   for (int i = 0; i < 60; ++i) {
     const auto ping = client.next_ping();
-    if (!ping) return ::testing::AssertionFailure() << "no more pings";
+    if (!ping) return ::testing::AssertionFailure() << "pings have ended";
     if (!ping->violations.empty()) return ::testing::AssertionFailure() << ping->violations[0];
     last_m = nearest_m(*ping);
     if (std::abs(last_m - range_m) < 0.08) return ::testing::AssertionSuccess();
@@ -118,7 +118,7 @@ double nearest_m(const oculus::DecodedPing& ping) {
 }
 
 TEST(AnalyticDaemon, PingsWhileControlChangesTheSceneAndTheConfigurationIsReadAgain) {
-  ASSERT_EQ(RayScene::version(), "analytic rays") << "linked with another tracer";
+  ASSERT_EQ(RayScene::version(), "analytic rays") << "the program is linked with another tracer";
   RealDaemon daemon;
   Client client(daemon.address());
   client.fire(fire_at(oculus::PingRate::hz40));
@@ -140,7 +140,7 @@ TEST(AnalyticDaemon, PingsWhileControlChangesTheSceneAndTheConfigurationIsReadAg
   ASSERT_EQ(kill(getpid(), SIGHUP), 0);
   EXPECT_TRUE(eventually([&] { return daemon.log_text().find("reloaded: front untouched") != std::string::npos; }))
       << daemon.log_text();
-  EXPECT_TRUE(sees_wall(client, 1.4)) << "the file's scene, without what control added";
+  EXPECT_TRUE(sees_wall(client, 1.4)) << "the scene of the file has no objects of control";
 
   EXPECT_EQ(daemon.stop(), 0) << daemon.log_text();
   const DeviceFigures f = daemon.app().devices().front().figures();
@@ -162,7 +162,7 @@ TEST(AnalyticDaemon, LogsOnceThatASonarIsAboveTheSeaSurface) {
   EXPECT_THAT(raise_to(0.4), HasSubstr("\"OK\""));
   EXPECT_TRUE(
       eventually([&] { return daemon.log_text().find("above the sea surface and receives noise only") != std::string::npos; }));
-  EXPECT_TRUE(client.next_ping()) << "pings go on";
+  EXPECT_TRUE(client.next_ping()) << "pings continue";
   EXPECT_THAT(raise_to(-3), HasSubstr("\"OK\""));
   EXPECT_TRUE(sees_wall(client, 1.7));
   EXPECT_THAT(raise_to(0.4), HasSubstr("\"OK\""));
@@ -171,7 +171,8 @@ TEST(AnalyticDaemon, LogsOnceThatASonarIsAboveTheSeaSurface) {
   EXPECT_GT(daemon.app().devices().front().figures().out_of_water, 0u);
   const std::string log = daemon.log_text();
   const auto first = log.find("above the sea surface");
-  EXPECT_EQ(log.find("above the sea surface", first + 1), std::string::npos) << "waves bring no line each\n" << log;
+  EXPECT_EQ(log.find("above the sea surface", first + 1), std::string::npos) << "the line must not be repeated with the waves\n"
+                                                                             << log;
   EXPECT_THAT(log, HasSubstr("z_m=0.4"));
 }
 

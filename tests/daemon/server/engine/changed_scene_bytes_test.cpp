@@ -1,4 +1,4 @@
-// Uses the real engine. If a change of the scene is outside a ping's view, the ping is equal to the last bit, because all other
+// Uses the real engine. If a change of the scene is outside the view of a ping, no bit of the ping changes, because all other
 // objects keep their speckle and the coordinates of their rays.
 #include <gtest/gtest.h>
 
@@ -50,7 +50,7 @@ class ChangedScene : public ::testing::Test {
 TEST_F(ChangedScene, AnObjectAddedOutOfSightChangesNoBit) {
   const auto before = ping(scene_);
   EXPECT_EQ(ping(with("astern", {-60, 3, -2}, false)), before);
-  EXPECT_EQ(ping(with("astern", {-60, 3, -2}, true)), before) << "a moving one neither";
+  EXPECT_EQ(ping(with("astern", {-60, 3, -2}, true)), before) << "a moving object changes no bit either";
   const ScenePointer gone = *without_object(*with("astern", {-60, 3, -2}, false), "astern");
   EXPECT_EQ(ping(gone), before);
 }
@@ -62,7 +62,7 @@ TEST_F(ChangedScene, AnObjectAddedInSightChangesThePing) {
   control::SetObject hide;
   hide.object = "ahead";
   hide.visible = false;
-  EXPECT_EQ(ping(*with_object_set(*more, hide)), before) << "hidden, it is as if it had never been there";
+  EXPECT_EQ(ping(*with_object_set(*more, hide)), before) << "a hidden object changes no bit";
 }
 
 }  // namespace

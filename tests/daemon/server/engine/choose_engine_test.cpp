@@ -30,14 +30,14 @@ class ChooseEngine : public ::testing::Test {
   std::vector<std::string> said_;
 };
 
-TEST_F(ChooseEngine, CpuIsTheCpuWithoutAWord) {
+TEST_F(ChooseEngine, CpuIsChosenWithoutALogLine) {
   const auto engine = choose(EngineDevice::cpu);
   ASSERT_TRUE(engine);
   EXPECT_THAT((*engine)->description(), StartsWith("cpu, "));
   EXPECT_TRUE(said_.empty());
 }
 
-TEST_F(ChooseEngine, CudaWithoutADeviceIs69AndSaysWhy) {
+TEST_F(ChooseEngine, CudaWithoutADeviceGivesExitCode69AndTheReason) {
   const auto engine = choose(EngineDevice::cuda);
   ASSERT_FALSE(engine);
   EXPECT_EQ(exit_code(engine.error().kind), 69);

@@ -17,21 +17,21 @@ namespace {
 
 constexpr std::uint32_t slow = 0, quick = 1;
 
-TEST(FairTurns, AQuickOneThatHadLessGoesFirst) {
+TEST(FairTurns, AQuickSonarThatHasUsedLessTimeGoesFirst) {
   FairTurns turns;
   turns.ask(slow), turns.ask(quick);
   turns.end(slow, 0.1), turns.end(quick, 0.01);
   EXPECT_TRUE(turns.goes_first(quick, slow, 0.005));
-  EXPECT_FALSE(turns.goes_first(quick, slow, 0.095)) << "the slow one is nearly done";
+  EXPECT_FALSE(turns.goes_first(quick, slow, 0.095)) << "the slow ping is nearly done";
   EXPECT_FALSE(turns.goes_first(slow, quick, 0));
 }
 
-TEST(FairTurns, AQuickOneThatHadMoreWaits) {
+TEST(FairTurns, AQuickSonarThatHasUsedMoreTimeWaits) {
   FairTurns turns;
   turns.ask(slow), turns.ask(quick);
   turns.end(slow, 0.1);
   for (int i = 0; i < 20; ++i) turns.end(quick, 0.01);
-  EXPECT_FALSE(turns.goes_first(quick, slow, 0.005)) << "0.2 s against 0.105 s";
+  EXPECT_FALSE(turns.goes_first(quick, slow, 0.005)) << "the quick sonar has used 0.2 s, the slow one 0.105 s";
 }
 
 TEST(FairTurns, IdleTimeGivesNoCredit) {
@@ -39,17 +39,17 @@ TEST(FairTurns, IdleTimeGivesNoCredit) {
   turns.ask(slow), turns.ask(quick);
   for (int i = 0; i < 50; ++i) turns.begin(slow), turns.end(slow, 0.1);
   turns.ask(quick);
-  EXPECT_NEAR(turns.used_s(quick), 4.9, 1e-9) << "as much as the other had when its last ping began";
+  EXPECT_NEAR(turns.used_s(quick), 4.9, 1e-9) << "the time that the slow sonar had used when its last ping began";
 }
 
-TEST(FairTurns, WhoseTimeIsUnknownIsNotLetIn) {
+TEST(FairTurns, ASonarWhoseTimeIsUnknownMayNotInterrupt) {
   FairTurns turns;
   turns.ask(slow), turns.ask(quick);
   turns.end(slow, 0.1);
   EXPECT_FALSE(turns.goes_first(quick, slow, 0));
 }
 
-/// Takes 100 ms for the slow sonar, in parts of 5 ms, and 1 ms for the quick one. Each part ends when the quick sonar requests a
+/// Takes 100 ms for the slow sonar, in 20 parts, and 1 ms for the quick one. Each part ends when the quick sonar requests a
 /// ping, so that a busy machine does not delay the quick one's requests beyond the parts.
 class Parts final : public PingEngine {
  public:
@@ -95,13 +95,13 @@ TEST(Simulator, AQuickSonarKeepsItsRateBesideASlowOne) {
   ask(slow), ask(quick);
   io.run();
   EXPECT_GE(slow_pings, 5);
-  EXPECT_GE(quick_pings, 25) << "one after the other they would be 5; the slow one's parts leave room for 100";
-  EXPECT_LT(quick_seconds / quick_pings, 0.5 * slow_seconds / slow_pings) << "each is charged its own time";
+  EXPECT_GE(quick_pings, 25) << "5 in strict turns; 100 would fit between the parts of the slow pings";
+  EXPECT_LT(quick_seconds / quick_pings, 0.5 * slow_seconds / slow_pings) << "each sonar's time is counted separately";
 }
 
 constexpr std::uint32_t wrong = 99, large = 98;
 
-/// Computes up to three pings of one size together; an invalid one makes the whole call fail. The first call waits for the
+/// Computes up to three pings of one size together; an invalid request makes the whole call fail. The first call waits for the
 /// requests of all sonars.
 class Together final : public PingEngine {
  public:
@@ -128,7 +128,7 @@ class Together final : public PingEngine {
   std::shared_future<void> all_asked_;
 };
 
-TEST(Simulator, GivesAnEngineThatTakesThemTheRequestsOfSeveralSonars) {
+TEST(Simulator, PassesRequestsOfSeveralSonarsToAnEngineThatComputesThemTogether) {
   asio::io_context io;
   std::vector<std::vector<std::uint32_t>> calls;
   std::vector<std::uint32_t> answered;
@@ -150,7 +150,7 @@ TEST(Simulator, GivesAnEngineThatTakesThemTheRequestsOfSeveralSonars) {
   }
   EXPECT_EQ(answered, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, large}));
   const std::vector<std::vector<std::uint32_t>> expected{{0}, {1, 2, 3}, {4, wrong}, {4}, {wrong}, {large}};
-  EXPECT_EQ(calls, expected) << "two that one of them spoils are tried alone; a large one keeps none waiting";
+  EXPECT_EQ(calls, expected) << "after an invalid request, its partner is computed alone; a large ping delays no other";
 }
 
 struct SeenOn final : PingFindings {
@@ -166,7 +166,7 @@ struct Looking final : VendorSettings {
   mutable std::atomic<int> looks = 0;
 };
 
-TEST(Simulator, LooksAtAPingOnceOnTheThreadThatComputesIt) {
+TEST(Simulator, MeasuresAPingOnceOnTheThreadThatComputesIt) {
   asio::io_context io;
   std::vector<std::vector<std::uint32_t>> calls;
   std::promise<void> all_asked;

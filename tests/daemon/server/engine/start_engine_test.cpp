@@ -30,7 +30,7 @@ EngineFactory throwing(Exception e) {
   return [e](const std::shared_ptr<const Scene>&) -> std::unique_ptr<PingEngine> { throw e; };
 }
 
-TEST(StartEngine, HandsOverWhatWasMade) {
+TEST(StartEngine, ReturnsTheEngineThatWasMade) {
   const auto engine = start_engine([](const auto&) { return std::make_unique<Idle>(); }, harbour());
   ASSERT_TRUE(engine);
   EXPECT_EQ((*engine)->description(), "idle");
@@ -54,7 +54,7 @@ TEST(StartEngine, AMachineWithoutTheNeededDeviceGivesExitCode69) {
   }
 }
 
-TEST(StartEngine, OurOwnMistakesAreNotExplainedAway) {
+TEST(StartEngine, OtherExceptionsAreReportedAsBugs) {
   EXPECT_THROW(static_cast<void>(start_engine(throwing(std::logic_error("ours")), harbour())), std::logic_error);
 }
 

@@ -1,4 +1,4 @@
-// The journal of faults in its file: lines are whole, sonard never waits for a reader or a disk, and lost lines are counted and
+// The file of the journal of faults: lines are whole, sonard never waits for a reader or a disk, and lost lines are counted and
 // reported.
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -100,7 +100,7 @@ TEST(JournalFile, CheckGivesTheErrorsOfOpenWithoutAFile) {
   EXPECT_TRUE(JournalFile::check(folder.path + "/new"));
   EXPECT_FALSE(std::filesystem::exists(folder.path + "/new"));
   std::filesystem::create_symlink("linked", folder.path + "/link");
-  EXPECT_TRUE(JournalFile::check(folder.path + "/link")) << "the file that a link names is made, too";
+  EXPECT_TRUE(JournalFile::check(folder.path + "/link")) << "the target of a link may be missing, too";
   EXPECT_FALSE(std::filesystem::exists(folder.path + "/linked"));
   EXPECT_TRUE(JournalFile::open(folder.path + "/link"));
   EXPECT_TRUE(std::filesystem::exists(folder.path + "/linked"));
@@ -118,7 +118,7 @@ TEST(JournalFile, CheckGivesTheErrorsOfOpenWithoutAFile) {
   }
 }
 
-/// A daemon with the fault of a stuck image in every ping; the journal gets a line for each ping.
+/// A daemon with a fault in every ping, so that the journal gets a line per ping.
 struct Journalled {
   explicit Journalled(const std::string& file) {
     DaemonSetup setup;
@@ -127,7 +127,7 @@ struct Journalled {
     client.emplace(daemon->address());
     client->fire(fire_at(oculus::PingRate::hz40));
   }
-  /// Requests pings until entries are lost.
+  /// Receives pings until entries of the journal are lost. Returns false if none is lost within the time limit.
   bool loses() {
     const auto deadline = Steady::now() + patience;
     while (daemon->status().notes_size() == 0 && Steady::now() < deadline)
@@ -143,7 +143,7 @@ struct Journalled {
   std::optional<Client> client;
 };
 
-TEST(FaultJournal, NeverHoldsPingsUpAndCountsWhatAReaderIsTooSlowFor) {
+TEST(FaultJournal, DelaysNoPingAndCountsTheEntriesThatASlowReaderLoses) {
   const Folder folder;
   const std::string file = folder.path + "/fifo";
   const SlowReader reader(file);

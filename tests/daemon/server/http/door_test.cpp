@@ -30,7 +30,7 @@ struct Door : testing::Test {
   std::variant<HttpAnswer, ViewWelcome> open(const Token& token = no_token) {
     return open_view(request, query, {token, secrets, {127, 0, 0, 1}, config}, now);
   }
-  /// "steers", "looks", or the status.
+  /// Returns "steers" or "looks" for an admitted viewer, else the status of the answer.
   std::string outcome(const Token& token = no_token) {
     const auto opened = open(token);
     if (const auto* welcome = std::get_if<ViewWelcome>(&opened)) return welcome->may_steer ? "steers" : "looks";
@@ -49,19 +49,19 @@ struct Door : testing::Test {
 };
 
 TEST_F(Door, OriginAndKeyDecideWhoMayReadAndSteer) {
-  EXPECT_EQ(outcome(), "steers") << "a program: no Origin";
+  EXPECT_EQ(outcome(), "steers") << "a program sends no Origin";
   EXPECT_EQ(outcome_from("http://127.0.0.1:8088"), "steers");
   EXPECT_EQ(outcome_from("http://sonar-lab"), "steers");
   EXPECT_EQ(outcome_from("https://look.example"), "looks");
   EXPECT_EQ(outcome_from("https://steer.example"), "steers");
-  EXPECT_EQ(outcome_from("https://look.example:8443"), "403") << "exact";
+  EXPECT_EQ(outcome_from("https://look.example:8443"), "403") << "the port must match, too";
   EXPECT_EQ(outcome_from("https://evil.example"), "403");
   EXPECT_EQ(outcome_from("null"), "403");
   EXPECT_EQ(outcome_from("file://"), "403");
   EXPECT_EQ(outcome_from(""), "403");
 }
 
-TEST_F(Door, TheKeyOpensForAnyOrigin) {
+TEST_F(Door, WithTheKeyAnyOriginIsAdmitted) {
   query = {{"key", secrets.key()}};
   EXPECT_EQ(outcome_from("null"), "steers");
   EXPECT_EQ(outcome_from("https://look.example"), "steers");
@@ -90,7 +90,7 @@ TEST_F(Door, WithATokenFileEveryViewerMustSendTheToken) {
   EXPECT_EQ(outcome(lab_token), "steers");
 }
 
-TEST_F(Door, TicketsAreGoodOnceAndForHalfAMinute) {
+TEST_F(Door, TicketsAreValidOnceAndForHalfAMinute) {
   const std::string ticket = secrets.new_ticket(now);
   EXPECT_EQ(ticket.size(), 32u);
   query = {{"ticket", ticket}};
@@ -113,7 +113,7 @@ TEST_F(Door, RefusalsNameTheLineThatWouldAdmitTheViewer) {
 TEST_F(Door, TheHandshakeIsChecked) {
   const auto status = [this] { return outcome(); };
   request.socket_protocols = "other, foxglove.websocket.v1 ,foxglove.sdk.v1";
-  EXPECT_EQ(std::get<ViewWelcome>(open()).protocol, "foxglove.websocket.v1") << "the first that the client names";
+  EXPECT_EQ(std::get<ViewWelcome>(open()).protocol, "foxglove.websocket.v1") << "the first protocol that the client names";
   request.socket_protocols = "foxglove.sdk.v1, foxglove.websocket.v1";
   EXPECT_EQ(std::get<ViewWelcome>(open()).protocol, "foxglove.sdk.v1");
   request.socket_protocols = "";

@@ -107,7 +107,7 @@ TEST(HttpRouter, RequestsWithoutTheRequiredTokenAreRejected) {
     EXPECT_EQ(answer_to(r, lab_token).status, 401u) << target;
   }
   HttpRequest post = request_for("POST", "/api/v1/sonar", "broken");
-  EXPECT_EQ(answer_to(post, lab_token).status, 401u) << "before the body is parsed";
+  EXPECT_EQ(answer_to(post, lab_token).status, 401u) << "the token is checked before the body";
   post.authorization = "Bearer 0123456789abcdef";
   EXPECT_EQ(answer_to(post, lab_token).status, 400u);
   EXPECT_FALSE(std::get<HealthAction>(routed(request_for("GET", "/healthz"), lab_token).action).with_text);

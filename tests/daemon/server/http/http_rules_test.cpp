@@ -1,4 +1,4 @@
-// Targets, hosts, origins, tokens, routes: which are accepted and which are refused.
+// Which targets, hosts, origins and routes are accepted and which are refused.
 #include "daemon/server/http/http_rules.hpp"
 
 #include <gmock/gmock.h>
@@ -14,7 +14,7 @@ using Kind = Route::Kind;
 constexpr Ipv4 reached{127, 0, 0, 5};
 const std::vector<std::string> names = {"sonar-lab", "sonar.example.org", "10.1.2.3"};
 
-TEST(HttpRules, TargetsAreTakenApartAndDecoded) {
+TEST(HttpRules, TargetsAreSplitAndDecoded) {
   const auto t = parse_target("/api/v1/sonars/front%20left%2Fup?pings=1&why=%41+b&flag");
   ASSERT_TRUE(t);
   EXPECT_THAT(t->segments, ElementsAre("api", "v1", "sonars", "front left/up"));
@@ -25,7 +25,7 @@ TEST(HttpRules, TargetsAreTakenApartAndDecoded) {
     EXPECT_FALSE(parse_target(bad)) << bad;
 }
 
-TEST(HttpRules, HostsWeMayBeCalled) {
+TEST(HttpRules, HostsOfThisComputerAreAllowed) {
   for (const char* good : {"127.0.0.5:8088", "127.0.0.5", "127.0.0.1:1", "localhost", "LocalHost:8088", "sonar-lab",
                            "SONAR.example.org:80", "10.1.2.3"})
     EXPECT_TRUE(host_allowed(good, reached, names)) << good;
@@ -33,10 +33,10 @@ TEST(HttpRules, HostsWeMayBeCalled) {
                           "localhost:", "localhost:80a", "localhost:123456", "127.0.0.1:80:80", "localhost@evil.example",
                           "0.0.0.0", "sonar-lab.", "127.1"})
     EXPECT_FALSE(host_allowed(bad, reached, names)) << bad;
-  EXPECT_TRUE(host_allowed("192.168.1.7:8088", {192, 168, 1, 7}, {})) << "the address we were reached at";
+  EXPECT_TRUE(host_allowed("192.168.1.7:8088", {192, 168, 1, 7}, {})) << "the address of the connection";
 }
 
-TEST(HttpRules, OriginsThatMayAsk) {
+TEST(HttpRules, OriginsThatMaySendRequests) {
   for (const char* good : {"http://127.0.0.5:8088", "http://localhost", "HTTPS://sonar-lab:444"})
     EXPECT_TRUE(origin_allowed(good, reached, names)) << good;
   for (const char* bad : {"", "null", "http://", "http://evil.example", "file://", "localhost", "ftp://localhost",
@@ -106,7 +106,7 @@ TEST(HttpRules, ARequestIsDetectedInAnyPieces) {
 
 TEST(HttpRules, QueriesSelectEvents) {
   const auto of = [](const char* target) { return subscription_of(*parse_target(target)); };
-  EXPECT_TRUE(of("/e")->pings && of("/e")->clients && of("/e")->poses && of("/e")->scene) << "nothing said: everything";
+  EXPECT_TRUE(of("/e")->pings && of("/e")->clients && of("/e")->poses && of("/e")->scene) << "without a query, all events";
   const auto some = of("/e?pings=1&scene=true&poses=0");
   ASSERT_TRUE(some);
   EXPECT_TRUE(some->pings && some->scene && !some->poses && !some->clients);

@@ -23,7 +23,7 @@ std::string header(const HttpAnswer& answer, const std::string& name) {
   return {};
 }
 
-TEST(Page, AnswersBrowsersAndLeavesOthersTheHelpText) {
+TEST(Page, AnswersBrowsersOnly) {
   const auto page = page_answer({"/", browser, "gzip, deflate, br", ""}, files);
   ASSERT_TRUE(page);
   EXPECT_EQ(page->status, 200u);
@@ -36,7 +36,7 @@ TEST(Page, AnswersBrowsersAndLeavesOthersTheHelpText) {
     EXPECT_FALSE(page_answer({"/", accept, "gzip", ""}, files)) << accept;
 }
 
-TEST(Page, GivesHashedFilesForEver) {
+TEST(Page, BrowsersMayKeepHashedFilesForEver) {
   const auto file = page_answer({"/app-0123.js", "*/*", "GZIP", ""}, files);
   ASSERT_TRUE(file);
   EXPECT_EQ(file->body, "\x04\x05");
