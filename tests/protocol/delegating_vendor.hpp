@@ -1,4 +1,4 @@
-// A vendor that passes every call to another one; tests override the functions that they change.
+// A make (Vendor) that passes every call to another; tests override the functions that they change.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,7 @@ namespace sonar::protocol {
 
 class DelegatingVendor : public Vendor {
  public:
-  /// `of` must outlive it.
+  /// `of` must outlive this object.
   explicit DelegatingVendor(const Vendor& of) : of_(of) {}
   std::string_view name() const override { return of_.name(); }
   std::span<const std::shared_ptr<const SonarModel>> models() const override { return of_.models(); }

@@ -1,4 +1,4 @@
-// Fields by their meaning: each is read from an encoded message at the place that the vendor states.
+// Vendor::field() finds each field by its meaning: the value at that place of an encoded message is right.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -17,7 +17,7 @@ using protocol::Part;
 using protocol::Region;
 using Place = std::pair<std::size_t, std::size_t>;
 
-/// Little-endian, by hand.
+/// Reads a little-endian value without the decoder under test.
 double value_at(wire::BytesView message, const Field& field) {
   std::uint64_t bits = 0;
   for (std::size_t i = field.size; i > 0; --i) bits = bits << 8 | std::to_integer<std::uint64_t>(message[field.offset + i - 1]);
@@ -151,7 +151,7 @@ TEST(Fields, AnOculusPingHasItsRegions) {
     EXPECT_EQ(vendor.region(region, {}), Place{});
 }
 
-/// Header and payload, as a host receives them.
+/// Returns header and payload of a ping, as a host receives them.
 wire::Bytes blueview_ping(const protocol::DeviceState& device) {
   Ping ping;
   ping.request.model = device.model;

@@ -1,4 +1,4 @@
-// Files of every kind with the bytes that the device of each make sends: its host reads the same pings from them.
+// For each make, the bytes of the device are stored in files of every kind; the host reads the same pings from these files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 namespace sonar::protocol::hosts_test {
 namespace {
 
-/// All that the device sent, as a recording keeps it.
+/// Returns the messages that the device sent, as in a recording.
 std::vector<recording::RecordedMessage> messages_of(const Talk& talk) {
   std::vector<recording::RecordedMessage> messages;
   for (const auto& [port, bytes] : talk.sent) {

@@ -25,7 +25,7 @@ TEST_P(Hosts, SendSettingsAndGetPings) {
   talk.run(30);
   ASSERT_FALSE(talk.error) << talk.error->text;
   EXPECT_TRUE(talk.host->is_open());
-  EXPECT_NEAR(talk.settings.range_m, range_m, 0.3) << "as with `sonarctl set sonar --range`";
+  EXPECT_NEAR(talk.settings.range_m, range_m, 0.3) << "the range is that of `sonarctl set sonar --range`";
   if (wanted.settings.gain_percent) {
     EXPECT_NEAR(make.device->gain_percent(talk.state), 50, make.scans ? 50 : 8) << "a Ping360 has three steps";
   }
@@ -36,7 +36,8 @@ TEST_P(Hosts, SendSettingsAndGetPings) {
   const HostPing& ping = talk.pings.back();
   EXPECT_THAT(ping.errors, testing::IsEmpty());
   EXPECT_THAT(ping.echo_mismatches, testing::IsEmpty());
-  EXPECT_THAT(ping.limited, testing::Each(testing::StartsWith("gain "))) << "a gain may have steps";
+  EXPECT_THAT(ping.limited, testing::Each(testing::StartsWith("gain ")))
+      << "only the gain may be limited, because it may have steps";
   EXPECT_NEAR(ping.facts.range_m, make.name() == "waterlinked" ? range_m : talk.settings.range_m, 0.2);
   EXPECT_GT(ping.facts.message_size, 50u);
   const auto picture = ping.picture();
@@ -75,7 +76,7 @@ TEST_P(Hosts, ReportTheTrueRangeInsteadOfTheEchoedOne) {
   EXPECT_THAT(ping.limited, testing::Contains(HasSubstr("not 900 m")));
 }
 
-/// Users type metres, and do not know the fields of messages.
+/// Users type metres and do not know the fields of messages.
 TEST_P(Hosts, RefuseARangeWithTheLimitsInMetres) {
   const auto& model = *GetParam().device->models()[model_of(GetParam())];
   for (const double wanted_m : {900.0, 0.001, static_cast<double>(model.modes.front().max_range_m)}) {
@@ -86,7 +87,7 @@ TEST_P(Hosts, RefuseARangeWithTheLimitsInMetres) {
     if (host) {
       Talk talk(GetParam(), wanted, 0, model_of(GetParam()));
       talk.run(30);
-      if (!talk.error && !talk.pings.empty()) continue;  // limited
+      if (!talk.error && !talk.pings.empty()) continue;  // the sonar has limited the range
       why = talk.error ? talk.error->text : "";
     }
     if (why.find("--range") != std::string::npos) continue;  // this make has no such setting
@@ -94,7 +95,7 @@ TEST_P(Hosts, RefuseARangeWithTheLimitsInMetres) {
   }
 }
 
-/// A host that gets no pings says why, for every model and at the ends of what a user can type.
+/// A host that gets no pings has an error, for every model and for extreme values that a user can type.
 TEST_P(Hosts, NameTheReasonForMissingPings) {
   std::vector<Wanted> all;
   const auto add = [&all](auto setting, auto... values) { ((all.emplace_back().settings.*setting = values), ...); };
@@ -146,14 +147,14 @@ TEST_P(Hosts, FindASonarWithSettingsThatItsModelHas) {
   }
 }
 
-TEST_P(Hosts, ShowPortAtPort) {
+TEST_P(Hosts, ShowAnEchoToPortAtPort) {
   Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), 0, model_of(GetParam()));
   talk.only_port = true;
   talk.run(6);
   ASSERT_FALSE(talk.pings.empty());
   const auto drawing = drawing_of(talk.pings.back());
   ASSERT_TRUE(drawing) << drawing.error().text;
-  if (drawing->kind == PictureKind::waterfall) return;  // one beam
+  if (drawing->kind == PictureKind::waterfall) return;  // it has one beam
   if (drawing->kind == PictureKind::sweep) {
     EXPECT_NEAR(std::remainder(drawing->head_rad - talk.head_rad, 2 * pi), 0, 0.02);
     return;
@@ -192,7 +193,7 @@ TEST_P(Hosts, SurviveTruncatedAndDamagedMessages) {
     other.run(2);
     const std::size_t before = other.pings.size();
     Bytes bytes(last.begin(), last.begin() + static_cast<std::ptrdiff_t>(i < cuts ? random() % last.size() : last.size()));
-    bool hits_length = false;  // always true: such a message may include all bytes that follow
+    bool hits_length = false;  // a message with a damaged length may include all following bytes
     for (std::size_t k = 0; i >= cuts && k < 4; ++k) {
       const std::size_t at = random() % std::min<std::size_t>(bytes.size(), 64);
       hits_length = hits_length || at < 16;
@@ -206,7 +207,8 @@ TEST_P(Hosts, SurviveTruncatedAndDamagedMessages) {
     const std::size_t before_next = other.pings.size();
     if (i % 10 != 0 || hits_length) continue;
     other.run(8);
-    EXPECT_TRUE(other.pings.size() > before_next || other.error) << "the next bytes are read, or the host gives up; input " << i;
+    EXPECT_TRUE(other.pings.size() > before_next || other.error)
+        << "the host neither reads the next pings nor ends with an error; input " << i;
   }
 }
 
@@ -258,10 +260,10 @@ TEST_P(Hosts, RequestSlowPingsForRatesBelowTheLowestOnTheWire) {
   for (const double rate_hz : {1e-300, 1e-6}) {
     Wanted slow;
     slow.settings.rate_hz = rate_hz;
-    if (!GetParam().host(slow)) continue;  // reports that its rate cannot be set
+    if (!GetParam().host(slow)) continue;  // this host reports that the rate cannot be set
     Talk talk(GetParam(), slow, 0, model_of(GetParam()));
     talk.run(3);
-    EXPECT_LE(talk.settings.rate_hz, 2) << "slower than that an Oculus cannot be";
+    EXPECT_LE(talk.settings.rate_hz, 2) << "2 Hz is the lowest rate of an Oculus";
   }
 }
 
@@ -276,7 +278,7 @@ TEST_P(Hosts, LeaveASonarThatKeepsItsSettingsAsTheyFoundIt) {
   talk.run(30);
   ASSERT_FALSE(talk.error) << talk.error->text;
   EXPECT_FALSE(talk.pings.empty());
-  EXPECT_FALSE(talk.state.settings->equals(*found)) << "it sets what is wanted";
+  EXPECT_FALSE(talk.state.settings->equals(*found)) << "the host has set nothing";
   talk.carry_out(talk.host->on_leave());
   EXPECT_TRUE(talk.state.settings->equals(*found));
 }
@@ -290,7 +292,7 @@ TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   talk.run(3);
   EXPECT_EQ(talk.settings.range_m, first.range_m);
   EXPECT_EQ(talk.settings.rate_hz, first.rate_hz);
-  if (!GetParam().each_ping_requested) {  // a request of a ping names the head, which then becomes the active one
+  if (!GetParam().each_ping_requested) {  // each request for a ping names a head, which becomes the active head
     EXPECT_EQ(talk.state.settings, before);
   }
 }
@@ -325,7 +327,7 @@ TEST(Makes, RefuseARateAboveThatOfTheSonar) {
     EXPECT_EQ(why->kind, ErrorKind::usage);
     EXPECT_THAT(why->text, testing::MatchesRegex("the rate of " + std::string(make.title) + " is [01] to .*"));
   }
-  // The heads of this make differ: the host knows the limit when it knows the product.
+  // The heads of this make differ, so the host knows the limit only when it knows the product.
   const Make& blueview = *find_make("blueview");
   Wanted wanted;
   wanted.settings.rate_hz = 40.5;
@@ -337,7 +339,7 @@ TEST(Makes, RefuseARateAboveThatOfTheSonar) {
   EXPECT_THAT(talk.error->text, HasSubstr("P900-90 is 0 to 15 Hz, not 15.5 Hz"));
 }
 
-TEST(Makes, TellTheGainOfTheNearestStep) {
+TEST(Makes, ReportTheGainOfTheNearestStep) {
   for (const auto& [name, told] :
        {std::pair("ping1d", "gain 33 % (step 2 of 6), not 40 %"), std::pair("s500", "gain 38 % (step 5 of 13), not 40 %"),
         std::pair("omniscan450", "gain 43 % (step 3 of 7), not 40 %"),
@@ -357,7 +359,7 @@ TEST(Makes, TellTheGainOfTheNearestStep) {
 }
 
 /// A fan of points opens downwards if the sonar looks down.
-TEST(Makes, DrawASonarThatLooksAheadUpwards) {
+TEST(Makes, DrawTheFanOfASonarThatLooksAheadUpwards) {
   std::map<std::string, bool> downwards;
   for (const Make& make : makes())
     for (std::size_t model = 0; model < make.device->models().size() && make.picture == PictureKind::points; ++model) {
@@ -382,11 +384,11 @@ TEST(Makes, HaveNamesAndPortsOfTheirOwn) {
       }
     bool served = false;
     for (const Port& port : one.device->ports()) served = served || port.number == one.ports.front().number;
-    EXPECT_TRUE(served) << "the device listens where its host connects";
+    EXPECT_TRUE(served) << "the device does not listen at the port of its host";
   }
 }
 
-TEST(Makes, NameWhatEachAddressCarries) {
+TEST(Makes, NameTheContentOfEachAddress) {
   const std::vector<Endpoint> status_to{{{10, 0, 0, 255}, 0}};
   for (const Make& one : makes()) {
     const auto addresses = driver_addresses(*one.device, {10, 0, 0, 5}, status_to);

@@ -1,4 +1,4 @@
-// The host of a make against the device of the same make, in memory and virtual time.
+// A conversation of the host of a make with the device of the same make, in memory and virtual time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace sonar::protocol::hosts_test {
 
 using namespace std::chrono_literals;
 
-/// Its drivers send nothing: `sonarctl set sonar` does.
+/// Returns true for a make whose drivers set nothing, because `sonarctl set sonar` does it.
 inline bool sets_nothing(const Make& make) {
   Wanted range;
   range.settings.range_m = 3;
@@ -42,7 +42,7 @@ inline Wanted all_that_is_known(const Make& make, double range_m) {
   return wanted;
 }
 
-/// Each byte is 7 more than the one before, modulo 251; copied in blocks, because single bytes take long without optimisation.
+/// Each byte is 7 more than the previous one, modulo 251. Blocks are copied, because single bytes take long without optimisation.
 inline void fill_with_pattern(std::vector<std::byte>& samples) {
   std::array<std::byte, 251> period;
   for (std::size_t i = 0; i < period.size(); ++i) period[i] = static_cast<std::byte>(i * 7 % period.size());
@@ -52,7 +52,7 @@ inline void fill_with_pattern(std::vector<std::byte>& samples) {
 
 class Talk {
  public:
-  /// Streams arrive in pieces of this many bytes; 0: in the pieces that were written.
+  /// `piece`: streams arrive in pieces of this many bytes; 0: in the pieces that were written.
   Talk(const Make& of, const Wanted& wanted, std::size_t piece = 0, std::size_t model = 0)
       : make(of), device(*of.device), piece_(piece), host(*of.host(sets_nothing(of) ? Wanted{} : wanted)) {
     state.name = "front";
@@ -66,9 +66,9 @@ class Talk {
     if (sets_nothing(of)) apply({*device.apply_override(wanted.settings, state)});
     for (const auto& [at, port] : test::conversations_of(make)) lines_.push_back({at, port, device.converse(*port, state, now)});
     open(std::move(host));
-    if (make.scans) run(10);  // the host may wait for what the head reports once a second
+    if (make.scans) run(10);  // the host may wait for a report that the head sends once per second
   }
-  /// The host takes the place of the present one.
+  /// Replaces the present host and opens the new one.
   void open(std::unique_ptr<Host> next) {
     host = std::move(next);
     const std::vector<std::uint16_t> own(make.ports.size(), 40000);
@@ -76,7 +76,7 @@ class Talk {
     tick();
   }
 
-  /// Steps of a tenth of a second, with a ping in each unless the device pings on request.
+  /// Runs steps of a tenth of a second. Each has a ping, unless the device pings only on request.
   void run(int steps) {
     for (int i = 0; i < steps && !error; ++i) {
       now += 100ms;
@@ -115,10 +115,10 @@ class Talk {
   PingSettings settings;
   Time now = Time(1'700'000'000s);
   std::vector<HostPing> pings;
-  std::vector<std::pair<std::size_t, Bytes>> sent;  // by the device, with the host's port
+  std::vector<std::pair<std::size_t, Bytes>> sent;  // bytes that the device sent, with the index of the host's port
   std::optional<Error> error;
   bool only_port = false;  // echoes are in some rows of the outermost quarter of the beams to port
-  double head_rad = 0;     // head angle of the request before
+  double head_rad = 0;     // head angle of the last request
 
  private:
   struct Line {
@@ -153,7 +153,7 @@ class Talk {
     sent.emplace_back(port, bytes);
     in_pieces(port, bytes, [&](BytesView part) { carry_out(host->on_bytes(port, part, now)); });
   }
-  /// Passes streams on in pieces and datagrams whole.
+  /// Passes streams in pieces, and datagrams whole, to `give`.
   void in_pieces(std::size_t port, const Bytes& bytes, const std::function<void(BytesView)>& give) const {
     const std::size_t step = piece_ == 0 || make.ports[port].kind != HostPort::Kind::tcp ? bytes.size() : piece_;
     for (std::size_t at = 0; at < bytes.size(); at += step) give(BytesView(bytes).subspan(at, std::min(step, bytes.size() - at)));
@@ -184,7 +184,7 @@ class Talk {
     for (Line& line : lines_) {
       const auto framed = test::bytes_at(make, *line.port, made, state);
       const auto framed_later = test::bytes_at(make, *line.port, looked_at, state);
-      EXPECT_EQ(framed_later ? *framed_later : Bytes{}, framed ? *framed : Bytes{}) << "the findings are the same";
+      EXPECT_EQ(framed_later ? *framed_later : Bytes{}, framed ? *framed : Bytes{}) << "look_at() changes the bytes";
       by_stream = by_stream || (framed && line.port->kind == Port::Kind::tcp_stream);
       const auto delivery = line.dialogue->on_ping(request.vendor_settings.get(), framed ? framed->size() : 0, now);
       for (const Bytes& prefix : delivery.prefixes) {
@@ -207,7 +207,7 @@ class Talk {
 };
 
 inline constexpr double range_m = 3;
-inline std::size_t model_of(const Make& make) { return make.name() == "aris" ? 2 : 0; }  // an ARIS 3000 shows 3 m
+inline std::size_t model_of(const Make& make) { return make.name() == "aris" ? 2 : 0; }  // ARIS 3000, which can show 3 m
 
 class Hosts : public testing::TestWithParam<Make> {};
 

@@ -34,17 +34,17 @@ TEST(Waterfall, AThinEchoStaysWhenTheNewestLineHasLargerRows) {
   EXPECT_THAT(ping.drawing().image.samples, testing::ElementsAre(0, 0, 0, 255, 0, 255));
 }
 
-TEST(Waterfall, ShowsTheDecibelsThatItsSamplesHave) {
+TEST(Waterfall, ShowsTheRangeOfDecibelsOfItsSamples) {
   Waterfall waterfall(48);
   HostPing ping;
   waterfall.add({0, -24, -48, -68}, 0, 1, Time{}, ping);
   EXPECT_THAT(ping.drawing().image.samples, testing::ElementsAre(255, 127.5, 0, 0));
 }
 
-TEST(EmptyFan, APictureShowsNothingBesideIt) {
+TEST(EmptyFan, APictureIsEmptyInsideAndOutsideOfTheFan) {
   SonarPicture points{.kind = PictureKind::points, .image = empty_fan(pi / 4, 10)};
-  const Raster seen = *PicturePainter({360, *find_colour_map("gray"), false}).draw(points);  // it opens downwards
-  EXPECT_EQ(seen.at(180, seen.height / 2).r, 0) << "no echo";
+  const Raster seen = *PicturePainter({360, *find_colour_map("gray"), false}).draw(points);  // the fan opens downwards
+  EXPECT_EQ(seen.at(180, seen.height / 2).r, 0) << "the fan has no echo";
   for (const int x : {20, 340}) EXPECT_EQ(seen.at(x, 60).r, outside_colour.r) << x;
 }
 

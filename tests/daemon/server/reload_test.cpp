@@ -1,5 +1,5 @@
 // SIGHUP: the configuration is read again. Unchanged sonars keep their clients, the others follow the file, and a
-// file with errors changes nothing. The signal goes to this process, as a user would send it.
+// file with errors changes nothing. The tests send the signal to their own process, as a user would.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -57,12 +57,12 @@ TEST(Reload, ASonarThatIsOpenedAnewGetsThePlanOfFaults) {
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "reloaded:"));
   const auto status = daemon.status();
-  ASSERT_EQ(status.faults_size(), 2) << "one each";
+  ASSERT_EQ(status.faults_size(), 2) << "each sonar has one fault";
   EXPECT_EQ(status.faults(1).sonar(), "rear");
   EXPECT_EQ(status.faults(1).name(), "late");
 }
 
-TEST(Reload, AStormOfHangupsIsReadTwice) {
+TEST(Reload, ManyHangupsAtOnceReadTheFileTwice) {
   std::promise<void> let_go;
   DaemonSetup setup = with_file();
   setup.options.load_scene = [goes = let_go.get_future().share()](const SceneFile&) -> Result<ScenePointer> {
@@ -73,15 +73,16 @@ TEST(Reload, AStormOfHangupsIsReadTwice) {
   daemon.on_io_thread([] {
     for (int i = 0; i < 10; ++i) ASSERT_EQ(raise(SIGHUP), 0);
   });
-  EXPECT_EQ(times(daemon.log_text(), "reloaded:"), 0u) << "the first still loads";
+  EXPECT_EQ(times(daemon.log_text(), "reloaded:"), 0u) << "the first reload is still loading";
   let_go.set_value();
   ASSERT_TRUE(eventually([&] { return times(daemon.log_text(), "reloaded:") >= 2; }));
-  ASSERT_TRUE(reload(daemon, "reloaded:", 3)) << "and a later one again";
+  ASSERT_TRUE(reload(daemon, "reloaded:", 3)) << "a later signal reads the file again";
   daemon.stop();
-  EXPECT_EQ(times(daemon.log_text(), "reloaded:"), 3u) << "the first, one for all that came meanwhile, the later one";
+  EXPECT_EQ(times(daemon.log_text(), "reloaded:"), 3u)
+      << "one for the first signal, one for all during it, one for the later signal";
 }
 
-TEST(Reload, AStormOfQuickOnesIsNoMoreThanTwoASecond) {
+TEST(Reload, QuickReloadsAreAtMostTwoPerSecond) {
   Daemon daemon(with_file());
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz2));
@@ -99,18 +100,18 @@ TEST(Reload, AStormOfQuickOnesIsNoMoreThanTwoASecond) {
   for (std::uint32_t i = 1; i <= 4; ++i) {
     const auto ping = client.next_ping();
     ASSERT_TRUE(ping);
-    EXPECT_EQ(ping->head.fixed.ping_id, first->head.fixed.ping_id + i) << "it costs no tick";
+    EXPECT_EQ(ping->head.fixed.ping_id, first->head.fixed.ping_id + i) << "reloads skip no ping";
   }
   daemon.stop();
 }
 
-TEST(Reload, ASceneThatTheMemoryDoesNotSufficeForKeepsEverything) {
+TEST(Reload, ASceneThatNeedsTooMuchMemoryChangesNothing) {
   const std::filesystem::path root = own_path("memory");
   std::filesystem::create_directories(root / "proc");
   std::ofstream(root / "proc/meminfo") << "MemAvailable: 1 kB\n";
   DaemonSetup setup = with_file();
   setup.options.load_scene = [root](const SceneFile&) -> Result<ScenePointer> {
-    memory_root() = root;  // the part that remains after the files are read
+    memory_root() = root;  // the memory is too small only after the files are read
     return small_scene(true);
   };
   Daemon daemon(setup);
@@ -124,14 +125,14 @@ TEST(Reload, ASceneThatTheMemoryDoesNotSufficeForKeepsEverything) {
   std::filesystem::remove_all(root);
 }
 
-/// The scene, lowered.
+/// Returns small_scene(), lowered by this depth.
 ScenePointer sunk_scene(double by_m) {
   auto scene = small_scene();
   for (Object& o : scene->objects) o.in_world.position_m.z -= by_m;
   return scene;
 }
 
-TEST(Reload, NotesAreOfTheNewConfigurationInTheNewScene) {
+TEST(Reload, NotesAreOnTheNewConfigurationInTheNewScene) {
   DaemonSetup setup = with_file();
   setup.options.load_scene = [](const SceneFile&) -> Result<ScenePointer> { return sunk_scene(100); };
   Daemon daemon(setup);
@@ -145,10 +146,10 @@ TEST(Reload, NotesAreOfTheNewConfigurationInTheNewScene) {
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "reloaded:", 2));
   EXPECT_EQ(daemon.status().notes_size(), 1);
-  EXPECT_THAT(daemon.log_text(), HasSubstr("m from everything in the scene")) << "now it is so";
+  EXPECT_THAT(daemon.log_text(), HasSubstr("m from everything in the scene")) << "the vehicle is now far from the scene";
 }
 
-TEST(Reload, ALoadThatLastsTooLongIsTrouble) {
+TEST(Reload, ALoadThatTakesTooLongIsReportedAsAProblem) {
   std::promise<void> let_go;
   DaemonSetup setup = with_file();
   setup.more = "limits: {load_s: 1}\n";
@@ -164,12 +165,13 @@ TEST(Reload, ALoadThatLastsTooLongIsTrouble) {
   };
   ASSERT_EQ(kill(getpid(), SIGHUP), 0);
   EXPECT_TRUE(eventually([&] { return trouble().find("a change of the scene has been loading for ") == 0; }));
-  EXPECT_TRUE(eventually([&] { return times(daemon.log_text(), "longer than limits.load_s") == 1; })) << "said once";
+  EXPECT_TRUE(eventually([&] { return times(daemon.log_text(), "longer than limits.load_s") == 1; }))
+      << "the log line is not repeated";
   let_go.set_value();
   EXPECT_TRUE(eventually([&] { return trouble().empty(); }));
 }
 
-TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {
+TEST(Reload, UntouchedSonarsContinueWhileOthersAreAddedChangedOrRemoved) {
   const std::string left = "127.0.0.3", rear = "127.0.0.4", up = "127.0.0.5";
   DaemonSetup setup = with_file();
   setup.sonar_lines = "    device_id: 7001\n" + sonar("left", left, 7002) + sonar("rear", rear, 7003);
@@ -182,12 +184,12 @@ TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {
   of_rear.fire(once);
   ASSERT_TRUE(client.next_ping() && of_left.next_ping() && of_rear.next_ping());
 
-  // The front moves to the end of the file, left has another device id, rear is gone, up is new.
+  // The front is unchanged, left has another device id, rear is gone, up is new.
   setup.sonar_lines = "    device_id: 7001\n" + sonar("left", left, 7012) + sonar("up", up, 7004);
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "reloaded: front untouched, left changed, up added, rear removed"));
 
-  EXPECT_TRUE(of_left.read_to_end()) << "a FIN after a whole message";
+  EXPECT_TRUE(of_left.read_to_end()) << "the stream ends with a whole message and a FIN";
   EXPECT_TRUE(of_rear.read_to_end());
   Client of_up(up), again(left);
   of_up.fire(fire_at(PingRate::hz10));
@@ -202,12 +204,12 @@ TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {
   for (int i = 0; i < 10; ++i) {  // pings from before the reload come first
     const auto next = client.next_ping();
     ASSERT_TRUE(next);
-    EXPECT_GT(next->head.fixed.ping_id, last) << "no ping twice";
+    EXPECT_GT(next->head.fixed.ping_id, last) << "no ping is sent twice";
     skipped += last == 0 ? 0 : next->head.fixed.ping_id - last - 1;
     last = next->head.fixed.ping_id;
   }
   daemon.stop();
-  EXPECT_LE(skipped, daemon.figures().dropped) << "no gap but what the client was too slow for";
+  EXPECT_LE(skipped, daemon.figures().dropped) << "only pings for which the client was too slow are missing";
   EXPECT_EQ(daemon.figures().clients, 1u);
   std::uint32_t number = 0;
   for (const PingRequest& r : daemon.requests())
@@ -216,7 +218,7 @@ TEST(Reload, UntouchedSonarsStreamOnWhileOthersComeChangeAndGo) {
     }
 }
 
-TEST(Reload, AnErrorKeepsEverything) {
+TEST(Reload, AnErrorChangesNothing) {
   DaemonSetup setup = with_file();
   Daemon daemon(setup);
   Client client(daemon.address());
@@ -231,7 +233,7 @@ TEST(Reload, AnErrorKeepsEverything) {
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
 }
 
-TEST(Reload, ASceneThatCannotBeLoadedKeepsEverything) {
+TEST(Reload, ASceneThatCannotBeLoadedChangesNothing) {
   DaemonSetup setup = with_file();
   setup.options.load_scene = [](const SceneFile& f) -> Result<ScenePointer> {
     return failure(ErrorKind::bad_data, f.name() + ": no such mesh");
@@ -265,7 +267,7 @@ TEST(Reload, ASonarThatCannotBeOpenedStaysAsItWas) {
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
 }
 
-TEST(Reload, AnOptionOfAnotherVendorTouchesNothing) {
+TEST(Reload, AnOptionOfAnotherVendorChangesNoSonar) {
   DaemonSetup setup = with_file();
   Daemon daemon(setup);
   setup.sonar_lines = "    options: {heads_base: strict}\n";  // options of BlueView
@@ -276,7 +278,7 @@ TEST(Reload, AnOptionOfAnotherVendorTouchesNothing) {
   EXPECT_TRUE(reload(daemon, "reloaded: front changed"));
 }
 
-TEST(Reload, SonarsMayChangeAddressesWithEachOther) {
+TEST(Reload, SonarsMayExchangeAddresses) {
   const std::string other = "127.0.0.3";
   DaemonSetup setup = with_file();
   setup.sonar_lines = "    device_id: 7001\n" + sonar("left", other, 7002);
@@ -291,7 +293,7 @@ TEST(Reload, SonarsMayChangeAddressesWithEachOther) {
   const auto ping = of_front.next_ping();
   ASSERT_TRUE(ping);
   EXPECT_EQ(ping->head.fixed.header.source, 7001);
-  EXPECT_EQ(daemon.requests().back().sonar_id, 0u) << "its noise is its own, wherever it listens";
+  EXPECT_EQ(daemon.requests().back().sonar_id, 0u) << "a sonar keeps its noise at another address";
 }
 
 TEST(Reload, WaterMountsVehiclesAndSeedAreTakenOver) {
@@ -311,7 +313,7 @@ TEST(Reload, WaterMountsVehiclesAndSeedAreTakenOver) {
   ASSERT_TRUE(eventually([&] { return daemon.requests().size() > by_now + 1; }));
   const PingRequest last = daemon.requests().back();
   EXPECT_EQ(last.water.temperature_c, 4);
-  EXPECT_EQ(last.sonar_in_world.position_m.z, -2) << "of the rov, which is the second vehicle now";
+  EXPECT_EQ(last.sonar_in_world.position_m.z, -2) << "the sonar is on the rov, which is now the second vehicle";
   EXPECT_EQ(static_cast<std::uint64_t>(last.seed), 99u);
   EXPECT_EQ(daemon.status().vehicles_size(), 2);
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(client.next_ping());
@@ -349,10 +351,10 @@ TEST(Reload, KeysThatNeedARestartAreNamedInOneWarning) {
   daemon.write_config(yaml_of(setup));
   ASSERT_TRUE(reload(daemon, "these need a restart and stay as they were: engine.threads, clock, log"));
   EXPECT_EQ(daemon.status().clock(), "realtime");
-  ASSERT_TRUE(reload(daemon, "these need a restart", 2)) << "as long as the file says so";
+  ASSERT_TRUE(reload(daemon, "these need a restart", 2)) << "the warning is repeated while the file has these keys";
 }
 
-TEST(Reload, ManyInARowLeaveNothingBehind) {
+TEST(Reload, ManyReloadsLeaveNoState) {
   const std::string left = "127.0.0.3";
   DaemonSetup setup = with_file();
   setup.sonar_lines = "    status_to: ['127.0.0.1:9']\n";
@@ -388,7 +390,7 @@ TEST(KeepWhatNeedsARestart, NamesAndRestoresChangedKeys) {
   next.poses.max_jump_m = 7;
   EXPECT_THAT(keep_restart_keys(now, next), ElementsAre("poses.json", "control", "engine.simd"));
   EXPECT_TRUE(next.poses.json.enabled);
-  EXPECT_EQ(next.poses.max_jump_m, 7) << "what can be taken over stays";
+  EXPECT_EQ(next.poses.max_jump_m, 7) << "keys that need no restart keep their new values";
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ class Gate {
 control::AddObject added(const std::string& name, bool moving = false) { return {name, "box", {}, Pose{{1, 2, -3}, {}}, moving}; }
 int objects_in(const v1::DaemonStatus& status) { return status.objects_size(); }
 
-TEST(SceneChange, PingsGoOnWithTheOldSceneUntilTheNewOneIsReady) {
+TEST(SceneChange, PingsUseTheOldSceneUntilTheNewOneIsReady) {
   auto gate = std::make_shared<Gate>();
   DaemonSetup setup;
   setup.before_engine = [gate](const Scene&) { gate->pass(); };
@@ -63,13 +63,13 @@ TEST(SceneChange, PingsGoOnWithTheOldSceneUntilTheNewOneIsReady) {
   gate->open();
   EXPECT_EQ(answer.get().code, Code::done);
   EXPECT_EQ(objects_in(daemon.status()), 3);
-  const std::size_t by_now = daemon.scenes().size() + 1;  // one may be on its way to the engine
+  const std::size_t by_now = daemon.scenes().size() + 1;  // a request may be on its way to the engine
   ASSERT_TRUE(eventually([&] { return daemon.scenes().size() > by_now; }));
   EXPECT_EQ(daemon.scenes().back()->objects.size(), 3u);
   EXPECT_THAT(daemon.log_text(), HasSubstr("scene: object buoy added"));
 }
 
-TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
+TEST(SceneChange, UnderLoadNoPingIsLostAndEachHasTheBodiesOfItsScene) {
   DaemonSetup setup;
   setup.moving_object = true;
   setup.engine_takes = milliseconds(3);
@@ -116,7 +116,7 @@ TEST(SceneChange, UnderLoadNoPingIsLostAndEachMeetsItsOwnBodies) {
     }
   }
   EXPECT_GT(with_whale, 0u);
-  EXPECT_LE(skipped, daemon.figures().dropped) << "the client misses only what it was too slow for";
+  EXPECT_LE(skipped, daemon.figures().dropped) << "only pings for which the client was too slow are missing";
   EXPECT_EQ(daemon.figures().refused, 0u);
 }
 
@@ -131,7 +131,7 @@ TEST(SceneChange, TheRateOfNewEnginesIsLimitedWhileADriverIsServed) {
   for (int i = 0; i < SceneChanges::most_at_once + beyond; ++i)
     EXPECT_EQ(daemon.ask(added("buoy " + std::to_string(i))).code, Code::done);
   EXPECT_GE(Steady::now() - begin, (beyond - 1) * SceneChanges::between_engines);
-  EXPECT_EQ(objects_in(daemon.status()), 2 + SceneChanges::most_at_once + beyond) << "none is lost";
+  EXPECT_EQ(objects_in(daemon.status()), 2 + SceneChanges::most_at_once + beyond) << "no object is lost";
 }
 
 /// Edits that wait at the same time need only one new engine. If one of them cannot be made, only that one fails.
@@ -147,7 +147,7 @@ TEST(SceneChange, EditsThatWaitShareAnEngine) {
   gate->open();
   EXPECT_EQ(first.get().code, Code::done);
   EXPECT_EQ(others[0].get().code, Code::done);
-  EXPECT_NE(others[1].get().code, Code::done) << "its name is taken";
+  EXPECT_NE(others[1].get().code, Code::done) << "an object of this name exists";
   EXPECT_EQ(others[2].get().code, Code::done);
   EXPECT_EQ(objects_in(daemon.status()), 5);
   EXPECT_EQ(gate->arrived(), 2) << "engines";
@@ -186,7 +186,7 @@ TEST(SceneChange, ChangesQueueInOrder) {
   gate->open();
   EXPECT_EQ(first.get().code, Code::done);
   EXPECT_EQ(second.get().code, Code::done);
-  EXPECT_EQ(third.get().code, Code::done) << "of an object that was added just before";
+  EXPECT_EQ(third.get().code, Code::done) << "the object was added just before";
   EXPECT_EQ(fourth.get().code, Code::done);
   const OperationResult again = wrong.get();
   EXPECT_EQ(again.code, Code::refused);
@@ -199,7 +199,7 @@ TEST(SceneChange, ChangesQueueInOrder) {
 
 TEST(SceneChange, AnAnsweredClientMayRequestAgainAtOnce) {
   Daemon daemon;
-  std::vector<OperationResult::Code> answers;  // on the I/O thread
+  std::vector<OperationResult::Code> answers;  // used only on the I/O thread
   daemon.on_io_thread([&] {
     Operations& operations = daemon.app().operations();
     const auto keep = [&answers](OperationResult result) { answers.push_back(result.code); };
@@ -247,7 +247,7 @@ TEST(SceneChange, ErrorsOfForeignFilesAreOnlyInTheLog) {
   const std::string file = ::testing::TempDir() + "secret" + std::to_string(::getpid()) + ".yaml";
   std::ofstream(file) << "password\n";
   DaemonSetup setup;
-  setup.options.load_scene = [](const SceneFile& f) -> Result<ScenePointer> {  // as the loader does
+  setup.options.load_scene = [](const SceneFile& f) -> Result<ScenePointer> {  // the error has the texts of the loader
     std::string word;
     std::ifstream(f.path) >> word;
     return failure(ErrorKind::bad_data, f.name() + ":1:1: expected a map, found \"" + word + "\"");
@@ -287,7 +287,7 @@ TEST(SceneChange, ALoadedSceneKeepsThePosesOfBodiesItAlsoHas) {
   EXPECT_EQ(request.bodies_in_world[1].position_m.y, 8);
 }
 
-TEST(SceneChange, MovingObjectsAreMovedAndHiddenWithoutASceneOfTheirOwn) {
+TEST(SceneChange, MovingObjectsAreMovedAndHiddenWithoutANewScene) {
   DaemonSetup setup;
   setup.moving_object = true;
   setup.before_engine = [](const Scene&) { ADD_FAILURE() << "an engine was built"; };
@@ -297,13 +297,13 @@ TEST(SceneChange, MovingObjectsAreMovedAndHiddenWithoutASceneOfTheirOwn) {
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", false, {}}).code, Code::done);
   EXPECT_FALSE(daemon.status().objects(2).visible());
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", {}, Pose{{3, 0, -3}, {}}}).code, Code::done);
-  EXPECT_FALSE(daemon.status().objects(2).visible()) << "a pose alone does not show it";
+  EXPECT_FALSE(daemon.status().objects(2).visible()) << "a pose alone does not show the object";
   ASSERT_EQ(daemon.ask(control::SetObject{"crate", true, {}}).code, Code::done);
   EXPECT_TRUE(daemon.status().objects(2).visible());
   EXPECT_EQ(daemon.status().objects(2).position().x(), 3);
 }
 
-TEST(SceneChange, SteppedTimeStandsStillMeanwhile) {
+TEST(SceneChange, SteppedTimeDoesNotPassMeanwhile) {
   auto gate = std::make_shared<Gate>();
   DaemonSetup setup;
   setup.more = "clock: stepped\n";
@@ -318,7 +318,7 @@ TEST(SceneChange, SteppedTimeStandsStillMeanwhile) {
   gate->open();
   EXPECT_EQ(answer.get().code, Code::done);
   ASSERT_TRUE(client.next_ping());
-  EXPECT_EQ(daemon.requests().front().fired_at, Time{}) << "no time has gone by";
+  EXPECT_EQ(daemon.requests().front().fired_at, Time{}) << "no simulated time has passed";
   EXPECT_EQ(daemon.scenes().front()->objects.size(), 3u);
 }
 

@@ -1,4 +1,4 @@
-// The beacon: when it starts, its source address, and its data about the connected client.
+// The beacon of an Oculus: its start, its source address, and its data about the connected client.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <netinet/in.h>
@@ -65,7 +65,7 @@ TEST(Status, ComesFromTheSonarsAddressAndFollowsTheConnection) {
   EXPECT_EQ(first->status.header.source, 4711u);
   EXPECT_EQ(first->from, daemon.address()) << "some drivers connect to the source, some to the payload";
   EXPECT_EQ(text_of(protocol::Ipv4(first->status.ip_address)), daemon.address());
-  EXPECT_NE(first->from_port, 52102) << "that port belongs to the drivers";
+  EXPECT_NE(first->from_port, 52102) << "drivers listen at that port";
   EXPECT_EQ(first->status.connected_ip, (std::array<std::uint8_t, 4>{}));
   {
     Client client(daemon.address());  // TCP is ready before the first status
@@ -74,11 +74,11 @@ TEST(Status, ComesFromTheSonarsAddressAndFollowsTheConnection) {
   EXPECT_TRUE(eventually([&] { return listener.next()->status.connected_ip == std::array<std::uint8_t, 4>{}; }));
 }
 
-TEST(Status, ComesOnceASecond) {
+TEST(Status, ComesOncePerSecond) {
   Listener listener;
   DaemonSetup setup;
   setup.sonar_lines = "    status_to: ['127.0.0.1:" + std::to_string(listener.port) + "']\n";
-  const auto begin = Steady::now();  // the first is sent after this time, no matter how late it is read
+  const auto begin = Steady::now();  // the first status is sent after this time, even if it is read late
   Daemon daemon(setup);
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(listener.next());
   const auto took = Steady::now() - begin;

@@ -1,4 +1,4 @@
-// A controller's side for tests: commands as bytes, and a device that receives them.
+// The side of a controller, for tests: commands as bytes, and a device that receives them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ inline Bytes hex(std::string_view text) {
   return bytes;
 }
 
-/// Valid on a 3000: 128 beams.
+/// Returns settings that are valid for an ARIS 3000, with 128 beams.
 inline Acoustics acoustics(std::uint32_t cookie = 1) {
   return {cookie, 12, 800, 1360, 4920, 4, 6, 9, true, Frequency::high, true, 12};
 }

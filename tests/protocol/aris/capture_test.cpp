@@ -1,4 +1,4 @@
-// A recording of a real ARIS 1200 with telephoto lens, which is stored outside the repository: our description of the header
+// A recording of a real ARIS 1200 with a telephoto lens, stored outside the repository: our description of the header
 // reads it, and our formulas give its window and its beams.
 #include <cstdlib>
 #include <filesystem>

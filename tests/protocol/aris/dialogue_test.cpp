@@ -18,7 +18,7 @@ struct Talk {
     state.connected_client = {10, 0, 0, 7};
     dialogue = vendor().converse(vendor().ports().front(), state, tests::at_s(0));
   }
-  /// Carries out the dialogue's requests, as the daemon does.
+  /// Passes bytes to the dialogue and carries out its events, as the daemon does.
   void say(const Bytes& bytes, double at = 0) {
     const protocol::Reaction reaction = dialogue->on_bytes(bytes, tests::at_s(at));
     EXPECT_TRUE(reaction.replies.empty()) << "the device never answers";
@@ -53,7 +53,7 @@ struct Talk {
   std::string closed;
 };
 
-TEST(ArisDialogue, FramesFlowOnceReceiverAndValidSettingsAreThere) {
+TEST(ArisDialogue, FramesNeedAReceiverAndValidSettings) {
   for (const bool receiver_first : {true, false}) {
     Talk talk;
     if (receiver_first) talk.say(tests::set_receiver(56444));
@@ -65,7 +65,8 @@ TEST(ArisDialogue, FramesFlowOnceReceiverAndValidSettingsAreThere) {
     }
     EXPECT_EQ(talk.settings.rate_hz, 12);
     ASSERT_EQ(talk.receivers.size(), 1u);
-    EXPECT_EQ(talk.receivers[0], (protocol::Endpoint{{}, 56444})) << "without an address, frames go to the controller's own";
+    EXPECT_EQ(talk.receivers[0], (protocol::Endpoint{{}, 56444}))
+        << "without an address, frames go to the address of the controller";
     EXPECT_EQ(talk.held().first_ping, 17u);
     EXPECT_EQ(talk.held().applied, 1u);
     EXPECT_EQ(talk.settings.beam_count, 128);
@@ -82,7 +83,7 @@ Command set_salinity(std::uint32_t psu) {
   return command;
 }
 
-TEST(ArisDialogue, CommandsAddUpWhileAFaultDelaysThem) {
+TEST(ArisDialogue, DelayedCommandsDoNotUndoEachOther) {
   Talk talk;
   talk.late = true;
   talk.say(tests::set_receiver(56444));
@@ -103,7 +104,7 @@ TEST(ArisDialogue, CommandsAddUpWhileAFaultDelaysThem) {
   EXPECT_EQ(talk.settings.rate_hz, 12) << "the receiver belongs to the connection";
 }
 
-TEST(ArisDialogue, AFurtherControllerNeitherRenumbersNorStopsTheFrames) {
+TEST(ArisDialogue, ASecondControllerNeitherRenumbersNorStopsTheFrames) {
   Talk talk;
   talk.say(tests::set_receiver(56444));
   talk.say(tests::set_acoustics(tests::acoustics()));

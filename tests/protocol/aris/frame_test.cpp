@@ -37,7 +37,8 @@ Ping ping_of(const protocol::DeviceState& device, const Settings& settings, std:
   ping.request.sonar_in_world.position_m = {0, 0, -10};
   const PingSettings& s = ping.request.settings;
   ping.samples.resize(static_cast<std::size_t>(s.range_bin_count * s.beam_count));
-  for (std::size_t i = 0; i < ping.samples.size(); ++i) ping.samples[i] = static_cast<std::byte>(i % 128);  // code = our beam
+  for (std::size_t i = 0; i < ping.samples.size(); ++i)
+    ping.samples[i] = static_cast<std::byte>(i % 128);  // the code is our number of the beam
   return ping;
 }
 
@@ -46,7 +47,7 @@ TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
   Settings s = initial_settings(state);
   s.first_ping = 40;
   s.clock_offset = std::chrono::seconds(100);
-  s.telephoto = true;  // a 3000 has no such lens
+  s.telephoto = true;  // no effect: an ARIS 3000 has no such lens
   apply(s, tests::acoustics(9), state);
   const auto datagrams = vendor().datagrams(vendor().ports()[2], ping_of(state, s, 42), state);
   FramePart part;
@@ -92,7 +93,7 @@ TEST(ArisFrame, HeaderFieldsAreAtTheVendorsOffsets) {
   EXPECT_EQ(u32(700), static_cast<std::uint32_t>(1.7e9));
 }
 
-TEST(ArisFrame, IsPutTogetherFromPartsInAnyOrder) {
+TEST(ArisFrame, IsAssembledFromPartsInAnyOrder) {
   for (const char* reordered : {"false", "true"}) {
     auto state = tests::device("aris-3000", {{"reordered", reordered}});
     Settings s = initial_settings(state);
@@ -114,7 +115,7 @@ TEST(ArisFrame, IsPutTogetherFromPartsInAnyOrder) {
   }
 }
 
-TEST(ArisFrame, LacksAPart) {
+TEST(ArisFrame, WithoutAPartIsIncomplete) {
   const auto state = tests::device();
   Settings s = initial_settings(state);
   apply(s, tests::acoustics(), state);
@@ -145,7 +146,7 @@ TEST(ArisFrame, TheFirstPartHasFieldsAndRegions) {
   ASSERT_TRUE(header && image);
   EXPECT_EQ(header->second, 744u);
   EXPECT_EQ(image->second, 620u);
-  EXPECT_EQ(image->first, header->first + 744 + 3) << "behind its field number and length";
+  EXPECT_EQ(image->first, header->first + 744 + 3) << "after its field number and length";
   EXPECT_FALSE(vendor().region(protocol::Region::bearings, first));
   EXPECT_FALSE(vendor().field(protocol::Part::beacon, protocol::FieldName::magic, {}));
   EXPECT_FALSE(vendor().field(protocol::Part::ping, protocol::FieldName::rows, BytesView(first).first(100)));

@@ -46,7 +46,7 @@ struct Levels {
     for (const auto& row : db) sum += std::inner_product(row.begin(), row.end() - 1, row.begin() + 1, 0.0);
     return sum / static_cast<double>(db.size() * (beams - 1)) / moment(2);
   }
-  /// Returns the mean of each channel's beams, less the mean of the channels beside it.
+  /// Returns the mean over the beams of each inner channel, less the mean of its two neighbours.
   std::vector<double> stripes() const {
     std::vector<double> gains(channels);
     for (const auto& row : db)
@@ -77,7 +77,7 @@ Statistics statistics_of(const Levels& levels) {
           levels.less_local_mean(15, 15).next_beam(), levels.stripes()};
 }
 void expect_like_recording(const Statistics& s) {
-  EXPECT_NEAR(s.spread_db, 4.01, 0.15 * 4.01);  // recording: 4.00 to 4.02; with one look a sample: 5.5
+  EXPECT_NEAR(s.spread_db, 4.01, 0.15 * 4.01);  // recording: 4.00 to 4.02; with one look per sample: 5.5
   EXPECT_NEAR(s.skew, -0.39, 0.15);             // recording: -0.37 to -0.40; with one look: -1.06
   EXPECT_NEAR(s.next_row, 0.16, 0.08);          // recording: 0.15 to 0.17
   EXPECT_NEAR(s.next_beam, 0.02, 0.06);         // recording: 0.02 to 0.03; with all beams of one ping: 0.14
@@ -88,8 +88,8 @@ void expect_like_recording(const Statistics& s) {
   EXPECT_LT(std::sqrt(error / static_cast<double>(table.size())), 0.35);  // the table itself has 1.2 dB rms
 }
 
-/// A frame at the recording's settings, of a bed 2 m below the sonar, which moves at 0.5 m/s; for comparison, frames whose beams
-/// are all of one ping.
+/// Returns a frame with the settings of the recording, of a bed 2 m below the sonar, which moves at 0.5 m/s. If not
+/// `interleaved`, all beams are of one ping.
 Levels emulated(bool interleaved = true) {
   const auto state = tests::device("aris-1200");
   Settings settings;
@@ -112,7 +112,7 @@ Levels emulated(bool interleaved = true) {
   return levels;
 }
 
-/// Returns frame 0 to 5 of the recording; empty without the recording.
+/// Returns a frame, 0 to 5, of the recording; no rows without the recording.
 Levels recorded(int frame) {
   const char* const folder = std::getenv("SONARD_CAPTURES");
   if (folder == nullptr) return {};
@@ -130,9 +130,9 @@ Levels recorded(int frame) {
   return levels;
 }
 
-TEST(ArisLikeness, SamplesHaveTheLooksOfTheRecording) { expect_like_recording(statistics_of(emulated())); }
+TEST(ArisLikeness, EmulatedSamplesHaveTheStatisticsOfTheRecording) { expect_like_recording(statistics_of(emulated())); }
 
-TEST(ArisLikeness, NeighboursOfOnePingWouldBeAlike) { EXPECT_GT(statistics_of(emulated(false)).next_beam, 0.1); }
+TEST(ArisLikeness, BeamsOfOnePingWouldBeMoreAlike) { EXPECT_GT(statistics_of(emulated(false)).next_beam, 0.1); }
 
 TEST(ArisLikeness, TheRecordingHasThoseStatistics) {
   for (int frame = 3; frame < 6; ++frame) {

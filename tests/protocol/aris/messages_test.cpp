@@ -1,4 +1,4 @@
-// Bytes of commands, beacon and parts against vectors of the vendor's own programs.
+// Compares the bytes of commands, beacon and parts with vectors of the vendor's own programs.
 #include "tests/protocol/aris/aris_testing.hpp"
 
 namespace sonar::aris {
@@ -41,7 +41,7 @@ TEST(ArisCommands, ArriveInPiecesOfAnySize) {
 
 TEST(ArisCommands, ZerosMayBeLeftOut) {
   Command command;
-  ASSERT_TRUE(protobuf::read(hex("08 04 32 00"), command)) << "fresh water, of a controller with proto3";
+  ASSERT_TRUE(protobuf::read(hex("08 04 32 00"), command)) << "a controller with proto3 sends no value for fresh water";
   EXPECT_EQ(command.type, CommandType::set_salinity);
   ASSERT_TRUE(command.salinity);
   EXPECT_EQ(command.salinity->value, 0u);
@@ -50,7 +50,7 @@ TEST(ArisCommands, ZerosMayBeLeftOut) {
   EXPECT_EQ(command.type, CommandType::set_date_time);
 }
 
-TEST(ArisCommands, LengthsThatLieAndCutMessages) {
+TEST(ArisCommands, WrongLengthsAndCutMessagesAreRefused) {
   CommandFramer framer;
   framer.append(hex("00001001 08"));
   EXPECT_FALSE(framer.next());
@@ -113,7 +113,7 @@ TEST(ArisParts, CoverTheFrameWithoutGapAndFitOldBuffers) {
   const auto parts = parts_of(1, header, Bytes(std::size_t{128} * 946));
   EXPECT_EQ(parts.size(), 89u);
   EXPECT_EQ(Bytes(parts[0].begin(), parts[0].begin() + 6), hex("08 01 10 80 B2 07"));
-  EXPECT_EQ(Bytes(parts[0].end() - 2, parts[0].end()), hex("28 00")) << "an offset of 0 is said";
+  EXPECT_EQ(Bytes(parts[0].end() - 2, parts[0].end()), hex("28 00")) << "an offset of 0 is written";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Beams of each product and lens, against the vendor's published tables as facts: edges, spacing, side.
+// Compares the beams of each product and lens with facts of the vendor's published tables: edges, spacing, side.
 #include "core/base/geometry.hpp"
 #include "tests/protocol/aris/aris_testing.hpp"
 

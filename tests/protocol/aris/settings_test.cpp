@@ -71,7 +71,7 @@ TEST(ArisSettings, PulseAndRateAreConstrained) {
   a.frame_rate_hz = 15, a.pulse_us = 20;
   Verdict verdict = judge(a, product("aris-3000"), true);
   EXPECT_TRUE(verdict.constrained);
-  EXPECT_EQ(verdict.used.pulse_us, 16u) << "240 / 15, and the limit of the high frequency";
+  EXPECT_EQ(verdict.used.pulse_us, 16u) << "240 / 15, which is also the limit of the high frequency";
   a.frequency = Frequency::low;
   EXPECT_EQ(judge(a, product("aris-3000"), true).used.pulse_us, 16u) << "240 / 15";
   a.frame_rate_hz = 10;
@@ -83,7 +83,7 @@ TEST(ArisSettings, PulseAndRateAreConstrained) {
   EXPECT_NEAR(verdict.used.frame_rate_hz, 6.7, 0.05);
 }
 
-TEST(ArisSettings, CookiesTellAppliedConstrainedAndInvalidSettings) {
+TEST(ArisSettings, CookiesNameAppliedConstrainedAndInvalidSettings) {
   const auto state = tests::device();
   Settings s = initial_settings(state);
   apply(s, tests::acoustics(3), state);
@@ -115,7 +115,7 @@ TEST(ArisSettings, SamplesLieWhereDelayPeriodAndSoundSpeedPutThem) {
   EXPECT_EQ(p.range_bin_count, 2000);
   s.salinity = 35;
   const double salt = static_cast<double>(ping_settings(s, state).device_sound_speed_mps) / c;
-  EXPECT_NEAR(salt, 1.029, 0.003) << "a wrong salinity is a wrong range";
+  EXPECT_NEAR(salt, 1.029, 0.003) << "a wrong salinity scales the ranges";
 }
 
 TEST(ArisSettings, FocusMovesAtTheSpeedOfItsMotor) {
@@ -127,7 +127,7 @@ TEST(ArisSettings, FocusMovesAtTheSpeedOfItsMotor) {
   EXPECT_FALSE(focus_at(s, tests::at_s(1.6)).moves);
 }
 
-TEST(ArisOverride, IsWhatAControllerWouldHaveSet) {
+TEST(ArisOverride, EqualsTheSettingsOfAController) {
   const auto state = tests::device();
   const auto change = [&](const protocol::SettingsOverride& wanted) { return vendor().apply_override(wanted, state); };
   const auto far = change({12, 5, 50, {}, {}});

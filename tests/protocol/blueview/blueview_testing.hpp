@@ -1,4 +1,4 @@
-// A host's side of the link for tests: requests as bytes, decoded replies, and a device that answers them.
+// The side of a host, for tests: requests as bytes, decoded replies, and a device that answers the requests.
 #pragma once
 
 #include <string>

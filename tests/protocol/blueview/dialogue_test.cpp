@@ -94,7 +94,7 @@ TEST(BlueViewDialogue, SettingsAreSharedByAllHosts) {
   EXPECT_EQ(std::get<float>(*read_value(reader, Key::stop_range)), 20);
 }
 
-TEST(BlueViewDialogue, SeveralSetsInOneReadAllHold) {
+TEST(BlueViewDialogue, AllOfSeveralSetRequestsInOneReadAreApplied) {
   auto device = test::device();
   Host host(device);
   wire::Bytes all = test::hello();
@@ -121,7 +121,7 @@ TEST(BlueViewDialogue, APingGoesOnceToHostsThatRequestedIt) {
   ASSERT_EQ(second.prefixes.size(), 1u);
   EXPECT_EQ(id_of(second.prefixes[0]), 22u);
   EXPECT_TRUE(quiet.ready().prefixes.empty());
-  EXPECT_TRUE(one.ready().prefixes.empty()) << "answered already";
+  EXPECT_TRUE(one.ready().prefixes.empty()) << "the requests are answered already";
 }
 
 TEST(BlueViewDialogue, APingWithOlderSettingsDoesNotAnswerARequest) {
@@ -133,7 +133,7 @@ TEST(BlueViewDialogue, APingWithOlderSettingsDoesNotAnswerARequest) {
   host.say(test::ping(3));
   const auto stale = host.dialogue->on_ping(before.get(), 10, at_s(0));
   EXPECT_TRUE(stale.prefixes.empty());
-  EXPECT_FALSE(stale.events.empty()) << "it asks again";
+  EXPECT_FALSE(stale.events.empty()) << "the dialogue requests another ping";
   const auto fresh = host.ready();
   ASSERT_EQ(fresh.prefixes.size(), 1u);
   EXPECT_EQ(id_of(fresh.prefixes[0]), 3u);
@@ -149,7 +149,7 @@ TEST(BlueViewDialogue, TriggersOfTwoHeadsAreServedOneAfterTheOther) {
   const auto delivery = host.dialogue->on_ping(of_first_head.get(), 10, at_s(0));
   ASSERT_EQ(delivery.prefixes.size(), 1u);
   EXPECT_EQ(id_of(delivery.prefixes[0]), 1u);
-  ASSERT_EQ(delivery.events.size(), 2u) << "the other head is next";
+  ASSERT_EQ(delivery.events.size(), 2u) << "the other head pings next";
   EXPECT_EQ(std::get<ChangeSettings>(delivery.events[0]).settings.mode, 1);
 }
 
@@ -213,7 +213,7 @@ TEST(BlueViewDialogue, KeepAliveIsSentInSilence) {
   const auto filled = host.tick(2);
   ASSERT_EQ(filled.replies.size(), 1u);
   EXPECT_EQ(test::reply_from(filled.replies[0]).header.type, FrameType::keep_alive);
-  EXPECT_FALSE(closes(host.tick(1000))) << "whether the host is there is not a matter of this time";
+  EXPECT_FALSE(closes(host.tick(1000))) << "simulated time does not end the connection of a silent host";
   EXPECT_EQ(blueview::make_dialogue(device, test::at_s(0))->longest_silence(), std::chrono::seconds(10));
 }
 

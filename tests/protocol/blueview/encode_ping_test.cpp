@@ -8,7 +8,7 @@
 namespace sonar::blueview {
 namespace {
 
-/// Sample = 100 row + beam.
+/// Makes a ping whose samples are 100 row + beam.
 Ping numbered_ping(const protocol::DeviceState& device, const SonarSettings& all) {
   Ping ping;
   ping.request.model = device.model;
@@ -80,8 +80,8 @@ TEST(BlueViewPing, CarriesTheVehiclesNavigation) {
   const Decoded d = decode(encode_ping(numbered_ping(device, all), device, all));
   EXPECT_EQ(d.nav, nav_time | nav_depth | nav_pitch | nav_roll | nav_heading);
   EXPECT_NEAR(d.depth, 7, 1e-5);
-  EXPECT_NEAR(d.pitch, 10, 1e-4) << "bow up";
-  EXPECT_NEAR(d.roll, 3, 1e-4) << "port up";
+  EXPECT_NEAR(d.pitch, 10, 1e-4) << "the bow is up";
+  EXPECT_NEAR(d.roll, 3, 1e-4) << "port is up";
   EXPECT_NEAR(d.heading, 0, 1e-4) << "yaw 90 deg from east is north";
 }
 

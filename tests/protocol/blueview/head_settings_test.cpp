@@ -39,7 +39,7 @@ TEST(HeadSettings, EverythingSetReadsBack) {
   }
 }
 
-TEST(HeadSettings, RangesAreMovedIntoTheProductOrRefused) {
+TEST(HeadSettings, RangesAreLimitedToThoseOfTheProductOrRefused) {
   const auto device = test::device();
   SonarSettings all = initial_sonar_settings(device);
   const auto moved = apply(all, 0, Key::range, FloatPair{0, 500}, device);
@@ -54,7 +54,7 @@ TEST(HeadSettings, RangesAreMovedIntoTheProductOrRefused) {
   const auto refused = apply(before, 0, Key::stop_range, 500.0f, strict);
   EXPECT_FALSE(refused.value);
   EXPECT_EQ(refused.refusal.code, Code::bad_range);
-  EXPECT_EQ(before.heads[0].stop_m, initial_sonar_settings(strict).heads[0].stop_m) << "state unchanged";
+  EXPECT_EQ(before.heads[0].stop_m, initial_sonar_settings(strict).heads[0].stop_m) << "a refused setting changes nothing";
 }
 
 TEST(HeadSettings, WrongKindsHeadsAndKeysAreRefused) {
@@ -81,7 +81,7 @@ TEST(HeadSettings, TheFirstBinLiesHalfABinBeyondTheStart) {
   HeadSettings far;
   far.start_m = 0;
   far.stop_m = 100;
-  EXPECT_EQ(grid_of(far, 0.0254).bins, 2400) << "coarser bins instead of more";
+  EXPECT_EQ(grid_of(far, 0.0254).bins, 2400) << "for a long range, bins become coarser, not more";
 }
 
 TEST(HeadSettings, BecomePingSettings) {
@@ -99,7 +99,7 @@ TEST(HeadSettings, BecomePingSettings) {
   all.heads[0].ping_interval_ms = 500;
   EXPECT_FLOAT_EQ(ping_settings(all, device).rate_hz, 2);
   all.heads[0].ping_interval_ms = 1;
-  EXPECT_FLOAT_EQ(ping_settings(all, device).rate_hz, 15) << "no faster than the product";
+  EXPECT_FLOAT_EQ(ping_settings(all, device).rate_hz, 15) << "the rate is limited to that of the product";
 }
 
 TEST(HeadSettings, NoSettingsAreTheInitialOnes) {

@@ -9,7 +9,7 @@
 namespace sonar::blueview {
 namespace {
 
-TEST(BlueViewModels, EveryHeadHasAPresetThatTheEngineTakes) {
+TEST(BlueViewModels, EveryHeadHasAPresetThatTheEngineAccepts) {
   std::set<std::string> profiles;
   for (const auto& model : models()) {
     EXPECT_TRUE(profiles.insert(model->profile).second) << model->profile;
@@ -24,7 +24,7 @@ TEST(BlueViewModels, EveryHeadHasAPresetThatTheEngineTakes) {
       EXPECT_GT(s.range_bin_count, 0);
       EXPECT_LE(presets[i].stop_m, static_cast<double>(model->modes[i].max_range_m));
       EXPECT_GE(presets[i].start_m, static_cast<double>(model->modes[i].min_range_m));
-      EXPECT_LT(model->name.size(), 20u) << model->name << ": hosts give 20 bytes";
+      EXPECT_LT(model->name.size(), 20u) << model->name << ": hosts reserve 20 bytes";
     }
   }
   for (const char* family : {"p450", "p900", "m450", "m900", "m900-2250", "mb1350", "mb2250"})

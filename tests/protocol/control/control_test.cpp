@@ -61,15 +61,15 @@ TEST(Control, APoseWithoutAnIdIsDetectedByItsFields) {
   EXPECT_FALSE(is_unasked_pose(encode_request({300, PoseSample{}})));
   EXPECT_FALSE(is_unasked_pose(encode_request({0, GetStatus{}})));
   EXPECT_FALSE(is_unasked_pose({}));
-  EXPECT_TRUE(is_unasked_pose(Wire{}.sub(13, {}).out)) << "an object's";
-  EXPECT_FALSE(is_unasked_pose(Wire{}.sub(12, {}).sub(3, {}).out)) << "the last of two counts";
-  EXPECT_FALSE(is_unasked_pose(Wire{}.sub(12, {}).varint(1, 7).out)) << "wherever the id stands";
+  EXPECT_TRUE(is_unasked_pose(Wire{}.sub(13, {}).out)) << "the pose of an object";
+  EXPECT_FALSE(is_unasked_pose(Wire{}.sub(12, {}).sub(3, {}).out)) << "the last of two operations is used";
+  EXPECT_FALSE(is_unasked_pose(Wire{}.sub(12, {}).varint(1, 7).out)) << "the id may come last";
   const Bytes whole = encode_request({0, PoseSample{}});
   for (std::size_t n = 0; n < whole.size(); ++n) EXPECT_FALSE(is_unasked_pose(BytesView(whole).first(n))) << n;
 }
 
 TEST(Control, DecodesHandAssembledNedPose) {
-  const double h = std::sqrt(0.5);  // yaw 90 degrees: heading east
+  const double h = std::sqrt(0.5);  // a yaw of 90 degrees, which is heading east
   const auto s = decode_pose_datagram(pose_bytes(1, vec(10, 20, 3), quat(h, 0, 0, h)));
   ASSERT_TRUE(s) << s.error().text;
   EXPECT_EQ(s->name, "rov");
@@ -140,7 +140,7 @@ TEST(Control, IllFormedNamesAreRefusedWithoutALineOnStderr) {
   EXPECT_FALSE(refused.has_value());
 }
 
-TEST(Control, SlightDriftOfTheNormIsRepaired) {
+TEST(Control, ANormThatDiffersSlightlyFromOneIsRepaired) {
   const auto s = decode_pose_datagram(pose_bytes(2, vec(0, 0, 0), quat(1.0005, 0, 0, 0)));
   ASSERT_TRUE(s);
   EXPECT_NEAR(norm_squared(s->pose.orientation), 1, 1e-14);

@@ -1,4 +1,4 @@
-// One example of every request, of a full status and of every event, with no two equal numbers; and comparisons of messages.
+// An example of every request, of a full status and of every event, in which all numbers differ; and comparisons of messages.
 #pragma once
 
 #include <vector>

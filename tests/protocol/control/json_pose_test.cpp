@@ -1,4 +1,4 @@
-// JSON lines: ArduPilot's keys, refusals in sentences, lines at every split.
+// JSON lines: ArduPilot's keys, texts of refusals, and lines that are split at any byte.
 #include "protocol/control/json_pose.hpp"
 
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ TEST(JsonPose, ReadsArduPilotsKeys) {
   const Vec3d ahead = rotate(s->pose.orientation, {1, 0, 0});
   EXPECT_NEAR(ahead.z, std::sin(0.1), 1e-12) << "positive pitch is bow up";
   ASSERT_TRUE(s->velocity_mps);
-  EXPECT_NEAR(s->velocity_mps->x, 2 * std::cos(0.1), 1e-12) << "2 m/s east, heading east: ahead in body axes";
+  EXPECT_NEAR(s->velocity_mps->x, 2 * std::cos(0.1), 1e-12) << "2 m/s to the east while heading east is ahead in body axes";
   EXPECT_EQ(s->fields, "timestamp position attitude velocity");
   EXPECT_EQ(s->sent_in, Frame::ned_frd);
 }
@@ -52,8 +52,8 @@ TEST(JsonPose, KeepsTheAnglesThatWereSent) {
     return angle_beyond_radians(parse_json_pose(R"({"position":[0,0,3],)" + orientation + "}")->sent_angles).rad;
   };
   EXPECT_EQ(largest(R"("attitude":[1,-90,45])"), 90);
-  EXPECT_EQ(largest(R"("attitude":[0,-5,45])"), 45) << "no pitch is half a turn";
-  EXPECT_EQ(largest(R"("attitude":[0,1.5,-45])"), 0) << "a heading of 7 turns";
+  EXPECT_EQ(largest(R"("attitude":[0,-5,45])"), 45) << "a pitch of 5 rad is impossible";
+  EXPECT_EQ(largest(R"("attitude":[0,1.5,-45])"), 0) << "a heading may be 7 turns";
   EXPECT_EQ(largest(R"("attitude":[0,1.5,-65])"), 65);
   EXPECT_EQ(largest(R"("quaternion":[1,0,0,0])"), 0);
 }
@@ -85,7 +85,7 @@ TEST(JsonPose, RefusalsHaveAReason) {
   EXPECT_EQ(why("{\"position\":[0,0,0],\"attitude\":[0,0,0],\"vehicle\":\"\xff\xfe\"}"), "line is not JSON") << "invalid UTF-8";
 }
 
-TEST(JsonPose, EveryTruncationIsRefusedQuietly) {
+TEST(JsonPose, EveryTruncationIsRefused) {
   const std::string line = R"({"timestamp":1.0,"position":[0,0,3],"attitude":[0,0.1,0.5],"velocity":[0,0,0]})";
   for (std::size_t n = 0; n < line.size(); ++n) ASSERT_NE(why(line.substr(0, n)), "accepted") << n;
   EXPECT_EQ(why(line), "accepted");
@@ -113,7 +113,7 @@ TEST(LineParser, EverySplitGivesTheSameLines) {
   }
 }
 
-TEST(LineParser, AfterAGapTheNextWholeLineIsTaken) {
+TEST(LineParser, AfterAGapTheNextWholeLineIsReturned) {
   const auto bytes = [](std::string_view text) { return std::as_bytes(std::span(text.data(), text.size())); };
   for (const bool has_whole_line : {false, true}) {
     LineParser parser;
@@ -124,7 +124,7 @@ TEST(LineParser, AfterAGapTheNextWholeLineIsTaken) {
       ASSERT_EQ(parser.next().value().text, "{\"a\":1}");
     }
     EXPECT_FALSE(parser.next());
-    EXPECT_TRUE(parser.may_become_object()) << "what a line began with is not known";
+    EXPECT_TRUE(parser.may_become_object()) << "the begin of the line is not known";
     parser.feed(bytes("5,6"));
     EXPECT_FALSE(parser.next());
     parser.feed(bytes("]}\n{\"c\":3}\n{\"d"));
@@ -180,7 +180,7 @@ TEST(LineParser, DetectsLinesThatBeginLikeAnObject) {
   EXPECT_FALSE(begins("POST / HTTP/1.1\n") || begins("[{}]\n") || begins(longest) || begins(longest + "\n"));
 }
 
-TEST(LineParser, ManyLinesInOneReadTakeTimeInProportion) {
+TEST(LineParser, TheTimeOfManyLinesGrowsInProportion) {
   // 32 MiB of two-byte lines: moving the rest forward after each line would copy 280 TB, which takes hours. Under sanitizers an
   // eighth of the size is used: 4 TB.
   constexpr int many = test::is_sanitized ? 2 << 20 : 16 << 20;
@@ -195,7 +195,7 @@ TEST(LineParser, ManyLinesInOneReadTakeTimeInProportion) {
   EXPECT_EQ(parser.next()->text, "last");
 }
 
-TEST(LineParser, ALineBeyondTheLimitIsReportedOnceAndSwallowed) {
+TEST(LineParser, ALineBeyondTheLimitIsReportedOnceAndSkipped) {
   LineParser parser;
   int too_long = 0;
   std::vector<std::string> lines;

@@ -41,7 +41,7 @@ TEST(ControlJson, ReadsEveryRequestLikeItsBytes) {
   const std::string at = R"("at":{"frame":"NED_FRD","position":{"x":1,"y":2,"z":3},"orientation":{"w":1}})";
   const auto add = request_from_json("add_object", R"({"name":"a","like":"b",)" + at + "}");
   ASSERT_TRUE(add) << add.error().text;
-  EXPECT_EQ(std::get<AddObject>(add->op).in_world.position_m.x, 2) << "north and east change places";
+  EXPECT_EQ(std::get<AddObject>(add->op).in_world.position_m.x, 2) << "north and east are exchanged";
   const auto plays = request_from_json("set_trajectory", R"({"vehicle":"rov","paused":true,"speed":2})");
   ASSERT_TRUE(plays) << plays.error().text;
   EXPECT_EQ(std::get<SetTrajectory>(plays->op).speed, 2.0);

@@ -42,7 +42,7 @@ TEST(ControlRequests, SettingsOfASonarArriveUnchanged) {
   EXPECT_EQ(got.id, 5u);
   EXPECT_EQ(b.sonar, "front");
   EXPECT_EQ(b.range_m, 12.5);
-  EXPECT_EQ(b.rate_hz, 0.0) << "zero is standby, not absence";
+  EXPECT_EQ(b.rate_hz, 0.0) << "a rate of zero is standby; it is not missing";
   EXPECT_EQ(b.gain_percent, 40.0);
   EXPECT_EQ(b.mode, 1u);
   EXPECT_EQ(b.beams, 256u);
@@ -52,7 +52,7 @@ TEST(ControlRequests, SettingsOfASonarArriveUnchanged) {
   moved.mount = MountChange{Vec3d{0, 0, 0}, {}};
   const auto kept = std::get<SetSonar>(round_trip({1, moved}).op);
   EXPECT_EQ(kept.mount->position_m, Vec3d{}) << "the origin is a position";
-  EXPECT_FALSE(kept.mount->orientation) << "what is not given stays";
+  EXPECT_FALSE(kept.mount->orientation) << "an orientation that is not given stays missing";
   const auto none = std::get<SetSonar>(round_trip({1, SetSonar{}}).op);
   EXPECT_FALSE(none.range_m || none.rate_hz || none.gain_percent || none.mode || none.beams || none.transmit || none.mount);
 }
@@ -87,7 +87,7 @@ TEST(ControlRequests, OtherRequestsArriveUnchanged) {
   EXPECT_EQ(std::get<Step>(round_trip(all[13]).op).dt_s, 0.125);
 }
 
-/// Request{id 3, sonar: SetSonar{range_m: 5, transmit: false}}, by hand: wrappers are messages of their own.
+/// The bytes of Request{id 3, sonar: SetSonar{range_m: 5, transmit: false}}, typed by hand. Optional values are wrapper messages.
 TEST(ControlRequests, HandAssembledBytesAreDecoded) {
   Bytes bytes;
   for (const unsigned b : {0x08u, 0x03u, 0x2au, 0x0du, 0x12u, 0x09u, 0x09u, 0u, 0u, 0u, 0u, 0u, 0u, 0x14u, 0x40u, 0x3au, 0x00u})
@@ -141,7 +141,7 @@ TEST(ControlRequests, TruncationsAndFlippedBytesAreReadOrRefusedNeverFatal) {
         return;
       }
       const auto again = decode_request(encode_request(*got));
-      EXPECT_TRUE(again) << "what was accepted can be said again: " << again.error().why;
+      EXPECT_TRUE(again) << "an accepted message can be encoded again: " << again.error().why;
     };
     for (std::size_t n = 0; n < whole.size(); ++n) try_it(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n)));
     for (std::size_t at = 0; at < whole.size(); ++at) {

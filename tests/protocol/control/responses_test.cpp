@@ -52,7 +52,7 @@ TEST(ControlResponses, EveryEventArrivesWhole) {
     ASSERT_TRUE(got) << got.error().text;
     EXPECT_TRUE(same(**got, sent)) << json_of(**got);
   }
-  EXPECT_FALSE(decode_response(encode_response(response_with(v1::Event())))) << "of a later version";
+  EXPECT_FALSE(decode_response(encode_response(response_with(v1::Event())))) << "an event of a later version";
 }
 
 TEST(ControlResponses, EveryCodeArrives) {

@@ -1,4 +1,4 @@
-// Findings on drivers from a daemon's status: statuses in, findings out.
+// The findings on drivers that doctor derives from the status of a daemon.
 #include "protocol/doctor/judge.hpp"
 
 #include <gmock/gmock.h>
@@ -56,7 +56,7 @@ bool any_fails(const v1::DaemonStatus& status) {
   return std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.level == Level::fail; });
 }
 
-TEST(Judge, AllIsWellWithADriverThatReads) {
+TEST(Judge, HasNothingToReportOnADriverThatReads) {
   const v1::DaemonStatus now = with(pinging + driver, R"(vehicles { name: "rov" source: "json 127.0.0.1" } engine: "embree")");
   v1::DaemonStatus before = two_seconds_before(now);
   before.mutable_sonars(0)->mutable_figures()->set_pings(80);
@@ -78,7 +78,7 @@ TEST(Judge, MissingDriversAreReported) {
       HasSubstr("the last driver, 10.0.0.7:1, left at 01:02:03 UTC: closed by the client"));
 }
 
-TEST(Judge, ADriverByUdpIsPointedAtItsPort) {
+TEST(Judge, TheFindingOnAMissingUdpDriverNamesItsPort) {
   const Finding f =
       trouble(judge(control::message_from<v1::DaemonStatus>(R"(clock: "realtime" sonars { name: "scan" profile: "ping360"
       advertised: "127.0.0.3" addresses { protocol: "udp" address: "127.0.0.3:12345" }
@@ -143,7 +143,7 @@ TEST(Judge, AConnectionForCommandsNeedsNoPings) {
   EXPECT_THAT(troubles(judge(with(pinging + driver + commands + "}"), nullptr)), IsEmpty());
   EXPECT_THAT(trouble(with(commands + "requests: 1 }"), "driver").text, HasSubstr("but nobody is connected for its pings"));
   EXPECT_EQ(trouble(with(pinging + driver + commands + "unread_s: 8 }"), "read").level, Level::fail);
-  EXPECT_THAT(trouble(with(commands + "}"), "driver").text, HasSubstr("has not asked for pings")) << "nobody gets pings yet";
+  EXPECT_THAT(trouble(with(commands + "}"), "driver").text, HasSubstr("has not asked for pings")) << "no client gets pings yet";
 }
 
 TEST(Judge, StandbyAndNoiseNameTheirClient) {
@@ -208,13 +208,14 @@ TEST(Judge, AReconnectedDriverIsOnlyAWarning) {
            "connected_s: " + connected_s + " }";
   };
   const std::string gone = left("127.0.0.1:1", "5");
-  EXPECT_TRUE(any_fails(with(pinging + silent + "}" + gone))) << "connected, without a ping";
+  EXPECT_TRUE(any_fails(with(pinging + silent + "}" + gone))) << "a connected driver without a ping is an error";
   EXPECT_TRUE(any_fails(with(pinging + silent + "pings_written: 3 }" + left("127.0.0.1:1", "2.5"))))
-      << "another driver of that host, which was connected before";
+      << "another driver of the same host that was connected before";
   const Finding f = trouble(with(pinging + silent + "pings_written: 3 }" + gone), "driver");
   EXPECT_EQ(f.level, Level::warn);
   EXPECT_EQ(f.cure, "");
-  EXPECT_TRUE(any_fails(with(pinging + silent + "pings_written: 3 }" + left("127.0.0.9:1", "5")))) << "another driver";
+  EXPECT_TRUE(any_fails(with(pinging + silent + "pings_written: 3 }" + left("127.0.0.9:1", "5"))))
+      << "another driver was disconnected";
 }
 
 TEST(Judge, ADriverThatAnotherClientReplacedIsNamed) {
@@ -230,7 +231,7 @@ TEST(Judge, ADriverThatAFaultDisconnectedIsNamed) {
   EXPECT_EQ(f.cure, "");
 }
 
-TEST(Judge, PosesThatStopOrComeTooLate) {
+TEST(Judge, PosesThatStopOrComeTooLateAreReported) {
   const v1::DaemonStatus now =
       with(pinging + driver, R"(vehicles { name: "rov" source: "json 10.0.0.9" stale: true } poses { late: 12 })");
   EXPECT_THAT(trouble(now, "poses").text, HasSubstr("poses of rov have stopped, the last came from json 10.0.0.9"));
@@ -240,7 +241,7 @@ TEST(Judge, PosesThatStopOrComeTooLate) {
   EXPECT_THAT(trouble(with(pinging + driver, R"(notes { text: "odd" cure: "even" })"), "note").cure, "even");
 }
 
-TEST(Judge, AnEngineThatIsTooSlow) {
+TEST(Judge, AnEngineThatIsTooSlowIsReported) {
   v1::DaemonStatus now = with(" pinging: true rate_hz: 10 figures { pings: 114 simulation_ms: 138 skipped_ticks: 30 } " + driver);
   v1::DaemonStatus before = two_seconds_before(now);
   before.mutable_sonars(0)->mutable_figures()->set_pings(100);
@@ -250,7 +251,7 @@ TEST(Judge, AnEngineThatIsTooSlow) {
   EXPECT_EQ(f.cure, less_to_compute);
   now.mutable_sonars(0)->set_profile("omniscan-450");
   EXPECT_EQ(trouble(judge(now, &before), "rate").text, "front makes 7.0 of 10 lines/s: computing takes 138 ms");
-  before.mutable_sonars(0)->mutable_figures()->set_skipped_ticks(30);  // its host requested no further pings
+  before.mutable_sonars(0)->mutable_figures()->set_skipped_ticks(30);  // the host of this sonar requested no further pings
   EXPECT_THAT(troubles(judge(now, &before)), IsEmpty());
   now.mutable_sonars(0)->mutable_figures()->set_refused(3);
   EXPECT_EQ(trouble(judge(now, &before), "rate").text, "The engine refused 3 pings of front");

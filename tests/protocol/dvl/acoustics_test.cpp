@@ -1,4 +1,4 @@
-// The beams of a DVL over ground at known places, computed by the whole engine.
+// The beams of a DVL over ground at known positions, computed with the whole engine.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,7 @@ namespace {
 using namespace tests;
 using namespace sonar::test;
 
-/// A DVL that looks down, and its device from ping to ping.
+/// A DVL that looks down, and the state of the device, which changes with each ping.
 struct Dvl {
   explicit Dvl(std::shared_ptr<const Scene> scene, std::size_t model = 0) : state(device(model)) {
     sounding = std::make_unique<Sounding>(scene, state.model->modes[0], vendor().initial_settings(state).settings);
@@ -39,7 +39,7 @@ struct Dvl {
     settings = next->settings;
     return m;
   }
-  /// Returns the measurement after this many pings, in which the device may find the ground.
+  /// Returns the measurement of the ninth ping at this position; the device may need eight to find the ground.
   Measurement settled(Vec3d at, RollPitchYaw vehicle = {}, Vec3d moves_mps = {}) {
     for (int i = 0; i < 8; ++i) ping(at, vehicle, moves_mps);
     return ping(at, vehicle, moves_mps);
@@ -75,8 +75,8 @@ TEST(DvlAcoustics, TheForwardBeamsReachTheGroundThatRisesAhead) {
   Dvl dvl(SceneMaker().add(height_field(-20, 20, -20, 20, 0.5, [](double x, double) { return -5 + 0.3 * x; }), -25).make());
   const Measurement m = dvl.settled({});
   ASSERT_TRUE(m.is_valid);
-  EXPECT_LT(m.beams[2].distance_m, m.beams[0].distance_m - 0.5) << "forward, port";
-  EXPECT_LT(m.beams[3].distance_m, m.beams[1].distance_m - 0.5) << "forward, starboard";
+  EXPECT_LT(m.beams[2].distance_m, m.beams[0].distance_m - 0.5) << "the beam forward to port";
+  EXPECT_LT(m.beams[3].distance_m, m.beams[1].distance_m - 0.5) << "the beam forward to starboard";
   EXPECT_NEAR(m.altitude_m, 5, 0.1);
 }
 
@@ -84,7 +84,7 @@ TEST(DvlAcoustics, StarboardIsStarboard) {
   Dvl dvl(SceneMaker().add(height_field(-20, 20, -20, 20, 0.5, [](double, double y) { return -5 - 0.3 * y; }), -25).make());
   const Measurement m = dvl.settled({});
   ASSERT_TRUE(m.is_valid);
-  EXPECT_LT(m.beams[0].distance_m, m.beams[1].distance_m - 0.5) << "starboard, where the ground rises";
+  EXPECT_LT(m.beams[0].distance_m, m.beams[1].distance_m - 0.5) << "the ground rises to starboard";
   EXPECT_LT(m.beams[3].distance_m, m.beams[2].distance_m - 0.5);
 }
 
@@ -96,7 +96,7 @@ TEST(DvlAcoustics, HasNoVelocityWithoutAnEchoOfTheGround) {
     EXPECT_EQ(valid, 0) << altitude_m;
   }
   Dvl far(bed(-80), 1);
-  EXPECT_TRUE(far.settled({}).is_valid) << "an A125";
+  EXPECT_TRUE(far.settled({}).is_valid) << "an A125 reaches the ground";
 }
 
 TEST(DvlAcoustics, SoftGroundIsLostAtLowerAltitudes) {
@@ -111,7 +111,7 @@ TEST(DvlAcoustics, SoftGroundIsLostAtLowerAltitudes) {
 }
 
 TEST(DvlAcoustics, ABeamOverAnEdgeIsLostAndThreeRemain) {
-  // Ground except ahead to starboard.
+  // The ground is missing ahead to starboard.
   Dvl dvl(SceneMaker()
               .add(height_field(-20, 0.3, -20, 20, 0.5, [](double, double) { return -5; }), -25)
               .add(height_field(0.3, 20, 0.3, 20, 0.5, [](double, double) { return -5; }), -25)

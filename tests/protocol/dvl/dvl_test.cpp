@@ -1,4 +1,4 @@
-// A DVL against the published protocol: its lines and commands, coordinate frames and signs, and the formulas of velocity and
+// Compares a DVL with the published protocol: lines, commands, coordinate frames, signs, and the formulas of velocity and
 // dead reckoning.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 constexpr std::array<double, beam_count> level{2, 2, 2, 2};
 
-/// Returns the measured velocity for this motion in the vehicle's axes: x forward, y to starboard, z down.
+/// Returns the measurement for this velocity in the axes x forward, y to starboard, z down.
 Measurement moving(Vec3d frd_mps, Settings settings = {}, std::array<double, beam_count> distances = level) {
   const protocol::DeviceState state = device();
   settings.mode = 1;
@@ -60,27 +60,27 @@ TEST(DvlVelocity, ThreeBeamsAreEnoughAndTwoAreNot) {
   EXPECT_FALSE(two.is_valid);
   EXPECT_EQ(two.velocity_mps, Vec3d{});
   EXPECT_EQ(two.altitude_m, -1);
-  EXPECT_FALSE(moving({5, 0, 0}).is_valid) << "faster than an A50 measures";
+  EXPECT_FALSE(moving({5, 0, 0}).is_valid) << "5 m/s exceeds the range of an A50";
 }
 
 TEST(DvlVelocity, AltitudeIsAlongTheAxisAboveSlopingGround) {
-  // The plane z = 2 + 0.2 x: distance d along a unit vector u with d u_z = 2 + 0.2 d u_x.
+  // On the plane z = 2 + 0.2 x, the distance d along a unit vector u satisfies d u_z = 2 + 0.2 d u_x.
   std::array<double, beam_count> distances{};
   for (std::size_t i = 0; i < beam_count; ++i) distances[i] = 2 / (beam_direction(i).z - 0.2 * beam_direction(i).x);
   EXPECT_NEAR(moving({}, {}, distances).altitude_m, 2, 0.002);
 }
 
-/// A DVL that is mounted a quarter turn clockwise: its x axis looks to the vehicle's starboard.
+/// The DVL is mounted a quarter turn clockwise, so its x axis points to the vehicle's starboard.
 TEST(DvlVelocity, MountingRotationTurnsIntoTheVehiclesFrame) {
   Settings s;
   s.mounting_rotation_deg = 90;
-  const Measurement m = moving({1, 0, 0.2}, s);  // in the device's axes
+  const Measurement m = moving({1, 0, 0.2}, s);  // velocity in the device's axes
   EXPECT_NEAR(m.velocity_mps.x, 0, 1e-9);
   EXPECT_NEAR(m.velocity_mps.y, 1, 1e-9);
   EXPECT_NEAR(m.velocity_mps.z, 0.2, 1e-9);
 }
 
-/// Without samples no measurement is possible; the device reports a measurement that was made before.
+/// After look_at(), the device reports the stored measurement, even if the samples are lost.
 TEST(DvlVelocity, IsMeasuredOnceForAllItsLines) {
   const protocol::DeviceState state = device();
   Settings s;
@@ -133,7 +133,7 @@ TEST(DvlVelocity, NoiseHasTheStatedCovarianceAndRepeats) {
   EXPECT_NEAR(of_squares / pings, stated, 0.1 * stated);
 }
 
-/// The example in the maker's documentation.
+/// Uses the example in the maker's documentation.
 TEST(DvlVelocity, FigureOfMeritIsTheRootOfTheLargestEigenvalue) {
   const Covariance example{{{2.4471841442164077e-08, -3.3937477272871774e-09, -1.6659699175747278e-09},
                             {-3.3937477272871774e-09, 1.4654466085062268e-08, 4.0409570134514183e-10},
@@ -188,7 +188,7 @@ TEST(DvlReckoning, IntegratesInTheAxesOfItsStart) {
     step(0.1 * i, 90);
   }
   EXPECT_NEAR(r.position_m.x, 1, 1e-9);
-  EXPECT_NEAR(r.position_m.y, 1, 1e-9) << "to starboard of the heading at the start";
+  EXPECT_NEAR(r.position_m.y, 1, 1e-9) << "the second metre is to starboard of the first heading";
   const Json line = Json::parse(text_of(position_line(r, Time(1'700'000'002s))));
   EXPECT_NEAR(line["yaw"].get<double>(), 90, 1e-6);
   EXPECT_NEAR(line["roll"].get<double>(), 0, 1e-6);
@@ -300,7 +300,7 @@ TEST(DvlCommands, PingsAreTriggeredOneByOneWhileAcousticsAreDisabled) {
   client.ask(R"({"command":"set_config","parameters":{"acoustic_enabled":false}})");
   EXPECT_EQ(client.settings.rate_hz, 0);
   for (int i = 0; i < 15; ++i) EXPECT_EQ(client.ask(trigger)["success"], true);
-  EXPECT_EQ(client.ask(trigger)["success"], false) << "15 wait";
+  EXPECT_EQ(client.ask(trigger)["success"], false) << "15 triggers wait already";
   EXPECT_GT(client.settings.rate_hz, 0);
   EXPECT_TRUE(client.settings.triggered);
   EXPECT_EQ(client.requests, 1);
@@ -308,7 +308,7 @@ TEST(DvlCommands, PingsAreTriggeredOneByOneWhileAcousticsAreDisabled) {
   EXPECT_EQ(client.requests, 15);
 }
 
-TEST(DvlCommands, DeadReckoningIsReportedFiveTimesASecondAndReset) {
+TEST(DvlCommands, DeadReckoningIsReportedFiveTimesPerSecondAndReset) {
   Client client;
   Settings s;
   s.reckoning = {.is_started = true, .at = client.now, .first = {}, .last = {}, .position_m = {3, 2, 1}, .velocity_mps = {}};
@@ -345,7 +345,7 @@ TEST(DvlSettings, AnOperatorSetsTheRangeAndStandbyAlone) {
   EXPECT_NEAR(vendor().apply_override(wanted, state)->settings.range_m, 14 / std::cos(rad_from_deg(22.5)), 1e-9);
   wanted = {.range_m = 60, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = {}};
   EXPECT_THAT(vendor().apply_override(wanted, state).error().text, HasSubstr("50 m"));
-  EXPECT_TRUE(vendor().apply_override(wanted, device(1))) << "an A125";
+  EXPECT_TRUE(vendor().apply_override(wanted, device(1))) << "an A125 has this range";
   wanted = {.range_m = {}, .rate_hz = 0, .gain_percent = {}, .mode = {}, .beams = {}};
   EXPECT_EQ(vendor().apply_override(wanted, state)->settings.rate_hz, 0);
   wanted.rate_hz = 5;

@@ -27,7 +27,7 @@ inline protocol::DeviceState device(std::size_t model = 0) {
   return state;
 }
 
-/// A ping whose beams have echoes at these distances, 0 for none, fired by a device that looks down and whose vehicle heads
+/// Returns a ping whose beams have echoes at these distances (0: no echo), of a device that looks down and whose vehicle heads
 /// along the world's x axis.
 inline Ping ping_of(const std::array<double, beam_count>& distances_m, const Settings& settings,
                     const protocol::DeviceState& state) {

@@ -1,4 +1,4 @@
-// The serial line of a DVL against the published protocol: sentences, checksums and commands.
+// Compares the serial protocol of a DVL with its published description: sentences, checksums and commands.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-/// The sentences without their checksums, which must be right.
+/// Returns the sentences of a text without their checksums, which it checks.
 std::vector<std::string> sentences_in(std::string_view text) {
   std::vector<std::string> all;
   while (!text.empty()) {
@@ -31,7 +31,7 @@ std::vector<std::string> sentences_in(std::string_view text) {
   return all;
 }
 
-/// The examples of the documentation.
+/// Uses the examples of the documentation.
 TEST(DvlSentences, ChecksumsAreThoseOfTheExamples) {
   EXPECT_EQ(crc8("123456789"), 0xF4);
   EXPECT_EQ(text_of(sentence_line("wrx,1164.94,0.000,0.000,0.000,2.707,-1.00,n,1")),
@@ -72,7 +72,7 @@ const protocol::Port& port_of(std::uint16_t number) {
   return *std::ranges::find(vendor().ports(), number, &protocol::Port::number);
 }
 
-/// A driver at the serial line.
+/// A driver at the port for the serial protocol.
 struct Line {
   std::vector<std::string> ask(std::string_view sent) { return take(serial->on_bytes(bytes_of(sent), now)); }
   std::vector<std::string> take(const protocol::Reaction& reaction) {
@@ -104,12 +104,14 @@ TEST(DvlSerial, CommandsAreAnswered) {
   EXPECT_THAT(line.ask("wcw\n"), ElementsAre("wrw,dvl-a50,2.7.2,0x00000000001b59"));
   EXPECT_THAT(line.ask("wcc\r"), ElementsAre("wrc,1475,0,y,n,auto,y"));
   EXPECT_THAT(line.ask("wcs,1450,,,y,=1,n\nwcc\n"), ElementsAre("wra", "wrc,1450,0,y,y,=1,n"));
-  EXPECT_THAT(line.ask("wcs,,90,,\nwcc\n"), ElementsAre("wra", "wrc,1450,90,y,y,=1,n")) << "as of versions without range modes";
+  EXPECT_THAT(line.ask("wcs,,90,,\nwcc\n"), ElementsAre("wra", "wrc,1450,90,y,y,=1,n"))
+      << "versions without range modes send this shorter command";
   EXPECT_THAT(line.ask("wcr\nwcg\n"), ElementsAre("wra", "wra"));
   EXPECT_THAT(line.ask("wcN\nwcn,10.0.0.1\nwcN\n"), ElementsAre("wrN,auto", "wra", "wrN,10.0.0.1"));
   line.state.powered_up_at = line.now - 45s;
   EXPECT_THAT(line.ask("wct\n"), ElementsAre("wrs,1700000000050000,y,10.0.0.1,45"));
-  EXPECT_THAT(line.ask("wcT,5\nwcm,1700000000000000\n"), ElementsAre("wrT,y", "wrn")) << "its clock is synchronised";
+  EXPECT_THAT(line.ask("wcT,5\nwcm,1700000000000000\n"), ElementsAre("wrT,y", "wrn"))
+      << "a device with a synchronised clock refuses the time";
 }
 
 TEST(DvlSerial, MalformedUnknownAndRefusedCommandsDiffer) {
@@ -123,7 +125,7 @@ TEST(DvlSerial, MalformedUnknownAndRefusedCommandsDiffer) {
   EXPECT_THAT(line.ask("wcc\n"), ElementsAre(HasSubstr("wrc,1475,0")));
 }
 
-TEST(DvlSerial, AChecksumIsOptionalAndIfGivenRight) {
+TEST(DvlSerial, AChecksumIsOptionalAndCheckedIfGiven) {
   Line line;
   const std::string right = text_of(sentence_line("wcv"));
   EXPECT_THAT(line.ask(right), ElementsAre("wrv,2.8.0"));
@@ -164,7 +166,7 @@ TEST(DvlSerial, TheOutputIsSelectedForAllDrivers) {
   EXPECT_EQ(line.lines_of_a_ping(), 0u);
   line.now += 200ms;
   EXPECT_THAT(line.take(line.serial->on_tick(line.now, false)), IsEmpty());
-  EXPECT_THAT(line.ask("wcv\n"), ElementsAre("wrv,2.8.0")) << "answers still come";
+  EXPECT_THAT(line.ask("wcv\n"), ElementsAre("wrv,2.8.0")) << "commands are still answered";
 }
 
 TEST(DvlSerial, PingsAreTriggered) {

@@ -1,4 +1,4 @@
-// Binary messages byte by byte, as the protocol's own examples have them.
+// Compares binary messages byte by byte with the examples of the protocol.
 #include "protocol/foxglove/foxglove_frames.hpp"
 
 #include <gmock/gmock.h>

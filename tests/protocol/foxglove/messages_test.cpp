@@ -98,7 +98,7 @@ TEST(FoxgloveMessages, TransformsAndLinesHaveTheirFields) {
   EXPECT_EQ(log["name"], "front");
 }
 
-TEST(FoxgloveMessages, ScenesOneAfterTheOtherAreOne) {
+TEST(FoxgloveMessages, JoinedSceneUpdatesAreOneUpdate) {
   const Bytes glb(3, std::byte{7});
   Bytes update = scene_update(at, Model{"crate", "world", {{1, 0, 0}, {}}, {{"material", "steel"}}, glb});
   const Bytes lines = scene_update(at, Lines{"swath", "front", {{0, 0, 0}, {1, 0, 0}}}), gone = scene_deletion(at, "wreck");
@@ -145,7 +145,7 @@ TEST(FoxgloveMessages, TruthHasTheHitOfEachBeam) {
   EXPECT_EQ(shifted, truth(*ping));
 }
 
-TEST(FoxgloveMessages, StampsMayBeOthers) {
+TEST(FoxgloveMessages, StampsCanBeReplaced) {
   const auto later = [](Time was) { return was + std::chrono::hours(1); };
   const auto of = [](const char* schema) { return Channel{1, "/x", "protobuf", {schema, "protobuf", ""}}; };
   const Time then{std::chrono::milliseconds(1500)};
@@ -160,7 +160,7 @@ TEST(FoxgloveMessages, StampsMayBeOthers) {
     bytes.insert(bytes.end(), image.samples->begin(), image.samples->end());
     return bytes;
   };
-  const auto same = [](Time was) { return was; };  // fields are in another order
+  const auto same = [](Time was) { return was; };  // with_stamps() writes the fields in another order
   EXPECT_EQ(with_stamps(of("foxglove.RawImage"), whole(then), later),
             with_stamps(of("foxglove.RawImage"), whole(later(then)), same));
   // sonar.v1.PingEvent: number = 7, fired_at_ns = 1
@@ -205,8 +205,8 @@ TEST(Glb, HasTheBytesOfATriangle) {
   reader("indices", indices);
   EXPECT_TRUE(reader.ok() && reader.remaining() == 0);
   EXPECT_EQ(chunk[0], 84u);
-  EXPECT_EQ(vectors[8], -3);  // the third corner, y of ours
-  EXPECT_EQ(vectors[10], 1);  // normals point up: y there
+  EXPECT_EQ(vectors[8], -3);  // the third corner: minus our y
+  EXPECT_EQ(vectors[10], 1);  // normals point up, which is y in glTF
   EXPECT_EQ(indices[2], 2u);
 }
 

@@ -1,4 +1,4 @@
-// JSON messages as values: those of the protocol's own examples, and messages of viewers that are refused.
+// JSON messages: those of the protocol's examples, and messages of viewers that are refused.
 #include "protocol/foxglove/foxglove_words.hpp"
 
 #include <gmock/gmock.h>

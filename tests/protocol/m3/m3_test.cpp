@@ -1,5 +1,5 @@
-// An M3 against the published layout: bytes at the offsets of the tables, samples, windows of real packets, and how its host
-// decodes packets that this file builds without our writer.
+// Compares an M3 with the published layout: bytes at the offsets of the tables, samples, windows of real packets, and how its
+// host decodes packets that this file builds without our writer.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ protocol::DeviceState device(const char* positive_angles = "port") {
 
 constexpr std::size_t beams = 128;
 
-/// Code 2^22 is an amplitude of 1.
+/// Returns a ping without signals. In samples that set() writes, the code 2^22 is an amplitude of 1.
 Ping ping_of(const protocol::DeviceState& state, const Settings& settings = {}) {
   Ping ping;
   PingRequest& r = ping.request;
@@ -112,7 +112,7 @@ TEST(M3Packets, HoldBeamsFromTheLeastAngleAndPhasesOfTheirSignals) {
   for (const bool to_port : {true, false}) {
     const protocol::DeviceState state = device(to_port ? "port" : "starboard");
     Ping ping = ping_of(state);
-    set(ping, 5, 0, 3, {0, 0.25f});  // most to port
+    set(ping, 5, 0, 3, {0, 0.25f});  // the outermost beam to port
     set(ping, 7, 127, 10, {-30, 40});
     const Bytes packet = encode_packet(ping, state);
     const auto sample = [&](std::size_t beam, std::size_t row) {
@@ -128,7 +128,7 @@ TEST(M3Packets, HoldBeamsFromTheLeastAngleAndPhasesOfTheirSignals) {
   }
 }
 
-TEST(M3Packets, HaveNoPhaseWhereThePingHasNone) {
+TEST(M3Packets, HaveNoPhaseIfThePingHasNoSignals) {
   const protocol::DeviceState state = device();
   Ping ping = ping_of(state);
   set(ping, 5, 127, 3, {0, 1});
@@ -138,7 +138,7 @@ TEST(M3Packets, HaveNoPhaseWhereThePingHasNone) {
   EXPECT_EQ(float_at(packet, 56 + 8512 + 8 * 5 + 4), 0);
 }
 
-/// Fields of the headers of real packets, in seconds after the start of the ping.
+/// The expected values are from headers of real packets. Times are in seconds after the start of the ping.
 TEST(M3Windows, AreThoseOfRealPackets) {
   const Window one = window_of(1, 10), two = window_of(0.2, 10), three = window_of(0.4, 20);
   EXPECT_NEAR(one.start_s + transmit_s, 0.001307, 1e-9);
@@ -164,7 +164,7 @@ TEST(M3Settings, FollowTheGainLawAndTheWater) {
   EXPECT_NEAR(vendor().gain_percent(state), 50, 1e-6);
 }
 
-TEST(M3Settings, AreRefusedWhereTheProductHasNone) {
+TEST(M3Settings, AreRefusedIfTheProductLacksThem) {
   const auto refusal = [](const protocol::SettingsOverride& wanted) {
     const auto change = apply_override(wanted, device());
     return change ? "taken" : change.error().text;
@@ -235,7 +235,7 @@ TEST(M3Host, ReadsATypedPacket) {
   EXPECT_THAT(picture->samples, testing::ElementsAre(5, 0, 0, 0, 0, 0)) << "sqrt(I^2 + Q^2)";
 }
 
-TEST(M3Host, TakesNoPacketThatContradictsItself) {
+TEST(M3Host, RefusesPacketsThatContradictThemselves) {
   for (const auto& [at, size] :
        {std::pair<std::size_t, std::size_t>{2, 2}, {8, 2}, {52, 4}, {56 + 52, 4}, {56 + 72, 2}, {56 + 8512 + 48, 4}}) {
     Typed typed;

@@ -27,14 +27,14 @@ struct MavlinkCommands : ::testing::Test {
   Sender ground{{255, 190, 0}};
 
   std::vector<Bytes> replies_to(const CommandLong& command) { return poses.on_datagram(ground(command), at_s(1)).replies; }
-  /// -1 = no answer.
+  /// Returns the MAV_RESULT of the answer; -1 without an answer.
   int result_of(const CommandLong& command) {
     const auto replies = replies_to(command);
     return replies.size() == 1 ? std::to_integer<int>(replies.front().at(12)) : -1;
   }
 };
 
-/// Payload and checksum by hand: CRC-16/MCRF4XX over the frame without its first byte, and 143.
+/// The payload is typed by hand. The checksum is CRC-16/MCRF4XX of the frame without its first byte, and of 143 (CRC_EXTRA).
 TEST_F(MavlinkCommands, TheAnswerIsAnAckToTheSender) {
   answer = MavResult::denied;
   const auto replies = replies_to(failure(7, 2, 3));
@@ -56,7 +56,7 @@ TEST_F(MavlinkCommands, EveryTypeIsPassedOn) {
   EXPECT_EQ(static_cast<int>(FailureType::intermittent), 7);
 }
 
-TEST_F(MavlinkCommands, ParametersThatAreNoSuchNumbersAreDenied) {
+TEST_F(MavlinkCommands, InvalidParametersAreDenied) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (const CommandLong& bad : {failure(nan, 1, 0), failure(-1, 1, 0), failure(0.5f, 1, 0), failure(7, 8, 0), failure(7, nan, 0),
                                  failure(7, 1, -2), failure(7, 1, 1e9f)})
@@ -64,7 +64,7 @@ TEST_F(MavlinkCommands, ParametersThatAreNoSuchNumbersAreDenied) {
   EXPECT_THAT(asked, IsEmpty());
 }
 
-TEST_F(MavlinkCommands, OthersAreIgnoredAsUnknownMessagesAre) {
+TEST_F(MavlinkCommands, CommandsForOthersAreIgnoredLikeUnknownMessages) {
   CommandLong to_autopilot = failure(7, 1, 0), to_all = to_autopilot, to_another = to_autopilot, other = to_autopilot;
   to_autopilot.target_component = 1;
   to_all.target_component = 0;
@@ -80,7 +80,7 @@ TEST_F(MavlinkCommands, OthersAreIgnoredAsUnknownMessagesAre) {
   EXPECT_FALSE(poses.system()) << "a ground station is no vehicle";
 }
 
-TEST_F(MavlinkCommands, OurSystemIsThatOfTheVehicle) {
+TEST_F(MavlinkCommands, OurSystemNumberIsThatOfTheVehicle) {
   Sender vehicle{{42, 1, 0}};
   poses.on_datagram(vehicle(autopilot_heartbeat()), at_s(1));
   CommandLong command = failure(7, 1, 0);

@@ -8,7 +8,7 @@
 namespace sonar::mavlink::distances_test {
 namespace {
 
-/// Looks straight down: roll, pitch and yaw in FLU axes.
+/// Returns the orientation of a sensor with this roll, pitch and yaw in FLU axes.
 Quatd mounted(double roll_deg, double pitch_deg, double yaw_deg) {
   return quat_from_rpy({rad_from_deg(roll_deg), rad_from_deg(pitch_deg), rad_from_deg(yaw_deg)});
 }
@@ -29,7 +29,7 @@ DistanceSensor at_ms(std::uint32_t ms, std::uint8_t sensor = 0) {
   return m;
 }
 
-TEST(DistanceSensorMessage, EachFieldStandsInItsPlace) {
+TEST(DistanceSensorMessage, EachFieldIsInItsPlace) {
   Identity sender{7, 193, 5};
   const Bytes frame = framed(distance_sensor_of(two_metres()), sender);
   const Bytes expected = bytes({0xFD, 39, 0,    0,    5,   7, 193,  132,  0, 0,  // header
@@ -48,7 +48,7 @@ TEST(DistanceSensorMessage, EachFieldStandsInItsPlace) {
 
 TEST(DistanceSensorMessage, ZerosAtTheEndAreLeftOut) {
   Identity sender;
-  EXPECT_EQ(std::to_integer<int>(framed(at_ms(1), sender).at(1)), 14) << "the payload ends with the covariance";
+  EXPECT_EQ(std::to_integer<int>(framed(at_ms(1), sender).at(1)), 14) << "the last field that is not 0 is the covariance";
 }
 
 TEST(DistanceSensorMessage, WithoutAnEchoTheDistanceIsBeyondTheFarthest) {
@@ -56,7 +56,7 @@ TEST(DistanceSensorMessage, WithoutAnEchoTheDistanceIsBeyondTheFarthest) {
   none.confidence_percent = 0;
   const DistanceSensor m = distance_sensor_of(none);
   EXPECT_EQ(m.current_cm, m.max_cm + 1);
-  EXPECT_EQ(m.signal_percent, 1) << "no valid signal";
+  EXPECT_EQ(m.signal_percent, 1) << "1 means no valid signal";
   none.farthest_m = 1e6;
   EXPECT_EQ(distance_sensor_of(none).current_cm, 65535);
   EXPECT_EQ(distance_sensor_of(none).max_cm, 65534);
@@ -76,7 +76,7 @@ TEST(DistanceSensorMessage, TheOrientationIsThatOfTheMount) {
     return static_cast<int>(distance_sensor_of(m).orientation);
   };
   EXPECT_EQ(looking(0, 0, 0), 0);
-  EXPECT_EQ(looking(30, 0, 0), 0) << "the beam is round";
+  EXPECT_EQ(looking(30, 0, 0), 0) << "roll is ignored, because the beam is round";
   EXPECT_EQ(looking(0, 0, -90), 2) << "starboard";
   EXPECT_EQ(looking(0, 0, 180), 4);
   EXPECT_EQ(looking(0, 0, 90), 6) << "port";
@@ -84,7 +84,7 @@ TEST(DistanceSensorMessage, TheOrientationIsThatOfTheMount) {
   EXPECT_EQ(looking(0, 80, 0), 25);
   EXPECT_EQ(distance_sensor_of(m).wxyz, (std::array<float, 4>{}));
   EXPECT_EQ(looking(0, 45, 0), 100);
-  // Half down: in FRD a pitch of -45 degrees.
+  // Obliquely down is a pitch of -45 degrees in FRD.
   const auto wxyz = distance_sensor_of(m).wxyz;
   EXPECT_NEAR(wxyz[0], 0.92388, 1e-5);
   EXPECT_NEAR(wxyz[2], -0.38268, 1e-5);
@@ -117,7 +117,7 @@ struct MavlinkDistanceCommands : ::testing::Test {
   bool has_range_finder = true;
   MavlinkPoses poses{{}, {}, [this] { return has_range_finder; }};
   Sender vehicle{{1, 1, 0}};
-  /// The MAV_RESULT of the answer.
+  /// Returns the MAV_RESULT of the answer; -1 without an answer.
   int result_of(std::uint16_t code, float message, float interval_us = 0) {
     CommandLong command;
     command.param1 = message, command.param2 = interval_us;

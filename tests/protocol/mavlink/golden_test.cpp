@@ -10,7 +10,7 @@
 namespace sonar::mavlink {
 namespace {
 
-/// name -> values as the golden file prints them.
+/// Collects the values of each field, as the golden file prints them.
 struct Told : wire::Visitor<Told> {
   std::map<std::string, std::string> values;
   template <class T>
@@ -91,9 +91,9 @@ CommandLong golden_command() {
   return m;
 }
 
-TEST(MavlinkGolden, FramesOfAnotherHandAreReadAndWrittenAlike) {
+TEST(MavlinkGolden, FramesOfAnotherWriterAreReadAndWrittenEqually) {
   const std::vector<Golden> all = golden();
-  ASSERT_EQ(all.size(), 25u) << "13 messages in version 2, all but ODOMETRY in version 1";
+  ASSERT_EQ(all.size(), 25u) << "13 messages in version 2, and in version 1 all except ODOMETRY";
   Bytes joined;
   std::size_t read = 0;
   for (const Golden& g : all) {

@@ -1,4 +1,4 @@
-// A vehicle that speaks MAVLink, for tests: frames of either version, joined into datagrams.
+// A vehicle that sends MAVLink, for tests: frames of either version, joined into datagrams.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -18,7 +18,7 @@ struct Sender {
   Bytes operator()(const M& message) {
     return framed(message, who);
   }
-  /// Version 1: all base fields and no extension fields.
+  /// Returns a frame of version 1, with all base fields and no extension fields.
   template <class M>
   Bytes version_1(const M& message) {
     Bytes out{std::byte{0xFE},
@@ -84,7 +84,7 @@ inline void expect_near(Vec3d is, Vec3d wanted, double tolerance) {
   EXPECT_NEAR(is.y, wanted.y, tolerance);
   EXPECT_NEAR(is.z, wanted.z, tolerance);
 }
-/// Expects these directions of the body's axes, in east, north, up.
+/// Expects these directions of the body's axes, given as east, north, up.
 inline void expect_axes(const Pose& pose, Vec3d ahead, Vec3d port, double tolerance = 1e-6) {
   expect_near(rotate(pose.orientation, {1, 0, 0}), ahead, tolerance);
   expect_near(rotate(pose.orientation, {0, 1, 0}), port, tolerance);

@@ -1,4 +1,4 @@
-// The message table against the rule by which MAVLink derives it: CRC_EXTRA follows from the names and types of the fields, the
+// Compares the message table with the rules of MAVLink: CRC_EXTRA follows from the names and types of the fields, the
 // length from their sizes, and their order from their sizes.
 #include "protocol/mavlink/messages.hpp"
 
@@ -14,7 +14,8 @@ namespace {
 struct Listed : wire::Visitor<Listed> {
   struct Row {
     std::string type, name;
-    std::size_t size = 0, count = 0;  // size of one element; 0 = no array
+    std::size_t size = 0,
+                count = 0;  // size of an element [bytes]; number of elements of an array, 0 if the field is not an array
   };
   std::vector<Row> rows;
 
@@ -55,7 +56,7 @@ void expect_by_the_rule(std::size_t size, std::size_t full) {
   for (const Listed::Row& row : base.rows) {
     seed += row.type + " " + row.name + " ";
     if (row.count > 0) seed += static_cast<char>(row.count);
-    EXPECT_LE(row.size, last_size) << row.name << " stands too late: fields are sorted by size";
+    EXPECT_LE(row.size, last_size) << row.name << " is too late: fields are sorted by size";
     last_size = row.size;
   }
   const std::uint16_t crc = plain_checksum(seed);
@@ -92,7 +93,7 @@ TEST(MavlinkMessages, TheTableHasNumbersAndChecksums) {
     EXPECT_EQ(known_messages()[i].crc_extra, wanted[i].second);
     EXPECT_EQ(find_message(wanted[i].first), &known_messages()[i]);
   }
-  EXPECT_EQ(find_message(77), nullptr) << "we write answers to commands, and read none";
+  EXPECT_EQ(find_message(77), nullptr) << "sonard writes answers to commands, but reads none";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Axes: messages about one pose in different frames give the same pose.
+// Messages that state the same pose in different frames give the same pose.
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {
@@ -23,7 +23,8 @@ Odometry with(std::uint8_t frame, std::uint8_t child, Vec3 at, Quatd q, Vec3 vel
 }
 Quatd about_z(double angle_rad) { return turned_by({0, 0, angle_rad}); }
 
-/// 10 m north, 2 m east, 3 m down, heading east. The vehicle moves ahead and to port, with its bow up, and turns to starboard.
+/// Expects 10 m north, 2 m east, 3 m down, heading east; the vehicle moves ahead and to port, its bow rises and turns to
+/// starboard.
 void expect_the_vehicle(const control::PoseSample& s) {
   expect_near(s.pose.position_m, {2, 10, -3}, 1e-6);
   expect_axes(s.pose, {1, 0, 0}, {0, 1, 0});
@@ -90,7 +91,7 @@ TEST(MavlinkReadings, AttitudesByAnglesAndByQuaternionAgree) {
   expect_axes(by_quaternion.pose, ahead, port, 1e-6);
 }
 
-TEST(MavlinkReadings, VelocityOfAPlaceIsTurnedIntoTheBody) {
+TEST(MavlinkReadings, TheVelocityOfAPositionIsRotatedIntoBodyAxes) {
   LocalPositionNed m = local(0, 0, 0, 0);
   m.north_mps = 2, m.down_mps = -1;
   const auto s = sample_of(raw_pose(attitude_of(attitude(0, static_cast<float>(pi / 2))), place_of(m)));
@@ -104,7 +105,7 @@ TEST(MavlinkReadings, SimStateWithoutAQuaternionHasAngles) {
   expect_axes(sample_of(raw_pose(m)).pose, {1, 0, 0}, {0, 1, 0});
 }
 
-TEST(MavlinkReadings, IntegersBeatFloatsAndZeroMeansNotKnown) {
+TEST(MavlinkReadings, IntegersHavePriorityOverFloatsAndZeroMeansUnknown) {
   SimState m;
   EXPECT_FALSE(*geodetic_of(m));
   m.latitude_deg = 47.6f, m.longitude_deg = -122.33f;

@@ -28,7 +28,7 @@ TEST(MavlinkPairs, AttitudesAreInterpolatedTheShortWay) {
   EXPECT_NEAR(yaw_of(at), -3.0, 1e-9) << "a quaternion and its negative are one attitude";
 }
 
-TEST(MavlinkPairs, TheNewestIsCarriedOnByItsRateForALittle) {
+TEST(MavlinkPairs, TheNewestAttitudeIsExtrapolatedForAShortTime) {
   Attitudes all;
   all.put(turned(1000, 1.0, 0.5));
   AttitudeReading at;
@@ -37,7 +37,7 @@ TEST(MavlinkPairs, TheNewestIsCarriedOnByItsRateForALittle) {
   EXPECT_EQ(all.at(1021, at), Attitudes::Answer::later);
   all.put(turned(2100, 1.0));
   EXPECT_EQ(all.at(1500, at), Attitudes::Answer::never) << "attitudes were missing for more than a second";
-  EXPECT_EQ(all.at(999, at), Attitudes::Answer::never) << "before the first";
+  EXPECT_EQ(all.at(999, at), Attitudes::Answer::never) << "before the first attitude";
 }
 
 TEST(MavlinkPairs, LateAttitudesChangeNothingAndEqualOnesReplace) {

@@ -48,7 +48,7 @@ TEST(MavlinkPoses, OdometryIsAWholePose) {
   EXPECT_THAT(r.refusals, IsEmpty());
 }
 
-TEST(MavlinkPoses, AttitudeAndLocalPositionMeetByTheBootClock) {
+TEST(MavlinkPoses, AttitudeAndLocalPositionArePairedByBootTime) {
   Sender v;
   Link link;
   EXPECT_THAT(link(v(attitude(1000, 0)), 1.0).poses, IsEmpty());
@@ -141,7 +141,7 @@ TEST(MavlinkPoses, HeartbeatsOfOtherComponentsDoNotChangeTheTypeOfTheVehicle) {
   }
 }
 
-TEST(MavlinkPoses, APlaceWithoutAnOriginIsADepthOnlyOfASubmarine) {
+TEST(MavlinkPoses, WithoutAnOriginAGlobalPositionGivesADepthOnlyForASubmarine) {
   for (const bool submarine : {true, false}) {
     Sender v;
     Link link;
@@ -171,7 +171,7 @@ TEST(MavlinkPoses, TheQuaternionHasPriorityOverTheAngles) {
   EXPECT_NEAR(heading_rad(later.poses[0].sample.pose.orientation), 2, 1e-6);
 }
 
-TEST(MavlinkPoses, TheBestSourceThatIsAliveCounts) {
+TEST(MavlinkPoses, TheBestSourceThatStillSendsIsUsed) {
   Sender v;
   Link link;
   const auto pair = [&v](std::uint32_t ms) { return v(attitude(ms, 0)) + v(local(ms, 1, 1, 1)); };
@@ -205,7 +205,7 @@ TEST(MavlinkPoses, MessagesWithoutATimeAreNoSourceIfPosesSetTheTime) {
   EXPECT_THAT(link(v(sim), 1.1).notices, IsEmpty()) << "a notice is given once";
 }
 
-TEST(MavlinkPoses, ARefusedSourceIsNotAlive) {
+TEST(MavlinkPoses, ASourceOfRefusedPosesIsNotUsed) {
   Sender v;
   Link link;
   Odometry broken = odometry(1, std::numeric_limits<float>::quiet_NaN());
@@ -226,7 +226,7 @@ TEST(MavlinkPoses, GeodeticSourcesNeedAnOrigin) {
   const Reaction r = with(v(sim) + v(attitude(1, 0)) + v(global(1, 47.6, -122.33, -12)), 1);
   ASSERT_EQ(r.poses.size(), 1u);
   EXPECT_EQ(r.poses[0].source, "system 1 SIM_STATE");
-  EXPECT_EQ(r.poses[0].sample.stamp.domain, ClockDomain::arrival) << "without a time stamp";
+  EXPECT_EQ(r.poses[0].sample.stamp.domain, ClockDomain::arrival) << "the message has no time stamp";
   expect_near(r.poses[0].sample.pose.position_m, {0, 0, -12}, 1e-6);
 }
 
@@ -244,14 +244,14 @@ TEST(MavlinkPoses, GlobalPositionsLieOnTheTangentPlane) {
   EXPECT_NEAR(r.poses[0].sample.velocity_mps->x, 1.5, 1e-6);
 }
 
-TEST(MavlinkPoses, ZeroZeroIsNoFixAndFarAwayIsAMistake) {
+TEST(MavlinkPoses, ZeroZeroIsNoFixAndAFarPositionIsRefused) {
   Sender v;
   Link link(with_origin());
   EXPECT_THAT(link(v(attitude(1, 0)) + v(global(1, 0, 0, 0)), 1).poses, IsEmpty());
   Link far(with_origin());
   const Reaction r =
       far(v(autopilot_heartbeat()) + v(attitude(1, 0)) + v(global(2, -35.363, 149.165, 584)) + v(attitude(2, 0)), 1.1);
-  EXPECT_THAT(r.poses, IsEmpty()) << "nor a depth";
+  EXPECT_THAT(r.poses, IsEmpty()) << "the position gives no depth either";
   ASSERT_EQ(r.refusals.size(), 1u);
   EXPECT_THAT(r.refusals[0], HasSubstr("km from world.origin"));
 }
@@ -288,7 +288,7 @@ TEST(MavlinkPoses, ARebootIsAReset) {
   Link link;
   const auto pair = [&v](std::uint32_t ms) { return v(attitude(ms, 0)) + v(local(ms, 0, 0, 0)); };
   const auto first = link(pair(600'000), 1).poses.at(0).sample;
-  EXPECT_THAT(link(v(local(599'500, 0, 0, 0)), 1.05).poses, IsEmpty()) << "a little late: no attitude of then is known";
+  EXPECT_THAT(link(v(local(599'500, 0, 0, 0)), 1.05).poses, IsEmpty()) << "a late position: no attitude of its time is known";
   const auto again = link(pair(2'000), 3).poses.at(0).sample;
   EXPECT_NE(again.reset_counter, first.reset_counter);
   EXPECT_EQ(again.stamp.ns, 2'000'000'000);
@@ -296,11 +296,11 @@ TEST(MavlinkPoses, ARebootIsAReset) {
   Link whole;
   const auto counter = whole(v(odometry(90'000'000, 0)), 1).poses.at(0).sample.reset_counter;
   EXPECT_EQ(whole(v(odometry(89'500'000, 0)), 1).poses.at(0).sample.reset_counter, counter)
-      << "a late packet is no restart; World decides about it";
+      << "a late packet is no restart; World decides whether to use it";
   EXPECT_NE(whole(v(odometry(1'000'000, 0)), 2).poses.at(0).sample.reset_counter, counter);
 }
 
-TEST(MavlinkPoses, StampsBeyondReasonGiveWayToArrival) {
+TEST(MavlinkPoses, ForImpossibleStampsTheTimeOfArrivalIsUsed) {
   Sender v;
   Link link;
   EXPECT_EQ(link(v(odometry(0, 0)), 1).poses.at(0).sample.stamp.domain, ClockDomain::arrival);
@@ -308,7 +308,7 @@ TEST(MavlinkPoses, StampsBeyondReasonGiveWayToArrival) {
   EXPECT_EQ(link(v(odometry(1'700'000'000'000'000, 0)), 1).poses.at(0).sample.stamp.ns, 1'700'000'000'000'000'000);
 }
 
-TEST(MavlinkPoses, TheFirstVehicleThatSpeaksIsTheOne) {
+TEST(MavlinkPoses, TheFirstVehicleThatSendsIsUsed) {
   Sender station{{255, 190, 0}}, one{{7, 1, 0}}, other{{8, 1, 0}};
   Link link;
   Heartbeat of_station;
@@ -319,7 +319,7 @@ TEST(MavlinkPoses, TheFirstVehicleThatSpeaksIsTheOne) {
   EXPECT_EQ(link.poses.system(), 7);
   EXPECT_THAT(link(other(odometry(1, 0)), 1.1).poses, IsEmpty());
   EXPECT_EQ(link(one(odometry(1, 0)), 1.2).poses.size(), 1u);
-  EXPECT_EQ(link(other(odometry(1, 0)), 6.3).poses.size(), 1u) << "the first is silent for more than 5 s";
+  EXPECT_EQ(link(other(odometry(1, 0)), 6.3).poses.size(), 1u) << "the first vehicle is silent for more than 5 s";
   EXPECT_EQ(link.poses.system(), 8);
 }
 

@@ -1,4 +1,4 @@
-// Reports to the autopilot and to the user.
+// Heartbeats and requests to the autopilot, and notices to the user.
 #include <functional>
 
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
@@ -22,7 +22,7 @@ std::vector<Frame> known_frames(const std::vector<Bytes>& datagrams) {
   }
   return frames;
 }
-/// Message and interval in microseconds of every request.
+/// Returns the message and the interval in microseconds of every request.
 std::vector<std::pair<int, int>> requests(const std::vector<Bytes>& datagrams) {
   std::vector<std::pair<int, int>> all;
   for (const Bytes& d : datagrams) {
@@ -42,7 +42,7 @@ std::string report_of(Settings settings, const Bytes& datagram) {
   poses.on_datagram(datagram, at_s(10));
   EXPECT_THAT(poses.on_tick(at_s(10.9)).notices, IsEmpty()) << "the first report comes after a second";
   const auto notices = poses.on_tick(at_s(11)).notices;
-  EXPECT_THAT(poses.on_tick(at_s(12)).notices, IsEmpty()) << "reported once";
+  EXPECT_THAT(poses.on_tick(at_s(12)).notices, IsEmpty()) << "the report is not repeated";
   return notices.size() == 1 ? notices[0] : "";
 }
 
@@ -145,7 +145,7 @@ TEST(MavlinkReports, TheFirstLineNamesMissingMessages) {
   EXPECT_THAT(report_of({}, v(broken)), AllOf(HasSubstr("the received messages were refused"), Not(HasSubstr("request_rates"))));
 }
 
-/// Returns the sentences between two times, each with its time in seconds.
+/// Returns the notices between two times, each with its time in seconds.
 std::vector<std::pair<int, std::string>> notices_of(MavlinkPoses& poses, int from_s, int to_s,
                                                     const std::function<void(int)>& each = {}) {
   std::vector<std::pair<int, std::string>> all;
@@ -156,7 +156,7 @@ std::vector<std::pair<int, std::string>> notices_of(MavlinkPoses& poses, int fro
   return all;
 }
 
-TEST(MavlinkReports, NothingIsMissingWhilePosesComeOtherwise) {
+TEST(MavlinkReports, NothingIsMissingWhilePosesComeFromOtherSenders) {
   bool come = true;
   MavlinkPoses poses({}, {}, {}, [&come] { return come; });
   EXPECT_THAT(notices_of(poses, 0, 60, [](int) {}), IsEmpty());
@@ -165,7 +165,7 @@ TEST(MavlinkReports, NothingIsMissingWhilePosesComeOtherwise) {
   EXPECT_THAT(poses.health_error(at_s(60)), HasSubstr("no message received"));
 }
 
-TEST(MavlinkReports, WhatIsMissingIsSaidAgainEverMoreSeldomAndWhenItIsThere) {
+TEST(MavlinkReports, MissingMessagesAreReportedLessAndLessOftenUntilTheyCome) {
   Sender v;
   MavlinkPoses poses({});
   const auto beats = [&](int s) { poses.on_datagram(v(autopilot_heartbeat()), at_s(s)); };
@@ -202,7 +202,7 @@ TEST(MavlinkReports, PosesThatEndWhileTheSystemSpeaksAreReported) {
                                                    Not(HasSubstr("sends HEARTBEAT, ODOMETRY"))))));
 }
 
-TEST(MavlinkReports, ALinkOnWhichTheRightOneNeverSpeaksIsReported) {
+TEST(MavlinkReports, ALinkWithoutMessagesOfTheConfiguredVehicleIsReported) {
   MavlinkPoses silent({});
   EXPECT_THAT(notices_of(silent, 0, 10), ElementsAre(Pair(5, HasSubstr("no poses yet: no message received"))));
   EXPECT_THAT(silent.health_error(at_s(1)), HasSubstr("no message received"));
@@ -231,11 +231,11 @@ TEST(MavlinkReports, IgnoredSendersAreNamedOnce) {
   Heartbeat of_station;
   of_station.type = 6, of_station.autopilot = 8;
   EXPECT_THAT(poses.on_datagram(one(odometry(1, 0)), at_s(0)).notices, IsEmpty());
-  EXPECT_THAT(poses.on_datagram(station(of_station), at_s(0.1)).notices, IsEmpty()) << "ground stations may be there";
+  EXPECT_THAT(poses.on_datagram(station(of_station), at_s(0.1)).notices, IsEmpty()) << "ground stations are allowed";
   EXPECT_THAT(poses.on_datagram(two(autopilot_heartbeat()), at_s(0.2)).notices,
               ElementsAre(AllOf(HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored"),
                                 HasSubstr("system 7, component 1 steers rov; give each vehicle a port of its own"))));
-  EXPECT_THAT(poses.on_datagram(two(odometry(1, 0)), at_s(0.3)).notices, IsEmpty()) << "each is reported once";
+  EXPECT_THAT(poses.on_datagram(two(odometry(1, 0)), at_s(0.3)).notices, IsEmpty()) << "each sender is reported once";
   EXPECT_THAT(poses.rival(at_s(5.2)), HasSubstr("system 8, component 1 sends HEARTBEAT and is ignored"))
       << "system 8 is a rival while it sends";
   EXPECT_THAT(poses.rival(at_s(5.4)), IsEmpty());

@@ -1,5 +1,5 @@
-// A driver's conversation with an emulated Micron, without a socket: frames, signs of life, scans, ignored messages, and the
-// handling of foreign bytes by its host.
+// A driver's conversation with an emulated Micron, without a socket: frames, alive messages, scans, ignored messages, and how the
+// host handles foreign bytes.
 #include <gmock/gmock.h>
 
 #include "core/base/geometry.hpp"
@@ -18,7 +18,7 @@ Bytes hex(std::string_view text) {
     if (text[i] != ' ') bytes.push_back(static_cast<std::byte>(std::stoi(std::string(text.substr(i, 2)), nullptr, 16)));
   return bytes;
 }
-/// Requests `lines` scan lines, each after the previous one has arrived.
+/// Requests `lines` scan lines, each after the previous one has arrived; returns their bearings.
 std::vector<int> scanned(Talk& talk, int lines) {
   std::vector<int> all;
   for (int i = 0; i < lines; ++i) {
@@ -60,7 +60,7 @@ TEST(Micron, AliveMessagesHaveTheStateOfTheHead) {
   talk.run_to(4.4);
   EXPECT_TRUE(talk.take().empty());
   talk.say(from_host(Id::send_version, {}), 4.4);
-  EXPECT_TRUE(talk.take().empty()) << "it hears nothing yet";
+  EXPECT_TRUE(talk.take().empty()) << "a head that is starting does not answer";
   talk.run_to(6.6);
   EXPECT_THAT(talk.head_infos(), ElementsAre(0x5D, 0x4D, 0x4A));
   HeadCommand left = sector();
@@ -75,7 +75,7 @@ TEST(Micron, AliveMessagesHaveTheStateOfTheHead) {
 TEST(Micron, ALineComesForEachRequest) {
   Talk talk;
   talk.say(request());
-  EXPECT_EQ(talk.notices, 1) << "without parameters";
+  EXPECT_EQ(talk.notices, 1) << "a request without parameters is reported";
   talk.say(command(sector()));
   EXPECT_FALSE(talk.dialogue->next_ping_request()) << "no line is requested";
   talk.say(request());
@@ -104,7 +104,7 @@ TEST(Micron, ALineComesForEachRequest) {
   EXPECT_THAT(twice.bearings(), ElementsAre(3200, 3216));
 }
 
-TEST(Micron, ASectorIsScannedToAndFro) {
+TEST(Micron, ASectorIsScannedBackAndForth) {
   Talk talk;
   HeadCommand c = sector();
   c.left = 3168;
@@ -113,8 +113,8 @@ TEST(Micron, ASectorIsScannedToAndFro) {
   EXPECT_THAT(scanned(talk, 8), ElementsAre(3200, 3216, 3232, 3216, 3200, 3184, 3168, 3184));
   EXPECT_NEAR(talk.aim.head_rad, 16 * 2 * pi / 6400, 1e-9) << "left of ahead is to port";
   talk.say(from_host(Id::head_command, hex("0f")), talk.last_ping_s);
-  EXPECT_THAT(scanned(talk, 2), ElementsAre(3200, 3184)) << "the head was on its way to the first";
-  c.left = 6384;  // across 0, away from the head
+  EXPECT_THAT(scanned(talk, 2), ElementsAre(3200, 3184)) << "the head was turning towards the first line";
+  c.left = 6384;  // the sector crosses 0 and is far from the head's position
   c.right = 32;
   talk.say(command(c), talk.last_ping_s);
   talk.last_ping_s += 2;  // half a turn takes 1.6 s
@@ -160,7 +160,7 @@ TEST(Micron, TheHeadAndTheLinkTakeTime) {
   EXPECT_NEAR(talk.last_ping_s - first, bins_s + link_s + turn_s, 1e-6);
 }
 
-TEST(Micron, FourBitBinsAreAWindowAndTwoInAByte) {
+TEST(Micron, FourBitBinsCoverAWindowAndAreTwoPerByte) {
   HeadCommand c = sector();
   c.control &= static_cast<std::uint16_t>(~control::eight_bits);
   c.ad_low = 51;
@@ -203,7 +203,7 @@ TEST(Micron, InvalidMessagesAreIgnored) {
     EXPECT_TRUE(talk.take().empty());
     EXPECT_FALSE(settings_from(talk.state.settings.get()).has_parameters);
     talk.say(from_host(Id::send_version, {}));
-    EXPECT_EQ(talk.take().size(), 1u) << "a good message behind it is answered";
+    EXPECT_EQ(talk.take().size(), 1u) << "a valid message after it is answered";
   }
 }
 
@@ -221,7 +221,7 @@ TEST(Micron, APingOfEarlierParametersIsNotSent) {
   EXPECT_EQ(talk.pings, 2);
 }
 
-TEST(Micron, AnOverrideIsWhatAHostWouldSet) {
+TEST(Micron, AnOverrideEqualsTheSettingsOfAHost) {
   const protocol::DeviceState state = device();
   const auto changed =
       vendor().apply_override({.range_m = 25, .rate_hz = {}, .gain_percent = 100, .mode = {}, .beams = {}}, state);
@@ -234,7 +234,8 @@ TEST(Micron, AnOverrideIsWhatAHostWouldSet) {
 
 TEST(MicronHost, SendsParametersAgainToAHeadThatHasRestarted) {
   const auto host = *make_host({});
-  EXPECT_TRUE(host->on_open({}, at_s(0)).empty()) << "the head may have parameters, which are to be put back";
+  EXPECT_TRUE(host->on_open({}, at_s(0)).empty())
+      << "the host waits for the parameters of the head, which it restores at the end";
   Talk talk;
   talk.run_to(1);
   const Bytes alive = talk.take().at(0);
@@ -243,10 +244,10 @@ TEST(MicronHost, SendsParametersAgainToAHeadThatHasRestarted) {
   ASSERT_EQ(actions.size(), 1u);
   EXPECT_EQ(read_frame(std::get<protocol::HostSend>(actions[0]).bytes)->header.id, Id::head_command);
   EXPECT_TRUE(host->on_tick(at_s(1.4)).empty());
-  EXPECT_EQ(host->on_tick(at_s(1.6)).size(), 1u) << "a request may be lost";
+  EXPECT_EQ(host->on_tick(at_s(1.6)).size(), 1u) << "the request is repeated, because it may be lost";
 }
 
-TEST(MicronHost, SendsParametersToAHeadThatSaysNothing) {
+TEST(MicronHost, SendsParametersToASilentHead) {
   const auto host = *make_host({});
   host->on_open({}, at_s(0));
   EXPECT_TRUE(host->on_tick(at_s(2)).empty());

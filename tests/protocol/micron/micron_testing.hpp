@@ -1,4 +1,4 @@
-// A driver's side for tests: a device, its received messages and its sent messages.
+// The side of a driver, for tests: a device, commands to it, and its messages.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ inline protocol::DeviceState device(const protocol::OptionValues& options = {}) 
   return state;
 }
 
-/// 200 bins of 9.6 mm, steps of 1 grad from 45 degrees to port to 45 degrees to starboard.
+/// Parameters of a scan: 200 bins of 9.6 mm, steps of 1 grad from 45 degrees to port to 45 degrees to starboard.
 inline HeadCommand sector() {
   HeadCommand c;
   c.control = 0x2305;
@@ -37,7 +37,7 @@ inline HeadCommand sector() {
 inline Bytes command(const HeadCommand& c) { return from_host(Id::head_command, wire::bytes_of(c)); }
 inline Bytes request() { return from_host(Id::send_data, Bytes(4)); }
 
-/// Applies the events of the device, as the daemon does.
+/// A conversation with a device, whose events are applied as the daemon does.
 struct Talk {
   explicit Talk(const char* option = nullptr, const char* value = nullptr)
       : state(device(option != nullptr ? protocol::OptionValues{{option, value}} : protocol::OptionValues{})) {
@@ -52,7 +52,7 @@ struct Talk {
       if (std::get_if<protocol::Notice>(&event) != nullptr) ++notices;
     }
   }
-  /// Runs every tick until then; pings take no time.
+  /// Runs all ticks until this time [s]; pings take no time.
   void run_to(double at) {
     while (dialogue->next_tick() <= at_s(at)) {
       const Time now = dialogue->next_tick();
@@ -80,7 +80,7 @@ struct Talk {
         all.push_back(read_front<HeadData>(message->payload)->bearing);
     return all;
   }
-  /// Returns the head information of the received signs of life.
+  /// Returns the head information of the received alive messages.
   std::vector<int> head_infos() {
     std::vector<int> all;
     for (const Bytes& reply : take())

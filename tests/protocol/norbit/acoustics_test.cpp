@@ -1,4 +1,4 @@
-// Bathymetry of a Norbit over a known floor and a ball, computed by the whole engine.
+// Bathymetry of a Norbit over a known floor and a ball, computed with the whole engine.
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace {
 using namespace tests;
 using namespace sonar::test;
 
-/// The sonar looks ahead, as in the engine's tests: port is +y.
+/// Returns the bathymetry of a ping of this scene. As in the engine's tests, the sonar looks ahead and port is +y.
 Bathymetry bathymetry_of(std::shared_ptr<const Scene> scene) {
   const protocol::DeviceState state = device();
   const Settings settings{.power = true, .stop_m = 6};

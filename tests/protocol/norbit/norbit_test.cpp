@@ -1,4 +1,4 @@
-// The packets of an emulated Norbit by hand-typed offsets, its commands, and refusals; without a socket.
+// The packets of an emulated Norbit, with offsets typed by hand, and its commands and refusals, without a socket.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -24,7 +24,7 @@ T at(BytesView bytes, std::size_t offset) {
   return value;
 }
 
-/// An echo in row 100 of beam 10 of 256: to port.
+/// Packets of a ping with an echo in row 100 of beam 10 of 256, which is to port.
 struct Packets : testing::Test {
   Settings settings{.power = true, .stop_m = 12};
   protocol::DeviceState state = device();
@@ -66,7 +66,8 @@ TEST_F(Packets, AnEchoToPortHasANegativeAngleAndItsRange) {
     EXPECT_NEAR(at<float>(bathymetry, beam + 4), -ping.beam_azimuth_rad[10], 0.002);
     EXPECT_NEAR(at<std::uint32_t>(bathymetry, beam) * 1500 / (2 * 78125.0), range_m, 0.01);
     EXPECT_EQ(bathymetry[beam + 18], std::byte{3});
-    EXPECT_NEAR(at<float>(bathymetry, beam + 12), std::pow(10, (-20.0 - 20) / 20), 1e-4) << "free of the gain of 20 dB";
+    EXPECT_NEAR(at<float>(bathymetry, beam + 12), std::pow(10, (-20.0 - 20) / 20), 1e-4)
+        << "the intensity is without the gain of 20 dB";
   }
   EXPECT_EQ(found, 1);
 }
@@ -86,7 +87,8 @@ TEST_F(Packets, TheWaterColumnHasTheEchoAtTheSamePlace) {
               ping.request.settings.range_of_row(100), coarse_m);
   EXPECT_NEAR(at<float>(column, directions + 4 * (brightest % beams)), -ping.beam_azimuth_rad[10], 0.02);
   EXPECT_LT(at<float>(column, directions), at<float>(column, directions + 4));
-  EXPECT_NEAR(std::fmod(78125, static_cast<double>(at<float>(column, 28))) / 78125, 0, 1e-3) << "a whole fraction";
+  EXPECT_NEAR(std::fmod(78125, static_cast<double>(at<float>(column, 28))) / 78125, 0, 1e-3)
+      << "the sample rate of the column is a whole fraction of 78125 Hz";
 }
 
 TEST_F(Packets, TruncatedAndDamagedPacketsAreRefused) {
@@ -129,7 +131,7 @@ TEST_F(Packets, FaultsFindTheirFields) {
 TEST_F(Packets, TheAnalogGainRisesByTheSlopeOfSetVga) {
   const double row_m = 1500 / (2 * static_cast<double>(at<float>(column, 28)));
   const auto rise_db = static_cast<double>(at<float>(column, 136) - at<float>(column, 128));
-  EXPECT_NEAR(rise_db / (2 * at<std::int32_t>(column, 132) * row_m), 50.0 / 100, 0.005) << "50 dB in 100 m of two-way range";
+  EXPECT_NEAR(rise_db / (2 * at<std::int32_t>(column, 132) * row_m), 50.0 / 100, 0.005) << "50 dB per 100 m of two-way range";
 }
 
 TEST_F(Packets, PixelsBelowZeroAreDark) {
@@ -146,7 +148,7 @@ TEST_F(Packets, PixelsBelowZeroAreDark) {
   EXPECT_EQ(std::ranges::max(picture->samples), 0);
 }
 
-/// The driver's side, which gets packets by port: 0 is the bathymetry, 1 is the water column.
+/// A host that gets packets from ports: 0 is the bathymetry, 1 is the water column.
 struct Hosts : Packets {
   void hear(std::size_t port, std::uint32_t number, double at) {
     const Bytes& like = port == 0 ? bathymetry : column;
@@ -170,19 +172,19 @@ struct Hosts : Packets {
   std::string take() { return std::exchange(shown, {}); }
 
   std::unique_ptr<protocol::Host> host = *make_host({.as_it_is = true, .settings = {}});
-  std::string shown, said;  // shown: pings with "p" for points, "c" for a water column
+  std::string shown, said;  // numbers of shown pings, with "p" for points and "c" for a water column; notices
 };
 
 TEST_F(Hosts, ShowCompletePings) {
   for (std::uint32_t number = 1; number <= 9; ++number) hear(0, number, 0.1 * number);
-  EXPECT_EQ(take(), "") << "the other connection is slower";
+  EXPECT_EQ(take(), "") << "the host waits for the other connection";
   hear(1, 1, 1);
   EXPECT_EQ(take(), "1pc ");
   hear(1, 2, 1.8);
   hear(1, 3, 2.6);
   EXPECT_EQ(take(), "2pc 3pc ");
   hear(1, 10, 2.7);
-  EXPECT_EQ(host->next_tick(), at_s(4.7)) << "of 10 only: its water column tells that those of 4 to 9 were dropped";
+  EXPECT_EQ(host->next_tick(), at_s(4.7)) << "only ping 10 waits: its water column shows that those of 4 to 9 were dropped";
   hear(0, 10, 2.8);
   EXPECT_EQ(take(), "10pc ");
   EXPECT_EQ(host->counts()->missing_pings, 6u);
@@ -225,7 +227,7 @@ TEST_F(Hosts, ShowPingsOfOnePortIfTheOtherIsSilent) {
   EXPECT_EQ(take(), "2p ");
   EXPECT_EQ(host->next_tick(), std::nullopt);
   hear(1, 2, 13);
-  EXPECT_EQ(take(), "") << "not twice";
+  EXPECT_EQ(take(), "") << "a ping is not shown twice";
   EXPECT_EQ(said, "the water column of ping 2 came after the ping was shown");
   hear(0, 3, 14);
   hear(1, 3, 14);
@@ -260,7 +262,7 @@ TEST_F(Hosts, WaitForBothPortsAfterAPause) {
 
 TEST_F(Hosts, LimitWaitingMessages) {
   for (std::uint32_t number = 1; number <= 1100; ++number) hear(0, number, 0.001 * number);
-  EXPECT_THAT(take(), StartsWith("1p 2p ")) << "the oldest";
+  EXPECT_THAT(take(), StartsWith("1p 2p ")) << "the oldest pings are shown";
 }
 
 TEST(NorbitCommands, AreAnsweredWithTheValuesInUse) {
@@ -269,7 +271,7 @@ TEST(NorbitCommands, AreAnsweredWithTheValuesInUse) {
   EXPECT_EQ(talk.take(), "Sonar is ready to accept commands\r\n");
   talk.say("set_range .5 30\r\nset_range\n");
   EXPECT_EQ(talk.take(), "set_range 0.5 30 # m\r\nset_range 0.5 30 # m\r\n");
-  EXPECT_EQ(talk.settings.rate_hz, 0) << "no power";
+  EXPECT_EQ(talk.settings.rate_hz, 0) << "without power, the sonar does not ping";
   talk.say("set_power 1\r\n");
   EXPECT_THAT(talk.take(), StartsWith("set_power 1 #"));
   EXPECT_NEAR(talk.settings.rate_hz, 1 / (2 * 30 / 1500.0 + 0.005), 0.2);
@@ -290,7 +292,7 @@ TEST(NorbitCommands, AreAnsweredWithTheValuesInUse) {
   EXPECT_TRUE(talk.closed);
 }
 
-TEST(NorbitCommands, WithoutAnEndOfLineEndAfterSilence) {
+TEST(NorbitCommands, ACommandWithoutAnEndOfLineEndsAfterSilence) {
   Talk talk;
   talk.tick(0);
   talk.take();
@@ -305,10 +307,10 @@ TEST(NorbitCommands, WithoutAnEndOfLineEndAfterSilence) {
   EXPECT_EQ(talk.dialogue->next_tick(), Time::max());
   talk.state.simulated_time = true;
   talk.say("set_power 1", 2);
-  EXPECT_THAT(talk.take(), StartsWith("set_power 1")) << "time may stand still";
+  EXPECT_THAT(talk.take(), StartsWith("set_power 1")) << "in simulated time, such a command ends at once";
 }
 
-TEST(NorbitCommands, OutOfLimitsChangeNothing) {
+TEST(NorbitCommands, ValuesOutsideTheLimitsChangeNothing) {
   Talk talk;
   talk.tick(0);
   talk.take();
@@ -327,7 +329,7 @@ TEST(NorbitCommands, OutOfLimitsChangeNothing) {
   for (int i = 0; i < 10000; ++i) many += "x\n";
   talk.notices = 0;
   talk.say(many);
-  EXPECT_EQ(talk.notices, 32 + 1) << "bounded, and the last says that the rest is ignored";
+  EXPECT_EQ(talk.notices, 32 + 1) << "32 notices, and one that the rest is ignored";
 }
 
 TEST(Norbit, EachPortHasItsOwnPackets) {
@@ -342,12 +344,12 @@ TEST(Norbit, EachPortHasItsOwnPackets) {
   ASSERT_EQ(parts_at(column_port).size(), 1u);
   EXPECT_TRUE(read_column(parts_at(column_port)[0]));
   EXPECT_TRUE(parts_at(command_port).empty());
-  EXPECT_EQ(vendor().frame(ping, state), nullptr) << "the parts together are the ping";
+  EXPECT_EQ(vendor().frame(ping, state), nullptr) << "a ping has only parts, one per port";
   EXPECT_TRUE(Talk(command_port).dialogue->on_ping(nullptr, 1, at_s(0)).prefixes.empty());
   EXPECT_EQ(Talk(bathymetry_port).dialogue->on_ping(nullptr, 1, at_s(0)).prefixes.size(), 1u);
 }
 
-TEST(Norbit, TheBottomIsLookedForOnce) {
+TEST(Norbit, TheBottomIsDetectedOnce) {
   const protocol::DeviceState state = device();
   Ping ping = ping_with({.power = true, .stop_m = 5}, state, 50, 10);
   const auto port = std::ranges::find(vendor().ports(), bathymetry_port, &protocol::Port::number);
@@ -360,7 +362,7 @@ TEST(Norbit, TheBottomIsLookedForOnce) {
   const auto looked_for_now = bottom();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(bottom(), looked_for_now) << "the device has found it before the samples were lost";
+  EXPECT_EQ(bottom(), looked_for_now) << "look_at() has stored the bottom before the samples were lost";
   look_at(ping);
   EXPECT_NE(bottom(), looked_for_now);
 }

@@ -1,4 +1,4 @@
-// A driver's side for tests: a device, and a ping of it.
+// The side of a driver, for tests: a device, a ping, and a conversation.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ inline protocol::DeviceState device() {
   return state;
 }
 
-/// A ping with those settings: silence, and an echo 40 dB over it in one row of one beam.
+/// Returns a ping with these settings: silence, and in one row of one beam an echo 40 dB above it.
 inline Ping ping_with(const Settings& settings, const protocol::DeviceState& state, int row, int beam) {
   Ping ping;
   ping.request.model = state.model;
@@ -48,7 +48,7 @@ inline Ping ping_with(const Settings& settings, const protocol::DeviceState& sta
   return ping;
 }
 
-/// A host at one of the ports; it applies the device's events, as the daemon does.
+/// A conversation at one of the ports; the events of the device are applied as the daemon does.
 struct Talk {
   explicit Talk(std::uint16_t number = command_port) {
     for (const protocol::Port& port : vendor().ports())

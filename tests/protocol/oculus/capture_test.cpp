@@ -76,7 +76,7 @@ TEST_F(Capture, Decodes) {
   EXPECT_EQ(sequence.skipped_ids(), 0u);
 }
 
-TEST_F(Capture, ReencodesByteForByteButForTheFiller) {
+TEST_F(Capture, ReencodesToTheSameBytesExceptTheFiller) {
   for (const DecodedPing& ping : pings_) {
     Bytes samples;
     for (std::size_t row = 0; row < ping.rows(); ++row)
@@ -95,7 +95,7 @@ TEST_F(Capture, OurBearingsAreTheDevices) {
   EXPECT_EQ(answer(device(), request).bearings_cdeg, pings_[0].bearings_cdeg);
 }
 
-// Our own device gets the captured request: every computed field is equal to the captured one.
+// The emulated device gets the captured request; every computed field is equal to the captured one.
 TEST_F(Capture, OurDeviceAnswersTheSameRequestAlike) {
   FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
   request.settings.network_speed = 25;

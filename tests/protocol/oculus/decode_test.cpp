@@ -43,7 +43,7 @@ TEST(Identities, EveryBrokenIdentityIsReported) {
   EXPECT_THAT(violations_after(108, "00 00"), Contains("there is no beam"));
   EXPECT_THAT(violations_after(97, "04"), Contains("data_size 4 is unknown"));
   EXPECT_THAT(violations_after(97, "01"), Contains("data_size contradicts the echoed flags"));
-  EXPECT_THAT(violations_after(20, "09"), Contains(HasSubstr("image_size is"))) << "echoed flags without gains";
+  EXPECT_THAT(violations_after(20, "09"), Contains(HasSubstr("image_size is"))) << "the echoed flags state no row gains";
   EXPECT_THAT(violations_after(122, "FF 7F"), Contains("bearings do not ascend"));
   EXPECT_THAT(violations_after(2048, "00 00 00 00"), Contains("a row gain is 0"));
   EXPECT_THAT(violations_after(98, "00 00 00 00 00 00 00 00"), Contains(HasSubstr("range_resolution 0")));
@@ -82,7 +82,7 @@ TEST(Decoder, EveryFlippedHeadByteIsSurvived) {
       flipped[i] ^= static_cast<std::byte>(flip);
       const auto decoded = decode_ping(Exact(flipped).view());
       if (!decoded || !decoded->has_image) continue;
-      std::uint64_t sum = 0;  // reads every sample that the ping claims to have
+      std::uint64_t sum = 0;  // reads every sample that the ping states
       for (std::size_t row = 0; row < decoded->rows(); ++row)
         for (std::size_t beam = 0; beam < decoded->beams(); ++beam) sum += decoded->sample(row, beam);
       EXPECT_LE(sum, std::uint64_t{0xFFFFFFFF} * decoded->rows() * decoded->beams());

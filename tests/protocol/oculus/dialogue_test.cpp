@@ -83,7 +83,8 @@ TEST(Dialogue, UnderstandsEveryPublicClient) {
   }
 }
 
-// The whole way: fire message, dialogue, made-up ping, frame, our decoder. The comparison that drivers make must succeed at once.
+// Uses all steps: fire message, dialogue, made-up ping, frame, our decoder. The drivers' comparison with the first ping must
+// succeed.
 TEST(Dialogue, EchoSatisfiesEveryPublicClient) {
   for (const Client& c : clients) {
     Conversation talk;
@@ -101,7 +102,7 @@ TEST(Dialogue, EchoSatisfiesEveryPublicClient) {
   }
 }
 
-TEST(Dialogue, AnIdenticalRepeatMeansTheSame) {
+TEST(Dialogue, ARepeatedMessageGivesEqualSettings) {
   Conversation talk;
   const Bytes message = make_fire(fire(0, 1, PingRate::hz10, 0x49, 5, 50), 0, true);
   const auto first = events_of<ChangeSettings>(talk.say(message)), again = events_of<ChangeSettings>(talk.say(message));
@@ -134,7 +135,7 @@ TEST(Dialogue, StandbyIsAcknowledgedWithADummy) {
   ASSERT_THAT(reaction.replies, SizeIs(1));
   EXPECT_TRUE(std::holds_alternative<DummyMessage>(decode_message(reaction.replies[0])));
   EXPECT_EQ(talk.dialogue->next_tick(), at(1.5));
-  EXPECT_THAT(talk.say(standby, 0.6).replies, IsEmpty()) << "a repeat is no new standby";
+  EXPECT_THAT(talk.say(standby, 0.6).replies, IsEmpty()) << "a repeated request for standby gets no dummy";
 }
 
 TEST(Dialogue, DummiesOnlyFillSilence) {
@@ -177,14 +178,14 @@ TEST(Dialogue, NoDummyComesWhilePingsAreRequested) {
   EXPECT_EQ(talk.dummies(90, 93.05), 3u);
   EXPECT_EQ(talk.fire_at(93.1, PingRate::hz2), 0u);
   EXPECT_EQ(talk.dummies(93.1, 120), 0u);
-  talk.state.settings.reset();  // another client sets the sonar to its stored state
+  talk.state.settings.reset();  // as after another client has left: the sonar has its initial settings
   EXPECT_GE(talk.dummies(120, 121.05), 1u);
 }
 
 TEST(Dialogue, WithNetworkTriggerDummiesAreSentBetweenRequests) {
   Asking talk;
   EXPECT_EQ(talk.fire_at(0.5, PingRate::hz10, 0xC9), 0u);
-  EXPECT_EQ(talk.dummies(0.5, 20), 0u) << "the ping is under way";
+  EXPECT_EQ(talk.dummies(0.5, 20), 0u) << "the ping is being computed";
   talk.dialogue->on_ping_queued(at(20));
   EXPECT_EQ(talk.dummies(20, 23.05), 3u);
   EXPECT_EQ(talk.fire_at(23.1, PingRate::hz10, 0xC9), 0u);
@@ -193,7 +194,7 @@ TEST(Dialogue, WithNetworkTriggerDummiesAreSentBetweenRequests) {
 
 TEST(Dialogue, DummyPeriodIsAnOption) {
   EXPECT_EQ(Conversation("dummy_period_ms", "250").dialogue->next_tick(), at(0.25));
-  EXPECT_EQ(Conversation("dummy_period_ms", "10").dialogue->next_tick(), at(0.01)) << "the shortest";
+  EXPECT_EQ(Conversation("dummy_period_ms", "10").dialogue->next_tick(), at(0.01)) << "the shortest period";
 }
 
 TEST(Dialogue, NotANumberIsIgnoredWithANotice) {
@@ -239,7 +240,7 @@ TEST(Dialogue, ShortAndForeignMessagesAreNoticed) {
   ASSERT_THAT(notices, SizeIs(2));
   EXPECT_EQ(notices[0].text, "ignored a fire message of 26 bytes, 53 are needed");
   EXPECT_EQ(notices[1].text, "ignored a message of unexpected type 0x0077 (16 bytes)");
-  EXPECT_THAT(talk.say(hex("53 4F 00 00 00 00 FF 00 00 00 00 00 00 00 00 00")).events, IsEmpty()) << "a dummy is no news";
+  EXPECT_THAT(talk.say(hex("53 4F 00 00 00 00 FF 00 00 00 00 00 00 00 00 00")).events, IsEmpty()) << "a dummy causes no event";
 }
 
 // VND requests the configuration with payload size 0 and reads the first 28 bytes that it gets.
@@ -251,13 +252,13 @@ TEST(Dialogue, UserConfigIsReadAndWritten) {
   ASSERT_THAT(reaction.replies, SizeIs(1));
   EXPECT_EQ(reaction.replies[0], hex("53 4F 59 1B 00 00 55 00 00 00 0C 00 00 00 00 00  02 01 A8 C0 00 FF FF FF 00 00 00 00"))
       << "the reply has the advertised address";
-  EXPECT_EQ(talk.dialogue->next_tick(), at(1.9)) << "quiet after the reply";
+  EXPECT_EQ(talk.dialogue->next_tick(), at(1.9)) << "the next dummy comes a period after the reply";
   reaction = talk.say(joined({write, read}));
   ASSERT_THAT(events_of<StoreAddress>(reaction), SizeIs(1));
   EXPECT_EQ(events_of<StoreAddress>(reaction)[0].address.ip, 0xC0A80107u);
   EXPECT_EQ(events_of<StoreAddress>(reaction)[0].address.netmask, 0xFFFF0000u);
   EXPECT_TRUE(events_of<StoreAddress>(reaction)[0].address.dhcp);
-  ASSERT_THAT(reaction.replies, SizeIs(1)) << "the write is silent, the read answers what was just written";
+  ASSERT_THAT(reaction.replies, SizeIs(1)) << "the write is not answered; the read returns the written values";
   EXPECT_EQ(Bytes(reaction.replies[0].begin() + 16, reaction.replies[0].end()), hex("07 01 A8 C0 00 00 FF FF 01 00 00 00"));
   talk.state.stored_address = events_of<StoreAddress>(reaction)[0].address;
   EXPECT_EQ(talk.say(read).replies.at(0), reaction.replies[0]);
@@ -284,10 +285,10 @@ bool greets_at(Conversation& talk, double when_s) {
 // A client may wait for the text before it fires; clients that do not wait must never receive it.
 TEST(Dialogue, BootTextIsSentOnceToASilentClient) {
   Conversation waits;
-  EXPECT_FALSE(greets_at(waits, 1)) << "a dummy";
+  EXPECT_FALSE(greets_at(waits, 1)) << "the first message is a dummy";
   EXPECT_EQ(waits.dialogue->next_tick(), at(2));
   EXPECT_TRUE(greets_at(waits, 2));
-  EXPECT_FALSE(greets_at(waits, 3)) << "once";
+  EXPECT_FALSE(greets_at(waits, 3)) << "the text is sent once";
 
   Conversation fires;
   EXPECT_FALSE(greets_at(fires, 1));
@@ -310,7 +311,7 @@ TEST(Dialogue, FirstPingsAreAnOption) {
   const auto ping = decode_ping(*vendor.frame(made, state));
   ASSERT_TRUE(ping.has_value());
   EXPECT_THAT(ping->violations, IsEmpty());
-  EXPECT_EQ(ping->head.fixed.header.version, 0) << "fits all clients";
+  EXPECT_EQ(ping->head.fixed.header.version, 0) << "all clients can read version 0";
 }
 
 TEST(Dialogue, EverySplitMeansTheSame) {
@@ -344,7 +345,7 @@ TEST(Dialogue, EveryFlippedByteIsSurvived) {
       Bytes flipped = whole;
       flipped[i] ^= static_cast<std::byte>(flip);
       talk.say(flipped);
-      bool heard = false;  // after any flipped bit the stream is in step again within the largest trusted payload
+      bool heard = false;  // a damaged length may skip up to the largest accepted payload
       for (int tries = 0; tries < 60 && !heard; ++tries) heard = !events_of<ChangeSettings>(talk.say(whole)).empty();
       EXPECT_TRUE(heard) << "byte " << i << " flip " << flip;
     }

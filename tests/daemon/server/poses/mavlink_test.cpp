@@ -1,4 +1,4 @@
-// Poses by MAVLink over real sockets: messages move the sonar, other bytes are counted, and the autopilot gets our messages.
+// Poses from MAVLink over real sockets: messages move the sonar, other bytes are counted, and the autopilot gets our messages.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <sys/socket.h>
@@ -119,7 +119,7 @@ TEST_F(Mavlink, AListeningLinkMovesTheSonarAndAnswersWithHeartbeats) {
   EXPECT_EQ(answer->component, mavlink::MavlinkPoses::own_component);
   EXPECT_EQ(vehicle.from_port, port);
   ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id));
-  EXPECT_GE(vehicle.commands, 3) << "messages were asked for";
+  EXPECT_GE(vehicle.commands, 3) << "too few requests for messages";
 
   vehicle.send(daemon.address(), port, framed(odometry_at(11, 1'000'000), vehicle.who));
   EXPECT_TRUE(asked_from(daemon, client, 11));
@@ -130,7 +130,7 @@ TEST_F(Mavlink, AListeningLinkMovesTheSonarAndAnswersWithHeartbeats) {
   EXPECT_EQ(daemon.status().vehicles().at(0).source(), source);
 }
 
-/// A BlueROV2 without DVL, with no further configuration.
+/// A BlueROV2 without a DVL needs no further configuration.
 TEST_F(Mavlink, DepthAndAttitudeMoveAVehicleAtItsInitialPlace) {
   DaemonSetup setup = with_link("udpin:HERE:0");
   setup.edit_config = [](Config& config) { config.vehicles.front().initial_pose.position_m = {5, 6, -1}; };
@@ -181,11 +181,11 @@ TEST_F(Mavlink, ACommandToInjectAFailureIsAnsweredToItsSender) {
   const mavlink::Bytes ack = ground.next_datagram();
   ASSERT_GT(ack.size(), 12u);
   EXPECT_EQ(ack[7], static_cast<std::byte>(mavlink::CommandAck::id));
-  EXPECT_EQ(ack[12], static_cast<std::byte>(mavlink::MavResult::denied)) << "not armed";
+  EXPECT_EQ(ack[12], static_cast<std::byte>(mavlink::MavResult::denied)) << "faults are not armed";
   ASSERT_TRUE(vehicle.next(mavlink::Heartbeat::id)) << "the vehicle is still the peer";
 }
 
-TEST_F(Mavlink, AFailureIsAFaultOfTheSonarsUntilAllIsWell) {
+TEST_F(Mavlink, AFailureIsAFaultOfTheSonarsUntilOkIsSent) {
   using enum mavlink::FailureType;
   using enum mavlink::MavResult;
   DaemonSetup setup = with_link("udpin:HERE:0");
@@ -218,14 +218,14 @@ TEST_F(Mavlink, AFailureIsAFaultOfTheSonarsUntilAllIsWell) {
   for (const auto& [type, code] : kinds)
     for (const std::uint32_t instance : {0u, 1u}) {
       EXPECT_EQ(inject(mavlink::distance_sensor, type, instance), accepted) << code;
-      EXPECT_EQ(acting(), code + " mavlink " + sonar + ";") << "it replaces the one before";
+      EXPECT_EQ(acting(), code + " mavlink " + sonar + ";") << "the failure replaces the previous one";
     }
-  EXPECT_EQ(inject(4, off, 0), unsupported) << "no GPS receiver";
+  EXPECT_EQ(inject(4, off, 0), unsupported) << "sonard has no GPS receiver";
   EXPECT_EQ(inject(mavlink::distance_sensor, off, 2), denied) << "there is one sonar";
   EXPECT_EQ(acting(), "P13 mavlink " + sonar + ";");
   EXPECT_EQ(inject(mavlink::distance_sensor, ok, 0), accepted);
   EXPECT_EQ(acting(), "");
-  EXPECT_EQ(inject(mavlink::distance_sensor, ok, 1), accepted) << "also when all is well";
+  EXPECT_EQ(inject(mavlink::distance_sensor, ok, 1), accepted) << "`ok` is accepted also when no fault is active";
 }
 
 TEST_F(Mavlink, WithATokenNoFailureIsInjected) {

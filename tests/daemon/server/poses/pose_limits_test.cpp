@@ -1,4 +1,4 @@
-// Limits of senders of poses by TCP: bytes a second, their turns, slots, and the end of a connection that uses another protocol.
+// Limits for senders of poses over TCP: bytes per second, turns, slots, and the end of a connection with another protocol.
 #include <gmock/gmock.h>
 
 #include <list>
@@ -13,7 +13,7 @@ using oculus::PingRate;
 using ::testing::HasSubstr;
 
 struct PoseLimits : ::testing::Test {
-  /// `limits`: "input_bytes_per_s: 16384"
+  /// Starts the daemon. `limits`: for example "input_bytes_per_s: 16384".
   void begin(const std::string& limits) {
     DaemonSetup setup;
     setup.vehicle_lines = "  - {name: boat}\n";
@@ -37,7 +37,7 @@ struct PoseLimits : ::testing::Test {
   bool is_at_x(int x, int vehicle = 0, milliseconds timeout = patience) {
     return eventually([&] { return daemon->status().vehicles().at(vehicle).position().x() == x; }, timeout);
   }
-  /// Connects again and again until it is accepted; at first there may be no connection that can be evicted. `meanwhile` is
+  /// Connects repeatedly until it is accepted, because initially no connection may be evictable. `meanwhile` is
   /// called before each attempt.
   bool a_newcomer_moves_the_boat(const std::function<void()>& meanwhile = [] {}) {
     return eventually([&] {
@@ -55,7 +55,7 @@ TEST_F(PoseLimits, ASenderOfTooManyBytesIsReadSlowly) {
   begin("input_bytes_per_s: 16384");
   Client sender(daemon->address(), port);
   const auto started = Steady::now();
-  sender.send(lines(200000));  // about 3800
+  sender.send(lines(200000));  // about 3800 lines
   ASSERT_TRUE(
       eventually([&] { return daemon->log_text().find("limits.input_bytes_per_s") != std::string::npos && heard() > 0; }));
   const double lines_heard = static_cast<double>(heard());
@@ -67,54 +67,54 @@ TEST_F(PoseLimits, ASenderOfTooManyBytesIsReadSlowly) {
 TEST_F(PoseLimits, ManyTogetherAreReadSlowlyAndTheirEndChangesNothing) {
   begin("pose_bytes_per_s: 65536");
   const auto started = Steady::now();
-  for (int i = 0; i < 8; ++i) Client(daemon->address(), port).send(lines(40000));  // and gone
-  ASSERT_TRUE(eventually([&] { return heard() >= 8; })) << "at least the newest of each";
+  for (int i = 0; i < 8; ++i) Client(daemon->address(), port).send(lines(40000));  // the client leaves
+  ASSERT_TRUE(eventually([&] { return heard() >= 8; })) << "at least the newest pose of each client";
   const double lines_heard = static_cast<double>(heard());
   const double most_bytes = 65536 * (1 + std::chrono::duration<double>(Steady::now() - started).count());
   EXPECT_LT(lines_heard * 50, most_bytes + 8 * 8192);
 }
 
 /// After a flood has ended, only its last burst has an effect, and its slot is free.
-TEST_F(PoseLimits, FloodsThatHaveEndedSteerNothingAndHoldNoPlace) {
+TEST_F(PoseLimits, FloodsThatHaveEndedMoveNothingAndOccupyNoSlot) {
   begin("input_bytes_per_s: 131072, pose_bytes_per_s: 262144");
   const std::string megabyte = lines(1000000);
-  for (int i = 0; i < 32; ++i) Client(daemon->address(), port).send(megabyte + line_at_x(1000 + i));  // and gone
+  for (int i = 0; i < 32; ++i) Client(daemon->address(), port).send(megabyte + line_at_x(1000 + i));  // the client leaves
   Client honest(daemon->address(), port);
   honest.send(line_at_x(22, "boat"));
-  EXPECT_TRUE(is_at_x(22, 1)) << "it is let in";
+  EXPECT_TRUE(is_at_x(22, 1)) << "the client is admitted";
   // At the allowed rate 32 MB would take 2 minutes.
   EXPECT_TRUE(eventually([&] {
     const auto before = heard();
     std::this_thread::sleep_for(milliseconds(500));
     return heard() == before;
   }));
-  EXPECT_LT(heard() * 50, 32000000 / 4) << "most were dropped";
+  EXPECT_LT(heard() * 50, 32000000 / 4) << "most lines were dropped";
   honest.send(line_at_x(33, "rov"));
   EXPECT_TRUE(is_at_x(33));
   std::this_thread::sleep_for(milliseconds(300));
-  EXPECT_TRUE(is_at_x(33, 0, milliseconds(0))) << "and nothing moves it away again";
+  EXPECT_TRUE(is_at_x(33, 0, milliseconds(0))) << "no later line moves the vehicle";
 }
 
 /// The sender's kernel stores megabytes after the close and sends them only as fast as this end reads.
 TEST_F(PoseLimits, BytesInTheKernelAfterTheEndAreDropped) {
   begin("input_bytes_per_s: 1048576");
   constexpr std::size_t sent = 16 << 20;
-  Client(daemon->address(), port).send(lines(sent) + line_at_x(77));  // and gone
+  Client(daemon->address(), port).send(lines(sent) + line_at_x(77));  // the client leaves
   EXPECT_TRUE(is_at_x(77));
   EXPECT_LT(heard() * 50, sent / 2);
 }
 
-TEST_F(PoseLimits, TheLastPoseOfOneThatSendsAndLeavesActs) {
+TEST_F(PoseLimits, TheLastPoseOfAClientThatLeavesIsUsed) {
   begin("input_bytes_per_s: 65536");
   for (int i = 1; i <= 5; ++i) {
     Client(daemon->address(), port).send(line_at_x(100 * i));
-    EXPECT_TRUE(is_at_x(100 * i)) << "as by echo and nc";
+    EXPECT_TRUE(is_at_x(100 * i)) << "as sent by echo and nc";
   }
   Client(daemon->address(), port).send(lines(3000000) + line_at_x(77));
   EXPECT_TRUE(is_at_x(77)) << "the last of more lines than the limits allow, as cat and nc send them";
 }
 
-TEST_F(PoseLimits, ThoseBehindGiveTheirPlacesToNewcomers) {
+TEST_F(PoseLimits, ClientsOverTheirLimitAreEvictedForNewOnes) {
   begin("pose_bytes_per_s: 262144");
   std::list<Client> flood;
   for (int i = 0; i < 32; ++i) {
@@ -125,7 +125,7 @@ TEST_F(PoseLimits, ThoseBehindGiveTheirPlacesToNewcomers) {
   EXPECT_THAT(daemon->log_text(), HasSubstr("closed to make room: it was idle or over its limit"));
 }
 
-TEST_F(PoseLimits, ThoseWhoSendNoPosesGiveTheirPlacesToNewcomers) {
+TEST_F(PoseLimits, ClientsWithoutPosesAreEvictedForNewOnes) {
   begin("");
   std::list<Client> idle;
   for (int i = 0; i < 32; ++i) idle.emplace_back(daemon->address(), port);
@@ -162,11 +162,11 @@ TEST_F(PoseLimits, AFloodCostsOthersNeitherPingsNorTime) {
     flood.back().send(lines(300000));
   }
   EXPECT_LT(twenty_poses(1), std::chrono::seconds(5) + 10 * alone)
-      << "in turn with the flood each would wait for some 100 ms and more";
+      << "in turns with the flood, each pose would wait for 100 ms or more";
   pings.join();
 }
 
-TEST_F(PoseLimits, JsonThatIsNotQuiteIsRefusedAndTheConnectionGoesOn) {
+TEST_F(PoseLimits, InvalidJsonIsRefusedAndTheConnectionContinues) {
   begin("");
   const std::string nan = "{\"position\":[0,0,NaN],\"attitude\":[0,0,0]}\n";
   std::string seven;
@@ -177,11 +177,11 @@ TEST_F(PoseLimits, JsonThatIsNotQuiteIsRefusedAndTheConnectionGoesOn) {
   friendly.send(seven + line_at_x(400));
   EXPECT_TRUE(is_at_x(400));
   friendly.send("{\"imu\":\"" + std::string(6000, 'x') + "\"}\n" + seven.substr(0, 6 * nan.size()) + line_at_x(500));
-  EXPECT_TRUE(is_at_x(500)) << "a long line is one of them";
+  EXPECT_TRUE(is_at_x(500)) << "a long line counts as one refused line";
   EXPECT_EQ(daemon->status().poses().refused(), 14u);
   friendly.send(seven + nan + line_at_x(600));
   friendly.read_to_end();
-  EXPECT_TRUE(friendly.ended) << "eight in a row";
+  EXPECT_TRUE(friendly.ended) << "eight refused lines in a row end the connection";
   EXPECT_EQ(daemon->status().poses().refused(), 22u);
   EXPECT_EQ(daemon->status().poses().accepted(), 3u);
 }
@@ -200,14 +200,14 @@ TEST_F(PoseLimits, APageOfTheWebMovesNothing) {
     EXPECT_EQ(stranger.bytes_read, 0u);
   }
   EXPECT_THAT(daemon->log_text(), HasSubstr("pose connection closed: not JSON"));
-  EXPECT_EQ(daemon->status().poses().accepted(), 1u) << "the line before the nonsense of the third";
+  EXPECT_EQ(daemon->status().poses().accepted(), 1u) << "the line before the nonsense of the third page";
   EXPECT_EQ(daemon->status().poses().refused(), 3u);
   Client friendly(daemon->address(), port);
   friendly.send("{\"no\":\"pose\"}\n" + line_at_x(7));
   EXPECT_TRUE(is_at_x(7)) << "JSON that is not a pose is refused, and the connection stays";
 }
 
-TEST_F(PoseLimits, ABadLineOfADatagramCostsTheOthersNothing) {
+TEST_F(PoseLimits, ABadLineOfADatagramDoesNotAffectTheOthers) {
   begin("");
   send_udp(daemon->address(), port, bytes_of(line_at_x(1, "boat") + "nonsense\n{\"position\":NaN}\n" + line_at_x(2)));
   EXPECT_TRUE(is_at_x(2));
@@ -215,7 +215,7 @@ TEST_F(PoseLimits, ABadLineOfADatagramCostsTheOthersNothing) {
   EXPECT_EQ(daemon->status().poses().refused(), 2u);
 }
 
-TEST_F(PoseLimits, AFloodOfDatagramsIsDroppedAndAnotherAddressSteers) {
+TEST_F(PoseLimits, AFloodOfDatagramsIsDroppedAndAnotherAddressIsNot) {
   begin("input_bytes_per_s: 16384");
   const auto began = Steady::now();
   for (int i = 0; i < 2000; ++i) send_udp(daemon->address(), port, bytes_of(line_at_x(1)));
@@ -232,11 +232,11 @@ TEST_F(PoseLimits, AFloodOfDatagramsIsDroppedAndAnotherAddressSteers) {
   EXPECT_THAT(daemon->log_text(), HasSubstr("more than limits.input_bytes_per_s was sent"));
 }
 
-TEST_F(PoseLimits, ADatagramHasSoManyLines) {
+TEST_F(PoseLimits, ADatagramMayHave64Lines) {
   begin("");
   send_udp(daemon->address(), port, bytes_of(lines(60000)));
   EXPECT_TRUE(eventually([&] { return daemon->log_text().find("at most 64 lines") != std::string::npos; }));
-  EXPECT_EQ(heard(), 65u) << "and one refusal for the rest";
+  EXPECT_EQ(heard(), 65u) << "64 lines, and one refusal for the rest";
 }
 
 }  // namespace

@@ -116,7 +116,7 @@ TEST_F(Poses, ControlStreamNeedsAHelloFirstAndTheRightVersion) {
   Client rude(daemon.address(), stream_port);
   rude.send(control::delimited(control::encode_request({7, at_x(99)})));
   EXPECT_GT(rude.read_raw(1).size(), 0u);
-  EXPECT_TRUE(rude.read_to_end()) << "told, then closed";
+  EXPECT_TRUE(rude.read_to_end()) << "the client gets an answer, and the connection is closed";
   Client future(daemon.address(), stream_port);
   future.send(control::delimited(control::encode_request({8, control::Hello{2, ""}})));
   EXPECT_GT(future.read_raw(1).size(), 0u);
@@ -126,7 +126,7 @@ TEST_F(Poses, ControlStreamNeedsAHelloFirstAndTheRightVersion) {
   EXPECT_TRUE(oversized.read_to_end());
 }
 
-TEST_F(Poses, TheDevicesOwnSoundSpeedFollowsItsDepthThoughTheRequestIsRepeated) {
+TEST_F(Poses, ARepeatedRequestUsesTheSoundSpeedAtThePresentDepth) {
   const float at_3_m = daemon.requests().back().settings.device_sound_speed_mps;
   PoseSample deep = at_x(0);
   deep.pose.position_m.z = -45;  // within max_jump_m
@@ -137,7 +137,7 @@ TEST_F(Poses, TheDevicesOwnSoundSpeedFollowsItsDepthThoughTheRequestIsRepeated) 
     return daemon.requests().back().settings.device_sound_speed_mps > at_3_m + 0.3f;
   }));
   const std::string log = daemon.log_text();
-  EXPECT_EQ(log.find("settings: "), log.rfind("settings: ")) << "a repeat is no news";
+  EXPECT_EQ(log.find("settings: "), log.rfind("settings: ")) << "a repeated request is not logged";
 }
 
 TEST_F(Poses, NonsenseIsRefusedCountedAndChangesNothing) {
@@ -161,7 +161,7 @@ TEST_F(Poses, NonsenseIsRefusedCountedAndChangesNothing) {
   EXPECT_EQ(daemon.app().world().counters().accepted, 1u);
 }
 
-TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
+TEST_F(Poses, ASilentConnectionIsEvictedForANewOne) {
   std::list<Client> senders;
   for (int i = 0; i < 32; ++i) {
     senders.emplace_back(daemon.address(), json_port);
@@ -175,7 +175,7 @@ TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
   ASSERT_TRUE(asked_from(20));
   std::this_thread::sleep_for(milliseconds(1200));
   for (Client& s : senders)
-    if (&s != &senders.back()) s.send(json_at_x(21));  // all senders but the last
+    if (&s != &senders.back()) s.send(json_at_x(21));  // all senders except the last
   ASSERT_TRUE(eventually([&] { return heard() == 32 + 31; }));
   ASSERT_TRUE(asked_from(21));
   Client late(daemon.address(), json_port);
@@ -184,7 +184,7 @@ TEST_F(Poses, ASilentConnectionGivesItsPlaceToANewOne) {
   EXPECT_TRUE(senders.back().read_to_end());
   EXPECT_THAT(daemon.log_text(), HasSubstr("it was idle or over its limit for longest"));
   senders.front().send(json_at_x(23));
-  EXPECT_TRUE(asked_from(23)) << "the others keep theirs";
+  EXPECT_TRUE(asked_from(23)) << "the other senders keep their connections";
 }
 
 /// Wall stamps are compared with the present clock, not with the clock at the daemon's start.
@@ -227,7 +227,7 @@ TEST(PoseRules, WallStampsFollowAClockThatWasSetAfterTheStart) {
     EXPECT_NEAR(world.vehicle_at(0, clock.now()).position_m.x, 5, 1e-9);
   }
   clock_set_by_ns = 0;
-  EXPECT_FALSE(accepted_at(set_wall() + std::chrono::hours(24))) << "judged by the clock as it is now";
+  EXPECT_FALSE(accepted_at(set_wall() + std::chrono::hours(24))) << "the stamp is compared with the present clock";
   EXPECT_THAT(log_text, HasSubstr("synchronise the clocks"));
   server.stop();
 }
@@ -241,10 +241,10 @@ TEST(PoseRules, MountIsAppliedAndStalePosesBlankThePicture) {
   client.fire(fire_at(PingRate::hz40));
   ASSERT_TRUE(client.next_ping());
   const PingRequest first = daemon.requests().front();
-  EXPECT_FALSE(first.blank) << "never had a pose: not stale";
+  EXPECT_FALSE(first.blank) << "before its first pose, a vehicle is not stale";
   EXPECT_NEAR(first.sonar_in_world.position_m.x, 0.3, 1e-12);
   EXPECT_NEAR(first.sonar_in_world.position_m.z, -3.1, 1e-12);
-  EXPECT_NEAR(rotate(first.sonar_in_world.orientation, {1, 0, 0}).z, -std::sin(rad_from_deg(15)), 1e-9) << "looks down";
+  EXPECT_NEAR(rotate(first.sonar_in_world.orientation, {1, 0, 0}).z, -std::sin(rad_from_deg(15)), 1e-9) << "the sonar looks down";
   send_udp(daemon.address(), daemon.app().poses().json().port, bytes_of(R"({"position":[0,0,3],"attitude":[0,0,0]})"));
   EXPECT_TRUE(eventually([&] {
     client.next_ping(milliseconds(100));

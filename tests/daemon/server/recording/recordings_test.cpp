@@ -93,7 +93,7 @@ RecordedPing ping_at(double at_s, std::size_t bytes = 64) {
           protocol::Bytes(20, std::byte{2}), names};
 }
 
-TEST(RecordingFile, KeepsAStatusASecondAndTheTruthOfEveryPing) {
+TEST(RecordingFile, HasAStatusPerSecondAndTheTruthOfEveryPing) {
   recording::Bytes bytes;
   RecordingFile file(recording::sink_into(bytes), &RecordingFile::mcap, {"front", "oculus", {}});
   for (const double at_s : {0.0, 0.5, 0.999, 1.0, 1.5}) EXPECT_TRUE(file.write(ping_at(at_s)));
@@ -209,14 +209,14 @@ TEST(Recordings, ASlowDiskEndsTheRecordingWithOneLine) {
   Queue q(1);
   Result<void> begun = failure(ErrorKind::bug, "not answered");
   q.recordings->start({"slow.mcap"}, {"front", "oculus", {}}, "test", [&](const Result<void>& r) { begun = r; });
-  EXPECT_FALSE(q.recordings->takes("front")) << "not before its file is open";
+  EXPECT_FALSE(q.recordings->takes("front")) << "no ping is recorded before the file is open";
   q.run();
   ASSERT_TRUE(begun) << begun.error().text;
   ASSERT_TRUE(q.recordings->takes("front"));
   EXPECT_FALSE(q.recordings->takes("rear"));
   q.recordings->take("front", ping_at(0));
   EXPECT_TRUE(q.recordings->takes("front"));
-  q.recordings->take("front", ping_at(0.1));  // before the event that the first one is written
+  q.recordings->take("front", ping_at(0.1));  // arrives before the first ping is written
   EXPECT_FALSE(q.recordings->takes("front"));
   q.recordings->take("front", ping_at(0.2));
   q.run();
@@ -230,7 +230,7 @@ TEST(Recordings, ASlowDiskEndsTheRecordingWithOneLine) {
   EXPECT_EQ(messages_in(status.file()), 1u);
 }
 
-TEST(Recordings, TheOneThatLetsMostWaitEndsFirst) {
+TEST(Recordings, TheRecordingWithMostWaitingBytesEndsFirst) {
   Queue q(3 * ping_at(0).size());
   for (const char* sonar : {"front", "rear"})
     q.recordings->start({std::string(sonar) + ".mcap"}, {sonar, "oculus", {}}, "test",
@@ -347,7 +347,7 @@ TEST(RecordedDaemon, ClientsAndFileHaveTheSameBytes) {
     const auto opened = recording::open_recording(std::filesystem::path(folder.path + "/run.oculus"));
     ASSERT_TRUE(opened);
     while (const auto message = opened->reader->next()) kept.add(message->bytes);
-    EXPECT_EQ(kept.hex(), digests.back()) << "the client was sent nothing but pings";
+    EXPECT_EQ(kept.hex(), digests.back()) << "the client received only pings";
     EXPECT_EQ(messages_in(folder.path + "/run.mcap"), 30u);
   }
   EXPECT_EQ(digests[0], digests[1]);
@@ -359,7 +359,7 @@ TEST(RecordedDaemon, IsListedInTheStatusAndStopsWhenRequested) {
   EXPECT_EQ(daemon.ask(control::StartRecording{"run.mcap", "rear"}).text, "no sonar is called \"rear\"; there are: front");
   EXPECT_EQ(daemon.ask(control::StopRecording{}).code, OperationResult::Code::refused);
   EXPECT_EQ(daemon.ask(control::StartRecording{"run.mcap", "front"}).code, OperationResult::Code::done);
-  EXPECT_EQ(daemon.ask(control::StartRecording{"run.mcap", "front"}).code, OperationResult::Code::failed) << "it is there";
+  EXPECT_EQ(daemon.ask(control::StartRecording{"run.mcap", "front"}).code, OperationResult::Code::failed) << "the file exists";
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
   EXPECT_TRUE(eventually([&] {
@@ -372,7 +372,7 @@ TEST(RecordedDaemon, IsListedInTheStatusAndStopsWhenRequested) {
   EXPECT_FALSE(told.running());
   EXPECT_EQ(told.why(), "stop requested");
   EXPECT_EQ(told.file(), folder.path + "/run.mcap");
-  EXPECT_EQ(messages_in(told.file()), told.pings()) << "complete when the stop was answered";
+  EXPECT_EQ(messages_in(told.file()), told.pings()) << "the file is complete when the stop is answered";
   EXPECT_EQ(std::filesystem::file_size(told.file()), told.bytes());
   EXPECT_TRUE(client.next_ping());
   EXPECT_EQ(daemon.stop(), 0);
@@ -405,7 +405,7 @@ TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
   const auto told = daemon.status().recordings().at(0);
   EXPECT_THAT(told.why(), HasSubstr("File too large"));
   EXPECT_EQ(daemon.stop(), 0);
-  EXPECT_LE(missing, daemon.figures().dropped) << "what is missing was dropped for a client that did not read";
+  EXPECT_LE(missing, daemon.figures().dropped) << "missing pings were dropped because the client did not read";
   const std::string log = daemon.log_text();
   const auto first = log.find("recording stopped: cannot write more to " + told.file());
   EXPECT_NE(first, std::string::npos) << log;
@@ -416,7 +416,7 @@ TEST(RecordedDaemon, AFullDiskEndsTheRecordingAndNothingElse) {
   EXPECT_LT(kept, told.pings());
 }
 
-TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
+TEST(RecordedDaemon, TheRecordingOfASonarThatAReloadRemovesEnds) {
   const Folder folder;
   DaemonSetup setup = recording_setup(folder);
   setup.config_file = setup.options.handle_signals = true;
@@ -436,10 +436,10 @@ TEST(RecordedDaemon, ASonarThatAReloadTakesAwayIsRecordedNoMore) {
   EXPECT_EQ(daemon.status().recordings().at(0).why(), "the configuration changed");
   EXPECT_TRUE(daemon.status().recordings().at(1).running());
   EXPECT_EQ(daemon.stop(), 0);
-  EXPECT_EQ(messages_in(folder.path + "/rear.mcap"), 0u) << "whole, if empty";
+  EXPECT_EQ(messages_in(folder.path + "/rear.mcap"), 0u) << "the file is complete and has no ping";
 }
 
-TEST(RecordedDaemon, AReloadThatFailsLeavesTheRecordingOfWhatGoesOn) {
+TEST(RecordedDaemon, AReloadThatFailsDoesNotEndTheRecording) {
   const Folder folder;
   DaemonSetup setup = recording_setup(folder);
   setup.config_file = setup.options.handle_signals = true;

@@ -15,7 +15,7 @@ using oculus::PingRate;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-/// Large pings: 512 beams, 32 bit, about 1.4 MB, so that kernel buffers fill within a second.
+/// Requests large pings (512 beams, 32 bit, about 1.4 MB), which fill the kernel's buffers within a second.
 oculus::FireRequest large_fire(PingRate rate) {
   auto fire = fire_at(rate, 4);
   fire.version = 2;
@@ -49,7 +49,7 @@ TEST(Clients, ASlowClientLosesWholePingsAndAHealthyClientNone) {
     EXPECT_THAT(healthy_ids.add(*ping), IsEmpty());
     last = ping->head.fixed.ping_id;
   }
-  EXPECT_EQ(healthy_ids.skipped_ids(), 0u) << "a stalled neighbour costs nothing";
+  EXPECT_EQ(healthy_ids.skipped_ids(), 0u) << "a stalled client costs the other no ping";
   // The slow client reads again: it gets old pings from the kernel's buffers, then a gap, then the newest. No ping is cut or
   // mixed with another.
   oculus::PingSequence slow_ids;
@@ -67,7 +67,7 @@ TEST(Clients, ASlowClientLosesWholePingsAndAHealthyClientNone) {
   EXPECT_GE(daemon.figures().dropped, slow_ids.skipped_ids());
 }
 
-/// Requests of a dozen pings that a client got at 40 Hz from an engine that takes 60 ms a ping.
+/// Returns the requests for a dozen pings at 40 Hz, of which an engine computes one in 60 ms.
 std::vector<PingRequest> overloaded(const std::string& sonar_lines) {
   DaemonSetup setup;
   setup.sonar_lines = sonar_lines;
@@ -102,7 +102,7 @@ TEST(Clients, AClientThatReadsNothingIsReset) {
   ASSERT_TRUE(eventually([&] { return daemon.log_text().find("read no byte for 300 ms") != std::string::npos; }));
   Client next(daemon.address());
   next.fire(fire_at(PingRate::hz10));
-  EXPECT_TRUE(next.next_ping()) << "the place of the client that read nothing is free again";
+  EXPECT_TRUE(next.next_ping()) << "the slot of the client that read nothing is free again";
   EXPECT_FALSE(stalled.read_to_end());
   EXPECT_TRUE(stalled.was_reset);
 }
@@ -167,7 +167,7 @@ TEST(Clients, PingIdsContinueAcrossClientsAndSettingsDoNot) {
   EXPECT_GT(second.next_ping()->head.fixed.ping_id, last);
 }
 
-/// Returns the first message to `heir`, which connected while a ping for the previous client was still being computed.
+/// Expects that `heir`, which connected while a ping for the previous client was still being computed, does not get that ping.
 void expect_only_its_own_pings(Daemon& daemon, Client& heir, PingGate& gate) {
   const std::size_t asked = daemon.requests().size();
   const auto connected = [&] {
@@ -179,15 +179,16 @@ void expect_only_its_own_pings(Daemon& daemon, Client& heir, PingGate& gate) {
   gate.open();
   const auto first = heir.next();
   ASSERT_TRUE(first);
-  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*first)) << "a ping of the client before it";
+  EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*first)) << "the heir got a ping of the previous client";
   heir.fire(fire_at(PingRate::hz10, 3));
   const auto ping = heir.next_ping();
   ASSERT_TRUE(ping);
   EXPECT_EQ(ping->head.fixed.fire.range, 3);
-  EXPECT_EQ(daemon.requests().at(asked - 1).settings.range_m, 2) << "the other one was under way, or this shows nothing";
+  EXPECT_EQ(daemon.requests().at(asked - 1).settings.range_m, 2)
+      << "no ping of the previous client was being computed, so the test shows nothing";
 }
 
-TEST(Clients, APingUnderWayIsNotForTheNextClient) {
+TEST(Clients, APingInProgressIsNotSentToTheNextClient) {
   DaemonSetup setup;
   setup.sonar_lines = "    options: {dummy_period_ms: 600}\n";
   setup.gate = std::make_shared<PingGate>();
@@ -234,7 +235,7 @@ TEST(Admission, CloseNewSendsTheSecondAFinAndNoByte) {
     ASSERT_TRUE(ping);
     EXPECT_THAT(ids.add(*ping), IsEmpty());
   }
-  EXPECT_EQ(ids.skipped_ids(), 0u) << "the first is undisturbed";
+  EXPECT_EQ(ids.skipped_ids(), 0u) << "the first client loses no ping";
   daemon.stop();
   EXPECT_EQ(daemon.figures().refused_clients, 1u);
 }
@@ -256,10 +257,10 @@ TEST(Admission, TakeOverEndsTheOldOneAtAMessageBoundary) {
   EXPECT_EQ(old.decoder.buffered_bytes(), 0u);
   ASSERT_TRUE(eventually([&] { return daemon.status().sonars(0).has_gone(); }));
   const auto status = daemon.status();
-  EXPECT_GT(status.sonars(0).gone().connected_s(), status.sonars(0).clients(0).connected_s()) << "the old one connected first";
+  EXPECT_GT(status.sonars(0).gone().connected_s(), status.sonars(0).clients(0).connected_s()) << "the old client connected first";
 }
 
-/// Its port never has pings.
+/// A port for commands never has pings.
 TEST(Admission, AConnectionForCommandsWithoutPingsIsNoError) {
   DaemonSetup setup;
   setup.profile = "norbit-wbms";
@@ -281,7 +282,7 @@ TEST(Admission, AConnectionForCommandsWithoutPingsIsNoError) {
     }
 }
 
-TEST(Admission, QueueServesTheNextWhenAPlaceIsFree) {
+TEST(Admission, QueueServesTheNextWhenASlotIsFree) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 1, when_full: queue}\n";
   Daemon daemon(setup);
@@ -322,14 +323,14 @@ TEST(Admission, AClientThatLeavesWhileWaitingLosesItsPlaceInTheQueue) {
   EXPECT_EQ(ping->head.fixed.fire.range, 3) << "the range is that of the client that stays";
 }
 
-TEST(Admission, TheLastFireWinsAmongSeveral) {
+TEST(Admission, TheLastFireMessageOfSeveralClientsIsUsed) {
   DaemonSetup setup;
   setup.sonar_lines = "    clients: {max: 3}\n";
   Daemon daemon(setup);
   Client a(daemon.address()), b(daemon.address());
   a.fire(fire_at(PingRate::hz40, 2));
   ASSERT_TRUE(a.next_ping());
-  ASSERT_TRUE(b.next_ping()) << "pings go to all";
+  ASSERT_TRUE(b.next_ping()) << "all clients get pings";
   b.fire(fire_at(PingRate::hz40, 3));
   ASSERT_TRUE(eventually([&] { return a.next_ping()->head.fixed.fire.range == 3; }));
   a.fire(fire_at(PingRate::hz40, 2));  // the same bytes as a's last request, but no longer the device's settings
@@ -349,7 +350,7 @@ TEST(Clients, ManyReconnectsLeaveNoState) {
   const std::string log = daemon.log_text();
   const auto lines = std::count(log.begin(), log.end(), '\n');
   EXPECT_GE(lines, 5);
-  EXPECT_LE(lines, 20 + 3 * (took / std::chrono::seconds(1))) << "a storm of visitors is no flood of lines";
+  EXPECT_LE(lines, 20 + 3 * (took / std::chrono::seconds(1))) << "many connections make few log lines";
 }
 
 TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
@@ -368,8 +369,8 @@ TEST(GracefulStop, ReadingClientsGetAWholeLastMessageAndStalledOnesAReset) {
   reader.join();
   EXPECT_TRUE(whole) << "FIN";
   EXPECT_EQ(healthy.decoder.buffered_bytes(), 0u) << "no message was cut off";
-  EXPECT_GE(took, Session::finish_limit) << "the stalled one had its time";
-  EXPECT_LT(took, patience) << "the promise is 2 s; this allows for a busy machine";
+  EXPECT_GE(took, Session::finish_limit) << "the stalled client had the full time";
+  EXPECT_LT(took, patience) << "docs promise 2 s; a busy machine may need more";
   EXPECT_THAT(daemon.log_text(), HasSubstr("did not receive its last message in time"));
 }
 

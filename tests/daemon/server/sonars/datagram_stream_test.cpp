@@ -1,4 +1,4 @@
-// A silent host by datagrams: when the daemon sends it a probe, and when it counts as disconnected.
+// A silent UDP host: when the daemon sends a probe to its computer, and when the host counts as disconnected.
 #include "daemon/server/sonars/datagram_stream.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ struct SilentHost : ::testing::Test, QuietParent {
   udp::socket socket{io, udp::v4()};
   std::shared_ptr<DatagramStream> stream = std::make_shared<DatagramStream>(*this, socket, 1, std::chrono::nanoseconds(0));
   int looks = 0;
-  int answered_look = 0;  // its computer answers each nth probe, with this n; 0: none
+  int answered_look = 0;  // the host's computer answers every nth probe, where n is this number; 0: no probe
 };
 
 TEST_F(SilentHost, IsGivenUpAfterTheLimitWhenNothingAnswers) {
@@ -55,7 +55,7 @@ TEST_F(SilentHost, StaysWhenAnAnswerOfItsComputerIsLost) {
   EXPECT_GE(looks, 6);
 }
 
-TEST_F(SilentHost, IsLookedForAfterTheDaemonStoodStill) {
+TEST_F(SilentHost, IsProbedAfterTheDaemonWasBlocked) {
   answered_look = 1;
   asio::post(io, [] { std::this_thread::sleep_for(3 * limit); });
   run_until([&] { return looks >= 2 || !why.empty(); });

@@ -1,4 +1,4 @@
-// Network actions of a device whose sonar asks it to close a port, reset a client or stop reading it.
+// Network actions that a sonar requests from its device: to close a port, reset a client, or stop reading from a client.
 #include "daemon/server/sonars/device.hpp"
 
 #include <gmock/gmock.h>
@@ -83,7 +83,7 @@ TEST_F(DeviceActions, ListenClosesAndOpensThePortOfClientsOnly) {
   for (int round = 0; round < 3; ++round) {
     device.perform({Listen{false}});
     EXPECT_EQ(device.data_endpoint().port, 52100);
-    EXPECT_EQ(device.problem(), "") << "closed on request";
+    EXPECT_EQ(device.problem(), "") << "a port closed on request is no problem";
     EXPECT_TRUE(refuses(52100));
     EXPECT_FALSE(refuses(52101));
     run(milliseconds(20));
@@ -104,7 +104,7 @@ TEST_F(DeviceActions, ListenTriesAgainWhileAnotherProgramHasThePort) {
     device.perform({Listen{true}});
     run(milliseconds(200));
     EXPECT_THAT(log_text, HasSubstr("port in use by another program"));
-    EXPECT_EQ(log_text.find("port in use"), log_text.rfind("port in use")) << "the log has one line on it";
+    EXPECT_EQ(log_text.find("port in use"), log_text.rfind("port in use")) << "the log line is not repeated";
     EXPECT_NE(device.problem(), "");
   }
   EXPECT_TRUE(soon([&] { return !refuses(52100); }));

@@ -1,4 +1,4 @@
-// An exception in one conversation, which is a bug of sonard, is logged and ends only that conversation.
+// An exception in one conversation (a bug of sonard) is logged and ends only that conversation.
 #include <gmock/gmock.h>
 
 #include "daemon/server/poses/pose_server.hpp"
@@ -17,7 +17,7 @@ struct ThrowingParent final : QuietParent {
   void on_fault(const std::string& what) override { fault = what; }
 };
 
-TEST(Faults, EndOnlyTheirSession) {
+TEST(Exceptions, EndOnlyTheirSession) {
   asio::io_context io;
   tcp::acceptor acceptor(io, {asio::ip::make_address("127.0.0.2"), 0});
   Client client(acceptor.local_endpoint().address().to_string(), acceptor.local_endpoint().port());
@@ -67,7 +67,7 @@ struct PoseFaults : ::testing::Test {
 
 const std::string pose_line = "{\"position\":[0,1,3],\"attitude\":[0,0,0]}\n";
 
-TEST_F(PoseFaults, AFaultInADatagramDoesNotStopTheListener) {
+TEST_F(PoseFaults, AnExceptionInADatagramDoesNotStopTheListener) {
   send_udp(address(), server->json().port, bytes_of(pose_line));
   send_udp(address(), server->json().port, bytes_of(pose_line));
   io.run_for(patience);
@@ -75,7 +75,7 @@ TEST_F(PoseFaults, AFaultInADatagramDoesNotStopTheListener) {
   EXPECT_THAT(log_text, HasSubstr("internal fault: no such luck"));
 }
 
-TEST_F(PoseFaults, AFaultClosesOnlyItsConnection) {
+TEST_F(PoseFaults, AnExceptionClosesOnlyItsConnection) {
   Client unlucky(address(), server->json().port);
   unlucky.send(pose_line);
   io.run_for(milliseconds(50));

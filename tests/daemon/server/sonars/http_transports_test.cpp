@@ -1,4 +1,4 @@
-// HTTP resources of a made-up make of sonar, served end to end, and receivers of datagrams that they name.
+// HTTP resources of a made-up make of sonar, served end to end, and receivers of datagrams that clients set over HTTP.
 #include <gmock/gmock.h>
 
 #include <thread>
@@ -44,7 +44,7 @@ TEST(Transports, HttpReadsAndChangesTheDevice) {
   EXPECT_TRUE(asked_for_range(daemon, 7));
 }
 
-TEST(Transports, PagesOfTheWebReadAndChangeNothingByHttp) {
+TEST(Transports, WebPagesReadAndChangeNothingOverHttp) {
   DaemonSetup setup = made_up();
   setup.edit_config = [edit = setup.edit_config](Config& config) {
     edit(config);
@@ -52,7 +52,8 @@ TEST(Transports, PagesOfTheWebReadAndChangeNothingByHttp) {
   };
   Daemon daemon(setup);
   const std::string& at = daemon.address();
-  EXPECT_THAT(http(at, "GET", "/range", "", "evil.example"), StartsWith("HTTP/1.1 403 ")) << "a name that was rebound";
+  EXPECT_THAT(http(at, "GET", "/range", "", "evil.example"), StartsWith("HTTP/1.1 403 "))
+      << "a foreign host name that resolves to this address";
   EXPECT_THAT(http(at, "PUT", "/range", "9", "", "Origin: http://evil.example\r\n"), StartsWith("HTTP/1.1 403 "));
   EXPECT_THAT(http(at, "PUT", "/range", "9", "", "Origin: null\r\n"), StartsWith("HTTP/1.1 403 "));
   EXPECT_EQ(body_of(http(at, "GET", "/range")), "5") << "refused requests change nothing";
@@ -98,15 +99,15 @@ TEST(Transports, AReceiverWithAClosedPortGetsNothingUntilThePortOpens) {
     daemon.on_io_thread([&] { bytes = daemon.app().devices().front().figures().bytes_written; });
     return bytes;
   };
-  std::this_thread::sleep_for(milliseconds(200));  // the last one is still being sent
+  std::this_thread::sleep_for(milliseconds(200));  // the last ping is still being sent
   const auto before = sent();
   std::this_thread::sleep_for(milliseconds(1000));
-  EXPECT_LT(sent() - before, 4u * 4000u) << "20 pings of 3200 bytes while it was open";
+  EXPECT_LT(sent() - before, 4u * 4000u) << "with an open port, 20 pings of 3200 bytes are sent";
   UdpSocket again("127.0.0.1", port);
   next_ping(again);
 }
 
-TEST(Transports, NoClientNamesABroadcastOrGroupThatTheConfigurationDoesNot) {
+TEST(Transports, ClientsMaySetOnlyConfiguredBroadcastAddressesAndGroups) {
   for (const bool named : {false, true}) {
     Daemon daemon(made_up(named ? "    groups: [127.255.255.255]\n" : ""));
     UdpSocket everybody("127.255.255.255"), receiver;

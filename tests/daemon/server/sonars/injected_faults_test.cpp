@@ -28,7 +28,7 @@ control::AddFault fault(const std::string& what, std::map<std::string, std::stri
 }
 bool done(const OperationResult& result) { return result.code == OperationResult::Code::done; }
 
-/// True if a connection is accepted; a refusal comes at once.
+/// Returns true if a connection is accepted; a refusal comes at once.
 bool accepts(const std::string& address) {
   asio::io_context io;
   tcp::socket socket(io);
@@ -48,7 +48,7 @@ struct InjectedFaults : ::testing::Test {
   Client client;
 };
 
-TEST(UnarmedFaults, AreRefusedWithWhatToDo) {
+TEST(UnarmedFaults, AreRefusedWithAdvice) {
   Daemon daemon;
   const OperationResult result = daemon.ask(fault("L05"));
   EXPECT_EQ(result.code, OperationResult::Code::refused);
@@ -79,7 +79,7 @@ TEST_F(InjectedFaults, AClosedPortRefusesAndOpensAgain) {
   EXPECT_TRUE(client.read_to_end());
   EXPECT_FALSE(accepts(daemon.address()));
   ASSERT_TRUE(done(daemon.ask(control::EndFaults{})));
-  EXPECT_TRUE(eventually([&] { return accepts(daemon.address()); })) << "within 100 ms on a quiet machine";
+  EXPECT_TRUE(eventually([&] { return accepts(daemon.address()); })) << "the port does not open again";
 }
 
 TEST_F(InjectedFaults, SilenceEndsWhenTheFaultIsCleared) {
@@ -145,7 +145,7 @@ TEST(PlannedFaults, BeginWithTheDaemonAndFillTheJournal) {
   client.fire(fire_at(oculus::PingRate::hz40));
   std::vector<std::uint32_t> numbers;
   while (numbers.size() < 4) {
-    setup.gate->allow(numbers.size() == 2 ? 2 : 1);  // every third is lost
+    setup.gate->allow(numbers.size() == 2 ? 2 : 1);  // every third ping is lost
     const auto ping = client.next_ping();
     ASSERT_TRUE(ping);
     numbers.push_back(ping->head.fixed.ping_id);
@@ -179,7 +179,8 @@ TEST_F(InjectedFaults, AThousandLeaveNothingOpen) {
     }
     ASSERT_TRUE(done(daemon.ask(control::EndFaults{})));
   }
-  EXPECT_TRUE(eventually([&] { return open_descriptors() == descriptors; })) << open_descriptors() << " not " << descriptors;
+  EXPECT_TRUE(eventually([&] { return open_descriptors() == descriptors; }))
+      << open_descriptors() << " descriptors are open, not " << descriptors;
   EXPECT_EQ(threads(), running);
 }
 

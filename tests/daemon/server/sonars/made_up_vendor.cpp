@@ -189,7 +189,7 @@ class MadeUpVendor final : public protocol::Vendor {
     return std::make_shared<const Bytes>(std::move(bytes));
   }
   std::vector<Bytes> datagrams(const protocol::Port& port, const Ping& ping, const DeviceState& device) const override {
-    if (port.kind == Kind::tcp_stream)  // each of the two sends its own part of a ping
+    if (port.kind == Kind::tcp_stream)  // each of the two ports sends its own part of a ping
       return port.number == data_port ? std::vector<Bytes>{*frame(ping, device)} : std::vector<Bytes>{};
     const std::string number = std::to_string(static_cast<std::uint32_t>(ping.request.number));
     if (port.group.port != 0) return {bytes_of(number)};

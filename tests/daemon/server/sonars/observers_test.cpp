@@ -41,25 +41,25 @@ TEST(Observers, GetTheDriversPingsAndChangeNothing) {
   EXPECT_EQ(status.clients_size(), 1);
   Client second(daemon.address());
   second.fire(fire_at(PingRate::hz40));
-  EXPECT_TRUE(second.read_to_end()) << "the driver's place is taken as before";
+  EXPECT_TRUE(second.read_to_end()) << "the slot for a driver is still in use";
   EXPECT_EQ(second.bytes_read, 0u);
-  std::thread reader([&] { EXPECT_TRUE(observer.read_to_end()) << "its last message is whole, and then a FIN"; });
+  std::thread reader([&] { EXPECT_TRUE(observer.read_to_end()) << "the stream ends with a whole message and a FIN"; });
   driver.close();
   EXPECT_EQ(daemon.stop(), 0);
   reader.join();
   const DeviceFigures f = daemon.figures();
   EXPECT_EQ(f.clients, 1u);
-  EXPECT_LE(f.offered, f.pings) << "pings are offered to one client";
+  EXPECT_LE(f.offered, f.pings) << "pings are offered to the driver only";
 }
 
-TEST(Observers, ADriverThatComesWhileOneLooksOnIsTheDriver) {
+TEST(Observers, DoNotTakeTheSlotOfALaterDriver) {
   Daemon daemon;
   Client observer(daemon.address(), observer_port(daemon));
   observer.fire(fire_at(PingRate::hz40, 5));
   const auto first = observer.next();
   ASSERT_TRUE(first);
   EXPECT_TRUE(std::holds_alternative<oculus::DummyMessage>(*first));
-  EXPECT_THAT(daemon.requests(), IsEmpty()) << "there is no client to ping for";
+  EXPECT_THAT(daemon.requests(), IsEmpty()) << "no ping is made without a driver";
   Client driver(daemon.address());
   driver.fire(fire_at(PingRate::hz40, 3));
   const auto ping = driver.next_ping();
@@ -101,7 +101,7 @@ TEST(Observers, UseNoSlotOfAClient) {
   EXPECT_TRUE(observer.next_ping());
 }
 
-TEST(Observers, DoNotHoldUpSteppedTime) {
+TEST(Observers, DoNotDelaySteppedTime) {
   DaemonSetup setup;
   setup.more = "clock: stepped\n";
   Daemon daemon(setup);

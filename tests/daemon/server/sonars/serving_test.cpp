@@ -1,4 +1,4 @@
-// One client, one sonar, over loopback: the conversation a driver has with the device.
+// One client and one sonar over loopback: the conversation of a driver with its device.
 #include <gmock/gmock.h>
 
 #include "protocol/control/answers.hpp"
@@ -11,7 +11,7 @@ using oculus::PingRate;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-TEST(Serving, PingsAreSoundConsecutiveAndEchoTheirRequest) {
+TEST(Serving, PingsAreValidAndConsecutiveAndEchoTheirRequest) {
   DaemonSetup setup;
   setup.gate = std::make_shared<PingGate>();
   Daemon daemon(setup);
@@ -63,12 +63,13 @@ TEST(Serving, NoDummyWhileAPingTakesLong) {
   const auto written = [&] { return daemon.status().sonars().at(0).clients().at(0).bytes_written(); };
   const auto before = written();
   for (const auto until = Steady::now() + milliseconds(1200); Steady::now() < until;) {
-    EXPECT_EQ(written(), before) << "a byte between the fire message and its ping";
+    EXPECT_EQ(written(), before) << "a byte was sent between the fire message and its ping";
     std::this_thread::sleep_for(milliseconds(10));
   }
   enough.set_value();
   auto message = client.next();
-  while (message && std::holds_alternative<oculus::DummyMessage>(*message)) message = client.next();  // sent before the message
+  while (message && std::holds_alternative<oculus::DummyMessage>(*message))
+    message = client.next();  // dummies from before the fire message
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(message);
     EXPECT_TRUE(std::holds_alternative<oculus::DecodedPing>(*message));
@@ -125,12 +126,13 @@ TEST(Serving, RepeatedFireMessagesDoNotRestartTheRhythm) {
   const auto begin = Steady::now();
   int pings = 0;
   while (pings < 10 &&
-         Steady::now() - begin < patience) {  // 50 requests a second; a restarted timer would ping as often, or never
+         Steady::now() - begin <
+             patience) {  // 50 requests per second; if each restarted the timer, pings would be as frequent, or would never come
     client.fire(fire_at(PingRate::hz5));
     if (client.next_ping(milliseconds(20))) ++pings;
   }
   EXPECT_EQ(pings, 10);
-  EXPECT_GE(Steady::now() - begin, milliseconds(9 * 200)) << "faster than the rate";
+  EXPECT_GE(Steady::now() - begin, milliseconds(9 * 200)) << "pings are faster than the rate";
 }
 
 TEST(Serving, LateSimulationSkipsTicksAndNeverQueues) {
@@ -154,7 +156,7 @@ TEST(Serving, LateSimulationSkipsTicksAndNeverQueues) {
   const auto requests = daemon.requests();
   ASSERT_GE(requests.size(), 4u);
   for (std::size_t i = 1; i < requests.size(); ++i)
-    EXPECT_GE(requests[i].fired_at - requests[i - 1].fired_at, 6 * milliseconds(25)) << "an older tick waited";
+    EXPECT_GE(requests[i].fired_at - requests[i - 1].fired_at, 6 * milliseconds(25)) << "a ping was made for an older tick";
 }
 
 TEST(Serving, Version2RequestsGetVersion2PingsWithAttitude) {
@@ -166,7 +168,7 @@ TEST(Serving, Version2RequestsGetVersion2PingsWithAttitude) {
   const auto ping = client.next_ping();
   ASSERT_TRUE(ping);
   EXPECT_THAT(oculus::echo_violations(fire, *ping), IsEmpty());
-  EXPECT_NEAR(ping->head.fixed.heading_deg, 90, 1e-6) << "a body along world +x heads east";
+  EXPECT_NEAR(ping->head.fixed.heading_deg, 90, 1e-6) << "the vehicle looks along +x of the world, which is east";
 }
 
 TEST(Serving, GarbageIsSkippedAndLoggedFewTimes) {
@@ -221,7 +223,7 @@ TEST(Serving, APingThatTheEngineRefusesIsDroppedCountedAndLogged) {
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
   for (const std::uint32_t number : {1u, 3u, 5u, 6u}) {
-    setup.gate->allow(number == 3 || number == 5 ? 2 : 1);  // the ping before it is refused
+    setup.gate->allow(number == 3 || number == 5 ? 2 : 1);  // the previous ping is refused
     const auto ping = client.next_ping();
     ASSERT_TRUE(ping);
     EXPECT_EQ(ping->head.fixed.ping_id, number);
@@ -268,7 +270,7 @@ std::string why_not(DaemonSetup setup) {
   return "opened";
 }
 
-TEST(Serving, ErrorsOfAddressesHaveARemedy) {
+TEST(Serving, ErrorsOfAddressesSayWhatToDo) {
   Daemon first;
   DaemonSetup same;
   same.address = first.address();

@@ -13,7 +13,7 @@
 namespace sonar::testing_daemon {
 
 struct QuietParent : SessionParent {
-  std::string why;  // empty: it has not ended
+  std::string why;  // why the conversation has ended; empty before that
   bool client_left = false;
   std::size_t on_bytes(ConnectionId, protocol::BytesView) override { return 0; }
   Outbox::Message next_message(ConnectionId) override { return {}; }

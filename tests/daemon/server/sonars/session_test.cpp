@@ -46,7 +46,7 @@ struct SessionShapes : ::testing::Test {
     began = Steady::now();
     session->start();
   }
-  /// Runs the session until then. Returns each received piece with its time since start().
+  /// A piece of the stream that read_until_end_or() has received, with its time since start().
   struct Piece {
     std::string text;
     milliseconds at;
@@ -85,11 +85,11 @@ std::string joined(const std::vector<SessionShapes::Piece>& pieces) {
   return all;
 }
 
-TEST_F(SessionShapes, PiecesArriveApart) {
+TEST_F(SessionShapes, PiecesArriveWithPauses) {
   start({shaped("abcdefgh", {{{0, milliseconds(200)}, {3, milliseconds(200)}, {3, {}}, {7, milliseconds(200)}}}),
          shaped("ijk", {})});
   const auto pieces = read_until_end_or(11);
-  ASSERT_GE(pieces.size(), 3u) << "the end of the first message and the second arrive together or apart";
+  ASSERT_GE(pieces.size(), 3u) << "the last piece may include the second message";
   EXPECT_EQ(pieces[0].text, "abc");
   EXPECT_EQ(pieces[1].text, "defg");
   EXPECT_EQ(pieces[2].text.front(), 'h');
@@ -102,7 +102,7 @@ TEST_F(SessionShapes, PiecesArriveApart) {
   EXPECT_EQ(parent.written, 2);
 }
 
-TEST_F(SessionShapes, APauseIsNoStall) {
+TEST_F(SessionShapes, APauseOfOursIsNoStallOfTheClient) {
   start({shaped("ab", {{{1, milliseconds(1500)}}})}, milliseconds(200));
   EXPECT_THAT(texts_of(read_until_end_or(2)), ElementsAre("a", "b"));
   EXPECT_FALSE(client.ended);
@@ -152,7 +152,7 @@ TEST_F(SessionShapes, ReportsThatTheClientLeft) {
 TEST_F(SessionShapes, ReportsThatTheClientLeftDuringAMessage) {
   start({shaped(std::string(16u << 20, 'x'), {})});  // more than the kernels hold
   session->read_from_client(false);
-  client.send(std::string("x"));  // the reader keeps it back, so only the writer can detect the end
+  client.send(std::string("x"));  // this unread byte hides the end from the reader, so only the writer can detect it
   io.restart();
   while (io.run_one_for(milliseconds(100)) > 0) continue;
   EXPECT_EQ(parent.why, "");

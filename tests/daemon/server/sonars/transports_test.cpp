@@ -1,4 +1,4 @@
-// Every kind of port but HTTP, served end to end by a made-up make of sonar: TCP streams, a beacon, datagrams that are answered,
+// Every kind of port except HTTP, served end to end for a made-up make of sonar: TCP streams, a beacon, datagrams with answers,
 // pings as datagrams to receivers and to a multicast group, and conversations across them.
 #include <gmock/gmock.h>
 
@@ -27,7 +27,7 @@ TEST(Transports, ATcpCommandNamesAReceiverOfDatagramsUntilItsConnectionEnds) {
   EXPECT_TRUE(asked_for_range(daemon, 8));
   client.reset();
   EXPECT_TRUE(eventually([&] { return receiver.next(milliseconds(500)).empty(); }))
-      << "the list of receivers ends with its connection";
+      << "the receivers of a connection end with it";
   daemon.stop();
   const DeviceFigures f = daemon.figures();
   EXPECT_EQ(f.offered, f.sent + f.dropped);
@@ -39,7 +39,7 @@ TEST(Transports, ReceiversOfSeveralConnectionsGetTheSameDatagrams) {
   UdpSocket one, other;
   Client first(daemon.address(), command_port), second(daemon.address(), command_port);
   EXPECT_EQ(ask(first, "receivers " + one.at()), "ok\n");
-  EXPECT_EQ(ask(second, "receivers " + other.at() + " " + one.at()), "ok\n") << "each address once";
+  EXPECT_EQ(ask(second, "receivers " + other.at() + " " + one.at()), "ok\n") << "an address may be set by several connections";
   unsigned ping = 0, same = 0;
   const std::string samples = next_ping(other, &ping);
   EXPECT_EQ(samples, pattern(ping));
@@ -73,7 +73,7 @@ TEST(Transports, DatagramsAreAnsweredAndSetTheDevicesOwnReceivers) {
   EXPECT_EQ(host.sender, daemon.address() + ":" + std::to_string(udp_port));
   host.send("fault", daemon.address(), udp_port);
   host.send("range 7", daemon.address(), udp_port);
-  EXPECT_EQ(host.next(), "ok\n") << "a mistake in the vendor's code costs one datagram";
+  EXPECT_EQ(host.next(), "ok\n") << "an exception in the vendor's code loses one datagram";
   EXPECT_THAT(daemon.log_text(), HasSubstr("internal fault: a mistake in the vendor's code"));
   host.send("receivers " + host.at(), daemon.address(), udp_port);
   EXPECT_EQ(host.next(), "ok\n");
@@ -102,7 +102,7 @@ TEST(Transports, AFloodOfDatagramsIsDroppedAndAnotherHostIsAnswered) {
   EXPECT_TRUE(eventually([&] {
     other.send("who", daemon.address(), udp_port);
     return other.next(milliseconds(200)) == "front 5\n";
-  })) << "other addresses do not wait for it";
+  })) << "other addresses do not wait for the flood";
   while (!flood.next(milliseconds(100)).empty()) ++answers;
   const double most_bytes = 65536 * (1 + std::chrono::duration<double>(Steady::now() - began).count());
   EXPECT_GT(answers, 50);
@@ -122,7 +122,7 @@ TEST(Transports, AnAddressThatConnectsTooOftenWaitsAndAnotherIsServed) {
     Client late(daemon.address(), command_port);
     late.send("range 7\n");
     return late.read_raw(3, std::chrono::seconds(5)).size() >= 3;
-  })) << "a client is served after the storm";
+  })) << "the address is served again later";
   asio::io_context io;
   tcp::socket other(io, {asio::ip::make_address("127.0.0.5"), 0});
   other.connect({asio::ip::make_address(daemon.address()), command_port});
@@ -158,7 +158,7 @@ TEST(Transports, AUdpDialogueBelongsToTheHostOfTheLastRequest) {
   EXPECT_TRUE(asked_for_range(daemon, 6));
   EXPECT_THAT(text_of(tcp.read_raw(20)), StartsWith("PING "));
   stranger.send("junk", daemon.address(), data_port);
-  EXPECT_FALSE(one.next().empty()) << "junk does not take the stream over";
+  EXPECT_FALSE(one.next().empty()) << "invalid bytes do not take the stream over";
   other.send("nothing\n", daemon.address(), data_port);
   EXPECT_EQ(other.next(), "no: unknown command\n");
   const std::string taken_over = next_ping(other, &ping);
@@ -167,10 +167,10 @@ TEST(Transports, AUdpDialogueBelongsToTheHostOfTheLastRequest) {
   EXPECT_EQ(daemon.status().sonars(0).clients_size(), 2);
   other.send("quit\n", daemon.address(), data_port);
   EXPECT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 1; }));
-  EXPECT_TRUE(stranger.next(milliseconds(100)).empty()) << "a stranger is sent nothing";
+  EXPECT_TRUE(stranger.next(milliseconds(100)).empty()) << "a host without a request gets nothing";
 }
 
-TEST(Transports, AHostByDatagramsWhosePortIsClosedIsGivenUpAndAnotherLosesNothing) {
+TEST(Transports, AUdpHostWhosePortIsClosedIsGivenUpAndAnotherLosesNothing) {
   Daemon daemon(made_up());
   {
     UdpSocket gone;
@@ -200,9 +200,9 @@ TEST(Transports, TheBeaconReportsClientsAtOnce) {
   Daemon daemon(made_up());
   UdpSocket host("127.0.0.1", beacon_port);
   auto client = std::make_unique<Client>(daemon.address(), command_port);
-  constexpr milliseconds at_once{5000};  // its period is 10 s
+  constexpr milliseconds at_once{5000};  // half the period of the beacon
   std::string status = host.next(at_once);
-  for (int waiting = 0; waiting < 3 && status == "front free"; ++waiting)  // from the start
+  for (int waiting = 0; waiting < 3 && status == "front free"; ++waiting)  // beacons from before the connection
     status = host.next(at_once);
   EXPECT_EQ(status, "front busy");
   client.reset();
@@ -249,7 +249,7 @@ TEST(Transports, ASilentUdpHostIsGivenUpUnlessItsComputerAnswers) {
   next_ping(listens, &first);
   do next_ping(listens, &last);
   while (last < first + 200 && last != 0);
-  EXPECT_EQ(daemon.status().sonars(0).clients_size(), 1) << "10 s and more later";
+  EXPECT_EQ(daemon.status().sonars(0).clients_size(), 1) << "the host is still connected after 10 s";
 }
 
 TEST(Transports, AStopFreesEveryPort) {

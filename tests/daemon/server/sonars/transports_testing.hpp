@@ -1,4 +1,4 @@
-// A daemon that serves a made-up make of sonar, its UDP hosts, and the pings that they get.
+// A daemon that emulates a sonar of a made-up make, UDP hosts, and the pings that these hosts get.
 #pragma once
 
 #include <arpa/inet.h>
@@ -103,7 +103,7 @@ inline Part part_of(const std::string& datagram) {
   return part;
 }
 
-/// The samples of the next whole ping.
+/// Returns the samples of the next whole ping.
 inline std::string next_ping(UdpSocket& from, unsigned* number = nullptr) {
   Part part = part_of(from.next());
   while (part.part != 0) part = part_of(from.next());
@@ -111,7 +111,7 @@ inline std::string next_ping(UdpSocket& from, unsigned* number = nullptr) {
   std::string samples = part.samples;
   while (part.part + 1 < part.parts) {
     const Part next = part_of(from.next());
-    EXPECT_EQ(next.ping, ping) << "pings are not mixed";
+    EXPECT_EQ(next.ping, ping) << "parts of two pings are mixed";
     EXPECT_EQ(next.part, part.part + 1);
     if (next.ping != ping) return {};
     samples += next.samples;
@@ -133,7 +133,7 @@ inline std::string ask(Client& client, const std::string& line) {
   return text_of(client.read_raw(3));
 }
 
-/// A ping that was under way when the range changed still has the range before.
+/// Waits until a ping has this range; a ping that was being computed at the change still has the previous range.
 inline bool asked_for_range(Daemon& daemon, double metres) {
   return eventually([&] { return daemon.requests().back().settings.range_m == metres; });
 }

@@ -36,7 +36,7 @@ TEST(VisitLog, FewVisitsAreLoggedOneByOne) {
   EXPECT_THAT(bench.lines, SizeIs(16)) << "a new period has its own lines";
 }
 
-TEST(VisitLog, ManyAreSummedUpAndNoneIsForgotten) {
+TEST(VisitLog, ManyVisitsAreSummedUpAndAllAreCounted) {
   Bench bench;
   bench.come_and_go(10);
   ASSERT_THAT(bench.lines, SizeIs(VisitLog::lines_a_spell));
@@ -62,7 +62,7 @@ TEST(VisitLog, TheEndReportsTheRemainingVisits) {
   EXPECT_THAT(bench.lines.back(), HasSubstr("connected=6  gone=6"));
   bench.visits.say(Kind::gone, "client gone: sonard stops", {});
   EXPECT_THAT(bench.lines.back(), HasSubstr("sonard stops")) << "clients disconnected after end() are logged";
-  EXPECT_EQ(bench.io.run(), 1u) << "nothing but the cancelled timer is left";
+  EXPECT_EQ(bench.io.run(), 1u) << "only the cancelled timer is left";
 }
 
 TEST(VisitLog, AReconnectingClientIsLoggedAsGone) {

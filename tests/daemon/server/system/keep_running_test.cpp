@@ -1,4 +1,4 @@
-// Loops of listeners continue after a fault, unless they have ended by themselves or must end with it.
+// The loop of a listener is restarted after an exception, unless the handler decides to end it.
 #include <gmock/gmock.h>
 
 #include <stdexcept>
@@ -31,7 +31,7 @@ struct Loop {
   }
 };
 
-TEST(KeepRunning, RestartsTheLoopAfterFaultsUntilItEnds) {
+TEST(KeepRunning, RestartsTheLoopAfterExceptionsUntilItEnds) {
   Loop loop;
   loop.faults = 2;
   loop.keep_running(5);
@@ -39,7 +39,7 @@ TEST(KeepRunning, RestartsTheLoopAfterFaultsUntilItEnds) {
   EXPECT_THAT(loop.told, ElementsAre("fault 1", "fault 2"));
 }
 
-TEST(KeepRunning, EndsWithTheFaultThatItIsNotToSurvive) {
+TEST(KeepRunning, EndsIfTheHandlerReturnsFalse) {
   Loop loop;
   loop.faults = 9;
   loop.keep_running(1);

@@ -20,7 +20,7 @@ using std::chrono::microseconds;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// The manager's end. `name` is a path, or @ and a name in the abstract namespace.
+/// The manager's end of the socket. `name` is a path, or @ and a name in the abstract namespace.
 class Manager {
  public:
   explicit Manager(const std::string& name) : name_(name) {
@@ -38,7 +38,7 @@ class Manager {
     std::error_code ec;
     if (name_[0] != '@') std::filesystem::remove(name_, ec);
   }
-  /// The next message; empty if none arrived in time.
+  /// Returns the next message; empty if none arrived in time.
   std::string next() {
     std::string text(4096, '\0');
     const auto size = ::recv(fd_, text.data(), text.size(), 0);
@@ -75,13 +75,13 @@ TEST_P(NotifyAt, ReportsReadinessAfterOpeningListenersAndTheEnd) {
   setup.options.service_manager = {name, {}};
   Daemon daemon(setup);
   EXPECT_THAT(manager.next(), StartsWith("READY=1\nSTATUS=Serving front on " + daemon.address()));
-  Client client(daemon.address());  // at once: the listener is open
+  Client client(daemon.address());  // connects at once, because the listener is open
   EXPECT_EQ(daemon.stop(), 0);
   EXPECT_THAT(manager.next(), StartsWith("STOPPING=1"));
 }
 INSTANTIATE_TEST_SUITE_P(PathAndAbstract, NotifyAt, ::testing::Values('/', '@'));
 
-TEST(Notify, SignsOfLifeComeWithoutClientsAndWhilePingsAreQuick) {
+TEST(Notify, WatchdogMessagesComeWithoutClientsAndWhilePingsAreQuick) {
   const std::string name = own_name('@');
   Manager manager(name);
   DaemonSetup setup;
@@ -114,7 +114,7 @@ TEST(Notify, APingThatDoesNotEndStopsTheWatchdogMessages) {
   manager.wait_at_most(milliseconds(600));  // three periods; earlier messages are read first
   int signs = 0;
   while (!manager.next().empty() && signs < 1000) ++signs;
-  EXPECT_LT(signs, 1000) << "the signs never ended";
+  EXPECT_LT(signs, 1000) << "watchdog messages do not end";
   held = false;
   manager.wait_at_most(patience);
   EXPECT_EQ(manager.next(), "WATCHDOG=1");
@@ -136,7 +136,7 @@ TEST(Notify, AReloadIsAnnouncedAndEndsWithReadiness) {
   notify.stopping();
   EXPECT_THAT(manager.next(), StartsWith("STOPPING=1"));
   manager.wait_at_most(milliseconds(50));
-  EXPECT_EQ(manager.next(), "") << "said once";
+  EXPECT_EQ(manager.next(), "") << "the message is not repeated";
 }
 
 TEST(Notify, AMissingManagerIsReportedOnceAndHasNoEffect) {

@@ -1,4 +1,4 @@
-// Signals as a user or a terminal sends them: which end the daemon gracefully, and which must not end it.
+// Which signals of a user or a terminal end the daemon gracefully, and which must not end it.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -22,7 +22,7 @@ bool logs(Daemon& daemon, const std::string& words) {
   return eventually([&] { return daemon.log_text().find(words) != std::string::npos; });
 }
 
-TEST(Signals, HangupIsLoggedAndTheClientsGoOn) {
+TEST(Signals, HangupIsLoggedAndClientsStayConnected) {
   Daemon daemon(with_signals());
   Client client(daemon.address());
   client.fire(fire_at(PingRate::hz40));
@@ -47,15 +47,15 @@ TEST(Signals, TerminateStillEndsGracefullyAfterAHangup) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("stopping: terminated"));
 }
 
-TEST(Signals, AHangupThatComesWithTheTerminationDoesNotKeepItAlive) {
+TEST(Signals, AHangupTogetherWithATerminationDoesNotPreventTheStop) {
   Daemon daemon(with_signals());
-  daemon.on_io_thread([] {  // both have arrived before either is handled
+  daemon.on_io_thread([] {  // both signals arrive before either is handled
     ASSERT_EQ(raise(SIGTERM), 0);
     ASSERT_EQ(raise(SIGHUP), 0);
   });
   const auto begin = Steady::now();
   EXPECT_EQ(daemon.wait(), 0);
-  EXPECT_LT(Steady::now() - begin, App::stop_limit) << "no client is connected: there is nothing to wait for";
+  EXPECT_LT(Steady::now() - begin, App::stop_limit) << "without clients, the stop waits for nothing";
   EXPECT_THAT(daemon.log_text(), Not(HasSubstr("reload:")));
 }
 
@@ -73,7 +73,7 @@ TEST(Signals, TerminateDoesNotWaitForALongPing) {
   ASSERT_EQ(kill(getpid(), SIGTERM), 0);
   EXPECT_TRUE(client.read_to_end()) << "a FIN, not a reset";
   client.close();
-  EXPECT_EQ(daemon.wait(), 0) << "run() returns while the ping is under way";
+  EXPECT_EQ(daemon.wait(), 0) << "run() returns while the ping is being computed";
   let_go.set_value();
 }
 

@@ -1,4 +1,4 @@
-// Time that programs advance: by control requests (lockstep) and by the stamps of poses (follow). Answers come when the pings
+// Time that other programs advance, with control requests (lockstep) or stamps of poses (follow). Answers come when the pings
 // have been sent.
 #include <gmock/gmock.h>
 
@@ -24,7 +24,7 @@ DaemonSetup with_clock(const std::string& mode, const std::string& more = "") {
   return setup;
 }
 
-/// A daemon with one client that requested 40 Hz, once the sonar has served it. The client reads all the time, because simulated
+/// A daemon whose sonar pings at 40 Hz for one client. The client reads continuously, because simulated
 /// time waits for readers.
 struct Pinging {
   explicit Pinging(DaemonSetup setup) : daemon(std::move(setup)), client(daemon.address()) {
@@ -69,20 +69,20 @@ struct Pinging {
   Daemon daemon;
   Client client;
   std::thread reader;
-  std::vector<oculus::DecodedPing> received;  // after stop()
+  std::vector<oculus::DecodedPing> received;  // complete after stop()
 };
 
-TEST(Lockstep, TimeStandsUntilAStepAndTheAnswerComesWhenThePingsAreOut) {
+TEST(Lockstep, TimeStandsStillUntilAStepWhoseAnswerComesAfterItsPings) {
   Pinging p(with_clock("lockstep"));
   std::this_thread::sleep_for(milliseconds(50));
   EXPECT_TRUE(p.daemon.requests().empty());
   EXPECT_EQ(p.daemon.status().clock(), "lockstep");
 
-  const v1::Stepped first = p.step(0.05);  // pings at 0 and 25 ms; that at 50 ms belongs to the next step
+  const v1::Stepped first = p.step(0.05);  // pings at 0 and 25 ms; the ping at 50 ms belongs to the next step
   EXPECT_EQ(first.now_ns(), 50'000'000);
   EXPECT_EQ(first.pings(), 2u);
   EXPECT_THAT(p.times_ms(), ElementsAre(0, 25));
-  EXPECT_EQ(p.daemon.status().sonars().at(0).clients().at(0).pings_written(), 2u) << "they are out";
+  EXPECT_EQ(p.daemon.status().sonars().at(0).clients().at(0).pings_written(), 2u) << "both pings have been sent";
   EXPECT_EQ(p.daemon.status().now_ns(), 50'000'000);
   EXPECT_EQ(p.step(0.01).pings(), 1u);
   const v1::Stepped none = p.step(0.01);
@@ -105,7 +105,7 @@ TEST(Lockstep, StepsThatWaitAreDoneOneAfterTheOther) {
   EXPECT_EQ(p.daemon.requests().size(), 8u);
 }
 
-TEST(Lockstep, APoseCountsFromTheNextStepOn) {
+TEST(Lockstep, APoseIsUsedFromTheNextStepOn) {
   Pinging p(with_clock("lockstep"));
   for (int i = 0; i < 4; ++i) {
     PoseSample s;
@@ -116,7 +116,7 @@ TEST(Lockstep, APoseCountsFromTheNextStepOn) {
   EXPECT_THAT(p.xs(), ElementsAre(0, 0.01, 0.02, 0.03));
 }
 
-TEST(Lockstep, RefusesStepsThatMeanNothing) {
+TEST(Lockstep, RefusesInvalidSteps) {
   Pinging p(with_clock("lockstep"));
   for (const double dt_s : {0.0, -1.0, 3601.0, 1e-12}) EXPECT_EQ(p.daemon.ask(Step{dt_s}).code, Code::refused) << dt_s;
   EXPECT_THAT(p.daemon.ask(Step{-1}).text, HasSubstr("more than 0 and at most 3600"));
@@ -127,7 +127,7 @@ TEST(Lockstep, RefusesStepsThatMeanNothing) {
   EXPECT_THAT(other.ask(Step{1}).text, HasSubstr("only with clock: lockstep; here it is clock: stepped"));
 }
 
-TEST(Lockstep, NoMoreThanSomeThousandsMayWait) {
+TEST(Lockstep, TheNumberOfWaitingStepsIsLimited) {
   const Clock clock(true);
   const World world({}, {{"rov", {}, false}}, {}, Time{});
   SteppedTime time(ClockMode::lockstep, clock, world);
@@ -159,7 +159,7 @@ TEST(Lockstep, TheStepOfAClientThatHasLeftEndsAndLaterStepsKeepTheirLength) {
   ASSERT_EQ(time.step(0), "dt_s must be more than 0 and at most 3600 seconds");
   clock.advance_to(Time(milliseconds(1500)));
   EXPECT_FALSE(time.end_left());
-  ASSERT_THAT(time.step(10), HasSubstr("would take more than 3600 seconds")) << "3598.5 s wait already";
+  ASSERT_THAT(time.step(10), HasSubstr("would take more than 3600 seconds")) << "3598.5 s are waiting already";
   first_left = true;
   EXPECT_TRUE(time.end_left());
   EXPECT_FALSE(time.end_left());
@@ -202,7 +202,7 @@ TEST(Lockstep, AStepEndsWhenItsClientLeavesWhileAnotherWaits) {
   ASSERT_EQ(other.wait_for(patience), std::future_status::ready);
   const std::int64_t now_ns = other.get().stepped->now_ns();
   EXPECT_LT(now_ns, 2'000'000'000'000);
-  EXPECT_EQ(p.daemon.status().now_ns(), now_ns) << "time stands again";
+  EXPECT_EQ(p.daemon.status().now_ns(), now_ns) << "time stands still again";
 }
 
 TEST(Lockstep, ADaemonThatStopsAnswersNoStep) {
@@ -217,26 +217,28 @@ TEST(Lockstep, ADaemonThatStopsAnswersNoStep) {
 TEST(Follow, TimeComesFromPosesAndPingsLieBetweenTwoPoses) {
   Pinging p(with_clock("follow"));
   std::this_thread::sleep_for(milliseconds(50));
-  EXPECT_TRUE(p.daemon.requests().empty()) << "no pose, no time";
+  EXPECT_TRUE(p.daemon.requests().empty()) << "without a pose, time does not begin";
 
-  const nanoseconds start = std::chrono::hours(400000);  // UNIX time, about
+  const nanoseconds start = std::chrono::hours(400000);  // about the present UNIX time
   ASSERT_EQ(p.pose(0, start).code, Code::done);
   EXPECT_EQ(p.daemon.status().now_ns(), start.count());
-  EXPECT_EQ(p.daemon.requests().size(), 1u) << "due at the first stamp, to the nanosecond, and out when that is answered";
+  EXPECT_EQ(p.daemon.requests().size(), 1u)
+      << "the first ping is due exactly at the first stamp, and sent when that pose is answered";
   ASSERT_EQ(p.pose(0.1, start + milliseconds(100)).code, Code::done);
   const auto requests = p.daemon.requests();
   ASSERT_EQ(requests.size(), 5u);
   for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(requests[static_cast<std::size_t>(i)].fired_at, Time(start + i * milliseconds(25)));
-    EXPECT_NEAR(requests[static_cast<std::size_t>(i)].vehicle_in_world.position_m.x, 0.025 * i, 1e-12) << "between two poses";
+    EXPECT_NEAR(requests[static_cast<std::size_t>(i)].vehicle_in_world.position_m.x, 0.025 * i, 1e-12)
+        << "the position is interpolated between two poses";
   }
-  EXPECT_EQ(p.daemon.status().sonars().at(0).figures().skipped_ticks(), 0u) << "before the first pose nothing was due";
+  EXPECT_EQ(p.daemon.status().sonars().at(0).figures().skipped_ticks(), 0u) << "no ping was due before the first pose";
   p.stop();
   ASSERT_EQ(p.received.size(), 5u);
   EXPECT_NEAR(p.received.front().head.fixed.ping_start_time_s, 0, 1e-6) << "the device was powered up when its time began";
 }
 
-TEST(Follow, ASimulatorThatBeginsAnewDoesNotTurnTimeBack) {
+TEST(Follow, ARestartedSimulatorDoesNotSetTimeBack) {
   Pinging p(with_clock("follow"));
   p.pose(0, std::chrono::seconds(100));
   p.pose(0, std::chrono::seconds(100) + milliseconds(50));
@@ -255,22 +257,22 @@ TEST(Follow, AJumpAheadSkipsTheTimeBetween) {
   p.pose(0, milliseconds(25));
   p.pose(9, std::chrono::seconds(3600));
   const auto requests = p.daemon.requests();
-  ASSERT_EQ(requests.size(), 2u) << "the next is due as long after the jump as it was before it";
+  ASSERT_EQ(requests.size(), 2u) << "a jump does not change the time to the next ping";
   p.pose(9, std::chrono::seconds(3600) + milliseconds(25));
   EXPECT_EQ(p.daemon.requests().back().fired_at, Time(std::chrono::seconds(3600) + milliseconds(25)));
   EXPECT_EQ(p.daemon.status().sonars().at(0).figures().skipped_ticks(), 0u);
   EXPECT_THAT(p.daemon.log_text(), HasSubstr("time follows the poses: it jumps ahead by 3599.975"));
 }
 
-TEST(Follow, TimeBeginsAtTheFirstPoseHoweverSoonThatIs) {
+TEST(Follow, TimeBeginsAtTheFirstPoseEvenIfItsStampIsSmall) {
   Pinging p(with_clock("follow"));
   p.pose(0, milliseconds(550));
   const auto requests = p.daemon.requests();
-  ASSERT_EQ(requests.size(), 1u) << "nothing was due before it";
+  ASSERT_EQ(requests.size(), 1u) << "no ping was due before the pose";
   EXPECT_EQ(requests[0].fired_at, Time(milliseconds(550)));
 }
 
-TEST(Follow, AVehicleThatJoinsFromBehindDelaysNoOther) {
+TEST(Follow, AVehicleThatJoinsWithAnOlderStampDelaysNoOther) {
   DaemonSetup setup = with_clock("follow");
   setup.engine_takes = milliseconds(30);
   setup.vehicle_lines = "  - {name: boat}\n";
@@ -325,10 +327,10 @@ TEST(Follow, ASimulatorThatDoesNotWaitLosesTicksAsInRealTime) {
   ASSERT_TRUE(eventually([&] {
     const auto figures = p.daemon.status().sonars().at(0).figures();
     return figures.pings() + figures.skipped_ticks() == 201;
-  })) << "every tick is accounted for";
+  })) << "every tick is a ping or counted as skipped";
   const auto requests = p.daemon.requests();
   EXPECT_LT(requests.size(), 100u);
-  EXPECT_GE(requests.size(), 41u) << "the last second is whole";
+  EXPECT_GE(requests.size(), 41u) << "the last second has all of its pings";
   EXPECT_EQ(requests.back().fired_at, Time(std::chrono::seconds(5)));
 }
 

@@ -32,13 +32,13 @@ DaemonSetup head(const std::string& clock) {
 struct Host {
   explicit Host(const Daemon& daemon, std::uint32_t interval_ms = 0) : link(daemon.address(), blueview::tcp_port) {
     link.send(bv::hello());
-    EXPECT_FALSE(link.read_raw(1).empty()) << "greeted";
+    EXPECT_FALSE(link.read_raw(1).empty()) << "no greeting";
     if (interval_ms > 0) link.send(bv::two_numbers(FrameType::subscribe, 2, 0, interval_ms));
     reader = std::thread([this] { was_sent_away = link.read_to_end(); });
   }
   ~Host() { reader.join(); }  // the daemon closes first
   Client link;
-  bool was_sent_away = false;  // by a FIN
+  bool was_sent_away = false;  // the stream ended with a FIN, not with a reset
   std::thread reader;
 };
 
@@ -52,12 +52,12 @@ TEST(SteppedTalk, ASubscriptionGetsEveryPingOfAStep) {
   Daemon daemon(head("lockstep"));
   Host host(daemon, 100);
   EXPECT_TRUE(eventually([&] { return daemon.status().sonars().at(0).clients().at(0).bytes_written() > 60; }))
-      << "it is agreed to";
+      << "the subscription is not confirmed";
   const v1::Stepped stepped = *daemon.ask(Step{0.5}).stepped;
   EXPECT_EQ(stepped.pings(), 5u);
   EXPECT_EQ(stepped.now_ns(), 500'000'000);
   EXPECT_THAT(times_ms(daemon), ElementsAre(0, 100, 200, 300, 400));
-  EXPECT_EQ(daemon.ask(Step{0.25}).stepped->pings(), 3u) << "that at its end belongs to the next step";
+  EXPECT_EQ(daemon.ask(Step{0.25}).stepped->pings(), 3u) << "the ping at the end of a step belongs to the next step";
   EXPECT_EQ(daemon.status().sonars().at(0).clients().at(0).pings_written(), 8u);
   daemon.stop();
 }
@@ -71,36 +71,36 @@ TEST(SteppedTalk, ASubscriptionMakesTimePassByItself) {
   EXPECT_THAT(times_ms(daemon), ElementsAre(0, 200, 400, 600));
 }
 
-TEST(SteppedTalk, AHostIsSilentByTheWallsClockOnly) {
+TEST(SteppedTalk, TheSilenceOfAHostIsMeasuredInWallTime) {
   Daemon daemon(head("lockstep"));
   Host host(daemon);
   const auto began = Steady::now();
   EXPECT_EQ(daemon.ask(Step{300}).code, Code::done);
   const auto status = daemon.status().sonars().at(0);
   ASSERT_EQ(status.clients_size(), 1) << "five simulated minutes take some ms";
-  EXPECT_GT(status.clients(0).bytes_written(), 149u * 16u) << "every 2 s a keep-alive";
+  EXPECT_GT(status.clients(0).bytes_written(), 149u * 16u) << "a keep-alive is sent every 2 s";
   EXPECT_TRUE(eventually([&] { return daemon.status().sonars().at(0).clients().empty(); }, patience + milliseconds(10000)));
   EXPECT_GT(Steady::now() - began, std::chrono::seconds(9));
   EXPECT_THAT(daemon.log_text(), HasSubstr("client gone: silent for 10 s"));
   daemon.stop();
   host.reader.join();
   host.reader = std::thread([] {});
-  EXPECT_TRUE(host.was_sent_away) << "not reset";
+  EXPECT_TRUE(host.was_sent_away) << "the connection was reset";
 }
 
-TEST(SteppedTalk, WhileNoTimeMayPassTheDaemonTakesNoProcessor) {
+TEST(SteppedTalk, WhileNoTimeMayPassTheDaemonUsesNoProcessorTime) {
   Daemon daemon(head("lockstep"));
   Host host(daemon);
   EXPECT_EQ(daemon.ask(Step{1}).code, Code::done);
   EXPECT_TRUE(eventually([] {
-    const std::clock_t before = std::clock();  // processor time of this process alone
+    const std::clock_t before = std::clock();  // processor time of this process only
     std::this_thread::sleep_for(milliseconds(500));
     return std::clock() - before < CLOCKS_PER_SEC / 100;
-  })) << "its event loop runs all the time";
+  })) << "the event loop of the daemon does not wait";
   daemon.stop();
 }
 
-TEST(SteppedTalk, BeforeTheFirstPoseThereIsNoTimeToPass) {
+TEST(SteppedTalk, NoTimePassesBeforeTheFirstPose) {
   Daemon daemon(head("follow"));
   Host host(daemon, 100);
   EXPECT_TRUE(eventually([&] { return daemon.status().sonars().at(0).clients().at(0).bytes_written() > 60; }));
@@ -119,7 +119,7 @@ TEST(SteppedTalk, TimeDoesNotPassForAHostWhosePingsWaitForAPose) {
   Daemon daemon(setup);
   EXPECT_EQ(daemon.ask(control::PoseSample{}).code, Code::done);
   Host host(daemon, 200);
-  EXPECT_TRUE(eventually([&] { return daemon.requests().size() == 6; })) << "up to stale_after_s";
+  EXPECT_TRUE(eventually([&] { return daemon.requests().size() == 6; })) << "pings end when the pose is older than stale_after_s";
   std::this_thread::sleep_for(milliseconds(100));
   EXPECT_EQ(daemon.requests().size(), 6u);
   EXPECT_LE(daemon.status().now_ns(), 1'200'000'000);
@@ -138,10 +138,10 @@ TEST(SteppedTalk, ASubscriptionTakesTheSonarFromNoClient) {
   other.send(bv::ping(3, 1, 20000));
   const auto answer = other.read_raw(16 + 100);
   EXPECT_GE(answer.size(), 116u) << "pings of the other head came in between";
-  std::thread reader([&other] { other.read_to_end(); });  // simulated time waits for it
+  std::thread reader([&other] { other.read_to_end(); });  // simulated time waits for this client
   const auto pings = daemon.requests();
   EXPECT_TRUE(std::any_of(pings.begin(), pings.end(), [](const PingRequest& r) { return r.settings.mode == 1; }));
-  EXPECT_TRUE(eventually([&] { return daemon.requests().size() > pings.size() + 5; })) << "the subscription goes on";
+  EXPECT_TRUE(eventually([&] { return daemon.requests().size() > pings.size() + 5; })) << "the subscription continues";
   EXPECT_EQ(daemon.requests().back().settings.mode, 0u);
   daemon.stop();
   reader.join();
@@ -185,7 +185,8 @@ TEST(SteppedTalk, KeepAlivesOfAnotherClientAreBetweenThePings) {
   for (int pings = 0; pings < 4;) {
     const auto message = client.next();
     ASSERT_TRUE(message);
-    EXPECT_TRUE(pings == 0 || std::holds_alternative<oculus::DecodedPing>(*message)) << "it waits for pings";
+    EXPECT_TRUE(pings == 0 || std::holds_alternative<oculus::DecodedPing>(*message))
+        << "a client that waits for pings gets no keep-alive";
     pings += std::holds_alternative<oculus::DecodedPing>(*message);
   }
   daemon.stop();

@@ -14,7 +14,7 @@ struct Served {
   std::vector<Time> times;
 };
 
-/// A client that reads at its own pace, sometimes very slowly, and repeats its request as some drivers do.
+/// Serves this number of pings to one client. With `dawdle`, the client reads slowly and repeats its request, as some drivers do.
 Served serve(std::uint64_t pings, milliseconds engine_takes, bool dawdle) {
   DaemonSetup setup;
   setup.more = "clock: stepped\n";
@@ -44,16 +44,16 @@ Served serve(std::uint64_t pings, milliseconds engine_takes, bool dawdle) {
   return out;
 }
 
-TEST(Stepped, EqualRunsServeEqualBytesWhateverTheWallClockDoes) {
+TEST(Stepped, EqualRunsServeEqualBytesAtAnySpeed) {
   const Served fast = serve(60, milliseconds(0), false);
   const Served slow = serve(60, milliseconds(3), true);
   EXPECT_EQ(fast.sha256, slow.sha256);
-  EXPECT_EQ(fast.sha256, fast.client_sha256) << "the digest is of what the client received";
+  EXPECT_EQ(fast.sha256, fast.client_sha256) << "the digest is that of the bytes that the client received";
   EXPECT_GT(fast.bytes, 60u * 2048u);
-  ASSERT_EQ(fast.times.size(), 60u) << "no ping beyond the last one served";
+  ASSERT_EQ(fast.times.size(), 60u) << "no ping is computed after the last one served";
   EXPECT_EQ(fast.times, slow.times);
   EXPECT_EQ(fast.times[0], Time{});
-  EXPECT_EQ(fast.times[59], Time{} + 59 * milliseconds(25)) << "time moves by the period";
+  EXPECT_EQ(fast.times[59], Time{} + 59 * milliseconds(25)) << "time advances by the period";
 }
 
 TEST(Stepped, WaitsForEveryClient) {
@@ -68,11 +68,11 @@ TEST(Stepped, WaitsForEveryClient) {
   reader.fire(fire);
   std::uint32_t last = 0;
   for (auto ping = reader.next_ping(); ping; ping = reader.next_ping(milliseconds(500))) last = ping->head.fixed.ping_id;
-  ASSERT_GT(last, 0u) << "the kernel's buffers take a few";
+  ASSERT_GT(last, 0u) << "the kernel's buffers store a few pings";
   for (std::uint32_t i = 1; i <= last + 3; ++i) {
     const auto ping = sleeper.next_ping();
     ASSERT_TRUE(ping);
-    EXPECT_EQ(ping->head.fixed.ping_id, i) << "nothing is ever dropped in stepped time";
+    EXPECT_EQ(ping->head.fixed.ping_id, i) << "no ping is dropped in stepped time";
   }
   daemon.stop();
 }
