@@ -25,7 +25,7 @@ void require(bool holds) {
 void use(const PolarPing& ping, std::uint8_t wishes) {
   require(ping.samples.size() == static_cast<std::size_t>(ping.beams) * static_cast<std::size_t>(ping.bins));
   for (const Packing packing : {Packing::plain, Packing::planes}) require(decode_ping(encode_ping(ping, packing)).has_value());
-  ImageSettings settings;  // small images: thousands of them a second
+  ImageSettings settings;  // images are small, so that thousands are made per second
   settings.requested_height = 1 + wishes % 40;
   settings.r_theta_width = wishes % 3 == 0 ? 0 : 1 + wishes % 50;
   settings.filter_flags = wishes % 5 == 0 ? 2 : wishes % 5 == 1 ? 16 : 0;

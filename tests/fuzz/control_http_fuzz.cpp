@@ -1,6 +1,6 @@
-// Input of the HTTP port: requests in a stream, and their routing. The first byte is the length of the pieces, the second one the
-// policy; the rest is the stream. The requests do not depend on the pieces. No request is accepted without its Host, and without
-// the token only /healthz and the files of the page are.
+// Input of the HTTP port: requests in a stream, and their routing. The first byte is the length of the pieces, the second byte
+// the policy; the rest is the stream. The requests do not depend on the pieces. No request is accepted without its Host, and
+// without the token only /healthz and the files of the page are.
 #include <algorithm>
 #include <string>
 #include <vector>

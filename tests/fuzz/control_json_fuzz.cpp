@@ -1,4 +1,4 @@
-// Control requests in JSON, as HTTP sends them. The first line is the operation, and after a colon the sonar or object; the rest
+// Control requests in JSON, as sent over HTTP. The first line is the operation, and after a colon the sonar or object; the rest
 // is the message. An accepted message is converted to protobuf and back. A refusal is one sentence of our own, not of protobuf.
 #include <cmath>
 #include <string_view>

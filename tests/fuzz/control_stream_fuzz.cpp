@@ -31,7 +31,7 @@ void answer(std::span<const std::byte> message) {
   require(back && (*back)->id() == response.id() && (*back)->status().code() == response.status().code());
 }
 
-/// Returns the decoded messages, and true if the stream ended in an error.
+/// The messages of a stream; broken: the stream ended in an error.
 struct Taken {
   std::vector<std::vector<std::byte>> messages;
   bool broken = false;

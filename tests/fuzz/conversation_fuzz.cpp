@@ -1,5 +1,5 @@
-// Whole conversations in virtual time, with both vendors: clients connect, send requests, read slowly and disconnect, in the
-// order of a script of bytes. The first byte selects vendor, product and options, the second one the outbox and the rules for
+// Whole conversations in virtual time, with Oculus and BlueView: clients connect, send requests, read slowly and disconnect, in
+// the order of a script of bytes. The first byte selects make, product and options, the second byte the outbox and the rules for
 // clients. Commands follow: a letter and its arguments.
 #include "protocol/blueview/frames.hpp"
 #include "protocol/oculus/fire.hpp"

@@ -1,4 +1,4 @@
-// Bytes of a driver to the sonars of every make: each input to each sonar, at every port. No input may crash a sonar, cause an
+// Bytes of a driver to the sonars of every make; each sonar gets each input at every port. No input may crash a sonar, cause an
 // answer that is much longer than the input, or lead to settings that no ping can have.
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 using namespace sonar;
 using fuzz::require;
 using PortKind = protocol::Port::Kind;
-constexpr std::size_t most_per_byte = 400, most_unasked = 4096;  // a DVL's reports of JSON and greetings are the longest
+constexpr std::size_t most_per_byte = 400, most_unasked = 4096;  // the longest are JSON reports of a DVL and greetings
 
 protocol::DeviceState state_of(const protocol::Vendor& vendor) {
   protocol::DeviceState state;

@@ -46,7 +46,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   dvl::read_line(bytes);
   const recording::Codec codec = dvl::codec();
-  if (const auto part = codec.ping_part(bytes))  // a sentence of the serial line is only for that port
+  if (const auto part = codec.ping_part(bytes))  // a sentence of the serial protocol is only for that port
     require(codec.answer(bytes, nullptr).size() == (part->port == dvl::tcp_port ? 2u : 1u));
 
   Ping ping;

@@ -1,5 +1,5 @@
-// Bytes of a sonar to the hosts of every make: each input to each host. A piece is a port, a length in two bytes, and bytes. At a
-// port of kind http a piece is the body of a reply.
+// Bytes of a sonar to the hosts of every make; each host gets each input. A piece is a port, a length in two bytes, and bytes. At
+// a port of kind http a piece is the body of a reply.
 #include <algorithm>
 #include <cstdlib>
 #include <span>
@@ -11,7 +11,7 @@ namespace {
 
 using namespace sonar;
 
-/// The host's requests are dropped; decoded pings must be whole.
+/// Drops the host's requests; decoded pings must be whole.
 void check(const protocol::HostActions& actions, std::size_t ports) {
   for (const protocol::HostAction& action : actions) {
     if (const auto* send = std::get_if<protocol::HostSend>(&action); send != nullptr && send->port >= ports) std::abort();

@@ -8,7 +8,7 @@
 
 namespace sonar::fuzz {
 
-/// Returns mostly places of a small lattice, so that equal corners and flat triangles are common; some are far away or not
+/// Returns mostly coordinates of a small lattice, so that equal corners and flat triangles are common; some are far away or not
 /// numbers.
 inline double coordinate(Script& script) {
   const std::uint8_t kind = script.byte();

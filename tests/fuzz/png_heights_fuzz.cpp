@@ -76,7 +76,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto grid = read_png_heights(file.path(), 20, 10, -3, 2);
   if (grid) {
     fuzz::check(*grid);
-    for (const float z : grid->z_m) fuzz::require(std::isnan(z) || (z >= -3 && z <= 2));  // transparent: a hole
+    for (const float z : grid->z_m) fuzz::require(std::isnan(z) || (z >= -3 && z <= 2));  // a transparent pixel is a hole
   } else {
     fuzz::require(grid.error().text.starts_with(file.path().string() + ": "));
   }

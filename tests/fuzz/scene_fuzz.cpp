@@ -1,5 +1,5 @@
 // Scene files with any text: the result is a scene or a sentence that starts with the file's name.
-// Short texts, without other files.
+// Texts are short and use no other files.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

@@ -16,7 +16,7 @@ using sonar::scene_tools::ImportedWorld;
 using sonar::scene_tools::PlacedShape;
 using sonar::scene_tools::Shape;
 
-/// Few and small enough to be converted to triangles ten thousand times.
+/// Returns true if the shapes are few and small enough to be converted to triangles ten thousand times.
 bool is_quick(const ImportedWorld& world) {
   if (world.shapes.size() > 8) return false;
   for (const PlacedShape& placed : world.shapes) {

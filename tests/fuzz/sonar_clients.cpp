@@ -16,12 +16,13 @@ using namespace std::chrono_literals;
 using protocol::Bytes;
 using protocol::BytesView;
 
-constexpr std::size_t largest_framed = 8u << 10;  // largest BlueView ping that is really framed, for a thousand runs a second
-constexpr int most_rows = 2;                      // rows of an Oculus ping, for the same reason
-constexpr auto longest_silence = 1h;              // limit of the time until the next tick
+constexpr std::size_t largest_framed =
+    8u << 10;                         // largest BlueView ping that is really framed, to allow a thousand runs per second
+constexpr int most_rows = 2;          // rows of an Oculus ping, for the same reason
+constexpr auto longest_silence = 1h;  // limit of the time until the next tick
 constexpr Time start = Time{} + std::chrono::hours(24 * 365 * 50);
 
-/// The payload of a ping with one sample, for a BlueView host.
+/// Returns the payload of a ping with one sample, for a BlueView host.
 Bytes smallest_polar_ping(std::uint32_t number) {
   bvt::PolarPing ping;
   ping.number = number;
@@ -34,7 +35,7 @@ Bytes smallest_polar_ping(std::uint32_t number) {
   return out;
 }
 
-/// Calls the vendor, except for large pings.
+/// A make that replaces large pings with small ones.
 class SmallPings final : public protocol::DelegatingVendor {
  public:
   using DelegatingVendor::DelegatingVendor;
@@ -128,13 +129,13 @@ void SonarClients::tick(std::size_t place) {
   if (!clients_[place]) return;
   const Connection* const connection = sonar_.connections().find(clients_[place]->id);
   const auto next = connection->next_tick();
-  if (!next || *next == Time::max()) return;  // no event before bytes or a ping arrive
+  if (!next || *next == Time::max()) return;  // no event is due before bytes or a ping arrive
   require(*next <= now_ + longest_silence);
   now_ = std::max(now_, *next);
   tick_all_due();
 }
 
-/// After its tick a conversation must soon request a later time; otherwise the daemon would loop without pause.
+/// After some ticks a conversation must state a later time for the next; otherwise the daemon would loop without pause.
 void SonarClients::tick_all_due() {
   for (int n = 0;; ++n) {
     perform(sonar_.on_tick(now_));
@@ -155,7 +156,7 @@ void SonarClients::wait(std::chrono::nanoseconds time) {
     now_ = std::max(now_, *next);
     tick_all_due();
   }
-  now_ = until;  // all events at once, as after SIGSTOP and SIGCONT
+  now_ = until;  // all events become due at once, as after SIGSTOP and SIGCONT
   tick_all_due();
 }
 
@@ -177,9 +178,9 @@ bool SonarClients::write_piece(Client& client, std::size_t& bytes) {
     client.writing = sonar_.next_message(client.id, now_);
     client.part = client.done = 0;
     if (!client.writing) return false;
-    require(!sonar_.next_message(client.id, now_));  // one at a time
+    require(!sonar_.next_message(client.id, now_));  // no further message while one is being written
   }
-  // Prefix, bytes, prefix, bytes: even parts are prefixes.
+  // Even parts are prefixes; each is followed by the bytes of the message.
   const auto& prefixes = client.writing.prefixes;
   const std::size_t parts = prefixes.empty() ? 1 : 2 * prefixes.size();
   const Bytes& from = !prefixes.empty() && client.part % 2 == 0 ? prefixes[client.part / 2] : *client.writing.bytes;
@@ -212,7 +213,7 @@ void SonarClients::finish(std::size_t place) {
   perform(sonar_.finish(clients_[place]->id, now_));
 }
 
-/// Disconnects in the middle of anything.
+/// Disconnects at any point, also within a message.
 void SonarClients::disconnect(std::size_t place) {
   if (!clients_[place]) return;
   const ConnectionId id = clients_[place]->id;

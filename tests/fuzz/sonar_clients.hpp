@@ -13,12 +13,12 @@
 
 namespace sonar::fuzz {
 
-/// Decodes a client's stream with the driver's side of its vendor: only whole messages, and pings in ascending order.
+/// Decodes a client's stream as a driver does. Fails unless messages are whole and pings in ascending order.
 class StreamReader {
  public:
   virtual ~StreamReader() = default;
   virtual void read(protocol::BytesView bytes) = 0;
-  /// True if no part of a message is left.
+  /// Returns true if no part of a message is left.
   virtual bool at_a_message_end() const = 0;
 };
 std::unique_ptr<StreamReader> oculus_reader();
@@ -28,16 +28,16 @@ class SonarClients {
  public:
   static constexpr std::size_t places = 3;
 
-  /// `sonar` must have no vehicle: it rests at 3 m depth.
+  /// `sonar` must have no vehicle; it is at rest at 3 m depth.
   explicit SonarClients(SonarConfig sonar);
 
   void connect(std::size_t place, Role role = Role::client);
-  void receive(std::size_t place, protocol::BytesView bytes);  // from the client
-  void tick(std::size_t place);                                // at its next tick, which may be later than now
-  void wait(std::chrono::nanoseconds time);                    // events that become due in this time are handled, up to a bound
-  void fire();                                                 // the engine has finished a ping
-  void write(std::size_t place, std::size_t bytes);            // the client reads this number of bytes
-  void finish(std::size_t place);                              // as after a silence of its peer
+  void receive(std::size_t place, protocol::BytesView bytes);  // the sonar gets these bytes of the client
+  void tick(std::size_t place);                      // advances to the next tick of the client, which may be later than now
+  void wait(std::chrono::nanoseconds time);          // events that become due in this time are handled, up to a bound
+  void fire();                                       // the engine has finished a ping
+  void write(std::size_t place, std::size_t bytes);  // the client reads this number of bytes
+  void finish(std::size_t place);                    // ends the connection, as after a silence of the client
   void disconnect(std::size_t place);
   /// Stops the sonar; all clients read the rest and disconnect. No message may be missing.
   void end();
@@ -47,7 +47,7 @@ class SonarClients {
     ConnectionId id = 0;
     bool served = false, finishing = false;
     std::unique_ptr<StreamReader> reader;
-    Outbox::Message writing = {};  // `part`: index of the copy; and the written bytes of it
+    Outbox::Message writing = {};  // `part`: index of the part that is being written; `done`: its written bytes
     std::size_t part = 0, done = 0;
   };
   void perform(Actions actions);

@@ -1,4 +1,4 @@
-// The drivers' sides of a conversation under fuzzing: our decoder for Oculus, and the decoder of the BlueView libraries.
+// The drivers of the fuzzed conversations: our decoder for Oculus, and the decoder of the BlueView libraries.
 #include <cstring>
 
 #include "clients/bvtsdk/core/description.hpp"

@@ -1,4 +1,4 @@
-// Lines of points as a grid of heights.
+// Files of points, a line each, that are read as a grid of heights.
 #include "tests/fuzz/heights.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

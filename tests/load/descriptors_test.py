@@ -1,4 +1,4 @@
-"""Clients use up all file descriptors: a running stream continues, new clients get a FIN, the log reports it once, and all is as
+"""Clients use up all file descriptors. A running stream continues, new clients get a FIN, the log has one line, and all is as
 before after they have disconnected. Uses the shipped program with a lowered limit; --quick takes a shorter time."""
 import pathlib
 import resource
@@ -120,7 +120,7 @@ class Descriptors(unittest.TestCase):
             resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (64, 64))
             strangers = [visit((daemon.address, port)) for port in (14770, 8088, 14771) for _ in range(33)]
             deadline = time.monotonic() + 60
-            while not self.is_pinged(daemon.address):  # while strangers still connect, it may be refused; then it connects again
+            while not self.is_pinged(daemon.address):  # tries again, because it may be refused while strangers still connect
                 self.assertLess(time.monotonic(), deadline, daemon.log())
             with urllib.request.urlopen(f"http://{daemon.address}:8088/healthz", timeout=20) as answer:
                 self.assertEqual(answer.read(), b"ok\n")

@@ -18,7 +18,7 @@ namespace sonar::load {
 /// --quick sets this: each test takes a few seconds, with the same assertions apart from those that hold only on a quiet machine.
 inline bool quick = false;
 inline constexpr std::chrono::seconds patience{20};          // time limit of every expected event
-inline constexpr bool memory_is_ours = !test::is_sanitized;  // a sanitizer keeps what was freed
+inline constexpr bool memory_is_ours = !test::is_sanitized;  // a sanitizer keeps freed memory
 
 using text::format;
 
@@ -32,10 +32,10 @@ inline void keep(const std::string& item, const std::string& figure, const std::
   EXPECT_TRUE(test::record_reliability({item, figure, bound, passed, command}));
 }
 
-/// The accounts of every sonar must balance after it has stopped, for any behaviour of its clients.
+/// The figures of a sonar must balance after it has stopped, for any behaviour of its clients.
 inline void expect_accounts_balance(const DeviceFigures& f) {
   EXPECT_LE(f.pings + f.skipped_ticks, f.ticks);
-  EXPECT_LE(f.ticks, f.pings + f.skipped_ticks + 1) << "a ping may be under way at the stop";
+  EXPECT_LE(f.ticks, f.pings + f.skipped_ticks + 1) << "a ping may be in progress at the stop";
   EXPECT_EQ(f.waiting, 0u);
   EXPECT_EQ(f.offered, f.sent + f.dropped);
   std::uint64_t by_reason = 0;

@@ -21,10 +21,10 @@ class LoadDaemon {
   explicit LoadDaemon(const LoadSetup& setup);
   ~LoadDaemon();
   const std::string& address(std::size_t sonar = 0) const;
-  /// The address of poses and control: UDP 14770 and 14771, TCP 14770 (control stream), 14771 (JSON poses) and 8088 (HTTP).
+  /// Returns the address for poses and control: UDP 14770 and 14771, TCP 14770 (control stream), 14771 (JSON poses), 8088 (HTTP).
   const std::string& pose_address() const { return address(0); }
   int stop();
-  /// Only after stop().
+  /// Call it only after stop().
   DeviceFigures figures(std::size_t sonar = 0) const;
   std::string log_text() const;
 

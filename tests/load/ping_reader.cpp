@@ -90,7 +90,7 @@ bool PingReader::read_some() {
     const std::size_t size = oculus::header_size + header.payload_size;
     if (header.oculus_id != oculus::magic || size > buffer_.size()) {
       ++garbled;
-      ended = true;  // such a stream cannot be decoded any further
+      ended = true;  // the rest of such a stream cannot be decoded
       return false;
     }
     if (filled_ < size) break;

@@ -11,7 +11,7 @@ namespace sonar::load {
 
 using Steady = std::chrono::steady_clock;
 
-/// A connected TCP socket that sends; the destructor closes it. -1: no program listens.
+/// A connected TCP socket; the destructor closes it. fd() is -1 if no program listens.
 class Socket {
  public:
   Socket(const std::string& address, std::uint16_t port, int receive_buffer = 0);
@@ -22,20 +22,20 @@ class Socket {
   Socket& operator=(Socket&&) = delete;
 
   int fd() const { return fd_; }
-  /// Sends bytes. Returns false if the other end does not take them within the time.
+  /// Sends bytes. Returns false if the other end does not receive them in time.
   bool send(const std::vector<std::byte>& bytes, std::chrono::milliseconds patience = std::chrono::seconds(20));
-  /// Waits for bytes; -1 after the time or an error, 0 at the end of the stream.
+  /// Waits for bytes and returns their number; -1 at the time limit or after an error, 0 at the end of the stream.
   long receive(std::byte* into, std::size_t size, std::chrono::milliseconds patience);
   void close();
-  void reset();          // RST instead of FIN
-  void die();            // like a computer that lost its power: it neither receives nor answers
-  void close_one_way();  // FIN, and the other direction stays open
+  void reset();          // closes with an RST instead of a FIN
+  void die();            // from now on like a computer without power: neither receives nor answers
+  void close_one_way();  // sends a FIN, and the other direction stays open
 
  private:
   int fd_ = -1;
 };
 
-/// The request of an unmodified driver: mode 2, 40 Hz, 2 m, 256 beams of 8 bit. `hz` 0 = standby; other values give the next
+/// Returns the request of an unmodified driver: mode 2, 2 m, 256 beams of 8 bit. `hz` 0 is standby; other values give the next
 /// existing rate.
 std::vector<std::byte> fire(int hz = 40);
 
@@ -48,7 +48,7 @@ class PingReader {
   bool read_some();
 
   std::uint64_t pings = 0, garbled = 0;  // garbled: pings with wrong content or order, and invalid messages
-  std::uint64_t ids_skipped = 0;         // between two pings of this stream
+  std::uint64_t ids_skipped = 0;         // ids that are missing between pings of this stream
   std::uint32_t last_id = 0;
   bool ended = false, was_reset = false;
   Steady::time_point last_at{};

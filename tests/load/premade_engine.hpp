@@ -1,5 +1,5 @@
 // An engine with premade pings of 256 beams x 512 rows of 8 bit. It needs almost no time, so that a load test measures the code
-// after it. Ping n has picture n modulo the number of pictures, so that its reader can check that it is whole.
+// after it. Ping n has picture n modulo the number of pictures, so that readers can check it.
 #pragma once
 
 #include <chrono>
@@ -10,7 +10,7 @@ namespace sonar::load {
 
 inline constexpr std::size_t beams = 256, rows = 512, picture_bytes = beams * rows, pictures = 16;
 
-/// Image of ping `number`.
+/// Returns the image of ping `number`.
 std::span<const std::byte> picture_of(std::uint32_t number);
 
 class PremadeEngine final : public PingEngine {

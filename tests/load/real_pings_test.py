@@ -51,10 +51,10 @@ class RealPings(unittest.TestCase):
         pings, served, dropped, skipped, ticks = (int(n) for n in said.groups())
         self.assertEqual(beams, {512})
         self.assertEqual(ticks, pings + skipped)
-        self.assertEqual(len(ids), served, "served is what arrived")
-        self.assertIn(pings - served - dropped, (0, 1), "the one under way at the end had nobody left")
+        self.assertEqual(len(ids), served, "served pings are those that arrived")
+        self.assertIn(pings - served - dropped, (0, 1), "the ping in progress at the end has no client")
         self.assertEqual(ids, sorted(set(ids)))
-        self.assertLessEqual(ids[-1] - ids[0] + 1 - len(ids), dropped, "a number that is missing was dropped")
+        self.assertLessEqual(ids[-1] - ids[0] + 1 - len(ids), dropped, "missing numbers are dropped pings")
         # Ticks are counted by the clock, not by the computed pings.
         self.assertLessEqual(abs(ticks - RATE_HZ * lasted), 0.02 * RATE_HZ * lasted + RATE_HZ)
         figure = f"{ticks} ticks = {pings} pings + {skipped} skipped; {served} served, {dropped} dropped"
@@ -77,7 +77,7 @@ class Threads(unittest.TestCase):
             client.send(fire_message())
             next_ping(client)
             first, *others = scheduling(daemon.process)
-        self.assertGreaterEqual(len(others), 4, "pool and simulation")
+        self.assertGreaterEqual(len(others), 4, "too few threads of pool and simulation")
         # Pings have the highest priority, then the live view, because a person waits for its pictures, then recordings and
         # scenes.
         self.assertEqual(set(others), {(min(first[0] + nice_by, 19), 0) for nice_by in (1, 5, 10)})
@@ -90,7 +90,7 @@ class Threads(unittest.TestCase):
             refused = daemon.log().count("engine.io_priority has no effect")
         self.assertEqual(first[1], 0 if refused else 1)
         self.assertLessEqual(refused, 1)
-        self.assertEqual({policy for _, policy in others}, {0}, "what computes is not scheduled in real time")
+        self.assertEqual({policy for _, policy in others}, {0}, "computing threads are not scheduled in real time")
 
 
 if __name__ == "__main__":

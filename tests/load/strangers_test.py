@@ -295,7 +295,7 @@ class Strangers(unittest.TestCase):
                 slack = IN_KERNELS / 6 if name == "empty fragments" else IN_KERNELS / 125 if name == "pongs" else 3
                 self.assertLessEqual(stranger.done, (1 + stranger.took) * LIMIT / work + slack, name)
             if name == "add_object":
-                self.assertLessEqual(stranger.done, 3 + stranger.took / 1.5, "2 at once, then 2 in 3 s")
+                self.assertLessEqual(stranger.done, 3 + stranger.took / 1.5, "2 objects at once, then 2 in 3 s")
             rows.append((name, alone, beside, stranger.done))
         with urllib.request.urlopen(f"http://{daemon.address}:8088/healthz", timeout=60) as answer:
             self.assertEqual(answer.read(), b"ok\n")
@@ -354,7 +354,7 @@ class Strangers(unittest.TestCase):
             begins = {"head": (8088, f"GET /healthz HTTP/1.1\r\nHost: {daemon.address}\r\nX: ".encode()),
                       "body": (8088, f"POST /api/v1/sonar HTTP/1.1\r\nHost: {daemon.address}\r\nContent-Type: application/json\r\n"
                                      "Content-Length: 100000\r\n\r\n ".encode()),
-                      "Hello": (14770, b"\xff\x0f")}  # 2 KB are announced
+                      "Hello": (14770, b"\xff\x0f")}  # states a message of 2 KB
             slow, begin = {}, time.monotonic()
             for name, (port, data) in begins.items():
                 slow[name] = connect(daemon.address, port)
@@ -372,7 +372,7 @@ class Strangers(unittest.TestCase):
                     sender.close()
                     del slow[name]
             self.assertEqual(list(slow), [], "still open")
-            self.assertGreater(time.monotonic() - begin, REQUEST_S / 2, "ended for another reason")
+            self.assertGreater(time.monotonic() - begin, REQUEST_S / 2, "the connection was ended for another reason")
 
     def test_poses_of_closed_connections_have_no_effect(self):
         with Sonard() as daemon:

@@ -20,7 +20,7 @@ using Readers = std::vector<std::unique_ptr<PingReader>>;
 
 const std::string dummies = "    options: {dummy_period_ms: 50}\n";
 
-/// Connects and waits until it is served; from then on it gets every ping.
+/// Connects and waits until the client is served; from then on it gets every ping.
 std::unique_ptr<PingReader> connected(const std::string& address) {
   auto reader = std::make_unique<PingReader>(Socket(address, 52100));
   std::byte first{};
@@ -58,12 +58,12 @@ TEST(Load, EightSonarsServeFourClientsEach) {
     const DeviceFigures f = daemon.figures(s);
     expect_accounts_balance(f);
     const std::uint64_t of_sonar = (f.pings - f.refused - f.unwanted) * static_cast<std::uint64_t>(clients);
-    EXPECT_EQ(of_sonar, f.offered) << "every ping was for every client";
+    EXPECT_EQ(of_sonar, f.offered) << "every ping was offered to every client";
     produced += of_sonar, sent += f.sent, dropped += f.dropped, skipped += f.skipped_ticks;
   }
   for (const auto& r : readers) received += r->pings, garbled += r->garbled;
   EXPECT_GT(produced, 0u);
-  EXPECT_EQ(received, sent) << "what we counted as sent is what clients have";
+  EXPECT_EQ(received, sent) << "clients have received all pings that are counted as sent";
   EXPECT_EQ(garbled, 0u);
   const double share = 100.0 * static_cast<double>(dropped) / static_cast<double>(produced);
   const double grown_mib = (static_cast<double>(after.resident_bytes) - static_cast<double>(before.resident_bytes)) / (1 << 20);
@@ -110,10 +110,11 @@ TEST(Load, AClientThatNeverReadsCostsNoPing) {
   const std::uint64_t at_stop = f.dropped_by[static_cast<std::size_t>(DropReason::stop)];
   EXPECT_LE(lost, at_stop);
   EXPECT_EQ(garbled, 0u);
-  EXPECT_GT(f.dropped_by[static_cast<std::size_t>(DropReason::slow)], 0u) << "the fourth one's";
-  EXPECT_GT(f.dropped_by[static_cast<std::size_t>(DropReason::gone)], 0u) << "what it had waiting when it was reset";
+  EXPECT_GT(f.dropped_by[static_cast<std::size_t>(DropReason::slow)], 0u) << "pings for the stalled client";
+  EXPECT_GT(f.dropped_by[static_cast<std::size_t>(DropReason::gone)], 0u)
+      << "pings that waited when the stalled client was reset";
   EXPECT_GE(reset_s, stall_s);
-  EXPECT_LE(reset_s, stall_s + 15) << "it takes a moment until the kernel's buffers are full";
+  EXPECT_LE(reset_s, stall_s + 15) << "the kernel's buffers fill first";
   const std::uint64_t to_fourth = f.offered - 3 * made, sent_to_fourth = f.sent - received;
   keep("stall-neighbours", format("%lu of %lu", lost - std::min(lost, at_stop), 3 * made), "0", lost <= at_stop);
   keep("stall-reset", format("%.1f s after the first ping, its kernel buffers filled first", reset_s), "10 s without progress",
@@ -129,7 +130,7 @@ class Junk {
     std::uint32_t state = 7;
     for (std::byte& b : noise_) b = static_cast<std::byte>((state = state * 1664525u + 1013904223u) >> 24);
     const auto real = fire(0);
-    for (std::size_t i = 0; i < noise_.size(); i += 4096)  // sometimes bytes that look like a message with a wrong length
+    for (std::size_t i = 0; i < noise_.size(); i += 4096)  // some bytes look like a message with a wrong length
       std::copy(real.begin(), real.begin() + 12, noise_.begin() + static_cast<std::ptrdiff_t>(i));
   }
   ~Junk() {
@@ -194,7 +195,7 @@ TEST(Load, JunkCostsNoPing) {
   EXPECT_EQ(neighbour.garbled, 0u);
   EXPECT_EQ(neighbour.ids_skipped, 0u);
   EXPECT_GT(junk.bytes(), 1u << 20);
-  EXPECT_LE(target.bytes_read, (2 + read_for_s) * target.clients << 20) << "1 MiB/s of each client";
+  EXPECT_LE(target.bytes_read, (2 + read_for_s) * target.clients << 20) << "1 MiB/s from each client";
   EXPECT_LE(gap_ms, quick ? 5000 : 250);
   if (!quick) {
     EXPECT_GE(static_cast<double>(neighbour.pings), 0.95 * due);

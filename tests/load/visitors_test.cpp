@@ -1,4 +1,4 @@
-// Thousands of clients connect and disconnect in many ways, including a reset. Afterwards everything is as before.
+// Thousands of clients connect and disconnect in many ways, including a reset. Afterwards the daemon is as before.
 #include <algorithm>
 #include <memory>
 #include <vector>
@@ -52,7 +52,7 @@ TEST(Load, ShortConnectionsLeaveNoDescriptors) {
     ASSERT_GE(socket.fd(), 0) << "cycle " << i;
     socket.send(fire(i % 3 == 0 ? 0 : 40));
     leave(socket, i);
-    if (i % 100 == 99) {  // not faster than they are accepted
+    if (i % 100 == 99) {  // waits, so that connections are accepted as fast as they come
       ASSERT_TRUE(is_served(daemon.address())) << "cycle " << i;
     }
   };
@@ -92,10 +92,10 @@ TEST(Load, ShortConnectionsLeaveNoDescriptors) {
        after.open_descriptors == idle.open_descriptors && after.threads == idle.threads && grown_mib <= 2);
 }
 
-/// Clients connect, request a ping, read it, and disconnect without a further message, as drivers do.
+/// Clients connect, request pings, read one to three of them, and disconnect in several ways.
 TEST(Load, ADriverReconnectsManyTimes) {
   const int times = quick ? 60 : 1000;
-  LoadDaemon daemon({1, "", "limits: {input_bytes_per_s: 1073741824}\n"});  // one slot, like the product
+  LoadDaemon daemon({1, "", "limits: {input_bytes_per_s: 1073741824}\n"});  // one slot, as by default
   int served = 0, attempts = 0;
   std::chrono::duration<double> longest{0};
   std::uint64_t garbled = 0;

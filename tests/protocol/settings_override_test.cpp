@@ -15,7 +15,7 @@ namespace sonar::settings_override_test {
 namespace {
 using testing::HasSubstr;
 
-/// Sets one setting after another: set().range(5).rate(10).
+/// Settings that can be chained: set().range(5).rate(10).
 struct Override : protocol::SettingsOverride {
   Override& range(double m) { return range_m = m, *this; }
   Override& rate(double hz) { return rate_hz = hz, *this; }
@@ -63,7 +63,7 @@ TEST(Overrides, AreRefusedWithThePermittedRangeOfEachProduct) {
     }
 }
 
-/// A rate that the range does not permit is not refused: sonars then ping as fast as they can.
+/// A rate that is too high for the range is not refused; the sonar then pings as fast as it can.
 TEST(Overrides, SetNoRateAboveThatOfTheProduct) {
   const std::regex ends("the range of .* is ([0-9.e+]+) to .*");
   for (const protocol::Vendor* vendor : protocol::vendors())
@@ -101,7 +101,7 @@ TEST(Overrides, RefuseARateAboveThatOfTheProduct) {
     EXPECT_EQ(why(profile, static_cast<double>(device_of(profile).model->max_rate_hz)), "");
 }
 
-/// Sound is never faster for these sonars, so that no settings give a higher rate.
+/// The highest speed of sound and the shortest range of these sonars give the highest rate, which is that of the product.
 TEST(Overrides, KeepTheRateOfTheProductAtTheHighestSpeedOfSound) {
   ping::surveyor::Settings surveyor;
   surveyor.parameters.speed_mps = 2000;
@@ -117,7 +117,7 @@ TEST(Overrides, KeepTheRateOfTheProductAtTheHighestSpeedOfSound) {
   EXPECT_FLOAT_EQ(ping::omniscan::ping_settings(omniscan).rate_hz, device_of("omniscan-450").model->max_rate_hz);
 }
 
-TEST(OculusOverride, IsTheFireMessageThatADriverWouldHaveSent) {
+TEST(OculusOverride, EqualsTheFireMessageOfADriver) {
   protocol::DeviceState device = oculus_device();
   oculus::FireRequest held = oculus::fire_of(device.settings.get());
   held.settings.gamma = 99;
@@ -129,7 +129,7 @@ TEST(OculusOverride, IsTheFireMessageThatADriverWouldHaveSent) {
   ASSERT_TRUE(change) << change.error().text;
   const oculus::FireRequest asked = oculus::fire_of(change->vendor_settings.get());
   EXPECT_EQ(asked.settings.range, 7.5);
-  EXPECT_EQ(asked.settings.ping_rate, oculus::PingRate::hz15) << "the nearest of the table";
+  EXPECT_EQ(asked.settings.ping_rate, oculus::PingRate::hz15) << "the nearest rate of the table";
   EXPECT_EQ(asked.settings.gain_percent, 30);
   EXPECT_EQ(asked.settings.gamma, 99) << "unset fields stay";
   EXPECT_EQ(asked.settings.sound_speed_mps, 1488);
@@ -150,7 +150,7 @@ TEST(OculusOverride, ModesBeamsAndStandbyCanBeSet) {
   ASSERT_TRUE(still);
   EXPECT_EQ(still->settings.rate_hz, 0);
   const auto far = oculus().apply_override(set().range(30).of_mode(0), device);
-  EXPECT_TRUE(far) << "the range of the mode set with it";
+  EXPECT_TRUE(far) << "the range is one of the mode in the same request";
 }
 
 TEST(OculusOverride, SampleBitsAndRowGainsAreFlags) {
@@ -166,7 +166,7 @@ TEST(OculusOverride, SampleBitsAndRowGainsAreFlags) {
   const auto narrow = oculus().apply_override(set().bits(8).gains_of_rows(false), device);
   ASSERT_TRUE(narrow);
   EXPECT_EQ(oculus::fire_of(narrow->vendor_settings.get()).settings.flags, before);
-  EXPECT_FALSE(oculus().apply_override(set().bits(32), device)) << "messages of version 0 cannot ask for it";
+  EXPECT_FALSE(oculus().apply_override(set().bits(32), device)) << "messages of version 0 cannot request 32 bits";
 
   oculus::FireRequest held = oculus::fire_of(wide->vendor_settings.get());
   held.version = 2;
@@ -195,7 +195,7 @@ TEST(OculusOverride, SettingsBeyondTheProductAreRefusedWithThePermittedOnes) {
   EXPECT_THAT(why(set().bits(24)), HasSubstr("8 or 16 bits"));
 }
 
-TEST(BlueViewOverride, IsWhatAHostWouldHaveSet) {
+TEST(BlueViewOverride, EqualsTheSettingsOfAHost) {
   protocol::DeviceState device = blueview::test::device();
   blueview::SonarSettings held = blueview::settings_from(device.settings.get(), device);
   held.heads[0].tvg_db_per_m = 0.25f;
@@ -223,7 +223,7 @@ TEST(BlueViewOverride, SettingsBeyondTheProductAreRefusedWithThePermittedOnes) {
   EXPECT_THAT(why(set().with_beams(256)), HasSubstr("512 beams"));
   EXPECT_THAT(why(set().bits(8)), HasSubstr("16 bits"));
   EXPECT_THAT(why(set().gains_of_rows(true)), HasSubstr("no row gains"));
-  EXPECT_EQ(why(set().bits(16).gains_of_rows(false)), "") << "as it is";
+  EXPECT_EQ(why(set().bits(16).gains_of_rows(false)), "") << "the device has these values already";
 }
 
 }  // namespace

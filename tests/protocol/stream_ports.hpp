@@ -1,4 +1,4 @@
-// The ports of kind tcp_stream of a make, for its host.
+// The ports of a device at which its host has conversations.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace sonar::protocol::test {
 
-/// For each of the host's ports that is a conversation of the device: the index and the device's port.
+/// Returns the host's ports that have a conversation with the device: the index in make.ports, and the port of the device.
 inline std::vector<std::pair<std::size_t, const Port*>> conversations_of(const Make& make) {
   if (make.is_by_udp()) return {{0, make.device->port(Port::Kind::udp_dialogue)}};
   std::vector<std::pair<std::size_t, const Port*>> all;
@@ -20,7 +20,7 @@ inline std::vector<std::pair<std::size_t, const Port*>> conversations_of(const M
   return all;
 }
 
-/// The bytes of a ping for clients at that port, behind the prefixes of their conversation (Vendor::datagrams). Null: none.
+/// Returns the bytes of a ping for clients at this port, without the prefixes of their conversation; null if there are none.
 inline std::shared_ptr<const Bytes> bytes_at(const Make& make, const Port& port, const Ping& ping, const DeviceState& state) {
   if (conversations_of(make).size() < 2) return make.device->frame(ping, state);
   auto own = make.device->datagrams(port, ping, state);

@@ -139,7 +139,7 @@ TEST(Options, NumbersMustBeNumbers) {
   }
 }
 
-// Performance table, case P1.
+// The case P1 of the benchmarks.
 TEST(BlueView, PresetIsTheBenchmarksCase) {
   const auto& model = *blueview::models().front();
   const FrequencyMode& mode = model.modes.front();

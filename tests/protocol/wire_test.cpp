@@ -1,4 +1,4 @@
-// The visitors alone, with a message that was made for this test.
+// Tests only the visitors of messages, with a message that was made for this test.
 #include "protocol/wire/wire.hpp"
 
 #include <gtest/gtest.h>
@@ -77,15 +77,15 @@ TEST(Wire, LocatesFieldsByTheirMeaning) {
   using sonar::wire::Field;
   using sonar::wire::locate;
   EXPECT_EQ(locate<Outer>(Meaning::colour), (Field{Field::Type::integer, 0, 2}));
-  EXPECT_EQ(locate<Envelope>(Meaning::colour), (Field{Field::Type::integer, 24, 2})) << "the last one";
+  EXPECT_EQ(locate<Envelope>(Meaning::colour), (Field{Field::Type::integer, 24, 2})) << "the last field";
   EXPECT_EQ(locate<Envelope>(Meaning::share), (Field{Field::Type::number, 44, 4}));
   EXPECT_EQ(locate<Inner>(Meaning::octets), (Field{Field::Type::bytes, 2, 3}));
   EXPECT_EQ(locate<Envelope>(Meaning::words), (Field{Field::Type::integer, 48, 4})) << "the first element";
-  EXPECT_EQ(locate<Envelope>(Meaning::parts), (Field{Field::Type::bytes, 56, 2})) << "side by side";
+  EXPECT_EQ(locate<Envelope>(Meaning::parts), (Field{Field::Type::bytes, 56, 2})) << "adjacent fields";
   EXPECT_FALSE(locate<Outer>(Meaning::words));
   EXPECT_TRUE(locate<Outer>(Meaning::share, little));
   EXPECT_FALSE(locate<Outer>(Meaning::share, BytesView(little).first(little.size() - 1)));
-  EXPECT_EQ(locate<Inner>(Meaning::octets, little, 7), (Field{Field::Type::bytes, 9, 3})) << "of a message inside the bytes";
+  EXPECT_EQ(locate<Inner>(Meaning::octets, little, 7), (Field{Field::Type::bytes, 9, 3})) << "the message begins at byte 7";
   EXPECT_FALSE(locate<Inner>(Meaning::octets, little, little.size() - 4));
 }
 
@@ -114,7 +114,7 @@ TEST(Wire, KeepsTheFirstFailureAndReadsNothingMore) {
     sonar::wire::Reader reader(BytesView(exact.get(), length));
     fields(reader, outer);
     EXPECT_FALSE(reader.ok()) << length;
-    EXPECT_EQ(outer.share, 7) << "a field behind the end was touched at length " << length;
+    EXPECT_EQ(outer.share, 7) << "a field after the end was changed at length " << length;
     EXPECT_LE(reader.failure().offset, length);
     EXPECT_GT(reader.failure().needed, reader.failure().left);
   }
@@ -128,7 +128,7 @@ TEST(Wire, NamesTheMissingField) {
   EXPECT_TRUE(reader.block("tail", 1).empty()) << "a failed reader gives no more bytes";
 }
 
-TEST(Wire, HandsOutBlocks) {
+TEST(Wire, ReturnsBlocks) {
   sonar::wire::Reader reader(little);
   EXPECT_EQ(reader.block("head", 4).size(), 4u);
   EXPECT_EQ(reader.position(), 4u);

@@ -1,4 +1,4 @@
-// docs/protocols/oculus.md describes every option as the code has it. The page of evidence lists every file with a guess.
+// docs/protocols/oculus.md describes every option of the code. The page of evidence lists every file with an assumption.
 #include <filesystem>
 #include <fstream>
 
@@ -14,7 +14,7 @@ std::string text_of(const std::filesystem::path& path) {
 }
 std::string page(const char* name) { return text_of(std::filesystem::path(SONARD_SOURCE_DIR) / "docs" / name); }
 
-/// Rows of the table behind `<!-- generated: NAME -->`.
+/// Returns the rows of the table after `<!-- generated: NAME -->`.
 std::string rows_of(const std::string& text, const std::string& name) {
   std::istringstream lines(text);
   std::string line, rows;

@@ -1,4 +1,4 @@
-// Pings framed by the vendor: sizes, echo, version, environment, formats, bearings.
+// Encoded pings: sizes, echo, version, environment, formats, bearings.
 #include "protocol/oculus/models.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
@@ -55,7 +55,7 @@ TEST(EncodePing, GainAssistFollowsTheFlagAndEchoesTheRequest) {
   const auto assisted = [](const char* option, const FireRequest& request) {
     return resolve(request, device("oculus-m1200d", {{"gain_assist", option}})).settings.gain_assist;
   };
-  EXPECT_TRUE(resolve(set, device()).settings.gain_assist) << "the default, as in the capture";
+  EXPECT_TRUE(resolve(set, device()).settings.gain_assist) << "gain assist is the default, as in the capture";
   EXPECT_FALSE(resolve(clear, device()).settings.gain_assist);
   EXPECT_FALSE(assisted("off", set));
   EXPECT_FALSE(assisted("off", clear));
@@ -82,10 +82,10 @@ TEST(EncodePing, RowGainsAreDigitalOrUndoTheTvg) {
   EXPECT_NEAR(digital.row_gains.front(), 21260, 100);
   EXPECT_NEAR(10 * std::log10(digital.row_gains.back() / 1922146.0), 0, 1) << "dB";
   EXPECT_TRUE(std::is_sorted(digital.row_gains.begin(), digital.row_gains.end()));
-  EXPECT_EQ(answer(device("oculus-m750d", {{"row_gain", "tvg"}}), request).row_gains[4], 5u) << "the gains are those of the ping";
+  EXPECT_EQ(answer(device("oculus-m750d", {{"row_gain", "tvg"}}), request).row_gains[4], 5u) << "row gains are those of the ping";
 
   const DecodedPing none = answer(device(), fire(0, 1, PingRate::hz10, 0x4D, 6, 0));
-  EXPECT_EQ(none.row_gains.front(), 1u) << "never 0: clients divide by the root";
+  EXPECT_EQ(none.row_gains.front(), 1u) << "clients divide by the root of a row gain, so it is never 0";
   FireRequest scientific = fire(2, 1, PingRate::hz10, 0x4D, 6, 100);
   scientific.extension.flags = flag::extended_32_bit;
   for (const std::uint32_t gain : answer(device(), scientific).row_gains) EXPECT_NEAR(gain, 3.981e9, 1e6) << "96 dB";
@@ -105,8 +105,9 @@ TEST(EncodePing, GainEchoFollowsTheOption) {
 TEST(EncodePing, AComputedSoundSpeedIsEchoedAsUsed) {
   FireRequest request = fire(0, 1, PingRate::hz10, 0x49, 5, 50);
   const DecodedPing computed = answer(device(), request);
-  EXPECT_EQ(computed.head.fixed.fire.sound_speed_mps, computed.head.fixed.sound_speed_mps) << "identical, as in the capture";
-  EXPECT_NEAR(computed.head.fixed.sound_speed_mps, 1466, 1) << "fresh water of 15 deg C";
+  EXPECT_EQ(computed.head.fixed.fire.sound_speed_mps, computed.head.fixed.sound_speed_mps)
+      << "both speeds are identical, as in the capture";
+  EXPECT_NEAR(computed.head.fixed.sound_speed_mps, 1466, 1) << "the speed is that of fresh water at 15 deg C";
   request.settings.sound_speed_mps = 1490.658551265436;
   const DecodedPing fixed = answer(device(), request);
   EXPECT_EQ(fixed.head.fixed.fire.sound_speed_mps, 1490.658551265436);
@@ -144,7 +145,7 @@ TEST(EncodePing, EnvironmentFollowsTheRequest) {
   Ping ping = made_up_ping(state, resolve(request, state).settings);
   ping.request.water.temperature_c = 7.5;
   ping.request.sonar_in_world.position_m.z = -20;
-  // Heading 90 (east): ahead is world +x, yaw 0 in ENU. Bow up is a negative turn about the axis to port.
+  // A heading of 90 (east) is yaw 0 in ENU, where ahead is world +x. The bow rises by a negative turn about the axis to port.
   ping.request.vehicle_in_world.orientation = quat_from_rpy({rad_from_deg(4), rad_from_deg(-3), 0});
   const auto decoded = decode_ping(encode_ping(ping, state, request));
   ASSERT_TRUE(decoded.has_value());
@@ -167,7 +168,7 @@ TEST(EncodePing, StartTimeUnits) {
   EXPECT_EQ(answer(state, fire(0, 1, PingRate::hz10, 0x49, 5, 50)).head.ping_start_counter, 12'250'000u);
 }
 
-// trunc(100 asin(s) in degrees), s linear from -sin to +sin of half the aperture: every model and mode, from float azimuths.
+// For every model and mode, bearings are trunc(100 asin(s) in degrees); s goes linearly from -sin to +sin of half the aperture.
 TEST(Bearings, FollowTheLawForEveryModel) {
   for (const auto& model : models()) {
     for (std::size_t mode = 0; mode < model->modes.size(); ++mode) {
@@ -177,7 +178,8 @@ TEST(Bearings, FollowTheLawForEveryModel) {
             answer(device(model->profile.c_str()), fire(0, static_cast<int>(mode) + 1, PingRate::hz10, flags, 1, 50));
         const auto beams = static_cast<double>(ping.beams());
         const double edge = std::sin(rad_from_deg(half_deg));
-        EXPECT_EQ(ping.bearings_cdeg.front(), std::lround(-100 * half_deg)) << "guarded against rounding";
+        EXPECT_EQ(ping.bearings_cdeg.front(), std::lround(-100 * half_deg))
+            << "float azimuths must not truncate the first bearing";
         for (std::size_t beam = 0; beam < ping.beams(); ++beam) {
           const double exact = 100 * deg_from_rad(std::asin(-edge + 2 * edge * static_cast<double>(beam) / (beams - 1)));
           EXPECT_NEAR(ping.bearings_cdeg[beam], std::trunc(exact + std::copysign(1e-3, exact)), 0)

@@ -1,4 +1,4 @@
-// The framer at every split and every truncation, with all kinds of other bytes, and with wrong sizes.
+// Tests the framer with every split and every truncation, with all kinds of other bytes, and with wrong sizes.
 #include "protocol/oculus/framer.hpp"
 
 #include "core/base/random.hpp"
@@ -79,7 +79,7 @@ TEST(Framer, JunkBetweenMessagesIsSkippedByteByByte) {
   for (const Bytes& junk : decoys) {
     std::uint64_t skipped = 0;
     const auto messages = cut(Sender::client, {joined({junk, short_fire, junk, dummy, short_fire})}, &skipped);
-    // 53 4F 53 looks like a header, and the next bytes may be taken as its payload; the framer must still find the next message.
+    // 53 4F 53 looks like a header, and the next bytes may count as its payload; the framer must still find the next message.
     ASSERT_FALSE(messages.empty());
     EXPECT_EQ(messages.back(), short_fire) << junk.size();
     if (junk != hex("53 4F 53")) {

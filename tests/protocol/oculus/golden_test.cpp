@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// Fills a message from a JSON object: the opposite of ToJson. Every name must be there.
+/// Fills a message from a JSON object, the reverse of ToJson. The object must have every name.
 class FromJson : public wire::Visitor<FromJson> {
  public:
   explicit FromJson(const Json& object) : object_(object) {}

@@ -1,5 +1,5 @@
-// Any Oculus message as a JSON object with the vendor's names, from the one description of its fields. The golden pairs use it,
-// and so does dump_oculus, a program with which tests in other languages check our decoder.
+// Converts any Oculus message to a JSON object with the vendor's names, by the description of its fields. The golden pairs use
+// it, and so does dump_oculus, a program with which tests in other languages check our decoder.
 #pragma once
 
 #include <nlohmann/json.hpp>

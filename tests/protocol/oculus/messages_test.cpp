@@ -4,7 +4,7 @@
 namespace sonar::oculus::tests {
 namespace {
 
-// Source 7892 = 0x1ED4, as the captured device; ENS's defaults: mode 2, 10 Hz, 255 Mbit/s, gamma 127, flags 0x0D, 2.54 m, 50 %.
+// The defaults of ENS: mode 2, 10 Hz, 255 Mbit/s, gamma 127, flags 0x0D, 2.54 m, 50 %. Addressed to the captured device, 7892.
 const Bytes fire_v0_bytes =
     hex("53 4F  00 00  D4 1E  15 00  00 00  25 00 00 00  00 00 "  // header, payload 37, addressed to 7892
         "02 00 FF 7F 0D "                                         // mode, rate, network, gamma, flags
@@ -13,7 +13,7 @@ const Bytes fire_v0_bytes =
         "00 00 00 00 00 70 97 40 "                                // sound speed 1500
         "00 00 00 00 00 80 41 40");                               // salinity 35
 
-// liboculus: version 2, payload 73, 32-bit data.
+// A fire message of liboculus: version 2, payload 73, 32-bit data.
 const Bytes fire_v2_bytes =
     hex("53 4F  00 00  00 00  15 00  02 00  49 00 00 00  00 00 "
         "02 02 FF 7F 4F "
@@ -89,7 +89,7 @@ TEST(Messages, StatusByHand) {
   EXPECT_EQ(Bytes(beacon.begin(), beacon.begin() + 134), status_bytes);
   const auto status = decode_status(beacon);
   ASSERT_TRUE(status.has_value());
-  EXPECT_NEAR(status->pressure_bar, 1.013 + 0.0981 * 5, 0.002);  // absolute, 5 m of fresh water
+  EXPECT_NEAR(status->pressure_bar, 1.013 + 0.0981 * 5, 0.002);  // absolute pressure at 5 m in fresh water
   EXPECT_THAT(status_violations(*status, beacon.size()), ::testing::IsEmpty());
 }
 
@@ -171,7 +171,7 @@ void expect_common_fields(const DecodedPing& ping) {
   EXPECT_EQ(ping.row_gains, (std::vector<std::uint32_t>{1, 2, 256}));
   EXPECT_EQ(ping.sample(1, 1), 0x15u);
   EXPECT_EQ(ping.sample(2, 0), 254u);
-  EXPECT_NEAR(ping.azimuth_rad(0), rad_from_deg(30), 1e-12) << "negative bearings lie to port";
+  EXPECT_NEAR(ping.azimuth_rad(0), rad_from_deg(30), 1e-12) << "negative bearings are to port";
   EXPECT_DOUBLE_EQ(ping.row_range_m(2), 0.625);
 }
 
@@ -217,7 +217,7 @@ TEST(Messages, DummyByHand) {
   EXPECT_EQ(std::get<DummyMessage>(received).header.source, 7001);
 }
 
-// First octet in the most significant byte: 192.168.1.2 = 0xC0A80102 = bytes 02 01 A8 C0.
+// The first octet is in the most significant byte: 192.168.1.2 is 0xC0A80102, which is the bytes 02 01 A8 C0.
 TEST(Messages, UserConfigByHand) {
   const Bytes bytes = hex("53 4F  59 1B  00 00  55 00  00 00  0C 00 00 00  00 00  02 01 A8 C0  00 FF FF FF  01 00 00 00");
   const auto received = decode_message(bytes);

@@ -59,7 +59,7 @@ Result<std::shared_ptr<const SonarModel>> tuned(const char* profile, const proto
   return found.vendor->tuned(found.model, protocol::check_options(*found.vendor, given).value());
 }
 
-TEST(Tuning, NothingGivenIsTheProductItself) {
+TEST(Tuning, WithoutOptionsTheModelIsThatOfTheProduct) {
   EXPECT_EQ(tuned("oculus-m1200d", {}).value(), protocol::find_profile("oculus-m1200d")->model);
   EXPECT_EQ(tuned("oculus-m1200d", {{"lf_aperture_deg", "product"}}).value(), protocol::find_profile("oculus-m1200d")->model);
 }
@@ -84,7 +84,7 @@ TEST(Tuning, EveryFigureReachesItsMode) {
   }
   EXPECT_EQ(model->part_number, 4713);
   const FrequencyMode& shared = protocol::find_profile("oculus-c550d")->model->modes[0];
-  EXPECT_NEAR(deg_from_rad(shared.horizontal_aperture_rad), 120, 1e-4) << "other sonars of the product keep their aperture";
+  EXPECT_NEAR(deg_from_rad(shared.horizontal_aperture_rad), 120, 1e-4) << "the shared model of the product keeps its aperture";
 }
 
 TEST(Tuning, ImpossibleValuesAreRefused) {

@@ -1,4 +1,4 @@
-// Shared by the Oculus tests: bytes that were typed by hand, buffers of exact size, a device, and a made-up ping.
+// Common parts of the Oculus tests: bytes that were typed by hand, buffers of exact size, a device, and a made-up ping.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ using wire::BytesView;
 inline unsigned hex_digit(char c) {
   return static_cast<unsigned>(c <= '9' ? c - '0' : std::toupper(static_cast<unsigned char>(c)) - 'A' + 10);
 }
-/// "53 4F" -> two bytes. Independent of the code under test.
+/// Converts "53 4F" to two bytes, independently of the code under test.
 inline Bytes hex(std::string_view text) {
   Bytes out;
   for (std::size_t i = 0; i + 1 < text.size(); ++i) {
@@ -48,7 +48,7 @@ inline void overwrite(Bytes& bytes, std::size_t offset, const Bytes& with) {
   std::copy(with.begin(), with.end(), bytes.begin() + static_cast<std::ptrdiff_t>(offset));
 }
 
-/// A heap copy of exactly the view's size, so that a sanitizer sees a read one byte too far.
+/// A heap copy of exactly the view's size, so that a sanitizer detects a read one byte beyond it.
 class Exact {
  public:
   explicit Exact(BytesView from) : size_(from.size()), bytes_(new std::byte[from.size()]) {
@@ -63,7 +63,7 @@ class Exact {
 
 inline Time at(double seconds_since_epoch) { return Time{} + nanoseconds_from(seconds_since_epoch); }
 
-/// A device with all options set, by default in fresh water of 15 deg C at 5 m depth.
+/// A device at 5 m depth in fresh water of 15 deg C; options that are not given have their defaults.
 inline protocol::DeviceState device(const char* profile = "oculus-m1200d", const protocol::OptionValues& options = {}) {
   const auto found = protocol::find_profile(profile);
   if (!found) throw std::runtime_error(found.error().text);
@@ -91,7 +91,7 @@ inline FireRequest fire(int version, int mode, PingRate rate, int flags, double 
   return request;
 }
 
-/// The bearings follow the formula of the product. The samples depend on their place: code = (row * 7 + beam) modulo 251 in the
+/// The bearings follow the formula of the product. The samples depend on row and beam: code = (row * 7 + beam) modulo 251 in the
 /// lowest byte.
 inline Ping made_up_ping(const protocol::DeviceState& state, const PingSettings& settings, std::uint32_t number = 1) {
   Ping ping;
@@ -115,7 +115,7 @@ inline Ping made_up_ping(const protocol::DeviceState& state, const PingSettings&
   return ping;
 }
 
-/// A device's answer to a fire message: resolved, pinged with made-up samples, framed, decoded.
+/// Returns a device's decoded answer to a fire message: a ping with the resulting settings and made-up samples.
 inline DecodedPing answer(const protocol::DeviceState& state, const FireRequest& request, std::uint32_t number = 1) {
   const Ping ping = made_up_ping(state, resolve(request, state).settings, number);
   return decode_ping(encode_ping(ping, state, request)).value();

@@ -17,14 +17,14 @@ PingSettings settings_of(const FireRequest& request, const protocol::DeviceState
   return resolve(request, state).settings;
 }
 
-// Captured ping: 2.0 m at 1490.658551265436 m/s is 703 rows of 2.8421889710794315 mm.
+// The captured ping has, for 2.0 m at 1490.658551265436 m/s, 703 rows of 2.8421889710794315 mm.
 TEST(RowGrid, IsTheCapturedOne) {
   const RowGrid law = row_grid(2.0, 1490.658551265436);
   EXPECT_EQ(law.count, 703);
   EXPECT_DOUBLE_EQ(law.spacing_m, 0.0028421889710794315);
 }
 
-// For the capture's request, the packet has the captured spacing bit for bit.
+// For the captured request, the spacing in the packet is equal to the captured one in every bit.
 TEST(RowGrid, SpacingReachesThePacketUnrounded) {
   FireRequest request = fire(0, 2, PingRate{195}, 0x19, 2, 50);
   request.settings.sound_speed_mps = 1490.658551265436;
@@ -88,7 +88,7 @@ TEST(Settle, ModesAndRangesAreApplied) {
   EXPECT_FALSE(high.triggered);
   const PingSettings per_cent = settings_of(fire(1, 1, PingRate::hz15, 0x00, 20, 50), state);
   EXPECT_EQ(per_cent.mode, 0);
-  EXPECT_DOUBLE_EQ(per_cent.range_m, 8) << "20 per cent of 40 m";
+  EXPECT_DOUBLE_EQ(per_cent.range_m, 8) << "the range is 20 per cent of 40 m";
   EXPECT_EQ(per_cent.beam_count, 256);
 }
 
@@ -103,7 +103,7 @@ TEST(Settle, ClampsValuesOutOfRangeWithANotice) {
   const auto state = device();
   const ResolvedSettings far = resolve(fire(0, 2, PingRate::hz10, 0x49, 20, 150), state);
   EXPECT_EQ(far.settings.range_m, 10);
-  EXPECT_NEAR(far.settings.gain_db, 96, 1e-4) << "mapped from 100 per cent";
+  EXPECT_NEAR(far.settings.gain_db, 96, 1e-4) << "the gain of 100 per cent";
   EXPECT_THAT(far.clamped,
               ElementsAre("range 20 m is outside 0.1..10 m, 10 m is used", "gain 150 % is outside 0..100 %, 100 % is used"));
   const ResolvedSettings near = resolve(fire(0, 1, PingRate::hz10, 0x49, -3, -5), state);
@@ -163,7 +163,7 @@ TEST(Settle, NotANumberIsNoticed) {
 
 TEST(Settle, DeviceComputesItsSoundSpeed) {
   auto state = device();
-  state.water = Water{20, 35, 8, 1234};  // the device does not use the world's speed
+  state.water = Water{20, 35, 8, 1234};  // the device does not use the sound speed of the world
   state.depth_m = 0;
   FireRequest request = fire(0, 1, PingRate::hz10, 0x49, 5, 50);
   EXPECT_NEAR(settings_of(request, state).device_sound_speed_mps, sound_speed_unesco_mps(20, 0, 0), 0.01);
@@ -198,7 +198,7 @@ TEST(Settle, ScientificDataHas32Bits) {
   EXPECT_EQ(s.format.max_code, 0xFFFFFFFFu);
   EXPECT_FALSE(s.tvg);
   EXPECT_FLOAT_EQ(s.gain_db, 48);
-  request.version = 1;  // version 1 does not have the extension
+  request.version = 1;  // a message of version 1 has no extension
   EXPECT_EQ(settings_of(request, state).format.bits, 16);
 }
 
@@ -229,7 +229,7 @@ TEST(Settle, PulseFollowsTheRows) {
   EXPECT_EQ(rows.samples_per_row, 1);
   const PingSettings native = settings_of(request, device("oculus-m1200d", {{"pulse", "native"}}));
   EXPECT_FLOAT_EQ(native.pulse_width_m, 0.0025f);
-  EXPECT_EQ(native.samples_per_row, 22) << "22.9 mm rows / 1.06 mm samples (F_s = 2b)";
+  EXPECT_EQ(native.samples_per_row, 22) << "rows of 22.9 mm have samples of 1.06 mm (F_s = 2b)";
 }
 
 TEST(Settle, OnlyTheRecordedModeHasTheRecordedPulse) {
@@ -238,7 +238,7 @@ TEST(Settle, OnlyTheRecordedModeHasTheRecordedPulse) {
     return static_cast<double>(s.pulse_width_m) / s.range_bin_m;
   };
   EXPECT_NEAR(rows_of("oculus-m1200d", 2), 0.71, 1e-6);
-  EXPECT_NEAR(rows_of("oculus-mf1200d", 2), 0.71, 1e-6) << "the same electronics";
+  EXPECT_NEAR(rows_of("oculus-mf1200d", 2), 0.71, 1e-6) << "this product has the same electronics";
   for (const auto& [profile, mode] :
        {std::pair("oculus-m1200d", 1), {"oculus-m750d", 2}, {"oculus-m3000d", 2}, {"oculus-n1200s", 1}})
     EXPECT_NEAR(rows_of(profile, static_cast<std::uint8_t>(mode)), 0.9, 1e-6) << profile;

@@ -1,4 +1,4 @@
-// Pings of a Ping360, an Omniscan, a Surveyor, a Ping1D and an S500 with bodies at known places, computed by the whole engine and
+// Pings of a Ping360, an Omniscan, a Surveyor, a Ping1D and an S500 with bodies at known positions, computed with the engine and
 // compared with closed forms.
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ struct Scanner {
     sounding = std::make_unique<Sounding>(scene, state.model->modes[0], s);
     sounding->request.water = state.water;
   }
-  /// Samples of a ping at that angle.
+  /// Returns the samples of a ping at this angle.
   std::vector<int> at(std::uint16_t angle) {
     const Ping& ping = sounding->ping_from({}, {0, 0, ping360::head_rad(angle, state.options)});
     std::vector<int> samples;
@@ -45,12 +45,12 @@ struct Scanner {
     return best;
   }
 
-  Transducer asked{1, 0, 0, 10, 88, 750, 1200, 1, 0};  // 1.65 mm a sample at 1500 m/s
+  Transducer asked{1, 0, 0, 10, 88, 750, 1200, 1, 0};  // 1.65 mm per sample at 1500 m/s
   protocol::DeviceState state;
   std::unique_ptr<Sounding> sounding;
 };
 
-/// First sample of at least half the amplitude of the highest: 6 dB of 60 dB.
+/// Returns the first sample of at least half the highest amplitude, 6 dB below it (255 codes are 60 dB).
 int half_maximum(const std::vector<int>& samples) {
   const int top = *std::max_element(samples.begin(), samples.end());
   EXPECT_GT(top, 60);
@@ -62,17 +62,17 @@ int half_maximum(const std::vector<int>& samples) {
 std::shared_ptr<const Scene> wall_at(double x_m) { return SceneMaker().add(wall(1, 1), -25, {x_m, 0, 0}).make(); }
 std::shared_ptr<const Scene> ball_at(Vec3d at) { return SceneMaker().add(sphere(0.03, 4), -10, at).make(); }
 
-TEST(Ping360Acoustics, AWallIsWhereTheHostsSoundSpeedPutsIt) { EXPECT_NEAR(half_maximum(Scanner(wall_at(1.5)).at(0)), 908, 5); }
+TEST(Ping360Acoustics, AWallIsAtTheRangeForTheHostsSoundSpeed) { EXPECT_NEAR(half_maximum(Scanner(wall_at(1.5)).at(0)), 908, 5); }
 
 TEST(Ping360Acoustics, AnotherSoundSpeedMovesTheWall) {
   EXPECT_NEAR(half_maximum(Scanner(wall_at(1.5), 1450).at(0)), 1.5 / (88 * 25e-9 * 1450 / 2) - 1, 5);
 }
 
 TEST(Ping360Acoustics, ABallIsBrightestAtItsBearing) {
-  EXPECT_NEAR(Scanner(ball_at({0, -1.2, 0})).brightest_angle(), 100, 1) << "to starboard";
-  EXPECT_NEAR(Scanner(ball_at({0, 1.2, 0})).brightest_angle(), 300, 1) << "to port";
+  EXPECT_NEAR(Scanner(ball_at({0, -1.2, 0})).brightest_angle(), 100, 1) << "a ball to starboard";
+  EXPECT_NEAR(Scanner(ball_at({0, 1.2, 0})).brightest_angle(), 300, 1) << "a ball to port";
   EXPECT_NEAR(Scanner(ball_at({0, -1.2, 0}), 1500, {{"mount_grad", "30"}}).brightest_angle(), 70, 1);
-  EXPECT_NEAR(Scanner(ball_at({-1, 1, 0})).brightest_angle(), 250, 1) << "astern to port";
+  EXPECT_NEAR(Scanner(ball_at({-1, 1, 0})).brightest_angle(), 250, 1) << "a ball astern to port";
 }
 
 TEST(Ping360Acoustics, ABallIsBrightestAtItsRange) {
@@ -83,7 +83,7 @@ TEST(Ping360Acoustics, ABallIsBrightestAtItsRange) {
   }
 }
 
-TEST(Ping360Acoustics, GainIsSixDecibelsAStep) {
+TEST(Ping360Acoustics, AStepOfGainIsSixDecibels) {
   Scanner low(wall_at(1.5)), high(wall_at(1.5));
   Transducer louder = low.asked;
   louder.gain = 1;
@@ -102,7 +102,7 @@ struct SideScan {
     sounding = std::make_unique<Sounding>(scene, state.model->modes[0], omniscan::ping_settings(settings));
     sounding->request.vendor_settings = std::make_shared<omniscan::HeldSettings>(settings);
   }
-  /// Powers [dB] of a ping, 10 mm a row.
+  /// Returns the powers [dB] of a ping with rows of 10 mm.
   std::vector<double> ping(double x_m = 0, double yaw_rad = -pi / 2) {
     sounding->request.sonar_in_world = {{x_m, 0, 0}, quat_from_rpy({0, pi / 6, yaw_rad})};
     sounding->request.number = PingNumber(1);
@@ -137,7 +137,8 @@ TEST(OmniscanAcoustics, ABallIsAtItsRangeAndWithinTheNarrowBeam) {
     const auto db = side.ping();
     const auto top = std::max_element(db.begin(), db.end()) - db.begin();
     EXPECT_NEAR((static_cast<double>(top) + 0.5) * 0.01, std::hypot(y_m, 1.0) - 0.03, 0.03) << y_m;
-    EXPECT_LT(loudest(side.ping(y_m * std::tan(rad_from_deg(1.5)))), loudest(db) - 10) << "1.5 degrees along the track";
+    EXPECT_LT(loudest(side.ping(y_m * std::tan(rad_from_deg(1.5)))), loudest(db) - 10)
+        << "the ball is 1.5 degrees along the track";
   }
 }
 
@@ -215,13 +216,13 @@ TEST(SurveyorAcoustics, AFlatBottomIsFlat) {
   for (std::uint32_t number = 1; number <= 20; ++number) {
     const Points points = points_in(sounder.ping(number)[2]);
     EXPECT_EQ(points.y.size(), 16u);
-    EXPECT_GT(points.y.front(), 2.5) << "to port first";
+    EXPECT_GT(points.y.front(), 2.5) << "the first point is to port";
     EXPECT_LT(points.y.back(), -2.5);
     for (std::size_t i = 0; i < points.z.size(); ++i) EXPECT_NEAR(points.z[i], -5, 0.05) << number << " y " << points.y[i];
   }
 }
 
-// Within some pulses: 1.5 steps of 400 to twice the altitude.
+// The tolerance of 0.02 times the altitude is 4 of the 400 steps to twice the altitude, some pulses.
 TEST(SurveyorAcoustics, BedsHaveAPointInEachDirection) {
   for (const double altitude_m : {2.0, 12.0})
     for (const double slope_deg : {0.0, 10.0, -20.0})
@@ -263,7 +264,7 @@ TEST(SurveyorAcoustics, RollIsInTheUpVectorAndInThePoints) {
   EXPECT_NEAR(up[1], std::sin(roll_rad), 0.002);
   EXPECT_NEAR(up[2], std::cos(roll_rad), 0.002);
   const Points points = points_in(frames[2]);
-  for (std::size_t i = 0; i < points.z.size(); ++i)  // along the up vector all points are 5 m down
+  for (std::size_t i = 0; i < points.z.size(); ++i)  // along the up vector, all points are 5 m down
     EXPECT_NEAR(points.y[i] * static_cast<double>(up[1]) + points.z[i] * static_cast<double>(up[2]), -5, 0.05);
 }
 
@@ -281,7 +282,7 @@ struct Altimeter {
     sounding = std::make_unique<Sounding>(scene, state.model->modes[0], ping1d::ping_settings(settings));
     sounding->request.switches.noise = true;
   }
-  /// Returns the echo of a ping from that height, pitched by this angle from straight down, after range and gain have settled.
+  /// Returns the echo of a ping from this position, pitched by this angle from straight down, after range and gain have settled.
   ping1d::Echo echo(double x_m = 0, double pitch_rad = 0) {
     ping1d::Echo found;
     for (int i = 0; i < 12; ++i) {
@@ -308,7 +309,8 @@ TEST(Ping1DAcoustics, TheBedIsAtItsDistance) {
       Altimeter altimeter(bed(0, altitude_m, strength_db));
       for (const double x_m : {0.0, 0.1, 0.2, 0.3}) {
         const ping1d::Echo echo = altimeter.echo(x_m * altitude_m);
-        const auto pulse_m = static_cast<double>(altimeter.sounding->request.settings.pulse_width_m);  // at least one point
+        const auto pulse_m =
+            static_cast<double>(altimeter.sounding->request.settings.pulse_width_m);  // pulses are at least one point long
         EXPECT_NEAR(echo.range_m, altitude_m, 1.5 * pulse_m) << altitude_m << " m, " << strength_db << " dB";
         EXPECT_GE(echo.confidence, 50);
       }

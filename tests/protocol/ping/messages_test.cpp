@@ -1,4 +1,4 @@
-// Frames of the ping protocol: published bytes, and any bytes split anywhere.
+// Frames of the ping protocol: published bytes, and arbitrary bytes that are split anywhere.
 #include <gmock/gmock.h>
 
 #include <random>
@@ -29,7 +29,7 @@ TEST(PingFrames, MessagesHaveThePublishedSizes) {
   EXPECT_EQ(wire::wire_size<AttitudeReport>(), 36u);
 }
 
-TEST(PingFrames, AFrameBehindAWrongOneIsFound) {
+TEST(PingFrames, AFrameAfterAWrongOneIsFound) {
   Bytes wrong = general(Id::protocol_version);
   wrong.back() = std::byte{0x55};
   Framer framer;
@@ -107,7 +107,7 @@ TEST(PingFrames, InADatagramAFalseStartHidesNoFrame) {
 
 TEST(PingFrames, OnlyDatagramsOfHostsOpenADialogue) {
   EXPECT_TRUE(holds_frame(general(Id::protocol_version)));
-  EXPECT_FALSE(holds_frame(ack(Id::motor_off, 2))) << "of another device";
+  EXPECT_FALSE(holds_frame(ack(Id::motor_off, 2))) << "the message is one of another device";
   EXPECT_FALSE(holds_frame(nack(Id::motor_off, 2, "no")));
   EXPECT_FALSE(holds_frame({}));
   EXPECT_FALSE(holds_frame(hex("00 FF")));

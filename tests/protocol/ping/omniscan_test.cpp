@@ -18,10 +18,10 @@ TEST(Omniscan, ASessionStartsAndEndsByEnable) {
   talk.say(general(Id::device_information));
   ASSERT_EQ(talk.take().size(), 1u);
   EXPECT_EQ(talk.settings.rate_hz, 0);
-  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "it says nothing by itself";
+  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "the device sends nothing without a request";
   talk.say(pings());
-  EXPECT_GE(talk.settings.rate_hz, 2.5) << "hosts wait half a second for a profile of 5 m";
-  EXPECT_NEAR(talk.settings.rate_hz, 1 / (10 / 1500.0 + 0.0018), 1e-3) << "as fast as sound allows";
+  EXPECT_GE(talk.settings.rate_hz, 2.5) << "hosts wait only half a second for a profile of 5 m";
+  EXPECT_NEAR(talk.settings.rate_hz, 1 / (10 / 1500.0 + 0.0018), 1e-3) << "the travel time limits the rate";
   talk.say(pings({.start_mm = 2000, .length_mm = 30000, .period_ms = 200, .results = 1200, .enable = 1}));
   EXPECT_EQ(talk.settings.rate_hz, 5);
   EXPECT_DOUBLE_EQ(talk.settings.range_start_m, 2);
@@ -31,7 +31,7 @@ TEST(Omniscan, ASessionStartsAndEndsByEnable) {
   EXPECT_TRUE(talk.take().empty());
 }
 
-TEST(Omniscan, BothSizesOfSettingsAndBothNumbersOfTheSpeedOfSoundAreKnown) {
+TEST(Omniscan, BothSizesOfSettingsAndBothMessagesOfTheSpeedOfSoundAreAccepted) {
   Talk talk("omniscan-450");
   Bytes payload = wire::bytes_of(OsPingParams{.length_mm = 7000, .enable = 1});
   EXPECT_EQ(payload.size(), 34u);
@@ -42,7 +42,7 @@ TEST(Omniscan, BothSizesOfSettingsAndBothNumbersOfTheSpeedOfSoundAreKnown) {
   EXPECT_EQ(talk.settings.device_sound_speed_mps, 1450);
   talk.say(framed_message(Id::set_sound_speed_before, 0, SoundSpeed{1480000}));
   EXPECT_EQ(talk.settings.device_sound_speed_mps, 1480);
-  EXPECT_DOUBLE_EQ(talk.settings.range_m, 7) << "the settings stay";
+  EXPECT_DOUBLE_EQ(talk.settings.range_m, 7) << "the other settings stay";
   EXPECT_TRUE(talk.take().empty());
 }
 
@@ -55,7 +55,7 @@ TEST(Omniscan, AProfileHasTheSettingsOfThePing) {
   ping.request.vendor_settings = talk.state.settings;
   ping.request.fired_at = at_s(2.5);
   ping.request.number = PingNumber(1);
-  ping.request.sonar_in_world.orientation = quat_from_rpy({0, 0, -pi / 2});  // to the south
+  ping.request.sonar_in_world.orientation = quat_from_rpy({0, 0, -pi / 2});  // the sonar looks to the south
   for (int i = 0; i < 700; ++i)
     for (const int part : {i & 0xFF, i >> 8}) ping.samples.push_back(static_cast<std::byte>(part));
   const auto datagrams = talk.vendor.datagrams(talk.vendor.ports()[1], ping, talk.state);
@@ -77,7 +77,7 @@ TEST(Omniscan, AProfileHasTheSettingsOfThePing) {
   EXPECT_NEAR(static_cast<double>(profile.transducer_heading_deg), 180, 1e-3);
 }
 
-/// A profile of a ping with these samples, and its powers.
+/// Returns the profile of a ping with these samples, and its powers.
 std::pair<OsMonoProfile, std::vector<std::uint16_t>> profile_of_samples(const std::vector<std::uint16_t>& samples) {
   Talk talk("omniscan-450");
   talk.say(pings({.results = 200, .enable = 1}));
@@ -139,7 +139,7 @@ TEST(Omniscan, RefusesWrongRequests) {
   EXPECT_EQ(talk.take().at(0).header.id, Id::nack);
 }
 
-TEST(Omniscan, AnOverrideIsWhatAHostWouldSet) {
+TEST(Omniscan, AnOverrideEqualsTheSettingsOfAHost) {
   Talk talk("omniscan-450");
   protocol::SettingsOverride wanted;
   wanted.range_m = 12;

@@ -31,7 +31,7 @@ std::vector<Id> ids_in(const std::vector<Frame>& frames) {
   return ids;
 }
 
-/// A profile of noise with an echo that begins at that row and is `rows` long.
+/// Returns a profile of noise with an echo that begins at this row and is `rows` long.
 Ping profile_with(const Parameters& parameters, int row, int peak, int rows = 8, int noise = 1) {
   Settings settings;
   settings.parameters = parameters;
@@ -48,8 +48,8 @@ Ping profile_with(const Parameters& parameters, int row, int peak, int rows = 8,
 TEST(Ping1D, AnswersByTheBytesOfTheDefinitions) {
   Talk talk("ping1d");
   talk.say(hex("42 52 02 00 06 00 00 00 05 00 a1 00"));  // protocol_version, as in the example of the definitions
-  talk.say(hex("42 52 00 00 b9 04 00 00 51 01"));        // 1209 is the number of no message; speed of sound has 1203
-  talk.say(hex("42 52 00 00 b4 04 00 00 4c 01"));        // range, as older hosts ask: its number without a payload
+  talk.say(hex("42 52 00 00 b9 04 00 00 51 01"));  // 1209 is not the number of a message; that of the speed of sound is 1203
+  talk.say(hex("42 52 00 00 b4 04 00 00 4c 01"));  // older hosts request the range with its number and no payload
   ASSERT_EQ(talk.replies.size(), 3u);
   EXPECT_EQ(talk.replies[0], hex("42 52 04 00 05 00 01 00 01 00 00 00 9f 00"));
   EXPECT_EQ(frames_in({talk.replies[1]}).at(0).header.id, Id::nack);
@@ -58,7 +58,7 @@ TEST(Ping1D, AnswersByTheBytesOfTheDefinitions) {
 
 TEST(Ping1D, SettingsAreReadBack) {
   Talk talk("ping1d");
-  Bytes all = setting<std::uint8_t>(Id::ping1d_set_mode_auto, 0);  // in one piece, as a stream may deliver them
+  Bytes all = setting<std::uint8_t>(Id::ping1d_set_mode_auto, 0);  // the requests are in one piece, as in a stream
   for (const Bytes& more : {framed_message(Id::ping1d_set_range, 0, ScanRange{500, 4000}),
                             setting<std::uint32_t>(Id::set_sound_speed_before, 1444000),
                             setting<std::uint16_t>(Id::ping1d_set_interval, 36), setting<std::uint8_t>(Id::ping1d_set_gain, 6),
@@ -89,7 +89,7 @@ TEST(Ping1D, SettingsAreReadBack) {
 
 TEST(Ping1D, AMeasurementThatIsRequestedIsTheNextOne) {
   Talk talk("ping1d");
-  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "it says nothing by itself";
+  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "the device sends nothing without a request";
   talk.say(general(Id::ping1d_distance));
   EXPECT_TRUE(talk.take().empty());
   talk.run_to(5, 0.05);
@@ -98,11 +98,12 @@ TEST(Ping1D, AMeasurementThatIsRequestedIsTheNextOne) {
   talk.say(request(Id::ping1d_profile), 5);
   talk.say(request(Id::ping1d_distance_simple), 5);
   talk.run_to(6, 0.05);
-  EXPECT_THAT(ids_in(talk.take()), testing::ElementsAre(Id::ping1d_distance_simple, Id::ping1d_profile)) << "of one ping";
+  EXPECT_THAT(ids_in(talk.take()), testing::ElementsAre(Id::ping1d_distance_simple, Id::ping1d_profile))
+      << "both answers are of one ping";
   EXPECT_EQ(talk.pings, 2);
 }
 
-TEST(Ping1D, AStreamGoesOnUntilItIsStopped) {
+TEST(Ping1D, AStreamContinuesUntilItIsStopped) {
   Talk talk("ping1d");
   talk.say(setting(Id::ping1d_continuous_start, Id::ping1d_profile));
   EXPECT_TRUE(talk.dialogue->hosts_fall_silent());
@@ -111,7 +112,7 @@ TEST(Ping1D, AStreamGoesOnUntilItIsStopped) {
   for (int i = 1; i <= 5; ++i) {
     talk.apply(talk.dialogue->on_tick(talk.dialogue->next_tick(), false));
     EXPECT_EQ(talk.pings, i);
-    EXPECT_FALSE(talk.dialogue->next_ping_request()) << "one at a time";
+    EXPECT_FALSE(talk.dialogue->next_ping_request()) << "only one ping is requested at a time";
     talk.deliver(0.1 * i);
     EXPECT_THAT(ids_in(talk.take()), testing::ElementsAre(Id::ping1d_profile));
   }
@@ -129,10 +130,10 @@ TEST(Ping1D, APingThatIsLostIsRequestedAgain) {
   const auto late = talk.aim.with;
   EXPECT_EQ(talk.dialogue->next_tick(), at_s(2));
   talk.apply(talk.dialogue->on_tick(at_s(2), true));
-  EXPECT_EQ(talk.pings, 1) << "it waits for its turn";
+  EXPECT_EQ(talk.pings, 1) << "no ping is requested while another ping is pending";
   talk.apply(talk.dialogue->on_tick(at_s(4), false));
   EXPECT_EQ(talk.pings, 2);
-  EXPECT_FALSE(talk.dialogue->on_ping(late.get(), 0, at_s(4)).prefixes.empty()) << "it is sent when it comes";
+  EXPECT_FALSE(talk.dialogue->on_ping(late.get(), 0, at_s(4)).prefixes.empty()) << "the late ping is sent when it comes";
 }
 
 TEST(Ping1D, NoMeasurementIsMadeWhilePingsAreDisabled) {
@@ -145,7 +146,7 @@ TEST(Ping1D, NoMeasurementIsMadeWhilePingsAreDisabled) {
   talk.say(general(Id::ping1d_distance));
   EXPECT_THAT(ids_in(talk.take()), testing::ElementsAre(Id::nack));
   talk.say(setting<std::uint8_t>(Id::ping1d_set_enable, 1), 3);
-  EXPECT_EQ(talk.dialogue->next_tick(), at_s(3)) << "the stream goes on";
+  EXPECT_EQ(talk.dialogue->next_tick(), at_s(3)) << "the stream continues";
 }
 
 TEST(Ping1D, RefusesWrongRequests) {
@@ -166,11 +167,11 @@ TEST(Ping1D, RefusesWrongRequests) {
        {framed_message(Id::ping1d_set_range, 0, ScanRange{100, 2000}), setting<std::uint8_t>(Id::ping1d_set_gain, 1)}) {
     Talk talk("ping1d");
     talk.say(own);
-    EXPECT_THAT(ids_in(talk.take()), testing::ElementsAre(Id::nack)) << "in automatic mode";
+    EXPECT_THAT(ids_in(talk.take()), testing::ElementsAre(Id::nack)) << "a setting of the manual mode in automatic mode";
   }
 }
 
-TEST(Ping1D, AnOverrideIsWhatAHostWouldSet) {
+TEST(Ping1D, AnOverrideEqualsTheSettingsOfAHost) {
   Talk talk("ping1d");
   const auto changed =
       talk.vendor.apply_override({.range_m = 12, .rate_hz = 4, .gain_percent = 100, .mode = {}, .beams = {}}, talk.state);
@@ -201,16 +202,17 @@ TEST(Ping1DDetector, NoiseAloneIsNoEcho) {
   EXPECT_EQ(find_echo(profile_with({}, 50, 0, 8, 0)).confidence, 0);
   EXPECT_EQ(find_echo(profile_with({}, 50, 12, 1, 4)).confidence, 0);
   EXPECT_EQ(find_echo(profile_with({}, 0, 255, 4)).range_m, find_echo(profile_with({}, 0, 1, 4)).range_m)
-      << "nearer than 0.3 m it does not listen";
+      << "the device detects nothing nearer than 0.3 m";
 }
 
 TEST(Ping1DAutomatic, RangeFollowsTheEcho) {
   Parameters p;
   p.range.length_mm = 10000;
-  EXPECT_EQ(adjusted(p, {.range_m = 6, .peak = 150, .confidence = 100}), p) << "it lies well";
+  EXPECT_EQ(adjusted(p, {.range_m = 6, .peak = 150, .confidence = 100}), p) << "a range that suits the echo stays";
   EXPECT_EQ(adjusted(p, {.range_m = 9, .peak = 150, .confidence = 100}).range.length_mm, 15000u);
   EXPECT_EQ(adjusted(p, {.range_m = 0.7, .peak = 150, .confidence = 100}).range.length_mm, 1500u);
-  EXPECT_EQ(adjusted(p, {.range_m = 3, .peak = 2, .confidence = 0}).range.length_mm, 20000u) << "it searches";
+  EXPECT_EQ(adjusted(p, {.range_m = 3, .peak = 2, .confidence = 0}).range.length_mm, 20000u)
+      << "without an echo, the range grows";
   p.range.length_mm = 100000;
   EXPECT_EQ(adjusted(p, {.range_m = 3, .peak = 2, .confidence = 0}).range.length_mm, 5000u);
 }
@@ -230,7 +232,7 @@ TEST(Ping1DAutomatic, GainKeepsTheEchoBelowFullScale) {
         return adjusted(from, {.range_m = 6, .peak = std::floor(peak), .confidence = 100});
       };
       for (int i = 0; i < 7; ++i) p = next(p);
-      EXPECT_EQ(next(p), p) << "it comes to rest; from gain " << gain << ", amplitude " << amplitude;
+      EXPECT_EQ(next(p), p) << "the gain does not settle; from gain " << gain << ", amplitude " << amplitude;
     }
 }
 
@@ -244,14 +246,14 @@ TEST(Ping1DAutomatic, SettingsFollowAPingUnlessAHostHasChangedThem) {
   talk.say(setting<std::uint8_t>(Id::ping1d_set_mode_auto, 0));
   talk.say(framed_message(Id::ping1d_set_range, 0, ScanRange{0, 30000}));
   talk.say(setting<std::uint8_t>(Id::ping1d_set_mode_auto, 1));
-  EXPECT_FALSE(talk.vendor.after_ping(near, talk.state)) << "of older settings";
+  EXPECT_FALSE(talk.vendor.after_ping(near, talk.state)) << "the ping has older settings";
   talk.say(setting<std::uint8_t>(Id::ping1d_set_mode_auto, 0));
   Parameters manual = first;
   manual.range.length_mm = 30000;
   EXPECT_FALSE(talk.vendor.after_ping(profile_with(manual, 20, 150), talk.state));
 }
 
-TEST(Ping1D, TheEchoIsLookedForOnce) {
+TEST(Ping1D, TheEchoIsDetectedOnce) {
   Talk talk("ping1d");
   Ping ping = profile_with(settings_from(talk.state.settings.get()).parameters, 20, 150);
   const auto said = [&] {
@@ -263,7 +265,7 @@ TEST(Ping1D, TheEchoIsLookedForOnce) {
   const auto looked_for_now = said();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(said(), looked_for_now) << "the device has found it before the samples were lost";
+  EXPECT_EQ(said(), looked_for_now) << "look_at() has stored the echo before the samples were lost";
   look_at(ping);
   EXPECT_NE(said(), looked_for_now);
 }
@@ -275,7 +277,7 @@ TEST(Ping1D, AProfileHasTheSettingsOfThePing) {
   p.gain = 2;
   const Ping ping = profile_with(p, 100, 200);
   const auto frames = talk.vendor.datagrams(talk.vendor.ports()[1], ping, talk.state);
-  ASSERT_EQ(frames.size(), 1u) << "a ping without a request has its profile";
+  ASSERT_EQ(frames.size(), 1u) << "a ping without a request is sent as a profile";
   EXPECT_EQ(*talk.vendor.frame(ping, talk.state), frames.front());
   const Frame frame = frames_in(frames).front();
   ASSERT_EQ(frame.payload.size(), 26u + 200);

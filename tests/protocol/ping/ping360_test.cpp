@@ -56,7 +56,7 @@ TEST(Ping360, AnswersRequestsForDeviceAndVersion) {
 TEST(Ping360, APingWaitsForTheHead) {
   Talk talk("ping360");
   talk.say(ping_at(200));
-  EXPECT_NEAR(talk.run_to(5), 1.2, 1e-6) << "200 grad at 6 ms";
+  EXPECT_NEAR(talk.run_to(5), 1.2, 1e-6) << "a turn of 200 grad takes 6 ms per grad";
   const auto replies = talk.take();
   ASSERT_EQ(replies.size(), 1u);
   const auto data = message_in<DeviceData>(replies[0]);
@@ -70,7 +70,7 @@ TEST(Ping360, APingWaitsForTheHead) {
   talk.say(ping_at(201), 5);
   EXPECT_NEAR(talk.run_to(6), 5.006, 1e-6);
   talk.say(ping_at(400), 6);
-  EXPECT_NEAR(talk.run_to(9), 7.194, 1e-6) << "by the shorter way; hosts send 400 for 0";
+  EXPECT_NEAR(talk.run_to(9), 7.194, 1e-6) << "the head turns the shorter way; hosts send 400 for 0";
   EXPECT_EQ(message_in<DeviceData>(talk.take().back()).angle, 0);
 }
 
@@ -86,7 +86,7 @@ TEST(Ping360, TurnsAndAnswersWithoutTransmitting) {
   Transducer t{1, 2, 0, 10, 80, 800, 300, 0, 0};
   talk.say(ping_at(10, t));
   const auto due = talk.dialogue->next_ping_request();
-  ASSERT_TRUE(due) << "stepped time waits for it";
+  ASSERT_TRUE(due) << "stepped time waits for the turn";
   EXPECT_NEAR(seconds(*due - at_s(0)), 0.06, 1e-6);
   EXPECT_NEAR(talk.run_to(1), 0.06, 1e-6);
   EXPECT_FALSE(talk.dialogue->next_ping_request());
@@ -129,7 +129,7 @@ TEST(Ping360, AScanIsAsSlowAsItsLink) {
     talk->say(scan(0, 399));
     talk->run_to(10);
   }
-  EXPECT_NEAR(fast.pings, 10 / 0.0064, 2) << "6 ms a grad and 0.4 ms of samples";
+  EXPECT_NEAR(fast.pings, 10 / 0.0064, 2) << "6 ms per grad and 0.4 ms of samples";
   EXPECT_NEAR(slow.pings, 10 / (0.0064 + 230 * 10 / 115200.0), 2);
 }
 
@@ -181,12 +181,12 @@ TEST(Ping360, ADatagramHasOneAnswerAndDevicesHaveNone) {
   EXPECT_EQ(talk.take().size(), 1u) << "a datagram that is one frame with a wrong sum is refused";
   for (const Bytes& of_a_device : {ack(Id::motor_off, 1), nack(Id::device_information, 1, "unknown message")}) {
     talk.say(of_a_device);
-    EXPECT_EQ(talk.take().size(), 0u) << "two devices would answer each other without end";
+    EXPECT_EQ(talk.take().size(), 0u) << "else two devices would answer each other endlessly";
   }
 }
 
 /// Hosts send such datagrams through a bridge to a serial line.
-TEST(Ping360, FramesOfADatagramAreAnsweredByOneThatIsLittleLonger) {
+TEST(Ping360, TheAnswerToADatagramIsOnlyALittleLonger) {
   Talk talk("ping360");
   Bytes three = request(Id::set_device_id, hex("09"));
   for (const Bytes& more : {general(Id::protocol_version), ping_at(0)}) three.insert(three.end(), more.begin(), more.end());
@@ -232,7 +232,7 @@ TEST(Ping360, ASinglePingThatIsLateIsAnswered) {
   talk.say(ping_at(0));
   talk.apply(talk.dialogue->on_tick(at_s(0), false));
   talk.run_to(3);
-  EXPECT_EQ(talk.pings, 1) << "it is not asked for again";
+  EXPECT_EQ(talk.pings, 1) << "the ping is not requested again";
   talk.deliver(3.5);
   const auto answers = talk.take();
   ASSERT_EQ(answers.size(), 1u);
@@ -247,10 +247,10 @@ TEST(Ping360, AScanLosesNoPingThatIsLate) {
   const auto tick = [&](bool pending) { talk.apply(talk.dialogue->on_tick(talk.dialogue->next_tick(), pending)); };
   tick(false);
   const protocol::RequestPing first = talk.aim;
-  tick(false);  // too late
+  tick(false);  // the first ping is too late
   tick(false);
   EXPECT_EQ(talk.pings, 2);
-  tick(true);  // the second waits for the first
+  tick(true);  // no further request while a ping is pending
   EXPECT_EQ(talk.pings, 2);
   const protocol::RequestPing second = std::exchange(talk.aim, first);
   talk.deliver(5);

@@ -1,4 +1,4 @@
-// A host's side for tests: requests as bytes, and a device that answers them.
+// The side of a host, for tests: requests as bytes, and a device that answers them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ M message_in(const Frame& frame) {
   return message;
 }
 
-/// Applies the events of the device, as the daemon does; pings take no time.
+/// A conversation with a device, whose events are applied as the daemon does. Pings take no time.
 struct Talk {
   explicit Talk(const std::string& profile, std::size_t port = 0, const protocol::OptionValues& options = {})
       : vendor(*protocol::find_profile(profile)->vendor), state(device(profile, options)) {
@@ -82,7 +82,7 @@ struct Talk {
       }
     }
   }
-  /// Runs every tick until then; returns the time of the last one.
+  /// Runs all ticks until this time [s]; returns the time of the last tick.
   double run_to(double at, double ping_takes = 0) {
     double last = -1;
     while (dialogue->next_tick() <= at_s(at)) {

@@ -23,7 +23,7 @@ std::vector<Id> ids_in(const std::vector<Frame>& frames) {
   return ids;
 }
 
-/// A profile of noise at -100 dB with an echo that begins at that row.
+/// Returns a profile of noise at -100 dB with an echo that begins at this row.
 Ping profile_with(const Settings& settings, int row, double echo_db) {
   Ping ping;
   ping.request.model = models().front();
@@ -41,10 +41,10 @@ Ping profile_with(const Settings& settings, int row, double echo_db) {
   return ping;
 }
 
-TEST(S500, AStreamIsOfTheReportThatIsRequested) {
+TEST(S500, AStreamHasTheRequestedReport) {
   Talk talk("s500");
-  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "it says nothing by itself";
-  // 1015 as ping-python sends it for 5 m: gain automatic, 100 ms, report 1308.
+  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "the device sends nothing without a request";
+  // Message 1015 as ping-python sends it for 5 m: automatic gain, 100 ms, report 1308.
   talk.say(hex("42 52 14 00 f7 03 00 00 00 00 00 00 88 13 00 00 ff ff 64 00 00 00 1c 05 00 00 00 00 c0 04"));
   EXPECT_THAT(ids_in(talk.take()), ElementsAre(Id::ack));
   EXPECT_DOUBLE_EQ(talk.settings.range_m, 5);
@@ -74,7 +74,7 @@ TEST(S500, ASinglePingIsSentOnce) {
   talk.say(general(Id::s500_distance2), 6);
   talk.say(request(Id::ping1d_distance_simple), 6);
   talk.run_to(7, 0.05);
-  EXPECT_THAT(ids_in(talk.take()), ElementsAre(Id::ping1d_distance_simple, Id::s500_distance2)) << "of one ping";
+  EXPECT_THAT(ids_in(talk.take()), ElementsAre(Id::ping1d_distance_simple, Id::s500_distance2)) << "both answers are of one ping";
   talk.say(params({}), 8);
   talk.take();
   talk.say(general(Id::s500_distance2), 8);
@@ -101,7 +101,7 @@ TEST(S500, ValuesAreReadBack) {
   }
   EXPECT_EQ(answer(Id::ping1d_gain).payload.at(0), std::byte{13});
   EXPECT_EQ(answer(Id::ping1d_interval).payload.at(0), std::byte{250});
-  EXPECT_EQ(answer(Id::ping1d_voltage_5).header.id, Id::nack) << "a Ping1D has it";
+  EXPECT_EQ(answer(Id::ping1d_voltage_5).header.id, Id::nack) << "only a Ping1D has this message";
 }
 
 TEST(S500, RefusesWrongRequests) {
@@ -119,7 +119,7 @@ TEST(S500, RefusesWrongRequests) {
   EXPECT_THAT(ids_in(talk.take()), ElementsAre(Id::nack, Id::nack));
 }
 
-TEST(S500, TheEchoIsLookedForOnce) {
+TEST(S500, TheEchoIsDetectedOnce) {
   Talk talk("s500");
   Settings s;
   s.parameters = requested(s.parameters, {.length_mm = 10240, .gain = 3, .report = Id::s500_profile6});
@@ -132,7 +132,7 @@ TEST(S500, TheEchoIsLookedForOnce) {
   const auto looked_for_now = said();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(said(), looked_for_now) << "the device has found it before the samples were lost";
+  EXPECT_EQ(said(), looked_for_now) << "look_at() has stored the echo before the samples were lost";
   look_at(ping);
   EXPECT_NE(said(), looked_for_now);
 }
@@ -146,9 +146,9 @@ TEST(S500, AProfileHasTheSettingsOfThePing) {
   const Ping ping = profile_with(s, 400, -20);
   const auto frames = talk.vendor.datagrams(talk.vendor.ports()[1], ping, talk.state);
   ASSERT_EQ(frames.size(), 1u);
-  EXPECT_LT(frames.front().size(), 4096u) << "hosts by UDP receive no more";
+  EXPECT_LT(frames.front().size(), 4096u) << "UDP hosts receive 4096 bytes at most";
   const auto profile = message_in<Profile6>(frames_in(frames).front());
-  EXPECT_EQ(profile.ping, 6u) << "from 0";
+  EXPECT_EQ(profile.ping, 6u) << "pings are numbered from 0";
   EXPECT_EQ(profile.start_mm, 1000u);
   EXPECT_EQ(profile.length_mm, 10240u);
   EXPECT_EQ(profile.start_hz, 500000u);
@@ -186,7 +186,7 @@ TEST(S500, DistancesAreAveragedOverTwentyPings) {
   EXPECT_NEAR(lost.averaged_mm, 2000, 30);
   EXPECT_EQ(lost.averaged_confidence, 67);
   for (int i = 0; i < 20; ++i) distance(500, -20);
-  EXPECT_NEAR(distance(500, -20).averaged_mm, 5000, 30) << "older ones do not count";
+  EXPECT_NEAR(distance(500, -20).averaged_mm, 5000, 30) << "older distances do not count";
   EXPECT_EQ(s.earlier.size(), 20u);
 }
 
@@ -201,12 +201,12 @@ TEST(S500, OnlyAutomaticSettingsFollowAPing) {
   EXPECT_EQ(next({.length_mm = 0, .gain = -1}, 900, 5).gain, 4);
   EXPECT_EQ(next({.length_mm = 10000, .gain = -1}, 900, 5).length_mm, 10000u);
   EXPECT_EQ(next({.length_mm = 0, .gain = 7}, 900, 5).gain, 7);
-  EXPECT_EQ(next({.length_mm = 0, .gain = -1}, 500, -30).gain, 11) << "it keeps the echo below full scale";
+  EXPECT_EQ(next({.length_mm = 0, .gain = -1}, 500, -30).gain, 11) << "the gain keeps the echo below full scale";
   Settings now;
   now.parameters.reach = {10000, 5};
   now.parameters = requested(now.parameters, {.length_mm = 0});
   const Ping before = profile_with(Settings{}, 900, 5);
-  EXPECT_EQ(after(before, now).parameters.reach.length_mm, 10000u) << "of older settings";
+  EXPECT_EQ(after(before, now).parameters.reach.length_mm, 10000u) << "the ping has older settings";
 }
 
 /// The host of both products at port 51200 does not know which one answers.
@@ -219,7 +219,7 @@ TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
   };
   const auto opened = [&] {
     auto host = *omniscan::make_host({});
-    EXPECT_THAT(sent(host->on_open({}, at_s(0))), ElementsAre(Id::general_request)) << "no settings yet";
+    EXPECT_THAT(sent(host->on_open({}, at_s(0))), ElementsAre(Id::general_request)) << "the host sends no settings yet";
     EXPECT_FALSE(host->is_open()) << "pings are not requested yet";
     return host;
   };
@@ -233,7 +233,8 @@ TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
   EXPECT_THAT(sent(beside_an_omniscan->on_bytes(0, unknown, at_s(0.1))), ElementsAre(Id::os_ping_params));
   EXPECT_FALSE(beside_an_omniscan->next_tick());
   EXPECT_TRUE(beside_an_omniscan->is_open());
-  EXPECT_THAT(sent(beside_an_omniscan->on_bytes(0, range, at_s(0.2))), ElementsAre()) << "of another host's request";
+  EXPECT_THAT(sent(beside_an_omniscan->on_bytes(0, range, at_s(0.2))), ElementsAre())
+      << "this answers the request of another host";
   const auto unanswered = opened();
   EXPECT_THAT(unanswered->on_tick(at_s(0.4)), testing::IsEmpty());
   EXPECT_FALSE(unanswered->is_open());
@@ -243,11 +244,11 @@ TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
               ElementsAre(Id::s500_set_ping_params));
   EXPECT_FALSE(unanswered->next_tick());
 
-  // Some sonars are silent at first, for example behind a bridge that starts, and do not refuse messages that they do not know.
+  // Some sonars are initially silent, for example while their bridge starts, and do not refuse unknown messages.
   const auto silent = [&] {
     auto host = opened();
     host->on_tick(*host->next_tick());
-    EXPECT_THAT(sent(host->on_tick(*host->next_tick())), ElementsAre(Id::general_request)) << "the other request was sent";
+    EXPECT_THAT(sent(host->on_tick(*host->next_tick())), ElementsAre(Id::general_request)) << "the second request has been sent";
     return host;
   };
   EXPECT_THAT(sent(silent()->on_bytes(0, range, at_s(2))), ElementsAre(Id::s500_set_ping_params));
@@ -256,7 +257,7 @@ TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
   EXPECT_FALSE(omniscan->next_tick());
 }
 
-/// The limit of the product that answers counts, not that of the one that was supposed.
+/// The limit is that of the product that answers, not of the product that the host assumed.
 TEST(PowerHost, RefusesARateAboveThatOfTheProductThatAnswers) {
   protocol::Wanted wanted;
   wanted.settings.rate_hz = 20;

@@ -36,7 +36,7 @@ TEST(Surveyor, TheEnableFieldStartsAndEndsASession) {
   EXPECT_DOUBLE_EQ(talk.settings.range_start_m, 0.25) << "at least 5 % of the end";
   EXPECT_DOUBLE_EQ(talk.settings.range_m, 5);
   talk.say(pings({.end_mm = 30000, .period_ms = 10, .enable = 1}));
-  EXPECT_NEAR(talk.settings.rate_hz, 1 / (60 / 1500.0 + 0.01), 1e-3) << "as fast as sound allows";
+  EXPECT_NEAR(talk.settings.rate_hz, 1 / (60 / 1500.0 + 0.01), 1e-3) << "the travel time limits the rate";
   talk.say(pings({.end_mm = 5000, .enable = 0}));
   EXPECT_EQ(talk.settings.rate_hz, 0);
 }
@@ -47,11 +47,11 @@ TEST(Surveyor, RequestsForMessagesOfEachPingAreAnsweredByTheNextPing) {
     talk.say(general(id));
     return !talk.take().empty();
   };
-  EXPECT_TRUE(answered(Id::yz_point_data)) << "refused: no pings are enabled";
+  EXPECT_TRUE(answered(Id::yz_point_data)) << "the refusal, because no pings are enabled";
   talk.say(pings({.end_mm = 5000, .enable = 1, .yz = 1, .atof = 0}));
   EXPECT_FALSE(answered(Id::yz_point_data));
   EXPECT_FALSE(answered(Id::attitude_report));
-  EXPECT_TRUE(answered(Id::atof_point_data)) << "refused: it is not enabled";
+  EXPECT_TRUE(answered(Id::atof_point_data)) << "the refusal, because the message is not enabled";
 }
 
 TEST(Surveyor, TheHostSetsTheClock) {
@@ -63,17 +63,17 @@ TEST(Surveyor, TheHostSetsTheClock) {
   EXPECT_EQ(asked[0].header.id, Id::utc_request);
   EXPECT_EQ(talk.dialogue->next_tick(), at_s(10));
   talk.say(pings());
-  EXPECT_EQ(talk.dialogue->next_tick(), at_s(10)) << "the device has asked already";
+  EXPECT_EQ(talk.dialogue->next_tick(), at_s(10)) << "the device has requested the time already";
   const auto utc = [&](double at) {
     return message_in<AttitudeReport>(frames_in({*talk.vendor.frame(ping_of(talk, at), talk.state)}).front()).utc_ms;
   };
   EXPECT_EQ(utc(1), 0u);
   talk.say(framed_message(Id::utc_response, 0, UtcResponse{1800000000000, 0}), 1);
   EXPECT_NEAR(static_cast<double>(utc(1.5)), 1800000000500.0, 1);
-  EXPECT_EQ(talk.settings.rate_hz, 10) << "the settings stay";
+  EXPECT_EQ(talk.settings.rate_hz, 10) << "the other settings stay";
 }
 
-/// If the device asked in the packet of an answer, a host that reads one message of each packet would get the answer late.
+/// Some hosts read one message of each packet. If the request were in the packet of an answer, they would get the answer late.
 TEST(Surveyor, TheDeviceRequestsTheTimeAfterEnable) {
   Talk talk("surveyor-240");
   const auto times_asked = [&] {
@@ -89,7 +89,7 @@ TEST(Surveyor, TheDeviceRequestsTheTimeAfterEnable) {
   EXPECT_EQ(times_asked(), 1);
   Talk other("surveyor-240");
   other.run_to(10);
-  EXPECT_EQ(other.take().size(), 1u) << "after 10 s it asks even if no pings are enabled";
+  EXPECT_EQ(other.take().size(), 1u) << "after 10 s the device requests the time even if no pings are enabled";
 }
 
 TEST(Surveyor, SendsOneFramePerDatagramAndTheSameFramesOverTcp) {
@@ -111,10 +111,10 @@ TEST(Surveyor, SendsOneFramePerDatagramAndTheSameFramesOverTcp) {
     EXPECT_EQ(*talk.vendor.frame(ping, talk.state), all);
   }
   EXPECT_EQ(talk.vendor.datagrams(talk.vendor.ports()[1], ping_of(talk, 6.05), talk.state).size(), 4u)
-      << "water_stats (118) is added once a second";
+      << "water_stats (118) is added once per second";
 }
 
-TEST(Surveyor, PointsAreLookedForOnce) {
+TEST(Surveyor, PointsAreDetectedOnce) {
   Talk talk("surveyor-240");
   talk.say(pings({.end_mm = 5000, .enable = 1, .yz = 1, .atof = 1}));
   Ping ping = ping_of(talk, 5.5);
@@ -126,12 +126,12 @@ TEST(Surveyor, PointsAreLookedForOnce) {
   const Bytes found_in_samples = said();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(said(), found_in_samples) << "the device found the point before the samples were cleared";
+  EXPECT_EQ(said(), found_in_samples) << "look_at() has stored the point before the samples were cleared";
   look_at(ping);
   EXPECT_LT(said().size(), found_in_samples.size()) << "without samples there is no point";
 }
 
-/// An AtofPointData of a ping that ends at 15 m, with one point 10 m away and 0.1 rad to port; or the same as YzPointData.
+/// Returns an AtofPointData or YzPointData of a ping that ends at 15 m, with one point 10 m away and 0.1 rad to port.
 Bytes one_point(Id id, std::uint32_t ping) {
   Bytes payload, point;
   if (id == Id::atof_point_data) {
@@ -187,7 +187,7 @@ TEST(Surveyor, RefusesWrongRequests) {
   }
 }
 
-TEST(Surveyor, AUdpHostThatEnablesNoPingsIsForgotten) {
+TEST(Surveyor, ASilentUdpHostIsDroppedEarlierIfItEnablesNoPings) {
   Talk tcp("surveyor-240", 0), udp("surveyor-240", 1);
   EXPECT_FALSE(tcp.dialogue->longest_silence());
   EXPECT_EQ(udp.dialogue->longest_silence(), std::chrono::seconds(10));

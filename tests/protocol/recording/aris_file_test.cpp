@@ -1,4 +1,4 @@
-// .aris files; the test reads their fields at the vendor's offsets.
+// .aris files. The test reads their fields at the offsets of the vendor.
 #include <cstdlib>
 #include <cstring>
 
@@ -46,7 +46,7 @@ TEST(ArisFile, HoldsWholeFramesInTheVendorsLayout) {
   const auto changed = write(*writer, datagrams(4, 300));
   ASSERT_FALSE(changed);
   EXPECT_THAT(changed.error().text, ::testing::HasSubstr("settings were changed"));
-  EXPECT_EQ(u32(file, 4), 2u) << "before it is closed";
+  EXPECT_EQ(u32(file, 4), 2u) << "the number of frames is right before the file is closed";
   ASSERT_TRUE(writer->close());
   ASSERT_EQ(file.size(), 1024 + 2 * (1024 + 48 * 200u));
   EXPECT_EQ(u32(file, 0), 0x05464444u);
@@ -58,7 +58,7 @@ TEST(ArisFile, HoldsWholeFramesInTheVendorsLayout) {
     const std::size_t at = 1024 + frame * (1024 + 48 * 200);
     EXPECT_EQ(u32(file, at), frame);
     EXPECT_EQ(u32(file, at + 12), 0x05464444u);
-    EXPECT_EQ(u32(file, at + 516), 1u) << "in the order of the picture";
+    EXPECT_EQ(u32(file, at + 516), 1u) << "samples are in the order of the picture";
     for (std::size_t i = 0; i < 48 * 200u; ++i) ASSERT_EQ(file[at + 1024 + i], static_cast<std::byte>(i % 251));
   }
 }
@@ -117,16 +117,16 @@ TEST(ArisFile, ErrorsOfDamagedFilesHaveTheOffset) {
   file[1024 + record + 12] = std::byte{0};
   read = read_back(file);
   EXPECT_EQ(read.frames.size(), 2u);
-  EXPECT_EQ(read.frames.back().index, 2) << "counted without a gap";
+  EXPECT_EQ(read.frames.back().index, 2) << "indexes have no gap";
   EXPECT_EQ(read.damage, "f: frame 2 at byte 11648 is damaged: its version or number of samples is not the file's");
   EXPECT_EQ(read_back(Bytes(whole.begin(), whole.begin() + 500)).damage, "f ends at byte 500, within its header");
   file = whole;
   file[16 + 1] = std::byte{77};
   EXPECT_EQ(read_back(file).damage, "f announces frames of 19760 beams and 200 samples, which no ARIS sends");
-  EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "one sonar without a name";
+  EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "the file has one sonar without a name";
 }
 
-/// The vendor's own sample, six frames of an ARIS 1200 (SONARD_CAPTURES).
+/// Reads a sample of the vendor, six frames of an ARIS 1200 (SONARD_CAPTURES).
 TEST(ArisFile, ReadsARealFile) {
   const char* const folder = std::getenv("SONARD_CAPTURES");
   auto opened = open_recording(std::filesystem::path(folder == nullptr ? "" : folder) / "aris" / "sample.aris");

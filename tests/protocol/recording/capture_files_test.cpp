@@ -1,4 +1,4 @@
-// Captures as other programs write them: every link type; segments that are lost, repeated or out of order; both byte orders;
+// Captures as other programs write them: every link type; lost, repeated and reordered segments; both byte orders;
 // pcapng.
 #include "protocol/ping/messages.hpp"
 #include "protocol/recording/pcap/packets.hpp"
@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// ---- captures by hand
+// ---- captures that are made by hand
 
 Bytes numbers(wire::Endian endian, std::initializer_list<std::pair<unsigned, std::uint32_t>> sizes_and_values) {
   Bytes bytes;
@@ -65,7 +65,7 @@ Bytes pcap_of(const std::vector<Bytes>& frames, std::uint32_t link_type, wire::E
   return file;
 }
 
-/// One message in segments of 100 bytes, and another one in one segment.
+/// Returns a message in segments of 100 bytes, and another in one segment.
 std::vector<Sent> two_pings(std::uint32_t first = 1) {
   std::vector<Sent> sent;
   const Bytes ping = ping_message(1);
@@ -150,7 +150,7 @@ TEST(CaptureFiles, RetransmittedAndReorderedSegmentsAreRead) {
 
 TEST(CaptureFiles, SequenceNumbersWrap) { EXPECT_EQ(read(pcap_of(raw_frames(two_pings(0xFFFFFF00u)), 101)).stream, both_pings); }
 
-TEST(CaptureFiles, ALostSegmentCostsItsMessage) {
+TEST(CaptureFiles, ALostSegmentLosesOnlyItsMessage) {
   std::vector<Sent> sent = two_pings();
   sent.erase(sent.begin() + 3);
   const Told told = read(pcap_of(raw_frames(sent), 101));
@@ -179,7 +179,7 @@ TEST(CaptureFiles, ACaptureMayBeginInTheMiddle) {
 TEST(CaptureFiles, ClientsMayFollowEachOther) {
   std::vector<Sent> sent{{{}, 99, true, tcp_flag::syn | tcp_flag::ack}};
   for (const Sent& each : two_pings(100)) sent.push_back(each);
-  sent.push_back({{}, 5000, true, tcp_flag::syn | tcp_flag::ack});  // the same ports again
+  sent.push_back({{}, 5000, true, tcp_flag::syn | tcp_flag::ack});  // a new connection with the same ports
   sent.push_back({ping_message(3), 5001});
   sent.push_back({{}, 5001 + static_cast<std::uint32_t>(ping_message(3).size()), true, tcp_flag::fin | tcp_flag::ack});
   const Told told = read(pcap_of(raw_frames(sent), 101));
@@ -187,7 +187,7 @@ TEST(CaptureFiles, ClientsMayFollowEachOther) {
   EXPECT_EQ(told.damage, "");
 }
 
-TEST(CaptureFiles, TheSonarIsKnownByItsPortOrItsMessages) {
+TEST(CaptureFiles, TheSonarIsRecognisedByItsPortOrItsMessages) {
   std::vector<Sent> other = two_pings();
   for (Sent& each : other) each.device_port = 6000;
   EXPECT_EQ(read(pcap_of(raw_frames(other), 101)).stream, both_pings);
@@ -314,7 +314,7 @@ TEST(CaptureFiles, PcapngIsRead) {
   ASSERT_NE(place, damaged.end());
   *place = std::byte{9};
   const Told told = read(damaged);
-  EXPECT_EQ(told.stream, ping_message(2)) << "only what it belongs to is lost";
+  EXPECT_EQ(told.stream, ping_message(2)) << "only the message of the damaged packet is lost";
   EXPECT_THAT(told.damage, HasSubstr("begins within a message"));
   EXPECT_THAT(told.damage, HasSubstr("; 1 more such place"));
   for (std::size_t size = 12; size < file.size(); size += 7)
@@ -326,9 +326,9 @@ TEST(CaptureFiles, ConnectionsShareTheLimitOfWaitingBytes) {
   std::vector<Bytes> frames;
   const auto add = [&frames](std::uint8_t client, const Sent& sent) {
     frames.push_back(ip_packet(sent));
-    frames.back()[23] = std::byte{client};  // low byte of its port
+    frames.back()[23] = std::byte{client};  // low byte of the client's port
   };
-  for (std::uint8_t client = 0; client < 20; ++client) {  // 78 MB that wait for 500 bytes each
+  for (std::uint8_t client = 0; client < 20; ++client) {  // 78 MB in all; each connection waits for 500 bytes
     add(client, {dummy_message(), 1});
     for (std::uint32_t i = 0; i < 60; ++i) add(client, {Bytes(early_bytes), 517 + i * static_cast<std::uint32_t>(early_bytes)});
   }
@@ -345,11 +345,11 @@ TEST(CaptureFiles, ConnectionsShareTheLimitOfWaitingBytes) {
   ASSERT_NE(at, std::string::npos) << told;
   const std::size_t packet = std::stoul(told.substr(at + before.size()));
   EXPECT_GT(packet, 900u) << told;
-  EXPECT_LT(packet, 1100u) << "the first is given up long before the end: " << told;
+  EXPECT_LT(packet, 1100u) << "the first connection is given up long before the end: " << told;
   EXPECT_THAT(told, HasSubstr("; 19 more such places"));
 }
 
-TEST(TcpStream, BytesThatWaitTooLongAreGivenWithTheirGap) {
+TEST(TcpStream, BytesThatWaitTooLongAreReturnedWithTheirGap) {
   TcpStream stream;
   const Bytes block_of(1 << 16, std::byte{1});
   stream.add(start, 0, {}, true);

@@ -1,4 +1,4 @@
-// MCAP: properties of chunks that a round trip does not check, and the messages for viewers. tests/acceptance/mcap_checker.py,
+// MCAP: properties of chunks that reading back does not check, and the messages for viewers. tests/acceptance/mcap_checker.py,
 // which was written from the format's description alone, checks whole files.
 #include <nlohmann/json.hpp>
 
@@ -40,7 +40,7 @@ Bytes session(const std::vector<RecordedMessage>& messages, bool closed = true) 
 
 TEST(Crc32, KnownAnswer) { EXPECT_EQ(crc32(bytes_of("123456789")), 0xCBF43926u); }
 
-/// Messages by topic. The messages of each topic are numbered from 0, and the channel names their schema.
+/// Returns the messages by topic. Checks that those of each topic are numbered from 0, and that the channel names their schema.
 std::map<std::string, std::vector<mcap::Message>> by_topic(const Bytes& file) {
   auto reader = mcap::Reader::open(source_from("a file", file));
   std::map<std::string, std::vector<mcap::Message>> found;
@@ -153,7 +153,7 @@ TEST(Mcap, ClientsSendAsTheMakeDoes) {
   }
 }
 
-TEST(Mcap, TheStatedProfileNamesTheModelWhereNoMessageDoes) {
+TEST(Mcap, TheStatedProfileNamesTheModelIfNoMessageDoes) {
   const auto sender_of_file = [](const std::string& profile) {
     Bytes file;
     McapSession writer(sink_into(file), "front", *protocol::find_make("oculus"), profile);
@@ -162,13 +162,13 @@ TEST(Mcap, TheStatedProfileNamesTheModelWhereNoMessageDoes) {
     auto messages = read_mcap(source_from("a file", file));
     const auto by = messages ? find_sender(**messages) : std::nullopt;
     if (!by) throw std::runtime_error("no sender was found");
-    EXPECT_EQ(read_all(**messages).size(), 1u) << "the reader must begin anew";
+    EXPECT_EQ(read_all(**messages).size(), 1u) << "the reader is not at the start";
     return by->sender;
   };
   const Sender stated = sender_of_file("oculus-m3000d");
   EXPECT_TRUE(stated.names_model);
   EXPECT_EQ(stated.model->profile, "oculus-m3000d");
-  EXPECT_NE(stated.serial, 0u) << "the message still tells it";
+  EXPECT_NE(stated.serial, 0u) << "the serial number is still that of the message";
   for (const char* const profile : {"", "aris-3000", "nothing"}) {
     const Sender other = sender_of_file(profile);
     EXPECT_FALSE(other.names_model) << profile;
@@ -201,7 +201,7 @@ TEST(Mcap, BytesAfterTheEndAreReported) {
   auto cut = open_bytes({whole.begin(), whole.end() - 1});
   ASSERT_TRUE(cut);
   expect_same(read_all(*cut->reader), conversation());
-  EXPECT_FALSE(cut->reader->damage()) << "its data are whole";
+  EXPECT_FALSE(cut->reader->damage()) << "the data of the file are complete";
 }
 
 TEST(Mcap, CompleteRecordsOfATruncatedChunkAreRead) {
@@ -217,7 +217,7 @@ TEST(Mcap, CompleteRecordsOfATruncatedChunkAreRead) {
   EXPECT_THAT(opened->reader->damage()->text, HasSubstr("is cut short by the end of the file"));
 }
 
-TEST(Mcap, RecordsThatNoFileHasAreReported) {
+TEST(Mcap, ImpossibleRecordsAreReported) {
   const auto damage_with = [](const Bytes& record, bool reads_on) {
     Bytes file = session(conversation());
     file.insert(file.begin() + static_cast<std::ptrdiff_t>(mcap::magic.size()), record.begin(), record.end());
@@ -236,7 +236,7 @@ TEST(Mcap, RecordsThatNoFileHasAreReported) {
     return record;
   };
   EXPECT_EQ(damage_with(record_of(0x0C), true), "") << "metadata";
-  EXPECT_EQ(damage_with(record_of(0x80), true), "") << "a record of an application";
+  EXPECT_EQ(damage_with(record_of(0x80), true), "") << "a record of an application is no damage";
   for (const unsigned reserved : {0x10u, 0x42u, 0x7Fu}) EXPECT_EQ(damage_with(record_of(reserved), true), "") << reserved;
   const auto chunk_of = [](const Bytes& records) {
     Bytes chunk;
@@ -277,7 +277,7 @@ TEST(Mcap, CompressionIsRefusedWithAReason) {
   EXPECT_THAT(opened->reader->damage()->text, HasSubstr("is compressed (zstd), which is not read"));
 }
 
-TEST(Mcap, TimesThatAreNoneAreTheBeginning) {
+TEST(Mcap, ImpossibleTimesBecomeZero) {
   constexpr std::uint64_t top = std::uint64_t{1} << 63;
   for (const auto& [told, expected] :
        std::initializer_list<std::pair<std::uint64_t, std::int64_t>>{{0, 0},
@@ -304,11 +304,11 @@ TEST(Mcap, DescriptionsAreKeptWithinBounds) {
   EXPECT_FALSE(reader->next());
   ASSERT_EQ(reader->schemas().size(), 1u);
   EXPECT_EQ(reader->schemas().at(2).name, "long");
-  EXPECT_TRUE(reader->schemas().at(2).data.empty()) << "not read";
+  EXPECT_TRUE(reader->schemas().at(2).data.empty()) << "the description was not read";
   EXPECT_EQ(reader->channels().size(), 15u);
   ASSERT_TRUE(reader->damage());
   EXPECT_THAT(reader->damage()->text, HasSubstr("the record at byte 8 is too long, 10486"));
-  EXPECT_THAT(reader->damage()->text, HasSubstr("; 5 more such places"));  // channels
+  EXPECT_THAT(reader->damage()->text, HasSubstr("; 5 more such places"));  // five of the twenty channels
 }
 
 TEST(Mcap, OneOfSeveralSonarsCanBeSelected) {

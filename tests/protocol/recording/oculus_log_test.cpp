@@ -1,4 +1,4 @@
-// Log files, byte by byte as other programs write them.
+// .oculus log files, compared byte by byte with those of other programs.
 #include <zlib.h>
 
 #include "protocol/recorded/zlib.hpp"
@@ -36,7 +36,7 @@ Bytes log_of(std::initializer_list<Bytes> items) {
   return file;
 }
 
-/// zlib data after the uncompressed length in big-endian: Qt's qCompress.
+/// Returns the format of Qt's qCompress: the uncompressed length in big-endian, then zlib data.
 Bytes compressed(const Bytes& plain) {
   std::vector<Bytef> in(plain.size()), out(compressBound(plain.size()));
   std::transform(plain.begin(), plain.end(), in.begin(), [](std::byte b) { return std::to_integer<Bytef>(b); });
@@ -73,7 +73,7 @@ TEST(OculusLog, HasTheVendorsLayout) {
   EXPECT_EQ(value_at<std::uint64_t>(file, 88 + 16 + 48), 123'456'789u);
 }
 
-TEST(OculusLog, ReadsWhatOthersWrite) {
+TEST(OculusLog, ReadsFilesOfOtherPrograms) {
   const Bytes other = bytes_of("settings of some viewer");
   auto opened = open_bytes(log_of({item(1, other), item(10, ping_message(1)), item(500, other),
                                    item(10, compressed(ping_message(2)), 1, 2000), item(10, status_message())}));
@@ -104,12 +104,12 @@ TEST(OculusLog, ReportsItemsThatItCannotRead) {
   }
 }
 
-TEST(OculusLog, AnImpossibleSizeCostsItsItemOnly) {
+TEST(OculusLog, AnImpossibleSizeLosesOnlyItsItem) {
   const Bytes whole = recorded(Format::oculus_log, conversation());
   Bytes expected = device_stream(conversation());
   expected.erase(expected.begin(), expected.begin() + static_cast<std::ptrdiff_t>(dummy_message().size()));
   Bytes damaged = whole;
-  damaged[83] ^= std::byte{0x10};  // top of the first payload's size
+  damaged[83] ^= std::byte{0x10};  // highest byte of the first payload's size
   auto opened = open_bytes(damaged);
   ASSERT_TRUE(opened);
   EXPECT_EQ(device_stream(read_all(*opened->reader)), expected);
@@ -132,7 +132,7 @@ TEST(OculusLog, OtherVersionsAreRefused) {
   EXPECT_THAT(open_bytes(bytes_of("\x44\x33\x22\x11 short")).error().text, HasSubstr("ends within its file header"));
 }
 
-TEST(OculusLog, NothingRecordedIsStillALog) {
+TEST(OculusLog, ALogWithoutMessagesIsValid) {
   auto opened = open_bytes(recorded(Format::oculus_log, {}));
   ASSERT_TRUE(opened);
   EXPECT_TRUE(read_all(*opened->reader).empty());

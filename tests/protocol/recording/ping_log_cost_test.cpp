@@ -28,7 +28,7 @@ void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 namespace sonar::recording {
 namespace {
 
-/// Two messages: the description of the file, and the temperature.
+/// Returns a log of two messages: the description of the file, and the temperature.
 Bytes short_log() {
   Bytes file;
   const auto writer = write_ping_log(sink_into(file));
@@ -38,8 +38,9 @@ Bytes short_log() {
   return file;
 }
 
-/// Each frame start claims the longest payload. A reader that copies or sums it for each start would need hours for a large file.
-TEST(PingLogCost, FalseStartsCostWorkInProportionToTheFile) {
+/// Each start of a frame states the longest payload. A reader that copied or summed it for each would need hours for a large
+/// file.
+TEST(PingLogCost, TheWorkForFalseStartsIsProportionalToTheFile) {
   std::vector<std::uint64_t> costs;
   for (const std::size_t starts : {std::size_t{1} << 15, std::size_t{1} << 17}) {
     Bytes file = short_log();

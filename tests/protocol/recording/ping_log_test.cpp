@@ -64,7 +64,7 @@ ReadBack read_back(Bytes file) {
 TEST(PingLog, IsReadAsFramesWithTimesSincePowerUp) {
   const ReadBack read = read_back(log_of(3));
   EXPECT_EQ(read.damage, "");
-  ASSERT_EQ(read.messages.size(), 6u) << "without the text";
+  ASSERT_EQ(read.messages.size(), 6u) << "the description is not a message";
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(read.messages[i].at, Time(std::chrono::milliseconds(5000 + 100 * (i / 2))));
     EXPECT_EQ(read.messages[i].bytes.size(), i % 2 == 0 ? 46u : 18u);
@@ -89,7 +89,7 @@ TEST(PingLog, ErrorsOfDamagedFilesHaveTheOffset) {
   file[text + 3] = std::byte{0xFF};
   EXPECT_EQ(read_back(file).damage, bytes(text, text + 45) + "; 1 more such place");
   EXPECT_THAT(read_back(Bytes(3, std::byte{'B'})).damage, ::testing::HasSubstr("is not a recording"));
-  EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "one sonar without a name";
+  EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "the file has one sonar without a name";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A host gets the messages of a recording.
+// decode_next() passes the messages and the times of a recording to a host.
 #include "protocol/recording/recording.hpp"
 
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@ using std::chrono::milliseconds;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-/// Every message is a ping, numbered by its size; a tick, 100 ms after the first message, is ping 0.
+/// Every message is a ping, whose number is its size. The first tick is due 100 ms after the first message and gives ping 0.
 class CountingHost final : public protocol::Host {
  public:
   protocol::HostActions on_open(std::span<const std::uint16_t>, Time) override { return {}; }
@@ -37,7 +37,7 @@ class CountingHost final : public protocol::Host {
 
 constexpr std::array<protocol::HostPort, 1> ports{{{protocol::HostPort::Kind::tcp, 4001}}};
 
-TEST(DecodeNext, TicksComeBeforeTheMessageThatIsLaterAndAtTheEnd) {
+TEST(DecodeNext, TicksComeBeforeALaterMessageAndAtTheEnd) {
   protocol::Make make;
   make.ports = ports;
   CountingHost host;
@@ -52,21 +52,21 @@ TEST(DecodeNext, TicksComeBeforeTheMessageThatIsLaterAndAtTheEnd) {
   EXPECT_THAT(decoded(1000, 5), ElementsAre(Ping(1000, 5)));
   EXPECT_THAT(decoded(1099, 6), ElementsAre(Ping(1099, 6)));
   EXPECT_THAT(decoded(1105, 7), ElementsAre(Ping(1105, 0), Ping(1105, 7))) << "the tick was due";
-  EXPECT_THAT(decoded(1200, 8, Origin::client), IsEmpty()) << "not of the device";
+  EXPECT_THAT(decoded(1200, 8, Origin::client), IsEmpty()) << "a message of a client is no ping";
   const auto last = decode_next(host, make, nullptr);
   ASSERT_EQ(last.size(), 1u) << "a ping that waits is complete at the end";
   EXPECT_EQ(last.front().at, Time(std::chrono::hours(1)));
   EXPECT_THAT(host.ticked_at, ElementsAre(Time(milliseconds(1105)), Time(std::chrono::hours(1))));
 }
 
-TEST(DecodeNext, AMessageOfTheClientLetsTimePass) {
+TEST(DecodeNext, TimePassesWithMessagesOfClients) {
   protocol::Make make;
   make.ports = ports;
   CountingHost host;
   const RecordedMessage first{Time(milliseconds(1000)), Origin::device, Carrier::stream, Bytes(5)};
   const RecordedMessage asked{Time(milliseconds(1200)), Origin::client, Carrier::stream, Bytes(5)};
   EXPECT_EQ(decode_next(host, make, &first).size(), 1u);
-  EXPECT_EQ(decode_next(host, make, &asked).size(), 1u) << "the tick alone";
+  EXPECT_EQ(decode_next(host, make, &asked).size(), 1u) << "only the ping of the tick";
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ INSTANTIATE_TEST_SUITE_P(Recording, EveryFormat, ::testing::ValuesIn(all_formats
   return name;
 });
 
-TEST_P(EveryFormat, GivesBackWhatWasWritten) {
+TEST_P(EveryFormat, ReturnsTheWrittenMessages) {
   auto opened = open_bytes(recorded(GetParam(), conversation()));
   ASSERT_TRUE(opened) << opened.error().text;
   EXPECT_EQ(opened->format, name_of(GetParam()));
@@ -37,7 +37,7 @@ TEST_P(EveryFormat, KeepsLongMessages) {
   expect_same(read_all(*opened->reader), messages, opened->reader->knows_times());
 }
 
-TEST_P(EveryFormat, GivesWhatIsReadableOfAFileCutShortAnywhere) {
+TEST_P(EveryFormat, ReturnsTheCompleteMessagesOfATruncatedFile) {
   const std::vector<RecordedMessage> written = kept_by(GetParam(), conversation());
   const Bytes whole = recorded(GetParam(), conversation());
   std::size_t most = 0;
@@ -50,7 +50,8 @@ TEST_P(EveryFormat, GivesWhatIsReadableOfAFileCutShortAnywhere) {
     }
     const std::vector<RecordedMessage> messages = read_all(*opened->reader);
     ASSERT_LE(messages.size(), written.size());
-    ASSERT_GE(messages.size() + 1, most) << size;  // a longer file never has fewer messages, apart from the order of the last two
+    ASSERT_GE(messages.size() + 1, most)
+        << size;  // a longer file has at most one message fewer, because of the order of the last two
     for (const RecordedMessage& message : messages) {
       const auto same = [&message](const RecordedMessage& other) {
         return other.bytes == message.bytes && other.from == message.from;
@@ -77,7 +78,7 @@ TEST_P(EveryFormat, SurvivesAnyByteBeingWrong) {
     }
 }
 
-TEST_P(EveryFormat, AFullDiskLeavesWhatWasWritten) {
+TEST_P(EveryFormat, AFullDiskKeepsTheWrittenMessages) {
   const TemporaryFile file("full-disk");
   std::vector<RecordedMessage> written;
   std::optional<Error> error;
@@ -164,15 +165,15 @@ TEST(Recording, RefusesOtherFiles) {
   EXPECT_EQ(folder.error().kind, ErrorKind::bad_data);
 }
 
-TEST(Recording, AMessageThatNamesTheModelGoesBeforeOnesThatDoNot) {
+TEST(Recording, AMessageThatNamesTheModelHasPriorityOverOthers) {
   const auto sender_in = [](const std::vector<RecordedMessage>& messages) {
     auto opened = open_bytes(recorded(Format::mcap, messages));
     const auto by = opened ? find_sender(*opened->reader) : std::nullopt;
     if (!by) throw std::runtime_error("no sender was found");
-    EXPECT_EQ(read_all(*opened->reader).size(), messages.size()) << "the reader must begin anew";
+    EXPECT_EQ(read_all(*opened->reader).size(), messages.size()) << "the reader is not at the start";
     return by->sender;
   };
-  const Sender named = sender_in(conversation());  // pings before the status
+  const Sender named = sender_in(conversation());  // has pings before the status, which names the model
   EXPECT_EQ(named.model->profile, "oculus-m1200d");
   EXPECT_TRUE(named.names_model);
   EXPECT_EQ(named.serial, 7001u);
@@ -197,7 +198,7 @@ TEST(Recording, BytesBetweenMessagesAreKept) {
     EXPECT_EQ(damage->kind, ErrorKind::bad_data);
     const std::vector<RecordedMessage> before(messages.begin(), messages.begin() + 3);
     const std::string dump_bytes = std::to_string(device_stream(before).size());
-    // Packets: three begin the connection, and each message has one and an acknowledgement.
+    // Three packets begin the connection; each message has a packet and an acknowledgement.
     const std::string place = format == Format::raw_dump ? "byte " + dump_bytes
                               : format == Format::pcap   ? "packet 10 of the connection with 127.0.0.1:40000"
                                                          : "the record at byte ";
@@ -250,7 +251,7 @@ class ShrunkenSource final : public Source {
 TEST(Recording, JunkBeforeAReadErrorIsReported) {
   Bytes file = ping_message(1);
   const std::string after_one = std::to_string(file.size());
-  const Bytes junk = bytes_of("what is this? SO");  // the last two bytes might begin a message
+  const Bytes junk = bytes_of("what is this? SO");  // a message may begin with the last two bytes
   file.insert(file.end(), junk.begin(), junk.end());
   const std::size_t readable = file.size();
   file.resize(file.size() + 100);
@@ -279,7 +280,7 @@ TEST(Recording, JunkInARawDumpIsCountedWithItsPlace) {
   };
   const std::string after_one = std::to_string(ping.size());
   EXPECT_EQ(damage_of({ping, ping}), "");
-  // The second piece begins as a message does, with an unknown type: both are one place.
+  // The second piece begins like a message, but with an unknown type. Both pieces are reported as one place.
   EXPECT_THAT(damage_of({ping, bytes_of("S"), bytes_of("SOSOSOSOSOSOSOSOSOSO"), ping}),
               HasSubstr("21 bytes from byte " + after_one + " on belong to no message"));
   EXPECT_THAT(damage_of({ping, bytes_of("x")}), HasSubstr("1 byte from byte " + after_one + " on belong to no message"));
@@ -288,7 +289,7 @@ TEST(Recording, JunkInARawDumpIsCountedWithItsPlace) {
   EXPECT_THAT(damage_of({bytes_of("no message"), ping}), HasSubstr("is not a recording"));
 }
 
-TEST(Recording, ADamagedPlaceCostsOnlyItself) {
+TEST(Recording, ADamagedPlaceLosesNoOtherMessage) {
   for (const Format format : {Format::oculus_log, Format::mcap}) {
     std::vector<RecordedMessage> messages;
     for (std::uint32_t i = 0; i < 9; ++i)
@@ -308,7 +309,7 @@ TEST(Recording, ADamagedPlaceCostsOnlyItself) {
   }
 }
 
-/// A real device's bytes through every format (SONARD_CAPTURES).
+/// Writes and reads the bytes of a real device in every format (SONARD_CAPTURES).
 TEST(Recording, KeepsTheCapturedPings) {
   const char* folder = std::getenv("SONARD_CAPTURES");
   if (folder == nullptr) GTEST_SKIP() << "SONARD_CAPTURES names no folder of recordings";

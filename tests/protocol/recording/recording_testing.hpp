@@ -65,7 +65,7 @@ inline Bytes status_message() {
   return wire::bytes_of(status);
 }
 
-/// Two settings, keep-alives, three pings and a status: messages of both ends, by both transports.
+/// Returns two settings, keep-alives, three pings and a status: messages of both ends, over TCP and UDP.
 inline std::vector<RecordedMessage> conversation() {
   using enum Origin;
   using enum Carrier;
@@ -82,7 +82,7 @@ inline std::vector<RecordedMessage> read_all(RecordingReader& reader) {
   return messages;
 }
 
-/// Bytes the device sent by TCP.
+/// Returns the bytes that the device sent over TCP.
 inline Bytes device_stream(const std::vector<RecordedMessage>& messages) {
   Bytes stream;
   for (const RecordedMessage& message : messages)
@@ -118,7 +118,7 @@ inline std::unique_ptr<RecordingWriter> writer_for(Format format, std::unique_pt
   }
 }
 
-/// The part of a conversation that this format keeps.
+/// Returns the messages of a conversation that this format can store.
 inline std::vector<RecordedMessage> kept_by(Format format, std::vector<RecordedMessage> messages) {
   if (format == Format::oculus_log || format == Format::raw_dump)
     std::erase_if(messages, [](const RecordedMessage& message) {

@@ -1,4 +1,4 @@
-// .sonar files: packets one after the other, their times, and the reports of damage.
+// .sonar files: their packets and times, and the reports of damage.
 #include <cstdlib>
 
 #include "protocol/recording/recording.hpp"
@@ -75,16 +75,16 @@ TEST(SonarFile, DamageIsReportedWithTheOffsetAndSkipped) {
   EXPECT_EQ(read.packets.size(), 5u);
   EXPECT_EQ(read.damage, "f: the packet at byte " + second + " is damaged: wrong CRC or compression");
   file = whole;
-  file[shots[0].size() + 5] = std::byte{0xFF};  // a byte of its length
+  file[shots[0].size() + 5] = std::byte{0xFF};  // a byte of the packet's length
   read = read_back(file);
-  EXPECT_EQ(read.packets.size(), 5u) << "the next one is found, whatever length this one states";
+  EXPECT_EQ(read.packets.size(), 5u) << "the next packet is found, even if this length is wrong";
   read = read_back(joined({shots[0], Bytes(100, std::byte{'R'}), shots[1], Bytes(3, std::byte{0})}));
   EXPECT_EQ(read.packets.size(), 4u);
   EXPECT_EQ(read.damage, "f: no packet begins at byte " + second + "; 1 more such place");
-  EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "one sonar without a name";
+  EXPECT_FALSE(open_recording(source_from("f", whole), "front")) << "the file has one sonar without a name";
 }
 
-/// The recording of a real unit (SONARD_CAPTURES).
+/// Reads the recording of a real unit (SONARD_CAPTURES).
 TEST(SonarFile, ReadsARealFile) {
   const char* const folder = std::getenv("SONARD_CAPTURES");
   auto opened = open_recording(std::filesystem::path(folder == nullptr ? "" : folder) / "sonar3d15" / "ship_short.sonar");

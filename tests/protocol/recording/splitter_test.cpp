@@ -49,7 +49,7 @@ TEST(MessageSplitter, LinesEndAtTheirLineEnd) {
   }
   MessageSplitter endless(Origin::device, lines);
   endless.append(after_ms(1), bytes_of("{\"" + std::string(70'000, 'a')));
-  EXPECT_TRUE(endless.next()) << "given up, as bytes that are not a message";
+  EXPECT_TRUE(endless.next()) << "a line that is too long is returned as bytes that are not a message";
 }
 
 TEST(MessageSplitter, TimeIsThatOfTheLastByte) {
@@ -63,7 +63,7 @@ TEST(MessageSplitter, TimeIsThatOfTheLastByte) {
   EXPECT_EQ(message->at, after_ms(7));
 }
 
-TEST(MessageSplitter, MissingBytesCostTheMessagesTheyBelongTo) {
+TEST(MessageSplitter, MissingBytesLoseOnlyTheirMessages) {
   const Bytes ping = ping_message(1), next = ping_message(2);
   MessageSplitter splitter(Origin::device, oculus::framing);
   splitter.append(start, BytesView(ping).first(500));
@@ -76,12 +76,12 @@ TEST(MessageSplitter, MissingBytesCostTheMessagesTheyBelongTo) {
   EXPECT_EQ(splitter.lost_bytes(), ping.size() - 200);
 }
 
-TEST(MessageSplitter, BehindLostBytesOnlyKnownFramesOfThePingProtocolCount) {
+TEST(MessageSplitter, AfterLostBytesOnlyKnownFramesOfThePingProtocolAreAccepted) {
   const Framing& framing = *protocol::find_make("surveyor240")->codec.framing;
   const Bytes unknown = ping::framed(static_cast<ping::Id>(7777), 1, Bytes(9)), known = ping::framed(ping::Id::ack, 1, Bytes(2));
   MessageSplitter splitter(Origin::device, framing);
   splitter.append(start, unknown);
-  EXPECT_EQ(drain(splitter), std::vector<Bytes>{unknown}) << "a message that is not known yet";
+  EXPECT_EQ(drain(splitter), std::vector<Bytes>{unknown}) << "without lost bytes, an unknown message is accepted";
   splitter.break_off();
   splitter.append(start, unknown);
   splitter.append(start, known);
@@ -89,7 +89,7 @@ TEST(MessageSplitter, BehindLostBytesOnlyKnownFramesOfThePingProtocolCount) {
   EXPECT_EQ(splitter.lost_bytes(), unknown.size());
 }
 
-TEST(MessageSplitter, AnUnfinishedMessageIsNotGiven) {
+TEST(MessageSplitter, AnIncompleteMessageIsNotReturned) {
   const Bytes ping = ping_message(1);
   MessageSplitter splitter(Origin::device, oculus::framing);
   splitter.append(start, BytesView(ping).first(ping.size() - 1));
@@ -99,7 +99,7 @@ TEST(MessageSplitter, AnUnfinishedMessageIsNotGiven) {
   EXPECT_EQ(splitter.lost_bytes(), ping.size() - 1);
 }
 
-TEST(MessageSplitter, ClientsMayLeaveTheirPayloadSizeOut) {
+TEST(MessageSplitter, ClientsMayOmitTheirPayloadSize) {
   Bytes fire = oculus::make_fire({});
   for (std::size_t i = 10; i < 14; ++i) fire[i] = std::byte{0};
   MessageSplitter splitter(Origin::client, oculus::framing);

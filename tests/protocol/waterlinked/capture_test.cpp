@@ -28,7 +28,7 @@ std::vector<Bytes> captured() {
   return packets;
 }
 
-TEST(WaterLinkedCapture, ContentIsMadeAgainByteByByte) {
+TEST(WaterLinkedCapture, ContentIsEncodedToTheSameBytes) {
   const std::vector<Bytes> packets = captured();
   if (packets.empty()) GTEST_SKIP() << "SONARD_CAPTURES names no folder with sonar3d15/ship_short.sonar";
   ASSERT_EQ(packets.size(), 12u);

@@ -1,4 +1,4 @@
-// The images of a Sonar 3D-15 as its host draws and lists them.
+// The images of a Sonar 3D-15 that its host draws, and their figures.
 #include "protocol/waterlinked/waterlinked.hpp"
 
 #include <gmock/gmock.h>
@@ -53,12 +53,12 @@ TEST(WaterlinkedHost, DrawsRangesWithoutStrengthsWithANote) {
   auto ranges = nothing_there();
   EXPECT_THAT(ping_from(ranges, nullptr)->facts.note, HasSubstr("no returns; no strengths given"));
   ranges.pixels[columns + 2] = 10;
-  EXPECT_EQ(ping_from(ranges, nullptr)->picture()->at(100, 2), 255) << "5 m of 15, ahead";
+  EXPECT_EQ(ping_from(ranges, nullptr)->picture()->at(100, 2), 255) << "the return is 5 m of 15 m ahead";
   EXPECT_FALSE(ping_from(ranges, nullptr)->drawing().nothing_detected());
   EXPECT_TRUE(ping_from(nothing_there(), nullptr)->drawing().nothing_detected());
 }
 
-TEST(WaterlinkedHost, TakesNoImageWhoseFieldsCannotBe) {
+TEST(WaterlinkedHost, RefusesImagesWithImpossibleFields) {
   const auto refuses = [](auto change) {
     auto ranges = nothing_there();
     change(ranges);

@@ -1,4 +1,4 @@
-// The HTTP API: every path, refusals, releases, the meaning of settings.
+// The HTTP API of a Sonar 3D-15: every path, refusals, older releases, and the effect of settings.
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
 namespace sonar::waterlinked::tests {
@@ -55,7 +55,7 @@ TEST(WaterLinkedHttp, PostedValuesAreReadBack) {
   EXPECT_THAT(unit.receivers, ::testing::ElementsAre(protocol::Endpoint{{192, 168, 99, 42}, 4748}));
 }
 
-TEST(WaterLinkedHttp, RefusesWhatIsNotInTheSchema) {
+TEST(WaterLinkedHttp, RefusesBodiesThatAreNotInTheSchema) {
   Unit unit;
   const std::pair<const char*, const char*> bad[] = {
       {"/acoustics/enabled", "\"enable\""},
@@ -144,7 +144,7 @@ TEST(WaterLinkedHttp, TheClockMayRunWithoutNtp) {
   EXPECT_EQ(synchronised.post("/time/ntp/force-sync", ""), 200u) << "the time limit of force-sync is optional";
 }
 
-TEST(WaterLinkedOverride, IsWhatAClientWouldHavePosted) {
+TEST(WaterLinkedOverride, EqualsTheSettingsThatAClientPosts) {
   Unit unit(protocol::OptionValues{{"acoustics_at_start", "enabled"}, {"udp_at_start", "multicast"}});
   const auto apply = [&](const protocol::SettingsOverride& wanted) { return vendor().apply_override(wanted, unit.device); };
   protocol::SettingsOverride wanted;

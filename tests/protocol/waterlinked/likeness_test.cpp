@@ -140,7 +140,7 @@ void expect_like_recording(const Image& image) {
   EXPECT_LT(image.alike_between_blocks(), 0.4);      // recording: 0.09 to 0.20; slopes: 0.21 and 0.32, from their brightness
 }
 
-/// A rough slope, 2 to 8 m away; for comparison, the same slope without the effects that are fitted to the recording.
+/// Returns an image of a rough slope, 2 to 8 m away. If not `fitted`, it lacks the effects that are fitted to the recording.
 Image emulated(double relief_m, bool fitted = true) {
   const tests::Unit unit;
   const auto settings = std::make_shared<HeldSettings>(settings_from(unit.device.settings.get(), unit.device));
@@ -188,14 +188,14 @@ std::vector<Image> recorded() {
   return images;
 }
 
-TEST(WaterLinkedLikeness, RangesHaveTheTracesOfTheFilters) {
+TEST(WaterLinkedLikeness, RangesHaveTheStatisticsOfTheFilters) {
   for (const double relief_m : {0.1, 0.3}) {
     SCOPED_TRACE(relief_m);
     expect_like_recording(emulated(relief_m));
   }
 }
 
-TEST(WaterLinkedLikeness, WithoutTheFiltersThereAreNoTraces) {
+TEST(WaterLinkedLikeness, WithoutTheFiltersStatisticsDiffer) {
   const Image image = emulated(0.1, false);
   EXPECT_LT(image.equal_across(), 0.26);
   EXPECT_LT(image.equal_in_blocks() / image.equal_between_blocks(), 2);
@@ -213,14 +213,14 @@ TEST(WaterLinkedLikeness, NoFilterDropsAThinPoleAnywhere) {
   for (const auto& [turn_rad, gain_db, least_pixels] :
        {std::tuple(0.0, 50.0F, 250), std::tuple(pi / 2, 50.0F, 250), std::tuple(0.0, first_gain_db, 10),
         std::tuple(pi / 2, first_gain_db, 10)}) {
-    ping.gain_db = gain_db;  // upright, then level
+    ping.gain_db = gain_db;
     const Quatd turn{std::cos(turn_rad / 2), std::sin(turn_rad / 2), 0, 0};
     const auto scene = test::SceneMaker().add(make_cylinder(0.01, 6, 48, Caps::none), -8, {8, 0, 0}, turn).make();
     test::Sounding sounding(scene, unit.device.model->modes[0], ping);
     sounding.request.vendor_settings = std::make_shared<HeldSettings>(settings);
     sounding.request.switches.noise = true;
     int least = rows * columns, most = 0;  // pixels with a return
-    for (int n = 0; n < 8; ++n) {          // within a cell of the beam grid
+    for (int n = 0; n < 8; ++n) {          // positions within a cell of the beam grid
       const Ping& shot = sounding.ping_from({0, n * 0.006, n * 0.011}, {0, 0, 0});
       int heard = 0;
       for (std::size_t i = 0; i < static_cast<std::size_t>(rows * columns); ++i) heard += range_pixel(shot, i).range != 0;
@@ -233,7 +233,7 @@ TEST(WaterLinkedLikeness, NoFilterDropsAThinPoleAnywhere) {
   }
 }
 
-TEST(WaterLinkedLikeness, TheRecordingHasThoseTraces) {
+TEST(WaterLinkedLikeness, TheRecordingHasTheseStatistics) {
   const std::vector<Image> images = recorded();
   if (images.empty()) GTEST_SKIP() << "SONARD_CAPTURES names no folder with sonar3d15/ship_short.sonar";
   ASSERT_EQ(images.size(), 6u);

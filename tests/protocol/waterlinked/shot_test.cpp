@@ -1,4 +1,4 @@
-// The datagrams of a shot, read back.
+// Reads back the datagrams of a shot.
 #include <cmath>
 
 #include "protocol/waterlinked/messages.hpp"
@@ -103,14 +103,14 @@ TEST(WaterLinkedShot, ImuSamplesAreTenMillisecondsApart) {
   EXPECT_LT(at_s(3.25) - batch->samples.back().at, std::chrono::milliseconds(10));
   EXPECT_EQ(batch->samples[1].at - batch->samples[0].at, std::chrono::milliseconds(10));
   for (const auto& sample : batch->samples) {
-    EXPECT_THAT(sample.specific_force_mps2, ::testing::ElementsAre(0.0f, 0.0f, -9.81f)) << "level, z down";
+    EXPECT_THAT(sample.specific_force_mps2, ::testing::ElementsAre(0.0f, 0.0f, -9.81f)) << "a level sonar, z down";
     EXPECT_THAT(sample.rate_radps, ::testing::Each(0.0f));
   }
   unit.post("/acoustics/mode", "\"high-frequency\"");
   EXPECT_EQ(read(shot(unit)[2]).imu->samples.size(), 5u);
 }
 
-TEST(WaterLinkedShot, ImuSamplesGoOnFromTheShotBefore) {
+TEST(WaterLinkedShot, ImuSamplesContinueFromThePreviousShot) {
   Unit unit;
   unit.post("/output/imu-batch/enabled", "true");
   unit.device.framed_at = at_s(3.25) - std::chrono::milliseconds(333);
