@@ -1,4 +1,4 @@
-// Part of every test program: testing::TempDir() is a folder of the process, because ctest runs each case as a process of its
+// Part of every test program. Makes testing::TempDir() a folder of the process, because ctest runs each case as a process of its
 // own, several at a time, and their files must not collide. The folder is removed when the process ends.
 #include <unistd.h>
 

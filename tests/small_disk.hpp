@@ -8,7 +8,7 @@
 
 namespace sonar {
 
-/// While it exists, no file can grow beyond this number of bytes, as if the disk were full.
+/// While an object exists, no file can grow beyond this number of bytes, as if the disk were full.
 class SmallDisk {
  public:
   explicit SmallDisk(rlim_t bytes) {

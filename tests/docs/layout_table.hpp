@@ -1,4 +1,4 @@
-// A layout as a Markdown table: offset, type and name of each field from fields(), and in words its meaning.
+// A layout as a Markdown table: offset, type and name of each field from fields(), and its meaning in words.
 #pragma once
 
 #include <initializer_list>
@@ -62,11 +62,11 @@ class Namer : public wire::Visitor<Namer> {
   std::string prefix_;
 };
 
-/// The meaning of fields by name. A name without dots stands for the field at the end of every path.
+/// Maps the name of a field to its meaning. A name without dots stands for the field at the end of every path.
 using Meanings = std::map<std::string, std::string, std::less<>>;
 
-/// The rows of `M` whose names do not begin with a prefix of `left_out`. Throws if no field has the name of a meaning, so that a
-/// renamed field does not lose its meaning.
+/// Returns the rows of `M` whose names do not begin with a prefix of `left_out`. Throws if no field has the name of a meaning,
+/// so that a renamed field does not lose its meaning.
 template <class M>
 std::string layout_table(const Meanings& meanings, std::initializer_list<std::string_view> left_out = {}) {
   Namer namer;

@@ -1,5 +1,5 @@
-// The Example, a make of sonar that tests add to the product's makes: it has a folder like protocol/<make>/ and a row in the
-// list.
+// The Example, a make of sonar that tests add to the product's makes. Its folder is
+// like protocol/<make>/.
 #pragma once
 
 #include "protocol/host.hpp"

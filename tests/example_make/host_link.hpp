@@ -53,7 +53,7 @@ inline std::shared_ptr<const Ping> computed(PingRequest request) {
     ping->beam_azimuth_rad.push_back(beams < 2 ? 0.0f : 0.5f - static_cast<float>(b) / static_cast<float>(beams - 1));
   if (s.format.row_gains) ping->row_gain.assign(rows, 1);
   ping->request = std::move(request);
-  look_at(*ping);  // as the engine's thread does; otherwise every message of the ping makes the findings again
+  look_at(*ping);  // as the engine's thread does; otherwise every message of the ping computes the findings again
   return ping;
 }
 
@@ -90,7 +90,7 @@ class Link {
     for (const Time end = now_ + time; now_ < end && pings == before;) step_once();
     return pings > before;
   }
-  /// Returns false if such a sonar has no such fault.
+  /// Returns false if this make of sonar cannot have the fault.
   bool add(const FaultKind& kind) {
     FaultRecord record;
     record.what = std::string(kind.code);
@@ -99,7 +99,7 @@ class Link {
     perform(sonar.add_faults(*faults, true, now_));
     return true;
   }
-  /// Sends arbitrary bytes from the driver, in all its conversations, and to it.
+  /// Sends arbitrary bytes to the sonar on all of its ports.
   void to_sonar(protocol::BytesView bytes) {
     for (std::size_t port = 0; port < make_.ports.size(); ++port) send(port, bytes);
     drain();
@@ -151,7 +151,7 @@ class Link {
     drain();
   }
 
-  /// A connection, or the conversation by datagrams.
+  /// A TCP connection, or the exchange of datagrams.
   struct Line {
     std::size_t host_port = 0;
     const protocol::Port* port = nullptr;

@@ -93,7 +93,7 @@ inline constexpr recording::Framing framing{{'E', 'X'}, header_size, length_of};
 
 /// Returns the kind of a whole message.
 inline Kind kind_of(BytesView whole) { return static_cast<Kind>(whole[2]); }
-/// Returns the first part of its payload; empty if the payload is shorter.
+/// Returns the beginning of its payload as an M; empty if the payload is shorter.
 template <class M>
 std::optional<M> payload_of(BytesView whole) {
   M read;

@@ -95,7 +95,7 @@ def micron(address, port):
 
 
 def ping_family(sonar, requests, data, number_at, front, item=1):
-    """Sends requests and reads the messages `data`: a number at `number_at`, and after `front` bytes the items that can be
+    """Sends requests and reads the messages of kind `data`: a number at `number_at`, and after `front` bytes items that can be
     mirrored."""
     for kind, payload in requests:
         body = b"BR" + struct.pack("<HHBB", len(payload), kind, 0, 0) + payload

@@ -20,7 +20,7 @@ CONNECT_S = 2.0
 
 
 def fire_message():
-    """Mode 2, 10 Hz, 8 bit, 256 beams, 5 m."""
+    """Returns a fire message: mode 2, 10 Hz, 8 bit, 256 beams, 5 m."""
     body = FIRE.pack(2, 0, 255, 127, 0x19, 5.0, 50.0, 0.0, 30.0)
     return HEADER.pack(MAGIC, 0, 0, FIRE_ID, 1, len(body), 0) + body
 
@@ -98,7 +98,7 @@ class Driver:
         self.asked_again = 0.0
 
     def log(self, text):
-        """Logs at most one line a second of each kind."""
+        """Logs at most one line per second of each kind."""
         now = time.monotonic()
         if now - self.last_log.get(text[:20], -9) >= 1:
             self.last_log[text[:20]] = now
@@ -122,7 +122,7 @@ class Driver:
         return settings
 
     def received(self, sonar, data):
-        """Handles bytes; returns whether there was a ping among them."""
+        """Handles bytes; returns whether they completed a ping."""
         any_ping, skipped = False, self.stream.skipped
         for ping in self.stream.feed(data):
             any_ping = True

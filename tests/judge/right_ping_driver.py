@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A correct driver of the ping protocol by UDP. The judge must find no fault in it.
+"""A correct driver of the ping protocol over UDP. The judge must find no fault in it.
 
 usage: right_ping_driver.py ADDRESS PORT [PERIOD_MS]     reads the profiles of a Ping1D; prints a tap line for each, and a log on
 standard error

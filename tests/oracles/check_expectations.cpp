@@ -11,7 +11,7 @@
 namespace sonar::render {
 namespace {
 
-/// Names that formulas may use besides those of the sweep. CONTRIBUTING.md lists them.
+/// Names that formulas may use besides those of the sweep. tests/oracles/README.md lists them.
 Values known_values(const RenderJob& job, const PingRequest& request) {
   const FrequencyMode& mode = job.mode();
   const PingSettings& s = job.settings;
@@ -35,10 +35,10 @@ Values known_values(const RenderJob& job, const PingRequest& request) {
 struct Step {
   Values values;
   std::vector<Expectation> expectations;
-  std::vector<double> measured;  // by expectation
+  std::vector<double> measured;  // one value for each expectation
 };
 
-/// Least squares over log10 of the swept value.
+/// Returns the slope of the least-squares line over log10 of the swept value.
 double slope_per_decade(const std::vector<Step>& steps, const std::string& against, std::size_t expectation) {
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
   for (const Step& step : steps) {

@@ -24,7 +24,7 @@ enum class Measure {
   peak_bearing_deg,  // azimuth of the peak, interpolated between the beams by a log-parabola, positive to port
   mean_level_db,     // 10 log10 of the mean power
   energy_db,         // power of a beam summed over time, mean over the beams [dB re 1 uPa^2 s]
-  strength_db,       // sum of sigma_i / r_i^4 behind the picture [dB re 1 / m^2]; only for beams uniform in the sine
+  strength_db,       // sum of sigma_i / r_i^4, from the picture [dB re 1 / m^2]; only for beams uniform in the sine
   coverage_percent,  // bins within 1 dB of the closed form on a plane bed
   coverage_worst_db,
 };
@@ -42,20 +42,20 @@ struct Expectation {
   Over over = Over::each;
   std::string against;  // slope: the swept value
   Window window;
-  std::optional<Window> less;  // if set, also measured there and subtracted
+  std::optional<Window> less;  // if set, the value in this window is subtracted
   enum class Bound { near, at_least, at_most } bound = Bound::near;
-  std::string value;  // a formula (CONTRIBUTING.md lists its names)
+  std::string value;  // a formula (tests/oracles/README.md lists its names)
   double within = 0;  // near: the tolerance
   std::string place;  // file:line:col
 };
 
-/// The expectations of one step of the sweep. `text` is the render file; errors name the position in it.
+/// Reads the expectations of one step of the sweep. `text` is the render file; errors name the position in it.
 Result<std::vector<Expectation>> read_expectations(const std::string& text, const std::string& source, const Values& values);
 
 std::string name_of(Measure measure);
 std::string unit_of(const Expectation& expectation);
 
-/// Measures the quantity in the ping of that job.
+/// Measures the quantity in the ping of this job.
 Result<double> measure(const Expectation& expectation, const RenderJob& job, const Ping& ping);
 
 struct Verdict {

@@ -46,10 +46,10 @@ class Picture {
   }
 
   double mean_power() const { return sum_of_power() / static_cast<double>(rows_.size() * beams_.size()); }
-  /// Mean energy of one beam.
+  /// Returns the mean energy of a beam.
   double energy() const { return sum_of_power() * row_s() / static_cast<double>(beams_.size()); }
 
-  /// Target strength. The sum of E|s|^2 over rows and beams contains the energy of each echo times theta_eff tau_eff
+  /// Returns the target strength. The sum of E|s|^2 over rows and beams contains the energy of each echo times theta_eff tau_eff
   /// (ResolutionCell). Therefore it is divided by both and by the source level.
   double strength() const {
     const ResolutionCell cell = cell_of(job_);

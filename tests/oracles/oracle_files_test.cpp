@@ -96,13 +96,13 @@ TEST(Expectations, AreMetWhenTrueAndNotWhenWrong) {
   EXPECT_TRUE(met("{measure: peak_level_db, range_m: [3.9, 4.1], less: {range_m: [4.5, 5]}, at_least: 100}"));
 }
 
-TEST(Expectations, NameFileQuantityMeasuredAndExpected) {
+TEST(Expectations, FailureNamesFileQuantityMeasuredAndExpected) {
   EXPECT_THAT(
       judged("{measure: peak_range_m, value: 5, within: 0.01, what: a point}").at(0).sentence(),
       AllOf(HasSubstr("r.yaml:6"), HasSubstr("a point"), HasSubstr("peak_range_m 4"), HasSubstr("expected 5 within 0.01")));
 }
 
-TEST(Expectations, WindowsAreInRealRangesWhereverTheRowsBegin) {
+TEST(Expectations, WindowsAreInRealRangesEvenIfRowsBeginLater) {
   const std::string late = "sonar: {ping: {range_m: 6, range_start_m: 4, rows: 100}}\nexpect: [{measure: mean_level_db, ";
   EXPECT_TRUE(verdicts_on(point + late + "range_m: [4, 4.1], at_least: 0}]\n", "r.yaml", ".").at(0).met);
   EXPECT_THROW(verdicts_on(point + late + "range_m: [3.8, 3.9], at_least: 0}]\n", "r.yaml", "."), std::runtime_error);

@@ -2,9 +2,9 @@
 """Makes the summary table of the oracles from the figures that a test run recorded (tests/oracles/record.hpp).
 
 usage: oracle_table.py FOLDER [--markdown] [--partial]
-  FOLDER      what the environment variable SONARD_ORACLES named, build/<preset>/oracles after ctest
+  FOLDER      the folder that SONARD_ORACLES named; build/<preset>/oracles after ctest
   --markdown  a table for the validation tables instead of one for the terminal
-  --partial   an oracle without figures is no fault: the run was asked for some tests only
+  --partial   only some tests were run, so an oracle without figures is no fault
 Exit status 1: an oracle is out of tolerance, or has no figures and no reason for that. 2: the folder cannot be read.
 """
 
@@ -71,7 +71,7 @@ NOT_BUILT = {
 
 
 def read_records(folder):
-    """All records of a run, in the order of their oracles, then of the tests that made them."""
+    """Returns all records of a run, in the order of their oracles, then of the tests that made them."""
     records = []
     for path in sorted(pathlib.Path(folder).glob("*.jsonl")):
         for at, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
@@ -83,7 +83,7 @@ def read_records(folder):
 
 
 def badness(record):
-    """How close to the edge of its tolerance a record is: over 1 is out. Records of one row are compared by it."""
+    """Returns how close a record is to the edge of its tolerance; over 1 is out. It selects the worst record of a row."""
     expected, measured = record["expected"], record["measured"]
     if math.isnan(measured):
         return math.inf
@@ -96,7 +96,7 @@ def badness(record):
 
 
 def rows_of(records):
-    """One row for each oracle and `what`: the worst of its records, and how many there are."""
+    """Returns a row for each oracle and `what`: the worst of its records, and their number."""
     rows = {}
     for record in records:
         row = rows.setdefault((record["oracle"], record["what"]), {"worst": record, "count": 0, "pass": True})

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The summary table: the worst of many figures stands for all, a failed or missing oracle is a fault, one that was not built is named."""
+"""The summary table: a row has its worst figure, failed and missing oracles are faults, those not built are named."""
 
 import json
 import os

@@ -20,10 +20,10 @@ inline constexpr int no_number = 0;
 /// the worst, so a loop may record every step. `number`: 1..46 or no_number. `unit`: as in "dB", empty for plain ratios.
 void record_oracle(int number, const std::string& what, double expected, double measured, double tolerance,
                    const std::string& unit, Place where = {__builtin_FILE(), __builtin_LINE()});
-/// The same for a lower bound: measured >= bound.
+/// Does the same for a lower bound: measured >= bound.
 void record_at_least(int number, const std::string& what, double bound, double measured, const std::string& unit,
                      Place where = {__builtin_FILE(), __builtin_LINE()});
-/// The same for an upper bound: measured < bound.
+/// Does the same for an upper bound: measured < bound.
 void record_below(int number, const std::string& what, double bound, double measured, const std::string& unit,
                   Place where = {__builtin_FILE(), __builtin_LINE()});
 

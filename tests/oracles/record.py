@@ -1,6 +1,6 @@
-"""Records what an oracle measured from Python; tests/oracles/record.hpp does the same for C++ and explains the fields.
+"""Records the figures of oracles in Python; tests/oracles/record.hpp does the same for C++ and explains the fields.
 
-A test that uses it is given the folder and its place in the run by
+For a test that uses it, CMake sets the folder and the order of the tests with
 set_tests_properties(NAME PROPERTIES ENVIRONMENT SONARD_ORACLES=${oracle_records} FIXTURES_REQUIRED oracles).
 """
 

@@ -39,7 +39,7 @@ bool loopback_up() {
   return up;
 }
 
-/// A user namespace gives its first process every capability; then tests of permissions would see no refusal.
+/// A user namespace gives its first process every capability, and then no test of permissions would be refused.
 bool drop_capabilities() {
   __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
   std::array<__user_cap_data_struct, 2> none{};

@@ -1,4 +1,4 @@
-"""in_own_network: addresses of its programs do not collide; without namespaces its programs run one after the other."""
+"""Tests in_own_network: its programs' addresses do not collide; without namespaces the programs run one after the other."""
 import os
 import pathlib
 import select

@@ -11,7 +11,7 @@ import sys
 
 
 def machine():
-    """'2 x Some Processor, Linux 6.1.0': without the name of the computer."""
+    """Returns e.g. '2 x Some Processor, Linux 6.1.0', without the name of the computer."""
     model = "processors"
     cpuinfo = pathlib.Path("/proc/cpuinfo")
     for line in cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []:

@@ -17,7 +17,7 @@ TEST(ReliabilityRecord, IsOneFileWithDateAndMachine) {
   std::filesystem::remove_all(folder);
   setenv("SONARD_RELIABILITY", folder.c_str(), 1);
   EXPECT_TRUE(record_reliability({"cycles", "3 \"more\"", "0", false, "build/load --only cycles"}));
-  EXPECT_TRUE(record_reliability({"cycles", "0", "0", true, "build/load --only cycles"})) << "the newer one counts";
+  EXPECT_TRUE(record_reliability({"cycles", "0", "0", true, "build/load --only cycles"})) << "the newer one replaces it";
   std::ifstream in(folder / "cycles.json");
   const auto record = nlohmann::json::parse(in);
   EXPECT_EQ(record.at("item"), "cycles");

@@ -2,10 +2,10 @@
 """Makes the table of reliability from the figures that tests recorded (tests/reliability/record.hpp and record.py).
 
 usage: reliability_table.py FOLDER [--strict] > PAGE
-  FOLDER     the folder of SONARD_RELIABILITY: build/reliability after tests/tools/long_checks.sh. Figures that are measured by
-  hand, with programs that are built elsewhere, are in by_hand/ beside this file (record.py writes them with
-  SONARD_RELIABILITY=that folder) --strict   exit status 1 also if an item was not run; without it only if a figure missed its
-  bound
+  FOLDER     the folder of SONARD_RELIABILITY: build/reliability after tests/tools/long_checks.sh
+  --strict   exit status 1 also if an item was not run; without it only if a figure missed its bound
+Figures that are measured by hand, with programs that are built elsewhere, are in by_hand/ beside this file. record.py writes
+them there if SONARD_RELIABILITY names that folder.
 """
 import json
 import pathlib
@@ -116,7 +116,7 @@ def range_of(values):
 
 
 class Page:
-    """Returns the rows of the tables. Commands, machines and dates are listed once and cited by number."""
+    """Makes the rows of the tables. Lists commands, machines and dates once, and cites them by number."""
 
     def __init__(self):
         self.machines, self.commands, self.faults = {}, {}, []

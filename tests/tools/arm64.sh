@@ -32,7 +32,7 @@ if [ -n "$root" ]; then
   exit
 fi
 
-# Programs that run here are from amd64, libraries from arm64; packages for all architectures have one form.
+# Programs that run here come from amd64 packages, libraries from arm64 packages. "all" packages have one form.
 setup() {
   [ "$(dpkg --print-architecture)" = amd64 ] || { echo "this script cross-builds on amd64; here ./run.sh builds" >&2; return 69; }
   local name names=(crossbuild-essential-arm64 qemu-user dpkg-dev file)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Shows the progress of a build from ninja's output on standard input: on a terminal one line that
-grows, otherwise a line for every tenth of the build.
+"""Shows the progress of a build from ninja's output on standard input: on a terminal as one line that
+grows, otherwise as a line for every tenth of the build.
 
 usage: ninja ... | build_progress.py       lines that are not steps, such as errors, are printed as they come
 """

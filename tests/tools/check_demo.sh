@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs and checks the demo as a user would: the daemon at a separate address, our client over TCP, 20 pings, a picture. usage:
-# check_demo.sh BUILD_FOLDER [PICTURE]     exit code 0, or a sentence about the failure
+# Runs and checks the demo as a user would: the daemon at a separate address, our client over TCP, 20 pings, a picture.
+# usage: check_demo.sh BUILD_FOLDER [PICTURE]     exit code 0, or a sentence about the failure
 set -u -o pipefail
 cd "$(dirname "$0")/../.." || exit 70
 folder=${1:?usage: check_demo.sh BUILD_FOLDER [PICTURE]}

@@ -1,4 +1,4 @@
-"""Tests what .ci/run and arm64.sh leave out, which compiler setup.sh chooses, and how run_programs.py and test_times.py name
+"""Tests what .ci/run and arm64.sh omit, which compiler setup.sh chooses, and how run_programs.py and test_times.py name
 failures."""
 import os
 import pathlib

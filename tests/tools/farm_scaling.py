@@ -6,7 +6,7 @@ usage: farm_scaling.py [--svg FILE]     prints the table of efficiencies; --svg 
 
 Efficiency: the sum of the workers' computing times, divided by the number of workers times the time until the last
 shard is acknowledged. The server does one thing at a time, in order of arrival; a worker waits for its answers. Each worker has
-50 shards on average. The file system is left out.
+50 shards on average. The time of the file system is ignored.
 """
 import argparse
 import heapq
@@ -21,7 +21,7 @@ import time
 
 # Processor time of nats-server 2.9.10 on an AMD EPYC [s], measured by --measure.
 COSTS = {"take": 125e-6, "look": 125e-6, "beat": 80e-6, "acknowledge": 90e-6}
-NETWORK_S = 0.0005  # both ways, without the server's time
+NETWORK_S = 0.0005  # there and back, without the server's time
 SPREAD = 0.3          # standard deviation of a shard's time over its mean: mines.yaml on a busy machine
 BETWEEN_BEATS_S = 5.0
 SHARDS_EACH = 50
@@ -29,7 +29,7 @@ SHARDS_EACH = 50
 
 def efficiency(workers, shard_s, rng):
     shards, server_free, computed, end = workers * SHARDS_EACH, 0.0, 0.0, 0.0
-    # Events in order of time: the requests of workers. Each shard has them in this order.
+    # Events are the requests of workers, in order of time. Each shard has those of COSTS in that order.
     events = [(rng.random() * 0.01, worker, "take", 0.0) for worker in range(workers)]
     heapq.heapify(events)
     following = {"take": "look", "look": "compute", "acknowledge": "take"}

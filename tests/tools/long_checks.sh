@@ -3,8 +3,8 @@
 # a mission of ten minutes, the page of the live view for 20 minutes, full fuzzing, the whole functional suite under the address
 # and undefined-behaviour sanitizers, and programs with threads under the thread sanitizer. ./test.sh --long runs it; it takes two
 # to four hours on two cores. Every step is run, also after one that failed; a table of the steps is printed last. The figures of
-# all steps become the table of reliability. A figure that misses its bound is a failure; without STEPs a figure that was not
-# measured is one too.
+# all steps become the table of reliability. A figure that misses its bound is a failure. Without STEPs, a figure that was
+# not measured is also a failure.
 # usage: tests/tools/long_checks.sh [STEP...]
 #   SONARD_FUZZ_RUNS, SONARD_FUZZ_SECONDS   see tests/tools/fuzz.sh
 #   SONARD_RELIABILITY                      where figures and their table are kept (build/reliability)

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Reads the whole tree, tests included, with other compilers than the usual one. It generates no code, so it finds errors, and
-# warnings that need no optimiser. Warnings are errors. usage: tests/tools/other_compilers.sh [--share N] [COMPILER...]
-#   --share N reads one Nth of the files; which one depends on the commit
+# Reads the whole tree, tests included, with other compilers than the usual one. They generate no code, so they find errors, and
+# warnings that need no optimiser. Warnings are errors.
+# usage: tests/tools/other_compilers.sh [--share N] [COMPILER...]
+#   --share N reads one Nth of the files; the commit selects which
 #   COMPILER  e.g. g++-11, clang++-14; without one, the commit selects an installed one; if there is none, the check is skipped.
 # Build folders stay in build/other.
 set -u -o pipefail

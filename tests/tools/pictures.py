@@ -47,7 +47,7 @@ def keep(picture, path, colours):
 
 
 def page(path, width, height):
-    """A picture of the page: the demo with one driver at 10 Hz, after ten seconds."""
+    """Takes a picture of the page: the demo with one driver at 10 Hz, after ten seconds."""
     with Daemon(None, str(SONARD)), Browser() as browser, \
             subprocess.Popen([SONARCTL, "listen", "--rate", "10", "--quiet"], stdout=subprocess.DEVNULL) as driver:
         try:
@@ -69,7 +69,7 @@ def view(path, maker, place, turn, more):
         checked(SONARCTL, "pose", "once", "--xyz", place, "--rpy", turn, "--confirm")
         checked(SONARCTL, "view", "--png", path, "--width", WIDTH, *more)
     picture = Image.open(path).convert("RGB")
-    if maker == "aris":  # nothing is below its window
+    if maker == "aris":  # the picture below its window is empty
         picture = picture.crop((0, 0, picture.width, int(0.68 * picture.height)))
     keep(picture, path, 32)
 

@@ -15,7 +15,7 @@ class Repeated(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def lines(self, runs, script, expected, busy_loops=0):
-        """Output of the tool for a good test and one that runs a shell script with the number of the run in $n."""
+        """Returns the tool's output for a good test and a test that runs a shell script with the number of the run in $n."""
         (self.folder / "test.sh").write_text(f"n=$(($(cat n 2>/dev/null || echo 0) + 1)); echo $n >n\n{script}\n", encoding="utf-8")
         (self.folder / "CTestTestfile.cmake").write_text(
             'add_test(good "true")\nadd_test([=[now and then]=] "sh" "test.sh")\n'

@@ -24,11 +24,11 @@ case "${1:-}" in
 esac
 preset=${kind%-all}
 
-# ctest runs the shipped programs. The following are left out, for these reasons:
+# ctest runs the shipped programs. These tests are omitted, for these reasons:
 #   render, determinism, reproducibility, mission, picture, capture_comparison, trajectory   compute for long; rendering, pictures,
 #                                                      recordings and replays are covered by the test programs
 #   service, package, container                        check unit, archive and image files, not a program of ours at run time
-#   bench, demo                                        measure speed and memory, by the same engine as the others
+#   bench, demo                                        measure speed and memory of the same engine as the others
 #   load.descriptors                                   the undefined behaviour sanitizer reads memory through a pipe, and reports
 #                                                      every object as invalid if no descriptor is left for the pipe
 #   the Python client alone and without numpy          they run no program of ours

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Comparison with a real device: three captured pings of an M1200d beside the same scene rendered, in one table and one picture.
+"""Compares with a real device: three captured pings of an M1200d beside renderings of the same scene, in a table and a picture.
 
-Statistics are made with the standard library alone, matplotlib draws. Writes capture.png into --out-dir and prints the chapter.
+Statistics need only the standard library, the picture needs matplotlib. Writes capture.png into --out-dir and prints the chapter.
 The captures stay where they are: tests and this script read them from the folder that SONARD_CAPTURES names.
 """
 import argparse
@@ -120,7 +120,7 @@ def difference(a, b, first, last):
 
 
 def local_sums(values):
-    """Sums over the 9 x 9 samples about each, as far as there are, and how many there are."""
+    """Returns, for each sample, the sum over the 9 x 9 samples around it that exist, and their number."""
     sums = [[0.0] * (BEAMS + 1)]
     for row in range(ROWS):
         line, along = sums[-1], 0.0
@@ -140,7 +140,7 @@ def local_sums(values):
 
 
 def texture_statistics(image):
-    """What is left of a picture without its local mean."""
+    """Returns the picture minus its local mean."""
     sums, counts = local_sums(image)
     ratio = [value / max(total / count, 1e-9) for value, total, count in zip(image, sums, counts)]
     squares, _ = local_sums([v * v for v in image])
@@ -179,12 +179,12 @@ def texture_statistics(image):
 
 
 def sector_mean(image, first, last, beams):
-    """Mean amplitude of some beams."""
+    """Returns the mean amplitude of some beams."""
     return mean([v * v for row in range(first, last) for i, v in enumerate(rows(image, row, row + 1)) if i in beams])
 
 
 def beam_statistics(pings):
-    """What differs between beams, and what stays from ping to ping."""
+    """Returns the differences between beams, and what stays equal from ping to ping."""
     one, two = pings[-1], pings[-2]  # the profile is fitted to the others
     edges, middle = {*range(24), *range(232, 256)}, range(100, 156)
     out = {f"{name}, edges over middle": sector_mean(one, *at, edges) / sector_mean(one, *at, middle)
@@ -201,7 +201,7 @@ def beam_statistics(pings):
 
 
 def statistics(pings):
-    """Name -> value, in the order of the table."""
+    """Returns name -> value, in the order of the table."""
     one, two = pings[-1], pings[-2]  # the profile is fitted to the others
     ordered = sorted(one)
     out = {f"percentile {p}": percentile(ordered, p) for p in (1, 5, 25, 50, 75, 95, 99)}
@@ -227,7 +227,7 @@ def statistics(pings):
 
 
 def off_by(real, ours):
-    """Name -> relative deviation of ours, of a correlation or skewness re SMALLEST_CORRELATION at least."""
+    """Returns name -> relative deviation of ours, of a correlation or skewness re SMALLEST_CORRELATION at least."""
     out = {}
     for name, value in real.items():
         scale = max(abs(value), SMALLEST_CORRELATION) if "apart" in name or "skewness" in name else abs(value)
@@ -249,7 +249,7 @@ def table(real, ours):
 
 
 def faults(real, ours):
-    """What is not as the reasons say: too far off, or not explained, or explained and not off."""
+    """Returns what contradicts the list of reasons: too far off, or not explained, or explained but not off."""
     found = []
     deviations = off_by(real, ours)
     for name, off in deviations.items():

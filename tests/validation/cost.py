@@ -1,4 +1,4 @@
-"""Time a ping, beside Table 3 of Choi 2025."""
+"""Measures the time per ping, beside Table 3 of Choi 2025."""
 
 import os
 

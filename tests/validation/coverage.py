@@ -1,4 +1,4 @@
-"""The results of `sonard render --report coverage` for every sonar, as a table."""
+"""Makes a table of the results of `sonard render --report coverage` for every sonar."""
 
 import re
 

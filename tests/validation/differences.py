@@ -11,7 +11,7 @@ KINDS = [("canonical", []), ("paper", ["--mode", "paper"]), ("raster", ["--mode"
 
 
 def grazing(sonard):
-    """Level of a flat bed, paper mode minus canonical, by grazing angle; both without elevation pattern."""
+    """Returns the level of a flat bed, paper mode minus canonical, by grazing angle; both without elevation pattern."""
     canonical = sonard.expected("grazing", "--specular", "off")
     paper = sonard.expected("grazing", "--mode", "paper", "--fixed-fan", 20000)
     rows, first = [], None
@@ -27,7 +27,7 @@ def grazing(sonard):
 
 
 def width_deg(azimuth, power):
-    """-3 dB width about the loudest beam, interpolated linearly between beams."""
+    """Returns the -3 dB width about the loudest beam, interpolated linearly between beams."""
     at = int(np.argmax(power))
     half = power[at] / 2
 

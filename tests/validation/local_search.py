@@ -11,7 +11,7 @@ FAN_DEG, TILT_DEG, HEIGHT_M = 20.0, 14.3239, 2.0
 
 
 def elevation_of_bed(ping):
-    """Where the level bed lies in each bin [rad], of flat beams; NaN where it does not."""
+    """Returns the angle of the level bed in each bin of flat beams [rad]; NaN in bins without bed."""
     tilt = np.radians(TILT_DEG)
     r, azimuth = np.meshgrid(ping.range, ping.azimuth, indexing="ij")
     # In the sonar's axes the bed is at x sin(tilt) - z cos(tilt) = h. Therefore a cos(phi) - b sin(phi) = h / r.
@@ -22,7 +22,7 @@ def elevation_of_bed(ping):
 
 
 def share_of_limit(sonard, *arguments):
-    """Bins of a comparison mode within 1 dB of the same mode with many rays, and how far off the worst is."""
+    """Compares a mode with itself at many rays: number of bins, percentage within 1 dB, largest difference."""
     some, = sonard.expected("flat-sand", *arguments)
     mode = arguments[arguments.index("--mode") + 1]
     limit, = sonard.expected("flat-sand", "--mode", mode, "--fixed-fan", DENSE_ROWS)

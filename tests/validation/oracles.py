@@ -1,4 +1,4 @@
-"""The oracles' table of a test run, for the validation tables: a complete run, or the chapter states what is missing."""
+"""Makes the oracles' table of a test run for the validation tables. The chapter states what is missing in the run."""
 
 import pathlib
 import subprocess
@@ -8,7 +8,7 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[1] / "oracles" / "oracle_table
 
 
 def chapter(folder, partial=False):
-    """The table of a test run, or None without one. A run that is not whole is refused, or with `partial` named in the chapter."""
+    """Returns the table of a test run, or None without one. Refuses an incomplete run; with `partial`, only notes it there."""
     if folder is None or not any(pathlib.Path(folder).glob("*.jsonl")):
         return None
     done = subprocess.run([sys.executable, str(SCRIPT), str(folder), "--markdown"], capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""Pictures of the page, of modest size."""
+"""Draws the pictures of the page, in small files."""
 
 import pathlib
 
@@ -11,7 +11,7 @@ LARGEST_PICTURE = 150_000  # bytes
 
 
 def save(figure, path):
-    """A PNG of few colours: speckle does not compress otherwise."""
+    """Makes a PNG of few colours, because speckle does not compress otherwise."""
     from PIL import Image
 
     figure.savefig(path, dpi=100, bbox_inches="tight", metadata={"Software": None})
@@ -25,7 +25,7 @@ def save(figure, path):
 
 
 def draw_fan(axes, ping, level_db, low_db, high_db, title):
-    """A ping as a fan: x to starboard, y ahead."""
+    """Draws a ping as a fan: x to starboard, y ahead."""
     import numpy as np
 
     edges_r = np.concatenate([[ping.range[0]], (ping.range[1:] + ping.range[:-1]) / 2, [ping.range[-1]]])

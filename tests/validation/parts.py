@@ -1,4 +1,4 @@
-"""Cost of the parts of the model, each switched off (the opt-in one: on) by itself, at the format that must run at 20 pings a second."""
+"""Measures the cost of each part of the model, with only this part off (the opt-in part: on), in the format for 20 pings/s."""
 
 import os
 

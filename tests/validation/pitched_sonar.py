@@ -1,4 +1,4 @@
-"""The paper's Figure 3: a sonar pitched down before a plate and a rod, and the floor that a model's rows leave dark."""
+"""Repeats the paper's Figure 3: a sonar pitched down before a plate and a rod, and the floor that a model's rows leave dark."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ PULSE_M = 0.0299
 
 
 def floor_of(ping, plate_m):
-    """Rows and beams that hold floor in front of the plate."""
+    """Returns the rows and beams that contain floor in front of the plate."""
     degrees = np.degrees(ping.azimuth)
     foot_m = np.hypot(plate_m, HEIGHT_M)
     return ((ping.range > FIRST_M) & (ping.range < foot_m - BEFORE_M), (degrees > BEAMS_DEG[0]) & (degrees < BEAMS_DEG[1]))
@@ -29,7 +29,7 @@ def too_dark(level_db, reference_db):
 
 
 def dark_floor(ping, reference, plate_m):
-    """Share of the floor's bins that lie more than 6 dB below the default's level, both re their own mean."""
+    """Returns the share of the floor's bins that lie more than 6 dB below the default's level, both re their own mean."""
     rows, beams = floor_of(ping, plate_m)
     nearest = [reference.beam_at(a) for a in ping.azimuth[beams]]
     ours, theirs = ping.power[rows][:, beams], reference.power[rows][:, nearest]
@@ -37,8 +37,8 @@ def dark_floor(ping, reference, plate_m):
 
 
 def predicted(rows, is_raster, range_m):
-    """The same share straight ahead, of rows alone: each meets the flat floor at height / sin(depression) and makes one pulse there,
-    of the power of its patch; beside it as many rows as make a whole floor."""
+    """Predicts the share straight ahead. Each row meets the flat floor at height / sin(depression) and makes one pulse there,
+    with the power of its patch. The reference has enough rows for a whole floor."""
     def level_db(count):
         half = np.radians(HALF_FAN_DEG)
         top = np.tan(half) if is_raster else half

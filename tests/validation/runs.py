@@ -16,7 +16,7 @@ def text_of(scene):
 
 
 class Ping:
-    """One rendered ping: pressure [rows, beams] in uPa and all of the sidecar."""
+    """A rendered ping: pressure [rows, beams] in uPa, and the whole sidecar."""
 
     def __init__(self, stem):
         self.about = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
@@ -56,7 +56,7 @@ class Sonard:
         return done.stdout
 
     def pings_of(self, scene, *arguments, text=None):
-        """Yields the pings of a render file, one at a time: their files live no longer. `text` stands for the file's."""
+        """Yields the pings of a render file one by one, and deletes their files at the end. `text` replaces the file's text."""
         folder = pathlib.Path(tempfile.mkdtemp(prefix="validation-"))
         try:
             file = SCENES / f"{scene}.yaml"
@@ -72,11 +72,11 @@ class Sonard:
             shutil.rmtree(folder)
 
     def expected(self, scene, *arguments, text=None):
-        """The pings' mean power instead of one draw of speckle, without noise."""
+        """Returns the pings' mean power, not one draw of speckle; without noise."""
         return list(self.pings_of(scene, "--expected-power", "--noise", "off", *arguments, text=text))
 
     def coverage(self, scene, *arguments):
-        """The result of --report coverage for the first ping: a dict."""
+        """Returns the result of --report coverage for the first ping, a dict."""
         lines = self.call("render", SCENES / f"{scene}.yaml", "--report", "coverage", *arguments).splitlines()
         words = lines[1].split()
         return {"bins": int(words[-5]), "within_1_db": float(words[-4]), "worst_db": float(words[-2]), "mean_db": float(words[-1])}

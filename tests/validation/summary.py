@@ -1,4 +1,4 @@
-"""The one-page summary, docs/validation.md, from the chapters of the validation tables. It reads their tables and runs nothing."""
+"""Makes the one-page summary, docs/validation.md, from the tables of the validation chapters. Runs nothing."""
 
 import math
 import re
@@ -19,12 +19,12 @@ NUMBER = re.compile(r"[+-]?(?:inf|nan|[\d.]+(?:e[+-]?\d+)?)")
 
 
 def first_number(cell):
-    """The number at the beginning of a cell, or behind `at least`, `below` and `±`."""
+    """Returns the number at the beginning of a cell, or after `at least`, `below` or `±`."""
     return float(NUMBER.search(cell.replace(",", ""))[0])
 
 
 def share_of_tolerance(expected, measured, tolerance):
-    """How much of its tolerance a measurement takes: over 1 is out, 0 is exact. Of the cells of the oracles' table."""
+    """Returns how much of its tolerance a measurement uses, from cells of the oracles' table: over 1 is out, 0 is exact."""
     limit, value = first_number(expected), first_number(measured)
     if math.isnan(value):
         return math.inf
@@ -45,7 +45,7 @@ def times_of(what):
 
 
 def oracle_rows(text):
-    """A row for each group: the measurement that takes most of its tolerance. Also the measurements, and those out of tolerance."""
+    """Returns a row for each group (its measurement closest to the tolerance), the measurements, and those out of tolerance."""
     (_, records), = tables_of(text)
     measured = [r for r in records if r[5] in ("yes", "NO")]
     rows = []

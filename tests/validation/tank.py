@@ -18,7 +18,7 @@ FRONT_M, MU_DB = 0.5, -10
 
 
 def along_centre(pings):
-    """Mean power of the beam that looks straight ahead, of pings of one kind."""
+    """Returns the mean power of the beam straight ahead, over pings of one kind."""
     total = 0
     for count, ping in enumerate(pings, 1):
         total = total + ping.power[:, ping.beam_at()]
@@ -32,7 +32,7 @@ def peak(ping, power, window):
 
 
 def total_db(ping, power, window):
-    """Energy of the echo over that of one pulse: sum of sigma D^2 / r^4, in dB re 1/m^2, times the source's power."""
+    """Returns the energy of the echo over that of one pulse: sum of sigma D^2 / r^4, in dB re 1/m^2, times the source's power."""
     settings = ping.about["settings"]
     b_hz = 0.588705 * settings["device_sound_speed_mps"] / settings["pulse_width_m"]
     pulse_m = np.sqrt(np.pi / 2) / b_hz * ping.sound_speed_mps / 2
@@ -41,12 +41,12 @@ def total_db(ping, power, window):
 
 
 def speckled_mean(sonard, reading, *arguments):
-    """Mean of 100 pings. In the canonical model a still scene repeats its speckle: the tank's surfaces are drawn anew instead."""
+    """Averages 100 pings. In the canonical model a still scene repeats its speckle, so the tank's surfaces are drawn anew."""
     return along_centre(sonard.pings_of("tank-rod", *arguments, text=with_seeds(with_step(text_of("tank-rod"), reading), PINGS)))
 
 
 def totals_table(lambert):
-    """Rows of the table, and the totals with absorption in them."""
+    """Returns the rows of the table, and the totals including absorption."""
     rows, levels = [], []
     for i, name in enumerate(READINGS):
         ping, power = along_centre([lambert[i]])
@@ -69,7 +69,7 @@ def differences(lambert, paper):
 
 
 def draw_fans(sonard, readings, folder):
-    """One ping of each reading as a fan, what the paper's Figures 6 (calibration) and 8 (validation) show."""
+    """Draws a ping of each reading as a fan, as in the paper's Figures 6 (calibration) and 8 (validation)."""
     figure, axes = page.plt.subplots(1, 2 * len(readings), figsize=(13, 3.4), width_ratios=[1, 1, 1.4, 1.4])
     kinds = [("canonical", []), ("paper mode", ["--mode", "paper"])]
     for axis, (i, (name, arguments)) in zip(axes, [(i, kind) for i in readings for kind in kinds]):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Tells captured pings of an M1200d from those of like-the-capture.yaml by the texture of small patches: the nearer to one half a
-classifier comes, the less the picture gives itself away.
+"""Tells captured pings of an M1200d from those of like-the-capture.yaml by the texture of small patches.
+The closer the accuracy is to one half, the more alike are the pictures.
 
 usage: tell_apart.py --program SONARD [--captures FOLDER]
 A random forest sees patches of 32 rows x 32 beams, half of them captured. It is judged on what it has not seen: a ping (trained on
@@ -26,7 +26,7 @@ FITTED = "type: point", "pulse_width_m:", "noise_width:"  # what drifts, and set
 
 
 def missing():
-    """Why there is nothing to tell, or None."""
+    """Returns why there is nothing to compare, or None."""
     if not os.environ.get("SONARD_CAPTURES"):
         return "no recordings: SONARD_CAPTURES is not set"
     try:
@@ -38,7 +38,7 @@ def missing():
 
 
 def box_mean(image, half):
-    """Mean over (2 half + 1)^2 samples, the edges repeated."""
+    """Returns the mean over (2 half + 1)^2 samples, with repeated edges."""
     import numpy as np
 
     wide = np.pad(image, half, mode="edge")
@@ -56,14 +56,14 @@ def correlation(a, b):
 
 
 def shifted(patch, down, right):
-    """The patch and itself so many rows and beams on."""
+    """Returns the patch, and the patch shifted by so many rows and beams."""
     rows, beams = patch.shape
     left = max(0, -right)
     return patch[:rows - down, left:beams - max(0, right)], patch[down:, left + right:beams + min(0, right)]
 
 
 def texture_features(ratio):
-    """Name -> value of a patch of sample over local mean."""
+    """Returns name -> value for a patch of samples divided by their local mean."""
     import numpy as np
 
     deviation = ratio.std()
@@ -87,7 +87,7 @@ def texture_features(ratio):
 
 
 def level_features(patch):
-    """Name -> value of a patch of codes."""
+    """Returns name -> value for a patch of codes."""
     import numpy as np
 
     mean = patch.mean() + 1
@@ -124,7 +124,7 @@ def forest(seed=1):
 
 
 def told_apart(ours, theirs, unseen):
-    """Right or wrong, patch by patch; `unseen` is the column of the places that is left out: 0 ping, 2 sector."""
+    """Returns right or wrong for each patch. `unseen`: column of the places that training leaves out, 0 ping or 2 sector."""
     import numpy as np
 
     features = np.vstack([ours[0], theirs[0]])
@@ -138,7 +138,7 @@ def told_apart(ours, theirs, unseen):
 
 
 def interval(right, places):
-    """Mean, and its 95 % by bootstrap over the patches' places: the pings of one place are alike."""
+    """Returns the mean and its 95 % interval, by bootstrap over the patches' places: the pings of one place are alike."""
     import numpy as np
 
     keys = np.unique(places[:, 1:], axis=0, return_inverse=True)[1].ravel()
@@ -149,7 +149,7 @@ def interval(right, places):
 
 
 def by_rows(right, places):
-    """First and last row of each band of patches, and the share that is right there."""
+    """Returns the first and last row of each band of patches, and the share of right answers there."""
     first_row = PATCH * places[:, 1]
     return [(first, last - 1, right[(first_row >= first) & (first_row < last)].mean()) for first, last in BANDS]
 
@@ -164,7 +164,7 @@ def of_rows(patch_set, first, last):
 
 
 def best_features(ours, theirs, names, count=5):
-    """The features that tell most when alone: accuracy of the best threshold on each, over all patches."""
+    """Returns the features that separate best alone: accuracy of the best threshold on each, over all patches."""
     import numpy as np
 
     truth = np.concatenate([np.zeros(len(ours[0])), np.ones(len(theirs[0]))])
@@ -181,7 +181,7 @@ def scene_like_the_recording():
 
 
 def scene_of_another_bed():
-    """The same without what FITTED names, and with relief of another seed."""
+    """Returns the scene without the lines of FITTED, and with relief of another seed."""
     kept = [line for line in scene_like_the_recording().splitlines() if not any(mark in line for mark in FITTED)]
     return "\n".join(kept).replace("      seed: 4\n", "      seed: 9\n")
 
@@ -194,7 +194,7 @@ def render(program, seed, scene):
 
 
 def results(captured, ours, others, another):
-    """Rows of the table: name, accuracy, its interval; the features that tell most, in the picture and near the floor; and shares by
+    """Rows of the table (name, accuracy, interval); the features that separate best, in the picture and near the floor; shares by
     rows: name -> of each band."""
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""The classifier of captured and simulated pings, on made pictures: it separates different ones, and does not separate equal ones."""
+"""Tests the classifier of captured and simulated pings on made pictures: it separates different ones only."""
 import os
 import random
 import unittest
@@ -15,7 +15,7 @@ except ImportError:
 
 
 def pings(seed, smooth=False, rows=slice(None)):
-    """Three pictures of noise; smooth: in these rows a sample is the mean of two rows."""
+    """Returns three pictures of noise. In the rows `smooth`, a sample is the mean of two rows."""
     draw = numpy.random.default_rng(seed)
     out = []
     for _ in range(comparison.PINGS):

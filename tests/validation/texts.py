@@ -1,4 +1,4 @@
-"""Texts of the validation pages and of the files they render: tables, chapters with their marks, steps of a sweep. Text only."""
+"""Handles texts of the validation pages and of their render files: tables, chapters with their marks, steps of a sweep."""
 
 import re
 
@@ -10,7 +10,7 @@ def table(header, rows):
 
 
 def tables_of(text):
-    """(header, rows) of every table in a text, cells without their blanks."""
+    """Returns (header, rows) of every table in a text, with cells stripped of blanks."""
     found = []
     for block in re.findall(r"(?:^\|.*\|$\n?)+", text, re.M):
         lines = [[cell.strip().replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in block.splitlines()]
@@ -23,13 +23,13 @@ def mark(name):
 
 
 def chapters_of(text):
-    """Name -> what stands between its mark and the next one, of a page written before."""
+    """Returns name -> text between its mark and the next one, from an existing page."""
     parts = re.split(r"^<!-- chapter: ([\w-]+) -->\n", text, flags=re.M)
     return dict(zip(parts[1::2], parts[2::2]))
 
 
 def with_seeds(text, count):
-    """A render file's text with its sweep made longer: every step `count` times, each time with another seed."""
+    """Returns a render file's text with a longer sweep: every step `count` times, each time with another seed."""
     lines = text.splitlines()
     out, inside, steps = [], False, 1
     for line in lines:
@@ -49,7 +49,7 @@ def with_seeds(text, count):
 
 
 def with_step(text, step):
-    """A render file's text with one step of its sweep."""
+    """Returns a render file's text with one step of its sweep."""
     lines, inside = [], False
     for line in text.splitlines():
         if line.startswith("sweep:"):

@@ -109,7 +109,7 @@ class Chapters(unittest.TestCase):
 
 class Summary(unittest.TestCase):
     def chapters(self):
-        """The least of every chapter that the summary reads."""
+        """Returns the minimum of every chapter that the summary reads."""
         return {
             "tank": table(["", "measured", "predicted outside"], [["HF", "-24.44", "-24.06"], ["LF", "-22.47", "-22.11"]])
                     + "\n" + table(["validation", "calibration", "total", "predicted"], [["LF", "HF", "+2.63 dB", "+2.60 dB"]]),
@@ -139,7 +139,7 @@ class Summary(unittest.TestCase):
         return {"oracles": table(oracle_table.HEAD, rows)}
 
     def test_the_page_of_the_tree_has_every_chapter(self):
-        """Its lines and headings are those of the summary; the values are of the run that wrote it."""
+        """The page has the summary's lines and headings; its values come from the run that wrote it."""
         def names(page):
             return [line for line in page.splitlines() if line.startswith("#")]
 

@@ -26,7 +26,7 @@ def peak_near(ping, range_m):
 
 
 def floor_gaps(ping, reference):
-    """Share of the bins with tank floor that lie more than 6 dB below the default's level, each re its own mean."""
+    """Returns the share of bins with tank floor that lie more than 6 dB below the default's level, each re its own mean."""
     r = ping.range
     rows = (r > 4.75) & (r < 5.15)  # the comparison modes' fan covers no shorter ranges
     wide = (np.abs(np.degrees(ping.azimuth)) > 8) & (np.abs(np.degrees(ping.azimuth)) < 25)

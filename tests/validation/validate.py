@@ -49,7 +49,7 @@ def write_tables(folder, chapters):
 
 
 def write_summary(page, folder, chapters):
-    """The summary with its picture. Without some of its chapters the page of before stays, and the answer is False."""
+    """Writes the summary with its picture. If chapters are missing, keeps the old page and returns False."""
     missing = [name for name in summary.CHAPTERS if name not in chapters]
     if missing:
         print(f"{page} is not rewritten: the tables lack {', '.join(missing)}", flush=True)
@@ -64,7 +64,7 @@ def write_summary(page, folder, chapters):
 
 
 def capture(program, folder):
-    """The chapter of the recorded ping, or None without recordings."""
+    """Returns the chapter of the recorded ping, or None without recordings."""
     script = HERE / "capture_comparison.py"
     if not os.environ.get("SONARD_CAPTURES") or not script.is_file():
         return None
@@ -76,7 +76,7 @@ def capture(program, folder):
 
 
 def tell_apart(program):
-    """The chapter of the classifier, or None where it has nothing to tell; the script says why."""
+    """Returns the chapter of the classifier, or None if it cannot run; the script prints why."""
     done = subprocess.run([sys.executable, str(HERE / "tell_apart.py"), "--program", str(program)], capture_output=True, text=True,
                           check=False)
     if done.returncode == 0:
@@ -88,7 +88,7 @@ def tell_apart(program):
 
 
 def makers_of(sonard, pictures, table_of_oracles):
-    """Chapter -> what makes it, in the order of the tables. The chapters draw with matplotlib, the summary does without."""
+    """Returns chapter -> its maker, in the order of the tables. The chapters need matplotlib, the summary does not."""
     import cost
     import coverage
     import differences
