@@ -1,4 +1,4 @@
-// The table of all kinds of faults: effect, parameters with limits and defaults, and the part of a vendor that a kind needs.
+// The table of all kinds of faults: effect, parameters with limits and defaults, and the message field that a kind needs.
 // Codes and names are stable, because users write them. Sources: public issue threads and measurements of open drivers.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Messages about the table of faults: for the reports of the daemon, and for sonarctl without a daemon.
+// Fills messages with the table of faults, for reports of the daemon and for sonarctl if no daemon runs.
 #pragma once
 
 #include "protocol/fault_kinds.hpp"
@@ -10,9 +10,9 @@ class Trouble;
 
 namespace sonar {
 
-/// All but the vendors without effect.
+/// Fills all fields except `without_effect`.
 void fill(v1::FaultKind& out, const FaultKind& kind);
-/// The name, the sentence and the codes.
+/// Fills the name, the sentence and the codes.
 void fill(v1::Trouble& out, const Trouble& trouble);
 
 }  // namespace sonar

@@ -26,7 +26,7 @@ bool is_number_of(const Option& option, std::string_view text) {
   return value >= option.lowest && value <= option.highest;
 }
 
-/// The reason if the option or its value is refused, else an empty text.
+/// Returns why the option or its value is refused; empty if both are valid.
 std::string complaint(const Vendor& vendor, const std::string& name, const std::string& value) {
   const Option* option = find_option(vendor, name);
   if (option == nullptr) {

@@ -23,7 +23,7 @@
 
 namespace sonar::protocol {
 
-/// The settings that a user requests. Of unset values the sonar keeps its own, or the host sends those of a usual driver.
+/// The settings that a user requests. For an unset value the sonar keeps its own, or the host sends that of a usual driver.
 struct Wanted {
   bool as_it_is = false;                         // true: sends no settings, and requests pings only if the make needs it
   bool stamped = false;                          // true: prefers messages that state when a ping was fired
@@ -133,7 +133,7 @@ struct Make {
   std::string_view request;  // the message that requests pings, for the text "no valid ... among them"
   std::string_view remedy;   // such as "send a fire message (type 0x15)"
   std::span<const HostPort> ports;
-  /// Error usage: a setting that this make does not have.
+  /// Errors: usage for a setting that this make does not have.
   Result<std::unique_ptr<Host>> (*host)(const Wanted& wanted) = nullptr;
   recording::Codec codec;
   std::optional<Announcement> (*announced)(BytesView beacon) = nullptr;  // nullopt: not a beacon; null: hosts need no beacon
@@ -141,7 +141,7 @@ struct Make {
 
   std::string_view usual_settings = {};  // settings that a host sends if none are given, as options of sonarctl: "--rate 10"
   std::string_view driver_call = {};     // call that opens the sonar at {at}, for makes whose drivers use one of our libraries
-  char own_faults = 0;                   // first letter of the kinds of faults that only this make has
+  char own_faults = 0;                   // first letter of the codes of faults that only this make has
   bool each_ping_requested = false;      // true: hosts request each ping; the rate is only a limit
   bool own_numbers = false;              // true: ping numbers in messages differ from those in sonard's events
   bool shares_port = false;              // true: another make uses the same port, and the hosts of both accept both makes
@@ -171,7 +171,7 @@ const Make* find_make(std::string_view name);
 const Make& make_of_profile(std::string_view profile);
 
 /// Checks that all requested settings are among `known`, the names of sonarctl's options: "range", "rate", "gain", "mode", ...
-/// Error usage: another setting.
+/// Errors: usage for another setting.
 Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::initializer_list<std::string_view> known);
 
 }  // namespace sonar::protocol

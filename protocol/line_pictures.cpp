@@ -22,7 +22,7 @@ PolarImage empty_fan(double half_rad, double range_m) {
   return image;
 }
 
-/// The strongest sample between two ranges, so that a thin echo stays in the picture when the newest line has larger rows.
+/// Returns the strongest sample between two ranges, so that a thin echo stays visible when the newest line has larger rows.
 float Waterfall::level_between(const Row& row, double from_m, double to_m) {
   if (!(row.row_m > 0)) return silent_db;
   constexpr double rounding = 1e-6;  // in samples

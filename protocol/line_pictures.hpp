@@ -1,4 +1,4 @@
-// Pictures of sonars that send no fans: a waterfall, the sweep of a turning head, and the fan below points.
+// Pictures of sonars that send no fans: a waterfall, the sweep of a turning head, and the empty fan on which points are drawn.
 #pragma once
 
 #include <deque>
@@ -11,7 +11,7 @@ namespace sonar::protocol {
 
 using Line = std::vector<float>;  // levels in the order of range [dB]
 
-/// A fan without echoes, from `half_rad` to port to as far to starboard.
+/// Returns a fan without echoes, from `half_rad` to port to `half_rad` to starboard.
 PolarImage empty_fan(double half_rad, double range_m);
 
 /// The lines of the last pings, one below the other, the newest on top.

@@ -197,7 +197,7 @@ class PushingVendor : public Vendor {
   explicit PushingVendor(std::uint16_t tcp_port)
       : ports_{{{.kind = Port::Kind::tcp_stream, .number = tcp_port, .carries = "pings"}}} {}
   std::span<const Port> ports() const override { return ports_; }
-  int default_max_clients() const override { return 4; }  // unknown: assumed
+  int default_max_clients() const override { return 4; }  // assumed, because no source states it
   bool pings_before_first_request(const DeviceState&) const override { return true; }
 
  private:

@@ -9,8 +9,8 @@
 
 namespace sonar::recording {
 
-/// Reads each frame as the datagrams that a sonar would send, numbered from 1, with the recorded header and picture. Error
-/// bad_data: the file does not begin with a valid header.
+/// Reads each frame as the datagrams that a sonar would send, numbered from 1, with the recorded header and picture. Errors:
+/// bad_data if the file does not begin with a valid header.
 Result<std::unique_ptr<RecordingReader>> read_aris_file(std::unique_ptr<Source> source);
 /// Accepts the datagrams of frames and writes complete frames; other messages are ignored. Errors: bad_data if a frame has
 /// another size than the first, because the settings have changed.

@@ -1,4 +1,4 @@
-// Checks JSON text: finds its depth, and the mistake in the JSON form of a control message, with the message's descriptor.
+// Checks JSON text: its depth, and, with the descriptor of a control message, the mistakes in the JSON form of that message.
 // protobuf 3.21 reports mistakes only as an English sentence, because its status has one code for all mistakes, and the interface
 // that reports field and value is not installed.
 #pragma once

@@ -39,7 +39,7 @@ class LineParser {
   /// Call it when a part of the stream was dropped. It discards the current line and all bytes up to the next line end, because
   /// they may belong to a dropped line.
   void skip_gap();
-  /// True if the current line is blank so far or begins with a brace, so that it can be a JSON object, and not a request line of
+  /// True if the current line is blank so far or begins with a brace, so that it can be a JSON object, but not a request line of
   /// HTTP.
   bool may_become_object() const;
 

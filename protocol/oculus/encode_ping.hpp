@@ -1,6 +1,6 @@
 // Encodes a ping as a ping result: sizes, echo of the request, and bearings, which are positive to starboard (our azimuths are
 // positive to port). Vendor::frame calls it once per ping; tests encode captured pings again with the function for PingBlocks.
-// Encodes also the small messages that a device sends beside pings.
+// Encodes also the small messages that a device sends besides pings.
 #pragma once
 
 #include <optional>
@@ -45,13 +45,13 @@ std::optional<protocol::Field> locate(protocol::Part part, protocol::FieldName n
 /// Implements Vendor::region.
 std::optional<std::pair<std::size_t, std::size_t>> locate(protocol::Region region, wire::BytesView ping);
 
-/// The status beacon, 142 bytes, sent by UDP. The messages below are a Dialogue's replies.
+/// Makes the status beacon, 142 bytes, sent over UDP. The messages below are a Dialogue's replies.
 wire::Bytes make_status(const protocol::DeviceState& device);
-/// A message without payload: keep-alive, and acknowledgement of standby.
+/// Makes a message without payload: keep-alive, and acknowledgement of standby.
 wire::Bytes make_dummy(std::uint16_t device_id);
-/// The stored configuration; if none is stored, the advertised address.
+/// Makes the message with the stored address; if none is stored, with the advertised one.
 wire::Bytes make_user_config(std::uint16_t device_id, const protocol::StoredAddress& stored, const protocol::DeviceState& device);
-/// A log message with ASCII text, such as a real device sends while it boots.
+/// Makes a log message with ASCII text, such as a real device sends while it boots.
 wire::Bytes make_log(std::uint16_t device_id, std::string_view text);
 
 }  // namespace sonar::oculus

@@ -44,7 +44,7 @@ protocol::PingFacts facts_of(const DecodedPing& ping) {
           ping.message.size()};
 }
 
-/// Returns the requested values that the sonar could not use. It echoes the request, and pings with its nearest values.
+/// Returns the requested values that the sonar could not use. The sonar echoes the request, but pings with the nearest values.
 std::vector<std::string> limits_of(const FireSettings& asked, const protocol::PingFacts& made) {
   std::vector<std::string> limits;
   constexpr double whole_rows = 1.5;  // a range ends with a whole row

@@ -16,10 +16,10 @@ std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& d
 inline constexpr std::array<protocol::HostPort, 1> host_ports{{{protocol::HostPort::Kind::tcp, tcp_port}}};
 
 /// Makes the fire message for the requested settings. Defaults: high frequency, 10 m, 10 Hz, 50 %, 512 beams, 8 bits. The rate is
-/// the nearest that a fire message can request. Error usage: a fire message does not have the mode or setting.
+/// the nearest that a fire message can request. Errors: usage if fire messages lack the mode or setting.
 Result<FireRequest> fire_from(const protocol::Wanted& wanted);
 
-/// Reads a status message.
+/// Reads a status message. Returns nullopt for other datagrams.
 std::optional<protocol::Announcement> announced(wire::BytesView datagram);
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

@@ -160,8 +160,8 @@ end
 
 -- Reading ---------------------------------------------------------------------------------------------------
 
--- Adds the fields of a layout from `offset` on; values and items by name go into `values` and `items`. Returns the offset behind
--- the last one, or nil and a complaint where the message ends before.
+-- Adds the fields of a layout from `offset` on; values and items by name go into `values` and `items`. Returns the offset after
+-- the last field; if the message ends before it, adds an expert item and returns nil.
 local function add_layout(tree, message, offset, part, values, items)
   for _, row in ipairs(layout[part]) do
     local size, read = types[row[2]][1], types[row[2]][3]
@@ -255,7 +255,7 @@ local function check_values(items, values)
   end
 end
 
--- All of these are enforced by some driver.
+-- Checks the sizes; each of these rules is enforced by some driver.
 local function check_sizes(items, values, message, header)
   local length = header.payload + HEADER
   local row = values.nBeams * (values.dataSize + 1) + (bit_set(values.flags, 2) and 4 or 0)
@@ -409,8 +409,8 @@ local function natural_length(kind, version)  -- of a client's message that anno
   return kind == 0x55 and 28 or HEADER
 end
 
--- Bytes of the message at `at`: a number; "more" when more data are needed; nil when no message begins here. After junk only a
--- known kind is believed: in the middle of an image anything can look like a header.
+-- Returns the length of the message at `at`; "more" if more data are needed; nil if no message begins here. After junk only
+-- known types are accepted, because in the middle of an image any bytes can look like a header.
 local function message_length(tvb, at, to_device, after_junk)
   local left = tvb:len() - at
   if tvb(at, 1):uint() ~= 0x53 or (left >= 2 and tvb(at + 1, 1):uint() ~= 0x4F) then return nil end
@@ -422,7 +422,7 @@ local function message_length(tvb, at, to_device, after_junk)
   return HEADER + payload
 end
 
--- The protocol column tells whether this frame has shown a message before.
+-- The protocol column shows whether this frame has shown a message before.
 local function show(pinfo, text)
   if tostring(pinfo.cols.protocol) == "Oculus" then
     pinfo.cols.info:append("; " .. text)
@@ -463,7 +463,7 @@ local function add_junk(tvb, pinfo, tree, from, to)
   show(pinfo, to - from .. " bytes of junk")
 end
 
--- First place from `at` on where a message may begin; the end of the buffer when there is none.
+-- Returns the first place from `at` on where a message may begin; the end of the buffer if there is none.
 local function next_start(tvb, at, to_device)
   local bytes = tvb:raw()
   while at < tvb:len() do
@@ -483,15 +483,15 @@ local function wait_for_more(tvb, pinfo, at, missing)
   return true
 end
 
--- What is missing of the message at `at`: nil for nothing, or for no message.
+-- Returns the number of missing bytes of the message at `at`; nil if none is missing, or if no message begins there.
 local function missing_bytes(tvb, at, to_device)
   local length = at < tvb:len() and message_length(tvb, at, to_device, false)
   if length == "more" then return DESEGMENT_ONE_MORE_SEGMENT end
   return length and length > tvb:len() - at and length - (tvb:len() - at) or nil
 end
 
--- Not dissect_tcp_pdus: it refuses units shorter than the header, which runs of junk may be. Junk waits for the message behind
--- it to be whole: TCP may hand in the same bytes again until then, and nothing is to be shown twice.
+-- Not dissect_tcp_pdus: it refuses units shorter than the header, which runs of junk may be. Junk is shown only when the
+-- message after it is whole, because TCP may pass the same bytes again until then, and nothing must be shown twice.
 function oculus.dissector(tvb, pinfo, tree)
   local to_device, at = pinfo.dst_port == pinfo.match_uint, 0
   while at < tvb:len() do

@@ -41,7 +41,7 @@ using protocol::text_option;
 std::string options_table();
 
 /// Returns the model with apertures and beam widths, which no public source states, from the options; without such options, the
-/// model itself. Error: a value for a mode that the product lacks.
+/// model itself. Errors: config for a mode that the product lacks.
 Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel> model, const protocol::OptionValues& options);
 
 /// Sample rate of the rows: 37.5 MHz / 143, exact in the capture (M1200d, mode 2). unknown: the rate of other modes; sonard

@@ -72,7 +72,7 @@ class MemorySource final : public Source {
   Bytes bytes_;
 };
 
-/// Appends whole records to a file. After an error every call fails with that error, until try_again().
+/// Appends whole records to a file. After an error of append() its next calls return that error, until try_again().
 class FileSink final : public Sink {
  public:
   FileSink(std::string name, int fd) : name_(std::move(name)), file_(fd) {}

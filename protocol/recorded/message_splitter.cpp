@@ -47,7 +47,7 @@ void MessageSplitter::lose(std::size_t count) {
   lost_bytes_ += count;
 }
 
-// After the waiting bytes others are missing, so the incomplete message is lost, and the next bytes may be in the middle of
+// Bytes are missing after the waiting ones, so the incomplete message is lost, and the next bytes may be in the middle of
 // another message.
 void MessageSplitter::break_off() {
   if (waiting_bytes() > 0) ++losses_;

@@ -27,9 +27,9 @@ class MessageSplitter {
   /// `framing` must outlive the object.
   MessageSplitter(Origin from, const Framing& framing) : from_(from), framing_(&framing) {}
 
-  /// Call next() until it returns nullopt before the next append, so that less than one message remains.
+  /// Before the next append(), call next() until it returns nullopt, so that less than one message remains.
   void append(Time at, wire::BytesView bytes);
-  /// Reports missing bytes: the incomplete message and all bytes up to the next header are lost.
+  /// Call it where bytes are missing. The incomplete message and all bytes up to the next header are then lost.
   void break_off();
   std::optional<RecordedMessage> next();
   /// Ends the stream. next() returns remaining bytes that do not begin a message; an incomplete message is lost.
@@ -58,13 +58,13 @@ class MessageSplitter {
 
 // Finds bytes of a recording that belong to no message.
 
-/// Takes the stream of a device in order, and reports each run of bytes outside messages as one damage.
+/// Reads the stream of a device in order, and reports each run of bytes outside messages as one damage.
 class JunkReport {
  public:
   /// `framing` must outlive the object. Null: the stream has no boundaries, so nothing is reported.
   explicit JunkReport(const Framing* framing) : framing_(framing) {}
 
-  /// Takes the next messages, or bytes between messages. `place` returns "byte 17", the place of these bytes.
+  /// Reads the next messages, or bytes between messages. `place` returns "byte 17", the place of these bytes.
   void take(wire::BytesView bytes, const auto& place, Damages& damages) {
     if (framing_ == nullptr) return;
     const std::size_t whole = whole_messages(bytes);

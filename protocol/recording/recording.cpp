@@ -22,7 +22,7 @@ bool is_capture(BytesView front) {
          begins_with(front, {0x0A, 0x0D, 0x0D, 0x0A});
 }
 
-/// Returns the address that selects a sonar of a capture; nullopt selects the only sonar.
+/// Returns the address that selects a sonar of a capture; nullopt if the text is empty.
 Result<std::optional<std::uint32_t>> address_from(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const auto ip = text::parse_ipv4(text);

@@ -22,8 +22,9 @@ struct Recording {
   std::string_view format;  // such as ".oculus log", "MCAP" or "capture"
   std::unique_ptr<RecordingReader> reader;
 };
-/// `sonar` selects one of several sonars, by IPv4 address in captures, by name in MCAP; empty = the sonar with most bytes, or the
-/// first. Errors: missing_file, io, bad_data; usage if a file of this format cannot name such a sonar.
+/// Opens a recording. `sonar` selects one of several sonars, by IPv4 address in captures, by name in MCAP; empty = the one that
+/// read_pcap() selects, or the first. Errors: missing_file, io, bad_data; usage if a file of this format cannot name such a
+/// sonar.
 Result<Recording> open_recording(const std::filesystem::path& file, const std::string& sonar = {});
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar = {});
 

@@ -33,12 +33,12 @@ struct PingTruth {
   std::uint32_t ping = 0;
   Time fired_at{};
   Pose sonar_in_world;
-  std::span<const BeamTruth> beams = {};       // beam 0 most to port
+  std::span<const BeamTruth> beams = {};       // beam 0 farthest to port
   std::span<const Pose> bodies_in_world = {};  // `names` has their names
   const SceneNames* names = nullptr;           // null: no names and no bodies are written
 };
 std::string truth_json(const PingTruth& truth);
-/// Writes the instances that occur in the labels of a ping.
+/// Returns the JSON of the instances that occur in the labels of a ping.
 std::string instances_json(const PingTruth& truth, const PingLabels& labels);
 
 }  // namespace sonar::recording::mcap

@@ -11,8 +11,8 @@ constexpr std::size_t most_channels = 4096;
 constexpr std::size_t most_summary_records = 1 << 20;
 constexpr std::uint64_t most_described_bytes = 16 << 20;  // limit for all schemas and channels that are kept
 
-/// True for records without messages that files may have here. Applications define records from 0x80 on, and later versions of
-/// the format may add others, also to chunks (https://mcap.dev/spec, "Records").
+/// True if a record without messages is valid here and is skipped. Applications define records from 0x80 on, and later versions
+/// of the format may add others, also to chunks (https://mcap.dev/spec, "Records").
 bool is_skipped(Opcode code, bool in_chunk) { return !in_chunk || code > Opcode::data_end; }
 
 std::string at_byte(std::uint64_t at) { return " at byte " + std::to_string(at); }
@@ -202,7 +202,7 @@ void Reader::enter_chunk(std::uint64_t at, std::uint64_t length, bool is_cut) {
   if (begin < end) chunk_end_ = end;
 }
 
-/// Compares the checksum of a chunk. Reads it in blocks, to save memory.
+/// Compares the checksum of a chunk, which is read in blocks to save memory.
 bool Reader::is_chunk_sound(std::uint64_t from, std::uint64_t size, std::uint32_t crc) {
   std::uint32_t found = 0;
   scan_.seek(from);

@@ -51,7 +51,7 @@ struct Message {
   std::uint64_t at = 0;  // offset of its record in the file, which the reader sets
 };
 
-/// Appends fields; a record is closed by end_record.
+/// Appends records: begin(), then the fields, then end().
 class RecordWriter {
  public:
   explicit RecordWriter(Bytes& out) : out_(out), writer_(out) {}

@@ -12,7 +12,7 @@
 
 namespace sonar::recording {
 
-/// Topics: /NAME/device, /NAME/client (TCP) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /tf, /NAME/labels,
+/// Topics: /NAME/device (TCP), /NAME/client (either) and /NAME/status (UDP), opaque; /NAME/image, /NAME/pose, /tf, /NAME/labels,
 /// /NAME/share and /NAME/caster in the live view's protobuf (protocol/foxglove/foxglove_messages.hpp); /NAME/truth,
 /// /NAME/instances and /faults in JSON.
 class McapSession final : public RecordingWriter {
@@ -23,7 +23,7 @@ class McapSession final : public RecordingWriter {
               std::string profile = {});
 
   Result<void> write(const RecordedMessage& message) override;
-  /// Writes the pose of the sonar at time `of`, also as the frame NAME of /tf. `at` must not decrease (see RecordedMessage).
+  /// Writes the pose of the sonar at time `of`, also as the frame NAME of /tf. `at` must not decrease (see RecordingWriter).
   Result<void> write_pose(Time at, Time of, const Pose& sonar_in_world);
   /// Writes the image of a ping whose messages hold no samples.
   Result<void> write_image(Time at, const std::shared_ptr<const Ping>& ping);

@@ -20,8 +20,8 @@ struct Packet {
   BytesView bytes;              // captured bytes, valid until the next call
 };
 
-/// pcap: seconds and micro- or nanoseconds, either byte order. pcapng: sections, interfaces with their own time unit, enhanced
-/// and simple packets; other blocks are skipped.
+/// Reads pcap in either byte order, with micro- or nanoseconds, and of pcapng the sections, the interfaces with their time units,
+/// and enhanced and simple packets; other blocks are skipped.
 class PacketReader {
  public:
   static constexpr std::size_t longest_packet = 256 << 10;  // limit of tcpdump

@@ -13,11 +13,11 @@
 namespace sonar::recording {
 
 struct PcapReading {
-  std::optional<std::uint32_t> device;  // address of the device; nullopt: the sonar that sent most bytes
+  std::optional<std::uint32_t> device;  // address of the device; nullopt: read_pcap() selects the sonar
 };
-/// Reads all connections of one sonar, one after the other, and its status datagrams; if it sends pings over UDP, all its
-/// datagrams. First reads the file once to find the sonar: the sender of a make's messages at that make's port, else the sender
-/// of most bytes. Errors: bad_data if there is none.
+/// Reads all connections of one sonar in the order of the capture, and its status datagrams; if it sends pings over UDP, all its
+/// datagrams. First reads the file once to find the sonar: of the senders of a make's messages, one at the make's port, else the
+/// one that sent most bytes. Errors: bad_data if there is none.
 Result<std::unique_ptr<RecordingReader>> read_pcap(std::unique_ptr<Source> source, const PcapReading& reading = {});
 
 struct PcapConversation {

@@ -169,7 +169,7 @@ class PcapReader final : public RecordingReader {
     const bool from_device = segment.source.address == found_.device.at.address;
     if (!found_.device.tcp) {
       if (segment.target == found_.device.at)
-        return take(Origin::client);  // tested first, because both ends may have one address
+        return take(Origin::client);  // tested first, because both ends may have the same address
       if (from_device) take(Origin::device);
       return;
     }
