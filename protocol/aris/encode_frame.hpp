@@ -13,7 +13,7 @@ namespace sonar::aris {
 
 inline constexpr std::size_t longest_datagram = 1400;  // an older sample program has a buffer of that size
 
-/// Converts from the picture, [samples][beams] with beam 0 most to starboard, to the order in which the device digitises:
+/// Converts from the picture, [samples][beams] with beam 0 farthest to starboard, to the order in which the device digitises:
 /// [pings][samples][16 channels].
 Bytes raw_from_picture(BytesView picture, std::size_t samples, int pings);
 Bytes picture_from_raw(BytesView raw, std::size_t samples, int pings);
@@ -41,7 +41,7 @@ bool change_beacon(protocol::FieldName name, const std::function<std::int64_t(st
 struct DecodedFrame {
   std::int32_t index = 0;
   FrameHeader header;
-  Bytes picture;  // [samples][beams], beam 0 most to starboard
+  Bytes picture;  // [samples][beams], beam 0 farthest to starboard
   std::size_t samples = 0, beams = 0;
 };
 /// Collects the datagrams of a frame until it is complete. If the next frame begins before that, the incomplete frame is dropped

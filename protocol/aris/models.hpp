@@ -21,7 +21,7 @@ inline constexpr int most_samples_per_row = 8;  // 1 would be no integration
 
 inline constexpr int channels = 16;  // beams that one ping of a frame forms
 /// Gains of the channels from starboard [dB], from SMP: the level of each channel's beams in frames 1 to 3, relative to the
-/// beams beside them. Frames 4 to 6 agree within 0.25 dB rms. unknown: the gains of other units; all emulated units have these.
+/// neighbouring beams. Frames 4 to 6 agree within 0.25 dB rms. unknown: the gains of other units; all emulated units have these.
 inline constexpr std::array<float, channels> channel_gain_db{-1.13f, 1.39f, -0.99f, 0.55f, -0.07f, -0.12f, -0.18f, 0.72f,
                                                              -0.48f, 0.63f, -0.74f, 0.67f, 0.23f,  -0.56f, 0.53f,  -0.45f};
 

@@ -22,7 +22,7 @@ Bytes set_config(bool acoustics, const std::string& range_mode) {
   return line_of(message.dump());
 }
 
-/// First asks for the settings, so that on_leave() can put them back: the device keeps those of the last driver.
+/// First requests the settings, so that on_leave() can put them back: the device keeps those of the last driver.
 Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
   Bytes all = line_of(R"({"command":"get_config"})");
   const Bytes ours =
@@ -31,7 +31,8 @@ Bytes request(const protocol::SettingsOverride& wanted, const Product& product) 
   return all;
 }
 
-/// The reach of the shortest range mode that covers the distance. The picture has this range, so that its scale is steady.
+/// Returns the reach of the shortest range mode that covers the distance. The picture has this range, so that its scale is
+/// steady.
 double window_m(double distance_m) {
   double far_m = 0;
   for (const auto& model : models())  // reports do not have the model

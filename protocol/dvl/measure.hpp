@@ -42,7 +42,7 @@ Reckoning reckoned(const Reckoning& before, const Measurement& measured, const P
 /// Returns the position at `now`, after the last ping, extrapolated with the last velocity.
 Reckoning extrapolated(const Reckoning& last, Time now);
 
-/// The velocity in the device's frame, by weighted least squares from the valid beams (at least three).
+/// Returns the velocity in the device's frame, with weighted least squares from the valid beams (at least three).
 struct Estimate {
   Vec3d velocity_mps;
   Covariance covariance{};

@@ -115,7 +115,7 @@ std::optional<Outcome> Session::execute(const std::string& command, const Json& 
   const auto before = s.configured();
   auto outcome = carry_out(command, parameters, device_, now, s);
   if (s.configured() != before || command == "reset_dead_reckoning") reaction.events.emplace_back(change_to(s, device_));
-  if (s.acoustics) waiting_ = 0;  // enabled acoustics end the triggers
+  if (s.acoustics) waiting_ = 0;  // enabled acoustics drop the triggers that wait
   return outcome;
 }
 

@@ -87,7 +87,7 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
 Bytes geometry(const Ping& ping, std::uint32_t number);
 /// Makes the sonar.v1.PingTruth of a ping that was made with SimulationSwitches::keep_truth.
 Bytes truth(const Ping& ping);
-/// Makes a sonar.v1.Picture. `times`: the marks beside a waterfall.
+/// Makes a sonar.v1.Picture. `times`: the time marks at the side of a waterfall.
 Bytes picture(const SonarPicture& picture, std::span<const TimeMark> times);
 /// Makes sonar.v1.Findings.
 Bytes findings(std::span<const doctor::Finding> all);

@@ -17,7 +17,7 @@ constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size 
 constexpr std::size_t notices_per_call = 8;                                            // bounds the log output of a hostile host
 
 /// The dialogue with one host (docs/protocols/micron.md, "Session"):
-/// - After power-up or a reboot the head has no parameters: it sends mtAlive once a second and ignores requests for scan lines.
+/// - After power-up or a reboot the head has no parameters: it sends mtAlive once per second and ignores requests for scan lines.
 /// - mtHeadCommand sets the parameters. The next mtAlive reports that they were received, and the one after it reports that they
 ///   are valid.
 /// - mtSendData requests one or two scan lines (`wanted_`). For each the head turns (`arrives_`), a ping is requested and awaited

@@ -5,7 +5,7 @@
 namespace sonar::norbit {
 namespace {
 
-/// The sender is that of the first packet. In a recording that sonard made, one message holds both packets of a ping.
+/// Returns the sender of the first packet. In a recording that sonard made, one message holds both packets of a ping.
 std::optional<recording::Sender> sender_of(const recording::RecordedMessage& message) {
   const auto size = framing.length(message.bytes, recording::Origin::device, true);
   if (!size || *size > message.bytes.size()) return std::nullopt;

@@ -87,7 +87,7 @@ PolarImage with_samples(PolarImage fan, const Column& column) {
   return fan;
 }
 
-/// Where the fan looks: mode 0 is that of a forward-looking sonar.
+/// Returns the elevation of the middle of the fan; mode 0 is that of a forward-looking sonar.
 double elevation_of(int sonar_mode) { return sonar_mode == 0 ? 0 : -pi / 2; }
 
 /// The two packets of a ping arrive at two ports, at each port in the order of the pings. The packets of a slow connection may

@@ -27,10 +27,10 @@ constexpr void fields(auto& visit, wire::Like<OsPingParams> auto& m) {
   visit("reserved_3", m.reserved1);
 }
 
-/// Followed by `results` powers, 0 to 65535 from lowest_db to highest_db.
+/// `results` powers follow; 0 to 65535 mean lowest_db to highest_db.
 struct OsMonoProfile {
   std::uint32_t ping = 0, start_mm = 0, length_mm = 0, power_up_ms = 0, hz = 0;
-  std::uint16_t gain = 0, results = 0, speed_dmps = 0;  // tenths of a metre a second
+  std::uint16_t gain = 0, results = 0, speed_dmps = 0;  // tenths of a metre per second
   std::uint8_t channel = 0, reserved = 0;
   float pulse_s = 0, analog_gain = 0, highest_db = 0, lowest_db = 0, transducer_heading_deg = 0, vehicle_heading_deg = 0;
 };

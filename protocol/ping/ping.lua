@@ -1,5 +1,5 @@
 -- Wireshark dissector for the ping protocol of Blue Robotics and Cerulean: Ping360 on UDP 12345 and 9092, Surveyor on TCP and UDP
--- 62312, Omniscan and S500 on 51200, Ping1D on 9090. It shares nothing with the C++ code, so that the two can judge each other
+-- 62312, Omniscan and S500 on 51200, Ping1D on 9090. It shares nothing with the C++ code, so that each can check the other
 -- (tests/acceptance/ping_link_test.py). Layouts: docs/protocols/ping.md; how to install it: clients/wireshark/README.md.
 
 local ping = Proto("brping", "Blue Robotics ping protocol")

@@ -63,7 +63,7 @@ constexpr void fields(auto& visit, wire::Like<Distance> auto& m) {
   visit("gain_setting", m.gain, means::gain);
 }
 
-/// Followed by `count` strengths of one byte each.
+/// `count` strengths of one byte each follow.
 struct Profile : Distance {
   std::uint16_t count = 0;
 };

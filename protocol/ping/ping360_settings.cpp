@@ -39,7 +39,7 @@ SonarModel make_model() {
   mode.centre_hz = 750e3f;
   mode.min_range_m = 0.15f;
   mode.max_range_m = 50;
-  mode.source_level_db = 200;  // unknown: level and gains; set so that a wall near by is bright at gain 0
+  mode.source_level_db = 200;  // unknown: level and gains; chosen so that a nearby wall is bright at gain 0
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(2));     // recalled from the data sheet

@@ -48,7 +48,8 @@ class PingHost : public protocol::Host {
   void ask(protocol::HostActions& actions) const {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
-  /// Tells the user if the gain of the ping, `step` of 0 to `most`, is not the wanted one, because a gain has few steps.
+  /// Adds to HostPing::limited if the gain of the ping, `step` of 0 to `most`, is not the wanted one, because a gain has few
+  /// steps.
   void compare_gain(int step, int most, protocol::HostPing& ping) const;
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
   /// Returns the reason of the error; nullopt = no error, because the host sends another request. `why`: text from the sonar.
@@ -63,7 +64,7 @@ class PingHost : public protocol::Host {
 };
 
 /// Checks the wanted settings of a sonar with one mode, this highest rate (nullopt: not known yet) and these options of sonarctl.
-/// Error usage: a setting that it does not have.
+/// Errors: usage for a setting that the sonar does not have.
 Result<void> check_wanted(std::string_view title, std::optional<float> fastest_hz, std::initializer_list<std::string_view> known,
                           const protocol::Wanted& wanted);
 

@@ -86,7 +86,7 @@ class PowerHost final : public PingHost {
   }
   std::optional<Time> next_tick() const override { return ask_at_; }
   bool is_open() const override { return has_requested_ || !ask_at_; }
-  /// Both products until the sonar shows which one it is: they share the port.
+  /// Names both products, which share the port, until the sonar shows which of them it is.
   std::string about() const override {
     return shown_.empty() ? std::string(product_->title) + " or " + std::string(other_->title) : std::string(shown_);
   }
@@ -112,7 +112,7 @@ class PowerHost final : public PingHost {
     shown_ = product_->title;
     request_pings(actions);
   }
-  /// The sonar is an Omniscan, to which the host's first request belongs.
+  /// Called when the sonar is found to be an Omniscan. Requests pings, unless the host has done so.
   void keep_product(HostActions& actions) {
     if (std::exchange(ask_at_, std::nullopt) && !has_requested_) request_pings(actions);
   }

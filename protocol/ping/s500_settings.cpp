@@ -19,7 +19,7 @@ using protocol::refused;
 
 constexpr int points = 1024;                // DEF: number of powers in a profile of one frequency
 constexpr std::uint32_t most_mm = 142000;   // CLI: limit of the hosts
-constexpr int fastest_ms = 100;             // MAN: at most 10 pings a second
+constexpr int fastest_ms = 100;             // MAN: at most 10 pings per second
 constexpr double shortest_pulse_us = 20;    // unknown: assumed
 constexpr double db_per_gain = 4;           // unknown: assumed, as are the level and full scale
 constexpr std::size_t averaged_pings = 20;  // DEF

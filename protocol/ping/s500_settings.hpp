@@ -59,7 +59,7 @@ double gain_percent(const Parameters& parameters);
 /// Returns the settings `now`, changed by the automatic range and gain after a ping. The ping may have been made with earlier
 /// settings.
 Settings after(const Ping& ping, const Settings& now);
-/// The frames for Settings::results, in the order of their numbers.
+/// Makes the frames for Settings::results, in the order of their numbers.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
 /// Does the same as ping1d::answer().
 std::vector<Bytes> answer(BytesView recorded, Results wanted);

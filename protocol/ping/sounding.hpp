@@ -1,5 +1,5 @@
-// The part that the dialogues with range finders (Ping1D, S500) share: each ping is fired for results that a host requests or
-// streams.
+// The part that the dialogues with range finders (Ping1D, S500) share: each ping is fired for results that a host has
+// requested, once or as a stream.
 #pragma once
 
 #include <cmath>

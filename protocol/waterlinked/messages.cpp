@@ -239,7 +239,7 @@ StrengthMessage strength_message(const Ping& ping, const Settings& settings, con
 }
 
 /// Samples are taken at whole periods of the device's clock, independent of the time of the shot. A batch continues where the
-/// previous one ended; after a pause, or at first, it begins one period of the mode before the shot.
+/// previous one ended; after a pause, or initially, it begins one period of the mode before the shot.
 ImuMessage imu_message(const Ping& ping, const Settings& settings, const protocol::DeviceState& device) {
   ImuMessage m;
   m.sequence = static_cast<std::uint32_t>(ping.request.number);

@@ -1,5 +1,5 @@
 -- Wireshark dissector for the images of a Water Linked Sonar 3D-15, UDP 4747 (for other ports: "Decode as"). It shares nothing with
--- the C++ code, so that the two can judge each other (tests/acceptance/waterlinked_link_test.py). Layouts:
+-- the C++ code, so that each can check the other (tests/acceptance/waterlinked_link_test.py). Layouts:
 -- docs/protocols/waterlinked.md; how to install it: clients/wireshark/README.md.
 
 local rip = Proto("waterlinked", "Water Linked Sonar 3D-15")
@@ -47,7 +47,7 @@ local function varint(text, at)
   end
 end
 
--- A raw Snappy block; nil when it is none.
+-- Returns the content of a raw Snappy block; nil if the bytes are not a valid block.
 local function unpacked(text)
   local size, at = varint(text, 1)
   if not size or size > LARGEST then return nil end
@@ -85,7 +85,7 @@ local function unpacked(text)
   return table.concat(parts)
 end
 
--- Calls take(number, value) for each field of a protobuf message: a number, or bytes; fixed ones as bytes. False: not a message.
+-- Calls take(number, value) for each protobuf field; fixed-size numbers are bytes. Returns false if this is no message.
 local function each(text, take)
   local at = 1
   while at <= #text do
