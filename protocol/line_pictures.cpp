@@ -34,7 +34,7 @@ float Waterfall::level_between(const Row& row, double from_m, double to_m) {
   return *std::max_element(at(first), at(last));
 }
 
-/// The scale follows the strongest echo of all lines shown, so that it is the same for all of them.
+/// Makes the drawing. Its scale follows the strongest echo of all lines shown, and is the same for all lines.
 SonarPicture Waterfall::picture_of(const std::deque<Row>& rows, float shown_db) {
   const Row& newest = rows.front();
   SonarPicture seen{.kind = PictureKind::waterfall, .image = {}};

@@ -16,7 +16,7 @@ std::optional<recording::Sender> sender_of(const recording::RecordedMessage& mes
   return recording::Sender{.model = models().front(), .names_model = false};
 }
 
-/// Each report counts as a ping.
+/// Finds the ping in a message. Each report counts as a ping.
 std::optional<recording::PingPart> ping_part(BytesView message) {
   if (recording::begins_with(message, {'w', 'r'})) return recording::PingPart{.port = serial_port};
   if (!is_json(message)) return std::nullopt;

@@ -78,7 +78,7 @@ struct Settings {
   int mode = 2;  // range mode of the next ping
   Reckoning reckoning;
 
-  /// The values that clients set.
+  /// Returns the values that clients set.
   auto configured() const {
     return std::tuple(speed_of_sound_mps, mounting_rotation_deg, acoustics, dark, cycles, range_mode, ntp_address, serial_output,
                       is_triggered);

@@ -207,7 +207,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Heartbeat::id:
       return handle(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
-      // Autopilots send the same attitude in both forms. Only the form with a quaternion is used, to use none twice.
+      // Autopilots send the same attitude in both forms. Only the form with a quaternion is used, so that none is used twice.
       if (!received_within(AttitudeQuaternion::id, at.now, source_silence)) handle(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:

@@ -52,7 +52,7 @@ using InjectFailure = std::function<MavResult(std::uint32_t unit, FailureType ty
 
 /// True if the vehicle has a range finder, whose distances can be sent.
 using HasRangeFinder = std::function<bool()>;
-/// True while the vehicle's poses come otherwise than by MAVLink, so that this link need not bring any.
+/// True while the vehicle's poses come from a source other than MAVLink, so that this link need not receive any.
 using HasOtherPoses = std::function<bool()>;
 
 struct SourcedPose {
@@ -77,15 +77,15 @@ class MavlinkPoses {
   static constexpr std::chrono::nanoseconds source_silence = std::chrono::seconds(1);
 
   /// Without `inject` the command to inject a failure is answered as unsupported.
-  /// Without `has_range_finder` the commands that ask for DISTANCE_SENSOR are answered as unsupported.
+  /// Without `has_range_finder` the commands that request DISTANCE_SENSOR are answered as unsupported.
   explicit MavlinkPoses(Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = {},
                         HasOtherPoses has_other_poses = {});
-  /// `now` may have any origin, but never goes back.
+  /// `now` may have any origin, but must not decrease.
   Reaction on_datagram(BytesView datagram, Time now);
   /// Call it several times per second. Sends heartbeats and requests. Reports the selected system and the missing parts of a
   /// pose: when poses start or stop, and at growing intervals while none arrive.
   Reaction on_tick(Time now);
-  /// Empty while poses arrive, here or otherwise; else one sentence with everything that is missing.
+  /// Returns one sentence with everything that is missing; empty while poses arrive, here or from another source.
   std::string health_error(Time now) const;
   /// Returns the name of another vehicle (system) that sends messages, which are ignored; else empty.
   std::string rival(Time now) const;
@@ -182,11 +182,11 @@ class MavlinkPoses {
   bool has_autopilot_ = false, is_submarine_ = false, sim_state_is_coarse_ = false;
   bool global_has_fix_ = false, sim_state_has_fix_ = false;
   Time found_at_{}, last_received_{}, next_heartbeat_{}, next_request_{}, next_reminder_{};
-  std::optional<Time> first_tick_;  // first tick
+  std::optional<Time> first_tick_;  // time of the first tick
   std::optional<bool> reported_;    // true: poses arrived at the last report
   std::chrono::nanoseconds reminder_period_{0};
   std::optional<std::pair<int, int>> ignored_;  // system and component of the last ignored message
-  /// Text of the notice for each system and component that one has named since the vehicle was selected.
+  /// Systems and components that notices have named since the vehicle was selected, with the text of the notice.
   std::map<std::pair<int, int>, std::string> reported_ignored_;
   std::pair<int, int> rival_{};  // the last ignored component of another system than the vehicle's
   Time rival_at_{};

@@ -36,7 +36,7 @@ HeadCommand command_of(const protocol::SettingsOverride& wanted) {
   return c;
 }
 
-/// The parameters with which a scan line was made.
+/// Returns the parameters with which a scan line was made.
 HeadCommand command_of(const HeadData& line) {
   HeadCommand c;
   c.control = line.control;

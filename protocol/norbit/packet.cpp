@@ -17,7 +17,7 @@ constexpr std::uint8_t good_quality = 8;  // DFD: quality of a signal 12 dB abov
 constexpr std::size_t longest_packet = 24 + 168 + (1u << 20) + 4 * 512;
 constexpr double most_pixel = 32767;
 
-/// A whole packet: the header, `front`, and the bytes after it.
+/// Makes a whole packet: the header, `front`, and `rest`.
 Bytes sealed(Type type, const auto& front, const Bytes& rest) {
   Bytes body = wire::bytes_of(front);
   body.insert(body.end(), rest.begin(), rest.end());

@@ -77,7 +77,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
   }
 
  private:
-  /// Refuses the request in automatic mode, in which the device determines range and gain.
+  /// True in manual mode. In automatic mode the device determines range and gain, so the request is refused.
   bool is_manual(const Frame& frame, Reaction& reaction) const {
     const bool manual = settings_after(reaction).parameters.mode_auto == 0;
     if (!manual) refuse(frame, "the mode is automatic", reaction);

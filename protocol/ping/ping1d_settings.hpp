@@ -55,7 +55,7 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 
 /// Returns the reason if the device refuses the parameters, else an empty text.
 std::string complaint(const Parameters& parameters);
-/// Duration of the pulse with these parameters.
+/// Returns the duration of the pulse with these parameters [us].
 std::uint16_t transmit_us(const Parameters& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
@@ -66,7 +66,7 @@ using ping::find_echo;
 /// Returns range and gain of the automatic mode after a ping in which `echo` was found.
 Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
-/// The frames for Settings::results, in the order of their message ids.
+/// Makes the frames for Settings::results, in the order of their message ids.
 std::vector<Bytes> frames_of(const Ping& ping);
 /// The frames for the results `wanted`, made from a recorded frame. The recorded frame is returned unchanged if it is one of
 /// them, or if `wanted` is no_result. A frame with more values than the recorded one gets no samples, and 0 for the missing

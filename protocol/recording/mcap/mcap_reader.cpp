@@ -91,7 +91,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
     give_up("the record" + at_byte(at) + " is cut short by the end of the " + (in_chunk ? "chunk" : "file"));
     return std::nullopt;
   }
-  const std::uint64_t behind = scan_.position() + length;
+  const std::uint64_t record_end = scan_.position() + length;
   if (!in_chunk && (code == Opcode::data_end || code == Opcode::footer)) {
     end_at(at);
     return std::nullopt;
@@ -105,7 +105,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
       damages_.add("the record" + at_byte(at) + " is too long, " + std::to_string(length) + " bytes");
     } else if (is_message) {
       auto message = take_message(content, at);
-      scan_.seek(behind);
+      scan_.seek(record_end);
       return message;
     } else {
       take_description(code, content, at);
@@ -114,7 +114,7 @@ std::optional<Message> Reader::take_record(std::uint64_t end, bool in_chunk) {
     damages_.add("the record" + at_byte(at) + " has the opcode " + std::to_string(static_cast<unsigned>(code)) +
                  ", which no record of a chunk has");
   }
-  scan_.seek(behind);
+  scan_.seek(record_end);
   return std::nullopt;
 }
 

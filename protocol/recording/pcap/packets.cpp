@@ -174,14 +174,14 @@ unsigned u8_at(BytesView bytes, std::size_t offset) {
 }
 
 /// Returns the packet in an Ethernet frame, after any number of VLAN tags.
-std::optional<BytesView> behind_ethernet(BytesView frame) {
+std::optional<BytesView> after_ethernet(BytesView frame) {
   std::size_t at = 12;
   while (u16_at(frame, at) == vlan_type || u16_at(frame, at) == provider_type) at += 4;
   if (u16_at(frame, at) != ip_type || frame.size() < at + 2) return std::nullopt;
   return frame.subspan(at + 2);
 }
 
-std::optional<BytesView> behind(BytesView frame, std::size_t header, bool is_ip) {
+std::optional<BytesView> after_header(BytesView frame, std::size_t header, bool is_ip) {
   if (!is_ip || frame.size() < header) return std::nullopt;
   return frame.subspan(header);
 }
@@ -189,20 +189,20 @@ std::optional<BytesView> behind(BytesView frame, std::size_t header, bool is_ip)
 std::optional<BytesView> ip_packet(std::uint32_t link_type, BytesView frame) {
   switch (link_type) {
     case ethernet:
-      return behind_ethernet(frame);
+      return after_ethernet(frame);
     case raw_ip:
     case raw_bsd:
     case raw_openbsd:
     case ipv4:
       return frame;
     case cooked:
-      return behind(frame, 16, u16_at(frame, 14) == ip_type);
+      return after_header(frame, 16, u16_at(frame, 14) == ip_type);
     case cooked2:
-      return behind(frame, 20, u16_at(frame, 0) == ip_type);
+      return after_header(frame, 20, u16_at(frame, 0) == ip_type);
     case null_link:  // address family 2 (IPv4) in the byte order of the computer that captured
-      return behind(frame, 4, u32_at(frame, 0) == 2 || u32_at(frame, 0) == 0x02000000);
+      return after_header(frame, 4, u32_at(frame, 0) == 2 || u32_at(frame, 0) == 0x02000000);
     case loop_link:
-      return behind(frame, 4, u32_at(frame, 0) == 2);
+      return after_header(frame, 4, u32_at(frame, 0) == 2);
     default:
       return std::nullopt;
   }
