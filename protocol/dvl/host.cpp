@@ -22,7 +22,7 @@ Bytes set_config(bool acoustics, const std::string& range_mode) {
   return line_of(message.dump());
 }
 
-/// Makes the commands. The settings are read first, so that on_leave() can put them back: the device keeps those of a driver.
+/// Makes the commands, first those that read the settings for on_leave(), because the device keeps those of the last driver.
 Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
   Bytes all = line_of(R"({"command":"get_config"})");
   const Bytes ours =

@@ -35,7 +35,7 @@ Bytes bytes_of(std::string_view text) {
   return Bytes(bytes.begin(), bytes.end());
 }
 
-/// Makes the commands. The settings are read first, so that on_leave() can put them back: the sonar keeps those of a driver.
+/// Makes the commands, first those that read the settings for on_leave(), because the sonar keeps those of the last driver.
 Bytes request_of(const protocol::SettingsOverride& wanted) {
   std::string text;
   for (const std::string_view name : set_by_us) text.append(name).append("\r\n");

@@ -12,8 +12,8 @@ using protocol::Reaction;
 constexpr std::uint16_t firmware_major = 3, firmware_minor = 29, supply_mv = 5000;
 constexpr double housing_above_water_c = 8;  // assumed
 
-/// The dialogue with one host. Each setting has its own message; SoundingConversation fires the pings that the host requests or
-/// streams.
+/// The dialogue with one host. Each setting has its own message; SoundingConversation fires the pings for the host's requests
+/// and streams.
 class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
  public:
   Ping1DDialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)

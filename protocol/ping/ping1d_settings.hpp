@@ -1,4 +1,4 @@
-// The Ping1D: its model, the checks of its settings, its automatic mode, and the frames of a ping. Pure functions; sources:
+// The Ping1D: its model, the checks of its settings, its automatic mode, and the frames of a ping. No I/O; sources:
 // protocol/ping/README.md.
 #pragma once
 
@@ -68,8 +68,8 @@ Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
 /// Makes the frames for Settings::results, in the order of their message ids.
 std::vector<Bytes> frames_of(const Ping& ping);
-/// The frames for the results `wanted`, made from a recorded frame. The recorded frame is returned unchanged if it is one of
-/// them, or if `wanted` is no_result. A frame with more values than the recorded one gets no samples, and 0 for the missing
+/// Makes the frames for the results `wanted`, made from a recorded frame. The recorded frame is returned unchanged if it is one
+/// of them, or if `wanted` is no_result. A frame with more values than the recorded one gets no samples, and 0 for the missing
 /// values. Returns none if the recorded frame holds no result.
 std::vector<Bytes> answer(BytesView recorded, Results wanted);
 
