@@ -26,7 +26,7 @@ struct Endpoint {
   bool operator==(const Endpoint&) const = default;
 };
 
-/// Sets the receivers of ping datagrams. A request on a client's connection sets the list of this connection, which ends with it;
+/// Sets the receivers of ping datagrams. A request on a client's connection sets a list that ends with the connection;
 /// other connections have their own lists. A request over UDP or HTTP sets the device's list, which replaces Port::group.
 struct SetReceivers {
   std::vector<Endpoint> to;  // address 0.0.0.0 = the requesting host

@@ -16,8 +16,8 @@ bool same_settings(const Settings& a, const Settings& b) {
   return a == b;
 }
 
-/// Returns the device's findings in a ping; null if there are none. A make
-/// whose device has findings defines this function in its own namespace.
+/// Returns the device's findings in a ping; null if there are none. A make whose device has findings
+/// defines this function in its own namespace.
 std::shared_ptr<const PingFindings> findings_of(const auto&, const Ping&) { return nullptr; }
 
 /// Findings of type T, as PingFindings.

@@ -19,7 +19,7 @@ class Framer {
  public:
   explicit Framer(Sender sender) : sender_(sender) {}
 
-  /// Adds received bytes. Call next() until it returns nullopt before the next append, so that less than one message remains.
+  /// Adds received bytes. Before the next append, call next() until it returns nullopt, so that less than one message remains.
   void append(wire::BytesView received);
   /// Returns the next whole message, including the header; it is valid until the next call of append or next.
   std::optional<wire::BytesView> next();

@@ -44,7 +44,7 @@ end
 local function gamma(value) return "exponent " .. (value == 0 and "1" or string.format("%.3f", value / 255)) end
 local function no_limit(value) return (value == 0 or value == 255) and "no limit" or "Mbit/s" end
 
--- Layouts: name, type, then what there is to say about the value. Order and widths are those of the wire. ---
+-- Layouts: name, type, then the display of the value. Order and widths are those of the wire. ---
 
 local layout = {
   header = {
@@ -476,7 +476,7 @@ local function next_start(tvb, at, to_device)
   return at
 end
 
--- Asks TCP for `missing` bytes more and to be called again from `at` on; false where it cannot (cut packets, reassembly off).
+-- Requests `missing` more bytes and a new call from `at` on; returns false if TCP cannot do so (cut packets, reassembly off).
 local function wait_for_more(tvb, pinfo, at, missing)
   if tvb:len() < tvb:reported_len() or pinfo.can_desegment == 0 then return false end
   pinfo.desegment_offset, pinfo.desegment_len = at, missing
