@@ -106,7 +106,7 @@ class Controller:
         self.command(ACOUSTICS, 5, acoustics(*values, **named))
 
     def frame(self):
-        """The next whole frame."""
+        """Returns the next whole frame."""
         index, header, raw, total = None, b"", {}, 0
         while True:
             data = self.udp.recv(2048)

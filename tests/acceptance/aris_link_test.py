@@ -56,10 +56,10 @@ class ArisLink(unittest.TestCase):
         self.assertLessEqual(len(data), 256)
         self.assertEqual((beacon[1], beacon[2], beacon[4]), ([7001], [1], [0]))
         self.assertNotIn(9, beacon)
-        early = any(self.tells_early(beacons) for _ in range(20))  # a busy computer delays some
+        early = any(self.is_early(beacons) for _ in range(20))  # a busy computer delays some
         self.assertTrue(early, "at once, not with the next beacon, a second later")
 
-    def tells_early(self, beacons):
+    def is_early(self, beacons):
         """Connects after a beacon that says free. Returns whether the one that says busy comes in less than a beacon's period."""
         self.assertTrue(beacons.until_state(0, 30))
         begin_s = beacons.arrived_s

@@ -94,7 +94,7 @@ class Host:
         return bytes(data)
 
     def receive(self):
-        """Type, request id and payload of the next frame that is not a keep-alive."""
+        """Returns type, request id and payload of the next frame that is not a keep-alive."""
         while True:
             magic, kind, _, request, size = struct.unpack("<4sHHII", self.receive_exactly(16))
             assert magic == b"BVE1", magic
@@ -142,7 +142,7 @@ class Host:
 
 
 def discover(address, patience_s=30):
-    """Model, serial and TCP port of the sonar at an address, or None."""
+    """Returns model, serial and TCP port of the sonar at an address, or None."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.settimeout(patience_s)
         s.sendto(b"BVE?" + struct.pack("<H", 1), (address, DISCOVERY_PORT))

@@ -26,7 +26,7 @@ def pose_at(t):
 
 class Clocks(unittest.TestCase):
     def driven(self, clock, drive, pause_s=0.0):
-        """The depths stated in PINGS pings, and the digest of the stream; drive(control, n) causes ping n."""
+        """Returns the depths stated in PINGS pings, and the digest of the stream; drive(control, n) causes ping n."""
         with Sonard(arguments=["--clock", clock, "--digest", "--exit-after-pings", PINGS]) as daemon:
             with Client(daemon.address) as client:
                 client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))

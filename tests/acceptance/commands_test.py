@@ -251,7 +251,7 @@ class Interrupted(unittest.TestCase):
         self.assertLess(time.monotonic() - begin, 10)
 
     def started(self, *words):
-        """The process, once its handler of SIGTERM is in place."""
+        """Starts sonarctl; returns its process when the handler of SIGTERM is in place."""
         process = subprocess.Popen([SONARCTL, *words], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                    text=True)
         self.addCleanup(process.wait)

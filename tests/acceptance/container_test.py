@@ -13,7 +13,7 @@ TEXT = FILE.read_text(encoding="utf-8")
 
 
 def instructions():
-    """(word, rest) of each instruction, with continued lines joined and without comments."""
+    """Returns (word, rest) of each instruction, with continued lines joined and without comments."""
     lines = [line for line in TEXT.splitlines() if not line.lstrip().startswith("#")]
     joined = re.sub(r"\\\n\s*", " ", "\n".join(lines))
     lines = [" ".join(line.split()) for line in joined.splitlines() if line.strip()]
@@ -97,7 +97,7 @@ class Container(unittest.TestCase):
 
     @unittest.skipIf(shutil.which("hadolint") is None, "hadolint is not here")
     def test_hadolint_finds_nothing(self):
-        result = run("hadolint", "--ignore", "DL3008", FILE)  # DL3008 demands fixed versions; the release determines ours
+        result = run("hadolint", "--ignore", "DL3008", FILE)  # DL3008 requires fixed versions; the Debian release fixes ours
         self.assertEqual(result.returncode, 0, result.stdout)
 
 

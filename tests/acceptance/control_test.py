@@ -19,13 +19,13 @@ CURL = shutil.which("curl")
 
 
 def examples():
-    """The command lines of the page, in order."""
+    """Returns the command lines of the page, in order."""
     blocks = re.findall(r"^```sh\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)
     return [line for block in blocks for line in block.splitlines() if line.startswith("curl ")]
 
 
 def parse(example):
-    """(method, host, path, headers, body) of a curl command with the options that the page uses."""
+    """Returns (method, host, path, headers, body) of a curl command with the options that the page uses."""
     words = shlex.split(example)[1:]
     method, url, headers, body = None, None, {}, None
     while words:
@@ -102,7 +102,7 @@ class Page(unittest.TestCase):
         def run_one(example, host):
             method, _, path, headers, body = parse(example)
             if "/events" in path:
-                return  # never ends: read below
+                return  # this stream never ends; curl reads it in the next test
             self.check(path, *ask(host, method, path, headers, body))
         self.run_examples(run_one)
 

@@ -28,7 +28,7 @@ def small_job(pings, shard):
 
 
 def shipped_loader():
-    """The generator that docs/datasets.md shows first."""
+    """Returns the generator that docs/datasets.md shows first."""
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/datasets.md").read_text(encoding="utf-8"), re.S)
     names = {}
     exec(blocks[0], names)  # pylint: disable=exec-used
@@ -36,7 +36,7 @@ def shipped_loader():
 
 
 def features(samples):
-    """Features of each sample: its level, the level around it, and its difference from the level of its row."""
+    """Returns features of each sample: its level, the level around it, and its difference from the level of its row."""
     level = np.log1p(samples.astype(float))
     around = sum(np.roll(np.roll(level, dy, 0), dx, 1) for dy in range(-2, 3) for dx in range(-2, 3)) / 25
     row = level.mean(1, keepdims=True) + 0 * level

@@ -82,12 +82,12 @@ def demo(maker):
 
 
 def product_of(daemon):
-    """The text that sonard prints when it starts."""
+    """Returns the name of the product that sonard prints when it starts."""
     return re.search(r"^sonar +front +(.+?)  ", daemon.log(), re.MULTILINE).group(1)
 
 
 def rows_of(image):
-    """The pixels of a RawImage, as lists of numbers."""
+    """Returns the pixels of a RawImage, as lists of numbers."""
     size = {"mono8": 1, "mono16": 2, "32FC1": 4}[image["encoding"]]
     data, step = image["data"], image["step"]
     values = list(data) if size == 1 else [int.from_bytes(data[i:i + size], "little") for i in range(0, len(data), size)]
@@ -95,13 +95,13 @@ def rows_of(image):
 
 
 def echoes(rows, noise):
-    """Fraction of the samples that exceed the noise at their range."""
+    """Returns the fraction of the samples that exceed the noise at their range."""
     loudest = [sorted(row)[int(MOST_NOISE * (len(row) - 1))] for row in noise]
     return sum(v > most for row, most in zip(rows, loudest) for v in row) / sum(len(row) for row in rows)
 
 
 def rows_seen(viewer, pings):
-    """Samples of the next pings, grouped by range."""
+    """Returns the samples of the next pings, grouped by range."""
     images, begin_ns = [], time.time_ns()
     while len(images) < pings:
         topic, ns, data = viewer.wait_for(lambda kind, _: kind == "message")

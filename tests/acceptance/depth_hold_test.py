@@ -41,7 +41,7 @@ class Autopilot:
         self.port, self.peer, self.speak = self.socket.getsockname()[1], peer, mavlink_frames.Speaker()
 
     def next(self, name):
-        """The fields of the next message of that name."""
+        """Returns the fields of the next message of that name."""
         while True:
             datagram, self.peer = self.socket.recvfrom(512)
             for message, fields in mavlink_frames.read_frames(datagram):
@@ -49,7 +49,7 @@ class Autopilot:
                     return fields
 
     def arrived(self):
-        """The distances that have arrived."""
+        """Yields the distances that have arrived."""
         self.socket.setblocking(False)
         try:
             while True:
@@ -60,7 +60,7 @@ class Autopilot:
             self.socket.settimeout(120)
 
     def command(self, code, interval_us=0):
-        """The MAV_RESULT."""
+        """Sends a command; returns its MAV_RESULT."""
         self.socket.sendto(self.speak("COMMAND_LONG", target_system=1, target_component=193, command=code, param1=132,
                                       param2=interval_us), self.peer)
         return self.next("COMMAND_ACK")["result"]

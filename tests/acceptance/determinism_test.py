@@ -21,7 +21,7 @@ PATIENCE_S = 120
 
 
 def run(threads, seed=1):
-    """SHA-256 of the bytes that a client received, and the digest that the daemon printed."""
+    """Returns the SHA-256 of the bytes that a client received, the digest that sonard printed, and the number of pings."""
     with Sonard(trajectory="orbit", mount="{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}",
                 arguments=["--clock", "stepped", "--digest", "--exit-after-pings", PINGS, "--threads", threads, "--seed", seed]) as daemon:
         received, pings = hashlib.sha256(), 0
@@ -52,7 +52,7 @@ class Determinism(unittest.TestCase):
 
 
 def way():
-    """A dive around the middle of the harbour, with the bow towards it: a CSV line every 0.2 s."""
+    """Returns a dive around the middle of the harbour, with the bow towards it: a CSV line every 0.2 s."""
     lines = ["# frame: ENU_FLU", "t_s,x_m,y_m,z_m,yaw_deg"]
     for step in range(11 + round(5 * STEPS * STEP_S)):
         turned = math.radians(4 * step / 5)
@@ -61,7 +61,7 @@ def way():
 
 
 def profiles():
-    """Continuous_start (1400) of profiles (1300) of the ping protocol."""
+    """Returns the request continuous_start (1400) of the ping protocol, for profiles (1300)."""
     body = b"BR" + struct.pack("<HHBBH", 2, 1400, 0, 0, 1300)
     return body + struct.pack("<H", sum(body) & 0xFFFF)
 

@@ -47,14 +47,14 @@ def framed(kind, version, payload):
 
 
 def same(shown, value):
-    """The text that tshark prints for a value, in which floating-point numbers have 15 digits."""
+    """Returns the text that tshark prints for a value, in which floating-point numbers have 15 digits."""
     if isinstance(value, float):
         return float(shown) == value or abs(float(shown) - value) <= 1e-14 * abs(value)
     return int(shown, 0) == value if isinstance(value, int) else shown == value
 
 
 def dumped_values(line):
-    """A line of dump_oculus with the dissector's names: {name: [values]}."""
+    """Returns a line of dump_oculus with the dissector's names: {name: [values]}."""
     values, kind = {}, line["kind"]
     for name, value in line["fields"].items():
         part = {"header": "header", "fire": "fire", "extension": "fire", "sizes": "ping"}.get(name)
@@ -141,7 +141,7 @@ class Dissected(unittest.TestCase):
             self.assertEqual(found.raw("log.text").decode("ascii"), line["text"])
 
     def expect_agreement(self, found, sent, dumped):
-        """tshark, the reader in Python and our decoder on the same messages."""
+        """Compares tshark, the reader in Python and our decoder on the same messages."""
         self.assertEqual(len(found), len(sent))
         self.assertEqual(len(dumped), len(sent))
         for message, data, line in zip(found, sent, dumped):
@@ -323,10 +323,10 @@ class Malformed(Dissected):
 
     def test_lengths_beyond_the_limits_are_junk(self):
         for payload in (4 * 1024 * 1024 - 15, 0x7FFFFFFF, 0xFFFFFFFF):
-            liar = HEADER.pack(0x4F53, 7001, 0, 0x23, 0, payload, 0)
-            found = self.dissect_stream(liar + golden("dummy"))
+            header = HEADER.pack(0x4F53, 7001, 0, 0x23, 0, payload, 0)
+            found = self.dissect_stream(header + golden("dummy"))
             self.assertEqual([m.is_junk() for m in found], [True, False], payload)
-        capture = Capture()  # a client's limit is lower
+        capture = Capture()  # the limit for messages of clients is lower
         capture.connect()
         capture.tcp("client", HEADER.pack(0x4F53, 0, 0, 0x15, 0, 4097, 0) + golden("fire_v0"))
         self.assertEqual([m.is_junk() for m in self.dissect(capture)], [True, False])

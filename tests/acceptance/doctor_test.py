@@ -15,7 +15,7 @@ PATIENT = ("--within", "40")  # for busy machines; a quiet one takes 3 s
 
 
 def doctor(address, *arguments, control_port=14770):
-    """Exit code and findings by check, ignoring other programs on this machine."""
+    """Returns exit code, findings by check, and the whole answer, ignoring other programs on this machine."""
     result = run(SONARCTL, "doctor", address, "--json", "--status-on", address, "--control",
                  f"{address}:{control_port}", "--http", f"{address}:8088", *arguments)
     found = json.loads(result.stdout)
@@ -25,7 +25,7 @@ def doctor(address, *arguments, control_port=14770):
     return result.returncode, by_check, found
 
 
-def told_of_control(daemon, *arguments):
+def doctor_by_control(daemon, *arguments):
     """Like doctor(), but only the control stream is given; the daemon reports the address of HTTP."""
     result = run(SONARCTL, "doctor", daemon.address, "--json", "--status-on", daemon.address, "--control", f"{daemon.address}:14770",
                  *PATIENT, *arguments)
@@ -62,11 +62,11 @@ class Doctor(unittest.TestCase):
 
     def test_http_is_asked_where_the_daemon_serves_it(self):
         with Sonard() as daemon:
-            code, findings, _ = told_of_control(daemon)
+            code, findings, _ = doctor_by_control(daemon)
             self.expect(findings, "http", "ok", f"http://{daemon.address}:8088/healthz returns ok")
             self.assertEqual(code, 0)
         with Sonard(http="off") as daemon:
-            self.expect(told_of_control(daemon)[1], "http", "ok", "HTTP is not served")
+            self.expect(doctor_by_control(daemon)[1], "http", "ok", "HTTP is not served")
 
     def test_a_token_that_was_not_given_is_a_warning_that_says_how(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -74,14 +74,14 @@ class Doctor(unittest.TestCase):
             token.write_text("0123456789abcdef01234567\n", encoding="utf-8")
             token.chmod(0o600)
             with Sonard(control=f', token_file: "{token}"') as daemon:
-                code, findings, _ = told_of_control(daemon)
+                code, findings, _ = doctor_by_control(daemon)
                 self.expect(findings, "control", "warn", "requires a token", "--token-file FILE")
                 self.assertEqual(code, 0)
-                code, findings, _ = told_of_control(daemon, "--token-file", token)
+                code, findings, _ = doctor_by_control(daemon, "--token-file", token)
                 self.expect(findings, "control", "ok", "1 sonar")
                 self.assertEqual(code, 0)
                 token.write_text("another one, long enough\n", encoding="utf-8")
-                code, findings, _ = told_of_control(daemon, "--token-file", token)
+                code, findings, _ = doctor_by_control(daemon, "--token-file", token)
                 self.expect(findings, "control", "fail", "is not that of control.token_file")
 
     def test_nothing_running_says_what_to_do(self):

@@ -22,7 +22,7 @@ OURS = ("EUSAGE", "EINTEGRITY", "EJSONPARSE")  # npm's error codes for a wrong p
 
 
 def install():
-    """The reason why the readers are missing; empty if they are installed."""
+    """Returns the reason why the readers are missing; empty if they are installed."""
     for program in ("node", "npm"):
         if not shutil.which(program):
             return f"no {program}"
@@ -79,7 +79,7 @@ class Driver:
                     self.messages.append(message)
 
     def sums(self):
-        """{ping number: SHA-256 of its samples}; 8 bit."""
+        """Returns {ping number: SHA-256 of its samples}, for samples of 8 bits."""
         pings = [Ping(message) for message in self.messages]
         return {ping.id: hashlib.sha256(b"".join(map(bytes, ping.image))).hexdigest() for ping in pings}
 

@@ -155,7 +155,7 @@ class Viewer:
         return "answer", (service, call, payload[13:13 + length].decode(), payload[13 + length:])
 
     def wait_for(self, wanted, patience_s=200):
-        """The first received item for which wanted(kind, value) is true."""
+        """Returns the first received item for which wanted(kind, value) is true."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
             kind, value = self.receive()
@@ -216,7 +216,7 @@ class Viewer:
         return self.wait_for(is_answer), kinds[-1]
 
     def first_of(self, topic, patience_s=200):
-        """The first message of the channel, decoded; waits for it if there is none yet."""
+        """Returns the first message of the channel, decoded; waits for it if there is none yet."""
         found = [payload for name, _, payload in self.messages if name == topic]
         if not found:
             found = [self.wait_for(lambda kind, value: kind == "message" and value[0] == topic, patience_s)[2]]
@@ -230,7 +230,7 @@ class Viewer:
         return self.schemas[channel["schema"]].decode(channel["schemaName"], payload)
 
     def status(self, part="", patience_s=200):
-        """The next status message that contains this text."""
+        """Returns the next status message that contains this text."""
         return self.wait_for(lambda kind, value: kind == "word" and value["op"] == "status" and part in value["message"], patience_s)
 
 
@@ -245,7 +245,7 @@ def varint(data, at):
 
 
 def fields(data):
-    """(number, wire type, value) of a protobuf message."""
+    """Yields (number, wire type, value) of a protobuf message."""
     at = 0
     while at < len(data):
         tag, at = varint(data, at)

@@ -63,7 +63,7 @@ class FullDisk(unittest.TestCase):
         subprocess.run(["mount", "-o", "remount,size=64m,nr_inodes=10000", str(self.disk)], check=True)
 
     def expect_refusal(self, done):
-        """The program ended with one sentence that names a file on the disk and what to do."""
+        """Checks that the program ended with one sentence that names a file on the disk and what to do."""
         self.assertEqual(done.returncode, 74, done.stdout + done.stderr)
         told = done.stderr.strip().splitlines()[-1]
         self.assertRegex(told, rf"cannot (write|make the folder) {re.escape(str(self.disk))}/\S*: No space left on device; "
@@ -90,7 +90,7 @@ class FullDisk(unittest.TestCase):
                     refused += 1
                     there = bytes_of(self.disk)
                     self.assertFalse((self.disk / "set/coco").exists())
-                    for name, contents in there.items():  # what has its name is whole
+                    for name, contents in there.items():  # files with their final names are complete
                         if name.startswith("set/") and ".tmp" not in name and ".unfinished" not in name:
                             self.assertEqual(contents, self.wanted[name[len("set/"):]], name)
                 self.make_room()

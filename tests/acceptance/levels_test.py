@@ -23,7 +23,7 @@ def scene_of_render_file(path, folder):
 
 class Levels(unittest.TestCase):
     def percentiles(self, flags, pings, echoed):
-        """Median and 99th percentile after several pings; their echo must state `echoed` per cent."""
+        """Returns median and 99th percentile of the last of several pings; its echo must state `echoed` per cent."""
         request = fire_message(rate_hz=15, flags=flags, range_=2.0, gain=50.0, sound_speed=1490.658551265436)
         with tempfile.TemporaryDirectory() as folder:
             scene = scene_of_render_file(ROOT / "tests/validation/scenes/like-the-capture.yaml", folder)

@@ -63,7 +63,7 @@ class Reader(threading.Thread):
         assert len(self.pings) >= count, f"{len(self.pings)} of {count} pings; {self.ending}"
 
     def lost(self):
-        """The missing numbers between the first ping and the last."""
+        """Returns how many numbers between the first ping and the last are missing."""
         return self.pings[-1] - self.pings[0] + 1 - len(self.pings)
 
 
@@ -106,7 +106,7 @@ class Started:
 
 
 def worked_s(daemon):
-    """Used processor time [s]."""
+    """Returns the used processor time [s]."""
     fields = pathlib.Path(f"/proc/{daemon.process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 

@@ -153,7 +153,7 @@ class Preview(unittest.TestCase):
             with Client(daemon.address) as client:
                 client.send(fire_message())
                 self.assertEqual(client.ping().id, 1, "a driver's first ping")
-                deadline = time.monotonic() + 60  # the view looks ten times a second
+                deadline = time.monotonic() + 60  # the live view checks this ten times a second
                 while viewer.parameters("now", "/front/preview")["/front/preview"]:
                     self.assertLess(time.monotonic(), deadline)
                     time.sleep(0.1)  # a viewer that sends requests without a pause is disconnected
@@ -182,7 +182,7 @@ class Preview(unittest.TestCase):
 
 
 def follows_file(loop=False):
-    """A trajectory of ten seconds, straight ahead."""
+    """Returns a daemon whose trajectory goes straight ahead for ten seconds."""
     daemon = Sonard(trajectory=f"{{file: ahead.tum, loop: {str(loop).lower()}}}", control=ORIGINS)
     lines = ["# frame: ENU_FLU", "100 -7 0 -3 0 0 0 1", "110 -6 0 -3 0 0 0 1"]
     (pathlib.Path(daemon.folder.name) / "ahead.tum").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -198,7 +198,7 @@ class Channels(unittest.TestCase):
             self.assertLessEqual(set(stamps["/front/ping"][:20]), set(stamps["/front/cloud"]))
 
     def test_fast_lines_come_without_loss(self):
-        """A sonar with 100 lines a second loses no share of them by a limit; a busy computer may lose some by full queues."""
+        """A sonar with 100 lines a second loses none by limits; a busy computer may lose some because queues are full."""
         with Sonard(profile="ping1d") as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribed("/front/ping", "/front/cloud")
             with subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "ping1d", "--range", "1", "--rate", "100"],
@@ -328,7 +328,7 @@ class LookingChangesNothing(unittest.TestCase):
             with Client(daemon.address) as client, contextlib.suppress(EOFError):
                 client.send(fire_message())
                 for n in range(10**6):
-                    if viewers == 8 and n == 10:  # one dies in the middle
+                    if viewers == 8 and n == 10:  # one viewer disconnects after ten messages
                         connections.pop().socket.close()
                     received.update(client.message()[1])
             self.assertEqual(daemon.wait(), 0, daemon.log())

@@ -41,7 +41,7 @@ class Packet:
         return (self.delay + sample * self.interval) * self.speed / 2
 
     def levels(self, least_m, most_m, least_deg, most_deg):
-        """Level, beam and sample of the values in a window."""
+        """Returns level, beam and sample of the values in a window."""
         rows = [k for k in range(self.samples) if least_m <= self.range_of(k) <= most_m]
         beams = [j for j in range(self.beams) if least_deg <= self.angles[j] <= most_deg]
         return [(abs(self.at(j, k)), j, k) for j in beams for k in rows]

@@ -46,7 +46,7 @@ VOLATILE = {"at_s", "rate_hz", "interval_max_ms", "interval_p50_ms", "interval_p
 
 
 def pixels_of(png):
-    """SHA-256 of the uncompressed rows, so that the version of zlib has no influence."""
+    """Returns the SHA-256 of the uncompressed rows, so that the version of zlib has no influence."""
     data, at, packed = png.read_bytes(), 8, b""
     while at < len(data):
         size, kind = int.from_bytes(data[at:at + 4], "big"), data[at + 4:at + 8]

@@ -115,7 +115,7 @@ class Vehicle(threading.Thread):
         self.socket.close()
 
     def was_in_time(self):
-        """It sends every 20 ms; one of 20 may be late."""
+        """Returns whether at most one message of 20, sent every 20 ms, was late."""
         late = [one for one, other in zip(self.sent, self.sent[1:]) if other[0] - one[0] > 0.03]
         return len(late) <= 0.05 * len(self.sent)
 
@@ -124,7 +124,7 @@ class Vehicle(threading.Thread):
 
 
 def target(i):
-    """East, north."""
+    """Returns the position of a target: east, north [m]."""
     angle = 2 * math.pi * (i + 0.25) / TARGETS
     return RING_M * math.cos(angle), RING_M * math.sin(angle)
 

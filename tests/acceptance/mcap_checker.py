@@ -51,7 +51,7 @@ class Fields:
 
 
 def records(data, begin, end):
-    """(opcode, offset, content) of records that fill [begin, end) exactly."""
+    """Yields (opcode, offset, content) of records that fill [begin, end) exactly."""
     at = begin
     while at < end:
         expect(end - at >= 9, f"no record fits at {at}")

@@ -39,7 +39,7 @@ class Line:
         self.bins = payload[31:]
 
     def strongest(self, least_m, most_m, speed):
-        """Value and range of the strongest bin in a window."""
+        """Returns value and range of the strongest bin in a window."""
         row_m = self.interval * 640e-9 * speed / 2
         rows = range(int(least_m / row_m), min(int(most_m / row_m), len(self.bins)))
         best = max(rows, key=lambda row: self.bins[row])

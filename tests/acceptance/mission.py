@@ -14,7 +14,7 @@ TWO_CLIENTS = "{frame: FLU, xyz_m: [0, 0, 0]}\n    clients: {max: 2}"  # inserte
 
 
 def way(seconds):
-    """A slow curve in front of the rod, which turns: CSV lines of two bodies, every 0.2 s."""
+    """Returns a slow curve in front of the rod, which turns: CSV lines of two bodies, every 0.2 s."""
     lines = ["# frame: ENU_FLU", "body,t_s,x_m,y_m,z_m,yaw_deg"]
     for step in range(5 * seconds + 1):
         t = step / 5
@@ -82,7 +82,7 @@ class Mission:
         return self
 
     def pictures(self):
-        """The pings of the stream."""
+        """Returns the pings of the stream."""
         found, rest = [], self.stream
         while rest:
             size = 16 + int.from_bytes(rest[10:14], "little")

@@ -55,7 +55,7 @@ class WholeMission(unittest.TestCase):
         kept("mission-pace", f"{SECONDS / took_s:.1f} x: {SECONDS} s in {took_s:.0f} s", "faster than real time", took_s < SECONDS)
 
     def received_again(self, log, flown):
-        """True if our client receives the same bytes from the replay as the client of the mission did."""
+        """Returns whether our client receives the same bytes from the replay as the client of the mission did."""
         with tempfile.TemporaryDirectory() as folder, Replay(log, "--stepped") as replay:
             again = pathlib.Path(folder) / "again.raw"
             done = run(SONARCTL, "listen", replay.address, "--as-it-is", "--wait", 100, "--pings", PINGS, "--quiet", "--record", again, patience_s=600)

@@ -40,7 +40,7 @@ def _read(message, offset, prefix, layout):
 
 
 def fields_of(message):
-    """[(filter name without "oculus.", its bytes, its value)] in wire order."""
+    """Returns [(filter name without "oculus.", its bytes, its value)] in wire order."""
     kind, version = struct.unpack_from("<HH", message, 6)
     fire = FIRE + (EXTENSION if version == 2 else [])
     found = list(_read(message, 0, "header", HEADER))

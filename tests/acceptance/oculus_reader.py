@@ -74,7 +74,7 @@ class Ping:
         return [samples for _, samples in self._rows]
 
     def brightest(self, row_begin=0, row_end=None):
-        """Range [m], bearing [deg], value of the largest sample in rows [row_begin, row_end)."""
+        """Returns range [m], bearing [deg], value of the largest sample in rows [row_begin, row_end)."""
         rows = range(row_begin, self.rows if row_end is None else row_end)
         row = max(rows, key=lambda r: max(self.image[r]))
         beam = max(range(self.beams), key=lambda b: self.image[row][b])
@@ -156,7 +156,7 @@ def reading(client):
 
 
 def expected_bearings(beams, half_aperture_deg):
-    """The bearing law of the capture: equal steps of the sine, truncated to hundredths of a degree."""
+    """Returns bearings by the law of the capture: equal steps of the sine, truncated to hundredths of a degree."""
     top = math.sin(math.radians(half_aperture_deg))
     values = [math.degrees(math.asin(top * (2 * i / (beams - 1) - 1))) for i in range(beams)]
     return [int(100 * v + math.copysign(1e-6, v)) for v in values]

@@ -48,7 +48,7 @@ def why_not():
 
 
 def fields(package):
-    """The control file as a dictionary; continuation lines joined."""
+    """Returns the control file as a dictionary, with continuation lines joined."""
     text = run("dpkg-deb", "-f", package).stdout
     return dict(line.split(": ", 1) for line in text.replace("\n ", " ").splitlines() if ": " in line)
 

@@ -221,7 +221,7 @@ class Live(PageChecks, unittest.TestCase):
 
     @staticmethod
     def tube(folder):
-        """A scene with a tube of 20 m, 2 cm wide, of 32000 triangles."""
+        """Writes a scene with a tube of 20 m, 2 cm wide, of 32000 triangles."""
         around, rings = 16, 1001
         places = [(0.02 * i, 0.01 * math.cos(math.tau * k / around), 0.01 * math.sin(math.tau * k / around))
                   for i in range(rings) for k in range(around)]
@@ -256,7 +256,7 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.querySelector('.fault-card progress').value < 0.97")
             page.wait("sonardTest.facts.findings?.some((f) => f.check === 'fault' && f.level > 0)")
             page.wait("document.querySelector('#announce').textContent.includes('fault: Deaf head')")
-            time.sleep(2.5)  # screen readers hear of changes at most every 2 s
+            time.sleep(2.5)  # screen readers get changes at most every 2 s
             announced = page.run("document.querySelector('#announce').textContent")
             self.assertNotIn("A fault acts", announced, "named twice, and after its end")
             page.click("#findings button.link")
@@ -324,7 +324,7 @@ class Live(PageChecks, unittest.TestCase):
         return f"document.querySelector('[data-trouble={name.lower().replace(' ', '_')}]')"
 
     def circle(self):
-        """A trajectory file: a circle around the middle of the demo's scene in 90 s, with the bow towards the middle."""
+        """Writes a trajectory file: a circle around the middle of the demo's scene in 90 s, with the bow towards the middle."""
         path = self.scratch() / "survey.csv"
         rows = []
         for n in range(901):
@@ -349,7 +349,7 @@ class Live(PageChecks, unittest.TestCase):
                     page.close()
 
     def test_axe_finds_nothing_serious(self):
-        """On the page as it opens, and after it was used: a fault, a refused setting, a held picture, the help."""
+        """Tests the page as it opens, and after use: with a fault, a refused setting, a held picture, the help."""
         axe = self.axe()
         with Sonard(mount=MOUNT, trajectory="orbit", arguments=["--faults"]) as daemon, Driver(daemon.address):
             for theme in ("dark", "light"):
@@ -389,7 +389,7 @@ class Live(PageChecks, unittest.TestCase):
         return found
 
     def axe(self):
-        """The text of axe-core, from npm with the versions of view/npm; into the build."""
+        """Returns the text of axe-core, which npm installs into the build folder with the versions of view/npm."""
         folder = BUILD / "tests/page-npm"
         if shutil.which("npm") is None:
             self.skipTest("no npm")

@@ -28,7 +28,7 @@ class Capture:
         self.packets.append(header[:10] + struct.pack("!H", _checksum(header)) + header[12:] + segment)
 
     def tcp(self, sender, data, flags=0x18):
-        """A segment from "device" or "client": ACK and PSH unless `flags` is given."""
+        """Writes a segment from "device" or "client": ACK and PSH unless `flags` is given."""
         receiver = "client" if sender == "device" else "device"
         (source, source_port), (target, target_port) = self.ends[sender], self.ends[receiver]
         header = struct.pack("!HHIIBBHHH", source_port, target_port, self.sequence[sender] & 0xFFFFFFFF,
@@ -56,7 +56,7 @@ class Capture:
 
 
 def pieces(data, sizes):
-    """`data` cut into pieces of these sizes, the rest in pieces of the largest that fits a packet."""
+    """Yields `data` cut into pieces of these sizes, the rest in pieces of the largest that fits a packet."""
     at, sizes = 0, iter(sizes)
     while at < len(data):
         size = next(sizes, 60000)

@@ -29,7 +29,7 @@ def frame(number, payload=b""):
 
 
 def read(data):
-    """(id, payload) of each frame."""
+    """Returns (id, payload) of each frame."""
     frames = []
     while data:
         size, number = struct.unpack("<HH", data[2:6])
@@ -216,8 +216,8 @@ class SurveyorLink(unittest.TestCase):
             self.assertEqual(struct.unpack_from("<I", host.next(3012)[0], 20)[0], first + step)
         now = time.time()
         host.send(frame(15, struct.pack("<QI", int(now * 1000), 0)))
-        told_s = lambda: struct.unpack_from("<Q", host.next(3012)[0], 4)[0] / 1000  # noqa: E731
-        eventually(lambda: abs(told_s() - time.time()) < 1)  # earlier pings may still wait to be read
+        stamp_s = lambda: struct.unpack_from("<Q", host.next(3012)[0], 4)[0] / 1000  # noqa: E731
+        eventually(lambda: abs(stamp_s() - time.time()) < 1)  # earlier pings may still wait to be read
         host.send(settings(0))
         expect_quiet(host.udp)
 
@@ -228,7 +228,7 @@ def side_scan(enable, length_mm=10000, results=600):
 
 class OmniscanLink(unittest.TestCase):
     def profile(self, payload):
-        """Ping number and powers [dB]."""
+        """Returns ping number and powers [dB]."""
         highest, lowest = struct.unpack_from("<ff", payload, 36)
         count = struct.unpack_from("<H", payload, 22)[0]
         self.assertEqual(len(payload), 52 + 2 * count)
@@ -262,7 +262,7 @@ class OmniscanLink(unittest.TestCase):
             self.assertEqual(self.served_again(file, daemon.address), frames)
 
     def connected_once_free(self, address):
-        """The host by UDP is forgotten some time after it has disabled pings."""
+        """Returns a TCP connection once the UDP host is forgotten, some time after it has disabled pings."""
         give_up = time.monotonic() + 60
         while time.monotonic() < give_up:
             tcp = socket.create_connection((address, OMNISCAN))
@@ -331,7 +331,7 @@ class Ping1DLink(unittest.TestCase):
 
 
 def sound(period_ms, report):
-    """An S500's ping parameters, with range and gain automatic."""
+    """Returns a frame with an S500's ping parameters, range and gain automatic."""
     return frame(1015, struct.pack("<IIhhHHHBB", 0, 0, -1, period_ms, 0, report, 0, 0, 0))
 
 

@@ -88,7 +88,7 @@ class Ending(unittest.TestCase):
         with Sonard(scene="tank-rod.yaml", profile="oculus-m1200d") as daemon:
             with Client(daemon.address) as stalled:
                 stalled.ping_made_with(fire_message(rate_hz=40, flags=0x4B, version=2, extended=0x200))
-                time.sleep(1)  # it stops reading, so its window fills
+                time.sleep(1)  # the client reads nothing, so its window fills
                 code, seconds = daemon.stop()
             self.assertEqual(code, 0, daemon.log())
             self.assertLess(seconds, 20)  # the documented limit is 2 s

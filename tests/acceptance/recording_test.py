@@ -24,7 +24,7 @@ SEEDS = ROOT / "tests/fuzz/corpus"
 
 
 def split(stream):
-    """Messages of a device's stream."""
+    """Returns the messages of a device's stream."""
     found = []
     while stream:
         magic, _, _, _, _, payload, _ = HEADER.unpack_from(stream)
@@ -35,7 +35,7 @@ def split(stream):
 
 
 def oculus_log_messages(data):
-    """Type 10 of an .oculus file, by the table of docs/recording.md."""
+    """Returns the messages of type 10 of an .oculus file, by the table of docs/recording.md."""
     assert struct.unpack_from("<II6s", data) == (0x11223344, 48, b"Oculus")
     at, found = 48, []
     while at < len(data):
@@ -48,7 +48,7 @@ def oculus_log_messages(data):
 
 
 class Replay:
-    """sonard replay FILE."""
+    """Runs sonard replay FILE."""
 
     address = "127.0.0.9"
 

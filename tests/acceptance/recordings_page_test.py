@@ -55,7 +55,7 @@ class Recordings(PageChecks, unittest.TestCase):
         os.chdir(folder.name)
 
     def look(self, viewer, kind, product):
-        """The page names the product and plays; then it seeks, pauses and plays again."""
+        """Checks that the page names the product and plays, then seeks, pauses and plays again."""
         viewer.greeted().subscribe("/recording/picture", "/recording/fan", "/recording/ping", "/status")
         self.assertEqual(viewer.first_of("/recording/picture", PATIENCE_S)["kind"], kind)
         image = viewer.first_of("/recording/fan")
@@ -121,7 +121,7 @@ class Recordings(PageChecks, unittest.TestCase):
             self.assertIn("pings 2", done.stdout, done.stderr)
 
     def test_recordings_of_sonarctl_have_name_and_poses_of_the_sonar(self):
-        """They come from the sonard of this computer, although no --control names it."""
+        """Name and poses come from the sonard of this computer, although no --control names it."""
         with demo("oculus"):
             done = run(SONARCTL, "record", "--mcap", "run.mcap", "--wait", 100, "--pings", 20)
             self.assertEqual(done.returncode, 0, done.stderr)

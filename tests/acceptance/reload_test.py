@@ -61,7 +61,7 @@ class Watcher(threading.Thread):
             self.ending = error
 
     def ping_after(self, more, patience_s=200):
-        """The newest ping, after waiting for a number of new ones."""
+        """Returns the newest ping, after waiting for a number of new ones."""
         wanted, deadline = len(self.ids) + more, time.monotonic() + patience_s
         while len(self.ids) < wanted:
             assert self.ending is None and time.monotonic() < deadline, f"{len(self.ids)} of {wanted} pings; {self.ending!r}"
@@ -69,7 +69,7 @@ class Watcher(threading.Thread):
         return Ping(self.newest)
 
     def wrong(self, daemon, begin=0):
-        """Number of ids from that position on that are repeated, out of order, or missing without being counted by the daemon."""
+        """Counts ids from `begin` on that are repeated, out of order, or missing without being counted by the daemon."""
         steps = [b - a for a, b in zip(self.ids[begin:], self.ids[begin + 1:])]
         figures = daemon.status()["sonars"][0]["figures"]
         counted = int(figures["skipped_ticks"]) + int(figures["dropped"])

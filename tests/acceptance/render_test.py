@@ -22,7 +22,7 @@ sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
 
 
 def read_npy(path):
-    """Shape, type and numbers of an array, by the format's description."""
+    """Returns shape, type and numbers of an array, by the format's description."""
     data = path.read_bytes()
     assert data[:8] == b"\x93NUMPY\x01\x00", data[:8]
     (length,) = struct.unpack_from("<H", data, 8)

@@ -80,7 +80,7 @@ class Reproducibility(unittest.TestCase):
             mcap_checker.check(mission.recorded("rest.mcap").read_bytes())
 
     def expect_true_places(self, recording):
-        """Pose and frames in protobuf agree with the ground truth in JSON."""
+        """Checks that pose and frames in protobuf agree with the ground truth in JSON."""
         frames = [frame for message in recording.read("/tf") for frame in message["transforms"]]
         self.assertEqual([frame["child_frame_id"] for frame in frames], ["front", "object/rod"] * PINGS)
         for number, (pose, truth) in enumerate(zip(recording.read("/front/pose"), recording.read("/front/truth"))):

@@ -90,7 +90,7 @@ class Sonard(Daemon):
             raise AssertionError(self.log())
 
     def ctl(self, command, *arguments, **options):
-        """sonarctl COMMAND ADDRESS ..."""
+        """Runs sonarctl COMMAND ADDRESS ..."""
         waits = command in ("view", "stats") or "--pings" in arguments
         wait = ("--wait", 100) if waits and "--wait" not in arguments else ()  # for the first ping
         return run(SONARCTL, command, self.address, *arguments, *wait, **options)
@@ -105,11 +105,11 @@ class Sonard(Daemon):
             return answer.read().decode()
 
     def ctl_to(self, endpoint, command, *arguments, **options):
-        """sonarctl COMMAND ... --to ENDPOINT, for poses."""
+        """Runs sonarctl COMMAND ... --to ENDPOINT, for poses."""
         return run(SONARCTL, command, *arguments, "--to", endpoint, **options)
 
     def stop(self, timeout_s=60):
-        """Exit code after SIGTERM, and the seconds it took."""
+        """Returns the exit code after SIGTERM, and the seconds until the end."""
         start = time.monotonic()
         return super().stop(timeout_s), time.monotonic() - start
 

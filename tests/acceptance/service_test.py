@@ -22,7 +22,7 @@ NEEDS_SYSTEMD = unittest.skipIf(shutil.which("systemd-analyze") is None, "system
 
 
 def settings():
-    """Key -> values in their order; repeated keys add up."""
+    """Returns key -> values in their order; repeated keys add up."""
     found = {}
     for line in UNIT.read_text(encoding="utf-8").splitlines():
         match = re.match(r"(\w+)=(.*)", line)
@@ -32,7 +32,7 @@ def settings():
 
 
 def calls_of(set_name, seen=()):
-    """The system calls of a set such as @system-service, including those of nested sets."""
+    """Returns the system calls of a set such as @system-service, including those of nested sets."""
     calls = set()
     for line in run("systemd-analyze", "syscall-filter", set_name).stdout.splitlines():
         name = line.strip()
@@ -140,7 +140,7 @@ class Unit(unittest.TestCase):
 
     @staticmethod
     def refuses_memory(libc):
-        """Set in a child process, because it cannot be undone."""
+        """Returns whether the kernel has the switch, which is set in a child process, because it cannot be undone."""
         child = os.fork()
         if child == 0:
             os._exit(0 if libc.prctl(PR_SET_MDWE, PR_MDWE_REFUSE_EXEC_GAIN, 0, 0, 0) == 0 else 1)

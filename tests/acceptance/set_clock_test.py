@@ -99,7 +99,7 @@ class SetClock(unittest.TestCase):
 
     @staticmethod
     def times_of(pcap):
-        """The times of the packets."""
+        """Returns the times of the packets."""
         magic, = struct.unpack_from("<I", pcap)
         times, at = [], 24
         while at < len(pcap):

@@ -29,7 +29,7 @@ def tshark(*arguments, dissector=DISSECTOR):
 
 
 def why_not():
-    """The reason if no tshark with Lua can run here; else None."""
+    """Returns the reason if no tshark with Lua can run here; else None."""
     if shutil.which("tshark") is None:
         return "tshark is not installed (Debian: apt-get install tshark)"
     with tempfile.NamedTemporaryFile("w", suffix=".lua") as probe:
@@ -66,7 +66,7 @@ class Message:
 
 
 def messages(capture, *arguments):
-    """Every message of a capture file in order, from tshark's detailed tree."""
+    """Returns every message of a capture file in order, from tshark's detailed tree."""
     tree = ElementTree.fromstring(tshark("-r", capture, "-T", "pdml", "-J", "oculus", *arguments))
     protocols = (proto for packet in tree.iter("packet") for proto in packet.findall("proto"))
     return [Message(proto) for proto in protocols if proto.get("name") == "oculus"]

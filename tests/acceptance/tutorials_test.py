@@ -16,7 +16,7 @@ import made_logs  # noqa: E402  pylint: disable=wrong-import-position
 
 
 def follow(name, folder):
-    """Runs the commands of a tutorial in `folder`; (exit code, output)."""
+    """Runs the commands of a tutorial in `folder`; returns (exit code, output)."""
     text = (ROOT / "docs/tutorials" / name).with_suffix(".md").read_text(encoding="utf-8")
     for file, content in re.findall(r"`(\w+\.yaml)`:\n\n```yaml\n(.*?)^```", text, re.M | re.S):
         (folder / file).write_text(content, encoding="utf-8")

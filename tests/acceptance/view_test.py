@@ -121,7 +121,7 @@ class View(unittest.TestCase):
                 reads.join(20)
 
     def test_an_observer_connects_again_after_a_restart_of_sonard(self):
-        for words in (("--observe",), ("--make", "oculus")):  # the second gets no slot at first, and one after the restart
+        for words in (("--observe",), ("--make", "oculus")):  # the second gets no slot initially, but one after the restart
             with self.subTest(words), Sonard() as daemon:
                 control = ("--control", f"{daemon.address}:14770")
                 said, pings = (pathlib.Path(daemon.folder.name) / name for name in ("said", "pings"))

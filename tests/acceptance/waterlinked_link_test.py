@@ -59,7 +59,7 @@ def varint(data, at):
 
 
 def unpacked(block):
-    """A raw Snappy block."""
+    """Returns the content of a raw Snappy block."""
     size, at = varint(block, 0)
     out = bytearray()
     while at < len(block):

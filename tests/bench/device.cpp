@@ -35,7 +35,7 @@ struct BatchRate {
 double rate(PingEngine& engine, Parallel& pool, Pinger& pinger, const std::vector<PingRequest>& requests, std::size_t batch) {
   const auto round = [&] {
     if (batch > 1) return pinger.fire(engine, pool, requests, batch);
-    double seconds = 0;  // one ping at a time, as a driver asks for them
+    double seconds = 0;  // one ping at a time, as a driver requests them
     for (const PingRequest& request : requests) seconds += pinger.fire(engine, request);
     return seconds;
   };

@@ -1,4 +1,4 @@
-// The findings of doctor on connections to a sonar and the pings that come, to itself and to drivers: facts in, lines out.
+// The findings of doctor on connections to a sonar, and on the pings that doctor and drivers get: facts in, lines out.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -40,8 +40,8 @@ Socket bound(int type, std::uint16_t& port) {
 }
 
 /// Accepts one client, waits for its fire message and sends the result of `answer`, then waits until the client leaves. Later
-/// clients are connected, and receive nothing. With `visits` > 1 it closes the connection instead, for this many clients one
-/// after another; then it closes its port.
+/// clients are connected, and receive nothing. With `visits` > 1 it closes the connection itself, for this many clients
+/// one after another; then it closes its port.
 class FakeDevice {
  public:
   using Answer = std::function<wire::Bytes(std::uint32_t number, const oculus::FireSettings& asked)>;

@@ -9,7 +9,7 @@
 
 namespace sonar::clients {
 
-/// 20 rows and 16 beams of zeros. `echo`: the settings that it repeats.
+/// Returns a ping of 20 rows and 16 beams of zeros, which repeats the settings `echo`.
 inline wire::Bytes ping_bytes(std::uint32_t id, const oculus::FireSettings& echo) {
   oculus::PingHead head;
   head.fixed.header.source = 7001;

@@ -123,7 +123,7 @@ TEST(Observe, WaitsWithoutPingsAsLongAsSonardAnswers) {
   for (const auto& [name, command] : commands) {
     SCOPED_TRACE(name);
     const Server observers(send_a_dummy);
-    const Control control(observers.at(), 4, "127.0.0.2:52100");  // one before the connection, and three after a silence each
+    const Control control(observers.at(), 4, "127.0.0.2:52100");  // before the connection, and after each of three silences
     const auto begin = std::chrono::steady_clock::now();
     const Result<void> done = command(observing(control));
     ASSERT_FALSE(done);
@@ -159,14 +159,14 @@ TEST(Observe, TheSonarsOrTheObserversPortCanBeGiven) {
   }
 }
 
-/// Ends the connection after it.
+/// Sends a ping, then ends the connection.
 void send_a_ping(const Socket& client) {
   static_cast<void>(write_all(client, ping_bytes(1, {})));
   ::shutdown(client.fd(), SHUT_WR);
   drain(client);
 }
 
-/// listen, as a client if the sonar has a free slot. It connects again; returns the end of the last attempt, and what it said.
+/// Runs listen, a client if the sonar has a free slot, which connects again. Returns the last attempt's end, and the output.
 std::pair<Result<void>, std::string> listen_beside_a_driver(const Server& sonar, const Control& control) {
   ListenOptions options;
   options.source = observing(control);
@@ -215,7 +215,7 @@ TEST(Observe, AnObserverThatReturnsAsAClientDoesNotWait) {
   EXPECT_THAT(done.error().text, HasSubstr("nothing more arrived within 0.5 s")) << said;
 }
 
-/// The error of observing a sonar at this address, of three.
+/// Observes the sonar at this address, one of three; returns the error.
 Error error_at(const Endpoint& device, const char* make = nullptr) {
   const Control control(
       R"(sonars { name: "front" profile: "oculus-m1200d" listens: "127.0.0.2:52100"

@@ -170,7 +170,7 @@ TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
   EXPECT_THAT(named.error().text, HasSubstr("is not a Sonar 3D-15"));
 }
 
-/// The client then may ask for the sonar's address for observers.
+/// After such an end the client may ask for the sonar's address for observers.
 TEST(Search, NamesASonarThatClosesTheConnectionWithoutAnAnswer) {
   for (const bool answers : {false, true}) {
     SCOPED_TRACE(answers);

@@ -19,7 +19,7 @@ WINDOW = "1640,1100"  # larger than all pages of the tests, because the browser 
 
 
 def program():
-    """The browser, or None."""
+    """Returns the path of the browser, or None."""
     return os.environ.get("SONARD_BROWSER") or shutil.which("chromium") or shutil.which("chromium-browser")
 
 
@@ -37,11 +37,11 @@ class Browser:
              "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
              "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--window-size={WINDOW}", f"--user-data-dir={self.folder.name}", "about:blank"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        told = pathlib.Path(self.folder.name) / "DevToolsActivePort"  # the browser writes its port there
+        port_file = pathlib.Path(self.folder.name) / "DevToolsActivePort"  # the browser writes its port there
         deadline = time.monotonic() + 200
         while self.process.poll() is None and time.monotonic() < deadline:
-            if told.is_file() and "\n" in told.read_text():
-                self.at = "127.0.0.1:" + told.read_text().splitlines()[0]
+            if port_file.is_file() and "\n" in port_file.read_text():
+                self.at = "127.0.0.1:" + port_file.read_text().splitlines()[0]
                 return self
             time.sleep(0.05)
         self.__exit__()

@@ -48,7 +48,7 @@ def read_pings(folder):
 
 
 def policy():
-    """The Content-Security-Policy of the daemon, read from its source."""
+    """Returns the Content-Security-Policy of the daemon, read from its source."""
     text = re.sub(r'"\s*\n\s*"', "", (ROOT / "daemon/server/http/page.cpp").read_text())
     return re.search(r"default-src[^\"]*", text).group()
 
@@ -292,7 +292,7 @@ class MockDaemon:
 
     @staticmethod
     def fan(ns):
-        """A wedge with a bright spot, 720 pixels wide."""
+        """Returns a wedge with a bright spot, 720 pixels wide."""
         width, height = 720, 720
         data = bytearray(width * height)
         for y in range(0, height, 2):
@@ -422,7 +422,7 @@ class Viewer:
             self.each_second()
 
     def catch_up(self):
-        """The present values of a channel, for a new subscriber."""
+        """Publishes the present values of all channels, for new subscribers."""
         mock, ns = self.mock, self.mock.now_ns()
         for i, entity in enumerate(made_up_scene.entities()):
             self.publish("/scene", {"entities": [entity]}, ns, once=f"/scene {i}")

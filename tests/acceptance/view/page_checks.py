@@ -72,7 +72,7 @@ def shown(page, patience_s=200):
 
 
 class PageChecks:
-    """Of a TestCase."""
+    """Methods for a TestCase."""
 
     @staticmethod
     def picture(page, name, settled_s=0.0):

@@ -4,7 +4,7 @@ import zlib
 
 
 def read_png(data):
-    """(width, height, RGB bytes) of a PNG with 8 bits a channel and no interlace."""
+    """Returns (width, height, RGB bytes) of a PNG with 8 bits a channel and no interlace."""
     at, body, head = 8, b"", None
     while at < len(data):
         size, kind = struct.unpack_from(">I4s", data, at)
@@ -52,7 +52,7 @@ def mirrored(width, height, rgb):
 
 
 def difference(a, b):
-    """(mean, 99th percentile, share above 8) of the absolute differences of all channels."""
+    """Returns (mean, 99th percentile, share above 8) of the absolute differences of all channels."""
     assert len(a) == len(b), (len(a), len(b))
     histogram = [0] * 256
     for x, y in zip(a, b):

@@ -96,7 +96,7 @@ class Heads(unittest.TestCase):
         self.sdk.BVTHead_SetSoundSpeed(head, 1490)
         self.assertEqual(self.sdk.BVTSonar_CreateFile(recording, file, sonar, b""), SUCCESS)
         _, recorded = self.head(recording, 0)
-        self.assertEqual(self.number(self.sdk.BVTHead_GetSoundSpeed, recorded, ctypes.c_int), 1490)  # not the value of connecting
+        self.assertEqual(self.number(self.sdk.BVTHead_GetSoundSpeed, recorded, ctypes.c_int), 1490)  # not the initial value
         for gain in (-6, -6, 3):
             self.assertEqual(self.sdk.BVTHead_SetGainAdjustment(head, ctypes.c_float(gain)), SUCCESS)
             ping = ctypes.c_longlong()

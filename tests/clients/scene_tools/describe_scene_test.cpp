@@ -102,7 +102,7 @@ TEST_F(DescribeScene, WarnsOfWhatLooksWrong) {
 }
 
 TEST_F(DescribeScene, WarnsOfGroundThatIsTinyOrUpsideDown) {
-  // A grid of one arc second. The loader takes its header for metres and its depths for heights.
+  // A grid of one arc second. The loader reads its header as metres and its depths as heights.
   files.write("g.asc", "ncols 2\nnrows 2\nxllcorner 5\nyllcorner 60\ncellsize 0.000277777778\n20 21 22 23\n");
   const Remarks tiny =
       remarks("objects: [{name: bed, type: heightmap, file: g.asc, material: sand, geographic: false, centred: true}]\n");

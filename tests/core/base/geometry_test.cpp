@@ -70,8 +70,8 @@ TEST_F(Geometry, RollPitchYawIsIntrinsicZYX) {
   EXPECT_NEAR(rpy_from_quat(quat_from_rpy({0, pi / 2, 0})).pitch_rad, pi / 2, 1e-7);  // at gimbal lock the result stays finite
 }
 
-// NED to ENU swaps the first two axes and reverses the third. FRD to FLU reverses the last two. Here as matrices, independent
-// of our quaternions.
+// NED to ENU swaps the first two axes and reverses the third. FRD to FLU reverses the last two. The matrices of this
+// test are independent of our quaternions.
 TEST_F(Geometry, ConvertsToNorthEastDown) {
   Eigen::Matrix3d enu_from_ned_axes, flu_from_frd_axes;
   enu_from_ned_axes << 0, 1, 0, 1, 0, 0, 0, 0, -1;

@@ -389,7 +389,7 @@ TEST(SurfaceCells, SmallBodiesHaveCellsOfAllSizes) {
   EXPECT_EQ(counted(beside, sides), counted(from_fine, whole_scene(2)));
 }
 
-// Alternating scenes: tiles that were kept equal newly made tiles, in the same order, at coarse and fine levels.
+// When scenes alternate, kept tiles are equal to new ones, in the same order, at coarse and fine levels.
 TEST(SurfaceCells, AnotherSceneHasTheCellsOfANewOne) {
   const auto one = terrain(20, 4.0, gentle), other = terrain(16, 4.0, gentle), ball = sphere(0.5, 12);
   const auto with = [&](std::vector<std::shared_ptr<const Mesh>> meshes, std::uint32_t texture_seed, float shape) {

@@ -88,8 +88,8 @@ class TabulatedBed {
   std::vector<double> weights_;
 };
 
-/// Every sample of every beam within 40 degrees between the first and last return of a bed, 2 dr inside both ends, where the
-/// two-way pattern is above -20 dB: against the closed form.
+/// Compares samples of a flat bed with the closed form: in the beams within 40 degrees, from 2 dr after the first return, and
+/// where the two-way pattern is above -20 dB at the sample and 2 dr to both sides.
 inline Coverage coverage_of(const FrequencyMode& mode, const PingSettings& settings, double height, double tilt, double yaw) {
   const double lambert_db = -27, dr = static_cast<double>(settings.pulse_width_m);
   Sounding s(flat_bed(settings.range_m * 1.15, lambert_db), mode, settings);

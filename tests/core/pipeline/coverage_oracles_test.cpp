@@ -1,5 +1,5 @@
-// The picture of a flat bed sample by sample, in expected power: no holes for some modes and rows. Those of every product are in
-// shipped_sonars_test.cpp.
+// The picture of a flat bed sample by sample, in expected power: no holes for some modes and rows. All products are
+// tested in shipped_sonars_test.cpp.
 #include <gtest/gtest.h>
 
 #include <tuple>

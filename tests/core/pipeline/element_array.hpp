@@ -25,7 +25,7 @@ class ElementArray {
   int elements() const { return static_cast<int>(place_m_.size()); }
 
   using Envelope = std::function<Complex(double)>;  // p(t)
-  /// s_j[n] of beams that are focused at every range of the grid. [beams][samples]
+  /// Returns s_j[n] of beams that are focused at every range of the grid. [beams][samples]
   std::vector<std::vector<Complex>> beams(std::span<const PlacedScatterer> scatterers, std::span<const double> beam_sines,
                                           const Grid& grid, const Envelope& p, double reach_s) const;
 

@@ -90,7 +90,7 @@ TEST(Elements, PointsThroughTheEngineMatchTheArray) {
     }
 }
 
-// The same through columns and the banded beamforming, with the points in the middle of columns.
+// The same comparison through columns and the banded beamforming, with the points in the middle of columns.
 TEST(Elements, ColumnsAndBeamWeightsMatchTheArray) {
   FrequencyMode mode = p900();
   mode.beam_spacing = BeamSpacing::uniform_in_sine;

@@ -40,7 +40,7 @@ TEST(Everything, IsTheSameBytesForAnyNumberOfThreadsAndWhateverCameBefore) {
   const std::shared_ptr<const Scene> scene = basin();
   Engine one(scene, 1), two(scene, 2), four(scene, 4);
   for (const auto& [what, narrow] : turns()) {
-    // All cells of the narrow beams where everything is on; a single change is tested on fewer.
+    // Narrow beams need many cells, so they are tested only with everything on; single changes use wide beams.
     const bool everything = what.starts_with("everything");
     const PingRequest request = everything ? narrow : with_wide_beams(narrow);
     const Ping ping = one.ping(request);

@@ -226,7 +226,7 @@ TEST(Labels, APointTargetIsAnInstance) {
 }
 
 TEST(Labels, EchoesBelowTheNoiseThatChannelsShareHaveNone) {
-  // Share of a point at the edge of the sector. Near the sonar the noise is strong there.
+  // The label share of a point at the edge of the sector. Near the sonar the noise is strong there.
   const auto share = [](float level_db) {
     FrequencyMode mode = p900();
     mode.receiver.shared_noise.level_db = level_db;

@@ -1,5 +1,5 @@
-// Pictures that begin at a range: PingSettings::range_start_m through the whole engine. The oracle is the picture from range 0.
-// The window must repeat its rows.
+// Pictures that begin at a range: PingSettings::range_start_m through the whole engine. The oracle is the picture from range 0,
+// whose rows the window must repeat.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -161,7 +161,7 @@ TEST(SideLobes, TheBedHasNoStepAtTheEdgeOfTheFan) {
 }
 TEST(SideLobes, AnObstacleBelowTheFanIsThere) {
   constexpr double range = 2.7, radius = 0.2;
-  const auto heard = [&](double psi_deg, bool side_lobes) {  // energy of the echo of a sphere at this angle
+  const auto energy = [&](double psi_deg, bool side_lobes) {  // energy of the echo of a sphere at this angle
     const double psi = rad_from_deg(psi_deg);
     Sounding s(SceneMaker().add(sphere(radius, 5), -10, {range * std::cos(psi), 0, range * std::sin(psi)}).make(), p900(),
                native_rows(4, 0.0254));
@@ -173,9 +173,9 @@ TEST(SideLobes, AnObstacleBelowTheFanIsThere) {
       for (int j = 0; j < s.beams(); ++j) sum += s.power(row, j);
     return sum;
   };
-  EXPECT_EQ(heard(-50, false), 0);
+  EXPECT_EQ(energy(-50, false), 0);
   record_oracle(no_number, "sphere in a side lobe, two-way pattern", two_way_db(p900(), rad_from_deg(-50)),
-                db(heard(-50, true) / heard(0, true)), 1, "dB");
+                db(energy(-50, true) / energy(0, true)), 1, "dB");
 }
 TEST(SideLobes, WithoutTheSwitchThereAreNoEchoes) { expect_bed(p900(), false, false); }
 

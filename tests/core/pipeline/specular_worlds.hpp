@@ -42,7 +42,7 @@ class SpecularSounding {
   Sounding& sounding() { return sounding_; }
   /// Amplitude of the strongest echo of the middle beam within `slack_m` of a range [uPa]; 0 without an echo.
   double peak_upa(double range_m, double slack_m = 0.05);
-  /// The same as a pressure re the source at 1 m, without absorption: eq. 7 without exp(-2 alpha r).
+  /// That amplitude as a pressure re the source at 1 m, without absorption: eq. 7 without exp(-2 alpha r).
   double strength_per_m(double range_m, double slack_m = 0.05);
   /// Turns the sonar by this much more to port.
   void turn(double yaw_rad);

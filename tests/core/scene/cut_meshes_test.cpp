@@ -65,7 +65,7 @@ TEST_F(CutMeshes, EveryCheckReadsTheSameHeaderOfAPly) {
     EXPECT_EQ(check_ply_text(text), std::nullopt);
     EXPECT_EQ(loaded("a.ply", text), "4 triangles");
   }
-  // The importer, too, takes a carriage return within a comment for the end of the line.
+  // The importer, too, treats a carriage return within a comment as the end of the line.
   const std::string many = replaced(ply, "made by hand", "made by\relement vertex 1000000");
   EXPECT_EQ(ply_head_of(many).elements.size(), 4u);
   EXPECT_THAT(check_ply(ply_head_of(many), many.size()).value_or(""), HasSubstr("says that it has 1000000 of \"vertex\""));
@@ -137,7 +137,7 @@ TEST_F(CutMeshes, UnusualTextsWithoutAFaultAreRead) {
   EXPECT_EQ(loaded("a.obj", obj + "f 1 2\n"), "4 triangles") << "a line, not a face";
 }
 
-// The search for a facet behind the name of a solid must not read the rest of the line again for each solid.
+// The search for a facet after the name of a solid must not read the rest of the line again for each solid.
 TEST(CutMeshTexts, ALineWithManySolidsTakesLittleTime) {
   std::string text;
   for (int k = 0; k < 40'000; ++k)

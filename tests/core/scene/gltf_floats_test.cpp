@@ -31,7 +31,7 @@ std::string corners(const std::array<T, 9>& xyz, std::size_t stride) {
   return bytes;
 }
 
-/// A triangle whose positions have this type, behind two bytes of a header in their view, in buffer 0.
+/// A triangle whose positions have this type, after two bytes of a header in their view, in buffer 0.
 struct Triangle {
   json description;
   std::string data;
@@ -236,7 +236,7 @@ TEST_F(GltfFloats, DracoIsReadOrTheErrorNamesTheCommandToUnpack) {
   EXPECT_THAT(refusal(file.dump()), HasSubstr("whole numbers that are compressed (KHR_draco_mesh_compression)"));
 }
 
-/// The indices are behind the positions in the same buffer, whose end is missing.
+/// The indices are after the positions in the same buffer, whose end is missing.
 TEST_F(GltfFloats, FilesThatAreCutWithinTheirIndicesAreRefused) {
   Triangle whole(5122, false, shorts, 8);
   const std::size_t begin = whole.data.size();
