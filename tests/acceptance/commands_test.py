@@ -97,7 +97,7 @@ class Mistakes(unittest.TestCase):
         for word in words:
             self.assertIn(word, result.stderr)
 
-    def test_options_of_another_vendor_are_told(self):
+    def test_options_of_another_vendor_are_reported(self):
         text = (ROOT / "scenes/sonard.yaml").read_text(encoding="utf-8")
         for profile, notes in (("oculus-m1200d", 0), ("blueview-p900-90", 2)):
             result = check(text.replace("profile: oculus-m1200d", f"profile: {profile}"))

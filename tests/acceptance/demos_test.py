@@ -137,7 +137,7 @@ class Preview(unittest.TestCase):
                         numbers.append(event["number"])
                     else:
                         self.assertEqual(numbers, [], "no preview beside a driver")
-                self.assertEqual(numbers[0], 1, "the first driver gets what it would have got")
+                self.assertEqual(numbers[0], 1, "previews do not change the first driver's numbers")
                 driver.terminate()
             viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping" and viewer.decode(*value[::2]).get("preview"))
             viewer.socket.close()

@@ -57,7 +57,7 @@ class Device(unittest.TestCase):
         for out, engine in (("cpu", "cpu"), ("device", "cuda")):
             self.assertEqual(self.render(out, engine, batch=3).returncode, 0)
         made = {"cpu, after a failure": self.samples("cpu"), "cuda, host loops": self.samples("device")}
-        self.assertNotEqual(*made.values(), "else this test sees nothing")
+        self.assertNotEqual(*made.values(), "otherwise this test shows nothing")
         found = set()
         for batch in (1, 2):
             for lasts in (30, 45, 60, 75):

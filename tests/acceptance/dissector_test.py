@@ -224,7 +224,7 @@ class RecordedRun(Dissected):
         self.expect_agreement(from_client, sent["client"], self.dump("client", streams["client"]))
         self.expect_agreement(from_device, sent["device"], self.dump("device", streams["device"]))
         complaints = [e for m in rest for e in m.experts if e[0] != "note"]
-        self.assertEqual(complaints, [], "a sound device gives no cause for complaint")
+        self.assertEqual(complaints, [], "messages of a correct device cause no warnings")
 
 
 class HandMade(Dissected):
@@ -252,7 +252,7 @@ class HandMade(Dissected):
         found = [m for m in self.dissect(capture) if not m.is_junk()]
         self.expect_agreement(found, sent, self.dump("client", b"00".join(sent)))
 
-    def test_every_broken_identity_is_told(self):
+    def test_every_broken_identity_is_reported(self):
         v1, v2 = golden("ping_v1"), golden("ping_v2")
         cases = [(with_bytes(v1, 10, "I", 2057) + b"\0", "messageSize"), (with_bytes(v1, 118, "I", 2073), "messageSize"),
                  (with_bytes(v1, 110, "I", 2040), "imageOffset + imageSize"), (with_bytes(v1, 114, "I", 25), "imageSize is 25"),
@@ -272,12 +272,12 @@ class HandMade(Dissected):
                 self.assertEqual(found[2 * number].experts, [], "a dummy")
                 told = found[2 * number + 1].experts
                 self.assertTrue(any(expected in text for _, text in told), told)
-                self.assertNotEqual(ours[2 * number + 1]["violations"], [], "our decoder holds this for sound")
+                self.assertNotEqual(ours[2 * number + 1]["violations"], [], "our decoder must find a fault, too")
         first, again = self.dissect_stream(v1 + v1)
         self.assertFalse(any("does not rise" in text for _, text in first.experts))
         self.assertTrue(any("does not rise" in text for _, text in again.experts))
 
-    def test_what_is_wrong_with_a_status_is_told(self):
+    def test_faults_of_a_status_are_reported(self):
         status = golden("status")
         cases = [(status + b"\0", "142 bytes"), (with_bytes(status, 2, "H", 5), "srcDeviceId is 5"),
                  (with_bytes(status, 24, "I", 1), "firmware does not run"),
@@ -302,7 +302,7 @@ class Malformed(Dissected):
         stream += b"".join(framed(kind, 1, bytes(size)) for kind in (0x22, 0x80, 0xFF, 0x77) for size in range(0, 600, 37))
         stream += golden("ping_v1")
         found = self.dissect_stream(stream, [60000])
-        self.assertEqual(sum(len(m.fields) > 0 for m in found), len(found), "no message is taken for junk")
+        self.assertEqual(sum(len(m.fields) > 0 for m in found), len(found), "no message is reported as junk")
         self.expect_as_python(found[-1], golden("ping_v1"))
         for short in found[:100]:  # 16 to 115 bytes of a ping of 122
             self.assertTrue(any(kind == "short" for kind, _ in short.experts), short.title)

@@ -211,8 +211,8 @@ class Playback(unittest.TestCase):
 
             paused = self.control(viewer, "a", pause=True, speed=1.5, to_ns=3 * self.S)
             self.assertEqual(paused, {"state": "paused", "ns": 3 * self.S, "speed": 1.5, "did_seek": 1, "request": "a"})
-            told = other.wait_for(lambda kind, value: kind == "playback" and value["state"] == "paused")
-            self.assertEqual((told["ns"], told["did_seek"], told["request"]), (3 * self.S, 1, ""))
+            playback = other.wait_for(lambda kind, value: kind == "playback" and value["state"] == "paused")
+            self.assertEqual((playback["ns"], playback["did_seek"], playback["request"]), (3 * self.S, 1, ""))
             for speed in (0.0, -1.0, 2000.0, float("nan"), float("inf")):
                 self.assertEqual(self.control(viewer, "b", pause=True, speed=speed)["speed"], 1.5)
                 self.assertIn("speed", viewer.words[-1]["message"])

@@ -2,7 +2,7 @@
 positions that follow from the true poses.
 
 The vehicle is mavlink_frames.py, written from the message definitions; pings are read by the Python client, and the moment of
-each ping comes from the daemon's events. Only pings are judged whose pose was sent in time; poses that a busy computer sends late
+each ping comes from the daemon's events. Only pings whose pose was sent in time are judged; poses that a busy computer sends late
 are tested in tests/daemon/emulator/world/world_test.cpp. A stall of the daemon itself is not visible from outside, so some echoes
 may be displaced by the motion of the vehicle during the stall. The square is driven again until enough pings can be judged.
 """
@@ -202,7 +202,7 @@ class Mavlink(unittest.TestCase):
                       daemon.log())
         names = [name for name, _ in vehicle.heard]
         self.assertGreaterEqual(names.count("HEARTBEAT"), 3)
-        self.assertEqual(set(names), {"HEARTBEAT"}, "nothing is asked of an autopilot unless the configuration says so")
+        self.assertEqual(set(names), {"HEARTBEAT"}, "sonard requests nothing from an autopilot unless the configuration says so")
         self.assertTrue(all(v["autopilot"] == 8 and v["type"] == 18 and v["system"] == 1 for _, v in vehicle.heard))
         return vehicle, pings, fired_at
 

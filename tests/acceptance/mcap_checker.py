@@ -110,7 +110,7 @@ class Checked:
         known = self.schemas if opcode == SCHEMA else self.channels
         expect(known.setdefault(found[0], found) == found, f"two things with the id {found[0]}")
         if opcode == CHANNEL:
-            expect(found[1] == 0 or found[1] in self.schemas, f"channel {found[2]} has a schema that was not told")
+            expect(found[1] == 0 or found[1] in self.schemas, f"channel {found[2]} has a schema that was not declared")
             expect(found[1] == 0 or self.schemas[found[1]][2] == {"json": "jsonschema"}.get(found[3], found[3]),
                    f"channel {found[2]} and its schema differ in encoding")
 
@@ -154,7 +154,7 @@ class Checked:
                 continue
             expect(opcode == MESSAGE, f"opcode {opcode} in a chunk")
             channel, sequence, logged, _ = struct.unpack_from("<HIQQ", record)
-            expect(channel in self.channels, f"message of channel {channel}, which was not told")
+            expect(channel in self.channels, f"message of channel {channel}, which was not declared")
             expect(sequence == self.sequences.setdefault(channel, 0), f"sequence of channel {channel}")
             self.sequences[channel] += 1
             found.setdefault(channel, []).append((logged, offset))
@@ -200,28 +200,28 @@ class Checked:
         for content, chunk in zip(indexes, self.chunks):
             self._check_chunk_index(content, chunk)
         self._check_statistics(statistics[0])
-        told = []
+        stated = []
         for opcode, _, content in records(self.data, self.offsets_at, self.footer_at):
             expect(opcode == SUMMARY_OFFSET and len(content) == 17, "summary offsets")
-            told.append([content[0], *struct.unpack("<QQ", content[1:])])
-        expect(told == groups, "places of the summary's groups")
+            stated.append([content[0], *struct.unpack("<QQ", content[1:])])
+        expect(stated == groups, "places of the summary's groups")
 
     @staticmethod
     def _check_chunk_index(content, chunk):
         f = Fields(content)
-        told = (f.u(8), f.u(8), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))), f.u(8), f.text(), f.u(8), f.u(8))
+        stated = (f.u(8), f.u(8), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))), f.u(8), f.text(), f.u(8), f.u(8))
         f.end()
-        expect(told == (chunk["first"], chunk["last"], chunk["at"], chunk["length"], chunk["indexed"], chunk["index_length"], "",
+        expect(stated == (chunk["first"], chunk["last"], chunk["at"], chunk["length"], chunk["indexed"], chunk["index_length"], "",
                         chunk["size"], chunk["size"]), "a chunk index")
 
     def _check_statistics(self, content):
         f = Fields(content)
-        told = (f.u(8), f.u(2), f.u(4), f.u(4), f.u(4), f.u(4), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))))
+        stated = (f.u(8), f.u(2), f.u(4), f.u(4), f.u(4), f.u(4), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))))
         f.end()
         first = min((chunk["first"] for chunk in self.chunks), default=0)
         last = max((chunk["last"] for chunk in self.chunks), default=0)
-        expect(told == (len(self.messages), len(self.schemas), len(self.channels), 0, 0, len(self.chunks), first, last, self.counts),
-               f"statistics {told}")
+        expect(stated == (len(self.messages), len(self.schemas), len(self.channels), 0, 0, len(self.chunks), first, last, self.counts),
+               f"statistics {stated}")
 
 
 def check(data):

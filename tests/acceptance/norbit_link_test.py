@@ -103,7 +103,7 @@ class Link(unittest.TestCase):
                 with Driver(daemon.address) as driver:
                     self.assertEqual([driver.say(f"{name.split()[0]}\r\n") for name in wanted], settings, command[0])
 
-    def test_sonarctl_hears_it_over_a_floor(self):
+    def test_sonarctl_lists_points_over_a_floor(self):
         with Sonard(scene="demo.yaml", profile="norbit-wbms", mount="{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}") as daemon:
             done = run(SONARCTL, "listen", f"{daemon.address}:{BATHYMETRY}", "--range", 20, "--rate", 5, "--wait", 100, "--pings", 3)
             self.assertEqual(done.returncode, 0, done.stderr)

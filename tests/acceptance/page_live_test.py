@@ -274,7 +274,7 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.body.dataset.situation === 'no-client'")
             page.click("#notice-button")
             page.wait("/^[1-9]\\d*\\.\\d lines\\/s$/.test(document.querySelector('#rate').innerText) && document.querySelector('#measured').innerText.endsWith(' lines/s')")
-            self.assertIsNone(page.run("document.querySelector('[name=\"/front/rate_hz\"]')"), "its host sets the rhythm")
+            self.assertIsNone(page.run("document.querySelector('[name=\"/front/rate_hz\"]')"), "its host sets the rate")
             self.assertNotIn("1000", page.text("#settings"))
             self.assert_quiet(page, url_of(daemon))
 

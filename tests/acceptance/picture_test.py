@@ -66,7 +66,7 @@ class Picture(unittest.TestCase):
         # The sonar is 1.9 m above the bed, which has relief. The main lobe reaches it at 3.9 m, row 174, and a side lobe straight
         # below.
         self.assertGreater(figures["first_echo_row"], 80, "nothing is nearer than the bed below")
-        self.assertLess(figures["first_echo_row"], 100, "a side lobe hears the bed below")
+        self.assertLess(figures["first_echo_row"], 100, "a side lobe receives echoes of the bed below")
         self.assertLess(figures["near_field_mean"], 15)
         self.assertGreater(figures["last_50_rows_mean"], figures["near_field_mean"])
 

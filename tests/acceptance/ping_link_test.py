@@ -102,7 +102,7 @@ class Ping360Link(unittest.TestCase):
     def tearDownClass(cls):
         cls.daemon.__exit__()
 
-    def test_discovery_is_one_datagram_to_who_asks(self):
+    def test_discovery_is_one_datagram_to_each_request(self):
         host = Host(self.daemon.address, DISCOVERY)
         host.udp.settimeout(30)
         for _ in range(100):
@@ -154,7 +154,7 @@ class Ping360Link(unittest.TestCase):
             top = max(brightest[range_m], key=brightest[range_m].get)
             self.assertAlmostEqual(top * 0.9, bearing_deg, delta=1.5)
 
-    def test_the_host_that_asked_last_has_the_dialogue(self):
+    def test_the_host_of_the_last_request_has_the_dialogue(self):
         one, other = Host(self.daemon.address, PING360), Host(self.daemon.address, PING360)
         one.send(scan(0, 399))
         one.next(2301)

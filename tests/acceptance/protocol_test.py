@@ -49,7 +49,7 @@ class Served(unittest.TestCase):
     def test_settings_come_back_and_pings_come_at_their_rate(self):
         with Client(self.daemon.address) as client:
             self.assertEqual(client.ping_made_with(fire_message(flags=0x19)).flags, 0x19)
-            self.assertEqual(client.stale, 0, "on a new connection the first ping is made with what was asked for")
+            self.assertEqual(client.stale, 0, "on a new connection the first ping has the requested settings")
             ping = client.ping_made_with(fire_message(range_=2.0, gain=30.0, sound_speed=1490.0, salinity=35.0, flags=0x19))
             self.assertEqual((ping.gain, ping.sound_speed, ping.salinity, ping.sound_speed_used), (30.0, 1490.0, 35.0, 1490.0))
             ids, start = [ping.id], time.monotonic()

@@ -254,7 +254,7 @@ class Inside(Files):
             for one in named["instances"]:
                 self.assertEqual(one["name"], names.get(one["instance"], one["name"]))
             met = {index + 1 for index in truth["object"] if index >= 0}
-            self.assertTrue(met & set(label), "what beams meet first is heard")
+            self.assertTrue(met & set(label), "an object that a beam meets first has samples")
 
     def test_recordings_are_made_only_in_the_configured_folder(self):
         with Sonard(scene="tank-rod.yaml") as self.daemon:
@@ -368,15 +368,15 @@ class OneIntoAnother(Files):
         junk = self.folder / "junk.raw"
         junk.write_bytes(sound + b"what is this?" + sound)
         done = self.convert(junk, "--mcap", self.path("mcap"), "--pcap", self.path("pcap"))
-        told = f"junk.raw: 13 bytes from byte {len(sound)} on belong to no message"
+        junk_note = f"junk.raw: 13 bytes from byte {len(sound)} on belong to no message"
         self.assertEqual(done.returncode, 65)
-        self.assertIn(told, done.stderr)
+        self.assertIn(junk_note, done.stderr)
         for kind, place in (("mcap", "the record at byte "), ("pcap", "packet ")):  # these still have the junk
             done = self.convert(self.path(kind), "--raw", self.folder / f"again-{kind}.raw")
             self.assertEqual(done.returncode, 65)
             self.assertIn(f": 13 bytes from {place}", done.stderr)
             self.assertEqual((self.folder / f"again-{kind}.raw").read_bytes(), junk.read_bytes())
-        for number, words in ((3, ""), (4, f"sonarctl: {self.folder}/{told}; the ping is from the undamaged part\n")):
+        for number, words in ((3, ""), (4, f"sonarctl: {self.folder}/{junk_note}; the ping is from the undamaged part\n")):
             done = run(SONARCTL, "view", "--from", junk, "--ping", str(number), "--png", self.folder / "a.png")
             self.assertEqual((done.returncode, done.stderr), (0, words))
         junk.write_bytes(sound[:16] + b"nothing but junk" * 9)

@@ -59,7 +59,7 @@ class Recordings(PageChecks, unittest.TestCase):
         viewer.greeted().subscribe("/recording/picture", "/recording/fan", "/recording/ping", "/status")
         self.assertEqual(viewer.first_of("/recording/picture", PATIENCE_S)["kind"], kind)
         image = viewer.first_of("/recording/fan")
-        self.assertGreater(max(image["data"]), 20, "an echo is to be seen")
+        self.assertGreater(max(image["data"]), 20, "an echo is visible")
         trajectory = viewer.first_of("/status")["vehicles"][0]["trajectory"]
         self.assertGreater(trajectory["duration_s"], 0)
         viewer.wait_for(lambda kind, value: kind == "word" and "playbackControl" in value.get("capabilities", ()) or viewer.info and

@@ -90,7 +90,7 @@ class Render(unittest.TestCase):
         self.assertIn(None, side["truth"]["object"])
         self.assertEqual(len(side["truth"]["first_hit_m"]), beams)
 
-    def test_the_sidecar_tells_every_parameter(self):
+    def test_the_sidecar_contains_every_parameter(self):
         self.expect(self.render("--format", "raw", "--seed", "5", "--volume", "off"), 0)
         side = json.loads((self.out / "000001.json").read_text(encoding="utf-8"))
         for key in ["sonard", "inputs", "ping", "time_s", "scene", "sonar", "sonar_name", "settings", "beam_azimuth_rad", "row_0_m",
@@ -106,7 +106,7 @@ class Render(unittest.TestCase):
         self.assertGreater(side["counts"]["rays"], 10000)
         self.assertFalse((self.out / "000001_pressure.npy").exists())
 
-    def test_switches_without_effect_are_refused_or_told(self):
+    def test_switches_without_effect_are_refused_or_noted(self):
         self.expect(self.render("--mode", "paper", "--noise", "on"), 64, "--noise on has no effect", "mode paper")
         self.expect(self.render("--fixed-fan", "8", "--multipath", "on"), 64, "a fixed fan leaves out multipath")
         self.expect(run(SONARD, "render", "--report", "coverage", "--mode", "raster"), 65, "canonical")
@@ -117,7 +117,7 @@ class Render(unittest.TestCase):
         self.config.write_text(CONFIG + "engine: {fixed_fan: 8, multipath: on}\n", encoding="utf-8")
         self.expect(self.render(), 78, "sonard.yaml:4", "multipath", "a fixed fan leaves out multipath")
 
-    def test_goes_on_where_it_stopped(self):
+    def test_continues_where_it_stopped(self):
         self.expect(self.render("--pings", "2", "--format", "npy"), 0)
         first = self.out / "000001_pressure.npy"
         before = first.stat().st_mtime_ns, first.read_bytes()
@@ -128,7 +128,7 @@ class Render(unittest.TestCase):
         self.assertTrue((self.out / "000003.json").exists())
         self.assertEqual([p.name for p in self.out.iterdir() if p.suffix == ".tmp"], [])
 
-    def test_batches_make_the_same_files_and_tell_the_rate(self):
+    def test_batches_make_the_same_files_and_report_the_rate(self):
         self.expect(self.render("--pings", "5", "--format", "raw"), 0, "5 of 5 pings", "MB/s written")
         batched = self.out.parent / "batched"
         self.expect(self.render("--pings", "5", "--format", "raw", "--batch", "3", out=batched), 0, "5 of 5 pings")
@@ -170,7 +170,7 @@ class Render(unittest.TestCase):
         poses.write_text("t,x,y,z\n0,0,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, "--pose-frame", "ENU_FLU", "--format", "raw", out=self.path / "third"), 0, "1 of 1")
 
-    def test_poses_about_another_origin_are_told(self):
+    def test_poses_about_another_origin_are_reported(self):
         poses = self.path / "poses.csv"
         poses.write_text("# frame: ENU_FLU\n# origin: 47.61,-122.33,0\nt,x,y,z\n0,0,0,-1\n", encoding="utf-8")
         for lat, notes in ((47.61, 0), (47.6, 1)):
@@ -210,7 +210,7 @@ class Render(unittest.TestCase):
         self.assertNotIn("snapshots", asked.stderr)
         self.assertEqual((self.path / "asked" / raw).read_bytes(), (self.path / "moved" / raw).read_bytes())
 
-    def test_a_sonar_above_the_sea_surface_is_told(self):
+    def test_a_sonar_above_the_sea_surface_is_reported(self):
         scene = self.path / "sea.yaml"
         scene.write_text((ROOT / "scenes/l-targets.yaml").read_text(encoding="utf-8") +
                          "sea_surface: {size_m: [20, 20], lambert_db: -30}\n", encoding="utf-8")
@@ -229,7 +229,7 @@ class Render(unittest.TestCase):
             self.assertIs(side["above_sea_surface"], is_above)
         self.assertEqual(self.render(*options, "--pings", "1", out=self.path / "below").stderr, "")
 
-    def test_a_sonar_above_z_0_is_told_without_a_sea_surface(self):
+    def test_a_sonar_above_z_0_is_reported_without_a_sea_surface(self):
         poses = self.path / "poses.csv"
         poses.write_text("# frame: ENU_FLU\nt,x,y,z\n0,0,0,-2\n1,0,0,2\n", encoding="utf-8")
         options = ["--poses", poses, "--quiet", "--format", "raw"]
@@ -291,7 +291,7 @@ class Render(unittest.TestCase):
             self.assertEqual(list(self.out.iterdir()), [])
         self.expect(self.render("--format", "raw"), 0)
 
-    def test_a_scene_is_told_from_a_render_file(self):
+    def test_a_scene_is_distinguished_from_a_render_file(self):
         """The suggested command works too."""
         scene = self.path / "my scene.yaml"
         scene.write_text((ROOT / "scenes/l-targets.yaml").read_text(encoding="utf-8"), encoding="utf-8")

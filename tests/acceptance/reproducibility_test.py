@@ -102,7 +102,7 @@ class Reproducibility(unittest.TestCase):
             killed.fly(after=(9, kill))
             self.assertEqual(killed.code, -signal.SIGKILL)
             self.assertGreaterEqual(killed.taken, 9)
-            self.assertTrue(self.plain.stream.startswith(killed.stream), "what had come is the beginning")
+            self.assertTrue(self.plain.stream.startswith(killed.stream), "the bytes received until then are the beginning")
             rest = killed.folder / "rest.raw"
             done = run(SONARCTL, "record", "--from", killed.recorded("run.oculus"), "--raw", rest)
             self.assertIn(done.returncode, (0, 65), done.stderr)  # 65: the last message is cut short

@@ -68,7 +68,7 @@ class SceneCommand(unittest.TestCase):
             self.assertEqual(process.returncode, code, error)
             self.assertLess(used.ru_maxrss, 300_000, "kB")
 
-    def test_an_imported_box_is_heard_where_its_poses_put_it(self):
+    def test_an_imported_box_has_its_echo_where_its_poses_put_it(self):
         said = self.import_quay("--material", "left_rig=concrete")
         for words in ["2 shapes of 3 models", '2 lights: without an echo', 'sensor "eye"', 'plugin "winch"', "rig/rig.sdf:16", ": ok: 2 objects"]:
             self.assertIn(words, said)
@@ -92,23 +92,23 @@ class SceneCommand(unittest.TestCase):
         self.assertAlmostEqual(side["truth"]["first_hit_m"][middle], 3.75, delta=0.01)
         self.assertEqual(side["truth"]["object_name"][middle], "left_rig/arm")
 
-    def test_info_tells_the_same_to_people_and_programs(self):
+    def test_info_is_the_same_for_people_and_programs(self):
         self.import_quay()
         table = self.ctl("info", self.scene)
         self.assertIn("left_rig/arm", table)
         self.assertIn("0.5 x 0.6 x 0.6", table)
-        told = json.loads(self.ctl("info", self.scene, "--json"))
-        box = next(o for o in told["objects"] if o["name"] == "left_rig/arm")
+        described = json.loads(self.ctl("info", self.scene, "--json"))
+        box = next(o for o in described["objects"] if o["name"] == "left_rig/arm")
         for found, wanted in zip(box["centre_m"], (3.863703, 1.035276, -2)):
             self.assertAlmostEqual(found, wanted, places=5)
-        self.assertEqual(told["triangles"], sum(o["triangles"] for o in told["objects"]))
+        self.assertEqual(described["triangles"], sum(o["triangles"] for o in described["objects"]))
         self.assertIn("harbour: ", self.ctl("info", "demo.yaml"))
 
     def test_a_urdf_moves_as_one(self):
         self.ctl("import", WORLDS / "arm.urdf", "--out", self.scene, "--moving", "arm", "--material", "steel", "--offset", "0,0,-5")
-        told = json.loads(self.ctl("info", self.scene, "--json"))
-        self.assertEqual(told["moving"], ["arm"])
-        fore = next(o for o in told["objects"] if o["name"] == "arm/fore")
+        described = json.loads(self.ctl("info", self.scene, "--json"))
+        self.assertEqual(described["moving"], ["arm"])
+        fore = next(o for o in described["objects"] if o["name"] == "arm/fore")
         for found, wanted in zip(fore["centre_m"], (0.4, 0, -4.5)):
             self.assertAlmostEqual(found, wanted, places=5)
         self.assertEqual(fore["moves_with"], "arm")

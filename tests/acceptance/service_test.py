@@ -109,7 +109,7 @@ class Unit(unittest.TestCase):
             served = self.serve_under_strace(pathlib.Path(folder))
             text = counts.read_text(encoding="utf-8", errors="replace") + served
         used = set(re.findall(r"^\d+ +(\w+)\(", text, re.M))
-        self.assertIn("accept4" if "accept4" in used else "accept", used, "the trace holds the serving")
+        self.assertIn("accept4" if "accept4" in used else "accept", used, "the trace contains the calls of serving a client")
         self.assertEqual(sorted(used - allowed - {"execve"}), [])
 
     def serve_under_strace(self, folder):

@@ -166,7 +166,7 @@ class View(unittest.TestCase):
                     waits.stderr.read()
                     self.assertRegex(said, rf"connected to {daemon.address}:52100, .*; requested pings; waiting for the first one, at most 10 s")
 
-    def test_a_value_that_the_sonar_limits_is_told_once(self):
+    def test_a_value_that_the_sonar_limits_is_reported_once(self):
         with tempfile.TemporaryDirectory() as folder:
             for command in (("view", "--png", f"{folder}/a.png"), ("view", "--live", "--pings", "3", "--png", f"{folder}/b.png"),
                             ("record", "--pings", "3", "--raw", f"{folder}/c"), ("listen", "--pings", "3"), ("stats",)):

@@ -50,11 +50,11 @@ FLOORS = {
     "clients/bvtsdk": ["clients/bvtsdk/", "protocol/blueview/link.hpp"],  # loaded into foreign processes: only constants are shared
     "tests": [""],
 }
-# In these, folders include each other in one direction only; so do components: a header and the sources of the same name.
+# Below these, folders include each other in one direction only; so do components (a header and the sources of its name).
 ONE_DIRECTION = r"daemon/|protocol/|core/|clients/|cuda/"
-# The list of makes includes them all, and nothing includes it.
+# The list of makes includes all makes, and nothing includes the list.
 LISTS = {"protocol/makes.cpp"}
-# Headers that go to other people's include folders find each other by name alone.
+# Headers that go to other people's include folders include each other by name alone.
 INSTALLED = r"clients/bvtsdk/(abi\d|codes)/include/"
 # Header of a dependency -> the only files that may include it (tests may include anything).
 DEPENDENCIES = {

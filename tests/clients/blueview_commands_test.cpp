@@ -148,7 +148,7 @@ std::string captured(const std::function<Result<void>()>& command) {
   return text;
 }
 
-TEST(BlueViewCommands, ListenFindsTheHeadAndAsksForEachPing) {
+TEST(BlueViewCommands, ListenFindsTheHeadAndRequestsEachPing) {
   FakeHead head;
   ListenOptions options;
   options.source = anything_there();
@@ -158,9 +158,9 @@ TEST(BlueViewCommands, ListenFindsTheHeadAndAsksForEachPing) {
   EXPECT_THAT(text, HasSubstr("ping 5  20 x 8  16 bit  4.00 m  0.9000 MHz"));
   EXPECT_THAT(text, HasSubstr("pings 5\n"));
   for (const char* not_judged : {"missing ids", "identity errors", "echoed"})
-    EXPECT_THAT(text, testing::Not(HasSubstr(not_judged))) << "what is not judged is not told";
-  EXPECT_EQ(head.pings, 5) << "no more than were wanted";
-  EXPECT_EQ(head.settings, 0) << "nothing was wished";
+    EXPECT_THAT(text, testing::Not(HasSubstr(not_judged))) << "figures that are not judged are not printed";
+  EXPECT_EQ(head.pings, 5) << "no more than requested";
+  EXPECT_EQ(head.settings, 0) << "no settings were requested";
 }
 
 TEST(BlueViewCommands, NoFileIsWrittenThatCouldNotBeRead) {

@@ -74,7 +74,7 @@ TEST(NoticeLog, KeepsTheFirstOfAKindAndThenFew) {
       kept, ElementsAre("ping 1 is late", "ping 2 is late", "ping 3 is late", "ping 10 is late  (the 10th message of this kind)",
                         HasSubstr("the 100th"), HasSubstr("the 1000th")));
   EXPECT_THAT(log.kept({"ping 9 is early"}), ElementsAre("ping 9 is early")) << "of another kind";
-  EXPECT_THAT(log.rest(), ElementsAre()) << "all of them are told";
+  EXPECT_THAT(log.rest(), ElementsAre()) << "all of them have been reported";
   log.kept({"ping 1001 is late"});
   EXPECT_THAT(log.rest(), ElementsAre("ping 1001 is late  (the last of 1001 messages of this kind)"));
   for (int i = 0; i < 200; ++i) log.kept({"kind " + std::string(static_cast<std::size_t>(i), 'x')});

@@ -113,7 +113,7 @@ TEST(Search, RefusesSettingsOnlyOfASonarThatIsThere) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::usage);
   EXPECT_THAT(refused.error().text, HasSubstr("--rate does not apply to a Ping360"));
-  EXPECT_THAT(sonar.received(), testing::Each(ping::Id::general_request)) << "its scan goes on";
+  EXPECT_THAT(sonar.received(), testing::Each(ping::Id::general_request)) << "its scan continues";
 }
 
 TEST(Search, StopsOnlyScansThatItStarted) {
@@ -147,7 +147,7 @@ TEST(Search, ASonarByUdpThatHasGoneIsNoticedWithoutARequest) {
   EXPECT_THAT(end.error, HasSubstr("refused"));
 }
 
-TEST(Search, GoesOnBesideAWebServer) {
+TEST(Search, ContinuesBesideAWebServer) {
   std::atomic<int> requests = 0;
   Socket sonar = bound(SOCK_STREAM, oculus::tcp_port);
   const SocketServer web(address, 80, [&](const Socket& client) {
@@ -159,7 +159,7 @@ TEST(Search, GoesOnBesideAWebServer) {
   EXPECT_EQ(requests, 1);
 }
 
-TEST(Search, DoesNotTakeAWebServerForTheSonarThatIsMissed) {
+TEST(Search, DoesNotMistakeAWebServerForAMissingSonar) {
   const SocketServer web(address, 80, refuse_as_a_web_server);
   const auto nothing = PingStream::open({address, 0}, nullptr, {}, 100ms);
   ASSERT_FALSE(nothing);

@@ -152,15 +152,16 @@ TEST(StatusText, PrintsHowLongAHostWithoutAConnectionIsSilent) {
 }
 
 TEST(StatusText, PrintsEvents) {
-  const auto told = [](const std::string& event) { return text_from(control::message_from<v1::Event>(event)); };
-  EXPECT_EQ(told(R"(client { sonar: "front" client: "10.0.0.9:4000" connected: true })"),
+  const auto text_of_event = [](const std::string& event) { return text_from(control::message_from<v1::Event>(event)); };
+  EXPECT_EQ(text_of_event(R"(client { sonar: "front" client: "10.0.0.9:4000" connected: true })"),
             "client 10.0.0.9:4000 connected to front");
-  EXPECT_EQ(told(R"(client { sonar: "front" client: "10.0.0.9:4000" why: "end of file" } unsent: 2)"),
+  EXPECT_EQ(text_of_event(R"(client { sonar: "front" client: "10.0.0.9:4000" why: "end of file" } unsent: 2)"),
             "client 10.0.0.9:4000 left front: end of file  (2 events before this one were not sent: too slow a reader)");
-  EXPECT_EQ(told(R"(pose { vehicle: "rov" stale: true text: "no pose for 1 s" })"), "pose rov stale: no pose for 1 s");
-  EXPECT_EQ(told(R"(scene { scene: "demo" text: "loaded" })"), "scene demo: loaded");
-  EXPECT_EQ(told(R"(ping { sonar: "front" number: 5 range_m: 10 beams: 512 rows: 437 clients: 1 simulation_ms: 20.04 })"),
-            "ping 5  front  10 m  512 beams x 437 rows  20.0 ms  1 client");
+  EXPECT_EQ(text_of_event(R"(pose { vehicle: "rov" stale: true text: "no pose for 1 s" })"), "pose rov stale: no pose for 1 s");
+  EXPECT_EQ(text_of_event(R"(scene { scene: "demo" text: "loaded" })"), "scene demo: loaded");
+  EXPECT_EQ(
+      text_of_event(R"(ping { sonar: "front" number: 5 range_m: 10 beams: 512 rows: 437 clients: 1 simulation_ms: 20.04 })"),
+      "ping 5  front  10 m  512 beams x 437 rows  20.0 ms  1 client");
 }
 
 TEST(LoadScene, NamesFilesOfThisComputerInFull) {

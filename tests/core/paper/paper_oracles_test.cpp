@@ -68,7 +68,7 @@ TEST(PaperWindow, ShowsAPointInItsRow) {
     const int row = static_cast<int>(loudest(window) / window.beam_azimuth_rad.size());
     EXPECT_EQ(row, static_cast<int>(3.01 / c.request.settings.range_bin_m) - skipped) << "the nearer, louder one is left out";
     Comparison whole(SceneMaker().add_point({3.01, 0, 0}, -10).make(), p900(), small_settings());
-    EXPECT_NEAR(at_row(window, row, 32) / at_row(whole.ping(mode), row + skipped, 32), 1, 0.01) << "nor has it a tail";
+    EXPECT_NEAR(at_row(window, row, 32) / at_row(whole.ping(mode), row + skipped, 32), 1, 0.01) << "its tail is left out, too";
   }
 }
 

@@ -95,7 +95,7 @@ TEST(Heap, AWarmPingAllocatesLittleForAnyNumberOfCells) {
   const auto scene = world();
   Parallel pool(1);
   const auto engine = make_cpu_engine(scene, pool);
-  const auto asked = [&](const PingRequest& request) {
+  const auto allocations_of = [&](const PingRequest& request) {
     std::size_t least = ~std::size_t{0};
     for (int k = 0; k < 4; ++k) {
       const std::size_t before = allocations;
@@ -104,10 +104,10 @@ TEST(Heap, AWarmPingAllocatesLittleForAnyNumberOfCells) {
     }
     return least;
   };
-  const std::size_t near = asked(seen_from(0, 0.5, 1, p900(), default_rows(4, 160)));
-  const std::size_t far = asked(seen_from(0, 0.5, 1, p900(), default_rows(12, 480)));
+  const std::size_t near = allocations_of(seen_from(0, 0.5, 1, p900(), default_rows(4, 160)));
+  const std::size_t far = allocations_of(seen_from(0, 0.5, 1, p900(), default_rows(12, 480)));
   EXPECT_LE(far, 100u);
-  EXPECT_LE(far, near + 4) << "nothing is asked for by the cell, the row or the ray";
+  EXPECT_LE(far, near + 4) << "nothing is allocated per cell, row or ray";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Bodies that are too thin for the depth map. Bodies a few centimetres thick echo only from the side that faces the sonar.
-// Bodies close behind an opaque face do not echo. In expected power, compared with integrals in double.
+// Bodies close behind an opaque face do not echo. Expected powers are compared with integrals in double.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -282,7 +282,7 @@ TEST_F(GeoTiff, DegreesStandAboutAnOrigin) {
   EXPECT_NEAR(grid->y[1], 59.995, 1e-12);
   EXPECT_TRUE(std::isnan(grid->z_m[1]));
   EXPECT_THAT(grid->notes, ::testing::ElementsAre(HasSubstr("1 cell of -32768, far from"), HasSubstr("are missing")));
-  EXPECT_FALSE(read(TiffFile::of(3, 2, six).at(5, 60, 0.01, 0.01).keys({{{1024, 1}}}))->origin) << "metres, says the file";
+  EXPECT_FALSE(read(TiffFile::of(3, 2, six).at(5, 60, 0.01, 0.01).keys({{{1024, 1}}}))->origin) << "the file states metres";
 }
 
 TEST_F(GeoTiff, TheUtmZoneOfAFilePlacesTheGridAboutAnOrigin) {

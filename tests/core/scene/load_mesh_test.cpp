@@ -136,7 +136,7 @@ TEST_F(LoadMesh, ObjLinesMayBeginWithBlanksOrAByteOrderMark) {
   }
 }
 
-TEST_F(LoadMesh, BinaryStlMayHaveBytesBehindItsTriangles) {
+TEST_F(LoadMesh, BinaryStlMayHaveBytesAfterItsTriangles) {
   const auto binary = [](std::uint32_t triangles, std::size_t present, const std::string& behind) {
     std::string text(80, '\0');
     text.append(reinterpret_cast<const char*>(&triangles), 4);

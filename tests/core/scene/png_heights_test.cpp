@@ -55,7 +55,7 @@ TEST(PngHeights, WrongFilesAreRefused) {
   const auto good = write_png(files, 3, 2, PNG_FORMAT_GRAY, colour);
   EXPECT_EQ(refusal(good), "accepted");
   const std::string bytes = files.read(good);
-  for (std::size_t n = 0; n + 12 < bytes.size(); ++n) {  // without its last chunk alone, the picture is whole
+  for (std::size_t n = 0; n + 12 < bytes.size(); ++n) {  // if only the last chunk is missing, the picture is whole
     EXPECT_THAT(refusal(files.write("cut.png", bytes.substr(0, n))), HasSubstr("not usable as heights")) << n;
   }
   for (std::size_t n = 0; n < bytes.size(); ++n) {
@@ -65,7 +65,7 @@ TEST(PngHeights, WrongFilesAreRefused) {
   }
 }
 
-// Drawing programs store grey so.
+// Drawing programs store grey in this way.
 TEST(PngHeights, GreyStoredAsColoursIsRead) {
   TemporaryFiles files;
   const std::uint8_t levels[6] = {0, 1, 255, 16, 32, 128};
@@ -99,7 +99,7 @@ TEST(PngHeights, GreyStoredAsColoursIsRead) {
               HasSubstr("not a grey image: it has colours"));
 }
 
-// gdal_translate marks cells without data so.
+// gdal_translate marks cells without data in this way.
 TEST(PngHeights, TransparentPixelsAreHoles) {
   TemporaryFiles files;
   const std::vector<std::uint8_t> grey_alpha{10, 255, 20, 0, 30, 255, 40, 255, 50, 1, 60, 255};

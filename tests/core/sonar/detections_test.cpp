@@ -151,7 +151,7 @@ TEST(Detections, TwoTargetsAreTwoPoints) {
   EXPECT_EQ(direction_of(points[1]), 11);
 }
 
-// Between them there is no echo.
+// Between the targets there is no echo.
 TEST(Detections, TargetsApartAreNoFloor) {
   Sounding s(0.024);
   for (const double azimuth_deg : {-37.5, -12.5, 12.5, 37.5}) s.add({rad_from_deg(azimuth_deg), 5, 1});

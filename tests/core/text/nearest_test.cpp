@@ -24,7 +24,7 @@ TEST(Nearest, AcceptsANameWithoutItsUnit) {
   EXPECT_EQ(nearest("mount_m", keys), "mount");
 }
 
-TEST(Nearest, StaysSilentWhenNothingIsNear) {
+TEST(Nearest, SuggestsNothingWhenNothingIsNear) {
   EXPECT_EQ(nearest("colour", keys), "");
   EXPECT_EQ(nearest("x", keys), "");
   EXPECT_EQ(nearest("mount", {}), "");
