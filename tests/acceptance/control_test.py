@@ -1,4 +1,4 @@
-"""Tests control: every curl example of docs/control.md with a running daemon, the token, the listeners' rules."""
+"""Tests the control interface with a running daemon: every curl example of docs/control.md, the token, rules of listeners."""
 import http.client
 import json
 import pathlib

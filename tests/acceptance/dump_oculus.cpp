@@ -33,7 +33,7 @@ std::string hex_from(wire::BytesView bytes) {
   return text;
 }
 
-/// The decoder stores both versions in the long form; fields that the short one does not have are omitted.
+/// The decoder stores both versions in the long form; fields that the short form does not have are omitted.
 Json fields_of(const DecodedPing& ping) {
   Json object = json_of(ping.head.fixed);
   if (ping.head.fixed.header.version >= 2) return object;

@@ -200,28 +200,28 @@ class Checked:
         for content, chunk in zip(indexes, self.chunks):
             self._check_chunk_index(content, chunk)
         self._check_statistics(statistics[0])
-        stated = []
+        said = []
         for opcode, _, content in records(self.data, self.offsets_at, self.footer_at):
             expect(opcode == SUMMARY_OFFSET and len(content) == 17, "summary offsets")
-            stated.append([content[0], *struct.unpack("<QQ", content[1:])])
-        expect(stated == groups, "places of the summary's groups")
+            said.append([content[0], *struct.unpack("<QQ", content[1:])])
+        expect(said == groups, "places of the summary's groups")
 
     @staticmethod
     def _check_chunk_index(content, chunk):
         f = Fields(content)
-        stated = (f.u(8), f.u(8), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))), f.u(8), f.text(), f.u(8), f.u(8))
+        said = (f.u(8), f.u(8), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))), f.u(8), f.text(), f.u(8), f.u(8))
         f.end()
-        expect(stated == (chunk["first"], chunk["last"], chunk["at"], chunk["length"], chunk["indexed"], chunk["index_length"], "",
+        expect(said == (chunk["first"], chunk["last"], chunk["at"], chunk["length"], chunk["indexed"], chunk["index_length"], "",
                         chunk["size"], chunk["size"]), "a chunk index")
 
     def _check_statistics(self, content):
         f = Fields(content)
-        stated = (f.u(8), f.u(2), f.u(4), f.u(4), f.u(4), f.u(4), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))))
+        said = (f.u(8), f.u(2), f.u(4), f.u(4), f.u(4), f.u(4), f.u(8), f.u(8), dict(f.pairs(lambda g: g.u(2), lambda g: g.u(8))))
         f.end()
         first = min((chunk["first"] for chunk in self.chunks), default=0)
         last = max((chunk["last"] for chunk in self.chunks), default=0)
-        expect(stated == (len(self.messages), len(self.schemas), len(self.channels), 0, 0, len(self.chunks), first, last, self.counts),
-               f"statistics {stated}")
+        expect(said == (len(self.messages), len(self.schemas), len(self.channels), 0, 0, len(self.chunks), first, last, self.counts),
+               f"statistics {said}")
 
 
 def check(data):

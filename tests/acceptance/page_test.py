@@ -158,7 +158,7 @@ class Page(PageChecks, unittest.TestCase):
             page.close()
 
     def test_fan_without_a_graphics_processor_is_true(self):
-        """Without one, the page draws whole samples, so the edges of echoes may differ by one sample."""
+        """Without a graphics processor the page draws whole samples, so the edges of echoes may differ by one sample."""
         for name in self.pings:
             self.mock.pings = [self.pings[name]]
             page = self.open(1100, 700, query="?test=600", script=WITHOUT_WEBGL)

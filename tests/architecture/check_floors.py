@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks the floors of docs/architecture.md: which folders may include which, and what files must not contain.
 
-usage: check_floors.py ROOT      prints one line a violation, exits 1 when there is any
+usage: check_floors.py ROOT      prints one line per violation, exits 1 if there is any
 """
 import pathlib
 import re

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that shipped programs and libraries have the protections of the compiler and the linker.
 
-usage: check_hardening.py FILE...    prints what is missing, a line each; exit 1 when anything is
+usage: check_hardening.py FILE...    prints missing protections, one per line; exits 1 if there is any
 """
 import subprocess
 import sys

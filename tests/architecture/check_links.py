@@ -3,9 +3,9 @@
 backticks (`daemon/commands/main.cpp`). Finds tables that an empty line cuts: GitHub shows the rows below it as text.
 
 usage: check_links.py ROOT              a checkout: its tracked files
-       check_links.py --installed ROOT  what an installation made below ROOT: a page may link to what is there, nowhere else
+       check_links.py --installed ROOT  an installation below ROOT: its pages may link only to files there
 
-Prints one line a dead link or cut table, exits 1 when there is any. Links to the web are not followed.
+Prints one line per dead link or cut table, exits 1 if there is any. Links to the web are not followed.
 """
 import pathlib
 import re

@@ -2,7 +2,7 @@
 """Checks which versions of system libraries programs and libraries need, so that they run on systems older than the build
 machine's.
 
-usage: check_symbol_versions.py GLIBC=2.35 [GLIBCXX=3.4.30 ...] FILE...    prints what is newer, a line each; exit 1 when anything is
+usage: check_symbol_versions.py GLIBC=2.35 [GLIBCXX=3.4.30 ...] FILE...    prints newer versions, one per line; exits 1 if any
 """
 import re
 import subprocess

@@ -16,7 +16,7 @@
 
 namespace sonar::clients {
 
-/// `type`: SOCK_STREAM or SOCK_DGRAM.
+/// Returns a socket of the `type` SOCK_STREAM or SOCK_DGRAM.
 inline Socket bound_socket(const std::string& address, int type, std::uint16_t port) {
   Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
   const int yes = 1;
@@ -30,7 +30,7 @@ inline Socket bound_socket(const std::string& address, int type, std::uint16_t p
   return socket;
 }
 
-/// Calls `serve` for each connection in turn, in a thread, until it is destroyed. Port 0: a free one.
+/// Calls `serve` for each connection in turn, in a thread, until it is destroyed. Port 0 means any free port.
 class SocketServer {
  public:
   using Serve = std::function<void(const Socket&)>;

@@ -25,7 +25,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Bound to a free port of our own loopback address.
+/// Returns a socket at a free port of our own loopback address.
 Socket bound(int type, std::uint16_t& port) {
   Socket socket(::socket(AF_INET, type | SOCK_CLOEXEC, 0));
   sockaddr_in address{};

@@ -36,7 +36,7 @@ TEST(Utm, TheMiddleOfAZoneHasItsMeridian) {
   EXPECT_NEAR(scale * meridian_arc_m(rad_from_deg(60.0)), 6'651'411.19, 0.01);  // the value printed in tables
 }
 
-// Only one projection has this property together with the meridian.
+// Only one projection preserves angles and has this scale along the meridian.
 TEST(Utm, IsTrueToAngles) {
   for (const double easting_m : {166'000.0, 300'000.0, 500'000.0, 780'000.0, 1'200'000.0})
     for (const double northing_m : {0.0, 1'500'000.0, 5'200'000.0, 8'700'000.0}) {

@@ -66,7 +66,7 @@ class TabulatedBed {
   }
 
   double pattern(double range_m, double cosine) const { return pattern_(range_m * cosine); }
-  /// The power averaged over the pulse's energy: where the fan's edge or the first return is near it changes within a pulse.
+  /// The power averaged over the pulse's energy, because it changes within a pulse near the fan's edge and the first return.
   double power(double range_m, double cosine) const {
     double sum = 0, weights = 0;
     for (int i = -6; i <= 6; ++i) {

@@ -231,7 +231,7 @@ TEST(SharedNoise, HasASteadyPart) {
     s.request.number = PingNumber{number};
     s.ping();
     const std::vector<std::complex<float>>& beams = s.last().beam_signal_upa;
-    ASSERT_EQ(beams.size(), mean.size()) << "one sample a row";
+    ASSERT_EQ(beams.size(), mean.size()) << "one sample per row";
     for (int row = 40; row < 110; ++row) {
       const auto at = static_cast<std::size_t>(row * s.beams() + 4);
       const double of_mean = std::pow(static_cast<double>(mean[at]), 2);
@@ -287,7 +287,7 @@ TEST(SharedLeak, IsTheSumOfTheFocusedArray) {
     power += static_cast<double>(std::norm(before[i])) / 2 + static_cast<double>(std::norm(s.last().beam_signal_upa[i])) / 2;
     difference += static_cast<double>(std::norm(before[i] - s.last().beam_signal_upa[i]));
   }
-  EXPECT_NEAR(difference / power, 2 * 0.02, 0.01) << "steady but for 2 % of the power";
+  EXPECT_NEAR(difference / power, 2 * 0.02, 0.01) << "steady except for 2 % of the power";
   s.request.switches.leak = false;
   s.ping();
   EXPECT_EQ(s.pressure(3, 40), 0);

@@ -68,7 +68,7 @@ TEST_F(SceneMemory, AMillionTrianglesInBinaryStlTakeLittleMemory) {
   ASSERT_TRUE(mesh);
   EXPECT_EQ(mesh->centred.mesh.triangles.size(), count);
   EXPECT_EQ(mesh->centred.mesh.vertices.size(), edge * edge);
-  EXPECT_LT(peak / static_cast<double>(count), 45) << "bytes a triangle";  // 31; the importer needs 240
+  EXPECT_LT(peak / static_cast<double>(count), 45) << "bytes per triangle";  // 31; the importer needs 240
 }
 
 TEST_F(SceneMemory, TwoMillionTracedTrianglesTakeLittleMemory) {
@@ -88,7 +88,7 @@ TEST_F(SceneMemory, TwoMillionTracedTrianglesTakeLittleMemory) {
   down.direction_z[0] = -1, down.far[0] = 10, down.origin_z[0] = 5, down.origin_x[0] = 0.03f;
   rays->trace(down, 1u, false);
   EXPECT_EQ(down.object[0], 0u);
-  EXPECT_LT(peak / static_cast<double>(scene->triangle_count()), 60) << "bytes a triangle";  // 36; 101 in the larger form
+  EXPECT_LT(peak / static_cast<double>(scene->triangle_count()), 60) << "bytes per triangle";  // 36; 101 in the larger form
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ TEST(Seabed, NotesRipplesThatAreTooFineForItsGrid) {
                                    "grid is 0.2 m; set spacing_m: 0.0833, and fine_size_m if the bed is large"));
   EXPECT_THAT(notes(0.72, 0, 0.1), testing::ElementsAre(HasSubstr("keep at most 20 % of their height")));
   EXPECT_THAT(notes(0.6, 0, 0.1), testing::ElementsAre(HasSubstr("do not appear")))
-      << "three grid points a wave, but for rounding";
+      << "three grid points per wave, except for rounding";
   EXPECT_THAT(notes(1.3, 0, 0.1), testing::IsEmpty());
   EXPECT_THAT(notes(0.5, pi / 2, 0.1), testing::IsEmpty()) << "the grid is finer along y";
   EXPECT_THAT(notes(0.5, 0, 0), testing::IsEmpty()) << "no ripples";

@@ -7,7 +7,7 @@
 #include "tests/clients/bvtsdk/programs/expect.h"
 
 #if !defined(__has_feature)
-#define __has_feature(name) 0 /* of clang, which does not define the two macros of gcc */
+#define __has_feature(name) 0 /* clang has it, and does not define the two macros of gcc */
 #endif
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || __has_feature(address_sanitizer) || \
     __has_feature(thread_sanitizer)
