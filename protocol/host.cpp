@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/text/format.hpp"
 #include "core/text/nearest.hpp"
 
 namespace sonar::protocol {
@@ -71,10 +72,8 @@ Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::
     if (known.size() == 0)
       return failure(ErrorKind::usage, std::string("--").append(name).append(" does not apply to ").append(title) +
                                            ", whose drivers set nothing: use `sonarctl set sonar`");
-    std::string all;
-    for (const std::string_view other : known) all.append(all.empty() ? "--" : ", --").append(other);
-    return failure(ErrorKind::usage,
-                   std::string("--").append(name).append(" does not apply to ").append(title) + ", which has " + all);
+    return failure(ErrorKind::usage, std::string("--").append(name).append(" does not apply to ").append(title) +
+                                         ", which has --" + text::joined(known, ", --"));
   }
   return {};
 }

@@ -10,6 +10,7 @@ namespace sonar::scene_tools {
 namespace {
 
 using text::format;
+using text::joined;
 
 /// Formats a number with three significant digits, without trailing zeros or exponent.
 std::string short_number(double v) {
@@ -39,12 +40,6 @@ std::string table(const std::vector<Row>& rows, const std::vector<std::size_t>& 
     line.erase(line.find_last_not_of(' ') + 1);
     out += line + "\n";
   }
-  return out;
-}
-
-std::string joined(const std::vector<std::string>& parts) {
-  std::string out;
-  for (const std::string& part : parts) out += (out.empty() ? "" : ", ") + part;
   return out;
 }
 

@@ -1,7 +1,9 @@
 // Probable mistakes in a valid scene, which a loader cannot detect and which show only as an empty image.
 #include <algorithm>
+#include <span>
 
 #include "clients/scene_tools/import_scene.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::scene_tools {
 namespace {
@@ -14,8 +16,7 @@ constexpr std::size_t many_triangles = 2'000'000;
 
 std::string list_of(const std::vector<std::string>& names) {
   constexpr std::size_t most = 8;
-  std::string out;
-  for (std::size_t i = 0; i < std::min(most, names.size()); ++i) out += (i ? ", " : "") + names[i];
+  std::string out = text::joined(std::span(names).first(std::min(most, names.size())));
   if (names.size() > most) out += std::string(" and ") + std::to_string(names.size() - most) + " more";
   return out;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/base/letters.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::scene_tools {
 namespace {
@@ -104,9 +105,8 @@ void Findings::fail(const Place& at, const std::string& what) {
 std::vector<std::string> Findings::left_out() const {
   std::string counts;
   for (const auto& [kind, found] : of_no_echo_) {
-    counts += (counts.empty() ? "" : ", ") + std::to_string(found.count) + " " + kind + (found.count == 1 ? "" : "s");
-    std::string names;
-    for (const std::string& name : found.names) names += (names.empty() ? "" : ", ") + name;
+    counts += (counts.empty() ? "" : ", ") + text::counted(found.count, kind);
+    const std::string names = text::joined(found.names);
     if (!names.empty()) counts += " (" + names + (found.more_names ? ", .." : "") + ")";
   }
   std::vector<std::string> all;

@@ -6,6 +6,7 @@
 #include "clients/sonarctl/ping_log.hpp"
 #include "clients/sonarctl/source.hpp"
 #include "clients/sonarctl/waiting.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -152,9 +153,7 @@ Result<void> report(const ListenOptions& options, const Listener& listener) {
   }
   const std::vector<std::string> found = complaints(summary, asked);
   if (found.empty()) return {};
-  std::string text;
-  for (const std::string& complaint : found) text += (text.empty() ? "" : "; ") + complaint;
-  return failure(ErrorKind::bad_data, text);
+  return failure(ErrorKind::bad_data, text::joined(found, "; "));
 }
 
 }  // namespace

@@ -117,8 +117,7 @@ std::string text_from(const PingSummary& s, bool asked, std::string_view rate_un
                  std::string(rate_unit).c_str(), s.interval_p50_ms, s.interval_p99_ms, s.interval_max_ms,
                  s.pings > 0 ? s.rate_hz * static_cast<double>(s.bytes) / static_cast<double>(s.pings) / 1e6 : 0.0);
   if (asked) text += "\nsettings echoed as requested: " + echo_text(s);
-  std::string limits;
-  for (const std::string& limit : s.limited) limits += (limits.empty() ? "" : "; ") + limit;
+  const std::string limits = text::joined(s.limited, "; ");
   if (!limits.empty()) text += (asked ? ", but the sonar limits them: its pings have " : "\nthe sonar's pings have ") + limits;
   return text;
 }

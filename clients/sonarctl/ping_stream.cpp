@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "core/base/regular_file.hpp"
+#include "core/text/format.hpp"
 #include "core/text/ipv4.hpp"
 
 namespace sonar::clients {
@@ -102,10 +103,9 @@ Result<PingStream> PingStream::open(const Endpoint& device, const Make* make, co
     }
     if (interrupted != 0) return failure(ErrorKind::io, "interrupted before " + device.host + " answered");
     if (is_last) {
-      std::string silent;
-      for (const auto& [one, at] : others)
-        silent +=
-            (silent.empty() ? "" : ", ") + std::string(one->ports.front().kind == Kind::http ? "http " : "udp ") + text_from(at);
+      const std::string silent = text::joined(others, ", ", [](const Candidate& at) {
+        return (at.first->ports.front().kind == Kind::http ? "http " : "udp ") + text_from(at.second);
+      });
       if (make == nullptr && !silent.empty())
         failed.text += ". No sonar answered at " + silent + " either; on a busy computer, name the make (--make)";
       return tl::unexpected(failed);
@@ -219,8 +219,7 @@ void PingStream::carry_out(protocol::HostActions actions) {
       else
         carry_out(host_->on_reply({.status = reply->status, .body = reply->body}, now()));
     } else if (auto* ping = std::get_if<HostPing>(&action)) {
-      std::string limits;
-      for (const std::string& limit : ping->limited) limits += (limits.empty() ? "" : "; ") + limit;
+      const std::string limits = text::joined(ping->limited, "; ");
       if (limits != std::exchange(limits_, limits) && !limits.empty())
         notices.push_back("the sonar limits the request: " + limits);
       items_.push_back({Wait::data, std::move(*ping), std::exchange(notices, {}), std::exchange(kept_, {}), {}});

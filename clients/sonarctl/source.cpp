@@ -70,11 +70,10 @@ Result<ServedStatus> status_at(const ControlOptions& options, const Make* make, 
   if (found.empty())
     return failure(ErrorKind::unavailable, "the sonard at " + text_from(control->at()) + " serves no sonar" + of_make + " at " +
                                                place + "; --control names another");
-  if (found.size() > 1) {
-    std::string all;
-    for (const v1::SonarStatus* s : found) all += (all.empty() ? "" : ", ") + own_address(*s) + " (" + s->name() + ")";
-    return failure(ErrorKind::usage, "several sonars are at " + place + ": name one with its port: " + all);
-  }
+  const auto named = [](const v1::SonarStatus* s) { return own_address(*s) + " (" + s->name() + ")"; };
+  if (found.size() > 1)
+    return failure(ErrorKind::usage,
+                   "several sonars are at " + place + ": name one with its port: " + text::joined(found, ", ", named));
   return ServedStatus{*std::move(control), *found.front()};
 }
 

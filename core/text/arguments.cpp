@@ -18,12 +18,6 @@ constexpr std::size_t short_list = 8;  // number of choices that an error lists
 
 std::string in_quotes(std::string_view word) { return "\"" + std::string(word) + "\""; }
 
-std::string joined(const std::vector<std::string>& words, const char* between) {
-  std::string all;
-  for (const std::string& word : words) all += (all.empty() ? "" : between) + word;
-  return all;
-}
-
 /// True if a word is a decimal number in any unambiguous form. CLI11 converts it afterwards.
 bool is_number(std::string_view given, double& value) {
   const std::string_view digits = given.starts_with('+') ? given.substr(1) : given;
@@ -85,7 +79,7 @@ std::string error_of_unknown(const UnknownWord& unknown) {
 /// text is returned.
 std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error) {
   if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::RequiredError)) return error.what();
-  if (asked.get_require_subcommand_min() > 0) return "a command is required: " + joined(command_names(asked), ", ");
+  if (asked.get_require_subcommand_min() > 0) return "a command is required: " + joined(command_names(asked));
   for (const CLI::Option* option : asked.get_options())
     if (option->get_required() && option->count() == 0) return option->get_name() + " is required: " + option->get_description();
   return error.what();
@@ -129,7 +123,7 @@ CLI::Validator one_of(std::vector<std::string> names) {
   const std::string described = joined(names, "|");
   const auto refusal = [names = std::move(names)](std::string& given) -> std::string {
     if (std::find(names.begin(), names.end(), given) != names.end()) return {};
-    if (names.size() <= short_list) return in_quotes(given) + " is not one of: " + joined(names, ", ");
+    if (names.size() <= short_list) return in_quotes(given) + " is not one of: " + joined(names);
     const std::vector<std::string_view> candidates(names.begin(), names.end());
     return "unknown value " + in_quotes(given) + suggestion(given, candidates, "give one of");
   };

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/letters.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::text {
 namespace {
@@ -57,11 +58,8 @@ std::string suggestion(std::string_view name, std::span<const std::string_view> 
     return "; did you mean \"" + std::string(near) + "\"?";
   }
   if (candidates.empty()) return {};
-  std::string out = "; " + std::string(label) + ": ";
   const std::size_t shown = std::min<std::size_t>(candidates.size(), 20);
-  for (std::size_t i = 0; i < shown; ++i) out += (i ? ", " : "") + std::string(candidates[i]);
-  if (shown < candidates.size()) out += ", ...";
-  return out;
+  return "; " + std::string(label) + ": " + joined(candidates.first(shown)) + (shown < candidates.size() ? ", ..." : "");
 }
 
 }  // namespace sonar::text

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "core/text/decimal.hpp"
+#include "core/text/format.hpp"
 #include "core/text/nearest.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "core/text/yaml_tree.hpp"
@@ -175,9 +176,7 @@ bool Node::boolean() const {
 bool Node::boolean_or(bool fallback) const { return present() ? boolean() : fallback; }
 
 std::size_t Node::choice_index(std::vector<std::string_view> names) const {
-  std::string all;
-  for (const auto n : names) all += (all.empty() ? "" : ", ") + std::string(n);
-  if (!expect_scalar("one of " + all)) return 0;
+  if (!expect_scalar("one of " + joined(names))) return 0;
   const auto found = std::find(names.begin(), names.end(), node_->scalar);
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
   fail("unknown value " + describe(*node_) + suggestion(node_->scalar, names, "valid values"));

@@ -5,6 +5,7 @@
 #include <csignal>
 #include <utility>
 
+#include "core/text/format.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/config/restart_keys.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
@@ -227,9 +228,7 @@ void App::take_over(Config next) {
   run_range_finders();
 
   for (const std::string& error : change.errors) log_.error("reload: " + error);
-  std::string listed;
-  for (const std::string& key : keys) listed += (listed.empty() ? "" : ", ") + key;
-  if (!listed.empty()) log_.warning("reload: these need a restart and stay as they were: " + listed);
+  if (!keys.empty()) log_.warning("reload: these need a restart and stay as they were: " + text::joined(keys));
   for (const std::string& note : notes_of_config(config_)) log_.info("reload: " + note);
   log_.info("reloaded: " + change.summary, {{"scene", scene().name}});
   events_.publish_scene(config_.scene.name(), "reloaded: " + change.summary);

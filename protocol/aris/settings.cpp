@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/text/format.hpp"
 #include "protocol/limits.hpp"
 
 namespace sonar::aris {
@@ -62,13 +63,13 @@ Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, con
   if (!wanted.beams || beams == static_cast<int>(*wanted.beams)) return {};
   const std::string asked = ", not " + std::to_string(*wanted.beams);
   if (wanted.mode) return refused(device.model->name + " forms " + std::to_string(beams) + " beams in this mode" + asked);
-  std::string counts;
   for (const PingMode& mode : product.ping_modes) {
-    counts += (counts.empty() ? "" : " or ") + std::to_string(mode.beams());
     if (mode.beams() != static_cast<int>(*wanted.beams)) continue;
     s.acoustics.ping_mode = mode.number;
     return {};
   }
+  const std::string counts =
+      text::joined(product.ping_modes, " or ", [](const PingMode& m) { return std::to_string(m.beams()); });
   return refused(device.model->name + " forms " + counts + " beams" + asked);
 }
 

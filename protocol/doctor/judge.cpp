@@ -30,11 +30,7 @@ std::string utc_text(std::int64_t ns) {
 std::string reason_of(const v1::Visit& gone) { return gone.why() + (gone.without_ping() ? ", before its first ping" : ""); }
 bool is_recent(const v1::Visit& visit) { return !visit.address().empty() && visit.ago_s() < recent_s; }
 
-std::string addresses_of(const v1::SonarStatus& sonar) {
-  std::string all;
-  for (const v1::ClientStatus& client : sonar.clients()) all += (all.empty() ? "" : ", ") + client.address();
-  return all;
-}
+std::string addresses_of(const v1::SonarStatus& sonar) { return text::joined(sonar.clients(), ", ", &v1::ClientStatus::address); }
 
 /// Returns the address at which a driver connects, such as "127.0.0.2, TCP port 52100"; without a port if the sonar is controlled
 /// over HTTP.

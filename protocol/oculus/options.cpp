@@ -3,6 +3,7 @@
 #include <array>
 
 #include "core/base/geometry.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::oculus {
 namespace {
@@ -104,8 +105,7 @@ std::span<const protocol::Option> options() { return option_rows; }
 std::string options_table() {
   std::string text;
   for (const protocol::Option& option : option_rows) {
-    std::string values = option.allowed.empty() ? protocol::numbers_of(option) : std::string();
-    for (const std::string_view& value : option.allowed) values.append(values.empty() ? "" : ", ").append(value);
+    const std::string values = option.allowed.empty() ? protocol::numbers_of(option) : text::joined(option.allowed);
     text.append("| `").append(option.name).append("` | ").append(values).append(" | ").append(option.default_value);
     text.append(" | ").append(option.meaning).append(" |\n");
   }

@@ -17,6 +17,7 @@ namespace {
 
 using text::counted;
 using text::format;
+using text::joined;
 
 constexpr double reported_silence_s = 3;
 
@@ -128,8 +129,7 @@ Error wrong(const char* option, const std::string& given, const std::string& why
 constexpr int most_still_objects = 12;  // in the status, so that the sonars stay in sight
 
 std::string parameter_text(const v1::FaultParameter& p) {
-  std::string values;
-  for (const std::string& word : p.words()) values += (values.empty() ? "" : "|") + word;
+  const std::string values = joined(p.words(), "|");
   return p.name() + "=" + p.value() + " (" + (values.empty() ? format("%.10g to %.10g", p.lowest(), p.highest()) : values) + ")";
 }
 

@@ -123,11 +123,9 @@ const v1::SonarStatus* served_at(const v1::DaemonStatus& status, const SonarFact
 }
 
 std::string addresses_of(const v1::SonarStatus& sonar) {
-  std::string all;
-  for (const v1::SonarAddress& address : sonar.addresses())
-    all += (all.empty() ? "" : ", ") + address.protocol() + " " + address.address() +
-           (address.carries().empty() ? "" : " (" + address.carries() + ")");
-  return all;
+  return text::joined(sonar.addresses(), ", ", [](const v1::SonarAddress& address) {
+    return address.protocol() + " " + address.address() + (address.carries().empty() ? "" : " (" + address.carries() + ")");
+  });
 }
 
 std::string served_by(const v1::DaemonStatus& status) {

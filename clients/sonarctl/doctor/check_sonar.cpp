@@ -12,15 +12,10 @@ using Outcome = StreamFacts::Outcome;
 using sonar::doctor::computing_text;
 using sonar::doctor::less_to_compute;
 using text::format;
+using text::joined;
 
 constexpr double fastest_hz = 40;  // highest rate of an Oculus
 constexpr double soon_s = 1;       // a driver requests pings within this time
-
-std::string joined(const auto& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
 
 std::string text_of(const PortHolder& holder) {
   if (holder.pid == 0) return "a program of another user";
@@ -228,8 +223,7 @@ class SonarChecks {
              ": use one of these ports; if it is one, sonarctl fault list shows whether a fault has closed it";
     if (facts_.daemons.empty() && is_replay(facts_.http))
       return "sonard replay shows this recording only on its page, http://" + text_from(facts_.http.at);
-    std::string others;
-    for (const PortHolder& daemon : facts_.daemons) others += (others.empty() ? "" : ", ") + daemon.at;
+    const std::string others = joined(facts_.daemons, ", ", &PortHolder::at);
     if (!others.empty())
       return text_of(facts_.daemons.front()) + " listens on " + others + ": sonarctl doctor " + facts_.daemons.front().at;
     for (const ReceivedStatus& received : facts_.status.received)

@@ -47,9 +47,8 @@ std::string_view scene_lines(std::string_view text) {
 
 /// Returns the numbers of the draws as a sweep of one step, so that formulas and `let` use them as in a render file.
 std::string sweep_of(const Draws& draws) {
-  std::string sweep;
-  for (const auto& [name, value] : draws.numbers)
-    sweep += (sweep.empty() ? "" : ", ") + name + ": [" + text::format("%.17g", value) + "]";
+  const std::string sweep = text::joined(
+      draws.numbers, ", ", [](const auto& number) { return number.first + ": [" + text::format("%.17g", number.second) + "]"; });
   return sweep.empty() ? "" : "sweep: {" + sweep + "}";
 }
 

@@ -4,9 +4,11 @@
 #include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <ranges>
 
 #include "core/base/geometry.hpp"
 #include "core/text/decimal.hpp"
+#include "core/text/format.hpp"
 
 namespace sonar::render {
 namespace {
@@ -142,8 +144,7 @@ class Parser {
     if (name == "pi") return pi;
     const auto value = values_.find(name);
     if (value != values_.end()) return value->second;
-    std::string known;
-    for (const auto& [other, ignored] : values_) known += (known.empty() ? "" : ", ") + other;
+    const std::string known = text::joined(std::views::keys(values_));
     set_error("unknown name " + std::string(name) + "; known names: " + (known.empty() ? "none" : known));
     return 0;
   }

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "core/base/regular_file.hpp"
+#include "core/text/format.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/sonar_keys.hpp"
@@ -178,8 +179,7 @@ Result<RenderInput> from_config(const std::filesystem::path& file, const std::st
   auto config = parse_config(text, file.string(), file.parent_path());
   if (!config) return tl::make_unexpected(config.error());
   std::size_t index = 0;
-  std::string names;
-  for (const SonarConfig& s : config->sonars) names += (names.empty() ? "" : ", ") + s.name;
+  const std::string names = text::joined(config->sonars, ", ", &SonarConfig::name);
   while (index < config->sonars.size() && config->sonars[index].name != sonar) ++index;
   if (sonar.empty() && config->sonars.size() > 1)
     return failure(ErrorKind::usage, file.string() + " has several sonars, choose one: --sonar " + config->sonars[0].name +

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/geometry.hpp"
+#include "core/text/format.hpp"
 #include "daemon/server/http/http_router.hpp"
 #include "protocol/control/control.hpp"
 
@@ -174,10 +175,9 @@ ReplayServer::Figures RequestedReplay::figures() const {
 }
 
 std::string RequestedReplay::at() const {
-  std::string all;
-  for (const protocol::DriverAddress& address : device_->addresses())
-    all += (all.empty() ? "" : ", ") + std::string(address.protocol) + " " + text_of(address.at);
-  return all;
+  return text::joined(device_->addresses(), ", ", [](const protocol::DriverAddress& address) {
+    return std::string(address.protocol) + " " + text_of(address.at);
+  });
 }
 
 ReplayPage::ReplayPage(asio::io_context& io, const LimitConfig& limits, Admission& admission, Log& log, PlayedRecording of)

@@ -15,11 +15,9 @@ Result<Device*> SonarOperations::find(const std::string& name) {
   std::list<Device>& sonars = fleet_.devices();
   Device* const device = name.empty() && sonars.size() == 1 ? &sonars.front() : fleet_.find(name);
   if (device != nullptr) return device;
-  std::string names;
-  for (const Device& d : sonars) names += (names.empty() ? "" : ", ") + d.config().name;
   return failure(ErrorKind::usage,
                  (name.empty() ? std::string("name the sonar") : "no sonar is called \"" + name.substr(0, 64) + "\"") +
-                     "; there are: " + names);
+                     "; there are: " + text::joined(sonars, ", ", [](const Device& d) { return d.config().name; }));
 }
 
 OperationResult SonarOperations::set(const control::SetSonar& asked, const Sender& sender) {

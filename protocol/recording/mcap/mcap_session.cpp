@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "core/text/format.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"
 #include "protocol/recorded/message_splitter.hpp"
 #include "protocol/sender.hpp"
@@ -53,8 +54,7 @@ class McapRecordingReader final : public RecordingReader {
   }
   std::optional<Error> damage() const override { return reader_.damage(); }
   std::string note() const override {
-    std::string names;
-    for (const std::string& name : others_) names += (names.empty() ? "" : ", ") + name;
+    const std::string names = text::joined(others_);
     return names.empty() ? "" : "the file holds other sonars too: " + names;
   }
   void rewind() override {

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <utility>
+#include <vector>
+
 namespace sonar::text {
 namespace {
 
@@ -22,6 +26,19 @@ TEST(Format, FrequenciesAreWrittenWithTheirUnit) {
   EXPECT_EQ(frequency_text(1e6), "1 MHz");
   EXPECT_EQ(frequency_text(750e3), "750 kHz");
   EXPECT_EQ(frequency_text(0), "0 kHz");
+}
+
+TEST(Joined, PutsASeparatorBetweenElements) {
+  EXPECT_EQ(joined(std::vector<std::string>{}), "");
+  EXPECT_EQ(joined(std::array{std::string_view("a")}), "a");
+  EXPECT_EQ(joined(std::vector<std::string>{"a", "b", "c"}), "a, b, c");
+  EXPECT_EQ(joined(std::array{"a", "b"}, "|"), "a|b");
+}
+
+TEST(Joined, TakesTheTextOfAnElementFromAFunctionOrMember) {
+  EXPECT_EQ(joined(std::array{1, 2}, " or ", [](int n) { return std::to_string(n); }), "1 or 2");
+  using Named = std::pair<int, std::string>;
+  EXPECT_EQ(joined(std::vector<Named>{{1, "front"}, {2, "rear"}}, ", ", &Named::second), "front, rear");
 }
 
 }  // namespace
