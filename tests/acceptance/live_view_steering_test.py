@@ -48,7 +48,8 @@ class Reload(unittest.TestCase):
 
     def test_a_sonar_that_becomes_another_make_gets_the_picture_of_that_make(self):
         with Sonard(profile="ping360") as daemon, Viewer(daemon.address) as viewer:
-            viewer.greeted().subscribe("/front/fan", "/front/picture")
+            viewer.greeted().subscribe("/front/fan", "/front/picture", "/front/cloud")
+            lines = viewer.channel("/front/cloud")
             self.assertEqual(viewer.set("/front/preview", True), True)
             self.assertEqual(viewer.first_of("/front/picture")["kind"], "sweep")
             config = pathlib.Path(daemon.folder.name) / "sonard.yaml"
@@ -59,6 +60,12 @@ class Reload(unittest.TestCase):
             self.assertEqual(viewer.set("/front/preview", True), True)
             viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/picture"
                             and viewer.decode(*value[::2])["kind"] == "points")
+            # Clouds of one beam are queued, clouds of a fan replace each other: the channel is another one.
+            viewer.wait_for(lambda *_: any(c["topic"] == "/front/cloud" and id != lines for id, c in viewer.channels.items()))
+            self.assertNotIn(lines, viewer.channels)
+            viewer.messages.clear()
+            viewer.subscribe("/front/cloud")
+            viewer.first_of("/front/cloud")
 
 
 class Steering(unittest.TestCase):

@@ -17,7 +17,7 @@ using ChannelKind = ViewChannel::Kind;
 using std::chrono::milliseconds;
 
 constexpr milliseconds tick_period{100}, status_period{1000}, after_change{200};
-constexpr double image_hz = 30, fan_hz = 10, places_hz = 30;
+constexpr double image_hz = 30, fan_hz = 10, cloud_hz = 5, places_hz = 30;
 constexpr std::size_t most_advertised = 100;  // number of channels in one message
 
 const Sender ourselves{"live view", "live view"};
@@ -137,7 +137,7 @@ ViewPayloadPointer ViewFeed::current(const Viewer& viewer, std::uint32_t channel
     if (!sonar.last) continue;
     if (channel == sonar.image) return sonar.picture ? sonar.picture : image_payload(sonar.name, sonar.last);
     if (channel == sonar.geometry) return geometry_payload(*sonar.last);
-    if (channel == sonar.cloud && clouds_are_lines(sonar))
+    if (channel == sonar.cloud && sonar.by_lines)
       return cloud_payload(sonar.name, *sonar.last, threshold_of(viewer, sonar.points));
     for (const Slow* slow : {&sonar.drawn, &sonar.points})
       if (const auto made = slow->made.find({channel, threshold_of(viewer, *slow)}); made != slow->made.end())
@@ -220,33 +220,34 @@ void ViewFeed::sync_sonars() {
     if (!is_there) remove(*sonar);
     sonar = is_there ? std::next(sonar) : sonars_.erase(sonar);
   }
-  std::vector<foxglove::Channel> added;
+  const std::uint32_t before = last_channel_;
   for (const Device& device : devices) {
     const std::string& name = device.config().name;
+    const bool by_lines = device.sonar().settings().beam_count == 1;
     if (SonarView* const known = find(name)) {
       known->be_of(device);
+      if (known->by_lines == by_lines) continue;
+      remove_channels({known->cloud});
+      add_cloud(*known, by_lines);
       continue;
     }
-    const std::uint32_t before = last_channel_;
     SonarView sonar{name};
     sonar.image = add_channel("/" + name + "/image", "foxglove.RawImage", ChannelKind::picture, image_hz);
     sonar.geometry = add_channel("/" + name + "/geometry", "sonar.v1.PingGeometry", ChannelKind::last_value);
     sonar.ping = add_channel("/" + name + "/ping", "sonar.v1.PingEvent", ChannelKind::event);
     sonar.fan = add_channel("/" + name + "/fan", "foxglove.RawImage", ChannelKind::picture, fan_hz);
     sonar.about = add_channel("/" + name + "/picture", "sonar.v1.Picture", ChannelKind::last_value, fan_hz);
-    const bool by_lines = device.sonar().settings().beam_count == 1;
-    sonar.cloud = add_channel("/" + name + "/cloud", "foxglove.PointCloud", by_lines ? ChannelKind::event : ChannelKind::picture,
-                              by_lines ? 0 : cloud_hz);
+    add_cloud(sonar, by_lines);
     sonar.drawn.channels = {sonar.fan, sonar.about};
-    sonar.points.channels = {sonar.cloud};
     sonar.points.threshold = "/" + name + "/view/cloud_threshold";
     sonar.truth = add_channel("/" + name + "/truth", "sonar.v1.PingTruth", ChannelKind::last_value, image_hz);
     sonar.figures = add_channel("/" + name + "/figures", "", ChannelKind::event);
     channels_.at(sonar.figures).advertised.encoding = "cdr";
     channels_.at(sonar.figures).advertised.schema = foxglove::figures_schema();
     sonars_.push_back(std::move(sonar));
-    for (std::uint32_t id = before + 1; id <= last_channel_; ++id) added.push_back(channels_.at(id).advertised);
   }
+  std::vector<foxglove::Channel> added;
+  for (std::uint32_t id = before + 1; id <= last_channel_; ++id) added.push_back(channels_.at(id).advertised);
   if (added.empty()) return;
   each([&](ViewConnection& c) {
     advertise(c.viewer(), added);
@@ -254,14 +255,26 @@ void ViewFeed::sync_sonars() {
   });
 }
 
-void ViewFeed::remove(const SonarView& sonar) {
-  const std::vector<std::uint32_t> gone{sonar.image, sonar.geometry, sonar.ping,  sonar.figures,
-                                        sonar.truth, sonar.fan,      sonar.about, sonar.cloud};
+/// Adds the channel of clouds: of all pings of a sonar with one beam, else of at most cloud_hz.
+void ViewFeed::add_cloud(SonarView& sonar, bool by_lines) {
+  sonar.by_lines = by_lines;
+  sonar.cloud = add_channel("/" + sonar.name + "/cloud", "foxglove.PointCloud",
+                            by_lines ? ChannelKind::event : ChannelKind::picture, by_lines ? 0 : cloud_hz);
+  sonar.points.channels = {sonar.cloud};
+}
+
+void ViewFeed::remove_channels(const std::vector<std::uint32_t>& gone) {
   for (const std::uint32_t id : gone) channels_.erase(id);
-  session_ = session_.substr(0, session_.find('-')) + "-" + std::to_string(++sessions_);
   each([&](ViewConnection& c) {
     for (const std::uint32_t id : gone) c.viewer().forget(id);
     c.viewer().say(foxglove::unadvertise(gone));
+  });
+}
+
+void ViewFeed::remove(const SonarView& sonar) {
+  remove_channels({sonar.image, sonar.geometry, sonar.ping, sonar.figures, sonar.truth, sonar.fan, sonar.about, sonar.cloud});
+  session_ = session_.substr(0, session_.find('-')) + "-" + std::to_string(++sessions_);
+  each([&](ViewConnection& c) {
     c.viewer().say(server_info(c.viewer()));
     // At a new session id viewers clear their state.
     send_time(c.viewer());

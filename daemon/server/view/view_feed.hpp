@@ -88,6 +88,7 @@ class ViewFeed final : public ViewerHost {
     std::string name;
     std::uint32_t image = 0, geometry = 0, ping = 0, figures = 0, truth = 0, cloud = 0;
     std::uint32_t fan = 0, about = 0;  // channels; about: sonar.v1.Picture of the fan
+    bool by_lines = false;             // true: the sonar has one beam, and `cloud` gets every ping
     Slow drawn{}, points{};            // fan and about; cloud
     const protocol::Make* make = nullptr;
     std::shared_ptr<const Ping> last = nullptr;
@@ -110,10 +111,8 @@ class ViewFeed final : public ViewerHost {
   bool previews_by_itself(const Device& device);
   void drive_previews();
   void on_preview(const std::string& sonar, const PingOutcome& outcome);
-  static constexpr double cloud_hz = 5;  // limit for clouds of fans
   void make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload make);
   void begin_slow_ones(SonarView& sonar);
-  bool clouds_are_lines(const SonarView& sonar) const;
   void offer_line(const SonarView& sonar);
   void on_log(LogLevel level, const std::string& line, const std::vector<LogField>& fields);
   void arm();
@@ -122,7 +121,9 @@ class ViewFeed final : public ViewerHost {
   void offer_status();
   void offer_scene(std::vector<ViewPayload::Piece> pieces);
   std::uint32_t add_channel(const std::string& topic, const std::string& schema, ViewChannel::Kind kind, double most_hz = 0);
+  void add_cloud(SonarView& sonar, bool by_lines);
   void remove(const SonarView& sonar);
+  void remove_channels(const std::vector<std::uint32_t>& gone);
   SonarView* find(const std::string& name);
   bool wants_truth(const std::string& sonar);
   bool wanted(std::uint32_t channel) const;

@@ -39,15 +39,9 @@ void ViewFeed::on_ping(const Device& of, const PingQueued& queued) {
     const std::string volume = std::to_string(s.mode) + " " + std::to_string(s.range_m) + " " + std::to_string(s.range_start_m);
     if (std::exchange(sonar->volume, volume) != volume) offer(swath_, swath_payload(sonar->name, ping));
   }
-  if (clouds_are_lines(*sonar)) offer_line(*sonar);
+  if (sonar->by_lines) offer_line(*sonar);
   begin_slow_ones(*sonar);
   if (of_.clock.stepped()) arm();
-}
-
-/// True if the clouds are of a sonar with one beam. After a reload the profile may have another number of beams than the channel
-/// expects.
-bool ViewFeed::clouds_are_lines(const SonarView& sonar) const {
-  return channel(sonar.cloud)->kind == ViewChannel::Kind::event && sonar.last->request.settings.beam_count == 1;
 }
 
 /// Offers the cloud of a sonar with one beam for each ping, because a missing line would be a gap in the sweep.
@@ -76,7 +70,7 @@ void ViewFeed::begin_slow_ones(SonarView& sonar) {
                   if (!picture) picture = draw();
                   return channel == about ? picture_payload(at, *picture) : fan_payload(name, at, *picture, *painter);
                 });
-  if (clouds_are_lines(sonar)) return;
+  if (sonar.by_lines) return;
   make_slowly(sonar, &SonarView::points, [name = sonar.name, ping = sonar.last](std::uint32_t, double threshold) {
     return cloud_payload(name, *ping, threshold);
   });
@@ -87,7 +81,7 @@ void ViewFeed::make_slowly(SonarView& sonar, Slow SonarView::*which, MakePayload
   Slow& slow = sonar.*which;
   const auto now = Steady::now();
   const Time at = sonar.last->request.fired_at;
-  const double limit_hz = channels_.at(slow.channels.front()).most_hz, most_hz = limit_hz > 0 ? limit_hz : cloud_hz;
+  const double most_hz = channels_.at(slow.channels.front()).most_hz;
   if (slow.under_way || now < slow.begun_at + nanoseconds_from(1 / most_hz)) return;
   decltype(slow.made) made;
   each([&](const ViewConnection& c) {
