@@ -174,7 +174,7 @@ void MavlinkPoses::on_command(const CommandLong& command, const Frame& frame, Re
 }
 
 MavResult MavlinkPoses::ask_for_distances(const CommandLong& command) {
-  if (!has_range_finder_ || !has_range_finder_()) return MavResult::unsupported;
+  if (!has_range_finder_()) return MavResult::unsupported;
   if (command.command == CommandLong::request_message)
     distances_.ask_once();
   else if (!distances_.set_interval_us(command.param2))

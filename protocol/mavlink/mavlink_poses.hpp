@@ -78,8 +78,9 @@ class MavlinkPoses {
 
   /// Without `inject` the command to inject a failure is answered as unsupported.
   /// Without `has_range_finder` the commands that request DISTANCE_SENSOR are answered as unsupported.
-  explicit MavlinkPoses(Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = {},
-                        HasOtherPoses has_other_poses = {});
+  explicit MavlinkPoses(
+      Settings settings, InjectFailure inject = {}, HasRangeFinder has_range_finder = [] { return false; },
+      HasOtherPoses has_other_poses = [] { return false; });
   /// `now` may have any origin, but must not decrease.
   Reaction on_datagram(BytesView datagram, Time now);
   /// Call it several times per second. Sends heartbeats and requests. Reports the selected system and the missing parts of a

@@ -57,7 +57,7 @@ bool MavlinkPoses::has_poses(Time now) const {
 /// states what is missing.
 void MavlinkPoses::report_changes(Time now, Reaction& out) {
   if (!first_tick_) first_tick_ = now;
-  if (has_other_poses_ && has_other_poses_()) return;
+  if (has_other_poses_()) return;
   if (system_ ? now - found_at_ < listen_before_report : now - *first_tick_ < silence_before_report) return;
   const bool well = has_poses(now);
   const bool is_news = reported_ != well;
@@ -69,7 +69,7 @@ void MavlinkPoses::report_changes(Time now, Reaction& out) {
 }
 
 std::string MavlinkPoses::health_error(Time now) const {
-  return has_poses(now) || (has_other_poses_ && has_other_poses_()) ? std::string() : report(now);
+  return has_poses(now) || has_other_poses_() ? std::string() : report(now);
 }
 
 void MavlinkPoses::request_messages(Reaction& out) {
