@@ -191,6 +191,13 @@ class Vendor {
   virtual std::optional<std::pair<std::size_t, std::size_t>> region(Region /*region*/, BytesView /*ping*/) const { return {}; }
 };
 
+/// Returns the models of a make with one product. `make` is called once.
+template <SonarModel (*make)()>
+std::span<const std::shared_ptr<const SonarModel>> only_model() {
+  static const std::shared_ptr<const SonarModel> model = std::make_shared<const SonarModel>(make());
+  return {&model, 1};
+}
+
 /// A sonar that sends pings without a request, from power-up on, to every client of one TCP port.
 class PushingVendor : public Vendor {
  public:

@@ -1,7 +1,5 @@
 #include "protocol/m3/settings.hpp"
 
-#include <array>
-
 #include "core/base/geometry.hpp"
 #include "protocol/m3/messages.hpp"
 
@@ -44,9 +42,6 @@ SonarModel make_model() {
 
 }  // namespace
 
-std::span<const std::shared_ptr<const SonarModel>> models() {
-  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
-  return all;
-}
+std::span<const std::shared_ptr<const SonarModel>> models() { return protocol::only_model<make_model>(); }
 
 }  // namespace sonar::m3

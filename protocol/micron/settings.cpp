@@ -62,10 +62,7 @@ std::span<const protocol::Option> options() {
   return all;
 }
 
-std::span<const std::shared_ptr<const SonarModel>> models() {
-  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
-  return all;
-}
+std::span<const std::shared_ptr<const SonarModel>> models() { return protocol::only_model<make_model>(); }
 
 bool same_settings(const Settings& a, const Settings& b) {
   return a.command == b.command && a.has_parameters == b.has_parameters;

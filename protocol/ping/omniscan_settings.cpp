@@ -1,7 +1,6 @@
 #include "protocol/ping/omniscan_settings.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -82,10 +81,7 @@ double heading_deg(const Pose& sonar_in_world) {
 
 }  // namespace
 
-std::span<const std::shared_ptr<const SonarModel>> models() {
-  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
-  return all;
-}
+std::span<const std::shared_ptr<const SonarModel>> models() { return protocol::only_model<make_model>(); }
 
 std::string complaint(const OsPingParams& p) {
   if (p.length_mm < least_length_mm || 1e-3 * p.start_mm + 1e-3 * p.length_mm > longest_m)

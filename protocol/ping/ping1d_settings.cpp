@@ -46,10 +46,7 @@ std::uint32_t end_mm(const ScanRange& r) { return r.start_mm + r.length_mm; }
 
 }  // namespace
 
-std::span<const std::shared_ptr<const SonarModel>> models() {
-  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
-  return all;
-}
+std::span<const std::shared_ptr<const SonarModel>> models() { return protocol::only_model<make_model>(); }
 
 bool same_settings(const Settings& a, const Settings& b) { return a.id == b.id && a.parameters == b.parameters; }
 

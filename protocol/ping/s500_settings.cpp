@@ -80,10 +80,7 @@ std::uint32_t mm(double metres) { return static_cast<std::uint32_t>(std::lround(
 
 }  // namespace
 
-std::span<const std::shared_ptr<const SonarModel>> models() {
-  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
-  return all;
-}
+std::span<const std::shared_ptr<const SonarModel>> models() { return protocol::only_model<make_model>(); }
 
 bool same_settings(const Settings& a, const Settings& b) {
   const auto all = [](const Settings& s) {

@@ -77,10 +77,7 @@ std::vector<Detection> points_of(const Ping& ping) {
 
 }  // namespace
 
-std::span<const std::shared_ptr<const SonarModel>> models() {
-  static const std::array<std::shared_ptr<const SonarModel>, 1> all{std::make_shared<const SonarModel>(make_model())};
-  return all;
-}
+std::span<const std::shared_ptr<const SonarModel>> models() { return protocol::only_model<make_model>(); }
 
 // Each answer to the time request gives a slightly different offset, which must not count as a change of settings every 10 s.
 bool same_settings(const Settings& a, const Settings& b) {
