@@ -31,12 +31,6 @@ std::vector<std::string> words_of(const std::string& list) {
   return words;
 }
 
-std::string order_key(const std::string& text) {
-  Sha256 hash;
-  hash.add(std::as_bytes(std::span(text)));
-  return hash.hex();
-}
-
 /// Writes one export, under a temporary name until it is complete.
 class Export {
  public:
@@ -272,7 +266,7 @@ std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const
   }
   // The order is independent of the draws and of the number of pings.
   std::vector<std::pair<std::string, std::size_t>> order;
-  for (std::size_t i = 0; i < scenes.size(); ++i) order.emplace_back(order_key(scenes[i]), i);
+  for (std::size_t i = 0; i < scenes.size(); ++i) order.emplace_back(sha256_of(scenes[i]), i);
   std::ranges::sort(order);
   std::vector<std::size_t> splits(scenes.size());
   for (std::size_t s = 0, at = 0; s < count.size(); ++s)

@@ -57,12 +57,6 @@ std::string counts_text(std::uint64_t shards, std::uint64_t pings, std::uint64_t
          " in each";
 }
 
-std::string digest_of(std::string_view bytes) {
-  Sha256 hash;
-  hash.add(std::as_bytes(std::span(bytes)));
-  return hash.hex();
-}
-
 /// Returns whether a name is a relative path that stays inside its folder, in normal form, so that a file has only one name.
 bool is_confined(const path& name) {
   return !name.empty() && name.is_relative() && name.lexically_normal() == name && name.has_filename() && *name.begin() != "..";
@@ -71,7 +65,7 @@ bool is_confined(const path& name) {
 std::string id_of(const FarmJob& record) {
   json names = json::object();
   for (const FarmFile& f : record.files) names[f.name] = f.digest;
-  return digest_of(json{
+  return sha256_of(json{
       {"version", record.version},
       {"instruction_set", record.instruction_set},
       {"file", record.file},
@@ -122,7 +116,7 @@ Result<FarmJob> describe(const dataset::DatasetJob& job, const std::string& inst
   record.version = render::version, record.instruction_set = instruction_set;
   record.file = path(job.source).filename().string();
   record.shards = job.shards(), record.shard_pings = job.shard_pings, record.pings = job.pings;
-  std::map<std::string, std::string> names{{record.file, digest_of(job.text)}};
+  std::map<std::string, std::string> names{{record.file, sha256_of(job.text)}};
   const path folder = std::filesystem::absolute(job.folder / ".").lexically_normal();
   for (const dataset::NamedFile& named : dataset::named_files(job)) {
     const path name = std::filesystem::absolute(named.file).lexically_normal().lexically_relative(folder);
@@ -173,7 +167,7 @@ Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const p
   for (const FarmFile& f : record.files) {
     const auto contents = f.name == record.file ? job.text : read_regular(job.folder / f.name, std::size_t{1} << 40);
     if (!contents) return tl::make_unexpected(contents.error());
-    if (digest_of(*contents) != f.digest)
+    if (sha256_of(*contents) != f.digest)
       return failure(ErrorKind::bad_data,
                      (job.folder / f.name).string() + " has changed since the job was read; submit it again");
     if (!is_there(files / f.name, f.digest))
@@ -202,7 +196,7 @@ Result<path> receive_files(const FarmJob& record, const path& files, Queue& queu
       // A short piece ends the file. If all pieces of a file are full, the file ends where the next piece is missing.
       if ((*piece)->size() < piece_bytes || contents.size() > most_in_bucket) break;
     }
-    if (digest_of(contents) != f.digest)
+    if (sha256_of(contents) != f.digest)
       return failure(ErrorKind::missing_file,
                      (files / f.name).string() + " is missing, or differs from the submitted file" +
                          (record.in_bucket ? ", and the queue does not have it; submit the job again"

@@ -13,12 +13,6 @@ namespace {
 
 constexpr std::string_view blanks = " \t\r\n";
 
-std::string digest_of(std::string_view text) {
-  Sha256 sum;
-  sum.add(std::as_bytes(std::span(text.data(), text.size())));
-  return sum.hex();
-}
-
 tl::unexpected<Error> unusable(const std::filesystem::path& file, const std::string& why) {
   return failure(ErrorKind::config, "control.token_file " + file.string() + ": " + why);
 }
@@ -48,7 +42,7 @@ Result<Token> Token::read(const std::filesystem::path& file, std::string& warnin
 /// Compares digests, because they have equal lengths and the time of the comparison reveals nothing about the secret.
 bool Token::matches(std::string_view shown) const {
   if (!needed()) return true;
-  const std::string ours = digest_of(secret_), theirs = digest_of(shown);
+  const std::string ours = sha256_of(secret_), theirs = sha256_of(shown);
   unsigned difference = 0;
   for (std::size_t i = 0; i < ours.size(); ++i) difference |= static_cast<unsigned char>(ours[i] ^ theirs[i]);
   return difference == 0;

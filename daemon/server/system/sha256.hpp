@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace sonar {
 
@@ -24,5 +25,6 @@ class Sha256 {
   std::array<std::byte, 64> pending_{};
   std::uint64_t size_ = 0;
 };
+std::string sha256_of(std::string_view text);
 
 }  // namespace sonar
