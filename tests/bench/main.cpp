@@ -144,8 +144,8 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
   if (asked("P13")) {
     report["threads"] = find_rates_of_threads(scene, where, options);
     report["sonars"] = json::array();
-    for (const int sonars : {1, 2, 4, 8}) {
-      auto rates = find_rates_of_sonars(scene, sonars, 5, options);
+    for (const int sonars : {1, 4, 8, 16}) {
+      auto rates = find_rates_of_sonars(scene, sonars, 0.025 * options.pings, options);
       if (!rates) return tl::make_unexpected(rates.error());
       report["sonars"].push_back(*std::move(rates));
     }

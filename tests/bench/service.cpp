@@ -35,13 +35,6 @@ std::string sonars_of(const std::string& profile, int count) {
   return list;
 }
 
-/// Pings follow one another as fast as the engine and the travel time of sound allow; the product's own limit is disabled.
-void lift_rate(SonarConfig& sonar) {
-  auto model = std::make_shared<SonarModel>(*sonar.profile.model);
-  model->max_rate_hz = 1000;
-  sonar.profile.model = std::move(model);
-}
-
 oculus::FireRequest fire_p3a(bool triggered) {
   oculus::FireRequest fire;
   fire.settings.mode = 2;
@@ -54,7 +47,7 @@ oculus::FireRequest fire_p3a(bool triggered) {
 }
 
 Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOptions& options,
-                                       const std::string& sonars = sonars_of("oculus-m1200d", 1), bool at_any_rate = false) {
+                                       const std::string& sonars = sonars_of("oculus-m1200d", 1)) {
   const std::string address = own_address();
   auto config = parse_config(
       "world: {scene: local-search.yaml}\n"
@@ -64,7 +57,6 @@ Result<std::unique_ptr<Service>> start(const ScenePointer& scene, const BenchOpt
       "bench", options.scene_folder);
   if (!config) return tl::make_unexpected(config.error());
   config->engine = options.engine;
-  if (at_any_rate) std::for_each(config->sonars.begin(), config->sonars.end(), lift_rate);
   return Service::start(*std::move(config), scene, options);
 }
 tcp::endpoint data_of() { return {asio::ip::make_address(own_address()), data_port}; }
@@ -274,13 +266,12 @@ Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double
 
 Result<json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double seconds, const BenchOptions& options) {
   constexpr std::chrono::seconds patience(patience_s);
-  auto service = start(scene, options, sonars_of("blueview-p900-90", sonars), true);
+  auto service = start(scene, options, sonars_of("blueview-p900-90", sonars));
   if (!service) return tl::make_unexpected(service.error());
   std::vector<clients::PingStream> streams;
   for (int i = 0; i < sonars; ++i) {
-    // The head's own interval would be 1 s; here only the travel time of sound limits the rate.
     clients::Wanted fast;
-    fast.settings.rate_hz = 1000;
+    fast.settings.rate_hz = 15;  // the product's highest
     auto stream = clients::PingStream::open({own_address(i), 0}, clients::find_make("blueview"), fast, patience);
     if (!stream) return tl::make_unexpected(stream.error());
     streams.push_back(*std::move(stream));
@@ -297,7 +288,8 @@ Result<json> find_rates_of_sonars(const ScenePointer& scene, int sonars, double 
   wait_s(1);
   const double begin = now_s();
   const std::vector<std::uint64_t> before = counts();
-  wait_s(seconds);
+  do wait_s(seconds);
+  while (counts() == before && now_s() < begin + patience_s);
   const double took_s = now_s() - begin;
   std::vector<double> rates;
   for (const std::uint64_t n : counts()) rates.push_back(static_cast<double>(n - before[rates.size()]) / took_s);
