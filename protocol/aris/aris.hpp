@@ -1,5 +1,5 @@
-// Sound Metrics ARIS (docs/protocols/aris.md): the device, the controller, which sends commands over TCP and receives frames over
-// UDP, and the codec for recordings.
+// Sound Metrics ARIS (docs/protocols/aris.md): device, controller, and codec for recordings. The controller sends commands over
+// TCP and receives frames over UDP.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 namespace sonar::aris {
 
 const protocol::Vendor& vendor();
-/// Makes the dialogue with one controller, which converts commands to changes of settings and receivers. The device never
+/// Makes the dialogue with one controller. It converts commands to changes of settings and receivers. The device never
 /// replies. `device` must outlive the dialogue.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::DeviceState& device);
 

@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::uint32_t most_beams = 128;
 
-/// The first fields of the file header, from the vendor's aris-file-sdk. Readers use its numbers of beams and samples, not those
-/// of the frames.
+/// The first fields of the file header, from the vendor's aris-file-sdk. Programs use the numbers of beams and samples of this
+/// header, not those of the frames.
 struct FileHeader {
   std::uint32_t version = aris::file_version, frames = 0;
   std::array<std::uint32_t, 2> reserved0{};

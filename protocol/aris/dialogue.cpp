@@ -29,7 +29,7 @@ class ArisDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // All commands of one call are one change of settings, with the result of the last command.
+    // All commands of one call result in one change of settings.
     settings_ = base();
     settings_.streaming |= streaming_;
     // frame_index counts from the first ping of a connection. If several controllers are connected, the first connection counts.
@@ -91,7 +91,7 @@ class ArisDialogue final : public protocol::Dialogue {
       case CommandType::home_focus:
         return move_focus(0, now);
       default:
-        break;  // keep-alives have no effect; a rotator and a log receiver, which have commands too, are not emulated
+        break;  // keep-alives and FORCE_FOCUS have no effect; a rotator and a log receiver are not emulated
     }
     if (command.type > CommandType::set_syslog_receiver)
       notice(reaction, "ignored a command of type " + std::to_string(static_cast<unsigned>(command.type)));

@@ -30,8 +30,8 @@ void for_each_sample(std::size_t samples, int pings, auto copy) {
       for (std::size_t channel = 0; channel < channels; ++channel) copy(raw++, sample * beams + sixteenth[channel] * n + ping);
 }
 
-/// Repeats the acoustic settings of the controller, after the limits of judge(). Only the window is from PingSettings, because it
-/// depends on the sound speed at the time of the ping.
+/// Repeats the acoustic settings of the controller, after the limits of judge(). Only window and sound speed are from
+/// PingSettings, because they are those at the time of the ping.
 void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, const Product& product) {
   const Acoustics& a = s.acoustics;
   h.window_start_m = static_cast<float>(used.range_start_m);
@@ -214,9 +214,9 @@ std::optional<DecodedFrame> FrameAssembler::whole() {
   return frame;
 }
 
-// Finds fields in the first datagram of a frame and in the beacon. Fields of the frame header have a fixed offset. Integers of
-// the protobuf messages are varints, whose offset and size depend on other values; to change an integer, the message is decoded
-// and encoded again.
+// The functions below find and change fields of a frame's datagrams and of the beacon. Fields of the frame header have a fixed
+// offset. Integers of the protobuf messages are varints, whose offset and size depend on other values; to change an integer, the
+// message is decoded and encoded again.
 
 // For an empty message, returns the position in the frame header, as Vendor::field() requires.
 std::optional<Field> locate(FieldName name, BytesView first_part) {

@@ -1,4 +1,4 @@
-// Converts a Ping to the datagrams of a frame (header, order of channels, parts), and back for tools and tests.
+// Converts a Ping to the datagrams of a frame (header, order of channels, parts), and datagrams to a frame.
 #pragma once
 
 #include <functional>

@@ -17,7 +17,7 @@ inline constexpr std::uint32_t file_version = 0x05464444;  // "DDF", 5
 inline constexpr std::size_t padded_header_size = 1024;
 
 struct FrameHeader {
-  static constexpr float no_axis = std::numeric_limits<float>::quiet_NaN();  // axis of a missing rotator or arm
+  static constexpr float no_axis = std::numeric_limits<float>::quiet_NaN();  // position of a missing rotator or arm
   std::uint32_t frame_index = 0;
   std::uint64_t frame_time_us = 0;  // time since 1970
   std::uint32_t version = file_version, status = 0;

@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 using protocol::HostActions;
 
 constexpr auto ping_after = 1s;                   // keep-alive; the device disconnects a controller after 10 s of silence
-constexpr double nominal_sound_speed_mps = 1490;  // converts a requested range to time until a frame states the sound speed
+constexpr double nominal_sound_speed_mps = 1490;  // converts the requested range to time; no frame has stated the speed yet
 constexpr std::uint32_t most_pulse_us = 80;
 constexpr std::size_t commands = 0, frames = 1;  // indices of ports
 

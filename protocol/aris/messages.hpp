@@ -37,9 +37,9 @@ struct Availability {
   std::uint32_t serial = 0;
   SystemType system{};
   SoftwareVersion software;
-  std::uint32_t busy = 0;  // 0 available, 1 a controller is connected
+  std::uint32_t busy = 0;  // 0 = available, 1 = a controller is connected
   Words capabilities;
-  std::uint32_t link = 1;  // 0 HomePlug, 1 Ethernet
+  std::uint32_t link = 1;  // 0 = HomePlug, 1 = Ethernet
   float cpu_c = 0;
   std::optional<std::uint32_t> power_down_reason;  // 0 = over-temperature
   float hot_limit_c = 0;
@@ -190,7 +190,7 @@ Bytes framed(const Command& command);
 class CommandFramer {
  public:
   void append(BytesView received);
-  /// Returns the next whole message; the view is valid until the next call.
+  /// Returns the next whole message; the view is valid until the next append().
   std::optional<BytesView> next();
   /// True after a length above longest_command; the rest of the stream is then unreadable.
   bool broken() const { return broken_; }

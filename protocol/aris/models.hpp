@@ -1,5 +1,5 @@
-// The ARIS products as SonarModel rows, one mode per ping mode, frequency and lens, and the limits of their settings. Sources:
-// protocol/aris/README.md.
+// The ARIS products as SonarModel rows, one mode per ping mode, frequency and lens, and the limits of their settings. models.cpp
+// explains the names of sources, such as SMP.
 #pragma once
 
 #include <array>

@@ -95,7 +95,7 @@ Result<void> set_range(Settings& s, double range_m, const protocol::DeviceState&
 
 }  // namespace
 
-// The salinity is the allowed value nearest to that of the water; the focus is at an eighth of the window.
+// The salinity is the allowed value nearest to that of the water; the focus is at an eighth of the longest range.
 Settings initial_settings(const protocol::DeviceState& device) {
   Settings s;
   const Product& product = product_of(*device.model);

@@ -1,5 +1,5 @@
-// Teledyne BlueView on sonard's link (docs/protocols/blueview-link.md): the device, whose clients are the drop-in SDK libraries
-// of clients/bvtsdk, the driver, which requests pings one by one, and the codec for recordings.
+// Teledyne BlueView on sonard's link (docs/protocols/blueview-link.md): device, driver, and codec for recordings. Clients of the
+// device are the drop-in SDK libraries of clients/bvtsdk. The driver requests pings one by one.
 #pragma once
 
 #include <array>

@@ -88,8 +88,8 @@ class BlueViewDialogue final : public protocol::Dialogue {
     const HeadSettings& fired = fired_with.heads[static_cast<std::size_t>(head)];
     const HeadSettings now_set = settings_from(device_.settings.get(), device_).heads[static_cast<std::size_t>(head)];
     for (auto it = waiting_.begin(); it != waiting_.end();) {
-      // A ping that was fired before a SET does not answer a PING request that came after the SET, because its settings differ
-      // from those at the request and from the present settings.
+      // A ping that was fired before a SET does not answer a PING request that came after the SET, because the settings of the
+      // ping differ from those at the request and from the present ones.
       if (it->head != head || (fired != it->asked_with && fired != now_set)) {
         ++it;
         continue;
@@ -131,7 +131,7 @@ class BlueViewDialogue final : public protocol::Dialogue {
   int base() const { return text_option(device_.options, option_name::heads_base) == "1" ? 1 : 0; }
 
   /// Returns the index of the head with the host's number `id`. Hosts number heads from 0 or from 1; if there is one head, both
-  /// numbers mean that head.
+  /// numbers mean that head, unless heads_base is strict.
   std::optional<int> head_of(std::int32_t id) const {
     const int count = static_cast<int>(settings_.heads.size());
     const int index = id - base();

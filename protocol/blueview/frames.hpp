@@ -17,7 +17,7 @@ namespace sonar::blueview {
 
 namespace means = protocol::means;
 
-inline constexpr std::size_t longest_request = 70000;  // longest message of a host; a text of 65535 bytes fits
+inline constexpr std::size_t longest_request = 70000;  // longest payload of a host; a text of 65535 bytes fits
 
 struct FrameHeader {
   std::array<std::uint8_t, 4> magic = blueview::magic;
@@ -53,7 +53,7 @@ class Put {
   wire::Bytes& out_;
 };
 
-/// Appends a text: a 16-bit length and that number of bytes of UTF-8. Longer texts are cut.
+/// Appends a text: a 16-bit length and that number of bytes of UTF-8. Texts above 65535 bytes are cut.
 void put_text(wire::Bytes& out, std::string_view text);
 std::string read_text(wire::Reader& reader, std::string_view name);
 /// Appends the kind of a value (one byte) and the value.
@@ -70,14 +70,14 @@ struct Frame {
   wire::BytesView payload;
 };
 
-/// Splits a stream into frames. After bytes that are not a frame, next() always returns nullopt, and broken() returns the
-/// reason.
+/// Splits a stream into frames. After bytes that are not a frame, or a frame that is too long, next() always returns nullopt, and
+/// broken() returns the reason.
 class Framer {
  public:
   /// `longest`: longest accepted payload; a host passes longest_payload.
   explicit Framer(std::size_t longest = longest_request) : longest_(longest) {}
   void append(wire::BytesView received);
-  /// Returns the next whole frame, which is valid until the next call.
+  /// Returns the next whole frame, whose payload is valid until the next append().
   std::optional<Frame> next();
   const std::string& broken() const { return broken_; }
 

@@ -20,8 +20,8 @@ const FrequencyMode& mode_of(const protocol::DeviceState& device, int head) {
 }
 bool strict_range(const protocol::DeviceState& device) { return text_option(device.options, option_name::strict_range) == "on"; }
 
-/// Returns the number in a value; nullopt for NaN and infinity. Hosts may send integers and floats for any numeric key, as the
-/// interface of the SDK does.
+/// Returns the number in a value; nullopt for texts, pairs, NaN and infinity. Hosts may send integers and floats for any numeric
+/// key, as the interface of the SDK does.
 std::optional<double> number_in(const Value& value) {
   if (const auto* i = std::get_if<std::int32_t>(&value)) return *i;
   if (const auto* f = std::get_if<float>(&value)) return std::isfinite(*f) ? std::optional<double>(*f) : std::nullopt;

@@ -20,7 +20,7 @@ struct HeadSettings {
   std::int32_t sound_speed_mps = 1500;
   float gain_db = 0;
   float tvg_db_per_m = 0;
-  std::int32_t fluid = 0;  // 0 salt, 1 fresh, 2 other
+  std::int32_t fluid = 0;  // 0 = salt, 1 = fresh, 2 = other
   std::int32_t transmit = 1;
   std::int32_t ping_interval_ms = 0;  // 0 = a ping whenever a host requests it
   std::int32_t dynamic_power = 0;     // stored and returned; no effect
@@ -32,7 +32,7 @@ struct HeadSettings {
 struct SonarSettings final : VendorSettings {
   bool equals(const VendorSettings& other) const override;
 
-  std::int32_t active_head = 0;  // index of the head that last pinged or was last requested
+  std::int32_t active_head = 0;  // index of the head that pings next
   std::int32_t local_clock = 0;  // stored and returned; no effect
   std::string name;
   std::vector<HeadSettings> heads;

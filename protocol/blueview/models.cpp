@@ -10,9 +10,9 @@ namespace {
 
 // Sources. P25: Choi et al. 2025, tables 1 and 2. DS: figures of the P900 data sheet that a public note on IOES-Lab/dave quotes.
 // NPS: the public model files of nps_uw_multibeam_sonar. UUV: the model files of uuv_simulator. Rows without a source are
-// recalled from data sheets and not verified; all beams are about 1 degree wide, three times their spacing. unknown: source
-// levels (P25's Table 2 has 220 dB for the P900 it simulates; its fit, 170 dB, is of an Oculus), noise figures, full scale,
-// tapers, vertical widths of the MB heads' transmitters.
+// recalled from data sheets and not verified; all beams are about 1 degree wide, more than five times their spacing. unknown:
+// source levels (P25's Table 2 has 220 dB for the P900 it simulates; its fit, 170 dB, is of an Oculus), noise figures, full
+// scale, tapers, vertical widths of the MB heads' transmitters.
 constexpr double inch = 0.0254;
 
 struct Head {
@@ -29,7 +29,7 @@ struct Product {
 
 const std::vector<Product>& products() {
   static const std::vector<Product> all{
-      // P25, DS, NPS: 900 kHz, 90 x 20 deg, 512 beams of 1 deg 0.18 deg apart, one inch, 15 Hz; unknown: DS gives 2 m as optimum
+      // P25, DS, NPS: 900 kHz, 90 x 20 deg, 512 beams of 1 deg 0.18 deg apart, one inch, 15 Hz; unknown: range (DS: optimum 2 m)
       {"blueview-p900-90", "BlueView P900-90", 15, {{"900 kHz", 900, 90, 20, 0.5, 100, {512, inch, 2, 10, true}}}},
       {"blueview-p450-45", "BlueView P450-45", 10, {{"450 kHz", 450, 45, 15, 1, 137, {256, 0.051, 2, 40, false}}}},
       {"blueview-p450-90", "BlueView P450-90", 10, {{"450 kHz", 450, 90, 15, 1, 137, {512, 0.051, 2, 40, false}}}},

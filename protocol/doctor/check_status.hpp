@@ -1,4 +1,4 @@
-// Checks a status, for sonarctl and the daemon.
+// Checks a daemon's status, for sonarctl and the daemon.
 #pragma once
 
 #include <string>

@@ -80,7 +80,7 @@ void check_faults(const v1::DaemonStatus& status, std::vector<Finding>& findings
   if (codes.empty()) findings.push_back({Level::ok, "fault", "No fault acts", ""});
 }
 
-/// Makes the findings of one sonar. `before_` is its earlier status, for values whose change matters.
+/// Makes the findings of one sonar. `before_` is the earlier status of the sonar, for values whose change matters.
 class SonarJudge {
  public:
   SonarJudge(const v1::DaemonStatus& status, const v1::SonarStatus& sonar, const v1::DaemonStatus* before,
@@ -92,7 +92,7 @@ class SonarJudge {
         past_s_(before == nullptr ? 0 : status.uptime_s() - before->uptime_s()),
         findings_(findings) {}
 
-  /// Makes all findings. If there is no driver and no ping, only that is reported, because settings and rates then mean nothing.
+  /// Makes all findings. Without drivers and pings, settings and rates are not checked, because they have no effect then.
   void run() {
     check_places();
     if (sonar_.clients().empty() && !sonar_.pinging()) return check_absence();
@@ -109,7 +109,7 @@ class SonarJudge {
     findings_.push_back({level, check, text, cure, sonar_.name(), client});
   }
 
-  /// Reports drivers that were refused a slot or that wait for one, unless they are connected by now.
+  /// Reports drivers that were refused a slot or that wait for one, unless they are connected now.
   void check_places() {
     const v1::Visit& visit = sonar_.turned_away();
     const std::string holders = sonar_.clients().empty() ? "" : " (" + addresses_of(sonar_) + ")";
@@ -155,12 +155,12 @@ class SonarJudge {
           "point it at " + where_to_connect(sonar_), observer);
   }
 
-  /// Reports connections that the sonar, or a time-out, has ended, but not drivers that disconnected.
+  /// Reports the last connection that ended if the sonar or a time-out ended it, but not if the driver disconnected.
   void check_who_left() {
     const v1::Visit& gone = sonar_.gone();
     if (!is_recent(gone) || gone.by_itself()) return;
-    // A driver that has connected again and gets pings is not reported. Its new connection may begin before the end of the old
-    // one, but not before its beginning; a client of the same host with an earlier connection is another driver.
+    // A driver that has connected again and gets pings is reported as a warning only. Its new connection begins after the start
+    // of the old one, perhaps before the end. A client of the same host with an earlier connection is another driver.
     const auto host = [](const std::string& address) { return address.substr(0, address.rfind(':')); };
     const bool is_back = std::any_of(sonar_.clients().begin(), sonar_.clients().end(), [&](const v1::ClientStatus& client) {
       return client.pings_written() > 0 && host(client.address()) == host(gone.address()) &&
@@ -266,7 +266,7 @@ class SonarJudge {
   std::vector<Finding>& findings_;
 };
 
-/// Finds the reason why stepped time does not advance: a client that has not read, a step, or a pose.
+/// Reports whether time advances and, if not, what it waits for: a client that has not read, a step, or a pose.
 void check_clock(const v1::DaemonStatus& now, const v1::DaemonStatus* before, std::vector<Finding>& findings) {
   if (now.clock() == "realtime") return findings.push_back({Level::ok, "clock", "Time runs: clock: realtime", ""});
   const v1::ClientStatus* slowest = nullptr;
@@ -344,7 +344,7 @@ bool looks_elsewhere(const v1::DaemonStatus& status) {
                       [](const v1::FaultStatus& fault) { return fault.state() == "active"; });
 }
 
-// Findings of one level are in the order in which they are made: faults, clock, sonars, poses.
+// Findings of one level are in the order in which they are made: faults, clock, sonars, addresses, poses, engine.
 std::vector<Finding> judge(const v1::DaemonStatus& now, const v1::DaemonStatus* before, const Elsewhere& elsewhere) {
   std::vector<Finding> findings;
   check_faults(now, findings);

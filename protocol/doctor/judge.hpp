@@ -1,4 +1,4 @@
-// Determines from the daemon's status why a driver gets no pings, with one finding per check. (`sonarctl doctor` checks from
+// Determines from the daemon's status why a driver gets no pings; each check adds findings. (`sonarctl doctor` checks from
 // outside, as a driver would.)
 #pragma once
 
@@ -13,7 +13,7 @@ namespace sonar::doctor {
 /// looks_elsewhere().
 struct Elsewhere {
   std::vector<SocketLine> tcp;
-  std::uint64_t refused = 0;  // number of refused connections in the last seconds
+  std::uint64_t refused = 0;  // number of connections that failed in the last seconds
 };
 
 /// Returns active faults first, then the other findings, worst first. `before`: a status from about two seconds earlier, for

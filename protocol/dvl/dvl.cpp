@@ -8,7 +8,7 @@ namespace {
 /// Delay from the last echo to the report. Three public reports, from software of different years, have 88 ms and 147 ms (USR)
 /// and 189 ms (DOC), which is too little evidence for a default.
 constexpr std::string_view report_delay = "report_delay_ms";
-constexpr double assumed_delay_ms = 2;
+constexpr double assumed_delay_ms = 2;  // in the reports, if the option is not set
 
 std::optional<double> wanted_delay_ms(const protocol::DeviceState& device) {
   return protocol::given_number(device.options, report_delay);

@@ -22,7 +22,7 @@ Bytes set_config(bool acoustics, const std::string& range_mode) {
   return line_of(message.dump());
 }
 
-/// Makes the commands, first those that read the settings for on_leave(), because the device keeps those of the last driver.
+/// Makes the commands. The first reads the settings that on_leave() restores, because the device would keep ours.
 Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
   Bytes all = line_of(R"({"command":"get_config"})");
   const Bytes ours =
@@ -115,7 +115,7 @@ class DvlHost final : public protocol::Host {
   const Product& product_ = product_of(*models().front());  // the first product, because reports do not name the model
   std::optional<Bytes> request_;
   std::optional<Response> before_;  // settings that the device had
-  double window_m_ = 0;             // the picture has at least the wanted range
+  double window_m_ = 0;             // least range of the picture, from the wanted range
   Bytes line_;
   std::uint32_t number_ = 0;
   protocol::Waterfall waterfall_;

@@ -6,7 +6,7 @@
 
 namespace sonar::dvl {
 
-inline constexpr double usual_nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all
+inline constexpr double usual_nsd_dbm = -90;  // DOC: -88 to -97 in its example; unknown: assumed the same for all beams
 
 struct Beam {
   bool is_valid = false;
@@ -25,7 +25,7 @@ struct Measurement {
   Vec3d velocity_mps;
   Covariance covariance{};
   double fom = 0, altitude_m = -1;
-  Time reflected_at{}, heard_at{};  // time at which the ground reflects the middle of the ping; end of the last echo
+  Time reflected_at{}, heard_at{};  // times at which the farthest beam is reflected, and at which its echo arrives
   int status = 0;                   // 1 if the device is too hot, which is not emulated
 };
 
@@ -42,11 +42,11 @@ Reckoning reckoned(const Reckoning& before, const Measurement& measured, const P
 /// Returns the position at `now`, after the last ping, extrapolated with the last velocity.
 Reckoning extrapolated(const Reckoning& last, Time now);
 
-/// Returns the velocity in the device's frame, with weighted least squares from the valid beams (at least three).
 struct Estimate {
   Vec3d velocity_mps;
   Covariance covariance{};
 };
+/// Returns the velocity in the device's frame, with weighted least squares from the valid beams (at least three).
 Estimate estimate(const std::array<Beam, beam_count>& beams);
 double largest_eigenvalue(const Covariance& m);
 

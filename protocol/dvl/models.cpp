@@ -40,7 +40,7 @@ SonarModel model_of(const Product& product) {
   mode.receiver.tvg_slope_db = 40;  // keeps echoes of all distances within 15 bits
   mode.receiver.tvg_minimum_range_m = 0.02f;
   mode.receiver.tvg_ceiling_db = 200;
-  mode.receiver.full_scale_upa = 1e10f;  // unknown: at 1 m
+  mode.receiver.full_scale_upa = 1e10f;  // unknown: full scale of an echo at 1 m
   SonarModel model;
   model.profile = product.profile;
   model.name = product.name;

@@ -13,8 +13,8 @@ using Json = nlohmann::ordered_json;
 
 Bytes line_of(const Json& message) { return dvl::line_of(message.dump()); }
 
-/// Returns a member of an object; nullopt if it is missing, or is not a finite number below 1e18, which conversions could
-/// overflow.
+/// Returns a member of an object; nullopt if it is missing, or is not a finite number below 1e18. Larger numbers could overflow
+/// in conversions.
 std::optional<double> number(const Json& from, const char* name) {
   const auto found = from.find(name);
   if (found == from.end() || !found->is_number()) return std::nullopt;

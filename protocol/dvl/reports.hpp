@@ -39,7 +39,7 @@ struct PositionReport {
 struct Response {
   std::string to, error;
   bool success = false;
-  std::optional<bool> acoustics = {};  // a field of get_config, like range_mode
+  std::optional<bool> acoustics = {};  // in the answer to get_config, as is range_mode
   std::string range_mode = {};
 };
 /// A line of the device. All members are absent for lines of other kinds and for text that is not JSON.

@@ -139,7 +139,7 @@ class SerialDialogue final : public Session {
     if (!words.empty()) return std::string(no_sentence);
     switch (letter) {
       case 'v':
-        return "wrv,2.8.0";  // version of the protocol in the software version that carry_out() states
+        return "wrv,2.8.0";  // version of the protocol in the software version that version_info() states
       case 'w':
         return product();
       case 'c':

@@ -99,7 +99,7 @@ Reaction Session::on_tick(Time now, bool ping_pending) {
   return reaction;
 }
 
-// Every client gets every ping, also pings that another client has triggered, and counts each ping for its own triggers.
+// Every client gets every ping, also pings that another client has triggered. Each ping counts as one that this client triggered.
 protocol::Delivery Session::on_ping(const VendorSettings*, std::size_t, Time now) {
   protocol::Delivery delivery{{protocol::Bytes{}}, {}};
   if (waiting_ > 0 && --waiting_ > 0) {

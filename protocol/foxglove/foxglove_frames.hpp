@@ -1,5 +1,5 @@
-// The binary messages of the Foxglove WebSocket protocol, little-endian; the first byte is the type. The specification is in the
-// history of https://github.com/foxglove/ws-protocol (the commit before 8e2a044).
+// The binary messages of the Foxglove WebSocket protocol, little-endian; the first byte is the opcode. The specification is in
+// the history of https://github.com/foxglove/ws-protocol (the commit before 8e2a044).
 #pragma once
 
 #include <cstdint>
@@ -44,8 +44,8 @@ struct PlaybackControl {
   Time to{};  // target of a seek
   std::string request;
 };
-/// Reads a frame that a viewer sent. Errors: bad_data if the frame is too short, its lengths do not fit, or viewers do not send
-/// its opcode.
+/// Reads a frame that a viewer sent. Errors: bad_data if the frame is too short, has wrong lengths or fields, or is neither a
+/// call nor a playback control.
 Result<std::variant<ServiceCall, PlaybackControl>> frame_of_viewer(BytesView frame);
 
 /// Returns the bytes of a call or a playback control that a viewer would send; for tests and clients.

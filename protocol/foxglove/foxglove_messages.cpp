@@ -87,7 +87,7 @@ void change_stamps(pb::Message& message, const Stamp& stamp) {
 
 }  // namespace
 
-// Recorded messages are replayed with the times of the playback, so all their stamps move.
+// Recorded messages are replayed with the times of the playback, so all their stamps change.
 Bytes with_stamps(const Channel& of, BytesView message, const Stamp& stamp) {
   const auto* const type = pb::DescriptorPool::generated_pool()->FindMessageTypeByName(of.schema.name);
   if (of.encoding == "cdr") return with_stamp(message, stamp);
@@ -146,8 +146,8 @@ Bytes image_head(Time at, const std::string& frame, const Image& image) {
   message.set_height(image.height);
   message.set_encoding(image.encoding);
   message.set_step(static_cast<std::uint32_t>(image.width * image.bytes_per_sample));
-  // The samples are the last field, `data`. The head ends with the key and length of that field, so that the samples need not be
-  // copied.
+  // The samples, field `data`, are written last. The head ends with the key and length of this field, so that the samples need
+  // not be copied.
   Bytes head = bytes_of(message);
   constexpr unsigned length_delimited = 2;
   head.push_back(static_cast<std::byte>(fg::RawImage::kDataFieldNumber << 3 | length_delimited));
@@ -263,7 +263,7 @@ Bytes cloud(Time at, const std::string& frame, std::span<const CloudPoint> point
   return bytes_of(message);
 }
 
-// With `number` = 0 two geometries can be compared, because viewers get a geometry only when it changes.
+// Viewers get a geometry only when it changes. With `number` = 0 the geometries of two pings can be compared.
 Bytes geometry(const Ping& ping, std::uint32_t number) {
   const PingSettings& s = ping.request.settings;
   v1::PingGeometry message;

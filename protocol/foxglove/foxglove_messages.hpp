@@ -31,7 +31,7 @@ Bytes descriptor_set(const std::string& name);
 /// Returns the schema of a channel: the descriptor set in base64.
 Schema protobuf_schema(const std::string& name);
 
-/// Changes the times in a message of the channel: the stamps, and our own fields in nanoseconds of the daemon's time.
+/// Returns a message of the channel with changed times: the stamps, and our own fields in nanoseconds of the daemon's time.
 Bytes with_stamps(const Channel& of, BytesView message, const std::function<Time(Time)>& stamp);
 
 /// A picture. It can share the samples of a ping.
@@ -68,8 +68,8 @@ struct Lines {
   std::string id, frame;
   std::vector<Vec3d> points;  // two points per line
 };
-// These functions make a foxglove.SceneUpdate with one entity. Concatenated updates are one update, because protobuf merges
-// repeated fields.
+// These functions make a foxglove.SceneUpdate with one entity or deletion. Concatenated updates are one update, because protobuf
+// merges repeated fields.
 Bytes scene_update(Time at, const Model& model);
 Bytes scene_update(Time at, const Lines& lines);
 Bytes scene_deletion(Time at, const std::string& id);

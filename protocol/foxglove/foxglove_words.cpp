@@ -76,7 +76,7 @@ std::optional<std::pair<std::uint32_t, std::uint32_t>> subscription(const Read& 
   if (!id || !channel) return std::nullopt;
   return std::pair(*id, *channel);
 }
-/// Reads a value from a viewer, which may write a "float64" without a fraction. Integers beyond 63 bits are refused.
+/// Reads a value from a viewer, which may write a "float64" without a fraction. Integers beyond 63 bits become OtherValue.
 Value value(const Read& json, bool is_float) {
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_float() || (json.is_number() && is_float)) return json.get<double>();

@@ -89,7 +89,8 @@ struct UnknownWord {
 };
 using ViewerWord = std::variant<UnknownWord, Subscribe, Unsubscribe, GetParameters, SetParameters, WatchParameters, Incapable>;
 /// Reads a JSON message of a viewer. If `stray` is not null, it is set to the name of an unknown field, or to an empty text.
-/// Errors: bad_data if the text is not a JSON object, is nested deeper than 16, or has no "op" or a field of a wrong type.
+/// Errors: bad_data if the text is not a JSON object, is nested deeper than 16, or has no "op", a field of a wrong type, or too
+/// many parameters.
 Result<ViewerWord> word_of_viewer(std::string_view text, std::string* stray = nullptr);
 
 }  // namespace sonar::foxglove

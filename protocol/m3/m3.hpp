@@ -1,5 +1,5 @@
-// The Kongsberg Mesotech M3: the device, which sends the stream of beam-formed data that the maker's program sends to its
-// clients, the driver, and the codec for recordings.
+// The Kongsberg Mesotech M3: device, driver, and codec for recordings. The device sends the stream of beam-formed data that the
+// maker's program sends to its clients.
 #pragma once
 
 #include <optional>

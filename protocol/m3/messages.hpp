@@ -62,11 +62,11 @@ constexpr void fields(auto& visit, wire::Like<GainLaw> auto& m) {
 /// The first part of the data header, up to the table of the beams' directions.
 struct DataFront {
   std::uint32_t version = 14, sonar_id = 0;
-  std::array<std::uint32_t, 8> sonar_info{};  // the first: serial number (unknown)
+  std::array<std::uint32_t, 8> sonar_info{};  // element 0: unknown, here the serial number
   std::uint32_t time_s = 0, time_ms = 0;      // UTC time at which the ping is fired
   float sound_speed_mps = 0;
   std::uint32_t samples = 0;        // samples in each beam
-  float near_m = 0, far_m = 0;      // limits of the mode
+  float near_m = 0, far_m = 0;      // near and far range of the settings
   float start_s = 0, length_s = 0;  // sampling window; `start_s` counts from the start of the ping
   std::uint16_t beams = 0, processing = 0;
 };

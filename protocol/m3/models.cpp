@@ -6,7 +6,7 @@
 namespace sonar::m3 {
 namespace {
 
-// Sources: PKT, LOG: protocol/m3/README.md.
+// protocol/m3/README.md explains the sources PKT and LOG.
 constexpr double elevation_deg = 30;  // recalled from the data sheet
 constexpr double elements = 64;       // PKT
 // unknown: levels. Full scale is chosen so that the strongest echoes of the demo scene have about the level of the strongest

@@ -117,7 +117,7 @@ DataHeader header_of(const Ping& ping, const protocol::DeviceState& device) {
 }
 
 /// The part of a packet that determines its length. The size in the head alone cannot detect a false start within samples, so the
-/// numbers of beams and samples must agree with it.
+/// numbers of beams and samples must agree with this size.
 struct StreamFront {
   PacketHead head;
   DataFront data;

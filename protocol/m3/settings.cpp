@@ -13,9 +13,9 @@ namespace {
 
 constexpr double shortest_interval_s = 10.24e-6;  // PKT
 constexpr int shortest_pulse_us = 20;             // PKT
-constexpr int most_samples = 2048;                // LOG: packets have up to 1681 samples, at half the interval 2745 and more
-constexpr int samples_multiple = 4;               // PKT
-constexpr double near_per_far = 0.02;             // PKT, LOG: 0.2 of 10 m, 0.4 of 20 m
+constexpr int most_samples = 2048;   // LOG: packets have up to 1681 samples; with half the interval they would have 2745 or more
+constexpr int samples_multiple = 4;  // PKT
+constexpr double near_per_far = 0.02;  // PKT, LOG: 0.2 m for 10 m, 0.4 m for 20 m
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Range, rate and gain, which only the M3's own program can set, not drivers, and the sampling window that follows from them.
+// Range, rate and gain, and the sampling window of a range. Only the M3's own program sets these values, not drivers.
 #pragma once
 
 #include <memory>

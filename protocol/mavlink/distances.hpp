@@ -25,7 +25,7 @@ struct Measured {
 /// (1).
 DistanceSensor distance_sensor_of(const Measured& measured);
 
-/// The vehicle's requests for distances: none, all, or one per interval; and requests for single distances.
+/// The requests for distances: none, all, or one per interval. In addition, a single distance can be requested.
 class DistanceRequests {
  public:
   explicit DistanceRequests(bool all) {

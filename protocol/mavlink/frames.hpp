@@ -31,7 +31,7 @@ M message_in(const Frame& frame) {
 
 struct FrameCounts {
   std::uint64_t frames = 0;        // valid frames
-  std::uint64_t unknown = 0;       // frames of unsupported messages, which are skipped
+  std::uint64_t unknown = 0;       // frames with an unsupported message or flag, which are skipped
   std::uint64_t bad_checksum = 0;  // damaged frames, or a dialect that uses the number for another message
   std::uint64_t wrong_size = 0;    // frames of version 1 whose payload has a wrong length
   std::uint64_t junk_bytes = 0;    // bytes that belong to no frame

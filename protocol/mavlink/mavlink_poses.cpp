@@ -11,7 +11,7 @@ using control::ClockDomain;
 using control::RawPose;
 using control::Stamp;
 
-constexpr std::int64_t late_ms = 1000;  // late packets are less old; a clock that decreases by more has been restarted
+constexpr std::int64_t late_ms = 1000;  // largest delay of a packet; a clock that decreases by more has been restarted
 constexpr std::int64_t late_ns = late_ms * 1'000'000;
 constexpr double farthest_m = 100e3;               // distance from the origin up to which the tangent plane is valid
 constexpr double moved_origin_m = 0.01;            // an origin that moves by more causes a jump of the poses
@@ -22,7 +22,7 @@ std::size_t index_of(Source source) { return static_cast<std::size_t>(source); }
 
 Stamp boot_stamp(std::int64_t at_ms) { return {ClockDomain::sim, at_ms * 1'000'000}; }
 
-/// Returns a parameter of a command that is a count; nullopt if it is not a whole number, or too large.
+/// Returns the parameter of a command as a whole number; nullopt if it has a fraction, is negative, or exceeds 65535.
 std::optional<std::uint32_t> whole_number(float value) {
   if (!(value >= 0 && value <= 65535) || value != std::floor(value)) return std::nullopt;
   return static_cast<std::uint32_t>(value);
@@ -86,8 +86,8 @@ void MavlinkPoses::clear_histories() {
 }
 
 /// True if the frame is from the selected system. If none is selected, selects the configured system, or else the first system
-/// that sends a pose or the heartbeat of an autopilot. Another system is selected only after the first has been silent for
-/// system_silence.
+/// that sends a pose or the heartbeat of an autopilot. Another system is selected only after the selected one has been silent
+/// for system_silence.
 bool MavlinkPoses::is_from_vehicle(const Frame& frame, Time now) {
   if (frame.system == self_.system && frame.component == own_component)
     return false;  // this component sent the frame, and a router returned it
@@ -207,7 +207,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Heartbeat::id:
       return handle(message_in<Heartbeat>(frame), frame);
     case Attitude::id:
-      // Autopilots send the same attitude in both forms. Only the form with a quaternion is used, so that none is used twice.
+      // Autopilots send the same attitude in both messages. While the quaternion arrives, this message is not used.
       if (!received_within(AttitudeQuaternion::id, at.now, source_silence)) handle(attitude_of(message_in<Attitude>(frame)), at);
       return;
     case AttitudeQuaternion::id:
@@ -229,7 +229,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
     case Odometry::id:
       return handle(message_in<Odometry>(frame), at);
     default:
-      return;  // SYSTEM_TIME: poses are stamped with the boot clock, which the World maps to the daemon's
+      return;  // SYSTEM_TIME is not used: the World maps the stamps of poses to the daemon's time without it
   }
 }
 

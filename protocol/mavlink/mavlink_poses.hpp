@@ -24,10 +24,11 @@ inline constexpr std::size_t source_count = 7;
 std::string_view name_of(Source source);
 
 struct Settings {
-  std::string vehicle;                           // a vehicle of the configuration; empty = the only one
-  std::uint8_t system_id = 0, component_id = 0;  // 0 = the first system that sends; its autopilot
-  bool request_rates = false;                    // true: requests messages from the autopilot
-  double rate_hz = 50;
+  std::string vehicle;             // a vehicle of the configuration; empty = the only one
+  std::uint8_t system_id = 0;      // 0 = the first vehicle that sends
+  std::uint8_t component_id = 0;   // 0 = the autopilot, or else the first component that sends a message
+  bool request_rates = false;      // true: requests messages from the autopilot
+  double rate_hz = 50;             // rate of the requested messages
   std::optional<Geodetic> origin;  // origin of the world; needed for latitudes and longitudes
   bool needs_time = false;         // true: messages without a time stamp are not used
   bool sends_distances = false;    // true: sends every distance of a range finder, until a command changes that
@@ -63,7 +64,7 @@ struct Reaction {
   std::vector<SourcedPose> poses;
   std::vector<std::string> refusals;  // errors of messages
   std::vector<std::string> notices;   // lines for the log
-  std::vector<Bytes> replies;         // datagrams: of on_datagram() for the sender, of on_tick() for the vehicle
+  std::vector<Bytes> replies;         // datagrams to send: from on_datagram() to the sender, from on_tick() to the vehicle
   bool from_vehicle = false;          // true: the datagram contained a frame of the selected system
 };
 
@@ -83,15 +84,15 @@ class MavlinkPoses {
       HasOtherPoses has_other_poses = [] { return false; });
   /// `now` may have any origin, but must not decrease.
   Reaction on_datagram(BytesView datagram, Time now);
-  /// Call it several times per second. Sends heartbeats and requests. Reports the selected system and the missing parts of a
-  /// pose: when poses start or stop, and at growing intervals while none arrive.
+  /// Call it several times per second. Returns heartbeats and requests to send. Reports the selected system and the missing parts
+  /// of a pose when poses start or stop, and at growing intervals while none arrive.
   Reaction on_tick(Time now);
   /// Returns one sentence with everything that is missing; empty while poses arrive, here or from another source.
   std::string health_error(Time now) const;
-  /// Returns the name of another vehicle (system) that sends messages, which are ignored; else empty.
+  /// Returns the notice about another system whose messages are ignored, until it has been silent for 5 s; else empty.
   std::string rival(Time now) const;
 
-  /// True if the settings, or the last command of the vehicle, request distances.
+  /// True if the settings or a command request distances.
   bool wants_distances() const { return distances_.wanted(); }
   /// Returns the datagram of a distance; nullopt if distances are not requested, or if less than the requested interval has
   /// passed since the last datagram of the sensor.
@@ -122,7 +123,7 @@ class MavlinkPoses {
     Reaction& out;
   };
 
-  static constexpr std::size_t most_reported = 16;  // ignored systems and components that notices name
+  static constexpr std::size_t most_reported = 16;  // limit of reported_ignored_
   /// True if only vehicles or their simulators, not ground stations, send this message.
   static bool contains_pose(std::uint32_t id);
   /// True if only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
@@ -184,12 +185,12 @@ class MavlinkPoses {
   bool global_has_fix_ = false, sim_state_has_fix_ = false;
   Time found_at_{}, last_received_{}, next_heartbeat_{}, next_request_{}, next_reminder_{};
   std::optional<Time> first_tick_;  // time of the first tick
-  std::optional<bool> reported_;    // true: poses arrived at the last report
+  std::optional<bool> reported_;    // true: the last report said that poses arrive
   std::chrono::nanoseconds reminder_period_{0};
-  std::optional<std::pair<int, int>> ignored_;  // system and component of the last ignored message
-  /// Systems and components that notices have named since the vehicle was selected, with the text of the notice.
+  std::optional<std::pair<int, int>> ignored_;  // system and component of the last message that is not from the vehicle
+  /// Senders (system, component) that were reported as ignored since the vehicle was selected, with the text of the notice.
   std::map<std::pair<int, int>, std::string> reported_ignored_;
-  std::pair<int, int> rival_{};  // the last ignored component of another system than the vehicle's
+  std::pair<int, int> rival_{};  // the last of these senders that is not in the vehicle's system
   Time rival_at_{};
   std::map<std::uint32_t, Arrival> received_;
 
@@ -197,7 +198,7 @@ class MavlinkPoses {
   PairedPlaces<PlaceReading> local_;
   PairedPlaces<GlobalPlace> global_;
   std::optional<Depth> depth_;
-  std::optional<Pose> local_in_world_;  // origin of the autopilot's local axes; absent: the world's origin
+  std::optional<Pose> local_in_world_;  // origin of the autopilot's local axes; nullopt = the world's origin
   std::int64_t newest_boot_ms_ = 0;
   std::array<std::int64_t, source_count> newest_ns_{};
   std::array<std::optional<Time>, source_count> last_pose_{};

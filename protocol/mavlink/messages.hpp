@@ -1,5 +1,5 @@
 // The MAVLink messages with poses and distances, and commands. Fields are in wire order: base fields sorted by size, then
-// extensions in the order of their addition. Each row's number, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and
+// extensions in the order of their addition. The numbers, CRC_EXTRA and lengths are those of minimal.xml, standard.xml and
 // common.xml of the MAVLink project; a test computes CRC_EXTRA and lengths from the fields below. protocol/mavlink/frames.hpp
 // reads and writes them.
 #pragma once
@@ -21,7 +21,7 @@ struct Heartbeat {
   static constexpr std::uint8_t crc_extra = 50;
   static constexpr std::string_view name = "HEARTBEAT";
   static constexpr std::uint8_t submarine = 12;    // MAV_TYPE_SUBMARINE
-  static constexpr std::uint8_t no_autopilot = 8;  // MAV_AUTOPILOT_INVALID: ground stations, cameras, ourselves
+  static constexpr std::uint8_t no_autopilot = 8;  // MAV_AUTOPILOT_INVALID: ground stations, cameras, sonard
   std::uint32_t custom_mode = 0;
   std::uint8_t type = 0, autopilot = 0, base_mode = 0, system_status = 0, mavlink_version = 3;
 };
@@ -296,9 +296,9 @@ struct MessageInfo {
   std::uint8_t crc_extra = 0;
   std::size_t size = 0, full_size = 0;  // size of the payload without and with extensions
 };
-/// Returns the supported messages, in the order of their ids.
+/// Returns the messages that can be read, in the order of their ids.
 std::span<const MessageInfo> known_messages();
-/// Returns null for unsupported messages.
+/// Returns null for messages that cannot be read.
 const MessageInfo* find_message(std::uint32_t id);
 
 }  // namespace sonar::mavlink

@@ -78,7 +78,7 @@ Result<std::optional<Geodetic>> geodetic(double latitude_deg, double longitude_d
   if (!on_earth)
     return failure(ErrorKind::bad_data, "latitude " + std::to_string(latitude_deg) + ", longitude " +
                                             std::to_string(longitude_deg) + ", altitude " + std::to_string(altitude_m) +
-                                            " is not a latitude and longitude");
+                                            " is not a possible position");
   return Geodetic{rad_from_deg(latitude_deg), rad_from_deg(longitude_deg), altitude_m};
 }
 Result<std::optional<Geodetic>> geodetic_e7(std::int32_t latitude_e7, std::int32_t longitude_e7, double altitude_m) {

@@ -33,7 +33,7 @@ struct PlaceReading {
 PlaceReading place_of(const LocalPositionNed& m);
 
 /// Returns the position, which is sent as degrees times 1e7; nullopt for 0, 0, which autopilots send without a fix. Errors: an
-/// impossible latitude or longitude.
+/// impossible latitude, longitude or altitude.
 Result<std::optional<Geodetic>> geodetic_of(const GlobalPositionInt& m);
 Result<std::optional<Geodetic>> geodetic_of(const GpsGlobalOrigin& m);
 /// Returns the position from the integers of the message; if they are 0, from the floats.
