@@ -243,7 +243,7 @@ function aris_frame.dissector(tvb, pinfo, tree)
   end
   local first, last = values.dataOffset or 0, (values.dataOffset or 0) + (values.data or 0)
   if last > values.totalSize then item:add_proto_expert_info(doubt, "the samples end after the frame") end
-  if tvb:len() > 1400 then item:add_proto_expert_info(doubt, "older controllers take at most 1400 bytes") end
+  if tvb:len() > 1400 then item:add_proto_expert_info(doubt, "older controllers accept at most 1400 bytes") end
   local text = string.format("frame %s: bytes %d to %d of %d", short(values.frameIndex), first, last, values.totalSize)
   local mode = values["header.PingMode"]
   if mode then

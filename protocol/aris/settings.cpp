@@ -184,10 +184,10 @@ std::uint32_t focus_position(double range_m, const Product& product) {
 }
 
 FocusNow focus_at(const Settings& s, Time at) {
-  const double way = std::abs(static_cast<double>(s.focus_to) - s.focus_from) / 1000;
-  const double gone = std::max(seconds(at - s.focus_set_at) / seconds(focus_travel), 0.0);
-  if (gone >= way) return {s.focus_to, false};
-  const double step = std::copysign(1000 * gone, static_cast<double>(s.focus_to) - s.focus_from);
+  const double distance = std::abs(static_cast<double>(s.focus_to) - s.focus_from) / 1000;
+  const double travelled = std::max(seconds(at - s.focus_set_at) / seconds(focus_travel), 0.0);
+  if (travelled >= distance) return {s.focus_to, false};
+  const double step = std::copysign(1000 * travelled, static_cast<double>(s.focus_to) - s.focus_from);
   return {static_cast<std::uint32_t>(std::lround(s.focus_from + step)), true};
 }
 

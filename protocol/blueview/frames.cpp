@@ -128,8 +128,8 @@ wire::Bytes deflated(wire::BytesView plain) {
 wire::Bytes inflated(wire::BytesView packed, std::size_t size) {
   // Decompression grows a stream at most 1032-fold (zlib's technical notes). With a wrong size this function must not allocate
   // more.
-  constexpr std::size_t best = 1032;
-  if (size > best * packed.size() + 64 || size == 0) return {};
+  constexpr std::size_t largest_ratio = 1032;
+  if (size > largest_ratio * packed.size() + 64 || size == 0) return {};
   std::vector<Bytef> in(packed.size()), out(size);
   if (!packed.empty()) std::memcpy(in.data(), packed.data(), packed.size());
   auto made = static_cast<uLongf>(size);

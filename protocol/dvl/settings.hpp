@@ -88,7 +88,7 @@ struct Settings {
 struct HeldSettings final : RangeImageSettings {
   HeldSettings(const Settings& s, const Product& product);
   bool equals(const VendorSettings& other) const override;
-  std::shared_ptr<const PingFindings> look_at(const Ping& ping) const override;  // a Measurement (measure.cpp)
+  std::shared_ptr<const PingFindings> look_at(const Ping& ping) const override;  // returns a Measurement (measure.cpp)
   Settings settings;
 };
 /// Returns the settings in `held`; if it is null, the settings of a new device.

@@ -48,8 +48,8 @@ void put(wire::Bytes& out, std::span<const Vec3> vectors) {
 // normals and indices, to which the JSON refers with buffer views and accessors.
 wire::Bytes glb(std::span<const Vec3> vertices, std::span<const std::array<std::uint32_t, 3>> triangles,
                 const std::array<double, 3>& colour) {
-  const std::size_t of_vectors = 12 * vertices.size(), of_indices = 12 * triangles.size();
-  const std::size_t of_data = 2 * of_vectors + of_indices;  // always a multiple of 4, as the format requires for chunks
+  const std::size_t vector_bytes = 12 * vertices.size(), index_bytes = 12 * triangles.size();
+  const std::size_t data_bytes = 2 * vector_bytes + index_bytes;  // always a multiple of 4, as the format requires for chunks
   Vec3 least = vertices.empty() ? Vec3{} : y_up(vertices.front()), most = least;
   for (const Vec3& v : vertices) {
     const Vec3 t = y_up(v);
@@ -77,23 +77,23 @@ wire::Bytes glb(std::span<const Vec3> vertices, std::span<const std::array<std::
       {"nodes", Json::array({{{"mesh", 0}}})},
       {"meshes", Json::array({{{"primitives", Json::array({primitive})}}})},
       {"materials", Json::array({material})},
-      {"buffers", Json::array({{{"byteLength", of_data}}})},
-      {"bufferViews", Json::array({view(0, of_vectors, target_vertices), view(of_vectors, of_vectors, target_vertices),
-                                   view(2 * of_vectors, of_indices, target_indices)})},
+      {"buffers", Json::array({{{"byteLength", data_bytes}}})},
+      {"bufferViews", Json::array({view(0, vector_bytes, target_vertices), view(vector_bytes, vector_bytes, target_vertices),
+                                   view(2 * vector_bytes, index_bytes, target_indices)})},
       {"accessors", Json::array({positions, accessor(1, type_float, vertices.size(), "VEC3"),
                                  accessor(2, type_u32, 3 * triangles.size(), "SCALAR")})}};
   std::string text = description.dump();
   text.append((4 - text.size() % 4) % 4, ' ');
 
-  constexpr std::size_t of_header = 12, of_chunk_header = 8;
+  constexpr std::size_t header_bytes = 12, chunk_header_bytes = 8;
   wire::Bytes out;
-  const auto total = static_cast<std::uint32_t>(of_header + 2 * of_chunk_header + text.size() + of_data);
+  const auto total = static_cast<std::uint32_t>(header_bytes + 2 * chunk_header_bytes + text.size() + data_bytes);
   out.reserve(total);
   wire::Writer writer(out);
   for (const std::uint32_t word : {magic, version, total, static_cast<std::uint32_t>(text.size()), chunk_json})
     writer("header", word);
   std::transform(text.begin(), text.end(), std::back_inserter(out), [](char c) { return static_cast<std::byte>(c); });
-  for (const std::uint32_t word : {static_cast<std::uint32_t>(of_data), chunk_bin}) writer("header", word);
+  for (const std::uint32_t word : {static_cast<std::uint32_t>(data_bytes), chunk_bin}) writer("header", word);
   put(out, vertices);
   put(out, normals_of(vertices, triangles));
   for (const auto& triangle : triangles)

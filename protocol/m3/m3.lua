@@ -29,7 +29,7 @@ local all = {}
 for _, field in pairs(fields) do all[#all + 1] = field end
 m3.fields = all
 local broken = ProtoExpert.new("m3.expert.broken", "Sizes contradict each other", expert.group.MALFORMED, expert.severity.ERROR)
-local junk = ProtoExpert.new("m3.expert.junk", "Not the begin of a packet", expert.group.PROTOCOL, expert.severity.WARN)
+local junk = ProtoExpert.new("m3.expert.junk", "Not the start of a packet", expert.group.PROTOCOL, expert.severity.WARN)
 m3.experts = {broken, junk}
 
 local function begins(tvb, at)

@@ -36,7 +36,7 @@ DistanceSensor distance_sensor_of(const Measured& measured) {
   m.horizontal_fov_rad = static_cast<float>(measured.horizontal_rad);
   m.vertical_fov_rad = static_cast<float>(measured.vertical_rad);
 
-  const Vec3d looks = rotate(measured.sensor_in_body, {1, 0, 0});
+  const Vec3d direction = rotate(measured.sensor_in_body, {1, 0, 0});
   constexpr std::array<std::pair<Vec3d, Orientation>, 6> axes{{{{1, 0, 0}, ahead},
                                                                {{0, -1, 0}, starboard},
                                                                {{-1, 0, 0}, astern},
@@ -44,7 +44,7 @@ DistanceSensor distance_sensor_of(const Measured& measured) {
                                                                {{0, 0, 1}, up},
                                                                {{0, 0, -1}, down}}};
   const auto along =
-      std::find_if(axes.begin(), axes.end(), [&](const auto& axis) { return dot(looks, axis.first) >= axis_tolerance; });
+      std::find_if(axes.begin(), axes.end(), [&](const auto& axis) { return dot(direction, axis.first) >= axis_tolerance; });
   m.orientation = along != axes.end() ? along->second : custom;
   if (m.orientation == custom) {
     // The message has the rotation between FRD axes. Half turns about x, before and after the rotation, change the signs of y and

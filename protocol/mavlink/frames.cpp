@@ -106,10 +106,10 @@ std::optional<Frame> FrameReader::checked(const Header& h) {
     skip(whole ? h.end : 1);
     return std::nullopt;
   }
-  const std::size_t behind = h.before + h.frame.payload_size;
+  const std::size_t checksum_at = h.before + h.frame.payload_size;
   // The checksum ends with the CRC_EXTRA of the message, so a dialect in which this number has another layout fails here.
-  const std::uint16_t is = checksum(std::array{std::byte{message->crc_extra}}, checksum(rest_.subspan(1, behind - 1)));
-  const auto stated = std::to_integer<unsigned>(rest_[behind]) | std::to_integer<unsigned>(rest_[behind + 1]) << 8;
+  const std::uint16_t is = checksum(std::array{std::byte{message->crc_extra}}, checksum(rest_.subspan(1, checksum_at - 1)));
+  const auto stated = std::to_integer<unsigned>(rest_[checksum_at]) | std::to_integer<unsigned>(rest_[checksum_at + 1]) << 8;
   if (is != stated) {
     ++counts_.bad_checksum;
     skip(1);

@@ -59,12 +59,12 @@ void MavlinkPoses::report_changes(Time now, Reaction& out) {
   if (!first_tick_) first_tick_ = now;
   if (has_other_poses_()) return;
   if (system_ ? now - found_at_ < listen_before_report : now - *first_tick_ < silence_before_report) return;
-  const bool well = has_poses(now);
-  const bool is_news = reported_ != well;
-  if (!is_news && (well || now < next_reminder_)) return;
-  reminder_period_ = is_news ? first_reminder : std::min(2 * reminder_period_, longest_reminder);
+  const bool arriving = has_poses(now);
+  const bool is_change = reported_ != arriving;
+  if (!is_change && (arriving || now < next_reminder_)) return;
+  reminder_period_ = is_change ? first_reminder : std::min(2 * reminder_period_, longest_reminder);
   next_reminder_ = now + reminder_period_;
-  reported_ = well;
+  reported_ = arriving;
   out.notices.push_back(report(now));
 }
 

@@ -182,9 +182,9 @@ namespace {
 
 /// Interpolates linearly over the smaller angle, because attitudes of one vehicle are close to each other.
 Quatd between(Quatd a, Quatd b, double u) {
-  const double sign = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -u : u;
-  const double rest = 1 - u;
-  const Quatd q{rest * a.w + sign * b.w, rest * a.x + sign * b.x, rest * a.y + sign * b.y, rest * a.z + sign * b.z};
+  const double of_b = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z < 0 ? -u : u;
+  const double of_a = 1 - u;
+  const Quatd q{of_a * a.w + of_b * b.w, of_a * a.x + of_b * b.x, of_a * a.y + of_b * b.y, of_a * a.z + of_b * b.z};
   return norm_squared(q) > 0 ? normalized(q) : a;
 }
 
