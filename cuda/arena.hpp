@@ -19,8 +19,8 @@ class Arena {
   enum class Where { device, host, both };
   static constexpr int not_cleared = -1;
   /// `clear_lane`: lane on which both copies of new memory are set to zero; only with Where::both. A copy of whole chunks
-  /// includes the gaps between pieces. If these were not set, compute-sanitizer's initcheck would report reads of memory that
-  /// was never written.
+  /// includes the gaps between pieces. If these gaps were not set, compute-sanitizer's initcheck would report reads of memory
+  /// that was never written.
   Arena(Machine& machine, Where where, std::size_t chunk_bytes, int clear_lane = not_cleared)
       : machine_(machine), where_(where), chunk_bytes_(chunk_bytes), clear_lane_(clear_lane) {}
   ~Arena();

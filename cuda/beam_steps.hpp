@@ -149,7 +149,7 @@ SONAR_HD inline void form_beams(const PingView& p, std::uint32_t i) {
   }
 }
 
-/// Blurs sample `i` of [beams][samples]: reads the beams, writes `mixed`.
+/// Blurs sample `i` of [beams][samples], and adds the pulses of other sonars. Reads the beams, writes `mixed`.
 SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
   const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
   const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));
@@ -163,7 +163,7 @@ SONAR_HD inline void refocus(const PingView& p, std::uint32_t i) {
   to[0] = s.re;
   to[1] = s.im;
 }
-/// Blends sample `i`: reads `mixed`, writes the beams.
+/// Blends sample `i`, and adds shared noise. Reads `mixed`, writes the beams.
 SONAR_HD inline void blend(const PingView& p, std::uint32_t i) {
   const auto j = static_cast<std::int32_t>(i / static_cast<std::uint32_t>(p.samples));
   const auto n = static_cast<std::int32_t>(i % static_cast<std::uint32_t>(p.samples));

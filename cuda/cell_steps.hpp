@@ -18,7 +18,7 @@ SONAR_HD inline float cell_value(const TileView& t, int column, int cell) {
   return static_cast<float>(t.cells[static_cast<std::int64_t>(column) * t.count + cell]);
 }
 
-/// Computes the position of a cell, and whether it is visible to the sonar.
+/// The position of a cell. place_cell() computes it, or returns false if the cell is not visible.
 struct CellPlace {
   float range, offset, cosine, sine2, sample;
   std::int32_t column;
@@ -70,7 +70,7 @@ SONAR_HD inline bool place_cell(const PingView& p, const TileView& t, int cell, 
   const float along = cell_value(t, cell_normal_x, cell) * (qx + dx) + cell_value(t, cell_normal_y, cell) * (qy + dy) +
                       cell_value(t, cell_normal_z, cell) * (qz + dz);
   if (!(along * t.turned_away <= 0)) return false;
-  // The plane of another object's facet, extended from the ray's position in the column to that of the cell.
+  // Compares with the plane of another object's facet, extended from the ray's position in the column to that of the cell.
   const float* slope = p.depth_slope + map_at;
   const auto differs = [&](std::int32_t i) {
     const auto in_map = static_cast<std::int32_t>(bits_of(map[i])), in_slope = static_cast<std::int32_t>(bits_of(slope[i]));

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t chunk_bytes = 16u << 20;
 constexpr std::size_t tiles_at_once = 256;  // number of tiles that one worker looks up
-constexpr std::size_t ahead = 8;            // number of tiles
+constexpr std::size_t ahead = 8;            // distance of prefetches, in tiles
 constexpr std::size_t most_values_a_copy = (2u << 20) / sizeof(std::int16_t);
 
 std::size_t values(const CellTile& t) { return static_cast<std::size_t>(t.stride) * CellTile::columns; }
@@ -97,8 +97,8 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
   return true;
 }
 
-/// Sends the next few missing tiles in one copy, because allocation of large pieces of memory for fast copies is slow. Returns
-/// the index after the last tile sent.
+/// Sends the next missing tiles in one copy of limited size, because allocation of large pieces of memory for fast copies is
+/// slow. Returns the index after the last tile sent.
 std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t from, int lane, Arena& staging,
                                  std::vector<const std::int16_t*>& cells) {
   const std::size_t most = machine_.pieces_apart() ? 1 : most_values_a_copy;

@@ -30,7 +30,7 @@ SONAR_HD inline NoisePlace place_of(const NoiseKey& key, std::uint32_t sonar, st
   return noise_place(key.seed, sonar, ping, column);
 }
 
-/// Computes sample `i` of [columns][samples].
+/// Adds multipath to sample `i` of [columns][samples].
 SONAR_HD inline void add_multipath(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples);
   const float* from = p.multipath + (i / samples) * p.multipath_stride + 2 * static_cast<std::int64_t>(i % samples);
@@ -38,7 +38,7 @@ SONAR_HD inline void add_multipath(const PingView& p, std::uint32_t i) {
   p.signals[2 * static_cast<std::int64_t>(i) + 1] += from[1];
 }
 
-/// Processes column `k`. At each sample it removes the slices of the fan that end there at a surface.
+/// Adds volume reverberation to column `k`. At each sample it removes the slices of the fan that end there at a surface.
 SONAR_HD inline void volume(const PingView& p, std::uint32_t k) {
   const SeaView& s = p.sea;
   const auto columns = static_cast<std::int64_t>(s.columns);
@@ -75,7 +75,7 @@ SONAR_HD inline void volume(const PingView& p, std::uint32_t k) {
   }
 }
 
-/// Computes sample `i` of [columns][samples].
+/// Applies the transmitter's pattern to sample `i` of [columns][samples], and adds noise and leak.
 SONAR_HD inline void finish_columns(const PingView& p, std::uint32_t i) {
   const auto samples = static_cast<std::uint32_t>(p.samples);
   const std::uint32_t k = i / samples, n = i % samples;

@@ -30,7 +30,7 @@ std::vector<fs::path> module_places() {
 
 struct Loaded {
   const CudaModule* module = nullptr;
-  std::string why_not;  // "not installed", or the fault of the module
+  std::string why_not;  // "not installed", or the error of the module
 };
 
 /// Loads the module. If it is already loaded, this takes little time.
@@ -123,7 +123,7 @@ class CudaMachine final : public Machine {
   void wait(int lane) override { check(module_.wait(at_, lane)); }
 
  private:
-  /// After an error of the device, the machine is not used again. DeviceEngine reports the error and may continue on the CPU.
+  /// After any error but full memory, the machine is not used again. DeviceEngine reports the error and may continue on the CPU.
   void check(int code) const {
     if (code == 0) return;
     const std::string why = name_ + ": " + module_.reason(code);

@@ -33,7 +33,7 @@ struct Lane {
   cudaStream_t stream = nullptr;
   cudaEvent_t done = nullptr;
   GraphShelf<cudaGraphExec_t> graphs;
-  std::vector<Transform> transforms;  // the last used first; each lane has its own, because a plan runs one transform at a time
+  std::vector<Transform> transforms;  // last used first; lanes do not share them, because a plan runs one transform at a time
   cudaEvent_t begin[timed_things] = {}, end[timed_things] = {};  // made when a launch is first timed
   bool timed[timed_things] = {};                                 // since the last call of step_seconds
   bool timing = false;                                           // the last launch was timed

@@ -6,7 +6,7 @@
 
 namespace sonar {
 
-/// Returns "not installed" (no CUDA module), "no device", "no device (<the driver's reason>)", the fault of the module, or
+/// Returns "not installed" (no CUDA module), "no device", "no device (<the driver's reason>)", the error of the module, or
 /// "NVIDIA H200, 139.8 GiB, compute 9.0". Every call queries the device, because a device can disappear.
 std::string cuda_status();
 /// Returns "not installed" or "not used" without loading the module. Loading takes seconds, and powers a suspended device up.

@@ -81,7 +81,8 @@ class DeviceEngine final : public PingEngine {
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
   std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
-    // The number of pings that are prepared in parallel. With it, a ping waits only for the steps of the others on the device.
+    // The number of pings that are prepared in parallel. With this limit, a ping waits only for the steps of the others on the
+    // device.
     const std::size_t most = std::min(batch_, static_cast<std::size_t>(pool_.threads()));
     return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? most : 1;
   }
@@ -162,7 +163,8 @@ class DeviceEngine final : public PingEngine {
       }
   }
 
-  /// Returns false if the device's memory was full. The memory has then been released, and unfinished work may be tried again.
+  /// Does the work. Returns false if the device's memory was full. The memory has then been released, and unfinished work may be
+  /// tried again.
   template <class Work>
   bool has_room_for(const Work& work) {
     try {
@@ -256,7 +258,7 @@ class DeviceEngine final : public PingEngine {
     return missing.empty() ? "" : without + " are computed by the CPU (" + missing + ")";
   }
   static CellFields fields_of(const PingRequest& request) { return {request.switches.texture, request.switches.grain}; }
-  /// Sets the scene of this request to its poses, for device and CPU.
+  /// Sets the poses of the request, for device and CPU, and makes cells for its seed.
   void place(const PingRequest& request) {
     if (!cells_ || !cells_->serves(request.seed, fields_of(request)))
       // Weights of cells depend on the seed. Therefore another seed needs other tiles.
@@ -285,7 +287,7 @@ class DeviceEngine final : public PingEngine {
 
   void launch(BatchRoom& room) {
     if (room.pings.empty()) return;
-    // This lane waits for the copies of plans and cells that were queued before.
+    // The room's lane waits for the copies of plans and cells that were queued before.
     machine_->order(room.lane, keeping_lane);
     Launch launch;
     launch.views = room.upload();

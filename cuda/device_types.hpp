@@ -123,7 +123,7 @@ struct VolumeSlice {
   double range_per_x, weight;
   std::int32_t bin, unused;
 };
-/// The pulse of a point or of another sonar on the sample grid; values[from, to) are complex doubles.
+/// The pulse of a point or of another sonar on the sample grid; `values`: complex doubles of samples [from, to).
 struct PulseInBeams {
   double sine;
   const double* values;
@@ -159,7 +159,7 @@ struct PingView {
   const double* beam_sines;             // [beams]
   const ReceivePattern* beam_patterns;  // [beams]
   const double* column_u;               // [columns], in double
-  const float* noise_table;             // complex, table_samples of them
+  const float* noise_table;             // complex, noise_table_samples of them
   const float* grain_table;             // the same, for leak and volume, with the correlation of the pulse
   std::int32_t taps, pulse_steps, samples, per_row, rows, beams;
   SpectralView spectral;  // grids and folded belong to this ping
@@ -217,7 +217,7 @@ struct PingView {
   std::uint8_t* codes;      // [rows][beams][bytes]
   float* pressure;          // [rows][beams], null = not needed
   float* kept_beams;        // complex [samples][beams], null = not needed
-  std::uint32_t* counters;  // [0] rays, [1] echoes: counters_a_ping of them
+  std::uint32_t* counters;  // [counters_a_ping]: number of rays, number of echoes
 };
 
 /// The kernels of a ping, in the order of their launches; steps.hpp has their bodies.

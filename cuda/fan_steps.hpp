@@ -1,7 +1,7 @@
 // Kernel bodies of the fan of rays. They compute the same values as trace_fan, in another order: one thread refines the
 // interval between two base rays from bottom to top and draws it into the depth map immediately. So no samples are stored, and
 // results do not depend on the order of threads. FanRefinement (core/pipeline/fan_refinement.hpp) contains the rule for
-// refining. Tests compare the two.
+// refining. Tests compare the results.
 #pragma once
 
 #include <cmath>

@@ -244,7 +244,7 @@ FlatScene::FlatScene(const Scene& scene) : origin_(ray_origin_of(scene)), bodies
     for (const FlatTriangle& t : own) boxes.push_back(box_of(t));
     const std::size_t first = order.size();
     group.root = build_bvh(boxes, nodes_, order);
-    // The order is that of the leaves: a leaf is a range of the array.
+    // The triangles have the order of the leaves: a leaf is a range of the array.
     for (std::size_t i = first; i < order.size(); ++i) triangles_.push_back(own[order[i]]);
     Bounds bounds;
     for (const Box& b : boxes) {

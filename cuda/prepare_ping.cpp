@@ -78,7 +78,7 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
     }
     return {rays_, cells, m.bodies, m.laws, m.turned_away, m.plan, m.scalars, kernels_, pool};
   };
-  // Multipath echoes need other cells. Their view must come before this one.
+  // Multipath echoes need other cells. Their SurfaceCells::in_view() must come before that of look().
   if (alone) find_points(all[0], context_of(all[0]), workers_[0]);
   look(all, cells);
   pool_.for_each(all.size(), [&](std::size_t i, int thread) {
@@ -102,19 +102,19 @@ std::vector<AskedPing> PingPreparer::add(std::span<const AskedPing> pings, Surfa
   return left;
 }
 
-/// Makes the parts that must not run in parallel: the plan's gain and noise, and the number of the view.
+/// Does the work that must not run in parallel: sets the plan's gain, makes its noise, and begins the view with its values.
 PingPreparer::Making PingPreparer::begin(const AskedPing& asked, int lane, BatchRoom& room) {
   const PingRequest& request = asked.wanted->request;
   PlanTables& plan = *asked.plan;
   // Leak and volume also read a table of shaped noise: that of the noise, or one with the pulse's correlation (docs/acoustics.md,
   // section 5).
   const bool leak = request.switches.leak && plan.plan().mode.receiver.leak_upa > 0;
-  const bool wants_noise = request.switches.noise || leak || (request.switches.volume && scene_->water_column.has_volume());
+  const bool needs_noise = request.switches.noise || leak || (request.switches.volume && scene_->water_column.has_volume());
   set_gain(plan.plan(), request.settings.gain_db);
-  if (wants_noise && !plan.plan().expected_power) plan.need_noise(lane);
+  if (needs_noise && !plan.plan().expected_power) plan.need_noise(lane);
   Making m{asked, room, plan.plan(), make_scalars(plan.plan(), request, flat_.origin()),
            request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world};
-  // Constants of the settings first, then those of the ping.
+  // The values of the plan come first; later functions add those of the ping.
   plan.fill(m.view);
   return m;
 }
@@ -164,7 +164,7 @@ void PingPreparer::complete(Making& m, const PingContext& context, int lane, Wor
     add_water(m);
     if (m.plan.spectral) {
       SpectralView& v = m.view.spectral;
-      // Number of complex values of all columns: the fine grids of eq. 25, and the spectra folded to one value per sample.
+      // Complex values of all columns: the fine grids of eq. 25, and the spectra folded to one value per sample.
       v.grids = m.room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.points)).device;
       v.folded = m.room.work.allocate<double>(2 * m.columns() * static_cast<std::size_t>(v.period)).device;
     }

@@ -152,7 +152,7 @@ struct BodyTest {
   }
 };
 
-/// range_m of a miss is `far_m`.
+/// Returns the first hit before `far_m`; range_m of a miss is `far_m`.
 SONAR_HD inline RayHit trace_ray(const TracerView& tracer, const Ray& ray, float far_m) {
   const Descent d = descent_of(ray);
   RayHit hit;

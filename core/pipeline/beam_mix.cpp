@@ -1,4 +1,4 @@
-// Mixes neighbouring beams: class BeamMix of core/pipeline/plan_tables.hpp.
+// Class BeamMix (core/pipeline/plan_tables.hpp), which mixes neighbouring beams.
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -12,7 +12,7 @@ namespace {
 constexpr double set_rad = 0.5;  // phase step at the aperture's ends between sets of taps; the error is at most half of this
 constexpr double most_rad = 16;  // largest phase error; at shorter ranges it stays at this value
 constexpr int aperture_points = 512;
-constexpr double neighbour_in_beams = 0.56;  // distance of a neighbour in -3 dB widths; equals one of 256 beams of the M1200d
+constexpr double neighbour_in_beams = 0.56;  // distance of a neighbour in -3 dB widths: the spacing of 256 beams of the M1200d
 
 /// The first sample after `n` whose set of taps differs from that of `n`. Sets change with 1 / range.
 int end_of_set(const BeamMixView& v, int j, int first_sample, int n, std::int32_t set, int samples) {
@@ -80,8 +80,8 @@ void BeamMix::lay_out_focus(const PingPlan& plan, double spacing) {
   };
   widest_ = reach_of(sets - 1);
   taps_.assign(2 * static_cast<std::size_t>(sets * (2 * widest_ + 1)), 0.0f);
-  // Sums over one period of the positions that beams of this spacing can distinguish. Beyond the aperture, where there is no
-  // signal, the phase is constant. The points lie on both sides of the middle, at odd multiples of 1 / circle.
+  // The taps are sums over one period of the positions that beams of this spacing can distinguish. Beyond the aperture, where
+  // there is no signal, the phase is constant. The points lie on both sides of the middle, at odd multiples of 1 / circle.
   constexpr int half = aperture_points / 2, circle = 2 * aperture_points;
   std::vector<double> cosine, place2;
   for (int i = 0; i < circle; ++i) cosine.push_back(std::cos(2 * pi * i / circle));
@@ -112,7 +112,7 @@ void BeamMix::lay_out_blend(const PingPlan& plan, double spacing) {
   const ReceivePattern& pattern = plan.beam_pattern[0];
   const double width = 2 * std::sin(static_cast<double>(plan.mode.pattern.azimuth_width_rad) / 2);
   step_ = std::max(1, static_cast<std::int32_t>(std::lround(neighbour_in_beams * width / spacing)));
-  // gamma: correlation of a diffuse field between two beams that are this far apart.
+  // Gamma of eq. 45: correlation of a diffuse field between two beams that are this far apart.
   const auto common = [&](int apart) {
     double product = 0, power = 0;
     for (int k = -plan.columns.count; k <= plan.columns.count; ++k) {

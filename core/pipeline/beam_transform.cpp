@@ -1,4 +1,4 @@
-// Forms the beams of all columns at once: class BeamTransformTables of core/pipeline/plan_tables.hpp.
+// Class BeamTransformTables (core/pipeline/plan_tables.hpp): tables for forming all beams from all columns at once.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -21,7 +21,7 @@ int smooth_size(int n) {
   }
 }
 
-/// e^{-i 2 pi i m / size} for m = 1 ... most: the twiddle factors of a pass.
+/// Appends the twiddle factors of a pass: e^{-j 2 pi i m / size} for i = 0 ... count - 1 and m = 1 ... most.
 void append_twiddles(int size, int count, int most, std::vector<float>& turns) {
   for (int i = 0; i < count; ++i)
     for (int m = 1; m <= most; ++m) {
@@ -50,7 +50,7 @@ std::vector<double> solve(std::vector<double> a, std::vector<double> b) {
 /// Weights of `taps` values at 0, 1, ... that give the value at `place`, by least squares, for any signal whose spectrum lies
 /// within +-band / 2 cycles per step.
 std::vector<double> weights_between(int taps, double place, double band) {
-  constexpr double ridge = 1e-13;  // oversampling makes the matrix nearly singular; it is also why a few taps are enough
+  constexpr double ridge = 1e-13;  // oversampling, for which a few taps are enough, makes the matrix nearly singular
   std::vector<double> matrix, right;
   for (int a = 0; a < taps; ++a) {
     for (int b = 0; b < taps; ++b) matrix.push_back(sinc(band * (a - b)) + (a == b ? ridge : 0));
@@ -144,7 +144,7 @@ void BeamTransformTables::compute_interpolation(double aperture_in_spacings, con
   const auto place_of = [&](double sine) { return (columns.first_sine - sine) / columns.spacing; };
   const bool on_columns = std::all_of(beam_sines.begin(), beam_sines.end(),
                                       [&](double sine) { return std::abs(place_of(sine) - std::round(place_of(sine))) < 1e-6; });
-  // Beams between columns are interpolated by the fewest taps that have the accuracy stated in the header.
+  // Beams between columns are interpolated with the fewest taps that have the accuracy stated in the header.
   tables_.taps = on_columns ? 1 : aperture_in_spacings < 0.25 ? 8 : 10;
   for (const double sine : beam_sines) {
     const double place = place_of(sine);

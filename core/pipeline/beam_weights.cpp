@@ -52,8 +52,8 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
   // Beams with different widths have the same band, that of the widest beam.
   c.half_band = alike ? band.half : band_of(widest, columns, options.dropped_energy).half;
   c.weight_energy = band.energy;
-  // Sums of powers do not cancel. The rounding error of a transform is relative to the largest value and would be visible in
-  // shadows.
+  // Squared weights need a band: the rounding error of a transform is relative to the largest value and would be visible in
+  // shadows, because sums of powers do not cancel.
   if (options.transform && !squared && alike && !nominal.unit && beam_sines.size() > 1) {
     auto tables = std::make_shared<const BeamTransformTables>(nominal, columns, beam_sines);
     const double band_cost = static_cast<double>(beam_sines.size()) * std::min(2 * c.half_band + 1, columns.count);
@@ -64,8 +64,8 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
     }
   }
 
-  // One ping of several forms only some beams. If beams have no weights outside their own band, the ping can skip the columns
-  // between them.
+  // A ping of an interleaved picture forms only some beams. If beams have no weights outside their own band, the ping can skip
+  // the columns between them.
   const bool own_bands = !alike && mode.interleaved_pings > 1;
   std::vector<int> half_bands(beam_sines.size(), c.half_band);
   for (std::size_t j = 0; own_bands && j < half_bands.size(); ++j)
@@ -90,8 +90,8 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
       for (int k = start; k < stop; ++k)
         for (int j = first; j < first + 4; ++j) {
           const auto beam = static_cast<std::size_t>(j);
-          const bool is_heard = j <= last && (!own_bands || std::abs(k - std::lround(nearest_column(j))) <= half_bands[beam]);
-          const double w = is_heard ? pattern[beam](columns.sine(k) - beam_sines[beam]) : 0.0;
+          const bool in_band = j <= last && (!own_bands || std::abs(k - std::lround(nearest_column(j))) <= half_bands[beam]);
+          const double w = in_band ? pattern[beam](columns.sine(k) - beam_sines[beam]) : 0.0;
           c.weights.push_back(static_cast<float>(squared ? w * w : w));
         }
     } else {

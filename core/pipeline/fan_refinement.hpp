@@ -80,8 +80,8 @@ class FanRefinement {
       std::swap(open_, halves_);
     }
   }
-  /// The elevation at which an interval is halved. If the interval contains an edge, it is the middle. Within one surface it is
-  /// near the middle, but different in each column. Rays in equal steps could hit only the crests of ripples, which would then
+  /// The elevation at which an interval is halved. If the interval contains an edge, this is its middle. Within one surface, this
+  /// is near the middle, but different in each column. Rays in equal steps could hit only the crests of ripples, which would then
   /// look flat.
   float middle_rad(const FanInterval& v) {
     const float below = at(v.below).elevation_rad, above = at(v.above).elevation_rad;
@@ -111,7 +111,7 @@ class FanRefinement {
   }
 
   /// Adds an interval to `list` if its middle must be traced. An interval is an edge if its ends hit different surfaces, or if
-  /// it has the largest depth.
+  /// they are far apart at the largest depth.
   void consider(std::int32_t below, std::int32_t above, std::int32_t column, int depth, std::vector<FanInterval>& list) {
     Sample &a = at(below), &b = at(above);
     const bool same = hit_the_same(a, b);

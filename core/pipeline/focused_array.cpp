@@ -9,7 +9,7 @@
 namespace sonar {
 namespace {
 
-constexpr int weightings = 3;  // weightings of a half: rising, as in the later half of a group; falling; constant
+constexpr int weightings = 3;  // weightings of a half: rising, as in the first half of a group; falling; constant
 constexpr double most_radians = 3.5, interpolation_error = 4e-6;
 constexpr std::size_t most_beams = 128;  // limit for a segment
 
@@ -71,7 +71,7 @@ FocusedArray::FocusedArray(const std::vector<double>& beam_sines, const SharedNo
 
 double FocusedArray::middle(int half) const { return (half * half_ + 0.5 * (half_ - 1) - 0.5 * (channels_ - 1)) * d_; }
 
-/// `reach`: distance from the middle of a half to its last channel, in spacings.
+/// `reach`: distance from the middle of a half to its last channel, in wavelengths.
 void FocusedArray::lay_out_segments(double reach) {
   const auto radians = [&](double a, double b) {
     // Near the array the phase changes faster with the sine than far away, by the factor (1 - q u) / (1 - 2 q u + q^2)^3/2, q =

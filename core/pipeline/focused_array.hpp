@@ -10,8 +10,8 @@
 namespace sonar {
 
 /// Computes the sums over channels of w_m (-1)^m e^{i 2 pi d / lambda}. Here d is the path from a point to channel m, minus the
-/// path from the point to the array's middle; focus() sets the range of the point, the beam its sine. Each sum is over one
-/// part: a group of channels. Neighbouring groups overlap by half, and their w^2 add to 1 in every channel. The last part
+/// path from the point to the array's middle; focus() sets the range of the point; its sine is that of the beam. Each sum is over
+/// one part: a group of channels. Neighbouring groups overlap by half, and their w^2 add to 1 in every channel. The last part
 /// contains all channels with equal weights.
 ///
 /// Half a group is short, so its sum hardly changes with the sine, except for the delay of its middle. Therefore the sum is
@@ -31,7 +31,7 @@ class FocusedArray {
  private:
   /// A segment of neighbouring beams, and the sines at which its sums are computed: the sines of the beams if there are few.
   struct Segment {
-    std::size_t first_beam = 0, beams = 0, first_node = 0, nodes = 0, weights = 0;  // weights: [nodes][beams] from there on
+    std::size_t first_beam = 0, beams = 0, first_node = 0, nodes = 0, weights = 0;  // weights: index of [nodes][beams]
     bool is_direct() const { return nodes == beams; }
   };
   void lay_out_segments(double reach);
@@ -43,7 +43,7 @@ class FocusedArray {
   std::vector<Segment> segments_;
   std::vector<float> sums_;     // [parts][2][beams]
   std::vector<float> at_node_;  // [weightings][2][nodes]
-  std::vector<float> length_;   // buffers: delays from the middle of a half; then cosines and sines of a channel
+  std::vector<float> length_;   // buffer: path lengths to the middle of a half, then cosines and sines of a channel
   int channels_, half_, halves_, parts_;
   double d_;  // spacing of the channels, in wavelengths
   double widest_ = 0;

@@ -53,7 +53,7 @@ struct ReceivedPulse {
   double amplitude_upa = 0;     // in a beam in its direction
   double phase_turns = 0;       // at from_sample
   double turns_per_sample = 0;  // difference from our carrier
-  double edge_per_sample = 0;   // b t of one sample: width of its edges after our filter
+  double edge_per_sample = 0;   // b t of one sample; gives the rise of its edges after our filter
 };
 /// The pulses of the scene's other sonars that arrive during this ping. Each sonar sends at its own rate from a hashed start
 /// time. Its sound travels one way. A surface between the two sonars blocks it.
@@ -64,7 +64,8 @@ SampledPulse tone_of(const ReceivedPulse& pulse, int from, int to);
 /// added.
 void add_pulses(std::span<const ReceivedPulse> pulses, const PingPlan& plan, BeamSignals& beams);
 
-/// Each channel leaks into every beam. A single echo of amplitude A in one direction adds e A to all beams, e = crosstalk_db.
+/// Each channel leaks into every beam. A single echo of amplitude A in one direction adds e A to all beams; e is crosstalk_db as
+/// a factor.
 class Crosstalk {
  public:
   Crosstalk() = default;
@@ -80,7 +81,7 @@ class Crosstalk {
  private:
   double amplitude_ = 0;
   double share_ = 1;         // factor of the sum over beams: beams overlap, so the sum counts an echo several times
-  double own_in_power_ = 0;  // expected power: 2 sum W / sum W^2, from a beam and its own leakage
+  double own_in_power_ = 0;  // for expected power: 2 sum W / sum W^2, the cross term of a beam with its own leakage
 };
 
 }  // namespace sonar

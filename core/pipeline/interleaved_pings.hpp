@@ -1,6 +1,6 @@
 // Pictures whose neighbouring beams come from successive pings (docs/acoustics.md, section 6). The functions make the requests
 // of these pings, select the beams that each ping forms, and combine the picture. A beam uses columns far beyond its own, so a
-// ping can skip few columns: half if its beams are eight apart, hardly any if they are three apart.
+// ping skips fewer columns than beams: half of them if its beams are eight apart, hardly any if they are three apart.
 #pragma once
 
 #include <span>

@@ -31,10 +31,11 @@ class LabelWork {
   void note_shadows(const FanScratch& fan, int first, int last);
   /// Prepares the group that begins at `group.first_column`. Any thread may call it, once for each group.
   void begin_group(const simd::GroupView& group);
-  /// Adds the energy of cells in the picture from Echoes::power, and clears the list of their tiles. It may be called several
-  /// times for a group.
+  /// Adds the energy of the echoes to the objects of their cells, and clears Echoes::runs. It may be called several times for a
+  /// group.
   void add_cells(const simd::GroupView& group, Echoes& echoes);
-  /// Adds the energy that labelled objects of the group would send if nothing hid them. Call it after the last add_cells().
+  /// Spreads the energy over the pulse, and adds what labelled objects of the group would return if nothing hid them. Call it
+  /// after the last add_cells().
   void finish_group(const simd::GroupView& group, Echoes& scratch);
   PingLabels finish(std::span<const PointEcho> points);
 
@@ -48,7 +49,7 @@ class LabelWork {
     std::vector<float> power = {};             // [columns][rows], spread over the length of the pulse
     std::vector<double> seen = {}, open = {};  // energy of labelled objects, by column; `open`: if nothing hid them
   };
-  struct Gap {  // samples of a column that lie in an object's shadow and have no echo
+  struct Gap {  // samples of a column in the shadow of an object, with or without echoes
     float from = 0, to = 0;
     std::uint32_t object = 0;
   };
@@ -84,9 +85,9 @@ class LabelWork {
   };
   std::vector<Group> groups_;
   std::vector<std::vector<Gap>> gaps_;          // by column
-  std::vector<std::uint16_t> dark_;             // [columns][rows]: instance that casts the shadow, for samples without an echo
+  std::vector<std::uint16_t> dark_;             // [columns][rows]: instance that casts the shadow; 0: no shadow, or an echo
   std::vector<float> nothing_;                  // a depth map in which nothing was hit
-  std::vector<float> from_points_;              // [rows][beams] of echoes without surface, in main lobes; empty without any
+  std::vector<float> from_points_;              // [rows][beams]: power of point echoes in main lobes; empty without any
   std::vector<double> noise_far_, noise_near_;  // by beam [uPa^2]
 };
 

@@ -47,8 +47,8 @@ class Interruption {
   virtual ~Interruption() = default;
   /// True if another ping is likely to be requested. The present ping is then computed in smaller parts.
   virtual bool expected() const = 0;
-  /// The engine calls it between two parts, on the thread of run(). It may call run() of the same engine. That run() does not
-  /// call run_other().
+  /// The engine calls it between two parts, on the thread of run(). An implementation may call run() of the same engine; this
+  /// inner run() does not call run_other().
   virtual void run_other() = 0;
 };
 

@@ -60,7 +60,7 @@ Fan make_fan(const FrequencyMode& mode, const PingSettings& settings, double pul
                                    : static_cast<double>(mode.pattern.elevation_width_rad) * unit_fan_over_width / 2;
   fan.half_angle_rad = std::min(reach, widest_fan_rad);
   const double tangent = std::tan(fan.half_angle_rad);
-  // At full range a bin of the depth map spans at most 0.7 pulse widths.
+  // At full range a bin of the depth map spans at most 0.7 pulse widths, unless this needs more than 2048 bins.
   const double wanted = settings.range_m * 2 * tangent / (0.7 * pulse_width_m);
   fan.bins = 256;
   while (fan.bins < 2048 && fan.bins < wanted) fan.bins *= 2;
@@ -191,7 +191,7 @@ void lay_out_noise_profile(PingPlan& p) {
     p.noise_profile.far.push_back(static_cast<float>(far));
     p.noise_profile.near_less_far.push_back(static_cast<float>(near - far));
   }
-  // Smallest relevant difference near - far: less than 0.05 dB. The difference is at most about 10 dB.
+  // Smaller decays change the noise by less than 0.05 dB, because near noise exceeds far noise by at most about 10 dB.
   constexpr double least = 1e-3;
   for (int n = 0; n < p.samples && !profile.near_noise_db.empty(); ++n) {
     const double decay = std::exp(-(n + p.sample_offset) * p.sample_spacing_m / static_cast<double>(profile.near_m));
@@ -348,14 +348,14 @@ void set_gain(PingPlan& plan, float gain_db) {
 }
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
-  PingSettings asked = r.settings;  // the plan's settings without values that affect no table
-  asked.rate_hz = plan.settings.rate_hz;
-  asked.gain_db = plan.settings.gain_db;
-  asked.gain_assist = plan.settings.gain_assist;
-  asked.triggered = plan.settings.triggered;
-  asked.transmit = plan.settings.transmit;
-  return asked == plan.settings && plan.switches == r.switches && plan.bearing_scale == bearing_scale_of(r) &&
-         plan.mode.name == r.model->modes[static_cast<std::size_t>(asked.mode)].name;
+  PingSettings requested = r.settings;  // below, the values that affect no table are set to the plan's
+  requested.rate_hz = plan.settings.rate_hz;
+  requested.gain_db = plan.settings.gain_db;
+  requested.gain_assist = plan.settings.gain_assist;
+  requested.triggered = plan.settings.triggered;
+  requested.transmit = plan.settings.transmit;
+  return requested == plan.settings && plan.switches == r.switches && plan.bearing_scale == bearing_scale_of(r) &&
+         plan.mode.name == r.model->modes[static_cast<std::size_t>(requested.mode)].name;
 }
 
 std::vector<CellLevel> make_cell_levels(double pulse_width_m, double beam_width_rad, double max_range_m) {

@@ -113,7 +113,7 @@ struct PingPlan {
   ConicalDirection direction_of(Vec3d from_sonar) const {
     return switches.conical ? conical_from_sonar(from_sonar) : flat_from_sonar(from_sonar);
   }
-  /// Returns nullopt if the direction is outside the fan, or farther than half_angle_rad from its middle.
+  /// The column of a direction; nullopt if there is none, or if the elevation exceeds half_angle_rad.
   std::optional<std::size_t> column_of(const ConicalDirection& direction, double half_angle_rad) const;
   /// A cell counts as visible up to this distance behind the depth map, because the map is interpolated linearly between rays.
   float depth_tolerance_m() const { return depth_tolerance_in_pulses * static_cast<float>(pulse_width_m); }
@@ -121,7 +121,7 @@ struct PingPlan {
   /// Largest angle about the array's axis in a fan with this half angle. For flat beams it exceeds the half angle, because away
   /// from the middle the same elevation is a larger angle about the axis.
   double widest_about_axis_rad(double half_angle_rad) const;
-  /// Number of the column whose rays are used for this column in the side lobes.
+  /// Number of the column whose rays are used for column k in the side lobes.
   int side_column(int k) const { return std::min(k - k % side_columns + side_columns / 2, columns.count - 1); }
   static constexpr int side_columns = 4;
   /// Sets the members of `view` that describe the fan and the levels of cells.

@@ -41,8 +41,8 @@ double PingScalars::doppler_samples(Vec3d from_sonar_m) const {
 
 namespace {
 
-/// If a target approaches at v, the frequency of a sweep's echo is higher by df = 2 v f / c. The echo's peak is earlier by df T /
-/// B, which is a range shorter by (f / B) T v.
+/// If a target approaches at v, the frequency of a sweep's echo is higher by df = 2 v f / c. The peak of a rising sweep's echo is
+/// earlier by df T / B, which is a range shorter by (f / B) T v.
 double doppler_metres_per_mps(const PingPlan& plan) {
   const Waveform& w = plan.mode.waveform;
   if (w.shape != Waveform::Shape::lfm) return 0;  // the Doppler effect only changes the phase of other pulses

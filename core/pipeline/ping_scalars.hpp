@@ -11,7 +11,7 @@ namespace sonar {
 /// of the echo is measured in the sonar's axes at reception.
 struct EchoGeometry {
   Vec3d from_sonar_m;  // sonar axes at reception
-  Vec3d moved_m;       // movement of the sonar until reception, axes of PingScalars::seen_from
+  Vec3d moved_m;       // movement of the sonar until the scattering, axes of PingScalars::seen_from
   Rotation turn;       // from the axes of seen_from to those at reception
 };
 
@@ -32,7 +32,7 @@ struct PingScalars {
   double seen_at_s = 0;  // time of `seen_from` after firing
   bool moves = false;
   Twist twist;
-  double doppler_m_per_mps = 0;  // added to the range of an echo that approaches by 1 m/s (docs/acoustics.md, section 4)
+  double doppler_m_per_mps = 0;  // added to the range of a target that approaches at 1 m/s (docs/acoustics.md, section 4)
 
   /// Geometry of the echo of a point in the axes of `seen_from`.
   EchoGeometry echo_geometry(Vec3d from_sonar_m) const;

@@ -17,10 +17,10 @@ namespace sonar {
 
 struct PingPlan;
 
-/// Forms all beams from all columns at once. Columns are uniform in the sine, so the sum over columns (form_beams.hpp) is a
-/// convolution. A Fourier transform of twice the length computes it exactly. Beams between columns are interpolated by a few
-/// weights, because the aperture limits how fast the response changes. form_beams() uses this class instead of wide bands of
-/// weights.
+/// Tables for forming all beams from all columns at once. Columns are uniform in the sine, so the sum over columns
+/// (form_beams.hpp) is a convolution. A Fourier transform of twice the length computes it exactly. Beams between columns are
+/// interpolated with a few weights, because the aperture limits how fast the response changes. form_beams() uses this class
+/// instead of wide bands of weights.
 class BeamTransformTables {
  public:
   /// Makes the tables. The relative error of the interpolation is at most 2e-6 for columns up to 0.35 of a beam apart (single
@@ -96,8 +96,8 @@ class SharedNoiseTable {
   bool has_leak() const { return !leak_upa_.empty(); }
   int samples() const { return samples_; }  // number of samples with shared noise; in later ones it lies outside the sector
   std::size_t parts() const { return parts_; }
-  /// Real and imaginary part, [parts][beams][2][samples], of the response to a signal of amplitude 1. The signal is in the
-  /// channels of one group; in the last part, in all channels.
+  /// Real and imaginary part, [parts][beams][2][samples], of the response to a signal of amplitude 1. In each part but the last,
+  /// the signal is in the channels of one group; in the last, in all channels.
   std::vector<float> response() const;
   std::size_t bytes() const {
     return sizeof(float) * (stored_.capacity() + noise_upa_.capacity() + steady_upa_.capacity() + leak_upa_.capacity()) +
@@ -109,7 +109,8 @@ class SharedNoiseTable {
   const std::vector<float>& steady_upa() const { return steady_upa_; }
   const std::vector<float>& leak_upa() const { return leak_upa_; }
   double noise_power(std::size_t beam, std::size_t sample) const;  // [uPa^2]; 0 beyond the samples
-  /// Draws the shared part of one ping's channels, [parts][2][samples], or its rms. `noise` and `leak` select what is drawn.
+  /// Draws the shared part of one ping's channels, [parts][2][samples]; in expected power, its rms. `noise` and `leak` select
+  /// what is drawn.
   void draw(const PingNoise& key, bool noise, bool leak, bool expected_power, std::vector<float>& shared) const;
   /// Adds the shared signals to the beams.
   void add(const std::vector<float>& shared, bool expected_power, BeamSignals& beams) const;

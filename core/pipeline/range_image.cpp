@@ -12,15 +12,15 @@
 namespace sonar {
 namespace {
 
-constexpr double reach = 1.1;  // in beam widths; the pattern is -14 dB there, and 0 beyond
+constexpr double reach = 1.1;  // in beam widths; the pattern is -14.6 dB there, and 0 beyond
 /// Two-way power pattern: a Gaussian with this -3 dB width.
 double pattern(double angle_rad, double width_rad) {
   const double x = angle_rad / width_rad;
   return std::abs(x) > reach ? 0 : std::exp(-4 * std::log(2.0) * x * x);
 }
 
-/// Power of one beam in each range cell. finish() computes it from differences between neighbouring cells. With `as_heard`, it
-/// computes it from complex amplitudes with speckle.
+/// Power of one beam in each range cell. finish() sums differences between neighbouring cells or, with `as_heard`, squares
+/// complex amplitudes with speckle.
 class Profile {
  public:
   Profile(double cell_m, std::size_t cells, bool as_heard)
@@ -62,7 +62,7 @@ class Profile {
     const auto begin = steps_.begin();
     return std::max_element(begin + from, begin + to + 1) - begin;
   }
-  /// Centre [m] of the cells around k that have at least half of its power.
+  /// Centre [m] of the cells around k that have more than half of its power.
   double centre_m(std::ptrdiff_t k) const {
     const double half = power(k) / 2;
     double sum = 0, moment = 0;
@@ -244,7 +244,7 @@ class RangeImager {
     return power > least_power() && strength(std::sqrt(power), range_m) >= static_cast<double>(wanted_.least_strength);
   }
 
-  /// The cell that is reported, within the wanted ranges. If no cell is detected there, it is the strongest of them.
+  /// The cell that is reported: with `nearest`, the first detected peak in the wanted ranges; otherwise the strongest cell there.
   std::ptrdiff_t chosen(const Profile& profile) const {
     const std::ptrdiff_t from = std::max(profile.first(), first_wanted_), to = std::min(profile.last(), last_wanted_);
     if (from > to) return profile.first();
@@ -295,7 +295,7 @@ class RangeImager {
       }
     }
     if (!is_detected(power, range_m) && request_.switches.noise && !request_.switches.expected_power) {
-      // The strongest of all cells with noise. If it is detected, it is a false alarm.
+      // The strongest noise of all cells. If this noise is detected, it is a false alarm.
       const double cells = static_cast<double>(cells_);
       power = -noise_power_ * std::log(-std::expm1(std::log(static_cast<double>(uniform_open(bits.v[2]))) / cells));
       range_m = settings_.range_m * static_cast<double>(uniform_open(bits.v[3]));

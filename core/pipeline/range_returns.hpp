@@ -80,7 +80,8 @@ class RangeReturns {
     int column = 0, row = 0;
     bool operator==(const Cell&) const = default;
   };
-  // Number of rays around the middle of a cell. They show which part of it an object covers that the middle ray misses.
+  // Number of rays around the middle of a cell. They show which part of the cell is covered by an object that the middle ray
+  // misses.
   static constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up,
                        cells_a_packet = RayPacket::size / rays_around;
   /// Number of rays across a cell in azimuth and in elevation. The rays are uniform over the cell.
@@ -120,7 +121,7 @@ class RangeReturns {
   std::vector<LawTable> laws_;
   std::vector<Angle> azimuth_, elevation_;  // angles of the columns and rows
   std::vector<Row> rows_;
-  std::vector<ComplexNormal> draws_;  // draws made by speckle_in()
+  std::vector<ComplexNormal> draws_;  // draws that speckle_in() returns
 };
 
 }  // namespace sonar

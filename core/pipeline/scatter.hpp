@@ -22,8 +22,8 @@ namespace sonar {
 /// The scattering law of every material of the scene, at this ping's frequency.
 std::vector<LawTable> laws_of(const Scene& scene, const PingPlan& plan, const PingScalars& scalars);
 
-/// For each object (as `skins`), the sign of the normals of those surfaces that face away from a sonar at `sonar_m` [m, world]
-/// and are hidden by the object itself: 1 or -1 for a closed mesh seen from outside, else 0.
+/// For each object, in the order of `skins`: the sign of the normals of those surfaces that face away from a sonar at `sonar_m`
+/// [m, world] and are hidden by the object itself: 1 or -1 for a closed mesh seen from outside, else 0.
 std::vector<float> turned_away_of(const Scene& scene, std::span<const Skin> skins, std::span<const Pose> bodies_in_world,
                                   Vec3d sonar_m);
 

@@ -40,7 +40,7 @@ PreparedSettings& SettingsCache::prepared_for(const PingRequest& request, const 
   const bool volume = request.switches.volume && scene.water_column.has_volume();
   const bool leak = request.switches.leak && p.plan.mode.receiver.leak_upa > 0;
   if (!p.plan.expected_power) {
-    std::vector<const NoiseTable*> drawn;  // settings that differ only in range have the same filter, counted in samples
+    std::vector<const NoiseTable*> drawn;  // tables to share: settings that differ only in range have the same filter
     for (const auto& other : prepared_) drawn.insert(drawn.end(), {&other->noise, &other->grains});
     if (request.switches.noise || ((leak || volume) && p.one_table())) p.noise.prepare(request.seed, p.plan.noise_filter, drawn);
     if ((leak || volume) && !p.one_table()) p.grains.prepare(request.seed, p.plan.pulse_filter, drawn);

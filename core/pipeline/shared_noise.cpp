@@ -179,7 +179,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   const double wavelength_m = device_wavelength_m(plan.mode, plan.settings);
   beams_ = plan.beam_sine.size();
   double widest = 0;
-  const std::vector<double> reported = make_beam_sines(plan.mode, plan.settings.beam_count);  // the delays of the beams
+  const std::vector<double> reported = make_beam_sines(plan.mode, plan.settings.beam_count);  // the sines that give the delays
   for (const double u : reported) widest = std::max(widest, std::abs(u));
   const Reach noise_reach = reach_of(plan.mode, plan.settings, widest);
   const auto range_m = [&](std::size_t n) { return (static_cast<double>(n) + plan.sample_offset) * plan.sample_spacing_m; };
@@ -252,7 +252,7 @@ SharedNoiseTable::SharedNoiseTable(const PingPlan& plan, Parallel& pool) {
   gather(blocks);
 }
 
-/// The table does not depend on the number of threads.
+/// Joins the blocks in order, so that the table does not depend on the number of threads.
 void SharedNoiseTable::gather(std::vector<Block>& blocks) {
   std::size_t floats = 0;
   for (const Block& block : blocks) floats += block.stored.size();

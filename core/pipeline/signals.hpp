@@ -11,8 +11,8 @@
 
 namespace sonar {
 
-/// Columns of constant direction sine u = y / r, which are cones about the array axis (flat beams: sine of azimuth). They fall
-/// from port to starboard like the beams.
+/// Columns of constant direction sine u = y / r, which are cones about the array axis (flat beams: sine of azimuth). The sines
+/// fall from port to starboard, like those of the beams.
 struct Columns {
   int count = 0;
   double first_sine = 0;        // centre of column 0

@@ -67,7 +67,7 @@ void finish_columns(const PingPlan& plan, const PingNoise& noise, int first, int
     if (begins_with_noise(plan, noise, k)) continue;
     float* at = signals.column(k);
     const float amplitude = plan.columns.transmit[static_cast<std::size_t>(k)];
-    // T(u) of eq. 6 is 1 in the sector and falls beyond it. Noise is added after it.
+    // T(u) of eq. 6 is 1 in the sector and falls beyond it. Noise is added after this factor.
     if (amplitude != 1.0f) {
       const float factor = plan.expected_power ? amplitude * amplitude : amplitude;
       for (std::ptrdiff_t i = 0; i < signals.stride; ++i) at[i] *= factor;

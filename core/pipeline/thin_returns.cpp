@@ -132,7 +132,7 @@ std::vector<RangeReturns::Cell> RangeReturns::crossed_cells(Parallel& pool) cons
   return crossed;
 }
 
-/// Traces the cells that thin objects cross again, with many rays.
+/// Traces again, with many rays, the cells that thin objects cross.
 void RangeReturns::look_closer(Parallel& pool) {
   const std::vector<Cell> cells = crossed_cells(pool);
   if (cells.empty() || cells.size() > most_thin_cells) return;

@@ -118,7 +118,7 @@ class FanTracer {
   /// Traces elevation by elevation, with packets of sixteen neighbouring columns, which are a fraction of a degree apart.
   void trace_base() {
     const int n = elevations();
-    // [columns][elevations] come first; refine() appends middles and links them by `next`.
+    // The base samples, [columns][elevations], come first; refine() appends middles and links them by `next`.
     s_.samples.resize(static_cast<std::size_t>(last_ - first_) * static_cast<std::size_t>(n));
     for (int e = 0; e < n; ++e) {
       const Elevation elevation = base_[static_cast<std::size_t>(e)];

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// Ranges along the ray [m]. The smaller range is kept, so the order of the calls has no effect.
+/// Keeps the smaller range along the ray [m], so the order of the calls has no effect.
 void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
   if (nearest.object != BeamTruth::nothing && nearest.range_m <= range_m) return;
   nearest = {range_m, object};

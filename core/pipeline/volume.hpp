@@ -25,7 +25,7 @@ class Volume {
  public:
   Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars& scalars);
 
-  /// A slice of the fan: its tangent, and the integral of the two-way power pattern over it [rad].
+  /// A slice of the fan: its middle bin, 1 / cos(psi) there, and the integral of the two-way power pattern over it [rad].
   struct Slice {
     int bin;
     double range_per_x, weight;

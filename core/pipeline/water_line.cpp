@@ -27,7 +27,7 @@ void change(PingRequest& r) {
   double& climbs_mps = r.sonar_moves.velocity_mps.z;
   // Moves a sonar at the surface to 1 mm below it (docs/acoustics.md, section 3).
   z = std::min(z, -least_depth_m);
-  // Reduces the speed of a rising sonar, so that it is just below the surface at that time. Other sonars keep their speed.
+  // Reduces the speed of a rising sonar, so that it is just below the surface at seen_at_s. Other sonars keep their speed.
   if (const double rise = rise_m(r); rise > 0) climbs_mps *= std::clamp((-least_depth_m - z) / rise, 0.0, 1.0);
 }
 

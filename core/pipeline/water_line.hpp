@@ -11,7 +11,7 @@
 namespace sonar {
 
 /// Least depth of a sonar below the sea surface, z = 0 [m]. A sonar that is nearer to the surface, on either side, is moved to
-/// it.
+/// this depth.
 inline constexpr double least_depth_m = 1e-3;
 
 /// True if a sonar at this position is above the sea surface and receives only noise. False in scenes without a sea surface.

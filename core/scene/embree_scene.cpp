@@ -134,7 +134,7 @@ struct RayScene::Impl {
       wanted.push_back({object.mesh, std::move(vertices), static_cast<std::uint32_t>(i)});
       triangles += object.mesh->triangles.size();
     }
-    // Finds the structure that already contains most of these objects. Returns none if reuse would not save time.
+    // Finds the structure that already contains most of these objects. If reuse would not save time, makes a new one.
     auto best = changing.end();
     std::size_t there = 0;
     for (auto group = changing.begin(); group != changing.end(); ++group)

@@ -11,11 +11,11 @@ namespace sonar {
 /// The tables of BeamMix. A null table means that its part is off. Signals are complex [beams][stride / 2], interleaved. In
 /// expected power, re is a power, and taps and shares are squared.
 struct BeamMixView {
-  const float* turn_m;                     // [beams]: phase error at the aperture's ends times range [rad m]
-  const float* taps;                       // complex [sets][2 reach + 1], beams j - reach to j + reach
-  const std::int32_t* reach;               // [sets]: number of taps on either side that are not 0
-  const float *own, *share;                // [beams]: weight of the beam, and of each neighbour
-  std::int32_t beams, sets, widest, step;  // widest: largest reach; step: number of beams between two neighbours that are mixed
+  const float* turn_m;                          // [beams]: phase error at the aperture's ends times range [rad m]
+  const float* taps;                            // complex [sets][2 widest + 1], for beams j - widest to j + widest
+  const std::int32_t* reach;                    // [sets]: number of taps on either side that are not 0
+  const float *own, *share;                     // [beams]: weight of the beam, and of each neighbour
+  std::int32_t beams, sets, widest, step;       // widest: largest reach; step: distance of the mixed neighbours, in beams
   float sets_per_rad, first_range_m, sample_m;  // first_range_m: of sample 0; sample_m: spacing
 };
 

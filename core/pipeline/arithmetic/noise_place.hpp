@@ -1,5 +1,5 @@
 // Computes where the noise of a column starts in the table of shaped noise, and by how many quarter turns it is rotated.
-// Receiver noise, the leak and the volume reverberation use it. The file uses only C++17 and the standard library.
+// Receiver noise, shared noise, the leak and the volume reverberation use it. The file uses only C++17 and the standard library.
 #pragma once
 
 #include <cstdint>

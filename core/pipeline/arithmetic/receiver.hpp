@@ -31,8 +31,8 @@ SONAR_HD inline double noise_rms_upa(const FrequencyMode& mode, double noise_ban
   return std::pow(10.0, noise_level_db(mode, noise_bandwidth_hz) / 20);
 }
 
-/// Time-varied gain [dB] (docs/acoustics.md, eq. 36): X log10 r + 2 alpha r. r is at least the minimum range, the sum at most the
-/// ceiling. `range_m` and `alpha_db_per_m` (one way) are the values that the device assumes.
+/// Time-varied gain [dB] (docs/acoustics.md, eq. 36): X log10 r + 2 alpha r. r is at least the minimum range, and the gain is at
+/// most the ceiling. `range_m` and `alpha_db_per_m` (one way) are the values that the device assumes.
 SONAR_HD inline double tvg_db(const ReceiverModel& law, double range_m, double alpha_db_per_m) {
   const double floor_m = static_cast<double>(law.tvg_minimum_range_m), ceiling_db = static_cast<double>(law.tvg_ceiling_db);
   const double r = range_m > floor_m ? range_m : floor_m;

@@ -80,7 +80,7 @@ class CpuEngine final : public ChangingEngine, private Interruption {
     ping.labels = std::move(labels);
     return ping;
   }
-  /// The ping that other pings may interrupt.
+  /// Computes a ping that other pings may interrupt.
   Ping run_outer(const PingRequest& request, PingLabels* labels, BeamChoice beams) {
     under_way_ = {&request, cells_, 0};
     struct Finish {
@@ -109,13 +109,13 @@ class CpuEngine final : public ChangingEngine, private Interruption {
   EngineOptions options_;
   const simd::Kernels& kernels_;
   std::shared_ptr<SurfaceCells> cells_;
-  std::array<Workspace, 2> work_;     // workspaces of the ping under way and of the next one
+  std::array<Workspace, 2> work_;     // workspaces of the ping under way and of pings that interrupt it
   std::vector<PingStatistics> each_;  // statistics of the last run
   Interruption* interruption_ = nullptr;
   struct UnderWay {
     const PingRequest* request = nullptr;
     std::shared_ptr<SurfaceCells> cells;  // an interrupting ping may need other cells
-    std::uint64_t view = 0;               // the view whose tiles it uses
+    std::uint64_t view = 0;               // the view whose tiles the ping uses
   } under_way_;
 };
 

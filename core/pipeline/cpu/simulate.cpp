@@ -136,7 +136,7 @@ class PingSimulation {
 
  private:
   bool ray_is_scatterer() const { return plan_.fixed_fan > 0; }
-  /// The columns that are traced together. The parts have nearly equal sizes, so that no small part remains.
+  /// Number of columns that are traced together. The parts have nearly equal sizes, so that no small part remains.
   int traced_columns() const {
     const int parts = (plan_.columns.count + most_traced_columns - 1) / most_traced_columns;
     return (plan_.columns.count + parts - 1) / parts;
@@ -165,7 +165,7 @@ class PingSimulation {
   std::span<const Pose> bodies_;
   const PingContext context_;
   std::vector<ColumnRange> heard_,
-      groups_;             // columns that the beams use; the same columns in parts that a worker computes at once
+      groups_;             // heard_: columns that the beams use; groups_: parts of them that a worker computes at once
   int group_columns_ = 0;  // most columns of a group
   std::vector<PointEcho> points_;
   std::vector<ReceivedPulse> other_sonars_;
@@ -177,7 +177,7 @@ class PingSimulation {
 /// the order of the tiles.
 int PingSimulation::group_columns() const {
   const int traced = traced_columns();
-  // Groups are small here, because a ping of another sonar is to run between them.
+  // If a ping of another sonar is likely, groups are small, so that this ping can run between them.
   const bool is_small = w_.between && w_.between->expected();
   if (is_small && !ray_is_scatterer()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
@@ -353,7 +353,7 @@ Ping PingSimulation::image() {
 void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWorker& mine, Ping& ping) {
   Stopwatch watch(w_.now_s, mine.statistics);
   const int per_row = plan_.settings.samples_per_row;
-  // A window has 64 samples of whole rows. Its beams stay in the cache until they are codes.
+  // A window has whole rows, with at most 64 samples. Its beams stay in the cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
   form_beams(w_.columns, plan_.beam_weights, beams_, heard_, kernels_, mine.beam_scratch, mine.beams);
   // Points and the pulses of other sonars are added to the beams in their exact directions. Then the beams are mixed. The pulse

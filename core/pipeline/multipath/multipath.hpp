@@ -24,8 +24,8 @@ struct MultipathCounts {
   std::size_t rays = 0, echoes = 0;
 };
 
-/// Computes `work.columns` (before the transmitter's pattern and noise) and appends the ghosts of point targets to `points`.
-/// The function calls SurfaceCells::in_view(), so the results of earlier calls become invalid.
+/// Computes `work.columns` (before the transmitter's pattern and noise) and appends the echoes of point targets via mirrors to
+/// `points`. The function calls SurfaceCells::in_view(), so the results of earlier calls become invalid.
 MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& work, std::vector<PointEcho>& points);
 
 /// Adds columns [first, last) of the multipath echoes to `signals`.

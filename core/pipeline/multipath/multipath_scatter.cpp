@@ -282,7 +282,7 @@ void MultipathScatterer::pair_up(const Cell& cell, float fade, std::vector<Echoe
   for (std::size_t i = 0; i < arrivals_.size(); ++i)
     for (std::size_t j = 0; j <= i; ++j) {
       const Arrival &a = arrivals_[i], &b = arrivals_[j];
-      if (i == 0 && direct_) continue;  // the direct pair is not a ghost
+      if (i == 0 && direct_) continue;  // the direct pair has no mirror
       // A surface scatters only to the side from which the sound arrives.
       if (a.front != b.front) continue;
       // The echo appears at the range (r_i + r_j) / 2 and at the bearing of the path back.

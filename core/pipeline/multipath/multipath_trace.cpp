@@ -193,8 +193,8 @@ class ColumnsTracer {
       }
     }
   }
-  /// Draws a node between two samples. The map is linear between hits of one sequence of surfaces. Across an edge it has the
-  /// farther surface behind the nearer sequence of mirrors.
+  /// Draws a node between two samples. The map is linear between hits of one sequence of surfaces. Across an edge, the map has
+  /// the mirrors of the nearer sample, and after them the farther surface.
   void draw_node(const Chain& a, const Chain& b, float part, int column, int bin) {
     const std::size_t node =
         static_cast<std::size_t>(column) * static_cast<std::size_t>(map_.fan.bins + 1) + static_cast<std::size_t>(bin);

@@ -59,8 +59,9 @@ std::vector<float> make_pulse_rows(const Pulse& pulse, double sample_time_s, int
 /// Number of taps of such rows, a multiple of 8.
 int taps_of(const Pulse& pulse, double sample_time_s);
 
-/// Real taps h for which sum_n h_n h_{n+k} = Re correlation(k sample times), and h_n h_n sums to 1. White noise filtered by h
-/// has the pulse's correlation on this grid. (For a complex pulse, this is the mean of its spectrum and the mirrored spectrum.)
+/// Real taps h for which sum_n h_n h_{n+k} = Re correlation(k sample times), and sum_n h_n h_n = 1. White noise filtered by h has
+/// the pulse's correlation on this grid. (For a complex pulse, the noise gets the mean of the pulse's spectrum and the mirrored
+/// spectrum.)
 std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s);
 
 }  // namespace sonar

@@ -16,7 +16,7 @@ constexpr int small_padding = 8, large_padding = 16;  // widths are padded, so t
 constexpr int extra_terms = 4;                        // terms of the polynomials beyond the width
 constexpr int restart_every = 256;  // number of steps after which a phase is computed anew, because rounding errors accumulate
 
-double kernel(double x) {  // |x| <= 1 over half of its width; the exponent is multiplied by the width, see sharpness_per_width
+double kernel(double x) {  // x: from the middle, in half widths; callers multiply by the width and sharpness_per_width
   // max(0) is needed because |x| may exceed 1 by rounding.
   return std::sqrt(std::max(0.0, 1 - x * x)) - 1;
 }

@@ -30,13 +30,13 @@ struct Arrival {
 /// F[m] = sum_i A_i e^{-i 2 pi f_m tau_i}, term by term in double. Tests compare with it. It needs no transform.
 std::vector<Complex> direct_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid);
 
-/// The same sums by a non-uniform transform. The relative L2 error is about 8e-6 at width 6, see FrequencySums.
+/// The same sums with a non-uniform transform. The relative L2 error is about 8e-6 at width 6, see FrequencySums.
 std::vector<Complex> fast_sum(std::span<const Arrival> arrivals, const FrequencyGrid& grid, int width = 6);
 
 /// Non-uniform Fourier transform, type 1. The grid is twice as fine as needed. Every echo is spread over `width` points of the
 /// grid with the kernel exp(2.3 width (sqrt(1 - x^2) - 1)) (docs/acoustics.md, eq. 26). The grid is transformed, and the result
-/// is divided by the transform of the kernel. Relative L2 errors by width: 4 8e-4, 5 7e-5, 6 8e-6, 7 9e-7, 8 1e-7, 10 1e-9.
-/// Several threads may use one object, each with its own grid.
+/// is divided by the transform of the kernel. Relative L2 errors: 8e-4 (width 4), 7e-5 (5), 8e-6 (6), 9e-7 (7), 1e-7 (8), 1e-9
+/// (10). Several threads may use one object, each with its own grid.
 class FrequencySums {
  public:
   explicit FrequencySums(int count, int width = 6);

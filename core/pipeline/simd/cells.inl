@@ -190,8 +190,8 @@ __attribute__((noinline)) void scatter_cells(const TileSeen& s, const GroupView&
   }
 }
 
-/// Computes the power of every visible cell in expected-power mode. |xi|^2 is 1, so only the cell's area is needed and no
-/// carrier.
+/// Computes the power of every visible cell in expected-power mode. |xi|^2 is 1, so only the cell's area is needed; the carrier
+/// is not.
 __attribute__((noinline)) void power_of_cells(const TileSeen& s, const GroupView& g, int n, const Chunk& c, float* power) {
   for (int i = 0; i < n; i += lanes) {
     const Lanes r = load(c.range + i);
@@ -217,8 +217,9 @@ int scatter_tile(const TileSeen& s, const GroupView& g, EchoArrays out) {
   int appended = 0;
   for (int from = 0; from < s.tile->count; from += chunk) {
     const int n = s.tile->count - from < chunk ? s.tile->count - from : chunk;
-    const int m = g.conical ? (s.moves ? see_cells<true, true>(s, g, w, from, n, c) : see_cells<true, false>(s, g, w, from, n, c))
-                            : (s.moves ? see_cells<false, true>(s, g, w, from, n, c) : see_cells<false, false>(s, g, w, from, n, c));
+    const int m = g.conical
+                      ? (s.moves ? see_cells<true, true>(s, g, w, from, n, c) : see_cells<true, false>(s, g, w, from, n, c))
+                      : (s.moves ? see_cells<false, true>(s, g, w, from, n, c) : see_cells<false, false>(s, g, w, from, n, c));
     if (m == 0) continue;
     if (s.law != nullptr) apply_law(s.law, m, c);
     if (g.expected_power)

@@ -18,8 +18,8 @@ namespace sonar::simd {
 struct BeamTransform {
   static constexpr int most_levels = 12;
   struct Level {
-    int radix, size;     // radix 2, 3, 4 or 6, but 6 not in the last level; size of its blocks
-    const float* turns;  // [size / radix][radix - 1] complex: e^{-i 2 pi i m / size}
+    int radix, size;     // radix: 2, 3, 4 or, except in the last level, 6; size: size of a block
+    const float* turns;  // [size / radix][radix - 1] complex: e^{-j 2 pi i m / size}
   };
   int columns = 0, beams = 0;
   int quarter = 0, levels = 0;  // the transform's size is 4 * quarter >= 2 * columns
@@ -65,7 +65,7 @@ struct GroupView {
   float first_edge_sine, columns_per_sine;  // column = (first_edge_sine - u) * columns_per_sine
   int first_column, last_column;            // half-open
   TangentAxis axis;                         // axis t of the depth map
-  int bins;                                 // values per column of the depth map; the map has bins + 1
+  int bins;                                 // bins per column of the depth map, which has bins + 1 values
   int map_first_column, fan_columns;        // first column of the depth map; number of columns of the fan
   int columns_beside;          // if the sonar moves: number of columns on either side in which a cell is also looked up
   const float* inverse_depth;  // DepthMap::inverse_x

@@ -64,8 +64,7 @@ void accumulate_taps<8>(const EchoArrays& e, int count, const PulseRows& pulse, 
       const auto here = static_cast<__mmask16>(0xFFFFu << 2 * begin);
       const __m512i places = _mm512_load_si512(turned[begin]);
       const __m512 first = _mm512_maskz_permutexvar_ps(here, places, _mm512_castps256_ps512(taps));
-      const __m512 second =
-          _mm512_maskz_permutexvar_ps(static_cast<__mmask16>(~here), places, _mm512_castps256_ps512(taps));
+      const __m512 second = _mm512_maskz_permutexvar_ps(static_cast<__mmask16>(~here), places, _mm512_castps256_ps512(taps));
       const __m512 a = _mm512_mask_blend_ps(0xAAAA, _mm512_set1_ps(re[i]), _mm512_set1_ps(im[i]));
       float* at = columns + (column[i] - first_column) * stride + 2 * (sample_at[i] - begin);
       _mm512_storeu_ps(at, _mm512_fmadd_ps(first, a, _mm512_loadu_ps(at)));
@@ -156,7 +155,8 @@ void form_beam_panel(const float* in, std::ptrdiff_t in_stride, const float* pan
   }
 }
 
-/// Sums the real and imaginary parts of the taps separately, and combines them once at the end. `both`: rows on either side.
+/// Sums the real and imaginary parts of the taps separately, and combines them once at the end. `both`: number of taps with rows
+/// on both sides.
 template <int width>
 inline void refocus_block(const float* from, std::ptrdiff_t stride, const FocusTaps& t, int both, Lanes* out) {
   Lanes re[width], im[width];

@@ -64,7 +64,7 @@ inline __attribute__((always_inline)) void sums(ComplexLanes* v) {
 }
 
 /// One pass over a block of n: n / radix butterflies, with (radix - 1) factors `w` each. Forward (decimation in frequency):
-/// first the sums, then the factors e^{-i 2 pi i m / n}. Inverse: the reverse order, with conjugate factors.
+/// first the sums, then the factors e^{-j 2 pi i m / n}. Inverse: the reverse order, with conjugate factors.
 template <int radix, bool forward>
 inline void butterflies(ComplexLanes* x, int n, const float* w) {
   const int q = n / radix;

@@ -30,7 +30,7 @@ struct Direction {
 };
 
 Direction direction_of(const SpecularPoint& p, std::size_t k, double wavelength_m) {
-  // q of eq. 19 [1/m]; 1 + r / R is negative behind a focus.
+  // q of eq. 19 [1/m]; 1 + r / R is negative beyond a focus.
   return {1 / fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]), bending(p.range_m, p.curvature[k]) < 0};
 }
 
@@ -259,7 +259,7 @@ std::complex<double> visible_factor(const SpecularPoint& point, double wavelengt
   return specular_factor(point, wavelength_m, window);
 }
 
-/// Largest angle of columns from straight ahead; it is larger if the sonar turns during the ping.
+/// Largest angle of columns from straight ahead, with a margin for a sonar that turns during the ping.
 double widest_direction_rad(const PingPlan& plan) {
   // Bearings are measured at reception (eq. 29). A turning sonar receives echoes from farther aside, by at most this angle [rad].
   constexpr double while_turning_rad = 0.05;

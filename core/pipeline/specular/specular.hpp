@@ -22,7 +22,7 @@ namespace sonar {
 struct SpecularWindow {
   static constexpr std::size_t cells = 16;
   std::array<std::array<double, cells + 1>, 2> edge{};  // along the principal directions [m]
-  std::bitset<cells * cells> hidden;                    // y * cells + x
+  std::bitset<cells * cells> hidden;                    // bit y * cells + x
 };
 SpecularWindow make_window(const SpecularPoint& point, double wavelength_m);
 
@@ -37,8 +37,8 @@ bool on_surface(const SpecularPoint& point, double x, double y);
 /// The point of the surface that is nearest to the foot of the perpendicular from the sonar.
 std::array<double, 2> nearest_on_surface(const SpecularPoint& point);
 
-/// Pressure that a surface reflects coherently at normal incidence: reflection times exp(-2 k^2 h^2). It is 0 for rough
-/// surfaces (smooth_below_kh) and for results below a hundredth.
+/// Fraction of the pressure that a surface reflects coherently at normal incidence: reflection times exp(-2 k^2 h^2). It is 0 for
+/// rough surfaces (smooth_below_kh) and for results below a hundredth.
 double coherent_reflection(const Material& material, double wavelength_m);
 
 /// Values that are kept between pings: all meshes with smooth materials, prepared when they are first in view.

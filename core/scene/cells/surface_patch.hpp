@@ -31,7 +31,7 @@ struct CellNode {
   std::atomic<bool> divided = false;                      // true: other threads may use `children`
   bool built = false, side_built = false, alone = false;  // alone: made by SurfacePatch::raise(), without children
   std::atomic<std::uint64_t> last_visited = 0;
-  std::array<std::unique_ptr<CellNode>, 8> children;  // null if it has no triangles
+  std::array<std::unique_ptr<CellNode>, 8> children;  // null if a child has no triangles
   std::vector<std::uint32_t> triangles;
   CellTile tile, side_tile;  // side_tile: for side lobes
 
@@ -51,7 +51,7 @@ class SurfacePatch {
  public:
   int object = 0, material = 0, axis = 0;
   bool negative_side = false;
-  Texture texture, grain;  // texture and grain of the material, seeded by the material, for the tiles
+  Texture texture, grain;  // those of the material; the tiles depend on them
   std::uint32_t texture_seed = 0;
   int coarsest = 0;  // coarsest level that an object may have with exact_small
   std::shared_ptr<const Mesh> mesh;
