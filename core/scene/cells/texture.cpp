@@ -15,7 +15,7 @@ constexpr int remembered_along = 16, remembered_up = 8;  // size of the cache of
 struct IncompleteGamma {
   double lower, upper;
 };
-/// P(a, x) and Q(a, x) = 1 - P, regularised. Below a + 1 a series is used, above it a continued fraction (Lentz).
+/// P(a, x) and Q(a, x) = 1 - P, regularised. For x below a + 1 a series is used, for larger x a continued fraction (Lentz).
 IncompleteGamma incomplete_gamma(double a, double x, double log_gamma_a) {
   const double front = std::exp(a * std::log(x) - x - log_gamma_a);
   if (x < a + 1) {

@@ -14,7 +14,7 @@
 namespace sonar {
 
 /// The field of one material: a smooth Gaussian field of unit variance, whose values are mapped to the Gamma distribution at
-/// equal quantiles. The Gaussian field consists of normal draws on a cubic lattice of the correlation length, blended by
+/// equal quantiles. The Gaussian field consists of normal draws on a cubic lattice of the correlation length, blended with
 /// quadratic splines.
 class TextureField {
  public:
@@ -53,7 +53,7 @@ class TexturePatch {
   int object_;
   bool stands_ = false;
   std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points around the last position
-  std::array<float, 27> near_{};                       // their normals, i fastest
+  std::array<float, 27> near_{};                       // their normals; i changes fastest
   std::vector<Point> points_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t most_bytes = std::size_t{512} << 20;
 
-// Words of a file with their line numbers, read through one block of memory.
+// The words of a text, with their line numbers.
 class Words {
  public:
   explicit Words(std::string text)
@@ -33,7 +33,7 @@ class Words {
   void end_header(std::string_view word) { at_ -= word.size(), in_header_ = false; }
 
  private:
-  /// Some programs write "ncols = 4" or "ncols: 4".
+  /// True if no word contains the character. Some programs write "ncols = 4" or "ncols: 4".
   bool is_between(char c) const {
     return c == ' ' || c == '\t' || c == '\n' || c == '\r' || (in_header_ && (c == '=' || c == ':'));
   }

@@ -104,7 +104,7 @@ std::string name_by(std::optional<std::uint16_t> code, const GeoKeys& keys, std:
   return !own.empty() ? own : !of_all.empty() ? of_all : "a system of its own";
 }
 
-/// Determines the datum; nullopt if the keys state neither the datum nor the ellipsoid.
+/// True if the datum is like WGS 84; nullopt if the keys state neither the datum nor the ellipsoid.
 std::optional<bool> has_modern_datum(const GeoKeys& keys) {
   if (const auto code = code_of(keys, geographic_system)) return agrees_with_wgs84(*code);
   if (const auto code = code_of(keys, ellipsoid)) return *code == 7019 || *code == 7030;

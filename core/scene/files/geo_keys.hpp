@@ -37,7 +37,8 @@ class GeoKeys {
   std::string texts_;
 };
 
-/// `height_unit`: the code of a unit that another part of the file states. Errors do not contain the file name.
+/// Reads the coordinate system. `height_unit`: the code of a unit that another part of the file states. Errors do not contain the
+/// file name.
 Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit);
 
 /// Codes of units of length.

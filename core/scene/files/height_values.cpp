@@ -61,8 +61,8 @@ bool could_be_degrees(const RawHeights& raw) {
   return raw.x.front() >= -180 && raw.x.back() <= 360 && raw.y.front() >= -90 && raw.y.back() <= 90;
 }
 
-/// True for cells of an arc second, a ninth of it, or several of them, such as 0.000277777778. Such sizes are unlikely in
-/// metres.
+/// True for multiples of a ninth of an arc second, such as 0.000277777778, that are not round decimals. Such sizes are unlikely
+/// in metres.
 bool are_arc_seconds(double cell) {
   const auto is_whole = [](double v) { return v > 0.5 && std::abs(v - std::round(v)) < 1e-3; };
   constexpr double ninths_in_a_degree = 9 * 3600;
@@ -89,7 +89,7 @@ bool shows_degrees(const RawHeights& raw, double height_m) {
   return slope > steep || (slope == 0 && cell < 0.005) || are_arc_seconds(cell);
 }
 
-/// A metre of Web Mercator is shorter on the ground by the cosine of the latitude.
+/// Converts to degrees, because a metre of Web Mercator is shorter on the ground by the cosine of the latitude.
 void convert_web_mercator(RawHeights& raw, std::vector<std::string>& notes) {
   constexpr double radius_m = 6378137;
   for (double& x : raw.x) x = deg_from_rad(x * raw.system.unit_m / radius_m);
@@ -195,8 +195,8 @@ void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodeti
                        "; set origin: {lat, lon} to place it otherwise");
 }
 
-/// Adds a note if large cells may be in degrees although the ground is flat: the coordinates are possible on Earth, and the
-/// grid neither begins nor has its middle at 0, 0, as local grids usually do, or is deeper than wide.
+/// Adds a note if large cells may be in degrees although the ground is flat: the coordinates are possible on Earth, and the grid
+/// is not local (0, 0 at a corner or in the middle), or spans the Earth, or is deeper than wide.
 void hint_at_degrees(HeightGrid& grid) {
   constexpr double least_cell = 0.05, all_around = 300, pole_to_pole = 175;
   const double cell = grid.x[1] - grid.x[0], near = cell;

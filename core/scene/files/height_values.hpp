@@ -64,7 +64,7 @@ struct RawHeights {
   double scale = 1, offset = 0;  // a height is scale * z + offset
   std::vector<std::string> notes = {};
 
-  /// Reverses the order of the rows, for files that begin in the north. `columns`: those of `z`.
+  /// Reverses the order of the rows, for files that begin in the north. `columns`: number of columns of `z`.
   void turn_rows(std::size_t columns);
 };
 

@@ -115,7 +115,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
       if (mesh) mesh->lost = stl->bytes_behind / bytes_of_stl_triangle;
       return mesh;
     }
-    // Binary files may begin with that word, too, but texts have no zero bytes.
+    // Binary files may begin with the word solid, too, but texts have no zero bytes.
     const std::string more = read_regular(request.file, 512).value_or("");
     if (small_letters(begin).find("solid") == std::string::npos || more.find('\0') != std::string::npos)
       return bad_mesh(

@@ -14,7 +14,7 @@ namespace sonar {
 
 /// Reads a mesh file. Errors: the file is missing, unreadable, empty or of an unknown format; vertices are not finite or beyond
 /// 1e7 m; there are more than 20 million triangles, or none with an area; the file names files in other folders; it needs too
-/// much memory or time. y up becomes z up by (x, y, z) -> (x, -z, y). A separate program reads all formats but binary STL
+/// much memory or time. y up is converted to z up: (x, y, z) -> (x, -z, y). A separate program reads all formats but binary STL
 /// (docs/decisions/0023-meshes-in-a-child.md).
 Result<LoadedMesh> load_mesh(const MeshFile& request);
 

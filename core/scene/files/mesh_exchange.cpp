@@ -19,7 +19,7 @@ constexpr std::uint64_t most_text = std::uint64_t{256} << 20;  // limit in bytes
 struct Head {
   std::uint64_t magic = 0;
   std::uint64_t error = 0;  // an ErrorKind; 0: the answer is a mesh
-  std::uint64_t text = 0;   // bytes: the sentence, or names of materials with a zero after each
+  std::uint64_t text = 0;   // bytes of the error text, or of the names of materials with a zero after each
   std::uint64_t vertices = 0, triangles = 0, left_out = 0, lost = 0, hidden = 0;
   Vec3d centre_m{};
 };

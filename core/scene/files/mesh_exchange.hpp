@@ -22,7 +22,7 @@ struct MeshFile {
   double scale = 1;              // file units to metres
   std::optional<UpAxis> up{};    // axis of the file that is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
   std::string_view in_memory{};  // the contents of the file, if not read from disk; `file` then gives only name and format
-  std::string part{};            // name of a node or mesh of the file, or its only part under any name; empty: all parts
+  std::string part{};            // name of a node or mesh of the file (any name if it has only one part); empty: all parts
   std::optional<std::filesystem::path> folder{};  // folder of the scene; a mesh may refer to files in it, and in its own folder
 };
 
@@ -37,7 +37,7 @@ struct ImportRequest {
   MeshFile mesh;  // `in_memory` is passed as standard input
   bool on_disk = true;
   int parent = 0;                  // id of the process that waits for the answer
-  std::filesystem::path readable;  // folder of confine_reads(); empty: all
+  std::filesystem::path readable;  // folder of confine_reads(); empty: all folders
   std::filesystem::path memory_root;
 };
 

@@ -35,7 +35,7 @@ using TriangleSink = std::function<void(std::span<const Vec3d, 3>, std::uint16_t
 /// A function that passes every triangle to the sink. Each call passes the same triangles in the same order.
 using TriangleSource = std::function<void(const TriangleSink&)>;
 
-/// `source` must pass at most `triangles` triangles, in the file's units and axes.
+/// Converts and cleans the triangles. `source` must pass at most `triangles` triangles, in the file's units and axes.
 Result<LoadedMesh> finish_mesh(const MeshFile& request, bool y_up_by_default, std::uint64_t triangles,
                                std::vector<std::string> names, const TriangleSource& source);
 

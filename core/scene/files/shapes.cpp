@@ -64,7 +64,7 @@ Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const No
   if (!made) return at.fail(made.error().text), Shape{};
   Shape shape = with_material(std::move(made->mesh), material);
   shape.centre_m = made->centre_m;
-  if (centred && !grid->origin) shape.centre_m.x = shape.centre_m.y = 0;  // the origin of degrees is the grid's middle
+  if (centred && !grid->origin) shape.centre_m.x = shape.centre_m.y = 0;  // grids in degrees already have their origin
   return shape;
 }
 
@@ -248,7 +248,8 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   static const std::map<std::string, Read> readers{
       {".asc", read_esri_heights}, {".xyz", read_xyz_heights}, {".tif", read_geo_tiff_heights}, {".tiff", read_geo_tiff_heights}};
   if (!is_usable()) return {};
-  static constexpr std::array<std::string_view, 4> of_tables{".csv", ".txt", ".dat", ".pts"};  // points, unless it is a grid
+  static constexpr std::array<std::string_view, 4> of_tables{".csv", ".txt", ".dat",
+                                                             ".pts"};  // read as points, unless the content is a grid
   const bool table = std::find(of_tables.begin(), of_tables.end(), extension) != of_tables.end();
   if (const std::string by_content = grid_by_content(path); !by_content.empty() || !readers.contains(extension))
     extension = by_content.empty() && table ? ".xyz" : by_content;

@@ -45,7 +45,7 @@ Picture picture_at(tiff* file);
 /// Fails if the picture is compressed in a way that is not read, or in blocks that are too large.
 Result<void> check_blocks(tiff* file);
 
-/// Cells of a row, from the given column on: their bytes, which are empty for a block that a sparse file does not contain.
+/// Receives the bytes of cells of a row, from the given column on; no bytes for a block that a sparse file does not contain.
 using TakeCells =
     std::function<Result<void>(std::span<const std::byte> bytes, std::uint32_t column, std::uint32_t row, std::uint32_t width)>;
 /// Unpacks the first plane of the picture, strip by strip or tile by tile.

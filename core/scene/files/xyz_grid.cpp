@@ -37,7 +37,7 @@ std::size_t split(std::string_view line, Line& words, std::string_view between =
   return count;
 }
 
-/// Splits a line into the fields between its `mark`, without blanks and quotes around them. A field may be empty.
+/// Splits a line into the fields between `mark` characters, without blanks and quotes around them. A field may be empty.
 std::size_t split_at(char mark, std::string_view line, Line& fields) {
   std::size_t count = 0;
   for (std::size_t at = 0; at <= line.size() && count < fields.size();) {
@@ -48,7 +48,7 @@ std::size_t split_at(char mark, std::string_view line, Line& fields) {
   return count;
 }
 
-/// True if tabs separate the fields of a table that begins with this line; otherwise they are blanks.
+/// True if tabs separate the fields of a table that begins with this line; otherwise tabs count as blanks.
 bool has_tab_marks(std::string_view line) {
   Line fields;
   const std::size_t count = line.find('\t') == line.npos ? 0 : split_at('\t', line, fields);
@@ -72,7 +72,8 @@ std::size_t split_values(std::string_view line, bool by_tabs, Line& words) {
   return split(line, words);
 }
 
-/// Uniform coordinates. An axis between two far points can have millions, so they are made only after their number is checked.
+/// Uniform coordinates. An axis between two far points can have millions of them, so they are listed only after their number is
+/// checked.
 struct EvenAxis {
   double first = 0, step = 0;
   std::size_t size = 0;
@@ -169,7 +170,8 @@ bool has_decimal_commas(std::string_view line) {
   return count >= 3 && std::any_of(words.begin(), words.begin() + static_cast<std::ptrdiff_t>(count), is_decimal);
 }
 
-/// Lists of surveyed points often have the northing first. Eastings of UTM have six digits, most northings have seven.
+/// True if the northing may be first, as often in lists of surveyed points. Eastings of UTM have six digits, most northings have
+/// seven.
 bool may_be_northing_first(const std::vector<double>& x, const std::vector<double>& y) {
   constexpr double least_easting = 1.6e5, most_easting = 8.4e5, least_northing = 1e6, most_northing = 1e7;
   return x.front() > least_northing && x.back() < most_northing && y.front() > least_easting && y.back() < most_easting;
@@ -185,7 +187,7 @@ Result<std::vector<Point>> points_of(std::string_view text, HeightValues& values
   Line words;
   std::size_t line = 0, first_count = 0;
   bool has_names = false, by_tabs = false;
-  std::pair<std::size_t, Order> comment;  // order by the names in a comment, and their number
+  std::pair<std::size_t, Order> comment;  // number of names in a comment, and the order that they give
   const char line_end = text.find('\n') == text.npos ? '\r' : '\n';
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   for (std::size_t at = 0; at < text.size();) {

@@ -47,7 +47,7 @@ struct ListedFaces {
   bool whole_numbers = false;  // positions or weights of a glTF file of version 2 are not floating-point numbers
 };
 
-/// `head`: the header of a file of `file_bytes`.
+/// Checks the counts of a header against the size of its file.
 MeshFault check_ply(const PlyHead& head, std::uint64_t file_bytes);
 /// Checks a file in text or binary (GLB), version 1 or 2. `is_itself` returns true if the URI of a buffer names the file.
 MeshFault check_gltf(std::string_view file, ListedFaces* faces = nullptr,
@@ -57,7 +57,7 @@ MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
 std::string_view json_of_gltf(std::string_view file);
 /// The binary chunk of a GLB file of version 2, up to the end of the file; empty if there is none.
 std::string_view binary_part_of_glb(std::string_view file);
-/// The fault in the container of a GLB file, version 2. The importer calls every such fault an unknown format.
+/// The fault in the container of a GLB file, version 2. The importer reports every such fault as an unknown format.
 MeshFault glb_fault(std::string_view file);
 /// The fault of a glTF or GLB file for which the importer finds no reader.
 std::string unknown_gltf(std::string_view file);

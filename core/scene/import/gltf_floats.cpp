@@ -236,7 +236,7 @@ class Rewriter {
   std::uint64_t most_bytes_;
   Json in_, out_ = Json::object();
   std::vector<Buffer> buffers_;
-  std::vector<bool> sound_;  // by view of the file: it lies within its buffer
+  std::vector<bool> sound_;  // by view of the file: true if it lies within its buffer
   std::string data_;         // bytes of all buffers, and of the new numbers
 };
 

@@ -1,4 +1,4 @@
-// Rewrites glTF files whose vertices are whole numbers (KHR_mesh_quantization), which the importer would take for floating-point
+// Rewrites glTF files whose vertices are whole numbers (KHR_mesh_quantization), which the importer would read as floating-point
 // numbers.
 #pragma once
 

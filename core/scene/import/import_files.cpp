@@ -146,7 +146,7 @@ class ObjCounter {
 
   ObjText text_;
   ObjCounts counts_;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> later_;  // faces, and the last vertex that they name
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> later_;  // faces, each with its highest vertex number
   std::uint64_t vertices_ = 0, face_ = 0, corners_ = 0, index_ = 0, furthest_ = 0;
   std::size_t of_statement_ = 0;  // letters of the line that belong to the statement
   bool is_negative_ = false, is_number_ = false, is_bad_ = false;
@@ -161,7 +161,7 @@ ObjCounts counts_of(std::FILE* file) {
 }
 
 /// An OBJ file whose faces have only vertices. Bad faces become comments and, if requested, lines that begin objects, too:
-/// surfaces and materials do not depend on these.
+/// surfaces and materials do not depend on objects.
 class ObjStream final : public Assimp::IOStream {
  public:
   ObjStream(OpenFile file, std::size_t size, bool without_objects, const std::vector<std::uint64_t>& bad_faces)

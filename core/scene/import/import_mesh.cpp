@@ -41,8 +41,8 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
   return triangles;
 }
 
-/// Leaves only the part of that name in the nodes: the meshes of nodes with this name, and meshes with it; if the file has only
-/// one part, that one. Otherwise returns the names of its parts, for an error.
+/// Keeps only the meshes that have this name or belong to nodes with this name; in a file with only one part, keeps this part. If
+/// there is no such part, returns the names of the parts, for an error.
 std::string keep_part(aiScene& scene, const std::string& wanted) {
   std::vector<aiNode*> holders;  // nodes that show meshes
   const auto walk = [&](const auto& self, aiNode& node, unsigned depth) -> void {
@@ -142,7 +142,7 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
   std::uint64_t faces = 0;
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) faces += scene.mMeshes[m]->mNumFaces;
   const std::uint64_t listed = ply_head_of(*text).faces();
-  return imported + (listed > faces ? listed - faces : 0);  // at least one triangle each
+  return imported + (listed > faces ? listed - faces : 0);  // a missing face has at least one triangle
 }
 
 /// True if the URI of a buffer names the mesh itself. Links to the mesh are not recognised: ImportFiles counts their size, as
@@ -150,7 +150,7 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
 bool is_itself(const MeshFile& request, const std::string& uri) {
   const std::string own = request.file.filename().string();
   const auto names_it = [&](const std::string& name) {
-    if (std::string_view(name).substr(name.rfind('/') + 1) != own) return false;  // without a slash, from 0
+    if (std::string_view(name).substr(name.rfind('/') + 1) != own) return false;  // without a slash, npos + 1 is 0
     std::error_code error;
     const std::filesystem::path parent = request.file.parent_path();
     const std::filesystem::path folder = std::filesystem::canonical(parent.empty() ? "." : parent, error);

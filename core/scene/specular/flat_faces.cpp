@@ -56,7 +56,7 @@ class FaceSorter {
     const double area = 0.5 * length(twice);
     if (!(area > 0)) return;
     const Vec3d n = one_sided((0.5 / area) * twice);
-    Candidate& c = drawer_of({n, dot(n, corner(mesh, t, 0))}, mesh.material[t]);
+    Candidate& c = candidate_of({n, dot(n, corner(mesh, t, 0))}, mesh.material[t]);
     if (area > c.largest_m2) c.plane = {n, dot(n, corner(mesh, t, 0))}, c.largest_m2 = area;
     c.material = mesh.material[t];
     c.area_m2 += area;
@@ -71,7 +71,7 @@ class FaceSorter {
  private:
   using Key = std::array<std::int64_t, 5>;
 
-  Candidate& drawer_of(const Plane& p, std::uint16_t material) {
+  Candidate& candidate_of(const Plane& p, std::uint16_t material) {
     const std::array<double, 4> x{p.normal.x * normal_steps, p.normal.y * normal_steps, p.normal.z * normal_steps,
                                   p.offset_m / same_plane_m};
     Key own{};

@@ -17,7 +17,7 @@ inline constexpr double smooth_edge_rad = 0.42;
 
 class SpecularMesh {
  public:
-  /// Prepares the triangles whose material is set in `wanted` (indexed like Mesh::material).
+  /// Prepares the triangles whose material is set in `wanted` (by index into Scene::materials).
   SpecularMesh(const Mesh& mesh, const std::vector<bool>& wanted);
 
   /// Appends the mirror points whose echoes may be strong enough. The caller tests whether they are hidden.
