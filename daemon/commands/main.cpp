@@ -90,7 +90,8 @@ int main(int argc, char** argv) {
     const auto code = sonar::run_command(command, begin, json);
     if (!code) return sonar::report_error(code.error(), json);
     const auto printed = sonar::flush_standard_output();
-    const bool is_lost = !printed && *code == 0 && !std::holds_alternative<sonar::RunCommand>(command);  // that writes a log
+    const bool is_lost =
+        !printed && *code == 0 && !std::holds_alternative<sonar::RunCommand>(command);  // the daemon writes a log
     return is_lost ? sonar::report_error(printed.error(), json) : *code;
   } catch (const std::bad_alloc&) {
     return sonar::report_error({sonar::ErrorKind::unavailable, sonar::not_enough_memory}, json);

@@ -15,7 +15,7 @@ bool same_options(const SonarConfig& a, const SonarConfig& b) {
   });
 }
 
-/// True if the sonars differ only in their mount and vehicle.
+/// True if the sonars differ at most in their mount and vehicle.
 bool is_same_device(const SonarConfig& a, const SonarConfig& b) {
   return a.name == b.name && a.profile.vendor == b.profile.vendor && a.profile.model->profile == b.profile.model->profile &&
          a.bind_ip == b.bind_ip && a.advertise_ip == b.advertise_ip && a.netmask == b.netmask && a.status_to == b.status_to &&

@@ -18,7 +18,7 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-/// Reads a text such as "3/8"; the first number is from 0 to 7.
+/// Reads a text such as "3/8". Returns false unless the first number is less than the second.
 bool read_part(const std::string& text, DatasetOptions& o) {
   const std::size_t slash = text.find('/');
   if (text.empty()) return true;
@@ -63,7 +63,7 @@ Result<int> run_dataset(const DatasetCommand& command) {
   options.out = command.out;
   options.threads = command.threads.value_or(std::max(1, static_cast<int>(std::thread::hardware_concurrency())));
   if (!read_part(command.shards, options))
-    return failure(ErrorKind::usage, "--shards " + command.shards + " is not I/N with I from 0 to below N, as 3/8");
+    return failure(ErrorKind::usage, "--shards " + command.shards + " is not I/N with I from 0 to N - 1, such as 3/8");
   const auto split = parse_split(command.split, command.split_by);
   if (!split) return tl::make_unexpected(split.error());
   const auto job = load_job(command.job);
@@ -87,9 +87,9 @@ Result<int> run_dataset(const DatasetCommand& command) {
   if (!command.quiet) {
     const std::uint64_t missing = done->missing.value_or(0);
     const std::string what = done->whole ? "the set is complete: manifest.json"
-                                         : shard_name(missing) + " is missing, which --shards " +
+                                         : "no manifest yet, because " + shard_name(missing) + " is missing (--shards " +
                                                std::to_string(missing % options.parts) + "/" + std::to_string(options.parts) +
-                                               " makes: no manifest yet";
+                                               " makes it)";
     std::fprintf(stderr, "%llu pings in %.1f s; %llu shards were there already; %s\n",
                  static_cast<unsigned long long>(done->pings), seconds_since(begin),
                  static_cast<unsigned long long>(done->kept_shards), what.c_str());

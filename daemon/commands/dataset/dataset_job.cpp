@@ -118,7 +118,7 @@ void add_files_in(std::string_view text, const std::filesystem::path& folder, co
   }
 }
 
-std::string without(std::string text, std::string_view lines, std::string_view instead) {
+std::string replaced(std::string text, std::string_view lines, std::string_view instead) {
   const std::size_t at = text.find(lines);
   return text.replace(at, lines.size(), instead);
 }
@@ -181,7 +181,7 @@ Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const K
     const std::string lines(scene_lines(filled));
     ping.scene_key = scene_key_of(job, ping.draws, lines, number);
     const bool is_known = known.scene && known.key == ping.scene_key;
-    if (is_known) filled = without(std::move(filled), lines, "scene: {objects: []}\n");
+    if (is_known) filled = replaced(std::move(filled), lines, "scene: {objects: []}\n");
     auto input = render::parse_render_file(with_sweep(filled, sweep_of(ping.draws)), job.source, job.folder, known.shapes);
     if (!input) return tl::make_unexpected(input.error());
     ping.job = std::move(input->jobs.front());
@@ -201,7 +201,7 @@ Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const K
   }
   return failure(ErrorKind::config, job.source + ": ping " + std::to_string(number) + ": no draw of " +
                                         std::to_string(job.constraints.tries) + " meets the constraints: " + unmet.sentence() +
-                                        "; widen what vary: draws, or give constraints.tries");
+                                        "; widen the ranges of vary, or increase constraints.tries");
 }
 
 PingRequest request_of(const DrawnPing& ping, std::uint64_t number) {

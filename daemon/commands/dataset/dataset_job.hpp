@@ -28,7 +28,7 @@ struct DatasetJob {
   std::uint64_t pings = 0, shard_pings = 1024;
   double negatives = 0;              // fraction of pings without targets
   std::vector<std::string> targets;  // names or labels
-  bool fan = false;                  // also writes a picture of each ping
+  bool fan = false;                  // true: also write a picture of each ping
   std::vector<Variation> variations;
   std::vector<std::pair<std::string, std::string>> formulas;  // formulas of `let`, as written
   Constraints constraints;
@@ -43,10 +43,10 @@ Result<DatasetJob> parse_job(std::string text, const std::string& name, const st
 /// A file that a job names.
 struct NamedFile {
   std::string word;            // as written in the job
-  std::filesystem::path file;  // path, relative to the file that names it
-  std::string digest;          // SHA-256; "unreadable"
+  std::filesystem::path file;  // path, in the folder of the file that names it
+  std::string digest;          // SHA-256, or "unreadable"
 };
-/// Returns all files that a ping may use, and the files that YAML files among them name (every word of the text that is a file).
+/// Returns all files that a ping may use: each word of the job's text, or of a YAML file found in this way, that names a file.
 std::vector<NamedFile> named_files(const DatasetJob& job);
 
 /// A ping that met the constraints.
@@ -55,17 +55,17 @@ struct DrawnPing {
   Draws draws;
   std::uint32_t attempt = 0;
   bool negative = false;
-  std::string scene_key;                     // scenes of equal keys are equal
+  std::string scene_key;                     // scenes with equal keys are equal
   std::shared_ptr<const Scene> whole_scene;  // with the objects that counts and negatives hide
 };
 
-/// Draws until the constraints are met. Errors: config if no draw meets them, or if the filled file is wrong. `known`: the last
-/// scene, which is reused if the new one is equal, and all shapes read so far.
+/// The last scene, which is reused if the next one is equal, and all shapes read so far.
 struct KnownScene {
   std::string key = {};
   std::shared_ptr<const Scene> scene = {};
   ShapeCache* shapes = nullptr;
 };
+/// Draws until the constraints are met. Errors: config if no draw meets them, or if the filled file is wrong.
 Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const KnownScene& known = {});
 
 /// Returns everything on which the ping depends.

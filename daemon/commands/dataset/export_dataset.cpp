@@ -128,7 +128,7 @@ class Export {
     return {};
   }
 
-  /// Writes one file of a ping; `ending` is such as "labels.png" or "json".
+  /// Writes one file of a ping. `ending`: for example "labels.png" or "json".
   Result<void> put(std::uint64_t ping, const std::string& ending, std::span<const std::byte> contents) {
     const path split = folder_of(split_of_[ping - 1]);
     if (form_ == ExportForm::coco)
@@ -234,7 +234,7 @@ Result<Split> parse_split(const std::string& shares, const std::string& by) {
       sum += split.shares[i];
     }
     if (words.size() != split.shares.size() || !(sum > 0) || !std::isfinite(sum))
-      return failure(ErrorKind::usage, "--split " + shares + " is not three shares of train, val and test, as 80,10,10");
+      return failure(ErrorKind::usage, "--split " + shares + " is not three shares of train, val and test, such as 80,10,10");
   }
   split.by = words_of(by);
   return split;
@@ -264,7 +264,7 @@ std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const
     const auto largest = static_cast<std::size_t>(std::ranges::max_element(count) - count.begin());
     if (count[s] == 0 && shares[s] > 0 && count[largest] > 1) --count[largest], ++count[s];
   }
-  // The order is independent of the draws and of the number of pings.
+  // Scenes are assigned in the order of the hashes of their names, which does not depend on the order of the pings.
   std::vector<std::pair<std::string, std::size_t>> order;
   for (std::size_t i = 0; i < scenes.size(); ++i) order.emplace_back(sha256_of(scenes[i]), i);
   std::ranges::sort(order);

@@ -158,7 +158,7 @@ json pixels_of(const PingLabels& labels, const Scene& scene) {
   return by_class;
 }
 
-/// Replaces the object of the first hit of each beam by its number in the labels; 0 if there is no hit.
+/// Replaces the object of the first hit of each beam with its number in the labels; 0 if there is no hit.
 void number_as_instances(json& truth) {
   json instance = json::array();
   for (const json& object : truth["object"]) instance.push_back(object.is_null() ? 0U : object.get<std::uint32_t>() + 1);
@@ -186,7 +186,7 @@ Result<DrawnPing> PingMaker::compute(std::uint64_t number, Ping& ping) {
   auto drawn = draw_ping(job_, number, known_);
   if (!drawn) return drawn;
   const std::string key = drawn->scene_key + "\n" + visible_of(*drawn->job.scene);
-  // An engine is used again while the scene and the visibility of its objects are the same.
+  // The engine gets a new scene only if the scene or the visibility of its objects differs.
   if (!engine_ || key != engine_key_) {
     const SimdLevel simd = simd_.value_or(drawn->job.config.engine.simd);
     // start_engine() returns the engine that `make` returned; it is kept.

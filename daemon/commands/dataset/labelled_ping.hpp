@@ -47,7 +47,7 @@ struct LabelledPing {
   std::optional<Raster> cell;  // picture of a ping on the contact sheet
 };
 
-/// Makes pings in sequence on one thread; reuses the engine while the scene is the same.
+/// Makes pings in sequence on one thread, with one engine, whose scene is changed when a ping has another scene.
 class PingMaker {
  public:
   /// `simd`, if set, replaces the instruction set of the job.

@@ -21,11 +21,11 @@ namespace {
 using nlohmann::json;
 using std::filesystem::path;
 
-constexpr std::uint64_t pings_a_thread = 4;  // pings of a batch, which wait in memory until they are written in order
+constexpr std::uint64_t pings_per_thread = 4;  // pings of a batch, which wait in memory until they are written in order
 
 constexpr std::array<std::string_view, 5> own_names{"job.json", "README.md", "manifest.json", "coco.json", "contact.png"};
 
-/// Returns the file for the pings of an incomplete shard, and for the notes on them.
+/// Return the file for the pings of an incomplete shard, and the file for the notes on them.
 path aside_file(const path& out, std::uint64_t shard) { return out / path(shard_name(shard)).replace_extension(".aside"); }
 path aside_note(const path& out, std::uint64_t shard) { return aside_file(out, shard).string() + ".json"; }
 
@@ -74,7 +74,7 @@ class Folder final : public DatasetFolder {
       return failure(ErrorKind::io, "cannot make the folder " + o_.out.string() + ": " + ec.message() + "; choose another --out");
     const path about = o_.out / "job.json";
     const std::string foreign =
-        own_file_in(o_.out);  // before the owner is checked, because another process may begin the folder at this moment
+        own_file_in(o_.out);  // searched before job.json, because another process may begin the folder at this moment
     if (!std::filesystem::exists(about, ec)) {
       if (!foreign.empty())
         return failure(ErrorKind::usage, (o_.out / foreign).string() +
@@ -127,7 +127,7 @@ class Folder final : public DatasetFolder {
     json part{{"images", json::array()}, {"pixels", json::object()}};
     auto tar = begin(shard, part);
     if (!tar) return tl::make_unexpected(tar.error());
-    const std::uint64_t at_once = pings_a_thread * static_cast<std::uint64_t>(pool_.threads());
+    const std::uint64_t at_once = pings_per_thread * static_cast<std::uint64_t>(pool_.threads());
     for (std::uint64_t from = first_of(shard) + part["images"].size(); from < end_of(shard); from += at_once) {
       const auto count = static_cast<std::size_t>(std::min(at_once, end_of(shard) - from));
       std::vector<std::optional<Result<LabelledPing>>> made(count);
@@ -141,7 +141,7 @@ class Folder final : public DatasetFolder {
       }
       on_progress_(progress_);
     }
-    // The part is written first, so a shard is complete if the archive has its final name.
+    // The notes are written first, so a shard is complete if the archive has its final name.
     if (const auto done = write_durably(part_file(o_.out, shard), part.dump() + "\n"); !done) return done;
     progress_.bytes += tar->bytes();
     if (const auto done = tar->commit(); !done) {
@@ -156,7 +156,7 @@ class Folder final : public DatasetFolder {
     return {};
   }
 
-  /// Called when no shard of any part is missing. Only the labels of one shard at a time are in memory.
+  /// Only the notes of one shard at a time are in memory.
   Result<DatasetProgress> conclude() override {
     json shards = json::array(), pixels = json::object();
     std::uint64_t negatives = 0;

@@ -23,7 +23,7 @@ struct DatasetOptions {
   std::uint64_t part = 0, parts = 1;   // the part has the shards whose number modulo `parts` is `part`
   int threads = 1;                     // pings computed in parallel
   std::optional<SimdLevel> simd = {};  // replaces the instruction set of the job
-  // When it becomes true, the pings being made are finished, and those of the incomplete shard are kept for the next run.
+  // When *stop becomes true, the pings being made are finished, and those of the incomplete shard are kept for the next run.
   const std::atomic<bool>* stop = nullptr;
 };
 
@@ -32,12 +32,12 @@ struct DatasetProgress {
   std::uint64_t pings = 0, all_pings = 0;                     // pings made so far by this run; all pings of this run
   std::uint64_t bytes = 0;                                    // bytes of finished shards
   std::uint64_t set_aside = 0;                                // pings of an incomplete shard, when stopped
-  bool stopped = false;                                       // stopped before all were made
+  bool stopped = false;                                       // stopped before all pings were made
   bool whole = false;                                         // the manifest has been written
   std::optional<std::uint64_t> missing = {};                  // the first shard that another part has not made yet
 };
 
-using OnProgress = std::function<void(const DatasetProgress&)>;  // after every few pings
+using OnProgress = std::function<void(const DatasetProgress&)>;  // called after every few pings
 
 /// The folder of a job's shards. Processes of several machines may work in one.
 class DatasetFolder {
@@ -50,7 +50,7 @@ class DatasetFolder {
   /// Makes the shard. If another process has made it in the meantime, its shard is kept; error bad_data if the bytes differ.
   /// Other errors: io; config, as draw_ping().
   virtual Result<void> make(std::uint64_t shard) = 0;
-  /// True if the last error is that a shard's bytes differ: another program, or a damaged disk or memory.
+  /// True if the last error is that a shard's bytes differ, because of another program or a damaged disk or memory.
   virtual bool differs() const = 0;
   /// Writes the manifest, the COCO file and the card, if no shard is missing; sets `whole` or `missing`.
   virtual Result<DatasetProgress> conclude() = 0;
@@ -71,7 +71,7 @@ inline constexpr std::array<std::string_view, 3> split_names{"train", "val", "te
 
 struct Split {
   std::array<double, 3> shares{80, 10, 10};  // shares of the scenes, in the order of split_names; the sum may be any number
-  std::vector<std::string> by;  // names of draws: pings with equal values are in one split; empty: pings of equal scenes are
+  std::vector<std::string> by;  // names of draws; pings with equal values (if empty: with equal scenes) are in one split
 };
 /// Parses texts such as "80,10,10" and "bed_seed,coat". Error usage: a mistake in one of them.
 Result<Split> parse_split(const std::string& shares, const std::string& by);

@@ -58,7 +58,7 @@ std::array<char, tar_block> tar_header(std::string_view name, std::size_t size) 
   return h;
 }
 
-/// Returns the size in a header, in octal; nullopt if these characters are not a number.
+/// Returns the size in a header, which is an octal number; nullopt if it is not a number.
 std::optional<std::uint64_t> size_in(std::string_view header) {
   std::uint64_t size = 0;
   for (const char c : header.substr(124, 11)) {

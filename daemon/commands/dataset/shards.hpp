@@ -66,7 +66,7 @@ class ShardWriter {
   /// Stores the incomplete archive under another name. Returns the digest.
   Result<std::string> set_aside(const std::filesystem::path& aside);
   /// Writes the end of the archive and gives it its final name, then writes `file`.sha256 in the format of sha256sum. Returns the
-  /// digest. If another worker has committed an archive of that name, the other archive is kept. If its bytes differ, the error
+  /// digest. If another worker has committed an archive of that name, that archive is kept. If its bytes differ, the error
   /// is ErrorKind::bad_data.
   Result<std::string> commit();
   std::uint64_t bytes() const { return hash_.size(); }

@@ -155,7 +155,7 @@ std::vector<std::pair<const Object*, Pose>> placed(const std::string& name, cons
 
 Vec3d middle_of(const Object& object, const Pose& in_world) { return transform(in_world, extent_of(*object.mesh).centre_m()); }
 
-/// True if a point lies within range, the horizontal aperture and the vertical beam width of the sonar.
+/// True if a point lies within the range, the horizontal aperture and the vertical beam width of the sonar.
 bool is_in_fan(Vec3d in_world, const PingRequest& r) {
   const Vec3d p = transform(inverse(r.sonar_in_world), in_world);
   const FrequencyMode& mode = r.model->modes[static_cast<std::size_t>(r.settings.mode)];

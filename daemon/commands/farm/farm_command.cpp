@@ -33,8 +33,8 @@ Result<std::unique_ptr<dataset::DatasetFolder>> open_folder(const dataset::Datas
   return dataset::open_dataset(job, options, [](const dataset::DatasetProgress&) {});
 }
 
-/// Sends files, record, consumer, then the missing shards, and last removes the mark "stopped". This order makes a repeated
-/// submission safe.
+/// Sends the files and the record, opens the consumer, publishes the missing shards, and last removes the mark "stopped". With
+/// this order a submission can safely be repeated.
 Result<int> submit(const FarmCommand& c) {
   auto job = dataset::load_job(c.job);
   if (!job) return tl::make_unexpected(job.error());
@@ -103,7 +103,7 @@ Result<std::map<std::string, std::string>> read_table(Queue& queue, Table table)
   return all;
 }
 
-/// Returns a text of a beat or a description. Other programs write them, so a value of another type counts as missing.
+/// Returns a text of a JSON object that another program wrote, so a value of another type counts as missing.
 std::string text_in(const json& is, const char* key) {
   const auto at = is.find(key);
   return at != is.end() && at->is_string() ? at->get<std::string>() : std::string();

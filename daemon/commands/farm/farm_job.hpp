@@ -18,7 +18,7 @@ struct FarmFile {
 };
 
 struct FarmJob {
-  std::string id;  // SHA-256 of the canonical JSON of the four first members, on which the bytes of the shards depend
+  std::string id;  // SHA-256 of the canonical JSON of the next four members, on which the bytes of the shards depend
   std::string version, instruction_set;
   std::string file;             // the job file, one of `files`
   std::vector<FarmFile> files;  // by name

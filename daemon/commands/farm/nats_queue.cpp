@@ -78,7 +78,7 @@ class NatsQueue final : public Queue {
       token->erase(token->find_last_not_of(" \r\n") + 1);
       natsOptions_SetToken(options.get(), token->c_str());
     }
-    if (!o.credentials.empty())  // the library would wait for a FIFO
+    if (!o.credentials.empty())  // opened here first, because the library would block on a FIFO
       if (const auto file = open_regular(o.credentials); !file) return tl::make_unexpected(file.error());
     if (!o.credentials.empty() &&
         natsOptions_SetUserCredentialsFromFiles(options.get(), o.credentials.c_str(), nullptr) != NATS_OK)
@@ -176,7 +176,7 @@ class NatsQueue final : public Queue {
     const natsStatus s =
         into(info, [&](auto** i) { return js_GetConsumerInfo(i, jetstream_.get(), stream, job.c_str(), nullptr, &code); });
     if (s == NATS_NOT_FOUND) return Waiting{};
-    if (s != NATS_OK) return refused("cannot ask for job " + job, s, code);
+    if (s != NATS_OK) return refused("cannot read the state of job " + job, s, code);
     return Waiting{info->NumPending, static_cast<std::uint64_t>(info->NumAckPending)};
   }
 
@@ -315,7 +315,6 @@ Result<void> NatsTask::again(milliseconds later) {
   return s == NATS_OK ? Result<void>{} : queue_.refused("cannot give a shard back", s);
 }
 
-// The table is written before the removal: if the worker dies between them, the shard is delivered again and not lost.
 Result<void> NatsTask::bury(const std::string& why) {
   const std::string shard = std::to_string(shard_);
   // The reason is stored before the shard leaves the queue. If the worker ends between the two, the shard is delivered again.

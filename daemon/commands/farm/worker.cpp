@@ -264,7 +264,7 @@ class Worker {
   milliseconds rest_ = least_rest;
   std::map<std::string, std::string> unfit_;  // jobs that cannot be opened here, and why
   bool is_unfit_ = false;                     // true if the last error of next_job() was not an error of the server
-  std::string opened_;                        // id of the open job, to which the next three members belong
+  std::string opened_;                        // id of the open job, to which the members below belong
   dataset::DatasetJob job_;
   std::unique_ptr<dataset::DatasetFolder> folder_;
   Clock::time_point begin_;

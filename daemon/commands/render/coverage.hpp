@@ -24,7 +24,7 @@ struct Coverage {
   std::size_t bins = 0, good = 0;  // all compared bins; bins within 1 dB
   std::size_t empty = 0;           // bins that are 10 dB or more below the closed form
   double worst_db = 0;             // the largest deviation of a bin, signed
-  double mean_db = 0;              // mean of the powers of all bins over their closed form
+  double mean_db = 0;              // mean ratio of the power of a bin to its closed form
   double percent() const { return bins == 0 ? 0 : 100.0 * static_cast<double>(good) / static_cast<double>(bins); }
 };
 
@@ -41,8 +41,8 @@ Result<Coverage> measure_coverage(const RenderJob& job, const Ping& ping);
 
 /// Returns a job with the product over a level bed: the sonar's height is a fifth of the range, and it points down by 0.25 rad.
 RenderJob over_a_level_bed(std::shared_ptr<const SonarModel> model, const PingSettings& settings, const std::string& name);
-/// Returns a job over a level bed for every mode of every product, at the stored range of the product or, if shorter, the longest
-/// range of the mode.
+/// Returns jobs over a level bed for the acoustically different modes of all products without range images, at the stored range
+/// of the product or, if shorter, the longest range of the mode.
 std::vector<RenderJob> shipped_sonars_over_a_bed();
 
 }  // namespace sonar::render

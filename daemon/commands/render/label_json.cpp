@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int beams_a_side = 4;  // largest distance between corners of a polygon along an arc
+constexpr int beams_per_edge = 4;  // largest distance between corners of a polygon along an arc
 
 /// Returns whether an instance is annotated: objects with a label and point targets are.
 bool is_thing(const Scene& scene, std::size_t i) {
@@ -76,7 +76,7 @@ json cartesian_polygon(const Outline& outline, const Cartesian& cartesian) {
   json polygon = json::array();
   for (std::size_t i = 0; i < outline.size(); ++i) {
     const Corner from = outline[i], to = outline[(i + 1) % outline.size()];
-    const int parts = std::max(1, (std::abs(to.x - from.x) + beams_a_side - 1) / beams_a_side);
+    const int parts = std::max(1, (std::abs(to.x - from.x) + beams_per_edge - 1) / beams_per_edge);
     for (int p = 0; p < parts; ++p) {
       const auto [x, y] = cartesian.at({from.x + (to.x - from.x) * p / parts, from.y + (to.y - from.y) * p / parts});
       polygon.push_back(tenth(x)), polygon.push_back(tenth(y));

@@ -61,7 +61,7 @@ Result<std::vector<path>> pings_in(const path& folder) {
   return found;
 }
 
-/// Locks the folder until the process ends, in any way; the lock is not a file.
+/// Locks the folder until the descriptor is closed, at the latest when the process ends; there is no lock file.
 Result<int> lock(const path& folder) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0 || ::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
@@ -152,7 +152,7 @@ std::vector<path> OutputFolder::files_of(std::uint64_t number) const {
   return files;
 }
 
-/// True if the sidecar names these inputs. It is the last file written, so the ping is then complete.
+/// True if all files of the ping exist, and the sidecar, which is written last, has the digest of these inputs.
 bool OutputFolder::holds(std::uint64_t number) const {
   std::error_code ec;
   for (const path& file : files_of(number))

@@ -1,5 +1,5 @@
 // The input of `sonard render`: a scene and one sonar with its settings and trajectory, read from a configuration or from a
-// render file. A render file may list several values of a key (a sweep, docs/render.md); this gives a job for each.
+// render file. A render file may list several values of a key (a sweep, docs/render.md); each value then gives a job.
 #pragma once
 
 #include <filesystem>

@@ -24,7 +24,7 @@ Result<std::vector<Time>> firing_times(const RenderJob& job, const OutputOptions
 /// an empty text otherwise, and if firing_times() fails.
 std::string note_of_air(const RenderInput& input, const OutputOptions& options);
 
-/// Calls `on_progress` after every ping, in order. Errors: io; requests that the engine rejects.
+/// Calls `on_progress` after each batch, and for each ping that exists already. Errors: io; requests that the engine rejects.
 Result<Progress> render_pings(const RenderInput& input, const OutputOptions& options, Parallel& pool,
                               const std::function<void(const Progress&)>& on_progress);
 

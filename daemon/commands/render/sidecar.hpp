@@ -17,15 +17,15 @@
 
 namespace sonar::render {
 
-/// `engine`: its description; `count`: the statistics of this ping.
+/// Returns the JSON file of a ping. `engine`: description of the engine; `count`: statistics of this ping.
 nlohmann::json sidecar(const RenderJob& job, const Ping& ping, const std::string& engine, const PingStatistics& count,
                        const std::string& digest);
 
-/// SHA-256 of everything that determines the pings: the files' text, the loaded scene, the sonar, switches, seed, poses and
-/// times; but not the threads and the number of pings. `plain_pictures`: without rings.
+/// Returns the SHA-256 of everything that determines the pings: the files' text, the loaded scene, the sonar, switches, seed,
+/// poses and times, but not the threads and the number of pings. `plain_pictures`: without rings.
 std::string digest_of(const RenderInput& input, double rate_hz, bool plain_pictures = false);
 
-// Writes NumPy arrays (.npy, format version 1.0): a short header, then the bytes, little-endian, last index fastest.
+// Makes the headers of NumPy arrays (.npy, format version 1.0). The little-endian bytes follow a header, last index fastest.
 
 /// Returns the header, whose size is a multiple of 64. `type`: "<f4", "<c8", "|u1", "<u2" or "<u4".
 std::string npy_header(std::string_view type, std::initializer_list<std::size_t> shape);
@@ -40,8 +40,8 @@ inline constexpr int cartesian_width_px = 1000;  // width of the fan to which `c
 /// it has boxes and polygons.
 nlohmann::json instances_of(const Scene& scene);
 
-/// Annotations of every visible thing: `bbox`, `area` and `segmentation` in pixels of the samples (x = beam, y = row), and
-/// under `cartesian` in pixels of the fan; `visible`, the fraction of the thing's echo energy that nothing blocks.
+/// Returns annotations of every visible thing: `bbox`, `area` and `segmentation` in pixels of the samples (x = beam, y = row),
+/// and under `cartesian` in pixels of the fan; `visible`, the fraction of the thing's echo energy that nothing blocks.
 nlohmann::json annotations_of(const PingLabels& labels, const Ping& ping, const Scene& scene);
 
 /// Returns the scale and origin of the Cartesian picture, which is the fan of --image-rings off.

@@ -28,7 +28,7 @@ class PlayedPings {
   /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all other recordings.
   bool is_scan() const { return !lines_.empty(); }
 
-  /// The next ping; nullopt at the end. Packets of different ports that follow each other are one ping.
+  /// Returns the next ping; nullopt at the end. Packets of different ports that follow each other are one ping.
   /// If a ping has several messages, the one with the most content is returned.
   std::optional<PlayedPing> next();
   /// True if next() has returned the last ping.

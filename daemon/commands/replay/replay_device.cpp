@@ -16,7 +16,7 @@ std::string why_only_seen(const protocol::Make& make) {
   return make.has_several_streams() ? "are sent over several connections" : "";
 }
 
-/// Describes a sonar that answers hosts.
+/// Describes a sonar of another make than Oculus.
 void take(ReplayDevice& device, const recording::SentBy& by) {
   device.make = by.make;
   device.vendor = by.make->device;

@@ -291,8 +291,8 @@ void ReplayServer::watch_stall(const ClientPointer& client) {
   });
 }
 
-/// Handles requests of a host, which determine the receivers of frames and the time of the first frame. A host that does not read
-/// the answers is disconnected, as an emulated sonar does.
+/// Handles requests of a host, which determine the receivers of frames and the time of the first frame. The server
+/// disconnects a host that does not read the answers, as an emulated sonar does.
 void ReplayServer::on_client_bytes(Client& client, protocol::BytesView bytes) {
   client.heard = Steady::now();
   const protocol::Reaction reaction = client.dialogue->on_bytes(bytes, {});

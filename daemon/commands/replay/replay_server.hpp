@@ -1,8 +1,8 @@
-// Serves a recording as the recorded sonar would: sends the messages byte for byte over TCP, to one client at a time, and status
-// datagrams. A sonar that sends pings on request answers its host, and sends pings once the host requests them: an ARIS as
-// datagrams to the receivers that its controller sets, a Sonar 3D-15 as datagrams to the receivers that were set over HTTP, as if
-// one client stayed connected. It uses no scene and no engine. RequestedReplay serves the sonars whose hosts select the
-// pings.
+// Serves a recording as the recorded sonar would. It sends status datagrams and, to one client at a time, the messages byte for
+// byte over TCP. If the device has dialogues, it answers the host, and pings begin when the host requests them. An ARIS sends
+// datagrams to the receivers that its controller sets. A Sonar 3D-15 sends datagrams to the receivers that were set over HTTP, as
+// if one client stayed connected. The server uses no scene and no engine. RequestedReplay serves the sonars whose hosts select
+// the pings.
 #pragma once
 
 #include <functional>

@@ -210,7 +210,7 @@ std::string summary(const App& app) {
                    static_cast<unsigned long long>(f.pings), static_cast<unsigned long long>(f.served),
                    static_cast<unsigned long long>(f.dropped), static_cast<unsigned long long>(f.skipped_ticks),
                    static_cast<unsigned long long>(f.ticks), static_cast<unsigned long long>(f.clients));
-    if (f.pings > 0) text += format(", %.1f ms a ping", 1e3 * f.simulation_s / static_cast<double>(f.pings));
+    if (f.pings > 0) text += format(", %.1f ms per ping", 1e3 * f.simulation_s / static_cast<double>(f.pings));
     text += "\n";
   }
   const PoseCounters& p = app.world().counters();

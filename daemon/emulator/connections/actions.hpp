@@ -52,7 +52,7 @@ struct ReadFrom {
 struct EndPauses {
   ConnectionId connection = 0;
 };
-/// The outbox has something to write.
+/// Write the waiting messages of the outbox.
 struct Wake {
   ConnectionId connection = 0;
 };

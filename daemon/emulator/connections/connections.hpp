@@ -1,6 +1,6 @@
 // The connections of one emulated sonar: clients, connections that wait for a slot, connections that are ending, and observers,
-// which receive every ping and change nothing. Each has a dialogue in the vendor's protocol and an outbox. Streams of datagrams
-// are connections without a dialogue. This file uses no sockets and no clock.
+// which receive every ping and change nothing. Streams of datagrams count as connections too. Each connection has an outbox and,
+// except for streams, a dialogue in the vendor's protocol. This file uses no sockets and no clock.
 #pragma once
 
 #include <cstdint>
@@ -66,7 +66,7 @@ struct Connection {
   std::optional<Time> next_request() const;
 };
 
-/// Adds the counts of the connection: sent, dropped and received.
+/// Adds the counts of pings and bytes of the connection.
 void add_traffic(DeviceFigures& figures, const Connection& of);
 
 class Connections {

@@ -50,13 +50,13 @@ struct DeviceFigures {
   std::uint64_t dropped = 0;        // offered pings that a client did not receive completely
   std::array<std::uint64_t, drop_reasons> dropped_by{};  // dropped pings by DropReason
   std::uint64_t waiting = 0;                             // pings in outboxes now that are not being written yet
-  std::uint64_t clients = 0, refused_clients = 0;        // clients since the start
+  std::uint64_t clients = 0, refused_clients = 0;        // served and refused clients since the start
   std::uint64_t clients_now = 0, clients_queued = 0;
   std::uint64_t bytes_written = 0, bytes_read = 0;
   double simulation_s = 0;  // wall time of all pings
   Histogram simulation;     // time to compute a ping
   Histogram lateness;       // delay from a tick's time to its processing
-  Histogram jitter;         // interval of two pings at a client's socket minus the interval of their ticks
+  Histogram jitter;         // difference between the interval at which two pings were sent and that of their ticks
   Histogram latency;        // time from a ping's tick until the kernel has the last byte, for each client
 };
 

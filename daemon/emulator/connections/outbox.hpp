@@ -19,7 +19,7 @@ namespace sonar {
 /// The reason why a client did not receive an offered ping completely.
 enum class DropReason {
   slow,   // a newer ping replaced the ping, or the queue was full
-  gone,   // the connection ended first
+  gone,   // the connection had ended, or the stream had no receivers
   stop,   // sonard ended the connection; only the current message is completed
   fault,  // a fault injected by the user
 };

@@ -23,10 +23,10 @@ std::chrono::nanoseconds ping_period(const PingSettings& s) {
 void Pacer::configure(const PingSettings& settings, Time now) {
   const auto period = ping_period(settings);
   travel_ = nanoseconds_from(travel_s(settings));
-  // With an unchanged period the grid does not change, because a driver that repeats its settings for every ping would postpone
-  // each ping.
+  // With an unchanged period the grid does not change, because otherwise a driver that repeats its settings for every ping would
+  // postpone each ping.
   if (running_ && period == period_ && settings.triggered == triggered_) return;
-  // A new grid begins when the last echo has returned and the shorter of both periods has passed.
+  // A new grid begins when the last echo has returned and the shorter of the old and the new period has passed.
   const Time quiet_until = has_fired_ ? std::max(home_at_, last_tick_ + std::min(period_, period)) : now;
   running_ = period.count() > 0;
   forget_tick();
@@ -69,8 +69,8 @@ void Pacer::forget_trigger() {
   if (std::exchange(trigger_waits_, false)) ++skipped_.trigger;
 }
 
-// A triggered sonar is idle, or a trigger waits (trigger_waits_) until the previous ping is over (trigger_at_); then fire() fires
-// the ping.
+// A triggered sonar is idle, or a trigger waits (trigger_waits_) until a period has passed since the previous ping (trigger_at_).
+// Then fire() fires the ping.
 void Pacer::trigger(Time now, bool joins) {
   if (!running_ || !triggered_) return;
   // At most one trigger waits. A further trigger joins it, or is counted as skipped.

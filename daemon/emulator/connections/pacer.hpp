@@ -1,5 +1,5 @@
-// Computes when the next ping of a sonar is due: at multiples of the period from a start time (never a sum of sleeps), or one
-// ping per trigger. The caller passes all times, and sets the timer.
+// Computes when the next ping of a sonar is due: at a start time plus a multiple of the period, so that delays do not add up, or
+// once per trigger. The caller passes all times, and sets the timer.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@ std::chrono::nanoseconds ping_period(const PingSettings& settings);
 
 /// Counts of ticks and triggers without a ping.
 struct SkippedTicks {
-  std::uint64_t late = 0;     // ticks after which the next tick was already due
-  std::uint64_t busy = 0;     // ticks during which the previous ping was being computed
+  std::uint64_t late = 0;     // ticks missed because a later tick was already due
+  std::uint64_t busy = 0;     // ticks that waited for the previous ping and were then skipped
   std::uint64_t trigger = 0;  // triggers that came while another one was waiting, or that were not used before pings stopped
   std::uint64_t total() const { return late + busy + trigger; }
 };
@@ -25,12 +25,12 @@ struct SkippedTicks {
 class Pacer {
  public:
   /// Uses new settings. If period and trigger mode are unchanged, the grid continues. Otherwise it restarts at `now`, but not
-  /// before the echoes of the last ping have returned and the shorter of both periods has passed since that ping. A pending
-  /// trigger is kept while pings are triggered.
+  /// before the echoes of the last ping have returned and the shorter of the old and the new period has passed since that ping. A
+  /// pending trigger is kept while pings are triggered.
   void configure(const PingSettings& settings, Time now);
   /// Call it when the clock jumps ahead: moves all times by `by`.
   void skip(std::chrono::nanoseconds by);
-  /// Free running: restarts the grid at `now`, without a pause.
+  /// Restarts the grid at `now`, without a pause, unless pings are triggered.
   void hurry(Time now);
   /// Stops pings until the next configure().
   void stop();

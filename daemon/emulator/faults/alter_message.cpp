@@ -226,8 +226,8 @@ void write_address(Bytes& bytes, const std::optional<Field>& field, const text::
   for (std::size_t i = 0; i < 4; ++i) bytes[field->offset + i] = static_cast<std::byte>(address[i]);
 }
 
-/// Makes the status of a second device. It differs in all values by which drivers distinguish devices: id, hardware address and,
-/// if requested, network address.
+/// Makes the status of a second device, with another id, hardware address and, if requested, network address. With the address
+/// `foreign` only the network address differs.
 Bytes second_device(const Fault& fault, const Vendor& vendor, Bytes bytes) {
   const auto of = [&](FieldName name) { return vendor.field(Part::beacon, name, bytes); };
   const std::string& address = fault.word("address");

@@ -54,7 +54,7 @@ struct MessageContext {
 /// The result of a fault for a message.
 struct Touch {
   bool acted = true;                      // false: the message is unchanged
-  std::optional<std::size_t> place = {};  // the byte at which the message pauses or ends; nullopt: at the first changed byte
+  std::optional<std::size_t> place = {};  // the byte at which the message pauses or ends; nullopt: the first changed byte
 };
 Touch alter_message(const Fault& fault, const MessageContext& context, MessageEdit& message);
 

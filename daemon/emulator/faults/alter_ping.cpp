@@ -129,7 +129,7 @@ void alter_ping(const Fault& fault, const FaultDraws& draws, const Ping* kept, s
   Image image(ping);
   const Levels levels(ping, image.full());
   const double share = fault.number("share");
-  // The beams depend on the fault, not on the ping, so they are the same in every ping.
+  // Dead beams depend on the fault, not on the ping, so they are the same in every ping.
   FaultDraws of_fault = draws;
   of_fault.ping = 0;
   const auto chosen_beam = [&](std::size_t beam) {

@@ -85,8 +85,8 @@ void Faults::end(Entry& e, Time now) {
   if (e.fault.span.count != 0 && e.begun >= e.fault.span.count) e.over = true;
 }
 
-/// Adds the orders of a fault that changes the device or its connections. Faults of messages and samples act when a message is
-/// sent.
+/// Adds the orders of a fault that changes the device or its connections. Other faults act later, on each ping, message or
+/// request.
 void Faults::begin_effect(Entry& e, Time now) {
   switch (e.fault.kind->effect) {
     case Effect::close_ports:

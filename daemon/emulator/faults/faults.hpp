@@ -101,7 +101,7 @@ class Faults {
   void begin_ping(std::uint32_t number, Time now);
   /// Returns the ping as the device reports it, with changed samples or stamps.
   std::shared_ptr<const Ping> altered(const std::shared_ptr<const Ping>& ping, const protocol::DeviceState& state, Time now);
-  /// True if alter_datagrams() may change this ping. If not, the receivers of a port share the datagrams.
+  /// True if alter_datagrams() may change the datagrams of this ping, so that they must be copied.
   bool alters_datagrams(const Connection& stream, std::uint32_t ping) const;
   void alter_datagrams(std::vector<protocol::Bytes>& datagrams, const Connection& stream, std::uint32_t ping, Time now);
   bool leaves_group() const;
@@ -149,7 +149,7 @@ class Faults {
     std::optional<std::uint32_t> first_number;
     std::shared_ptr<const Ping> kept;
     std::optional<Time> kept_time;
-    protocol::Bytes before;                           // previous message, for splice, older_part and late_part
+    protocol::Bytes before;  // previous message (splice), or part of an earlier ping (older_part, late_part)
     std::vector<std::pair<Time, ConnectionId>> ends;  // times at which end_after ends connections
     std::vector<std::pair<Time, ApplyRequest>> late;  // requests that delay_requests holds back
   };

@@ -1,4 +1,4 @@
-// Faults of clients: selects clients, and determines admission and the outcome of requests.
+// Selects the clients on which faults act, and determines admission and the outcome of requests.
 #include "daemon/emulator/faults/faults.hpp"
 
 namespace sonar {

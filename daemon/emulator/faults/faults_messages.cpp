@@ -77,8 +77,8 @@ bool Faults::withholds(std::uint32_t ping, Time now) const {
   });
 }
 
-/// Returns false if the message must not be sent. Faults that silence the sonar act first, then faults that change bytes, pace or
-/// end.
+/// Returns false if the message must not be sent. Faults that silence the sonar act first, then faults that change the bytes or
+/// their pace, or end the connection.
 bool Faults::shape(const Connection& to, Outbox::Message& message, Time now) {
   if (entries_.empty() || to.role == Role::observer) return true;
   for (Entry& e : entries_) {

@@ -1,5 +1,5 @@
 // Manages the connections of an emulated sonar: slots of clients, the queue for slots, take-over, receivers of streams, and the
-// end of a connection. The Sonar, which changes settings and makes pings, calls has_audience() after each change.
+// end of a connection. After each change of the connections the Sonar calls has_audience(), and starts or stops pings.
 #pragma once
 
 #include <exception>
@@ -51,7 +51,7 @@ class Audience {
   void begin_finish(Connection& connection, const std::string& why, Actions& actions);
   /// Ends all connections as finish() does, and admits no more.
   void stop(const std::string& why, Actions& actions);
-  /// Accounts for a closed connection and removes it.
+  /// Adds the counts of a closed connection to the figures, and removes the connection.
   void remove(Connection& connection, const std::string& why, bool by_client, Actions& actions);
   // Effects of faults.
   void end_by_fault(Connection& connection, Faults::RequestVerdict verdict, Actions& actions);

@@ -39,7 +39,7 @@ class FramedPing {
   const Ping& ping_;
   const PartsByPort* recorded_;
   std::shared_ptr<const Bytes> bytes_;
-  bool is_first_ports_ = false;  // true: there are several TCP ports, and bytes_ are for the first
+  bool is_first_ports_ = false;  // true: vendor.frame() made bytes_, which are for the first TCP port
   struct AtPort {
     const protocol::Port* port;
     Datagrams parts;

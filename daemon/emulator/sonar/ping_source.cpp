@@ -156,7 +156,7 @@ void PingSource::catch_up(Actions& actions) {
 
 // ---- pings
 
-/// Returns the number of the next ping. With an option, pings that were skipped because of overload are numbered too.
+/// Returns the number of the next ping. With Overload::count, pings that were skipped because of overload are numbered too.
 PingNumber PingSource::next_number() {
   const SkippedTicks& skipped = pacer_.skipped();
   const std::uint64_t lost = skipped.late + skipped.busy;

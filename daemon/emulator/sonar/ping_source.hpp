@@ -31,7 +31,7 @@ class PingSource {
   void forget_clients();
   /// Applies settings. `who`: the client, for the log and asked_by(); empty = the device itself.
   void change_settings(const protocol::ChangeSettings& change, const std::string& who, Time now, Actions& actions);
-  /// Returns whether the value changed.
+  /// Sets whether the sonar transmits. Returns whether the value changed.
   bool set_transmit(bool on) { return std::exchange(transmits_, on) != on; }
   bool transmits() const { return transmits_; }
   void use_water(const Water& water, Time now);

@@ -7,7 +7,7 @@
 namespace sonar {
 namespace {
 
-constexpr std::uint64_t ticks_a_stretch = 40;
+constexpr std::uint64_t ticks_per_group = 40;
 constexpr double tolerated_share = 0.1;  // tolerated fraction of skipped ticks
 
 }  // namespace
@@ -34,7 +34,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
   longest_s_ = std::max(longest_s_, ping_s);
   const std::uint64_t passed = ticks - ticks_before_;
   // Ticks are evaluated in groups of 40, so that a single slow ping causes no warning.
-  if (passed < ticks_a_stretch) return std::nullopt;
+  if (passed < ticks_per_group) return std::nullopt;
   const double skipped = static_cast<double>(busy - busy_before_) / static_cast<double>(passed);
   const double mean_s = ping_s_ / pings_, made_hz = rate_hz * (1 - skipped), alone_hz = 1 / std::max(mean_s, 1e-9);
   const double longest_s = longest_s_;
@@ -48,7 +48,7 @@ std::optional<std::string> RateWatch::look(std::uint64_t ticks, std::uint64_t bu
                           : has_others ? ", and other sonars are computed in between"
                                        : text::format(", single pings up to %.0f ms", 1e3 * longest_s);
   return text::format(
-      "computing takes %.0f ms a ping%s: %.*f Hz at most here, %.3g Hz are requested; ticks are skipped: request "
+      "computing takes %.0f ms per ping%s: %.*f Hz at most here, %.3g Hz are requested; ticks are skipped: request "
       "fewer beams, less range or a lower rate, or give more engine.threads",
       1e3 * mean_s, why.c_str(), possible_hz < 10 ? 1 : 0, possible_hz, rate_hz);
 }

@@ -1,5 +1,5 @@
-// Detects that a sonar does not reach the requested rate because pings take too long to compute. Sonar passes the figures and
-// gets one sentence to report.
+// Detects that a sonar does not reach the requested rate because pings take too long to compute. PingSource passes the figures
+// and gets one sentence to report.
 #pragma once
 
 #include <cstdint>

@@ -41,7 +41,7 @@ void Sonar::move(const SonarConfig& config, Time now) {
   move_mount(config.mount, now);
 }
 
-/// Adds the figures of the present connections to `data_`, which has those of ended connections.
+/// Returns the figures of ended connections, which `data_` has, plus those of the present connections.
 DeviceFigures Sonar::figures() const {
   DeviceFigures f = data_.figures;
   f.ticks = source_.pacer().ticks();
@@ -204,7 +204,7 @@ void Sonar::on_left(Time now, Actions& actions) {
   const bool kept_waiting = faults_.admission() == Faults::Admission::wait;
   Connection* const next = kept_waiting ? nullptr : audience_.next_waiting();
   if (next == nullptr) return on_membership(now, actions);
-  // This must be before serve(), because then the next client counts as audience, and the settings would not be restored.
+  // This must be before serve(), after which the next client counts as audience, so that the settings would not be restored.
   if (!audience_.has_audience()) source_.forget_clients();
   serve(*next, now, actions);
 }

@@ -44,7 +44,7 @@ class Sonar {
   std::size_t take_reactions() { return std::exchange(reactions_, 0); }
   /// Returns the next message to write; an empty one if none waits, or while a message is being written.
   Outbox::Message next_message(ConnectionId id, Time now) { return delivery_.next_message(id, now); }
-  /// Reports that `bytes` more of the message were sent; after the last byte, call on_written().
+  /// Reports that another `bytes` bytes of the message were sent; after the last byte, call on_written().
   void on_sent(ConnectionId id, std::size_t bytes) { delivery_.on_sent(id, bytes); }
   void on_written(ConnectionId id, const Outbox::Message& message, Time now) { delivery_.on_written(id, message, now); }
   /// Reports that a stream's last message had no receiver, or that none of its datagrams could be sent.

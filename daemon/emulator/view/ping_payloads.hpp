@@ -14,7 +14,7 @@ namespace sonar {
 PolarImage polar_image_of(const Ping& ping, const Shades& shades = {});
 
 using PingPointer = std::shared_ptr<const Ping>;
-// The stamp of each message is the time at which the ping was fired; `sonar` is the frame.
+// The stamp of each message is the time at which the ping was fired; `sonar` is the name of its frame.
 ViewPayloadPointer image_payload(const std::string& sonar, const PingPointer& ping);
 ViewPayloadPointer geometry_payload(const Ping& ping);
 /// Makes the ground truth of a ping, which must have it.

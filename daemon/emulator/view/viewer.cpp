@@ -237,7 +237,8 @@ Viewer::Slot* Viewer::next_slot(bool last_values, Moment now, std::uint32_t& sub
   return best;
 }
 
-/// Returns messages in this order: removed statuses, JSON texts, the time, last values, then pictures and events.
+/// Queues the removal of expired statuses. Then returns messages in this order: JSON texts, the time, last values, pictures and
+/// events.
 std::optional<ViewMessage> Viewer::next(Moment now) {
   if (slow_since_ && now - *slow_since_ >= slow_is_said_for) {
     slow_since_.reset();

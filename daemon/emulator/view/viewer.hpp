@@ -102,7 +102,7 @@ class Viewer {
   std::optional<ViewMessage> next(Moment now);
   /// Returns the time at which next() must be called again, because a message waits for its rate or a warning ends.
   std::optional<Moment> next_due(Moment now) const;
-  /// If the code is not `none`, the connection must be ended with it.
+  /// If the code is not `none`, the connection must be closed with this code.
   CloseCode close_code() const { return close_; }
 
   // ---- from the host

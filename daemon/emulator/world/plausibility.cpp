@@ -23,7 +23,7 @@ constexpr double least_ground_m = 2;           // width; a narrower flat plate i
 constexpr double far_from_origin_m = 1000;     // a scene may be this far away, because vehicles may drive to it
 constexpr double long_ranges = 5;              // an object may be this many times as long as the longest range
 
-// Each remedy identifies a kind of note; a kind is reported once.
+// Each remedy identifies a kind of note, which is reported once per vehicle.
 constexpr const char* surface_cure =
     "was NED taken for ENU, or the reverse? ENU_FLU counts z upwards, NED_FRD downwards: 3 m deep is z = -3 in the one and z = 3 "
     "in the other; state the frame that was sent";
@@ -213,8 +213,8 @@ std::vector<Note> notes_on_plans(const Config& config, const Surroundings& aroun
   return notes;
 }
 
-/// Returns notes on the initial poses of vehicles without trajectories. A vehicle that waits for its first pose has no pose to
-/// check.
+/// Returns notes on mounts, scene and origin, and on the initial poses of vehicles without trajectories. A vehicle that waits for
+/// its first pose has no pose to check.
 std::vector<Note> notes_on_start(const Config& config, const Scene& scene, const Surroundings& around) {
   const std::vector<Carrier> carriers = carriers_of(config);
   std::vector<Note> notes = notes_on_mounts(config);
@@ -341,7 +341,7 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
 
 // ---- in a running daemon
 
-std::vector<Note> Plausibility::untold(const std::vector<Note>& notes) {
+std::vector<Note> Plausibility::unreported(const std::vector<Note>& notes) {
   std::vector<Note> fresh;
   for (const Note& n : notes)
     // A vehicle gets one note per cure, even if numbers differ; the scene gets one note per text.
@@ -364,7 +364,7 @@ std::vector<Note> Plausibility::use(const Config& config, const Scene& scene) {
   before.swap(of_poses_);
   for (const Carrier& c : carriers_)
     if (const auto last = before.find(c.vehicle); last != before.end()) judge(c, of_poses_[c.vehicle] = last->second);
-  return untold(all());
+  return unreported(all());
 }
 
 void Plausibility::judge(const Carrier& carrier, LastPose& last) const {
@@ -385,7 +385,7 @@ std::vector<Note> Plausibility::use(const control::PoseSample& sample, Time now)
   last.vehicle_in_world = sample.pose;
   last.largest_angle = angle_beyond_radians(sample.sent_angles, last.turns.has_counted());
   judge(*carrier, last);
-  return untold(last.notes);
+  return unreported(last.notes);
 }
 
 std::vector<Note> Plausibility::all() const {

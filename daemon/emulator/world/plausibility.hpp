@@ -69,8 +69,8 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
 /// The notes of a running daemon: on configuration and scene, and on the newest pose of each vehicle.
 class Plausibility {
  public:
-  /// Call it at the start and after a change of configuration or scene. Returns new notes only. Checks trajectories and poses
-  /// again if positions in the scene have changed.
+  /// Call it at the start and after a change of configuration or scene. Returns new notes only. Checks trajectories again only if
+  /// they or positions in the scene have changed.
   std::vector<Note> use(const Config& config, const Scene& scene);
   /// Checks an accepted pose of a vehicle; returns only notes that are new for this vehicle.
   /// `now`: the time of a pose without a stamp.
@@ -85,7 +85,7 @@ class Plausibility {
     std::vector<Note> notes = {};
     TurnCount turns = {};
   };
-  std::vector<Note> untold(const std::vector<Note>& notes);
+  std::vector<Note> unreported(const std::vector<Note>& notes);
   void judge(const Carrier& carrier, LastPose& last) const;
 
   Surroundings around_;

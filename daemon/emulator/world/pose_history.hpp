@@ -1,5 +1,5 @@
 // The poses of one body in the last two seconds, and its pose at any time: interpolated, extrapolated for a short time, or held.
-// World has one history for each vehicle and moving object. Times are the sender's stamps, converted to our time.
+// World has one history for each vehicle and moving object. Times are the sender's stamps; World converts our times to them.
 #pragma once
 
 #include <deque>

@@ -67,7 +67,8 @@ World::Track* World::find(PoseSample::Of of, const std::string& name, std::strin
     names.push_back(t.body.name);
   }
   const std::string kind = vehicle ? "vehicle" : "moving object";
-  refusal = name.empty() ? "the message names no " + kind + " and there is not exactly one; known: " + joined_names(names)
+  refusal = name.empty() ? "the message names no " + kind +
+                               ", which is allowed only if there is exactly one; known: " + joined_names(names)
                          : "no " + kind + " is called \"" + name.substr(0, 64) + "\"; known: " + joined_names(names);
   return nullptr;
 }
@@ -84,7 +85,7 @@ bool World::continues(const Track& track, const PoseSample& sample, const Sender
   return !is_set_back && now - track.last_arrival <= rules_.stale_after;
 }
 
-/// Stores the sender of a pose, and returns true once while two senders alternate.
+/// Stores the previous sender if a pose has another one, and returns true once while two senders alternate.
 bool World::has_rival(Track& track, const Sender& sender, Time now) const {
   const bool silent = now - track.last_arrival > rules_.stale_after;
   if (silent) {
@@ -123,7 +124,7 @@ std::string World::why_bad_time(const PoseSample& sample, Time at, Time now) con
     return "WALL time stamp is " + std::to_string(seconds(at - now)) +
            " s from this computer's clock: synchronise the clocks, or send SIM or ARRIVAL time";
   if (rules_.follows && sample.of == PoseSample::Of::vehicle && sample.stamp.domain == ClockDomain::arrival)
-    return "it has no time stamp, but clock: follow needs one: send SIM or WALL time";
+    return "it has no time stamp, which clock: follow needs; send SIM or WALL time";
   return {};
 }
 

@@ -89,7 +89,7 @@ class World {
   std::optional<Played> object_plays(std::size_t object) const { return plays(objects_[object]); }
 
   Pose vehicle_at(std::size_t vehicle, Time t) const { return pose_at(vehicles_[vehicle], t); }
-  /// Returns the motion with which vehicle_at() extrapolates; zero if it is implausibly fast.
+  /// Returns the motion of vehicle_at() at this time; zero if it is implausibly fast.
   PoseHistory::Motion vehicle_moves(std::size_t vehicle, Time t) const;
   std::vector<Pose> objects_at(Time t) const;
   Pose object_at(std::size_t object, Time t) const { return pose_at(objects_[object], t); }

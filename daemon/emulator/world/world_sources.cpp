@@ -39,8 +39,8 @@ std::string World::steer(const control::SetTrajectory& asked, Time now) {
   return {};
 }
 
-// Time that follows the time stamps of the vehicles' poses (clock: follow): how their clocks are converted to ours, and how far
-// time may advance.
+// The functions below are for time that follows the stamps of the vehicles' poses (`clock: follow`). They convert stamps to our
+// time, and determine how far time may advance.
 
 namespace {
 __extension__ using Wide = __int128;  // the difference between a sender's stamp and our time may exceed 64 bits

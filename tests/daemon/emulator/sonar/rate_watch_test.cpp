@@ -29,7 +29,7 @@ struct Sonar {
 TEST(RateWatch, ReportsOnceTheRateThatComputingAllows) {
   Sonar slow{40, 0.052, 0};
   slow.ping(200);
-  EXPECT_THAT(slow.said, StartsWith("computing takes 52 ms a ping: 19 Hz at most here, 40 Hz are requested"));
+  EXPECT_THAT(slow.said, StartsWith("computing takes 52 ms per ping: 19 Hz at most here, 40 Hz are requested"));
   EXPECT_EQ(std::count(slow.said.begin(), slow.said.end(), '\n'), 1);
 }
 
@@ -50,7 +50,7 @@ TEST(RateWatch, AFewSlowFirstPingsAreNotReported) {
 TEST(RateWatch, AccountsForOtherSonars) {
   Sonar one_of_three{20, 0.03, 0.06};
   one_of_three.ping(200);
-  EXPECT_THAT(one_of_three.said, HasSubstr("30 ms a ping, and other sonars are computed in between: 10 Hz at most here"));
+  EXPECT_THAT(one_of_three.said, HasSubstr("30 ms per ping, and other sonars are computed in between: 10 Hz at most here"));
 }
 
 TEST(RateWatch, WithoutOtherSonarsReportsTheSlowestPing) {
@@ -61,7 +61,7 @@ TEST(RateWatch, WithoutOtherSonarsReportsTheSlowestPing) {
     uneven.ping_s = 0.09;
     uneven.ping(1);
   }
-  EXPECT_THAT(uneven.said, HasSubstr(" ms a ping, single pings up to 90 ms: 15 Hz at most here, 20 Hz are requested"));
+  EXPECT_THAT(uneven.said, HasSubstr(" ms per ping, single pings up to 90 ms: 15 Hz at most here, 20 Hz are requested"));
 }
 
 TEST(RateWatch, AnotherRateIsCheckedAnew) {

@@ -335,7 +335,7 @@ std::vector<std::string> warnings_of_slow_pings(bool recorded) {
 }
 
 TEST(SonarInVirtualTime, PingsOfARecordingAreNotTooSlow) {
-  EXPECT_THAT(warnings_of_slow_pings(false), ::testing::Contains(HasSubstr("computing takes 300 ms a ping")));
+  EXPECT_THAT(warnings_of_slow_pings(false), ::testing::Contains(HasSubstr("computing takes 300 ms per ping")));
   EXPECT_THAT(warnings_of_slow_pings(true), ::testing::Not(::testing::Contains(HasSubstr("computing takes"))));
 }
 
