@@ -72,7 +72,7 @@ struct PoseListener {
 };
 /// A MAVLink link for poses (docs/poses.md, "MAVLink").
 struct MavlinkConfig {
-  bool dials = false;  // true (udpout): sonard sends first, and accepts only that address
+  bool dials = false;  // true (udpout): sonard sends first, and accepts messages only from `at`
   Endpoint at;
   std::string vehicle;
   std::uint8_t system_id = 0, component_id = 0;  // 0 = the ids of the first message
@@ -110,7 +110,7 @@ struct ControlConfig {
 /// Resource limits for clients.
 struct LimitConfig {
   int clients = 256;         // limit for all sonars together; SonarConfig::max_clients (16) is the limit for one sonar
-  int control_clients = 32;  // limit for the stream, and for HTTP
+  int control_clients = 32;  // limit for clients of the stream, and separately for those of HTTP
   int viewers = 8;           // limit for the viewers of the live view among the clients of HTTP
   std::size_t input_bytes_per_s = 1u << 20;      // limit for one client; above it reading slows down
   std::size_t pose_bytes_per_s = 2u << 20;       // limit for all pose connections together

@@ -88,7 +88,7 @@ FaultConfig read_faults(const Node& node, const std::vector<SonarConfig>& sonars
   if (plan.present()) config.plan_place = plan.location() + ": " + plan.path();
   for (const Node& item : plan.items(0, most_faults)) {
     FaultRecord record = read_record(item);
-    // Records without a name get a number, so that each can be ended by name.
+    // Records without a name get a numbered name, so that each fault can be ended by name.
     if (record.name.empty()) record.name = "plan-" + std::to_string(config.plan.size() + 1);
     const auto faults = check_fault(record, false);
     if (!faults) {

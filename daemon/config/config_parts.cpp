@@ -136,7 +136,7 @@ EngineConfig read_engine(const Node& node, const Switches& defaults) {
     bool& is_on = engine.switches.*part.is_on;
     const Node given = map.optional(part.name);
     is_on = given.choice_or<bool>(is_on, {{"on", true}, {"off", false}});
-    // A switch is refused if another switch, the mode or fixed_fan (which are read before it) makes it ineffective.
+    // A switch is refused if the mode or fixed_fan, which are read before the switches, makes it ineffective.
     const std::string why = why_without_effect(engine.switches, part);
     if (given.present() && is_on && !why.empty()) given.fail("has no effect: " + why + "; leave out one of them");
   }

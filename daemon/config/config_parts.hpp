@@ -23,7 +23,7 @@ Pose read_mount(const text::Node& node);
 Endpoint read_endpoint(const text::Node& node, bool is_listener);
 /// Reads `{lat, lon, alt}` of the world's origin; nullopt if absent.
 std::optional<Geodetic> read_origin(const text::Node& node);
-/// Reads one endpoint, or a list of links. `has_ranges`: poses.allow_from is given.
+/// Reads `off`, one endpoint, or a list of links. `has_ranges`: poses.allow_from is given.
 std::vector<MavlinkConfig> read_mavlink(const text::Node& node, bool has_ranges, const Config& config);
 /// Reads the keys for faults, and checks whether the sonars can have the faults of the plan.
 FaultConfig read_faults(const text::Node& node, const std::vector<SonarConfig>& sonars, const std::filesystem::path& directory);

@@ -71,18 +71,18 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
   if (!named.file) return plan;
   const motion::TrajectoryFile& f = *named.file;
   const std::string wanted = asked.empty() && f.bodies.size() > 1 ? body : asked;
-  const auto way = motion::trajectory_of(f, named.name, wanted);
-  if (!way) {
-    file.fail(way.error().text);
+  const auto trajectory = motion::trajectory_of(f, named.name, wanted);
+  if (!trajectory) {
+    file.fail(trajectory.error().text);
     return plan;
   }
-  plan.trajectory = *way;
+  plan.trajectory = *trajectory;
   for (const auto& one : f.bodies)
-    if (one.trajectory == *way) plan.largest_angle = one.largest_angle;
+    if (one.trajectory == *trajectory) plan.largest_angle = one.largest_angle;
   plan.origin = f.origin;
   plan.file = file.text(1024);
   plan.about = text::format("%s: %s, %s, %zu poses, %.3f s", plan.file.c_str(), std::string(name_of(f.format)).c_str(),
-                            std::string(name_of(f.frame)).c_str(), (*way)->size(), seconds((*way)->duration()));
+                            std::string(name_of(f.frame)).c_str(), (*trajectory)->size(), seconds((*trajectory)->duration()));
   if (f.unit != "seconds" || f.unit_by_steps) plan.about += ", stamps in " + std::string(f.unit);
   if (f.unit_by_steps) plan.about += " by their steps (a first line with names would define it: t_s x y z qx qy qz qw)";
   if (f.replaced > 0) plan.about += ", " + text::counted(f.replaced, "pose") + " replaced by the next of the same stamp";

@@ -25,7 +25,7 @@ inline constexpr std::array<std::string_view, 4> log_levels = {"debug", "info", 
 struct LogOptions {
   LogLevel level = LogLevel::info;
   bool json = false;
-  std::function<void(LogLevel, const std::string&)> sink;  // instead of stderr: tests
+  std::function<void(LogLevel, const std::string&)> sink;  // replaces stderr, for tests
 };
 
 enum class WhenFull { replace_oldest, drop_newest };

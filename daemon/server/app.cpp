@@ -133,7 +133,7 @@ void App::wait_for_signal() {
   signals_.async_wait([this](const error_code& ec, int signal) {
     if (ec) return;
     if (signal == SIGHUP && stopping_) {
-      on_change();  // look() may have cancelled before this coroutine waits again
+      on_change();  // look() may have cancelled the signals before this handler waits again
     } else if (signal == SIGHUP) {
       reload_.request();
     } else {
@@ -163,7 +163,7 @@ void App::stop(const std::string& why) {
   changes_.stop();
   fleet_.stop();
   recordings_.finish();
-  // At that time all clients are finished. Other work, such as a long computation, is abandoned.
+  // After stop_limit all clients are finished. Other work, such as a long computation, is abandoned.
   stop_timer_.expires_after(stop_limit);
   stop_timer_.async_wait([this](const error_code& ec) {
     if (ec) return;

@@ -56,7 +56,7 @@ struct EndPauses {
 struct Wake {
   ConnectionId connection = 0;
 };
-/// Complete the current message, send no other, and end the stream; on_closed() follows.
+/// Send the rest of the current message and the waiting replies, then end the stream; on_closed() follows.
 struct Finish {
   ConnectionId connection = 0;
   std::string why;

@@ -1,5 +1,5 @@
-// Operations of a running daemon. AppOperations carries them out; the stream server and the HTTP server of control only
-// translate. Used only in the I/O thread.
+// Operations of a running daemon. AppOperations carries them out; the stream server and the HTTP server of control only translate
+// requests and answers. Used only in the I/O thread.
 #pragma once
 
 #include <functional>

@@ -23,7 +23,7 @@ class ConnectionSlots {
 
   using Owner = std::function<std::string(const Connection&)>;
 
-  /// A connection with useful activity within `busy` is evicted only for an owner that has fewer connections.
+  /// A connection with useful activity within `busy` is evicted only for an owner that has at least two connections fewer.
   explicit ConnectionSlots(std::size_t most, Silence busy = std::chrono::seconds(1), Owner owner = {})
       : most_(most), busy_(busy), owner_(std::move(owner)) {}
   /// Returns true if a slot is free for a connection of `owner`. If necessary, calls `evicted` with a connection and then evicts

@@ -1,6 +1,6 @@
-// One HTTP client: requests one after the other, or a stream until it disconnects. read() parses requests and write() answers
-// them; an HttpService, the control server or an emulated sonar, makes the answers. Owned by the listener's slots and by its own
-// coroutines.
+// Serves one HTTP client: requests one after the other, or a stream until the client disconnects. read() parses requests and
+// write() answers them; an HttpService (of the control server or of an emulated sonar) makes the answers. The listener's slots
+// and the coroutines of the connection own it.
 #pragma once
 
 #include <functional>
@@ -44,7 +44,7 @@ class HttpConnection;
 class HttpService {
  public:
   virtual ~HttpService() = default;
-  /// `from` outlives the call. It may wait on from.wait_timer(), which ends with the connection.
+  /// `from` outlives the call. The service may wait on from.wait_timer(), which ends with the connection.
   virtual asio::awaitable<HttpOutcome> answer(const HttpRequest& request, HttpConnection& from) = 0;
   /// Returns the answer to a request that cannot be parsed, or for which no slot is free.
   virtual HttpAnswer refusal(const HttpRefusal& refusal) const = 0;

@@ -1,6 +1,6 @@
-// Limits the rate at which one client's bytes are read, and the work that the clients of one address cause: token buckets. Pure
-// arithmetic. After each read the Session waits for the returned pause, so that the excess bytes of a client wait in its own
-// kernel.
+// Limits the rate at which one client's bytes are read, and the work that the clients of one address cause, with token buckets
+// and without I/O. After each read the Session waits for the returned pause, so that the excess bytes of a client wait in the
+// client's kernel.
 #pragma once
 
 #include <algorithm>
@@ -97,7 +97,7 @@ class SharedRate {
   std::shared_ptr<const char> counted_ = std::make_shared<const char>('\0');  // its use count is the number of Parts + 1
 };
 
-/// Work in bytes. Measured: a byte costs at most 50 ns of the I/O thread, so the default rate uses at most 5 % of its time.
+/// Work in bytes. A byte was measured to cost at most 50 ns of the I/O thread, so the default rate uses at most 5 % of its time.
 namespace work {
 inline constexpr std::size_t of_connection = 1024, of_request = 512, of_upgrade = 32768;  // HTTP
 inline constexpr std::size_t of_frame = 64, of_control_frame = 512;                       // WebSocket

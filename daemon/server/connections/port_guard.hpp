@@ -45,7 +45,7 @@ class DatagramRate {
 
  private:
   static constexpr std::size_t all = 16384, of_dropped = 1;
-  static constexpr std::chrono::milliseconds least_pause{5};  // prevents that a flood sets a timer for each datagram
+  static constexpr std::chrono::milliseconds least_pause{5};  // so that a flood does not set a timer for each datagram
   std::size_t of_taken_;
   InputRate rate_{all};
 };

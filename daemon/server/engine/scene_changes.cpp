@@ -21,7 +21,7 @@ SceneChanges::SceneChanges(asio::io_context& io, Simulator& simulator, ScenePoin
       on_change_(std::move(on_change)),
       pause_(io) {
   asio::post(thread_, [nice_by] {
-    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // after a failure, this thread only disturbs other threads more
+    if (nice_by != 0 && ::nice(nice_by) == -1) return;  // if this fails, the thread keeps its priority
   });
 }
 

@@ -97,7 +97,7 @@ std::vector<Simulator::Job> Simulator::take_together() {
   return jobs;
 }
 
-/// Returns the job whose sonar has used the least time of the present engine; among equals, the job that has waited longest.
+/// Returns the job for the present engine whose sonar has used the least time; among equals, the job that has waited longest.
 std::list<Simulator::Job>::iterator Simulator::next_to_run() {
   auto best = waiting_.begin();
   for (auto it = waiting_.begin(); it != waiting_.end() && !it->engine; ++it)

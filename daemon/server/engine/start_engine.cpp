@@ -12,8 +12,8 @@ namespace sonar {
 
 namespace {
 
-// Bytes per triangle while the acceleration structure is built. Measured: 100 to 230; 36 for compact triangles that share
-// corners.
+// Bytes per triangle while the acceleration structure is built. Measurements gave 100 to 230, and 36 for compact triangles that
+// share corners.
 constexpr std::uint64_t memory_of_a_triangle = 250, memory_of_a_compact_triangle = 150;
 
 std::uint64_t memory_of_rays(const Scene& scene) {

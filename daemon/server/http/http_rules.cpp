@@ -32,7 +32,7 @@ std::optional<std::string> decoded(std::string_view text) {
   return out;
 }
 
-/// Removes the text up to `stop`, and `stop` itself.
+/// Removes the text up to `stop`, and `stop` itself. Returns the text before `stop`.
 std::string_view cut(std::string_view& rest, char stop) {
   const std::size_t end = std::min(rest.find(stop), rest.size());
   const std::string_view part = rest.substr(0, end);

@@ -23,7 +23,7 @@ void fill_effects(v1::FaultKind& out, const FaultKind& kind) {
       (*out.mutable_without_effect())[std::string(vendor->name())] = why;
 }
 
-/// Returns the event for which a fault waits if it was requested without a trigger; empty = none.
+/// Returns the event for which a fault that has not begun waits: its trigger `on`, else a ping; empty = none.
 std::string awaited(const Fault& fault) {
   constexpr std::array<const char*, occasion_names.size()> words = {"a connection", "new settings", "a status message",
                                                                     "the end of a connection"};

@@ -128,7 +128,7 @@ asio::awaitable<void> MavlinkServer::receive(Link& link) {
     udp::endpoint from;
     const std::size_t n = co_await link.socket.async_receive_from(asio::buffer(buffer), from, into(ec));
     if (stopping_) co_return;
-    if (ec) continue;  // after an ICMP answer, the port is not open yet
+    if (ec) continue;  // the error is an ICMP answer: the port of the other end is not open yet
     const auto now = std::chrono::steady_clock::now();
     const std::size_t work = work_of_datagram + work_of_byte * n;  // a frame has at least 12 bytes
     const bool taken = link.of_address.takes(from.address().to_string(), work, config_.limits.input_bytes_per_s, now);

@@ -5,7 +5,7 @@
 namespace sonar {
 namespace {
 constexpr auto wall_tolerance = std::chrono::milliseconds(1);
-constexpr auto longest_pause = std::chrono::seconds(5);  // between poses that count as arriving
+constexpr auto longest_pause = std::chrono::seconds(5);  // longest time between poses that count as arriving
 }  // namespace
 
 void PoseIntake::log_refusal(const std::string& why, const Sender& sender) {

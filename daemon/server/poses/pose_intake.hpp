@@ -24,11 +24,11 @@ class PoseIntake {
 
   /// Accepts or refuses a pose. Returns one sentence if it is refused, else an empty text.
   std::string take(control::PoseSample sample, const Sender& sender);
-  /// Places, shows or hides the moving object `body` of the world. Returns like take().
+  /// Places, shows or hides the moving object `body` of the world. Returns a refusal, as take() does.
   std::string place(const control::SetObject& asked, std::size_t body, const Sender& sender);
-  /// Pauses, seeks or plays a trajectory. Returns like take().
+  /// Pauses, seeks or plays a trajectory. Returns a refusal, as take() does.
   std::string steer(const control::SetTrajectory& asked, const Sender& sender);
-  /// The source of a vehicle's poses while they arrive, else empty.
+  /// Returns the source of a vehicle's poses while they arrive, else empty.
   std::string_view live_source(const std::string& vehicle) const;
   /// Counts and logs an invalid pose message.
   void refuse(const std::string& why, const Sender& sender);

@@ -20,7 +20,7 @@ class WriterThread {
   /// `nice_by` is added to the niceness of the thread; `on_idle` is called after the last job, on the I/O thread.
   WriterThread(asio::io_context& io, int nice_by, std::function<void()> on_idle = {}) : io_(io), on_idle_(std::move(on_idle)) {
     asio::post(thread_, [nice_by] {
-      if (nice_by != 0 && ::nice(nice_by) == -1) return;  // after a failure, this thread only disturbs other threads more
+      if (nice_by != 0 && ::nice(nice_by) == -1) return;  // if this fails, the thread keeps its priority
     });
   }
   /// Waits until all jobs are done.

@@ -36,8 +36,8 @@ Result<void> Device::open() {
   return open_observers();
 }
 
-/// Opens a port. Each kind of port has its own listener or socket, but streams and dialogues share a datagram socket if their
-/// numbers are equal.
+/// Opens a port, with its own listener or socket. But ports of kind udp_stream, udp_dialogue and udp_answer with equal numbers
+/// share a socket.
 Result<void> Device::open(const protocol::Port& port) {
   using Kind = protocol::Port::Kind;
   const Ipv4 ip = config().bind_ip;

@@ -68,7 +68,7 @@ struct StreamDigest {
   std::string sha256;
 };
 
-/// Outcome of a connection attempt.
+/// A refused or ended connection, or a search for the sonar.
 struct Visit {
   std::string address, why;
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();

@@ -111,7 +111,7 @@ bool Fleet::is_held(Ipv4 ip) const {
   });
 }
 
-/// Sets the mount and vehicle of the new configuration for sonars that continue; returns the sonars to open.
+/// Stops removed sonars, and sets mount and vehicle of the sonars that continue. Returns the sonars to open.
 std::vector<Fleet::Opening> Fleet::sort_out(const Config& now, const Config& next, Outcomes& outcomes) {
   std::vector<Opening> openings;
   for (auto it = devices_.begin(); it != devices_.end();) {

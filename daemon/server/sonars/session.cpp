@@ -56,9 +56,9 @@ Session::Session(SessionParent& parent, tcp::socket socket, const Setup& setup)
 }
 
 // A session has three coroutines on the I/O thread: read() passes bytes to the sonar, write() takes messages from the outbox,
-// watch() ends the session of a client that reads nothing or is silent. It is first serving, then finishing_ (the last message,
-// then FIN), then over_ (the socket is closed). Each coroutine tests over_ after every wait, because another coroutine may have
-// ended the session.
+// watch() ends the session of a client that reads nothing or is silent. A session is first serving, then finishing_ (the last
+// messages, then FIN), then over_ (the socket is closed). Each coroutine tests over_ after every wait, because another coroutine
+// may have ended the session.
 void Session::start() {
   spawn(&Session::read);
   spawn(&Session::write);
@@ -228,7 +228,7 @@ void Session::send_fin() {
   wake_watch_.cancel();
 }
 
-/// Writes whole messages one by one. If none waits, it waits for wake(); when finishing_, it sends FIN and no further message.
+/// Writes whole messages one by one. If none waits, it waits for wake() or, when finishing_, sends FIN.
 asio::awaitable<void> Session::write() {
   const auto self = shared_from_this();
   while (!over_) {
@@ -291,8 +291,8 @@ bool Session::is_silent(Steady::time_point now) const {
   return longest && reading_ && now - received_at_ > *longest && socket_.available(ec) == 0;
 }
 
-/// Begins an orderly end: the current message is completed, then FIN is sent; the client may still close first. All four waits
-/// are cancelled, so that each coroutine checks `finishing_`.
+/// Begins an orderly end: write() sends the current message and waiting replies, then FIN; the client may still close first. All
+/// four waits are cancelled, so that each coroutine checks `finishing_`.
 void Session::finish(std::string why) {
   if (over_ || finishing_) return;
   finishing_ = true;

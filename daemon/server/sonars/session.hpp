@@ -41,7 +41,7 @@ class SessionParent {
   /// Called when the host of a stream has been silent for half of longest_silence(), so that the parent can check whether the
   /// host is alive.
   virtual void look_for_host(ConnectionId stream) = 0;
-  /// Reports that the session will end after the current message.
+  /// Reports that the session will end after the current message and waiting replies.
   virtual void on_finish(ConnectionId session) = 0;
   /// Reports that an exception ended a coroutine; on_over follows.
   virtual void on_fault(const std::string& what) = 0;
@@ -72,13 +72,13 @@ class Session : public std::enable_shared_from_this<Session> {
   void start();
   /// Call it when there is a message to write.
   void wake();
-  /// Completes the current message without pauses, then sends FIN. Resets a client that does not receive the message in time.
+  /// Sends the current message without pauses, waiting replies, and FIN. Resets a client that does not receive them in time.
   void finish(std::string why);
   /// Ends the connection at once with RST.
   void reset(std::string why);
-  /// Starts or stops reading. With `on` false the client's bytes stay in the buffers of the kernels. Writes the rest of the
-  /// current message without pauses.
+  /// Writes the rest of the current message without pauses.
   void end_pauses();
+  /// Starts or stops reading. With `on` false the client's bytes stay in the buffers of the kernels.
   void read_from_client(bool on);
   /// Ends the session if the peer has closed and every byte from it has been read.
   void end_if_closed();

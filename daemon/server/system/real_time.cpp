@@ -39,7 +39,7 @@ void compute_apart(const std::function<void()>& work) {
   std::exception_ptr fault;
   std::thread([&] {
     if (::nice(background_niceness) == -1) {
-      // On Linux niceness belongs to the thread; after a failure, this thread only disturbs others more.
+      // On Linux niceness belongs to the thread. If setting it fails, the thread keeps its priority.
     }
     try {
       work();

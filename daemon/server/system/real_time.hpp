@@ -6,8 +6,8 @@
 
 namespace sonar {
 
-/// Niceness of the threads that compute pings, so that the I/O thread has priority over them. Higher values would be too high: at
-/// +10, other busy programs would get nine tenths of a shared core.
+/// Niceness of the threads that compute pings, so that the I/O thread has priority over them. With a much higher value the
+/// threads would get too little time: at +10, other busy programs would get nine tenths of a shared core.
 inline constexpr int compute_niceness = 1;
 /// Niceness of threads for which no ping waits: building a scene, recording.
 inline constexpr int background_niceness = 10;

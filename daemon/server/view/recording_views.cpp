@@ -362,7 +362,7 @@ bool RecordingViews::Seen::steer_playback(Viewer& viewer, const foxglove::Playba
 }
 
 RecordingViews::RecordingViews(asio::io_context& io, Log& log) : io_(io), log_(log) {
-  asio::post(thread_, [] { [[maybe_unused]] const int niceness = ::nice(5); });  // a failure costs only smoothness
+  asio::post(thread_, [] { [[maybe_unused]] const int niceness = ::nice(5); });  // if this fails, the thread keeps its priority
 }
 
 RecordingViews::~RecordingViews() {

@@ -10,10 +10,10 @@ namespace sonar {
 namespace {
 
 constexpr double longest_gap_s = 10;  // longest time between two compared statuses; without viewers no status is read
-constexpr auto failures_told = std::chrono::seconds(8);
+constexpr auto failures_counted_for = std::chrono::seconds(8);
 constexpr std::size_t most_bytes = 256 << 10;  // limit for a table of the kernel, which takes a millisecond to read
 
-/// Returns an empty string if the file cannot be read.
+/// Returns the beginning of a file, up to most_bytes; empty if the file cannot be read.
 std::string content_of(const char* file) {
   std::string text(most_bytes, '\0');
   std::ifstream in(file);
@@ -52,7 +52,7 @@ doctor::Elsewhere ViewDoctor::look_elsewhere() {
     return {};
   }
   failed_.emplace_back(looked_at_, doctor::failed_attempts(content_of("/proc/net/snmp")));
-  while (looked_at_ - failed_.front().first > failures_told) failed_.pop_front();
+  while (looked_at_ - failed_.front().first > failures_counted_for) failed_.pop_front();
   return {doctor::parse_proc_net(content_of("/proc/net/tcp") + content_of("/proc/net/tcp6")),
           failed_.back().second - failed_.front().second};
 }

@@ -30,7 +30,7 @@ void advertise(Viewer& viewer, std::span<const foxglove::Channel> channels) {
 }  // namespace
 
 ViewFeed::ViewFeed(const Viewed& of) : of_(of), timer_(of.io) {
-  asio::post(thread_, [] { [[maybe_unused]] const int niceness = ::nice(5); });  // a failure costs only smoothness
+  asio::post(thread_, [] { [[maybe_unused]] const int niceness = ::nice(5); });  // if this fails, the thread keeps its priority
   tf_ = add_channel("/tf", "foxglove.FrameTransforms", ChannelKind::last_value, places_hz);
   scene_ = add_channel("/scene", "foxglove.SceneUpdate", ChannelKind::last_value);
   swath_ = add_channel("/swath", "foxglove.SceneUpdate", ChannelKind::last_value);
