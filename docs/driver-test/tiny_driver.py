@@ -1,4 +1,4 @@
-"""A minimal driver: connects, requests pings, prints one JSON line for each. Replace it by yours in test_driver.py.
+"""A minimal driver: connects, requests pings, prints one JSON line per ping. Replace it with yours in test_driver.py.
 
 usage: tiny_driver.py ADDRESS
 """
@@ -14,7 +14,7 @@ RESULT = struct.Struct("<IIddddIBdHHIII")  # version 1, from byte 53
 
 
 def fire_message():
-    # Mode 2, 10 Hz, gamma 127; flags: metres, gain as asked, simple results, 512 beams; 10 m, 20 %, salinity 30.
+    # Mode 2, 10 Hz, gamma 127; flags: metres, gain as requested, simple results, 512 beams; 10 m, 20 %, salinity 30.
     body = FIRE.pack(2, 0, 255, 127, 0x59, 10.0, 20.0, 0.0, 30.0)
     return HEADER.pack(0x4F53, 0, 0, 0x15, 0, len(body), 0) + body
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds a vehicle above the bed by DISTANCE_SENSOR, as an autopilot does: docs/poses.md, "Distances".
+"""Holds a vehicle above the bed with DISTANCE_SENSOR messages, as an autopilot does: docs/poses.md, "Distances".
 
 `sonard run depth_hold.yaml` sends the distances to this program, which answers with poses.
     depth_hold.py [--listen 127.0.0.1:14552] [--sonard 127.0.0.1] [--altitude 2] [--steps 300]
