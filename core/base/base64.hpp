@@ -25,7 +25,7 @@ inline std::string base64(std::span<const std::byte> bytes) {
   return text;
 }
 
-/// The bytes of a text with or without padding; nullopt if it has other characters, or an impossible length.
+/// Returns the bytes of a text with or without padding, or nullopt if the text has other characters or an impossible length.
 inline std::optional<std::string> from_base64(std::string_view text) {
   while (text.ends_with('=')) text.remove_suffix(1);
   if (text.size() % 4 == 1) return std::nullopt;

@@ -10,7 +10,7 @@
 
 namespace sonar {
 
-/// A file in memory, without a name. It is deleted when the last process closes it.
+/// A file in memory, without a path. It is deleted when the last process closes it.
 class MemoryFile {
  public:
   static Result<MemoryFile> make(const char* name);
@@ -27,7 +27,7 @@ class MemoryFile {
 
 struct ChildEnd {
   int signal = 0;     // signal that ended the program; 0 = it exited
-  int exit_code = 0;  // exit code of the program; -1: unknown, because this process ignores its children
+  int exit_code = 0;  // exit code of the program; -1: unknown, because this process ignores SIGCHLD
 };
 
 /// Runs the program and waits until it ends. The program gets `arguments`, the environment and working folder of this process,

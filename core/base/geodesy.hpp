@@ -21,7 +21,7 @@ inline constexpr double earth_semi_major_m = 6378137.0;        // WGS84 (NIMA TR
 inline constexpr double earth_flattening = 1 / 298.257223563;  // source: the same table
 inline constexpr double earth_eccentricity_squared = earth_flattening * (2 - earth_flattening);
 
-/// Earth-centred, earth-fixed [m]: x through latitude 0 longitude 0, z through the north pole.
+/// Returns earth-centred, earth-fixed coordinates [m]; x points to latitude 0, longitude 0, z to the north pole.
 inline Vec3d ecef_from(const Geodetic& place) {
   const double s = std::sin(place.latitude_rad), c = std::cos(place.latitude_rad);
   const double normal_m = earth_semi_major_m / std::sqrt(1 - earth_eccentricity_squared * s * s);
@@ -30,14 +30,14 @@ inline Vec3d ecef_from(const Geodetic& place) {
           (normal_m * (1 - earth_eccentricity_squared) + place.altitude_m) * s};
 }
 
-/// The axes east, north, up at a position, expressed in earth-centred axes.
+/// Returns the pose of the axes east, north, up at a position, expressed in earth-centred axes.
 inline Pose enu_in_ecef(const Geodetic& place) {
-  const Quatd about_z = turned_by({0, 0, place.longitude_rad + pi / 2});  // x turns east
-  const Quatd about_x = turned_by({pi / 2 - place.latitude_rad, 0, 0});   // z turns up
+  const Quatd about_z = turned_by({0, 0, place.longitude_rad + pi / 2});  // x then points east
+  const Quatd about_x = turned_by({pi / 2 - place.latitude_rad, 0, 0});   // z then points up
   return {ecef_from(place), about_z * about_x};
 }
 
-/// The pose of the axes east, north, up at `place`, expressed in the axes at `origin`. Its rotation is small.
+/// Returns the pose of the axes east, north, up at `place`, expressed in those at `origin`. Near it, the rotation is small.
 inline Pose enu_in_enu_of(const Geodetic& origin, const Geodetic& place) {
   return compose(inverse(enu_in_ecef(origin)), enu_in_ecef(place));
 }
@@ -52,16 +52,16 @@ struct UtmZone {
   bool operator==(const UtmZone&) const = default;
 };
 
-/// The name of the zone: "33N", "33S".
+/// Returns the name of the zone: "33N", "33S".
 std::string text_of(UtmZone zone);
 /// Reads "33N" or "33 south"; returns nullopt for any other text.
 std::optional<UtmZone> utm_zone_from(std::string_view text);
-/// The zone that contains a position, without the exceptions for Norway and Svalbard.
+/// Returns the zone that contains a position, without the exceptions for Norway and Svalbard.
 UtmZone utm_zone_at(const Geodetic& place);
 
-/// True if the coordinates [m] can lie in a zone or in the usual margin around it.
+/// True if the coordinates [m] are in the ranges of a zone, or at most 500 km outside.
 bool are_utm(double easting_m, double northing_m);
-/// The position on the ellipsoid with these coordinates [m].
+/// Returns the position on the ellipsoid with these coordinates [m].
 Geodetic geodetic_from_utm(UtmZone zone, double easting_m, double northing_m);
 
 }  // namespace sonar

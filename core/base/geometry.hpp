@@ -36,7 +36,7 @@ inline constexpr double pi = 3.14159265358979323846;
 SONAR_HD constexpr double rad_from_deg(double deg) { return deg * (pi / 180.0); }
 SONAR_HD constexpr double deg_from_rad(double rad) { return rad * (180.0 / pi); }
 
-// These are written by hand, because C++17 has no defaulted comparison.
+// The comparisons are written by hand, because C++17 has no defaulted ones.
 SONAR_HD constexpr bool operator==(Vec3 a, Vec3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 SONAR_HD constexpr bool operator==(Vec3d a, Vec3d b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 SONAR_HD constexpr bool operator==(Quatd a, Quatd b) { return a.w == b.w && a.x == b.x && a.y == b.y && a.z == b.z; }
@@ -92,7 +92,7 @@ SONAR_HD constexpr Pose inverse(const Pose& a_in_b) {
   const Quatd q = conjugate(a_in_b.orientation);
   return {rotate(q, Vec3d{-a_in_b.position_m.x, -a_in_b.position_m.y, -a_in_b.position_m.z}), q};
 }
-/// The point `p_in_a` expressed in b.
+/// Returns the point `p_in_a` expressed in b.
 SONAR_HD constexpr Vec3d transform(const Pose& a_in_b, Vec3d p_in_a) {
   return a_in_b.position_m + rotate(a_in_b.orientation, p_in_a);
 }
@@ -123,7 +123,7 @@ SONAR_HD constexpr Rotation transposed(const Rotation& r) {
   return t;
 }
 
-/// The rotation about the direction of the vector by its length [rad].
+/// Returns the rotation about the vector through an angle equal to the vector's length [rad].
 SONAR_HD inline Quatd turned_by(Vec3d rotation_rad) {
   const double angle = length(rotation_rad);
   const double part = angle > 0 ? std::sin(angle / 2) / angle : 0.5;
@@ -160,7 +160,7 @@ SONAR_HD inline Pose enu_flu_from_ned_frd(const Pose& p) {
 SONAR_HD inline Pose flu_from_frd(const Pose& p) {
   return {flu_from_frd(p.position_m), Quatd{p.orientation.w, p.orientation.x, -p.orientation.y, -p.orientation.z}};
 }
-/// Compass heading [rad], clockwise from north (world +y), of a body-to-world orientation.
+/// Returns the compass heading [rad], clockwise from north (world +y), of a body-to-world orientation.
 SONAR_HD inline double heading_rad(Quatd body_in_world) {
   const Vec3d ahead = rotate(body_in_world, Vec3d{1, 0, 0});
   const double h = std::atan2(ahead.x, ahead.y);

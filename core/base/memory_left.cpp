@@ -11,14 +11,14 @@ namespace {
 
 using std::filesystem::path;
 
-/// The number in a file that contains only a number; nullopt for the word "max".
+/// Returns the number at the start of a file; nullopt if there is none, as with the word "max".
 std::optional<std::uint64_t> number_in(const path& file) {
   std::ifstream in(file);
   std::uint64_t number = 0;
   return in >> number ? std::optional(number) : std::nullopt;
 }
 
-/// The number that follows a word at the beginning of a line; 0 if no line begins with the word.
+/// Returns the number that follows a word at the beginning of a line; 0 if no line begins with the word.
 std::uint64_t number_after(const path& file, const std::string& word) {
   std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
@@ -35,7 +35,7 @@ struct Names {  // files of one version of control groups
 constexpr Names version_1{"memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file "};
 constexpr Names version_2{"memory.max", "memory.current", "inactive_file "};
 
-/// Minimum of the memory left to a control group and to its parents, as far as this process can read them.
+/// Returns the minimum of the memory left to a control group and to its parents, as far as this process can read them.
 std::optional<std::uint64_t> left_of_groups(const path& mount, path group, const Names& names) {
   std::optional<std::uint64_t> least;
   for (group = group.relative_path();; group = group.parent_path()) {

@@ -36,8 +36,8 @@ inline ImplausibleAngle angle_beyond_radians(const RollPitchYaw& a, bool counts_
 /// anywhere, jumps after a turn, and changes 57 times as fast.
 class TurnCount {
  public:
-  /// Adds the yaw of a pose; poses must be in the order of time. Returns false if this yaw cannot follow from that of the
-  /// previous pose.
+  /// Adds the yaw of a pose; poses must be in the order of time. Returns false if this yaw begins a new series: it is the first
+  /// one, or a vehicle cannot have turned to it.
   bool add(double yaw_rad, Time at) {
     const bool goes_on = last_ && is_turn(yaw_rad, at);
     if (!goes_on) {

@@ -20,10 +20,10 @@ Result<void> flush_standard_output();
 
 // Makes room for the stacks of a program, because a program whose stack reaches its limit ends without a message.
 
-constexpr std::size_t usual_stack_bytes = std::size_t{8} << 20;  // the limit that systems set
+constexpr std::size_t usual_stack_bytes = std::size_t{8} << 20;  // the usual limit of systems
 
-/// Raises the limit of the main thread's stack to the usual size, as far as the hard limit permits, and gives new threads the
-/// usual size. Call it first in main(). Error: unavailable if the hard limit leaves too little.
+/// Raises the limit of the main thread's stack to the usual size, as far as the hard limit permits, and that of new threads if
+/// it is below 1 MiB. Call it before threads start. Error: unavailable if the hard limit is too low.
 Result<void> make_room_for_stacks();
 
 }  // namespace sonar

@@ -57,7 +57,7 @@ enum class Domain : std::uint32_t {
   relief_gradient = 0x67726164u,  // seabed and rocks; used as the key's high word, not combined
 };
 
-/// Makes the key of one stream of draws.
+/// The key of one stream of draws.
 struct RandomKey {
   std::uint32_t low = 0, high = 0, domain = 0;
 };
@@ -69,10 +69,10 @@ SONAR_HD constexpr Random4 philox(std::uint32_t c0, std::uint32_t c1, std::uint3
   return philox(c0, c1, c2, key.domain, key.low, key.high);
 }
 
-/// A number in (0, 1): never 0, so that its logarithm is finite.
+/// Returns a number in (0, 1): never 0, so that its logarithm is finite.
 SONAR_HD constexpr float uniform_open(std::uint32_t bits) { return (static_cast<float>(bits >> 9) + 0.5f) * (1.0f / 8388608.0f); }
 
-/// Circular complex Gaussian with E|z|^2 = 1 (Box-Muller).
+/// Returns a circular complex Gaussian number with E|z|^2 = 1 (Box-Muller).
 SONAR_HD inline ComplexNormal complex_normal(std::uint32_t a, std::uint32_t b) {
   const float radius = std::sqrt(-std::log(uniform_open(a)));
   const float angle = 6.28318530717958647692f * uniform_open(b);

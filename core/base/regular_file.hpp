@@ -1,6 +1,6 @@
 // Opens files named by configurations, scenes and users, but only regular files. Opening a FIFO can block forever. Reading a
-// device may never end, or may start an action. Recordings (protocol/recorded/byte_source.cpp) follow the same rule. Checks
-// whether a folder can be written, too.
+// device may never end, or may start an action. Recordings (protocol/recorded/byte_source.cpp) follow the same rule. The last
+// function checks whether files can be created in a folder.
 #pragma once
 
 #include <cstddef>
@@ -25,11 +25,11 @@ bool is_absent(const std::filesystem::path& file);
 /// Opens a file for reading in binary mode. Error: missing_file if it does not exist or is not a regular file ("x.png: is a
 /// FIFO, not a regular file").
 Result<OpenFile> open_regular(const std::filesystem::path& file);
-/// Reads at most `most_bytes` + 1 bytes of the file, so that the caller can detect a file that is too long. Errors: io if
-/// reading fails, unavailable if there is too little memory.
+/// Reads at most `most_bytes` + 1 bytes of the file, so that the caller can detect a file that is too long. Errors: those of
+/// open_regular(), io if reading fails, unavailable if there is too little memory.
 Result<std::string> read_regular(const std::filesystem::path& file, std::size_t most_bytes);
 
-/// open() for writing, without the wait for the reader of a FIFO. Returns -1 on failure; errno then has the reason, and
+/// Opens a file for writing, without waiting for the reader of a FIFO. Returns -1 on failure; errno then has the reason, and
 /// why_not_written() explains it.
 int open_to_write(const std::filesystem::path& file, int flags);
 std::string why_not_written(const std::filesystem::path& file, int error);
@@ -39,11 +39,11 @@ std::string why_not_written(const std::filesystem::path& file, int error);
 
 /// After this call, open_regular() opens only files whose real path is below `folder`. Call it once, before threads start.
 void confine_reads(const std::filesystem::path& folder);
-/// The folder passed to confine_reads(); empty if every file may be read.
+/// Returns the folder passed to confine_reads(), or an empty path if every file may be read.
 const std::filesystem::path& readable_folder();
 
-/// The reason why files cannot be created in the folder, such as "is not a folder". It follows the folder's name in an error.
-/// Empty = files can be created. The check writes nothing.
+/// Returns why files cannot be created in the folder, such as "is not a folder", to follow the folder's name in an error.
+/// Returns an empty text if files can be created. The check writes nothing.
 std::string why_no_files_in(const std::filesystem::path& folder);
 
 }  // namespace sonar

@@ -1,4 +1,4 @@
-// Result<T>: a value or an error. It is the return type of functions that can fail for an outside cause. See
+// Result<T>: a value or an error. It is the return type of functions that can fail for a cause outside the program. See
 // docs/architecture.md, "Errors".
 #pragma once
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Rgb head_colour{79, 184, 255};
 constexpr double waterfall_shape = 0.75;  // height divided by width
-constexpr double closest_marks = 0.06;    // of the height
+constexpr double closest_marks = 0.06;    // as a fraction of the height
 constexpr float not_measured = -1;
 
 /// The number of rows that fill the height of a waterfall.

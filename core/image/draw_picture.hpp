@@ -26,7 +26,7 @@ std::vector<TimeMark> time_marks(const SonarPicture& waterfall);
 class PicturePainter {
  public:
   explicit PicturePainter(FanStyle style) : style_(style), fan_(std::move(style)) {}
-  /// Draws the picture. Errors: as draw_fan.
+  /// Draws the picture. Returns the same errors as draw_fan().
   Result<Raster> draw(const SonarPicture& picture);
 
  private:

@@ -1,4 +1,4 @@
-// A picture in memory: RGB pixels, row 0 at the top, and functions that draw lines and texts on it. write_png writes either a
+// A picture in memory: RGB pixels, row 0 at the top, and functions that draw pixels and texts on it. write_png writes either a
 // complete file or no file.
 #pragma once
 
@@ -29,7 +29,7 @@ struct Raster {
 /// Mixes `colour` over a pixel. Pixels outside the picture are ignored.
 void blend(Raster& raster, int x, int y, Rgb colour, float opacity);
 
-/// Draws digits, '.', '-' and 'm' in a 3 x 5 font, with dots of `scale` pixels; other characters are blank.
+/// Draws digits, '.', '-', 'm' and 's' in a 3 x 5 font, with dots of `scale` pixels; other characters are blank.
 void draw_text(Raster& raster, int left, int top, std::string_view text, Rgb colour, int scale);
 int text_width(std::string_view text, int scale);
 
@@ -46,7 +46,7 @@ Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
 
 // Writes 8-bit or 16-bit integers, such as samples and labels, as grey PNG files without a colour map.
 
-/// Little-endian values, `bits` / 8 bytes each, [height][width]; 8 or 16 bits. Equal values give equal bytes.
+/// Encodes little-endian values, `bits` / 8 bytes each, [height][width]; 8 or 16 bits. Equal values give equal bytes.
 Result<std::vector<std::byte>> encode_gray_png(std::span<const std::byte> values, int width, int height, int bits);
 
 }  // namespace sonar

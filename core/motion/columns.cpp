@@ -20,9 +20,9 @@ constexpr std::array<std::pair<int, std::string_view>, 4> units{
 constexpr std::size_t longest_quoted = 40, longest_name = 64;
 
 /// The error in a line; empty for a valid line.
-using Complaint = std::optional<std::string>;
+using LineError = std::optional<std::string>;
 
-Complaint not_a_number(std::string_view word, const char* what = "a number") {
+LineError not_a_number(std::string_view word, const char* what = "a number") {
   return in_quotes(word) + " is not " + what + std::string(text::number_hint(word));
 }
 
@@ -133,7 +133,7 @@ Columns Columns::kitti() {
   return c;
 }
 
-Complaint Columns::refuse_header(const Words& header, Columns& out) {
+LineError Columns::refuse_header(const Words& header, Columns& out) {
   out = Columns();
   out.count_ = header.size();
   bool has_degrees = false;
@@ -162,7 +162,7 @@ Complaint Columns::refuse_header(const Words& header, Columns& out) {
   return out.refuse_set();
 }
 
-Complaint Columns::refuse_set() const {
+LineError Columns::refuse_set() const {
   if (!has(t) && !has(t_ns)) return "column t_s is missing";
   if (has(t) && has(t_ns)) return "give the time once: t_s or t_ns";
   for (const Column c : {x, y, z})
@@ -179,7 +179,7 @@ Complaint Columns::refuse_set() const {
   return std::nullopt;
 }
 
-Complaint Columns::refuse_vector(const Words& words, Column first, const char* what, Vec3d& out) const {
+LineError Columns::refuse_vector(const Words& words, Column first, const char* what, Vec3d& out) const {
   double* const parts[3] = {&out.x, &out.y, &out.z};
   for (int i = 0; i < 3; ++i) {
     const std::string_view text = word(words, static_cast<Column>(first + i));
@@ -213,7 +213,7 @@ std::string_view Columns::unit() const {
   return std::find_if(units.begin(), units.end(), [&](const auto& unit) { return unit.first == power_; })->second;
 }
 
-Complaint Columns::refuse_stamp(const Words& words, Row& out) const {
+LineError Columns::refuse_stamp(const Words& words, Row& out) const {
   const std::string_view text = word(words, has(t) ? t : t_ns);
   const auto stamp = nanoseconds_of(text, power_);
   if (!stamp) return not_a_number(text, ("a time in " + std::string(unit())).c_str());
@@ -221,9 +221,9 @@ Complaint Columns::refuse_stamp(const Words& words, Row& out) const {
   return std::nullopt;
 }
 
-Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
+LineError Columns::refuse_orientation(const Words& words, Row& out) const {
   std::array<double, 4> v{};
-  const auto fill = [&](std::initializer_list<Column> group) -> Complaint {
+  const auto fill = [&](std::initializer_list<Column> group) -> LineError {
     std::size_t i = 0;
     for (const Column c : group) {
       // Angles without a column are 0. Quaternions always have all four columns.
@@ -252,7 +252,7 @@ Complaint Columns::refuse_orientation(const Words& words, Row& out) const {
   return std::nullopt;
 }
 
-Complaint Columns::refuse_matrix(const Words& words, Row& out) const {
+LineError Columns::refuse_matrix(const Words& words, Row& out) const {
   std::array<double, 12> v{};
   for (std::size_t i = 0; i < v.size(); ++i) {
     const auto value = number(words[i]);
@@ -268,7 +268,7 @@ Complaint Columns::refuse_matrix(const Words& words, Row& out) const {
   return std::nullopt;
 }
 
-Complaint Columns::refuse(const Words& words, Row& out) const {
+LineError Columns::refuse(const Words& words, Row& out) const {
   if (matrix_) return refuse_matrix(words, out);
   if (auto wrong = refuse_stamp(words, out)) return wrong;
   if (auto wrong = refuse_vector(words, x, "the position", out.pose.position_m)) return wrong;

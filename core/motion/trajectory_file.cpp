@@ -92,7 +92,7 @@ struct Track {
 
 class Reader {
  public:
-  Reader(const std::string& name, const ReadOptions& asked) : name_(name), asked_(asked), format_(asked.format) {}
+  Reader(const std::string& name, const ReadOptions& options) : name_(name), options_(options), format_(options.format) {}
 
   Result<TrajectoryFile> run(std::string_view text) {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // a byte order mark
@@ -134,7 +134,7 @@ class Reader {
     if (const auto wrong = columns_->refuse(words_, row)) return set_error(*wrong);
     if (format_ == Format::kitti) {
       // Each time [ns] is computed from the line number, because a sum of intervals would drift.
-      const double stamp_ns = static_cast<double>(rows_) * 1e9 / *asked_.rate_hz;
+      const double stamp_ns = static_cast<double>(rows_) * 1e9 / *options_.rate_hz;
       if (stamp_ns > static_cast<double>(farthest_stamp_ns)) return set_error("the time is beyond 146 years");
       row.stamp_ns = std::llround(stamp_ns);
     }
@@ -174,7 +174,7 @@ class Reader {
     const bool numbers = is_number(words_.front());
     if (format_ == Format::automatic) format_ = guessed(numbers);
     if (!wrong_.empty()) return false;
-    if (asked_.rate_hz && format_ != Format::kitti) set_error("the lines have times; remove rate_hz");
+    if (options_.rate_hz && format_ != Format::kitti) set_error("the lines have times; remove rate_hz");
     switch (format_) {
       case Format::tum:
         columns_ = Columns::tum();
@@ -185,7 +185,7 @@ class Reader {
         columns_ = Columns::euroc(words_.size());
         return false;
       case Format::kitti:
-        if (!(asked_.rate_hz.value_or(0) > 0))
+        if (!(options_.rate_hz.value_or(0) > 0))
           set_error("KITTI lines have no time; give the number of lines per second (rate_hz or --pose-rate)");
         columns_ = Columns::kitti();
         return false;
@@ -236,9 +236,9 @@ class Reader {
     if (!frame) return set_error("the frame must be ENU_FLU or NED_FRD");
     // Contradictory frames are an error, because the frame that the file states must not be ignored silently.
     if (frame_.value_or(*frame) != *frame) return set_error("an earlier comment names another frame; a file has one frame");
-    if (asked_.frame.value_or(*frame) != *frame)
+    if (options_.frame.value_or(*frame) != *frame)
       return set_error("the file states the frame " + std::string(name_of(*frame)) + ", but " +
-                       std::string(name_of(*asked_.frame)) + " was requested");
+                       std::string(name_of(*options_.frame)) + " was requested");
     frame_ = frame;
   }
 
@@ -275,7 +275,7 @@ class Reader {
   void check_whole_file() {
     if (tracks_.empty()) {
       wrong_ = name_ + ": the file has no poses; write one pose per line (docs/poses.md)";
-    } else if (!frame_ && !asked_.frame) {
+    } else if (!frame_ && !options_.frame) {
       wrong_ = name_ +
                ": the file does not state the frame of its poses; begin it with a line \"# frame: ENU_FLU\" or \"# frame: "
                "NED_FRD\", or give the frame with the file's name (docs/poses.md)";
@@ -285,7 +285,7 @@ class Reader {
   TrajectoryFile finished() {
     TrajectoryFile file;
     file.format = format_;
-    file.frame = frame_ ? *frame_ : *asked_.frame;
+    file.frame = frame_ ? *frame_ : *options_.frame;
     // Times of all bodies count from the earliest time in the file.
     Ns first = tracks_.front().points.times.front(), last = first;
     for (const Track& t : tracks_) {
@@ -315,7 +315,7 @@ class Reader {
   }
 
   const std::string& name_;
-  const ReadOptions& asked_;
+  const ReadOptions& options_;
   Format format_;
   std::optional<Frame> frame_;
   std::optional<Geodetic> origin_;

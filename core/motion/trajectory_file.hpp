@@ -42,7 +42,7 @@ struct TrajectoryFile {
   Ns duration{0};                       // time from the earliest to the latest stamp of the file
   std::size_t replaced = 0;             // poses that were replaced by a later line with the same stamp
   std::string_view unit = "seconds";    // unit of the stamps in the file
-  bool unit_by_steps = false;           // neither the file nor its format names the unit: it is guessed from the steps
+  bool unit_by_steps = false;  // true: the file does not name the unit, and the steps show another than is usual for the format
 };
 
 /// Reads a trajectory file. Comments in the file can state the frame, `# frame: NED_FRD`, and the position of 0, 0, 0 in degrees,

@@ -12,7 +12,7 @@ namespace {
 
 /// The delay divided by the record's length. The record begins at the near edge of the picture.
 double turns_of(double range_m, const Prepared& p, const PingScalars& s) {
-  // The delay in periods of the record, because the sum over frequencies of P25 (its eq. 4) repeats after T.
+  // The delay in periods of the record, because the sum over frequencies of Choi 2025 (its eq. 4) repeats after T.
   return (range_m * s.samples_per_m - p.plan.start_samples) / p.plan.samples;
 }
 

@@ -18,11 +18,11 @@ class ComparisonEngine {
   ComparisonEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options, paper::FrequencySum sum)
       : rays_(scene, pool.threads()), scene_(std::move(scene)), pool_(pool), options_(options), sum_(sum) {}
 
-  Ping run(const PingRequest& asked) {
+  Ping run(const PingRequest& requested) {
     // At the sea surface, a ping is computed at a pose that differs from the requested one. The result states the requested
     // pose.
     std::vector<PingRequest> changed;
-    const PingRequest& request = in_water({&asked, 1}, *scene_, changed).front();
+    const PingRequest& request = in_water({&requested, 1}, *scene_, changed).front();
     if (const std::string why = why_invalid(request); !why.empty()) throw std::invalid_argument(why);
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
@@ -30,7 +30,7 @@ class ComparisonEngine {
     if (!prepared_ || !prepared_->serves(request)) prepared_ = std::make_unique<paper::Prepared>(request, sum_);
     statistics_ = {};
     Ping ping = paper::simulate(rays_, request, *prepared_, simd::kernels_for(options_.simd), pool_, options_.now_s, statistics_);
-    restore_requested_pose({&asked, 1}, {&ping, 1});
+    restore_requested_pose({&requested, 1}, {&ping, 1});
     return ping;
   }
   const PingStatistics& statistics() const { return statistics_; }

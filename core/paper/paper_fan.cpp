@@ -46,7 +46,7 @@ PaperFan make_paper_fan(const PingPlan& plan, Mode mode, int rays) {
 
   const double aperture = static_cast<double>(plan.mode.horizontal_aperture_rad);
   if (!fan.perspective) {
-    // A column has a constant azimuth; it is not a cone about the array (O46).
+    // A column has a constant azimuth; it is not a cone about the array (oracle 46).
     for (const double sine : plan.beam_sine) fan.azimuth_rad.push_back(std::asin(sine));
     fan.column_width = widths_of(fan.azimuth_rad, aperture);
     tabulate(fan);

@@ -12,7 +12,7 @@ namespace sonar::paper {
 namespace {
 
 constexpr int sum_width = 8;              // grid points for each echo in the fast sum; its relative error is 1e-7
-constexpr double width_constant = 0.884;  // from P25's code, for sinc patterns: -3 dB width times aperture
+constexpr double width_constant = 0.884;  // from the code of Choi 2025 (P25), for sinc patterns: -3 dB width times aperture
 
 /// The comparison modes have no motion within the ping.
 PingScalars still_scalars(const PingPlan& plan, PingRequest request, Vec3d origin) {
@@ -249,7 +249,7 @@ Prepared::Prepared(const PingRequest& request, FrequencySum sum)
   if (sum == FrequencySum::fast && spectral::have_transform)
     fast = std::make_unique<spectral::FrequencySums>(spectrum.count, sum_width);
   if (plan.expected_power) pulse_power = std::make_unique<PulsePower>(spectrum, inverse);
-  // If the azimuths are uniform, the correction is a convolution and is computed by a transform.
+  // If the azimuths are uniform, the correction is a convolution and is computed with a transform.
   const double spacing = static_cast<double>(plan.mode.horizontal_aperture_rad) / plan.settings.beam_count;
   if (!plan.expected_power) even = even_correction(fan.azimuth_rad, spacing);
   if (!even)
@@ -269,7 +269,7 @@ Ping simulate(const RayScene& scene, const PingRequest& request, const Prepared&
               Parallel& pool, double (*now_s)(), PingStatistics& statistics) {
   PaperPing ping(scene, request, prepared, kernels, pool, now_s, statistics);
   ping.simulate_columns();  // trace_column, eq. (2), and the sum of eq. (1) times |S(f)|, one column per beam
-  ping.correct_beams();     // by the weights "as coded" in P25's program (make_correction)
+  ping.correct_beams();     // with the weights "as coded" in P25's program (make_correction)
   return ping.image();
 }
 

@@ -46,7 +46,7 @@ void PaperEchoes::push_back(const PaperEcho& e) {
 void sum_frequencies(const PaperEchoes& echoes, const PaperSpectrum& spectrum, const spectral::FrequencySums* fast,
                      const simd::Kernels& kernels, SumScratch& scratch, std::span<std::complex<float>> out) {
   std::vector<Complex>& sums = scratch.sums;
-  // The sum of eq. 1 over scatterers at every frequency, by a non-uniform transform or term by term.
+  // The sum of eq. 1 over scatterers at every frequency, with a non-uniform transform or term by term.
   if (fast) {
     sums.resize(static_cast<std::size_t>(spectrum.count));
     scratch.grid.assign(static_cast<std::size_t>(fast->grid_points() + fast->padding), 0.0);

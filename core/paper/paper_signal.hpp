@@ -17,7 +17,7 @@
 
 namespace sonar::paper {
 
-/// Method for the sum of eq. (1) over the scatterers: term by term, or by a non-uniform transform (relative error 1e-7).
+/// Method for the sum of eq. (1) over the scatterers: term by term, or with a non-uniform transform (relative error 1e-7).
 enum class FrequencySum { fast, direct };
 
 /// Eq. (2) without xi: mu cos^2(incidence) r^2 dOmega [m^2], the printed footprint. Lambert's law would have cos^1 here.
@@ -65,7 +65,7 @@ std::vector<float> make_correction(std::span<const double> azimuth_rad, double s
 /// Makes the correction, not squared, for uniform azimuths, for which V depends only on the difference of two azimuths. Returns
 /// null if the azimuths are not uniform.
 std::unique_ptr<BeamTransformTables> even_correction(std::span<const double> azimuth_rad, double spacing_rad);
-/// out[j][...] = sum_k V_jk in[k][...] by these tables; rows have `values` floats, a multiple of 32.
+/// out[j][...] = sum_k V_jk in[k][...] with these tables; rows have `values` floats, a multiple of 32.
 void correct(const BeamTransformTables& even, std::span<const float> in, int values, const simd::Kernels& kernels, Parallel& pool,
              std::span<float> out);
 
@@ -84,7 +84,7 @@ class InverseTransform {
 
  private:
   const PaperSpectrum& grid_;
-  std::unique_ptr<spectral::Fft> inverse_;    // none in a build without a transform
+  std::unique_ptr<spectral::Fft> inverse_;    // null in a build without a transform
   std::vector<spectral::Complex> half_turn_;  // [M] e^{i 2 pi f_m t_0}
   std::vector<spectral::Complex> root_;       // [samples] e^{i 2 pi n / samples}
   std::vector<spectral::Complex> baseband_;   // [samples] e^{i 2 pi f_1 t_n}

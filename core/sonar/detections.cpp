@@ -50,7 +50,8 @@ class Levels {
     }
     return low;
   }
-  /// The median is found by counting the bytes of codes, the highest byte first. This takes half the time of a partial sort.
+  /// The median level of a beam, found by counting the bytes of codes, the highest byte first. This takes half the time of a
+  /// partial sort.
   double median_of(int beam) const {
     std::vector<std::uint64_t> all(static_cast<std::size_t>(rows));
     for (int row = 0; row < rows; ++row) all[static_cast<std::size_t>(row)] = code(row, beam);

@@ -117,7 +117,7 @@ struct Twist {
 
 struct Ping;
 
-/// Base class of what a device finds in a ping, such as the points of a bottom. core does not read the contents.
+/// Base class of a device's findings in a ping, such as the points of a bottom. core does not read the contents.
 struct PingFindings {
   virtual ~PingFindings() = default;
 };

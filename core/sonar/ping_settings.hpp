@@ -43,7 +43,7 @@ struct PingSettings {
   float device_sound_speed_mps = 1500;   // sound speed that the device assumes
   float device_absorption_db_per_m = 0;  // one way, as the device's TVG assumes
   bool triggered = false;                // one ping per request of the client
-  bool transmit = true;                  // false: it receives noise only
+  bool transmit = true;                  // false: the sonar receives noise only
   SampleFormat format;
 
   /// Range of a row's samples as computed by the device [m]; `row` may lie between two rows.

@@ -27,8 +27,8 @@ struct Waveform {
   /// samples.
   std::vector<std::complex<float>> samples;
   double sample_rate_hz = 0;
-  /// True: synthesises in the frequency domain (exact up to the band limit) instead of using a table of the pulse. `measured`
-  /// pulses always do so.
+  /// True: pulses are summed in the frequency domain (exact up to the band limit) instead of with a table of the pulse.
+  /// `measured` pulses always do so.
   bool exact = false;
 #if __cplusplus >= 202002L  // device code is C++17 and needs no comparison
   bool operator==(const Waveform&) const = default;
@@ -42,7 +42,7 @@ enum class Taper { uniform, taylor30, hamming, hann, unit };
 enum class ElevationWidthIs { one_way, two_way };
 enum class BeamSpacing {
   uniform_in_sine,   // beam azimuths asin(s), s linear over +-sin(half aperture): Oculus
-  uniform_in_angle,  // BlueView
+  uniform_in_angle,  // beams in the middles of equal parts of the aperture: BlueView
   listed,            // FrequencyMode::beam_azimuths_rad
 };
 

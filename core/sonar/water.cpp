@@ -1,5 +1,5 @@
-// Absorption, sound speed, density and pressure of the water, by published formulae with their published digits.
-// A ping computes each value once; the code of vendors uses the formulae for values that their devices assume.
+// Absorption, sound speed, density and pressure of the water, from published formulae with their published digits. A ping
+// computes each value once; the code of vendors uses the formulae for values that their devices assume.
 #include "core/sonar/water.hpp"
 
 #include <algorithm>

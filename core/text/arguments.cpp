@@ -31,9 +31,9 @@ std::string full_name(const CLI::App& app) {
 }
 
 /// The innermost command that the parser has recognised.
-const CLI::App& asked_command(const CLI::App& app) {
-  const std::vector<CLI::App*> asked = app.get_subcommands();
-  return asked.empty() ? app : asked_command(*asked.front());
+const CLI::App& requested_command(const CLI::App& app) {
+  const std::vector<CLI::App*> requested = app.get_subcommands();
+  return requested.empty() ? app : requested_command(*requested.front());
 }
 
 std::vector<std::string> command_names(const CLI::App& app) {
@@ -77,10 +77,10 @@ std::string error_of_unknown(const UnknownWord& unknown) {
 
 /// The error text of CLI11. If a command or argument is missing, that text contains neither choices nor meaning, so another
 /// text is returned.
-std::string error_of_parser(const CLI::App& asked, const CLI::ParseError& error) {
+std::string error_of_parser(const CLI::App& requested, const CLI::ParseError& error) {
   if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::RequiredError)) return error.what();
-  if (asked.get_require_subcommand_min() > 0) return "a command is required: " + joined(command_names(asked));
-  for (const CLI::Option* option : asked.get_options())
+  if (requested.get_require_subcommand_min() > 0) return "a command is required: " + joined(command_names(requested));
+  for (const CLI::Option* option : requested.get_options())
     if (option->get_required() && option->count() == 0) return option->get_name() + " is required: " + option->get_description();
   return error.what();
 }
@@ -113,7 +113,7 @@ void check_environment(CLI::App& app) {
 
 void parse(CLI::App& app, int argc, const char* const* argv) {
   app.parse(argc, argv);
-  for (int i = 1; i < argc; ++i)  // mostly a variable of a script that is not set
+  for (int i = 1; i < argc; ++i)  // usually a variable of a script that is not set
     if (*argv[i] == '\0')
       throw CLI::ValidationError("argument " + std::to_string(i), "it is empty: write a value, or leave it out");
   check_environment(app);
@@ -164,18 +164,18 @@ CLI::Validator in_small_letters() {
 }
 
 std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& words) {
-  const CLI::App& asked = asked_command(app);
+  const CLI::App& requested = requested_command(app);
   const UnknownWord unknown = unknown_word(app);
   const bool is_help = error.get_exit_code() == 0;
   if (is_help && unknown.command == nullptr) return {};
   std::string text =
-      unknown.command != nullptr ? error_of_unknown(unknown) : with_its_source(error_of_parser(asked, error), app, words);
+      unknown.command != nullptr ? error_of_unknown(unknown) : with_its_source(error_of_parser(requested, error), app, words);
   // Replaces line breaks, so that the error is one line.
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
   return text + where_help_is(app);
 }
 
-std::string where_help_is(const CLI::App& app) { return " (" + full_name(asked_command(app)) + " --help)"; }
+std::string where_help_is(const CLI::App& app) { return " (" + full_name(requested_command(app)) + " --help)"; }
 
 }  // namespace sonar::text

@@ -28,8 +28,8 @@ void parse(CLI::App& app, int argc, const char* const* argv);
 
 /// The error of a command line as one line that ends with where_help_is(). For unknown commands and options: `unknown command
 /// "veiw"; did you mean "view"?`. For other errors it is the parser's text. For a value from an environment variable, the error
-/// names the variable. Empty for --help and --version without an unknown word. `words`: the command line as typed, without the
-/// program.
+/// names the variable. Returns an empty text for --help and --version without an unknown word. `words`: the command line as
+/// typed, without the program.
 std::string complaint_about(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& words);
 
 /// The help option of the innermost command that the parser has recognised: " (sonarctl pose circle --help)".

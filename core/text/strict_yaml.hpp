@@ -9,8 +9,8 @@
 //   for (text::Node sonar : root.required("sonars").items(1, 16)) read_sonar(sonar.map());
 //   if (auto error = document->finish()) return tl::make_unexpected(*error);
 //
-// Readers never stop at an error: a wrong value is read as the fallback (or zero, or empty), and finish() returns the first
-// error, unknown keys before missing ones. Subset: one document, no anchors, aliases, tags or merge keys; keys are plain words.
+// Readers never stop at an error: a wrong value is read as zero, empty, the first choice or the fallback. finish() returns the
+// first error. Accepted: one document without anchors, aliases, tags, merge keys; its keys are plain words.
 #pragma once
 
 #include <array>
@@ -95,7 +95,7 @@ class Node {
   }
   std::vector<std::string> texts(std::size_t min_count = 0, std::size_t max_count = 256) const;
 
-  /// Returns the elements of a list; empty if it is absent or not a list.
+  /// Returns the elements of the list, or none if it is absent, too long or not a list.
   std::vector<Node> items(std::size_t min_count = 0, std::size_t max_count = 100000) const;
   /// Returns the value as a map; an empty map if it is absent or not a map.
   Map map() const;
@@ -148,7 +148,7 @@ class Document {
   ~Document();
 
   Map root() const;
-  /// Returns the first error. Wrong values come first, then unknown and missing keys of every map that was opened.
+  /// Returns the first error. Wrong values come first, and missing keys before unknown keys that do not resemble them.
   std::optional<Error> finish() const;
   /// Returns the first wrong value so far. Unknown keys are not checked.
   std::optional<Error> error() const;

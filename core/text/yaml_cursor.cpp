@@ -231,7 +231,7 @@ bool Map::has(std::string_view key) const {
 }
 Node Map::optional(std::string_view key) {
   if (!node_) return Node(tree_, nullptr, nullptr, std::string(key));
-  add_once(node_->asked, key);
+  add_once(node_->requested, key);
   for (YamlNode* child : node_->children) {
     if (child->key == key) return Node(tree_, child, node_, {});
   }
@@ -270,7 +270,7 @@ namespace {
 
 // If an unknown key is near a missing key, the error about the unknown key explains more.
 std::optional<Error> check_keys(const YamlTree& tree, const YamlNode& map) {
-  std::vector<std::string_view> valid(map.asked.begin(), map.asked.end());
+  std::vector<std::string_view> valid(map.requested.begin(), map.requested.end());
   std::vector<std::string_view> missing(map.missing.begin(), map.missing.end());
   const YamlNode* unknown = nullptr;
   for (const YamlNode* child : map.children) {

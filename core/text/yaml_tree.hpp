@@ -26,10 +26,10 @@ struct YamlNode {
   std::string scalar;
   std::vector<YamlNode*> children;
 
-  // This is set while a reader uses this map.
+  // These are set when a reader uses this map.
   bool opened = false;
   bool any_key = false;  // its keys are names chosen by the user
-  std::vector<std::string> asked, missing;
+  std::vector<std::string> requested, missing;
 };
 
 struct YamlTree {

@@ -12,7 +12,7 @@ constexpr double twins_in_units = 0.5;  // mirror points nearer to each other th
 constexpr double walk_units = 16;       // an edge beyond this does not change the echo
 constexpr double trusted_units = 2;  // if the surface leaves its osculating arc farther out than this, the echo does not change
 
-/// True if the foot (0, 0) lies within the outline.
+/// True if the foot lies within the outline.
 bool within(const std::vector<OutlineEdge>& outline, Vec3d foot) {
   bool in = false;
   for (const OutlineEdge& e : outline)
@@ -99,8 +99,8 @@ void SpecularMesh::find_on_curves(const SpecularQuery& q, std::vector<SpecularPo
   }
 }
 
-// Finds the point p0 + a e1 + b e2 of the triangle from which the interpolated normal, t long, ends at the sonar, by Newton's
-// method.
+// Finds, with Newton's method, the point p0 + a e1 + b e2 of the triangle from which the interpolated normal, t long, ends at the
+// sonar.
 std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle, Vec3d sonar_m) const {
   const Vertex &v0 = vertices_[triangle.vertex[0]], &v1 = vertices_[triangle.vertex[1]], &v2 = vertices_[triangle.vertex[2]];
   const Vec3d p0 = to_double(v0.position), e1 = to_double(v1.position) - p0, e2 = to_double(v2.position) - p0;

@@ -183,7 +183,7 @@ void SpecularMesh::Maker::add_curved(const std::vector<std::uint32_t>& patch) {
   const auto first_vertex = static_cast<std::uint32_t>(out_.vertices_.size());
   const auto first_triangle = static_cast<std::int32_t>(out_.triangles_.size());
   vertex_now_.resize(place_.size(), no_owner);
-  // New numbers for the patch's triangles and, below, for its vertices.
+  // Gives new numbers to the patch's triangles and, below, to its vertices.
   for (std::size_t i = 0; i < patch.size(); ++i) triangle_now_[patch[i]] = first_triangle + static_cast<std::int32_t>(i);
   for (const std::uint32_t f : patch) {
     SpecularMesh::Triangle triangle;

@@ -34,7 +34,7 @@ class SpecularMesh::Maker {
   void branch(std::vector<std::uint32_t>& order, std::uint32_t first, std::uint32_t last);
 
   SpecularMesh& out_;
-  std::vector<Vec3d> place_;  // vertices; equal positions are one
+  std::vector<Vec3d> place_;  // vertices; equal positions are one vertex
   std::vector<Facet> facets_;
   std::vector<std::uint32_t> vertex_now_;   // by index in place_: the last vertex that was made for this position
   std::vector<std::int32_t> triangle_now_;  // by index in facets_: the curved triangle that was made of the facet
