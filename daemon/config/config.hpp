@@ -160,7 +160,7 @@ struct Config {
   std::uint64_t seed = 1;
   std::optional<Geodetic> origin;  // origin of latitudes and longitudes
   Water water;
-  bool allow_hot = false;  // accepts water of 30 C or more
+  bool allow_hot = false;  // true: accepts water of 30 C or more
   std::vector<VehicleConfig> vehicles;
   std::vector<ObjectConfig> objects;
   std::vector<SonarConfig> sonars;

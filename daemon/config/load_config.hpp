@@ -28,8 +28,8 @@ struct FoundConfig {
   std::filesystem::path file;  // empty = none
 };
 
-/// If `file` is empty, tries ./sonard.yaml, ~/.config/sonard/sonard.yaml and /etc/sonard/sonard.yaml in this order. `demo`
-/// ignores all files. Errors: those of load_config().
+/// If `file` is empty, tries ./sonard.yaml, ~/.config/sonard/sonard.yaml and /etc/sonard/sonard.yaml in this order. With
+/// `demo` all files are ignored. Errors: those of load_config().
 Result<FoundConfig> find_config(const std::string& file, bool demo);
 
 }  // namespace sonar

@@ -55,7 +55,7 @@ Result<void> move_sonar(SonarConfig& sonar, int offset) {
 
 Result<void> move_port(Endpoint& at, int offset) {
   if (at.port == 0) return {};
-  const int port = at.port + ports_an_offset * offset;
+  const int port = at.port + ports_per_offset * offset;
   if (port > 65535) return cannot_move("the port of " + text_of(at) + " would exceed 65535; give a smaller offset");
   at.port = static_cast<std::uint16_t>(port);
   return {};

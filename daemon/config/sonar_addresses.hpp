@@ -7,7 +7,7 @@
 namespace sonar {
 
 inline constexpr int highest_offset = 99;
-inline constexpr int ports_an_offset = 10;  // ports per offset; a daemon uses adjacent ports such as 14770 and 14771
+inline constexpr int ports_per_offset = 10;  // ports per offset; a daemon uses adjacent ports such as 14770 and 14771
 
 /// Changes everything that could conflict with another daemon: sonars move from 127.0.0.x to 127.0.N.x (with the same ports,
 /// which drivers expect), device ids increase by 100 N (drivers distinguish sonars by id), and the ports of poses and control

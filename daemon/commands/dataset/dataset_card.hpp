@@ -23,8 +23,8 @@ struct FilesOfSplit {
 std::string card_head(const DatasetJob& job, const std::vector<FilesOfSplit>& files, bool is_webdataset);
 
 struct Statistics {
-  const nlohmann::json& pixels;                           // samples by class
-  const std::map<std::string, std::uint64_t>& instances;  // visible things, by class
+  const nlohmann::json& pixels;                           // number of samples of each class
+  const std::map<std::string, std::uint64_t>& instances;  // number of visible things of each class
   std::uint64_t negatives = 0;
   bool has_contact_sheet = false;
 };

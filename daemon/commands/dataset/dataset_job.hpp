@@ -27,7 +27,7 @@ struct DatasetJob {
   Seed seed{};
   std::uint64_t pings = 0, shard_pings = 1024;
   double negatives = 0;              // fraction of pings without targets
-  std::vector<std::string> targets;  // names or labels
+  std::vector<std::string> targets;  // names or labels of objects
   bool fan = false;                  // true: also write a picture of each ping
   std::vector<Variation> variations;
   std::vector<std::pair<std::string, std::string>> formulas;  // formulas of `let`, as written
@@ -36,7 +36,7 @@ struct DatasetJob {
   std::uint64_t shards() const { return (pings + shard_pings - 1) / shard_pings; }
 };
 
-/// Errors: file:line:col: key.path: what is wrong.
+/// Errors have the form file:line:col: key.path: cause.
 Result<DatasetJob> load_job(const std::filesystem::path& file);
 Result<DatasetJob> parse_job(std::string text, const std::string& name, const std::filesystem::path& folder);
 
@@ -56,7 +56,7 @@ struct DrawnPing {
   std::uint32_t attempt = 0;
   bool negative = false;
   std::string scene_key;                     // scenes with equal keys are equal
-  std::shared_ptr<const Scene> whole_scene;  // with the objects that counts and negatives hide
+  std::shared_ptr<const Scene> whole_scene;  // includes the objects that counts and negatives hide
 };
 
 /// The last scene, which is reused if the next one is equal, and all shapes read so far.

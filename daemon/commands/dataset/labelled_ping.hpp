@@ -39,8 +39,8 @@ Raster contact_sheet(const std::vector<Raster>& cells);
 struct LabelledPing {
   std::vector<std::pair<std::string, std::vector<std::byte>>> files;  // ending and contents
   nlohmann::json annotations;                                         // made by render::annotations_of
-  nlohmann::json pixels;                                              // samples by class
-  int width = 0, height = 0;                                          // beams, rows
+  nlohmann::json pixels;                                              // number of samples of each class
+  int width = 0, height = 0;                                          // numbers of beams and rows
   bool negative = false;
   std::string scene;           // digest of scene_key
   nlohmann::json draws;        // names and words of the draws

@@ -76,7 +76,7 @@ struct Split {
 /// Parses texts such as "80,10,10" and "bed_seed,coat". Error usage: a mistake in one of them.
 Result<Split> parse_split(const std::string& shares, const std::string& by);
 
-/// Returns the split of each scene, which depends on its name. Every split with a share gets a scene if there are enough scenes.
+/// Returns the split of each scene, which depends on the names. Every split with a share gets a scene if there are enough scenes.
 std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const std::array<double, 3>& shares);
 
 struct Exported {

@@ -21,7 +21,7 @@ struct FarmJob {
   std::string id;  // SHA-256 of the canonical JSON of the next four members, on which the bytes of the shards depend
   std::string version, instruction_set;
   std::string file;             // the job file, one of `files`
-  std::vector<FarmFile> files;  // by name
+  std::vector<FarmFile> files;  // in the order of their names
   std::uint64_t shards = 0, shard_pings = 0, pings = 0;
   std::chrono::milliseconds patience{60'000};
   double submitted_unix_s = 0;
@@ -44,7 +44,7 @@ Result<void> send_files(const dataset::DatasetJob& job, FarmJob& record, const s
 /// is in neither.
 Result<std::filesystem::path> receive_files(const FarmJob& record, const std::filesystem::path& files, Queue& queue);
 
-/// Reads the job file of receive_files(). Errors: bad_data if its size differs from the record.
+/// Reads the job file of receive_files(). Errors: bad_data if its numbers of pings and shards differ from the record.
 Result<dataset::DatasetJob> load_files(const FarmJob& record, const std::filesystem::path& file);
 
 /// Returns a sentence if this program would make other bytes than the program that submitted the job; else empty.

@@ -1,4 +1,4 @@
-// The options of each command. Only few .cpp files include CLI11, because it is slow to compile.
+// The options of each command. Only a few .cpp files include CLI11, because it is slow to compile.
 #pragma once
 
 #include <cstdint>

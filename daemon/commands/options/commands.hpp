@@ -1,5 +1,5 @@
 // The commands of sonard. Each has its own file. docs/render.md and docs/datasets.md are the manuals of `render`, `dataset`,
-// `farm` and `worker`. Errors report the input, the options and the folders that the user named.
+// `farm` and `worker`. Errors name the input, the options and the folders that the user gave.
 #pragma once
 
 #include <chrono>
@@ -29,8 +29,8 @@ namespace farm {
 class Queue;
 
 /// Puts jobs into the farm's queue, shows their progress, and makes the data set of finished shards; `sonarctl farm` calls it.
-/// Returns the exit code. Errors: also unavailable if the server does not answer; bad_data if shards are missing or differ from
-/// their digests.
+/// Returns the exit code. Errors include unavailable if the server does not answer, and bad_data if shards are missing or differ
+/// from their digests.
 Result<int> run_farm(const FarmCommand& command);
 /// Returns lines about the jobs, their dead shards and their workers.
 Result<std::string> describe_farm(Queue& queue);

@@ -18,7 +18,7 @@ struct OutputOptions {
   bool npy = true, png = true, raw = false, complex = false, labels = false;
   bool rings = true;                   // range rings in pictures
   int batch = 1;                       // number of pings that all threads make before any is written
-  bool overwrite = false;              // pings of other inputs in the folder are removed
+  bool overwrite = false;              // true: remove pings of other inputs from the folder
   std::uint64_t first = 1;             // number of the first ping to make
   std::optional<std::uint64_t> pings;  // pings of each job; nullopt: one, or one for every pose of the file
   std::optional<double> rate_hz;       // pings per second; nullopt: the rate of the settings, or one ping at every pose

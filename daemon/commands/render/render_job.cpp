@@ -56,9 +56,8 @@ std::string note_of_range(const RenderJob& job) {
   const double least_m = static_cast<double>(job.mode().min_range_m), most_m = static_cast<double>(job.mode().max_range_m);
   const double range_m = job.settings.range_m;
   if (range_m >= least_m / rounding && range_m <= most_m * rounding) return {};
-  return text::format("range %g m: %s in mode %s takes %g to %g m; rendered all the same, where the device would use %g m",
-                      range_m, job.model().name.c_str(), job.mode().name.c_str(), least_m, most_m,
-                      std::clamp(range_m, least_m, most_m));
+  return text::format("range %g m: %s in mode %s accepts %g to %g m; rendered anyway, where the device would use %g m", range_m,
+                      job.model().name.c_str(), job.mode().name.c_str(), least_m, most_m, std::clamp(range_m, least_m, most_m));
 }
 
 Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const std::string& name, const std::string& body) {

@@ -93,7 +93,7 @@ inline constexpr std::size_t steps_per_fast_step = 10;
 /// Poses that are closer in time count as one step, because the jitter of a fast log is not motion.
 inline constexpr motion::Ns shortest_step = std::chrono::milliseconds(100);
 
-/// The steps of a trajectory.
+/// The number and speeds of the steps of a trajectory.
 struct Steps {
   std::size_t all = 0, too_fast = 0;
   double fastest_mps = 0, fastest_radps = 0;

@@ -1,4 +1,4 @@
-// `sonard replay` on the command line.
+// The options of `sonard replay`, and the command.
 #pragma once
 
 #include <cstdint>

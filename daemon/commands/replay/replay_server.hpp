@@ -45,7 +45,7 @@ class ReplayServer {
   Result<void> open();
   /// Serves the recording in io.run(), which returns at the end of the recording (not with loop) or after stop().
   void start();
-  /// Completes the present message and ends the stream; after 1.5 s the connection is closed.
+  /// Completes the present message and ends the stream. Resets a connection whose client has not received it after 1.5 s.
   void stop();
 
   const Figures& figures() const { return figures_; }
@@ -65,7 +65,7 @@ class ReplayServer {
     std::string name;
     bool gone = false;
     InputRate input;
-    // For a sonar that sends pings on request:
+    // The members below are for a device with dialogues.
     std::unique_ptr<protocol::Dialogue> dialogue;
     protocol::Bytes replies;  // replies that are not sent yet
     std::vector<udp::endpoint> receivers;

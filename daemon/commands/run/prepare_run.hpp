@@ -37,7 +37,7 @@ struct BannerFacts {
 };
 std::string banner(const App& app, const BannerFacts& facts);
 std::string ready_line(const App& app, double seconds);
-/// Returns one line per sonar, such as "sonar front  20 pings  0 dropped  0 late ticks ...", and a line about the memory.
+/// Returns one line per sonar, such as "sonar front  20 pings, 20 served, ...", and lines about poses, if any came, and memory.
 std::string summary(const App& app);
 /// Returns one line per client stream.
 std::string digest_lines(const App& app);

@@ -66,7 +66,7 @@ struct Reset {
   ConnectionId connection = 0;
   std::string why;
 };
-/// A connection is closed and forgotten.
+/// A connection was closed, and the Sonar has removed it.
 struct Closed {
   std::string peer;  // name of the peer
   Role role{};

@@ -1,5 +1,5 @@
 // Messages that wait for one client: the one being written, replies in order, and at most `depth` pings. The Sonar adds messages;
-// the session takes them. All messages are complete, so they are never cut or mixed.
+// the session fetches them. All messages are complete, so they are never cut or mixed.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Effects on the bytes of messages: faults of the stages framing, stream and link change one ping of one client, faults of the
+// Effects on the bytes of messages: faults of the stages framing, stream and link change one ping of one client; faults of the
 // stage status change status messages.
 #pragma once
 

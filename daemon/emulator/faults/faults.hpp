@@ -1,6 +1,6 @@
 // The faults of one emulated sonar. The Sonar calls this object wherever a fault may act. It has no sockets and no clock:
 // effects on ports and connections are returned as orders. Random numbers depend only on (seed, fault, sonar, ping, client), so
-// the same plan gives the same bytes.
+// the same plan of faults gives the same bytes.
 #pragma once
 
 #include <cstdint>

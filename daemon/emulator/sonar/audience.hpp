@@ -39,7 +39,7 @@ class Audience {
   void open_stream(ConnectionId id, const protocol::Port& port);
   /// Transfers the dialogue at a port of kind udp_dialogue to another host.
   void hand_over(ConnectionId id, Peer to);
-  /// Sets the list of receivers of client `from`, or of the device if null. An address 0.0.0.0 becomes `ip`.
+  /// Sets the list of receivers of client `from`, or of the device if `from` is null. An address 0.0.0.0 becomes `ip`.
   void set_receivers(Connection* from, protocol::Ipv4 ip, protocol::SetReceivers wanted);
   /// Restores the device's own list of a stream to that of the stored configuration.
   void restore_receivers(protocol::SetReceivers initial);

@@ -104,7 +104,7 @@ class Sonar {
   Result<Actions> change(const protocol::SettingsOverride& wanted, const std::string& who, Time now);
   /// Sets whether the sonar pings without a client, for example a range finder whose distances an autopilot gets.
   void run_itself(bool on, Time now) { source_.run_itself(on, now); }
-  /// Returns whether the setting changed.
+  /// Sets whether the sonar transmits. Returns whether that changed.
   bool set_transmit(bool on) { return source_.set_transmit(on); }
   bool transmits() const { return source_.transmits(); }
   /// Returns the name of the client that last changed the settings; empty if no client did.

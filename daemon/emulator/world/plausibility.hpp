@@ -91,7 +91,7 @@ class Plausibility {
   Surroundings around_;
   std::vector<Carrier> carriers_;
   std::vector<std::shared_ptr<const motion::Trajectory>>
-      played_;                                // the trajectories on which of_plans_ are notes; a reload reads new trajectories
+      played_;                                // the trajectories to which the notes of_plans_ belong; a reload reads new ones
   std::vector<Note> of_plans_, of_setup_;     // of_setup_ contains of_plans_
   std::map<std::string, LastPose> of_poses_;  // key: vehicle
   std::set<std::string> reported_;

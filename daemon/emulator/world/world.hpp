@@ -45,7 +45,7 @@ enum class PoseVerdict { accepted, late, unknown_name, bad_time };
 struct PoseOutcome {
   PoseVerdict verdict = PoseVerdict::accepted;
   std::string refusal;  // one sentence if the pose is refused
-  std::string notice;   // text for the log: the source changed, or poses arrive again
+  std::string notice;   // text for the log, such as that the source changed
   std::string body;     // the body to which the notice refers
 };
 

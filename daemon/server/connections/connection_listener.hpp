@@ -82,7 +82,8 @@ class ConnectionListener {
   }
   void say_evicted(const Connection& evicted) {
     log_limited(services_.log, services_.notices, LogLevel::info,
-                services_.server + " connection closed: longest idle, and its slot was needed", {{"from", evicted.sender().id}});
+                services_.server + " connection closed: another client needs the slot, and it was idle longest",
+                {{"from", evicted.sender().id}});
   }
   /// Moves a client that has sent the token to the slots for such clients. Returns false if no slot is free.
   bool claim_slot(const std::shared_ptr<Connection>& connection) {

@@ -30,10 +30,10 @@ class HttpTakeover {
   virtual ~HttpTakeover() = default;
   /// Sends the answer to the request. Returns false if the connection must be closed.
   virtual asio::awaitable<bool> begin() = 0;
-  // Both run until the socket closes.
+  // read() and write() run until the socket closes.
   virtual asio::awaitable<void> read() = 0;
   virtual asio::awaitable<void> write() = 0;
-  /// Called before we close the socket. May send a last message if that does not block.
+  /// Called before the server closes the socket. May send a last message if that does not block.
   virtual void on_closing() = 0;
 };
 

@@ -27,7 +27,7 @@ struct HttpAnswer {
 
 struct HttpRequest {
   std::string method, target, host, origin, authorization, content_type, body;
-  // Values of headers as received; several headers with the same name are joined by ", ".
+  // Values of headers as received; several headers with the same name are joined with ", ".
   std::string upgrade, connection, accept, accept_encoding, if_none_match;
   std::string socket_key, socket_version, socket_protocols;  // Sec-WebSocket-...
   bool bytes_behind = false;                                 // true: bytes after the request had already arrived

@@ -82,7 +82,7 @@ class StreamConnection : public std::enable_shared_from_this<StreamConnection> {
   Events::Token subscription_;
   HttpDetector http_;
   std::function<bool()> claim_slot_;       // empty if the client is trusted
-  bool greeted_ = false, ending_ = false;  // ending_: only the last answer is still written
+  bool greeted_ = false, ending_ = false;  // ending_: only the remaining answers are still written
 };
 
 }  // namespace sonar

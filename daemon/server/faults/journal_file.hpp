@@ -34,7 +34,7 @@ class JournalFile {
   std::string write_line(std::string_view line);
 
   int descriptor_;
-  bool cut_ = false;  // the file ends with an incomplete line
+  bool cut_ = false;  // true: the file ends with an incomplete line
 };
 
 }  // namespace sonar

@@ -114,7 +114,7 @@ std::string help_text(const std::string& address) {
   const std::string url = "http://" + address;
   const std::string post = "  curl -s " + url + "/api/v1/";
   const std::string json = " -H 'Content-Type: application/json' -d ";
-  return "sonard, control by HTTP (docs/control.md). With control.token_file add: -H \"Authorization: Bearer $(cat FILE)\"\n\n"
+  return "sonard, control over HTTP (docs/control.md). With control.token_file add: -H \"Authorization: Bearer $(cat FILE)\"\n\n"
          "  curl -s " +
          url +
          "/healthz\n"

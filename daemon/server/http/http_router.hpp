@@ -13,7 +13,7 @@
 
 namespace sonar {
 
-/// Makes an answer with the body {"code", "text"}, as every answer without a document.
+/// Makes an answer with the body {"code", "text"}, like every answer without a document.
 HttpAnswer answer_of(unsigned status, control::StatusCode code, const std::string& text);
 
 /// True for GET with "Upgrade: websocket".

@@ -48,7 +48,7 @@ void SceneOperations::load(const control::LoadScene& asked, const Sender& sender
   if (changes_.is_full()) return done(too_many_changes());
   const std::filesystem::path folder = std::filesystem::path(config_.source).parent_path();
   if (!has_scene_name(asked.path))
-    return done(refused("\"" + asked.path.substr(0, 256) + "\" is not a scene: their names end in .yaml or .yml"));
+    return done(refused("\"" + asked.path.substr(0, 256) + "\" is not a scene: the names of scenes end in .yaml or .yml"));
   const auto file = find_scene(asked.path, folder);
   if (!file) return done(refused("no scene file \"" + asked.path.substr(0, 256) + "\"; looked in " + scene_folders(folder)));
   changes_.submit(

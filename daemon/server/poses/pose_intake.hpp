@@ -48,7 +48,7 @@ class PoseIntake {
     std::string source;
     Time at{};
   };
-  std::map<std::string, Newest> newest_;    // the last accepted pose, by the name of the vehicle in it; empty: the only one
+  std::map<std::string, Newest> newest_;    // the last accepted poses; key: the vehicle that the pose names, or empty
   std::uint32_t placements_ = 0;            // placements of moving objects; each begins a new history
   std::chrono::nanoseconds wall_shift_{0};  // our time = WALL stamp + shift
 };

@@ -303,7 +303,7 @@ bool PoseServer::drop_backlog(Connection& c, bool pauses) {
   dropping_.pause_after(static_cast<std::size_t>(dropped), now);
   c.lines.skip_gap();
   intake_.refuse(
-      "older ones that waited: more than limits.input_bytes_per_s, or than a share of limits.pose_bytes_per_s, was sent",
+      "older poses that waited, because more than limits.input_bytes_per_s or a share of limits.pose_bytes_per_s was sent",
       c.sender);
   return true;
 }

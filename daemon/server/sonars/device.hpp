@@ -46,7 +46,7 @@ class DeviceParent {
   virtual void compute(const Device& of, PingRequest request, Simulator::Done done) = 0;
   virtual void on_ping_queued(const Device& of, const PingQueued& ping) = 0;
   virtual void on_client(const Device& of, const std::string& peer, bool connected, const std::string& why) = 0;
-  /// Called when the device has stopped.
+  /// Called when a device that was started begins to stop.
   virtual void on_stop(const Device& of, const std::string& why) = 0;
   /// Called after a change for which stepped time or the shutdown may wait.
   virtual void on_change() = 0;

@@ -9,7 +9,7 @@ namespace sonar {
 /// Niceness of the threads that compute pings, so that the I/O thread has priority over them. With a much higher value the
 /// threads would get too little time: at +10, other busy programs would get nine tenths of a shared core.
 inline constexpr int compute_niceness = 1;
-/// Niceness of threads for which no ping waits: building a scene, recording.
+/// Niceness of threads for which no ping waits, such as those that build a scene or record.
 inline constexpr int background_niceness = 10;
 
 /// Gives the calling thread real-time priority (SCHED_FIFO), which threads that it starts do not inherit. `priority` 1 to 99.

@@ -35,7 +35,7 @@ class ViewConnection final : public HttpTakeover, public std::enable_shared_from
   const std::string& address() const { return address_; }
   /// Returns the vehicle whose trajectory the viewer requested; empty = none.
   const std::string& playback() const { return playback_; }
-  /// Call it when the viewer has a message to write.
+  /// Call it when a message for the viewer waits.
   void wake() { wake_.cancel(); }
 
  private:

@@ -15,7 +15,7 @@ std::string ViewFeed::set_preview(Viewer& viewer, Device& device, bool on) {
   Preview& preview = device.preview();
   if (!on) {
     no_preview_.insert(name);
-    end_preview(device, "by request of " + viewer.who());
+    end_preview(device, "on request of " + viewer.who());
     return {};
   }
   const Time now = of_.clock.now();

@@ -92,7 +92,7 @@ std::optional<std::string> ViewFeed::set_own(Viewer& viewer, const foxglove::Par
   for (Device& device : of_.fleet.devices()) {
     if (wanted.name != "/" + device.config().name + "/preview") continue;
     const bool* const on = std::get_if<bool>(&wanted.value);
-    if (of_.clock.stepped()) return "there is a preview with clock: realtime only";
+    if (of_.clock.stepped()) return "a preview needs clock: realtime";
     return on == nullptr ? "must be true or false" : set_preview(viewer, device, *on);
   }
   return std::nullopt;

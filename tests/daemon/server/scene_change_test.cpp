@@ -256,7 +256,7 @@ TEST(SceneChange, ErrorsOfForeignFilesAreOnlyInTheLog) {
   for (const char* other : {"/etc/passwd", "", "/proc/self/environ"}) {
     const OperationResult refused = daemon.ask(control::LoadScene{other});
     EXPECT_EQ(refused.code, Code::refused);
-    EXPECT_THAT(refused.text, HasSubstr("their names end in .yaml or .yml"));
+    EXPECT_THAT(refused.text, HasSubstr("the names of scenes end in .yaml or .yml"));
   }
   const OperationResult answer = daemon.ask(control::LoadScene{file});
   EXPECT_EQ(answer.code, Code::failed);
