@@ -31,7 +31,6 @@ class StatusWire(threading.Thread):
         self._control, self._stopping = control, threading.Event()
         self.connections: List[Tuple[float, Optional[float], str]] = []
         self.ping_times: List[float] = []
-        self.bytes_taken = 0
         self._open: Dict[str, Tuple[int, int]] = {}  # address: (number of connection, pings written)
 
     def run(self) -> None:
