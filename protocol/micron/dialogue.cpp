@@ -12,16 +12,16 @@ using protocol::Reaction;
 
 constexpr auto alive_period = std::chrono::seconds(1);
 constexpr auto boot_time = std::chrono::seconds(2);  // unknown; assumed, because hosts wait 2.5 s before they read
-constexpr int recentring_alives = 2;                 // signs of life after a restart: 5D, 4D, then 4A (ENS)
+constexpr int recentring_alives = 2;                 // Alive::head_info after a restart: 5D, 4D, then 4A (ENS)
 constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size = 14;  // sizes of the payloads; ROCK, ENS
-constexpr std::size_t notices_per_call = 8;                                            // bounds the log output of a hostile host
+constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile host can cause
 
 /// The dialogue with one host (docs/protocols/micron.md, "Session"):
 /// - After power-up or a reboot the head has no parameters: it sends mtAlive once per second and ignores requests for scan lines.
 /// - mtHeadCommand sets the parameters. The next mtAlive reports that they were received, and the one after it reports that they
 ///   are valid.
-/// - mtSendData requests one or two scan lines (`wanted_`). For each the head turns (`arrives_`), a ping is requested and awaited
-///   (`awaited_`), and the head turns on. mtAlive pauses meanwhile.
+/// - mtSendData requests one or two scan lines (`wanted_`). For each line a ping is requested when the head has turned
+///   (`arrives_`), and is awaited (`awaited_`). Then the head turns on. mtAlive pauses meanwhile.
 /// The protocol has no refusal, so invalid messages are logged and ignored.
 class MicronDialogue final : public protocol::Dialogue {
  public:

@@ -26,7 +26,7 @@ HeadCommand command_of(const protocol::SettingsOverride& wanted) {
   c.left = ahead - turn / 4;
   c.right = ahead + turn / 4;
   const double range_m = wanted.range_m.value_or(usual_range_m);
-  // Rounding must not extend the bins beyond the farthest range, because the sonar would refuse them.
+  // Rounding must not extend the bins beyond the farthest range, because the sonar would ignore the command.
   c.interval = static_cast<std::uint16_t>(
       std::clamp<long>(std::lround(2 * range_m / sound_mps / c.bins / bin_unit_s), 1, longest_interval(c.bins)));
   c.range_dm = static_cast<std::uint16_t>(std::clamp(std::lround(10 * range_m), 1L, 16383L));
@@ -64,7 +64,7 @@ class MicronHost final : public protocol::Host {
     if (command_) learns_until_ = now + learning;
     return {};
   }
-  /// Repeats the request, because it or its answer may be lost.
+  /// Ends the wait for the head's parameters, or repeats the request, because it or its answer may be lost.
   HostActions on_tick(Time now) override {
     if (!command_ || now < *next_tick()) return {};
     return learns_until_ ? begin(now) : HostActions{request(now)};
@@ -117,7 +117,7 @@ class MicronHost final : public protocol::Host {
     return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*command_))}, request(now)};
   }
 
-  /// Sends the parameters again to a head that has lost them by a restart.
+  /// Before begin(): requests a line if the head has parameters, else begins. Later: sends the parameters to a restarted head.
   void on_alive(BytesView payload, Time now, HostActions& actions) {
     const auto alive = read_front<Alive>(payload);
     if (!alive || !command_) return;
@@ -159,7 +159,7 @@ class MicronHost final : public protocol::Host {
 
   std::optional<HeadCommand> command_;  // nullopt: this host sends nothing, as for a recording
   std::optional<HeadCommand> before_;   // parameters that the head had
-  std::optional<Time> learns_until_;    // while the host waits for them
+  std::optional<Time> learns_until_;    // set while the host waits for before_
   recording::MessageSplitter splitter_{recording::Origin::device, framing};
   protocol::Sweep sweep_{400};
   Time requested_at_{};
@@ -173,7 +173,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (auto accepted = protocol::accept_settings(wanted, "a Micron", {"range", "gain", "mode"}); !accepted)
     return tl::unexpected(accepted.error());
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a Micron has one mode only");
-  // The sonar would not refuse the range, only send nothing.
+  // The range is refused here, because the sonar would ignore the command and send nothing.
   const double farthest = static_cast<double>(models().front()->modes.front().max_range_m);
   const std::string why = protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Micron", 0, farthest);
   if (!why.empty()) return failure(ErrorKind::usage, why);

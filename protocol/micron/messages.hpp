@@ -1,4 +1,4 @@
-// The messages of a Micron's serial protocol, each described once, and their frames. Little-endian. Sources and meanings:
+// The little-endian messages of a Micron's serial protocol, each described once, and their frames. Sources and meanings:
 // docs/protocols/micron.md.
 #pragma once
 
@@ -71,15 +71,15 @@ struct HeadCommand {
   std::uint8_t kind = 1;  // 1: this layout; 0x1D: 16 more bytes follow
   std::uint16_t control = 0x2307;
   std::uint8_t device_type = 0x11;
-  std::array<std::uint32_t, 4> carriers{};  // transmitter, receiver; not used by this product
+  std::array<std::uint32_t, 4> carriers{};  // transmitter, receiver; no effect here
   std::uint16_t pulse_us = 0;
   std::uint16_t range_dm = 100;             // only displayed; upper 2 bits: the unit
   std::uint16_t left = 0, right = 0;        // 1/16 grad
   std::uint8_t ad_span = 255, ad_low = 0;   // window of 4-bit bins
   std::uint8_t gain = 105, gain2 = 105;     // 0 to 210
-  std::array<std::uint16_t, 2> slope{};     // not used by this product
-  std::uint8_t motor_time = 25, step = 16;  // 10 us; 1/16 grad
-  std::uint16_t interval = 52, bins = 400;  // interval of the bins: 640 ns
+  std::array<std::uint16_t, 2> slope{};     // no effect here
+  std::uint8_t motor_time = 25, step = 16;  // in units of 10 us; in 1/16 grad
+  std::uint16_t interval = 52, bins = 400;  // interval of the bins, in units of 640 ns
   std::uint16_t most_samples = 500, lockout_us = 100, minor_axis = 1600;
   std::uint8_t major_axis = 1, control2 = 0;
   std::uint16_t scan_z = 0;
@@ -115,7 +115,7 @@ inline constexpr std::uint8_t whole_command = 0x01, long_command = 0x1D, reverse
 
 /// `size` bytes of bins follow.
 struct HeadData {
-  std::uint16_t total = 0;  // number of bytes up to the last bin
+  std::uint16_t total = 0;  // size of the payload, including the bins
   std::uint8_t device_type = 0, head_status = 0, sweep = 0;
   std::uint16_t control = 0, range_dm = 0;
   std::uint32_t carrier = 0;
@@ -149,7 +149,7 @@ constexpr void fields(auto& visit, wire::Like<HeadData> auto& m) {
 static_assert(wire::wire_size<HeadData>() == 31);
 
 struct Alive {
-  std::uint8_t lacks_parameters = 0;  // 0x80 = the head has no parameters
+  std::uint8_t lacks_parameters = 0;  // 0x80 = the head has no valid parameters
   std::uint32_t time_ms = 0;
   std::uint16_t bearing = 0;
   std::uint8_t head_info = 0;
@@ -190,7 +190,7 @@ inline Bytes from_host(Id id, BytesView payload) { return framed(id, host_node, 
 
 struct Message {
   Header header;
-  BytesView payload;  // payload of the frame that was read
+  BytesView payload;  // part of the frame that was read
 };
 /// Reads a frame; returns nullopt if the bytes are not a whole frame.
 std::optional<Message> read_frame(BytesView frame);

@@ -14,16 +14,16 @@ namespace {
 
 using protocol::refused;
 
-constexpr double receiver_db = 80;  // ENS: span of an 8-bit bin, and of the gain
+constexpr double receiver_db = 80;  // ENS: range of levels in 8-bit bins, and range of the gain
 constexpr double farthest_m = 200;  // our choice: end of the last bin, which bounds the work for a ping; the device's is unknown
-constexpr double pulse_m = 0.0075;  // length after compression of a chirp of 100 kHz: recalled from the data sheet
+constexpr double pulse_m = 0.0075;  // length after compression of a chirp of 100 kHz: data sheet, from memory
 constexpr auto turn_of_a_sixteenth = std::chrono::microseconds(500);  // unknown: time for 1/16 grad; a turn takes 3.2 s
 constexpr double fastest_hz = 1000;                                   // no limit: hosts request each scan line
 
 SonarModel make_model() {
   FrequencyMode mode;
   mode.name = "700 kHz";
-  mode.centre_hz = 700e3f;  // chirp of 650 to 750 kHz: recalled
+  mode.centre_hz = 700e3f;  // chirp of 650 to 750 kHz: from memory
   mode.min_range_m = 0.3f;
   mode.max_range_m = static_cast<float>(farthest_m);
   mode.source_level_db = 200;  // unknown, like full scale; set so that a gain of 50 % shows the demo well

@@ -32,7 +32,7 @@ using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.
 inline Settings settings_from(const VendorSettings* held) { return protocol::settings_in<HeldSettings>(held); }
 
-/// Returns the longest interval that complaint() accepts for this number of bins.
+/// Returns the longest interval, in units of 640 ns, that complaint() accepts for this number of bins.
 int longest_interval(int bins);
 /// Returns the reason if the device ignores the command, else an empty text.
 std::string complaint(const HeadCommand& command);
@@ -42,12 +42,12 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
 
 /// Returns the angle [rad] by which the sonar is rotated to port, so that it points in the direction of the head.
 double head_rad(const Settings& settings);
-/// listening() returns the duration of a ping's bins, transfer() the time to send the scan line over the link.
+/// listening() returns the duration of a ping's bins, transfer() the time to send the scan line, turning() the time to turn.
 std::chrono::nanoseconds listening(const HeadCommand& command);
 std::chrono::nanoseconds transfer(const HeadCommand& command, const protocol::OptionValues& options);
 std::chrono::nanoseconds turning(int sixteenths);
 
-/// The bearing of the head in a scan, and its direction. A sector is the part from the left limit clockwise to the right limit.
+/// The bearing of the head, and the direction of the scan. A sector is the part from the left limit clockwise to the right limit.
 struct Scan {
   int bearing = ahead;
   bool to_right = true;

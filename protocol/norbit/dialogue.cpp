@@ -22,7 +22,7 @@ constexpr std::size_t longest_line = 512;
 constexpr std::size_t events_per_call = 32;                  // limits the events that a hostile host can cause
 constexpr auto end_of_line = std::chrono::milliseconds(20);  // silence that ends a line, because ROS sends no line end
 
-/// A command with arguments: reads or changes a setting.
+/// A command that reads or changes a setting. Its reply ends with `comment`.
 struct Command {
   std::string_view name;
   std::string (*values)(const Settings&);
@@ -109,7 +109,7 @@ class CommandDialogue final : public protocol::Dialogue {
       else if (line_.size() < longest_line)
         line_ += c;
     }
-    // Simulated time may not advance while a host waits for the reply.
+    // Simulated time may not advance while a host waits for the reply, so there the received bytes end a line.
     ends_at_ = line_.empty() ? Time::max() : now + end_of_line;
     if (device_.simulated_time) end_line(reaction);
     return reaction;

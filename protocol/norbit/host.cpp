@@ -35,7 +35,7 @@ Bytes bytes_of(std::string_view text) {
   return Bytes(bytes.begin(), bytes.end());
 }
 
-/// Makes the commands, first those that read the settings for on_leave(), because the sonar keeps those of the last driver.
+/// Makes the commands. The first ones read the settings that on_leave() restores, because the sonar keeps settings.
 Bytes request_of(const protocol::SettingsOverride& wanted) {
   std::string text;
   for (const std::string_view name : set_by_us) text.append(name).append("\r\n");
@@ -56,8 +56,8 @@ std::vector<std::pair<double, double>> points_of(const Bathymetry& bathymetry) {
   return points;
 }
 
-/// Makes the picture of a water column, without samples. Returns nullopt if the angles do not increase from port to starboard, or
-/// if the samples have no range.
+/// Makes the picture of a water column, without samples. Returns nullopt if the angles do not increase from port to starboard, if
+/// the samples have no range, or if there are no rows or fewer than two beams.
 std::optional<PolarImage> fan_of(const Column& column) {
   PolarImage fan;
   fan.rows = column.front.samples;
@@ -114,10 +114,10 @@ class NorbitHost final : public protocol::Host {
           parts->bathymetry = std::move(bathymetry);
       } else if (auto column = read_column(whole->bytes)) {
         if (Parts* const parts = place_for(column->front.ping, of_column, whole->bytes.size(), now, actions)) {
-          parts->column_bytes = std::move(whole->bytes);  // a move keeps the bytes in their place
+          parts->column_bytes = std::move(whole->bytes);  // a move keeps the address, which `column` needs
           parts->column = std::move(column);
         }
-      } else if (port == 1) {  // others may hold replies to commands: a recording is one stream
+      } else if (port == 1) {  // not at port 0: a recording is one stream there, also with replies to commands
         counts_.junk_bytes += whole->bytes.size();
       }
       show(std::nullopt, actions);
@@ -204,8 +204,8 @@ class NorbitHost final : public protocol::Host {
     return (heard ? std::max(*heard, ping.since) : begun_.value_or(ping.since)) + patience;
   }
 
-  /// Shows the complete pings. If a port has already sent the packet of a later ping, the packet of the earlier ping counts as
-  /// missing, because a slow reader loses different pings at each port. If the port is silent at `now`, the ping is shown
+  /// Shows the complete pings. If a port has already sent the packet of a later ping, the earlier ping is not shown, because a
+  /// slow reader loses different pings at each port. If the port is silent at `now`, or too many pings wait, the ping is shown
   /// incomplete.
   void show(std::optional<Time> now, HostActions& actions) {
     while (!waiting_.empty()) {

@@ -46,7 +46,7 @@ struct BathymetryFront {
   double time_s = 0, network_time_s = 0;  // UNIX time of the transmission
   float rate_hz = 0;
   std::uint16_t kind = 4;
-  std::uint8_t beam_mode = 2, sonar_mode = 1;  // 2: 256 beams, equally spaced in angle
+  std::uint8_t beam_mode = 2, sonar_mode = 1;  // beam_mode 2: 256 beams, equally spaced in angle
   std::array<std::uint16_t, 4> reserved{};
   float tilt_rad = 0, gain = 1, frequency_hz = 0, bandwidth_hz = 0, pulse_s = 0, reserved_2 = 0, voltage = not_measured,
         swath_middle_rad = 0, swath_rad = 0, gate_tilt_rad = 0;
@@ -98,7 +98,7 @@ constexpr void fields(auto& visit, wire::Like<Beam> auto& m) {
   visit("quality_val", m.quality_value);
 }
 
-/// Analog gain: g1 up to sample t1, g2 from t2 on, linear in dB between them.
+/// The analog gain is g1 up to sample t1, g2 from t2 on, and linear in dB between them.
 struct ColumnFront {
   float sound_mps = 0, sample_hz = 0;
   std::uint32_t beams = 0, samples = 0;  // samples of a beam

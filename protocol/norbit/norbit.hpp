@@ -13,7 +13,7 @@
 namespace sonar::norbit {
 
 const protocol::Vendor& vendor();
-/// Makes the dialogue at a port: lines of text with commands, or nothing at ports that only send. `device` must outlive it.
+/// Makes the dialogue at a port. The command port reads lines of text, the others ignore all bytes. `device` must outlive it.
 std::unique_ptr<protocol::Dialogue> make_dialogue(const protocol::Port& port, const protocol::DeviceState& device, Time now);
 
 inline constexpr protocol::HostPort host_ports[]{{protocol::HostPort::Kind::tcp, bathymetry_port},
@@ -29,7 +29,7 @@ recording::Codec codec();
 
 // Converts a ping to packets, and splits packets into their parts.
 
-/// Boundaries of packets in a stream.
+/// Finds the boundaries of packets in a stream.
 extern const recording::Framing framing;
 
 Bytes encode_bathymetry(const Ping& ping, const protocol::DeviceState& device);
@@ -47,10 +47,10 @@ struct Column {
 };
 /// Returns nullopt if `packet` is not a whole packet of this type, or if its checksum is wrong.
 std::optional<Bathymetry> read_bathymetry(BytesView packet);
-/// Returns nullopt like read_bathymetry(), and if the pixels do not have 16 bits.
+/// Returns nullopt like read_bathymetry(), and if the pixels do not have 16 bits or there are more than 1024 beams.
 std::optional<Column> read_column(BytesView packet);
 
-/// Corrects the checksums of packets whose bytes were changed.
+/// Corrects the checksums of the packets whose bytes differ from those in `before`.
 void reseal(BytesView before, Bytes& packets);
 
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packets);

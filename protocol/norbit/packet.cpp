@@ -12,7 +12,7 @@
 namespace sonar::norbit {
 namespace {
 
-constexpr double above_db = 15;           // unknown: assumed
+constexpr double above_db = 15;           // threshold of the bottom above a beam's median; unknown: assumed
 constexpr std::uint8_t good_quality = 8;  // DFD: quality of a signal 12 dB above the noise
 constexpr std::size_t longest_packet = 24 + 168 + (1u << 20) + 4 * 512;
 constexpr double most_pixel = 32767;
@@ -265,7 +265,8 @@ void reseal(BytesView before, Bytes& packets) {
   }
 }
 
-// Locates the fields and regions of packets that faults change. A message is one packet, or both of a ping, bathymetry first.
+// Locates the fields and regions of packets that faults change. A message is one packet, or both packets of a ping, bathymetry
+// first.
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packets) {
   if (packets.empty()) return in_packet<ColumnFront>(name, {});  // the packet with the most fields
   const auto header = header_of(packets);

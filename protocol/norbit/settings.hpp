@@ -14,10 +14,10 @@ namespace sonar::norbit {
 // The products. Sources: protocol/norbit/README.md.
 
 inline constexpr int bottom_beams = 256;                          // beams of bathymetry
-inline constexpr double swath_deg = 140, beam_width_deg = 0.9;    // DFD; recalled
+inline constexpr double swath_deg = 140, beam_width_deg = 0.9;    // DFD; from memory
 inline constexpr double sample_hz = 78125;                        // DFD
 inline constexpr double farthest_m = 600, fastest_hz = 60;        // DFD
-inline constexpr double shortest_m = 1;                           // of the range; chosen
+inline constexpr double shortest_m = 1;                           // shortest length of the range; our choice
 inline constexpr double frequency_khz = 400, bandwidth_khz = 80;  // DFD
 inline constexpr int amplitude = 15, pulse_us = 500;              // DFD
 
@@ -29,13 +29,13 @@ int mode_of(const SonarModel& model);
 inline constexpr double most_gain_db = 40;          // DFD
 inline constexpr double gain_slope_db_per_m = 0.5;  // per metre of two-way range; DFD 2D
 
-/// Format of the samples from which both packets are made; they include gain_db.
+/// Format of the samples from which both packets are made. The samples include gain_db.
 inline constexpr SampleFormat sample_format{
     .bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -120, .ceiling_db = 40};
 
 struct Settings {
   bool power = false;
-  double start_m = 0, stop_m = 10;  // chosen; DFD: 50, or the product's value
+  double start_m = 0, stop_m = 10;  // our choice; stop_m in DFD: 50, or the product's value
   double rate_hz = -1;              // -1 = the highest rate that the range permits
   double gain_db = 20;
   int samples = 256, beams = 128;  // size of the water column; the number of samples is approximate
@@ -50,12 +50,12 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 /// Returns the reason why a sonar cannot have these settings; empty if it can.
 std::string complaint(const Settings& settings);
 
-/// Sample numbers count at sample_hz from the transmission. A row of the ping has `step` samples; a row of the water column has
+/// Sample numbers count at sample_hz from the transmission. Rows of the ping are `step` samples apart, rows of the water column
 /// `thin` rows of the ping.
 struct Grid {
   int first = 0, step = 1, rows = 0;  // first: a multiple of step * thin
   int thin = 1;
-  double sample_m = 0;  // difference in range of two samples
+  double sample_m = 0;  // difference in range of successive samples
   int column_rows() const { return (rows + thin - 1) / thin; }
 };
 Grid grid_of(const Settings& settings, double sound_mps);

@@ -95,7 +95,7 @@ class Visitor {
   }
 };
 
-/// Appends to a byte vector, which must outlive the writer.
+/// Appends fields to a byte vector, which must outlive the writer.
 class Writer : public Visitor<Writer> {
  public:
   explicit Writer(Bytes& out, Endian endian = Endian::little) : out_(out), endian_(endian) {}
@@ -112,7 +112,7 @@ class Writer : public Visitor<Writer> {
   Endian endian_;
 };
 
-/// Reads fields from a span. It stores the first failure; later fields are not changed.
+/// Reads fields from a span. It stores the first failure; fields from there on keep their values.
 class Reader : public Visitor<Reader> {
  public:
   struct Failure {
@@ -131,7 +131,7 @@ class Reader : public Visitor<Reader> {
   std::size_t position() const { return position_; }
   std::size_t remaining() const { return in_.size() - position_; }
 
-  /// Returns the next `count` bytes unchanged, or an empty view after a failure.
+  /// Returns the next `count` bytes; if fewer are left, or after a failure, returns an empty view.
   BytesView block(std::string_view name, std::size_t count) {
     if (!has(name, count)) return {};
     const BytesView taken = in_.subspan(position_, count);
@@ -165,7 +165,7 @@ class Reader : public Visitor<Reader> {
   Failure failure_;
 };
 
-/// Counts bytes.
+/// Counts the bytes of the fields.
 class Counter : public Visitor<Counter> {
  public:
   std::size_t bytes = 0;
@@ -178,7 +178,7 @@ class Counter : public Visitor<Counter> {
   }
 };
 
-/// The position and type of a field in a little-endian message. `bytes`: any type except integers and floating-point numbers.
+/// The position and type of a field in a little-endian message. `bytes`: an array of bytes, or joined fields.
 struct Field {
   enum class Type { integer, number, bytes } type{};
   std::size_t offset = 0, size = 0;
