@@ -21,7 +21,7 @@ constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hos
 /// - mtHeadCommand sets the parameters. The next mtAlive reports that they were received, and the one after it reports that they
 ///   are valid.
 /// - mtSendData requests one or two scan lines (`wanted_`). For each line a ping is requested when the head has turned
-///   (`arrives_`), and is awaited (`awaited_`). Then the head turns on. mtAlive pauses meanwhile.
+///   (`arrives_`), and is awaited (`awaited_`). Then the head turns by a step. mtAlive pauses meanwhile.
 /// The protocol has no refusal, so invalid messages are logged and ignored.
 class MicronDialogue final : public protocol::Dialogue {
  public:

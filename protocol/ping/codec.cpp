@@ -115,12 +115,12 @@ bool holds_result(BytesView message, BytesView poorer, ResultsOf results_of, Ans
   const auto frame = made.size() == 1 ? whole_frame(made.front()) : std::nullopt, recorded = whole_frame(poorer);
   return frame && recorded && frame->payload == recorded->payload;
 }
-/// Handles the messages that a Surveyor sends while pings are enabled. A ping may have several messages.
+/// Returns a part for each message that a Surveyor sends while pings are enabled. A ping may have several messages.
 std::optional<recording::PingPart> surveyor_part(BytesView message) {
   const Id id = id_in(message);
   return part_if(id == Id::atof_point_data || id == Id::yz_point_data || id == Id::attitude_report || id == Id::water_stats);
 }
-/// Handles the messages of an Omniscan. A log may also have those of a Surveyor; each replay serves the messages of its product.
+/// Returns a part for the profile of an Omniscan. A log may also have messages of a Surveyor, which another replay serves.
 std::optional<recording::PingPart> omniscan_part(BytesView message) { return part_if(id_in(message) == Id::os_mono_profile); }
 
 constexpr std::array<recording::FileKind, 1> kinds{{{

@@ -39,7 +39,7 @@ class Conversation : public protocol::Dialogue {
   virtual Bytes message_now(Id wanted, Time now) = 0;
   /// True if the message is sent with every ping and pings are enabled, so that the next ping answers the request for it.
   virtual bool comes_with_pings(Id) const { return false; }
-  /// Answers the request for this message if the product does so itself; then returns true.
+  /// Answers the request for this message in the product's own way and returns true; else returns false.
   virtual bool on_wanted(Id /*wanted*/, Time /*now*/, protocol::Reaction& /*reaction*/) { return false; }
   /// Called when a host has set id_.
   virtual void on_new_id(protocol::Reaction&) {}

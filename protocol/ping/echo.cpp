@@ -49,11 +49,11 @@ Echo find_echo(const Ping& ping) {
   int front = top;
   for (int row = top - 1; row >= first && front - row <= longest_gap + 1; --row)
     if (amplitude(row) >= half) front = row;
-  // The crossing of half the peak, interpolated between the point before the front and the front.
+  // The amplitude crosses half the peak at this part of the way from the front to the point before it (interpolated).
   const double below = front > 0 ? amplitude(front - 1) : half;
   const double part = front > 0 && below < half ? (amplitude(front) - half) / (amplitude(front) - below) : 0;
-  // The amplitude of an even bed reaches half its peak at its distance, that of a mirror 0.7 pulses earlier. Half a pulse is a
-  // compromise.
+  // The echo of an even bed reaches half its peak at the distance of the bed, that of a mirror 0.7 pulses earlier. So half a
+  // pulse is added, as a compromise.
   echo.range_m = s.range_of_row(front - part) + static_cast<double>(s.pulse_width_m) / 2;
   // A linear code of 0 may hide any noise below one code, so the noise counts as at least one code.
   const double least_noise = s.format.scale == SampleFormat::Scale::linear ? full / s.format.max_code : 1e-9;
@@ -67,7 +67,7 @@ Reach adjusted(const Reach& made_with, const Echo& echo, const ReachLimits& limi
   constexpr int sure = 50;      // least confidence of a valid distance, per cent
   constexpr double loud = 250;  // with this amplitude or more, the peak may be limited
   constexpr double loudest_wanted = 200;
-  // Fractions of the range, between which the echo should be.
+  // The echo should be between the first two fractions of the range; a new range puts it at the third.
   constexpr double nearest_part = 0.35, farthest_part = 0.85, wanted_part = 0.6;
   constexpr std::uint32_t length_step_mm = 500, first_length_mm = 5000;
   const auto gain_of = [&](int index) { return limits.gains[static_cast<std::size_t>(index)]; };

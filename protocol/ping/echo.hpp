@@ -34,7 +34,7 @@ struct Echo {
   double peak = 0;     // the highest amplitude; 255 is full scale
   int confidence = 0;  // per cent
 };
-/// Finds the strongest echo of a profile, and the range where the echo begins.
+/// Finds the strongest echo of a profile. Its range is that of the front of the echo, plus half a pulse.
 Echo find_echo(const Ping& ping);
 /// Returns the echo among the findings of the ping; computes it if there is none.
 inline Echo echo_in(const Ping& ping) { return protocol::found_in(ping, find_echo); }

@@ -36,10 +36,10 @@ Bytes surveyor_request(const protocol::SettingsOverride& wanted) {
 Bytes ping360_request(const protocol::SettingsOverride& wanted) {
   const double range_m = wanted.range_m.value_or(usual_range_m);
   AutoTransmit t;
-  const double window = 2 * range_m / sound_mps / sample_unit_s;  // in units of the sample period
+  const double window = 2 * range_m / sound_mps / sample_unit_s;  // duration of all samples in units of 25 ns
   t.samples = static_cast<std::uint16_t>(std::clamp(window / 80, 200.0, 1000.0));
   t.period = static_cast<std::uint16_t>(std::clamp(window / t.samples, 80.0, 40000.0));
-  t.transmit_us = static_cast<std::uint16_t>(std::clamp(8000 * range_m / sound_mps, 5.0, 500.0));  // the makers' rule
+  t.transmit_us = static_cast<std::uint16_t>(std::clamp(8000 * range_m / sound_mps, 5.0, 500.0));  // the maker's rule
   t.khz = 750;
   t.gain = static_cast<std::uint8_t>(std::lround(wanted.gain_percent.value_or(0) / 50));
   t.start = first_grad;
@@ -49,7 +49,7 @@ Bytes ping360_request(const protocol::SettingsOverride& wanted) {
 
 using Points = std::vector<std::pair<double, double>>;  // azimuth and range of each point
 
-/// Returns the points before the first invalid one, or to the end of the message.
+/// Returns the points before the first invalid one, or all points.
 Points points_in(const YzPointData& data, BytesView rest) {
   Points polar;
   wire::Reader reader(rest);
@@ -78,8 +78,8 @@ Points points_in(const AtofPointData& data, BytesView rest) {
 }
 
 double end_m(const YzPointData& data, const Points&) { return static_cast<double>(data.end_m); }
-/// Returns a lower bound of the far end of the range, which the message does not state, from the time for which the sonar
-/// listened, which begins at the near end.
+/// Returns a lower bound of the far end of the range, because the message states only the listening time, which begins at the
+/// near end.
 double end_m(const AtofPointData& data, const Points& polar) {
   double far_m = static_cast<double>(data.listening_s) * static_cast<double>(data.speed_mps) / 2;
   for (const auto& point : polar) far_m = std::max(far_m, point.second);
@@ -144,8 +144,8 @@ class SurveyorHost final : public PingHost {
   std::pair<std::optional<std::uint32_t>, Id> newest_{};  // number of the newest ping, and the message from which it is read
 };
 
-/// First requests the protocol version, which changes nothing. UDP has no connection, so only the answer shows that there is a
-/// sonar; then the host requests a scan. A datagram may be lost, so the first request is repeated until it is answered.
+/// The host first requests the protocol version, which changes nothing. UDP has no connection, so only an answer shows that there
+/// is a sonar. Then the host requests a scan. A datagram may be lost, so the first request is repeated until a frame arrives.
 class Ping360Host final : public PingHost {
  public:
   using PingHost::PingHost;

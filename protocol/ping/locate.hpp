@@ -14,7 +14,7 @@ using Place = std::pair<std::size_t, std::size_t>;  // offset, size
 std::optional<protocol::Field> locate_ping360(protocol::FieldName name, protocol::BytesView frame);
 std::optional<Place> locate_ping360(protocol::Region region, protocol::BytesView frame);
 
-/// `frames` must be the frames of a ping over TCP, which begin with attitude_report (504).
+/// `frames` must be the frames of a ping over TCP, which begin with attitude_report (504), or the frame of one datagram.
 std::optional<protocol::Field> locate_surveyor(protocol::FieldName name, protocol::BytesView frames);
 std::optional<Place> locate_surveyor(protocol::Region region, protocol::BytesView frames);
 

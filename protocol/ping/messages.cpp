@@ -95,8 +95,8 @@ std::optional<Frame> Framer::next() {
       continue;
     }
     std::uint16_t stated = 0;
-    wire::Reader behind(left.subspan(summed));
-    behind("checksum", stated);
+    wire::Reader rest(left.subspan(summed));
+    rest("checksum", stated);
     // The sum of the frame is the difference of two sums from the start of the buffer, so no byte is added twice.
     frame.sum_is_right = stated == static_cast<std::uint16_t>(sums_[begin_ + summed] - sums_[begin_]);
     if (frame.sum_is_right) {

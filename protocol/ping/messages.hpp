@@ -1,4 +1,4 @@
-// The messages of the ping protocol that the emulated devices use, and their frames. Little-endian. Source: the public
+// The little-endian messages of the ping protocol that the emulated devices use, and their frames. Source: the public
 // definitions of bluerobotics/ping-protocol.
 #pragma once
 
@@ -35,7 +35,7 @@ enum class Id : std::uint16_t {
   attitude_report = 504,
   ping1d_set_device_id = 1000,
   ping1d_set_range = 1001,
-  set_sound_speed_before = 1002,  // used by a Ping1D and, in older definitions, by other devices
+  set_sound_speed_before = 1002,  // used by a Ping1D, an S500 and, in older definitions, other devices
   ping1d_set_mode_auto = 1003,
   ping1d_set_interval = 1004,
   ping1d_set_gain = 1005,
@@ -78,7 +78,7 @@ enum class Id : std::uint16_t {
 
 inline constexpr std::size_t header_size = 8, sum_size = 2;
 inline constexpr std::size_t longest_payload = 65535;
-inline constexpr std::size_t longest_request = 256;  // payload; the longest that a host has to send is 36
+inline constexpr std::size_t longest_request = 256;  // limit of the payload; the longest that a host has to send has 36 bytes
 
 struct Header {
   std::array<std::uint8_t, 2> start{'B', 'R'};
@@ -145,7 +145,7 @@ class Framer {
 /// Returns the first frame of a complete message; nullopt if there is none, or if its sum is wrong.
 std::optional<Frame> whole_frame(BytesView message);
 
-/// True for messages that only devices send. They are not answered, because two devices would answer each other without end.
+/// True for ack, nack and texts, which only devices send. They get no answer, or two devices would answer each other without end.
 constexpr bool is_of_device(Id id) { return id == Id::ack || id == Id::nack || id == Id::ascii_text; }
 
 /// True if a datagram contains a valid frame of a host.

@@ -34,7 +34,7 @@ SonarModel make_model() {
   mode.source_level_db = 205;
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
-  // The width along the track is that of the Omniscan 3D 450 SS, which the maker states. The width across is recalled.
+  // The width along the track is that of the Omniscan 3D 450 SS, which the maker states. The width across is from memory.
   mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(0.8));
   mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(50));
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;

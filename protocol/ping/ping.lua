@@ -5,7 +5,7 @@
 local ping = Proto("brping", "Blue Robotics ping protocol")
 local HEADER, SUM = 8, 2
 
--- Payloads: name, type; "rest" is what follows.
+-- Names of messages, and their fields: name, type; "rest" is all bytes that follow, "skip" a number of unused bytes.
 local messages = {
   [1] = {"ack", {{"acked_id", "u16"}}},
   [2] = {"nack", {{"nacked_id", "u16"}, {"nack_message", "text"}}},
@@ -140,7 +140,7 @@ local function add_payload(tree, id, payload)
   end
 end
 
--- One frame of the range, whose length is known to be there.
+-- Adds the frame that fills the range.
 local function add_frame(range, pinfo, tree)
   local length, id = range(2, 2):le_uint(), range(4, 2):le_uint()
   local name = messages[id] and messages[id][1] or ("message " .. id)

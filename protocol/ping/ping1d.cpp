@@ -46,7 +46,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
         return true;
       case Id::ping1d_set_enable:
         set_value(frame, reaction, &Parameters::enable);
-        forget_ping(now);  // disabling pings ends the request of the ping that is being made
+        forget_ping(now);  // a requested ping may not come any more
         return true;
       case Id::ping1d_continuous_start:
       case Id::ping1d_continuous_stop:

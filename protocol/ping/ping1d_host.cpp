@@ -74,7 +74,7 @@ class Ping1DHost final : public PingHost {
     return found;
   }
 
-  static constexpr float step_db = 48;  // samples of 8 bits: from 1, which is nearly noise, to 255
+  static constexpr float step_db = 48;  // from sample 1, which is nearly noise, to 255
   Waterfall waterfall_{step_db};
 };
 

@@ -17,7 +17,7 @@ using protocol::refused;
 
 constexpr std::array<double, 7> gains{0.6, 1.8, 5.5, 12.9, 30.2, 66.1, 144};  // DEF: amplification of each gain_setting
 static_assert(gains.size() == most_gain + 1);
-constexpr int points = 200;                // recalled
+constexpr int points = 200;                // from memory
 constexpr std::uint32_t most_mm = 100000;  // MAN
 constexpr double shortest_pulse_us = 26;   // USR: pulse at 1 m. unknown: pulses at longer ranges
 

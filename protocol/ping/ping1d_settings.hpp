@@ -1,4 +1,4 @@
-// The Ping1D: its model, the checks of its settings, its automatic mode, and the frames of a ping. No I/O; sources:
+// The Ping1D: the model, the checks of the settings, the automatic mode, and the frames of a ping. Sources:
 // protocol/ping/README.md.
 #pragma once
 
@@ -68,9 +68,9 @@ Parameters adjusted(const Parameters& made_with, const Echo& echo);
 
 /// Makes the frames for Settings::results, in the order of their message ids.
 std::vector<Bytes> frames_of(const Ping& ping);
-/// Makes the frames for the results `wanted`, made from a recorded frame. The recorded frame is returned unchanged if it is one
-/// of them, or if `wanted` is no_result. A frame with more values than the recorded one gets no samples, and 0 for the missing
-/// values. Returns none if the recorded frame holds no result.
+/// Makes the frames for the results `wanted` from a recorded frame. The recorded frame is returned unchanged if it is one of
+/// them, or if `wanted` is no_result. A frame with more values than the recorded frame gets no samples, and 0 for the missing
+/// values. Returns no frames if the recorded frame holds no result.
 std::vector<Bytes> answer(BytesView recorded, Results wanted);
 
 }  // namespace sonar::ping::ping1d

@@ -72,7 +72,7 @@ class Ping360Dialogue final : public Conversation {
   }
 
  protected:
-  /// transducer (2601) and auto_transmit (2602) begin a task, whose pings are the answer; other requests are acknowledged.
+  /// transducer (2601) and auto_transmit (2602) begin a task, whose messages are the answer; other requests are acknowledged.
   bool on_request(const Frame& frame, Time now, Reaction& reaction) override {
     switch (frame.header.id) {
       case Id::transducer: {

@@ -42,8 +42,8 @@ SonarModel make_model() {
   mode.source_level_db = 200;  // unknown: level and gains; chosen so that a nearby wall is bright at gain 0
   mode.beam_spacing = BeamSpacing::listed;
   mode.beam_azimuths_rad = {0};
-  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(2));     // recalled from the data sheet
-  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(25));  // recalled from the data sheet
+  mode.pattern.azimuth_width_rad = static_cast<float>(rad_from_deg(2));     // data sheet, from memory
+  mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(25));  // data sheet, from memory
   mode.horizontal_aperture_rad = mode.pattern.azimuth_width_rad;
   mode.receiver.tvg_slope_db = 20;
   mode.receiver.tvg_ceiling_db = 60;

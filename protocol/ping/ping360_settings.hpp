@@ -29,7 +29,7 @@ struct Settings {
   std::uint16_t start = 0, stop = 399;
   std::uint8_t steps = 1, delay_ms = 0;
 };
-/// Compares settings without the angle, which changes with every ping.
+/// Compares settings without the id of the device, and without the angle, which changes with every ping.
 bool same_settings(const Settings& a, const Settings& b);
 using HeldSettings = protocol::Held<Settings>;
 /// Returns the settings in `held`; if it is null, the settings of a new device.
@@ -51,7 +51,7 @@ struct Line {
   Transducer ping;
   Bytes samples;
 };
-/// Reads the scan line in such a message; nullopt for another or incomplete message, or a wrong checksum.
+/// Reads the scan line in such a message; returns nullopt if it is another or incomplete, has no samples or a wrong checksum.
 std::optional<Line> line_in(BytesView message);
 
 /// Returns the angle [rad] by which the sonar is rotated to port, so that it points in the direction of the head. Angles of the

@@ -1,4 +1,4 @@
-// The part that all hosts of the family share: frames, refusals, the settings that a user requests, and the picture of one
+// The part that all hosts of the family share: frames, refusals, the settings that a user requests, and the powers of one
 // beam.
 #pragma once
 
@@ -16,7 +16,7 @@ using protocol::Waterfall;
 
 inline constexpr double usual_range_m = 10;
 
-/// Returns the period for the requested rate [ms]; 0 if no rate is requested, so that the device chooses it.
+/// Returns the period for the requested rate [ms]; 0 if no rate, or the rate 0, is requested.
 double period_ms_of(const protocol::SettingsOverride& wanted);
 
 /// Makes a request for a message, which does not change the device's settings.
@@ -52,7 +52,7 @@ class PingHost : public protocol::Host {
   /// steps.
   void compare_gain(int step, int most, protocol::HostPing& ping) const;
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
-  /// Returns the reason of the error; nullopt = no error, because the host sends another request. `why`: text from the sonar.
+  /// Returns the reason of the error; nullopt = no error, for example if the host sends another request. `why`: the sonar's text.
   virtual std::optional<std::string> on_nack(Id /*refused*/, std::string why, protocol::HostActions&) { return why; }
   virtual std::optional<protocol::HostPing> ping_from(const Frame& frame, Time now) = 0;
 

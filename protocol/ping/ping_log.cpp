@@ -27,7 +27,7 @@ std::string beginning(ping::Id first) {
          (first == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
 }
 
-/// Returns the time since power-up in a message; nullopt if messages of this kind do not have it.
+/// Returns the time since power-up in a message of a Surveyor or an Omniscan; nullopt for other messages.
 std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   const auto of = [&](auto message) -> std::optional<std::uint32_t> {
     wire::Reader reader(frame.payload);

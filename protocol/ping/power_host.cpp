@@ -1,5 +1,5 @@
-// The host of an Omniscan and of an S500. Both have the same port. The host first asks for a message that only an S500 has, which
-// changes nothing. While the sonar is silent, the host repeats this question, and sends the request of an Omniscan once.
+// The host of an Omniscan and of an S500, which have the same port. For an S500 it sends the request at once. For an Omniscan it
+// first requests a message that only an S500 has. While the sonar is silent, it repeats this, and sends the other request once.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -170,14 +170,14 @@ class PowerHost final : public PingHost {
   const Product* product_;  // whose request was sent last, or is sent first
   const Product* other_;
   std::string refusal_;     // why the request of the first product was refused
-  std::string_view shown_;  // the product that refused the other's request, or whose ping came; empty: not known
+  std::string_view shown_;  // the product that a ping, an answer or a refusal has shown; empty: not known
   protocol::SettingsOverride settings_;
-  std::optional<Time> ask_at_;  // when the question is repeated; nullopt: the product is known
+  std::optional<Time> ask_at_;  // when the question is repeated; nullopt: never
   bool has_requested_ = false, has_switched_ = false;
   protocol::Waterfall waterfall_;
 };
 
-/// The rate is compared with the limit of the product that answers.
+/// Makes the host, which compares the rate with the limit of the product that answers.
 Result<std::unique_ptr<protocol::Host>> host_of(const Product& product, const Product& other, const protocol::Wanted& wanted) {
   if (auto fits = check_wanted(product.title, std::nullopt, {"range", "rate", "gain", "mode"}, wanted); !fits)
     return tl::unexpected(fits.error());

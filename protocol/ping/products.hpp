@@ -49,7 +49,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
 recording::Codec codec();
 }  // namespace s500
 
-// Converts a ping rate to a period, which devices and hosts of the family use.
+// Conversion of a ping rate to a period, for devices and hosts of the family.
 
 /// Returns the period for a rate above 0 [ms], limited to 1 to 30000.
 inline double period_ms(double rate_hz) { return std::clamp(1000 / rate_hz, 1.0, 30000.0); }

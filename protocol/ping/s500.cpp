@@ -14,8 +14,8 @@ constexpr auto port_table = streaming_ports(51200, "settings, profiles");
 constexpr std::uint16_t firmware_major = 2, firmware_minor = 2;
 constexpr double processor_above_water_c = 20;  // assumed
 
-/// The dialogue with one host. One message, set_ping_params (1015), sets everything and starts or ends the pings;
-/// SoundingConversation fires the pings.
+/// The dialogue with one host. One message, set_ping_params (1015), sets all except the sound speed, and starts or ends the
+/// pings; SoundingConversation fires the pings.
 class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
  public:
   S500Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)

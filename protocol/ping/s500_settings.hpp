@@ -33,7 +33,7 @@ struct Settings {
   std::uint8_t id = 0;  // id of the device; unknown: the id of a new device
   Parameters parameters;
   Results results = no_result;  // results that hosts requested; no_result: no host did, and the profile is sent
-  std::vector<Echo> earlier;    // the newest is the last
+  std::vector<Echo> earlier;    // echoes of earlier pings, the newest last
 };
 /// Compares settings without the results and the echoes, which differ between pings.
 bool same_settings(const Settings& a, const Settings& b);
@@ -49,7 +49,7 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 std::string complaint(const SetPingParams& wanted);
 /// Returns the parameters after the request.
 Parameters requested(const Parameters& before, const SetPingParams& wanted);
-/// Returns the shortest interval between pings.
+/// Returns the interval between pings: the requested one, but at least 100 ms.
 int interval_ms(const Parameters& parameters);
 PingSettings ping_settings(const Settings& settings);
 protocol::ChangeSettings change_to(const Settings& settings);
@@ -59,7 +59,7 @@ double gain_percent(const Parameters& parameters);
 /// Returns the settings `now`, changed by the automatic range and gain after a ping. The ping may have been made with earlier
 /// settings.
 Settings after(const Ping& ping, const Settings& now);
-/// Makes the frames for Settings::results, in the order of their numbers.
+/// Makes the frames for Settings::results: altitude, distance, profile.
 std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device);
 /// Does the same as ping1d::answer().
 std::vector<Bytes> answer(BytesView recorded, Results wanted);

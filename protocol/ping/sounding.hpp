@@ -10,9 +10,9 @@
 
 namespace sonar::ping {
 
-/// A ping is fired when results are requested (`once_`, `streamed_`) and the interval is over (`due_`). The next ping is fired
-/// only after this ping has arrived or two seconds have passed. `Settings`: as for StreamingConversation, and with `results`, for
-/// which a ping is fired. `Held` has the settings.
+/// A ping is requested while results are requested (`once_`, `streamed_`); the daemon fires it when the interval is over. The
+/// next ping is requested only after this ping has arrived or two seconds have passed. `Settings`: as for StreamingConversation,
+/// and with `results`, for which a ping is fired. `Held` has the settings.
 template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*)>
 class SoundingConversation : public StreamingConversation<Settings, settings_from> {
   using Base = StreamingConversation<Settings, settings_from>;
@@ -60,7 +60,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   void want_once(Results result, Time now, protocol::Reaction& reaction) { want(once_, result, now, reaction); }
   void stream(Results result, Time now, protocol::Reaction& reaction) { want(streamed_, result, now, reaction); }
   void stop_stream(Results result) { streamed_ &= ~result; }
-  /// Call it if the ping that is being computed must no longer serve a request.
+  /// Ends the wait for the ping that is being computed, so that the next is due now. Results that are requested are still sent.
   void forget_ping(Time now) {
     fired_.reset();
     due_ = now;
@@ -78,7 +78,7 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   }
 
  private:
-  /// Requests `result`. The next ping serves the request, not the one that is being computed.
+  /// Requests `result`. A ping that is being computed serves the request only if it was fired for the same result.
   void want(Results& results, Results result, Time now, protocol::Reaction& reaction) {
     // The initial settings enable pings, but the sonar pings only after a first change of settings: this one.
     if (!std::exchange(has_asked_, true)) this->change(reaction, [](Settings&) {});

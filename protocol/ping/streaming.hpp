@@ -10,7 +10,7 @@ namespace sonar::ping {
 
 constexpr std::array<protocol::Port, 2> streaming_ports(std::uint16_t number, std::string_view carries) {
   // ping-python reads one message of each packet that it receives, so messages in one packet would fill its queue. The value is
-  // chosen.
+  // our choice.
   constexpr std::chrono::milliseconds between_messages{3};
   return {{{.kind = protocol::Port::Kind::tcp_stream, .number = number, .carries = carries, .gap = between_messages},
            {.kind = protocol::Port::Kind::udp_dialogue, .number = number, .carries = carries}}};
@@ -29,7 +29,7 @@ class StreamingConversation : public Conversation {
   protocol::Reaction on_tick(Time, bool) override { return {}; }
   Time next_tick() const override { return Time::max(); }
   std::optional<std::chrono::milliseconds> longest_silence() const override {
-    if (by_datagrams_ && settings().parameters.enable == 0) return std::chrono::seconds(10);  // chosen
+    if (by_datagrams_ && settings().parameters.enable == 0) return std::chrono::seconds(10);  // our choice
     return Conversation::longest_silence();
   }
 
@@ -78,7 +78,7 @@ class StreamingVendor : public protocol::Vendor {
   virtual std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& device) const = 0;
 };
 
-/// Options of such products.
+/// Options of Surveyor, Omniscan and S500.
 inline std::span<const protocol::Option> streaming_options() {
   static const std::array<protocol::Option, 2> all{
       {type_option("0", "number of the product in its device information"), silence_option()}};

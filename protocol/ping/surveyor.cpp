@@ -11,9 +11,9 @@ constexpr auto port_table = streaming_ports(62312, "settings, points");
 constexpr auto utc_period = std::chrono::seconds(10);
 
 /// The dialogue with one host. The device requests the time from the host every 10 s, for the first time when the host enables
-/// pings. unknown: the time of the first request. A request at the start could be in the packet of the answer for which
-/// ping-python waits; this would delay ping-python's initialization by 10 s, because ping-python reads one message of each
-/// packet.
+/// pings, or 10 s after the start. unknown: the time of the first request. A request at the start could be in the packet of the
+/// answer for which ping-python waits; this would delay its initialization by 10 s, because ping-python reads one message of
+/// each packet.
 class SurveyorDialogue final : public StreamingConversation<Settings, settings_from> {
  public:
   SurveyorDialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)

@@ -17,7 +17,7 @@ namespace {
 using protocol::refused;
 
 constexpr int beams = 64, directions = 16;         // a point is sought in as many directions as there are receive elements
-constexpr double swath_deg = 80;                   // recalled, as are the width along the track and the number of elements
+constexpr double swath_deg = 80;                   // from memory, as is the number of elements
 constexpr double beam_width_deg = 7;               // width for an array of 16 elements half a wavelength apart
 constexpr double above_db = 15;                    // unknown: assumed; level of a point above the median of its beam
 constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with which the device follows the bottom

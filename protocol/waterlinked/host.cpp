@@ -20,8 +20,8 @@ constexpr double darkest = 0.85;  // fraction by which the farthest pixel of a r
 constexpr std::size_t most_pixels = 1 << 20;
 constexpr std::string_view title = "a Sonar 3D-15", api = "/api/v1/integration";
 
-/// Returns the carrier of the shot's mode. The field `frequency` has the rate, so the horizontal field of view identifies the
-/// mode.
+/// Returns the carrier frequency of the shot's mode. The field `frequency` has the rate, so the horizontal field of view
+/// identifies the mode.
 double centre_hz_of(const Shot& shot) {
   for (const auto& mode : mode_rows())
     if (std::abs(mode.horizontal_deg - static_cast<double>(shot.horizontal_deg)) < 1) return mode.centre_hz;
@@ -101,8 +101,8 @@ class WaterlinkedHost final : public protocol::Host {
 
   HostActions on_open(std::span<const std::uint16_t>, Time) override { return {ask("GET", "/udp", "")}; }
 
-  /// Handles a reply, the first of which is that of GET /udp. If the output is disabled, the host switches multicast on; if it is
-  /// unicast to another program, the host does not change it, and fails. Then the host sends the settings.
+  /// Handles a reply, the first of which is that of GET /udp. If the output is disabled, the host switches multicast on, or fails
+  /// if it may change no settings. If the output is unicast, the host does not change it, and fails. Then it sends the settings.
   HostActions on_reply(const protocol::ResourceReply& reply, Time) override {
     const auto fail = [](ErrorKind kind, std::string text) { return HostActions{Error{kind, std::move(text)}}; };
     if (!std::exchange(knows_output_, true)) {

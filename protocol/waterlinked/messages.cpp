@@ -148,7 +148,7 @@ constexpr std::chrono::nanoseconds imu_period = std::chrono::milliseconds(10);
 constexpr std::chrono::nanoseconds longest_batch = std::chrono::seconds(1);  // bounds a batch after a pause of the acoustics
 
 /// A pixel of both images. Where one of them has no return, such as a strength below the first pixel value, both have 0, so that
-/// their masks agree.
+/// both images have returns at the same pixels.
 struct Pixel {
   std::uint32_t range = 0;
   std::uint8_t strength = 0;
@@ -182,7 +182,7 @@ std::array<float, 3> frd(Vec3d flu) {
 
 }  // namespace
 
-// The length counts the whole packet, and the CRC everything before itself.
+// The length is that of the whole packet. The CRC covers all bytes before it.
 Bytes rip_packet(BytesView content, Rip version) {
   Bytes block(content.begin(), content.end());
   if (version == Rip::two) {

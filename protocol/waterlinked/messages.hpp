@@ -29,7 +29,7 @@ struct Shot {
 struct RangeMessage {
   Shot shot;
   float pixel_scale_m = 0;
-  std::vector<std::uint32_t> pixels;  // row by row, lowest first
+  std::vector<std::uint32_t> pixels;  // row by row, lowest row first
 };
 struct StrengthMessage {
   Shot shot;

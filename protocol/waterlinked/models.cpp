@@ -7,7 +7,7 @@
 namespace sonar::waterlinked {
 
 // Sources. DOC: the vendor's public documentation. SMP: a recording of a real unit. unknown: centre of the low frequency
-// (recalled), beams of the high frequency, range resolution. Beam width of the low frequency: the strengths in neighbouring
+// (from memory), beams of the high frequency, range resolution. Beam width of the low frequency: the strengths in neighbouring
 // columns have a correlation of 0.7 with 0.9 degrees, and of 0.85 with 1.5 degrees; SMP has 0.62.
 std::span<const ModeRow> mode_rows() {
   static constexpr std::array<ModeRow, 2> all{{

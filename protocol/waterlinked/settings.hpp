@@ -18,7 +18,7 @@ inline constexpr int columns = 256, rows = 64;
 inline constexpr double longest_range_m = 15, least_window_m = 0.1, pixel_scale_m = 50.0 / 65536;
 inline constexpr std::uint32_t full_scale_strength = 400;  // linear; the assisted gain keeps 99 % of the pixels below 80 % of it
 
-/// Properties of the device in the images of SMP, fitted to shots 1 to 3 and confirmed with shots 4 to 6 (likeness_test.cpp).
+/// Properties of the device in SMP, a recording; fitted to its shots 1 to 3, confirmed with shots 4 to 6 (likeness_test.cpp).
 /// Half of the ranges equal that of a neighbour, more often at strong returns, because beams in which the same scatterer is the
 /// strongest report its range. In neighbouring rows the strengths have a correlation of 0.59, and half of the ranges are equal.
 /// Across the edges of four blocks of 16 rows the correlation is 0.09 to 0.20, and 1 to 7 % of the ranges are equal.
@@ -79,7 +79,7 @@ Time device_time(Time at, const Settings& settings, const protocol::DeviceState&
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// Options of a sonar in the configuration, under `options:`: properties that the public sources do not state.
+/// Options of a sonar in the configuration (`options:`), for properties that the public sources do not state.
 namespace option_name {
 inline constexpr std::string_view release = "release", rip = "rip", acoustics_at_start = "acoustics_at_start",
                                   udp_at_start = "udp_at_start", clock = "clock";

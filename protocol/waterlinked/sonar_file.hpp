@@ -1,4 +1,4 @@
-// Recordings of a Water Linked Sonar 3D-15 (.sonar): its successive datagrams (docs/protocols/waterlinked.md).
+// Recordings of a Water Linked Sonar 3D-15 (.sonar): the successive datagrams of the sonar (docs/protocols/waterlinked.md).
 #pragma once
 
 #include <memory>

@@ -18,8 +18,8 @@ inline constexpr std::array<protocol::HostPort, 2> host_ports{
     {{protocol::HostPort::Kind::http, http_port},
      {protocol::HostPort::Kind::udp_listen, multicast_group.port, multicast_group.ip}}};
 
-/// Builds a top-view ping: each column of pixels becomes a beam; each pixel puts its strength at its horizontal range. Without
-/// `strengths` all returns are equally bright. Returns nullopt if the messages do not describe one image.
+/// Makes a ping with a picture from above. Each column becomes a beam; each pixel puts its strength at its horizontal range.
+/// Without `strengths` all returns are equally bright. Returns nullopt if the messages do not describe one image.
 std::optional<protocol::HostPing> ping_from(const RangeMessage& ranges, const StrengthMessage* strengths);
 
 Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted);

@@ -85,7 +85,7 @@ local function unpacked(text)
   return table.concat(parts)
 end
 
--- Calls take(number, value) for each protobuf field; fixed-size numbers are bytes. Returns false if this is no message.
+-- Calls take(number, value) for each protobuf field; fixed-size numbers are bytes. Returns false if `text` is not a message.
 local function each(text, take)
   local at = 1
   while at <= #text do
