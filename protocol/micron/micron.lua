@@ -38,7 +38,7 @@ local all = {}
 for _, field in pairs(fields) do all[#all + 1] = field end
 micron.fields = all
 local broken = ProtoExpert.new("micron.expert.broken", "Lengths contradict each other", expert.group.MALFORMED, expert.severity.ERROR)
-local junk = ProtoExpert.new("micron.expert.junk", "Not the begin of a message", expert.group.PROTOCOL, expert.severity.WARN)
+local junk = ProtoExpert.new("micron.expert.junk", "Not the start of a message", expert.group.PROTOCOL, expert.severity.WARN)
 micron.experts = {broken, junk}
 
 local function begins(tvb, at)

@@ -104,7 +104,7 @@ class NorbitHost final : public protocol::Host {
   HostActions on_bytes(std::size_t port, BytesView received, Time now) override {
     HostActions actions;
     if (!begun_) begun_ = now;
-    if (port < kinds) heard_at_[port] = now;
+    if (port < kinds) received_at_[port] = now;
     if (port == command_port_index && request_) return on_replies(received);
     auto& splitter = splitters_[std::min(port, splitters_.size() - 1)];  // a recording has the packets of all ports in one stream
     splitter.append(now, received);
@@ -177,7 +177,7 @@ class NorbitHost final : public protocol::Host {
   /// Returns the ping to which a packet belongs; null if the ping was shown without the packet.
   Parts* place_for(std::uint32_t number, Kind kind, std::size_t bytes, Time now, HostActions& actions) {
     ++counts_.messages;
-    heard_at_[kind] = now;
+    received_at_[kind] = now;
     if (shown_without_[kind].erase(number) > 0) {
       const char* const what = kind == of_column ? "water column" : "bathymetry";
       actions.emplace_back(protocol::Notice{format("the %s of ping %u came after the ping was shown", what, number)});
@@ -200,8 +200,8 @@ class NorbitHost final : public protocol::Host {
   /// Returns the time at which a ping is shown without its other packet. A port that has never sent a packet may be closed on
   /// purpose, so only the first pings wait for it.
   Time given_up_at(const Parts& ping) const {
-    const std::optional<Time>& heard = heard_at_[ping.missing()];
-    return (heard ? std::max(*heard, ping.since) : begun_.value_or(ping.since)) + patience;
+    const std::optional<Time>& last = received_at_[ping.missing()];
+    return (last ? std::max(*last, ping.since) : begun_.value_or(ping.since)) + patience;
   }
 
   /// Shows the complete pings. If a port has already sent the packet of a later ping, the earlier ping is not shown, because a
@@ -292,7 +292,7 @@ class NorbitHost final : public protocol::Host {
   std::deque<Parts> waiting_;  // begins with a ping that lacks a packet
   std::size_t waiting_bytes_ = 0;
   std::optional<Time> begun_;
-  std::array<std::optional<Time>, kinds> heard_at_;
+  std::array<std::optional<Time>, kinds> received_at_;
   std::array<std::set<std::uint32_t>, kinds> shown_without_;  // numbers of pings whose packet may still come
   double shown_m_ = usual_range_m;                            // far end of the last water column
   std::optional<std::uint32_t> last_;

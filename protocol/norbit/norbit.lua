@@ -39,7 +39,7 @@ local all = {}
 for _, field in pairs(fields) do all[#all + 1] = field end
 norbit.fields = all
 local broken = ProtoExpert.new("norbit.expert.broken", "Sizes contradict each other", expert.group.MALFORMED, expert.severity.ERROR)
-local junk = ProtoExpert.new("norbit.expert.junk", "Not the begin of a packet", expert.group.PROTOCOL, expert.severity.WARN)
+local junk = ProtoExpert.new("norbit.expert.junk", "Not the start of a packet", expert.group.PROTOCOL, expert.severity.WARN)
 norbit.experts = {broken, junk}
 
 local function add(tree, list, tvb, at)

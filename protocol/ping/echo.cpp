@@ -38,10 +38,10 @@ Echo find_echo(const Ping& ping) {
   while (first < rows && s.range_of_row(first) < nearest_echo_m) ++first;
   if (first >= rows) return {};
   // Points nearer than nearest_echo_m count neither for the peak nor for the noise.
-  std::vector<double> heard(amplitudes.begin() + first, amplitudes.begin() + rows);
-  const int top = first + static_cast<int>(std::max_element(heard.begin(), heard.end()) - heard.begin());
-  const auto middle = heard.begin() + static_cast<std::ptrdiff_t>(heard.size() / 2);
-  std::nth_element(heard.begin(), middle, heard.end());
+  std::vector<double> counted(amplitudes.begin() + first, amplitudes.begin() + rows);
+  const int top = first + static_cast<int>(std::max_element(counted.begin(), counted.end()) - counted.begin());
+  const auto middle = counted.begin() + static_cast<std::ptrdiff_t>(counted.size() / 2);
+  std::nth_element(counted.begin(), middle, counted.end());
   Echo echo{.peak = amplitude(top)};
   if (echo.peak == 0) return echo;
   const double half = echo.peak / 2;
