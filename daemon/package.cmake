@@ -120,7 +120,7 @@ set(CPACK_DEBIAN_BVTSDK_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_BVTSDK_PACKAGE_SUGGESTS sonard)
 set(CPACK_COMPONENT_BVTSDK_DESCRIPTION "libraries with the interface of the BlueView SDK, for sonard
 Open drivers of BlueView sonars that are built with them run against sonard.
-They cannot talk to a real sonar. Each of the two interfaces, 3.x and 4.x, has
+They cannot connect to a real sonar. Each of the two interfaces, 3.x and 4.x, has
 a folder of its own, /usr/lib/sonard/bvt3 and bvt4: give it to CMake as
 CMAKE_PREFIX_PATH.")
 include(CPack)
