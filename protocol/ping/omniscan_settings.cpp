@@ -18,7 +18,7 @@ constexpr double db_per_gain = 6;  // unknown: assumed, as are full scale and th
 constexpr int most_gain = 7;
 constexpr double longest_m = 150;
 constexpr std::uint32_t least_length_mm = 100;
-constexpr double processing_s = 0.0018;  // time from the last echo to the next ping (REC)
+constexpr double processing_s = 0.0018;  // time from the last echo to the next ping (recording of a 450 FS)
 
 constexpr double fastest_mps = 2000;  // highest sound speed that a host can set
 
@@ -47,7 +47,7 @@ SonarModel make_model() {
   return model;
 }
 
-/// The powers of a ping, scaled so that the lowest is 0 and the highest 65535 (REC).
+/// The powers of a ping, scaled so that the lowest is 0 and the highest 65535 (recording of a 450 FS).
 struct Powers {
   float lowest_db = 0, highest_db = 0;
   Bytes codes;

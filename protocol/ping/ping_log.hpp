@@ -1,5 +1,5 @@
 // Logs of Cerulean's products (.svlog): successive frames of the ping protocol. The first has a JSON text that describes the
-// log (docs/protocols/ping.md).
+// log (docs/recording.md).
 #pragma once
 
 #include <memory>
