@@ -265,8 +265,7 @@ void reseal(BytesView before, Bytes& packets) {
   }
 }
 
-// Locates the fields and regions of packets that faults change. A message is one packet, or both packets of a ping, bathymetry
-// first.
+// Locates the fields and regions that faults change. A message is one packet, or both packets of a ping, bathymetry first.
 std::optional<protocol::Field> locate(protocol::FieldName name, BytesView packets) {
   if (packets.empty()) return in_packet<ColumnFront>(name, {});  // the packet with the most fields
   const auto header = header_of(packets);
