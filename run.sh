@@ -20,8 +20,8 @@ case "${1:-}" in
     exec tests/tools/check_demo.sh build/release
     ;;
   --package)
-    # Tools of dpkg-dev and the command `file` read the packages' dependencies from the programs; without them these would be
-    # missing.
+    # Tools of dpkg-dev and the command `file` read the packages' dependencies from the programs. Without these tools the
+    # packages would state no dependencies.
     setup_and_build installed && need_packages dpkg-dev file && cd build/release && cpack -G DEB && say "packages" && ls -1 "$PWD"/*.deb
     exit
     ;;

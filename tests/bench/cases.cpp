@@ -53,7 +53,7 @@ BenchCase p900() {
 
 std::vector<BenchCase> bench_cases() {
   BenchCase paper = p900();
-  paper.name = "P2", paper.description = "P1 by the paper's mode, 300 rays";
+  paper.name = "P2", paper.description = "P1 in paper mode, 300 rays";
   paper.mode = Mode::paper;
   BenchCase fine = oculus("P4a", "M1200d HF, 10 m, 4,000 rows, 300 rays", hf, 10, 4000, false);
   BenchCase far = oculus("P4b", "M1200d LF, 30 m, 12,000 rows, 300 rays", lf, 30, 12000, false);
