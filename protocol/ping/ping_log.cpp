@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "protocol/ping/omniscan_messages.hpp"
+#include "protocol/ping/s500_messages.hpp"
 
 namespace sonar::recording {
 namespace {
@@ -23,11 +24,15 @@ bool is_answer(ping::Id id) {
 
 /// Returns the JSON text with which the maker's programs begin a log, without the parts that describe a computer.
 std::string beginning(ping::Id first) {
-  return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") +
-         (first == ping::Id::os_mono_profile ? "os450" : "mbes24016") + R"("}],"is_recording":true})";
+  using enum ping::Id;
+  const char* const product = first == os_mono_profile                            ? "os450"
+                              : first == s500_profile6 || first == s500_distance2 ? "s500"  // unknown: the maker's name
+                                                                                  : "mbes24016";
+  return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") + product +
+         R"("}],"is_recording":true})";
 }
 
-/// Returns the time since power-up in a message of a Surveyor or an Omniscan; nullopt for other messages.
+/// Returns the time since power-up in a message of a Surveyor, an Omniscan or an S500; nullopt for other messages.
 std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
   const auto of = [&](auto message) -> std::optional<std::uint32_t> {
     wire::Reader reader(frame.payload);
@@ -43,6 +48,10 @@ std::optional<std::uint32_t> power_up_ms(const ping::Frame& frame) {
       return of(ping::YzPointData{});
     case ping::Id::os_mono_profile:
       return of(ping::OsMonoProfile{});
+    case ping::Id::s500_distance2:
+      return of(ping::Distance2{});
+    case ping::Id::s500_profile6:
+      return of(ping::Profile6{});
     default:
       return std::nullopt;
   }

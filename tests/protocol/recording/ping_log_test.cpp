@@ -3,11 +3,18 @@
 
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_log.hpp"
+#include "protocol/ping/s500_messages.hpp"
 #include "protocol/recording/recording.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::ping_log_test {
 namespace {
+
+std::string text_of(const Bytes& bytes) {
+  std::string text;
+  for (const std::byte b : bytes) text += static_cast<char>(b);
+  return text;
+}
 
 TEST(PingLog, HasADescriptionBeforeTheFrames) {
   Bytes file;
@@ -24,9 +31,7 @@ TEST(PingLog, HasADescriptionBeforeTheFrames) {
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(framer.waiting_bytes(), 0u);
   EXPECT_EQ(frames[0].header.id, ping::Id::json_wrapper);
-  std::string text;
-  for (const std::byte b : frames[0].payload) text += static_cast<char>(b);
-  EXPECT_THAT(text, ::testing::HasSubstr("\"mbes24016\""));
+  EXPECT_THAT(text_of(frames[0].payload), ::testing::HasSubstr("\"mbes24016\""));
   EXPECT_EQ(frames[2].header.id, ping::Id::water_stats);
 }
 
@@ -68,6 +73,28 @@ TEST(PingLog, IsReadAsFramesWithTimesSincePowerUp) {
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(read.messages[i].at, Time(std::chrono::milliseconds(5000 + 100 * (i / 2))));
     EXPECT_EQ(read.messages[i].bytes.size(), i % 2 == 0 ? 46u : 18u);
+  }
+}
+
+TEST(PingLog, AnS500HasItsNameAndTimes) {
+  ping::Distance2 distance;
+  distance.power_up_ms = 5000;
+  ping::Profile6 profile;
+  profile.power_up_ms = 5100;
+  const Bytes frames[] = {ping::framed_message(ping::Id::s500_distance2, 0, distance),
+                          ping::framed_message(ping::Id::s500_profile6, 0, profile)};
+  for (const Bytes& first : frames) {
+    Bytes file;
+    const auto writer = write_ping_log(sink_into(file));
+    ASSERT_TRUE(writer->write({tests::start, Origin::device, Carrier::stream, first}));
+    for (const Bytes& frame : frames) ASSERT_TRUE(writer->write({tests::start, Origin::device, Carrier::stream, frame}));
+    ASSERT_TRUE(writer->close());
+    EXPECT_THAT(text_of(file), ::testing::HasSubstr("\"s500\""));
+    const ReadBack read = read_back(file);
+    EXPECT_EQ(read.damage, "");
+    ASSERT_EQ(read.messages.size(), 3u);
+    EXPECT_EQ(read.messages[1].at, Time(std::chrono::milliseconds(5000)));
+    EXPECT_EQ(read.messages[2].at, Time(std::chrono::milliseconds(5100)));
   }
 }
 
