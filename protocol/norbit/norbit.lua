@@ -17,7 +17,7 @@ local rows = {
     {104, 4, "float", "swath", "opening angle [rad]"},
   },
   [2] = {
-    {36, 4, "uint32", "samples", "samples of a beam"}, {48, 4, "uint32", "pixelType", "type of pixels"}, {52, 4, "int32", "first", "first sample"},
+    {36, 4, "uint32", "samples", "samples of a beam"}, {48, 4, "uint32", "pixelType", "type of pixels"}, {52, 4, "int32", "firstSample", "first sample"},
     {56, 4, "float", "gain", "gain"}, {68, 4, "float", "swath", "opening angle [rad]"}, {72, 4, "float", "frequency", "frequency [kHz]"},
     {80, 4, "float", "pulse", "pulse [s]"}, {100, 4, "float", "rate", "ping rate [Hz]"}, {108, 4, "uint32", "ping", "ping"},
     {124, 4, "int32", "gainBegin", "gain begins at sample"}, {128, 4, "float", "gainBeginDb", "gain there [dB]"},
