@@ -11,7 +11,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr std::size_t most_hits = 64;  // number of stored pings; more than an outbox holds
+constexpr std::size_t most_hits = 2 * Outbox::most_held;  // number of stored pings; more than are held back or wait
 
 nanoseconds length_of_power_cycle(const Fault& fault) {
   return nanoseconds_from(fault.number("boot-s") + std::max(0.0, fault.number("gap-s")));

@@ -123,7 +123,7 @@ void Audience::stop(const std::string& why, Actions& actions) {
 
 void Audience::remove(Connection& connection, const std::string& why, bool by_client, Actions& actions) {
   // Pings that a fault holds back enter the outbox, which then drops them, so that the counters add up.
-  for (Connection::Held& held : connection.held) connection.outbox.push_ping(std::move(held.ping));
+  for (Connection::Held& held : connection.held) connection.outbox.push_held(std::move(held.ping));
   connection.outbox.end(connection.finishing ? DropReason::stop : DropReason::gone);
   actions.emplace_back(Closed{connection.peer.name, connection.role, connection.state != Connection::State::waiting,
                               connection.pings_written(), connection.outbox.pings_dropped(), why, by_client,

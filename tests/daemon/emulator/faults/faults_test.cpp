@@ -408,6 +408,33 @@ TEST(Faults, HeldPingsComeInOrderAndAreCounted) {
   EXPECT_EQ(order[3], 3u);
 }
 
+TEST(Faults, PingsThatAreHeldLongKeepTheirOtherFault) {
+  VirtualTime time(yaml_of(two));
+  const ConnectionId client = time.connect("front");
+  time.add_fault("front", record("latency", {{"ms", "9000"}}));
+  FaultRecord gap = record("gap");
+  gap.at.every = 1;
+  time.add_fault("front", gap);
+  time.send(client, fire());
+  time.run(seconds(20));
+  EXPECT_THAT(ping_numbers(time.clients[client].received), ::testing::IsEmpty());
+  const DeviceFigures f = time.sonar("front").figures();
+  EXPECT_GT(f.dropped_by[static_cast<std::size_t>(DropReason::fault)], 100u);
+}
+
+TEST(Faults, HeldPingsOfAClientThatLeavesCountAsGone) {
+  VirtualTime time(yaml_of(two));
+  const ConnectionId client = time.connect("front");
+  time.add_fault("front", record("latency", {{"ms", "9000"}}));
+  time.send(client, fire());
+  time.run(seconds(8));
+  time.close(client);
+  time.run(seconds(1));
+  const DeviceFigures f = time.sonar("front").figures();
+  EXPECT_GT(f.dropped_by[static_cast<std::size_t>(DropReason::gone)], 50u);
+  EXPECT_EQ(f.dropped_by[static_cast<std::size_t>(DropReason::gone)], f.dropped);
+}
+
 TEST(Faults, AThousandOfEveryKindLeaveNothing) {
   VirtualTime time(yaml_of(oculus_sonar("front", "127.0.0.2", "    clients: {max: 4}\n")));
   for (const std::string& code : codes_of_oculus()) {
