@@ -9,6 +9,7 @@
 #include <numeric>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "clients/sonarctl/ping_stream.hpp"
 #include "daemon/config/load_config.hpp"
@@ -83,7 +84,7 @@ class Client {
     for (;;) {
       while (auto message = decoder_.next())
         if (const auto* ping = std::get_if<oculus::DecodedPing>(&*message)) {
-          if (fire != nullptr && !answers(*fire, *ping)) continue;
+          if (fire != nullptr && !answers(*fire, *ping) && ++skipped > 0) continue;
           rows = static_cast<int>(ping->rows());
           return read_at_s_;
         }
@@ -99,6 +100,7 @@ class Client {
     socket_.shutdown(tcp::socket::shutdown_both, ec);
   }
   int rows = 0;
+  int skipped = 0;  // number of pings with other settings
 
  private:
   tcp::socket socket_;
@@ -187,19 +189,23 @@ Result<json> find_first_pings(const ScenePointer& scene, const BenchOptions& opt
   constexpr double allowed_median = 3, allowed_slowest = 5;  // 3.9 and 3 before tables of shared noise were cheap
   constexpr int warm_pings = 3;
   std::vector<double> first_ms, late_ms, first_cpu_ms, warm_cpu_ms;
+  double warm_ms = 0;
   std::string slowest;
   // The last setting is requested once at the start, because the first ping of a daemon takes longer with any setting.
   for (int k = -1; k < settings_in_grid; ++k) {
     const GridSetting setting = grid_setting(k < 0 ? settings_in_grid - 1 : k);
     const double begin_s = now_s(), used_s = processor_s();
+    client.skipped = 0;
     client.fire(setting.fire);
     const double first_s = client.next_ping(&setting.fire), first_used_s = processor_s();
     bool is_sent = first_s != 0;
     for (int i = 0; i < warm_pings && is_sent; ++i) is_sent = client.next_ping() != 0;
     if (!is_sent) return tl::make_unexpected(broken("sent no ping within 20 s"));
+    const double before_ms = std::exchange(warm_ms, 1e3 * (processor_s() - first_used_s) / warm_pings);
     if (k < 0) continue;
-    warm_cpu_ms.push_back(1e3 * (processor_s() - first_used_s) / warm_pings);
-    first_cpu_ms.push_back(1e3 * (first_used_s - used_s));
+    warm_cpu_ms.push_back(warm_ms);
+    // Pings with the former settings, which are computed before the change, do not belong to the first ping.
+    first_cpu_ms.push_back(1e3 * (first_used_s - used_s) - client.skipped * before_ms);
     first_ms.push_back(1e3 * (first_s - begin_s));
     late_ms.push_back(first_ms.back() - 2 * setting.period_ms);
     if (late_ms.back() == *std::max_element(late_ms.begin(), late_ms.end())) slowest = setting.text;
