@@ -249,7 +249,7 @@ TEST(RenderFile, ARangeThatTheProductDoesNotHaveGetsANote) {
   EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: LF, range_m: 25}"), "");
   EXPECT_EQ(note("profile: oculus-m1200d, ping: {mode: HF, range_m: 25}"),
             "range 25 m: Oculus M1200d in mode HF accepts 0.1 to 10 m; rendered anyway, where the device would use 10 m");
-  EXPECT_THAT(note("profile: oculus-m370s, ping: {range_m: 0.15}"), HasSubstr("takes 0.2 to 200 m"));
+  EXPECT_THAT(note("profile: oculus-m370s, ping: {range_m: 0.15}"), HasSubstr("accepts 0.2 to 200 m"));
   EXPECT_EQ(note("ping: {range_m: 600}"), "") << "a sonar without a profile has no limits";
   EXPECT_EQ(note("ping: {range_m: 0.01}"), "");
 }
