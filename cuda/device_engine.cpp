@@ -17,7 +17,7 @@
 namespace sonar::cuda {
 namespace {
 
-// Largest number of sets of settings with tables on the device.
+// The device holds tables for at most this many sets of settings.
 constexpr std::size_t most_plans = 8;
 constexpr int keeping_lane = 2;  // lane for data that stay on the device: plans and cells; rooms have lanes 0 and 1
 
@@ -81,8 +81,8 @@ class DeviceEngine final : public PingEngine {
            std::to_string(pool_.threads()) + (pool_.threads() == 1 ? " thread" : " threads");
   }
   std::size_t most_together(const PingRequest& a, const PingRequest& b) const override {
-    // The number of pings that are prepared in parallel. With this limit, a ping waits only for the steps of the others on the
-    // device.
+    // The number of pings that are prepared in parallel. With this limit, a ping waits for the others' steps on the device, but
+    // not for their preparation.
     const std::size_t most = std::min(batch_, static_cast<std::size_t>(pool_.threads()));
     return !failed_ && are_alike(a, b) && why_by_cpu(a).empty() && why_by_cpu(b).empty() ? most : 1;
   }
@@ -96,7 +96,7 @@ class DeviceEngine final : public PingEngine {
     std::string invalid;                       // reason if a request is invalid; no ping of the call is then computed
   };
 
-  /// Removes the first or the last call and returns its pings.
+  /// Removes the first or the last call and returns its pictures.
   std::vector<Ping> take_pings(std::size_t which) {
     const Call call = std::move(calls_[which]);
     calls_.erase(calls_.begin() + static_cast<std::ptrdiff_t>(which));
@@ -113,7 +113,7 @@ class DeviceEngine final : public PingEngine {
         pings.push_back(std::move(it->ping));
         statistics.push_back(it->statistics);
       }
-    } catch (...) {  // no work is under way, because on_device() has waited for it
+    } catch (...) {  // no work is under way: on_device() has waited for it, or the device has failed
       wanted_.erase(begin, end);
       throw;
     }
@@ -230,8 +230,8 @@ class DeviceEngine final : public PingEngine {
     if (!one_room_) which_ = 1 - which_;
   }
 
-  /// The next requests, from `first` on, that can be prepared together and fit in the room. The limits are their number and, if
-  /// the memory of a ping is known, their memory.
+  /// The next requests, from `first` on, that can be prepared together and fit in the room. The limits are their number and
+  /// memory; while the memory of a ping is not known, one.
   std::vector<AskedPing> some_from(std::size_t first, const BatchRoom& room) {
     place(wanted_[first].request);
     std::vector<AskedPing> some{{&wanted_[first], plan_for(wanted_[first].request)}};
@@ -261,7 +261,7 @@ class DeviceEngine final : public PingEngine {
   /// Sets the poses of the request, for device and CPU, and makes cells for its seed.
   void place(const PingRequest& request) {
     if (!cells_ || !cells_->serves(request.seed, fields_of(request)))
-      // Weights of cells depend on the seed. Therefore another seed needs other tiles.
+      // Cells depend on the seed, texture and grain. Therefore other values need other cells.
       cells_ = std::make_unique<SurfaceCells>(scene_, request.seed, options_.cell_cache_bytes, fields_of(request));
     if (!scene_->bodies_in_world.empty())
       rays_.place(request.bodies_in_world.empty() ? scene_->bodies_in_world : request.bodies_in_world);
@@ -276,10 +276,10 @@ class DeviceEngine final : public PingEngine {
   std::shared_ptr<PlanTables> plan_for(const PingRequest& request) {
     const auto it = std::find_if(plans_.begin(), plans_.end(), [&](const auto& p) { return p->serves(request); });
     if (it != plans_.end()) {
-      std::rotate(plans_.begin(), it, it + 1);  // newest first
+      std::rotate(plans_.begin(), it, it + 1);  // last used first
       return plans_.front();
     }
-    // Drops the plan that was not used for longest. Batches in work have their own reference to it.
+    // Drops the least recently used plan. Batches in work have their own reference to it.
     if (plans_.size() >= most_plans) plans_.pop_back();
     plans_.insert(plans_.begin(), std::make_shared<PlanTables>(*machine_, keeping_lane, request));
     return plans_.front();
@@ -370,9 +370,9 @@ class DeviceEngine final : public PingEngine {
   Workspace work_;                 // workspace of the CPU
   std::set<std::string> reported_;
   PingStatistics statistics_;
-  std::vector<PingStatistics> each_;   // statistics of the last call that was collected
-  bool one_room_ = false;              // true after lack of memory: no batch is prepared while the device is busy
-  bool all_released_ = false;          // true if all memory has been released since the last run that had enough
+  std::vector<PingStatistics> each_;  // statistics of the last call that was collected
+  bool one_room_ = false;      // true if memory was full with batches of one ping: none is prepared while the device is busy
+  bool all_released_ = false;  // true if all memory was released and no work has succeeded since
   std::optional<std::string> failed_;  // reason of the device's failure
 };
 

@@ -76,8 +76,8 @@ Result<OpenFile> open_regular(const std::filesystem::path& file) {
     ::close(descriptor);
     return not_opened(file);
   }
-  // Another file may have replaced this file since the check. Because of O_NONBLOCK, open() did not wait for a FIFO. The flag
-  // has no effect on regular files.
+  // A FIFO may have replaced this file since the check. Because of O_NONBLOCK, open() did not wait for its writer. The flag has
+  // no effect on regular files.
   if (::fstat(descriptor, &status) != 0) return not_opened(file);
   if (!S_ISREG(status.st_mode)) return is_other();
   return opened;

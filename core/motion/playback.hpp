@@ -27,7 +27,7 @@ struct Speed {
 struct PlaybackRules {
   Speed speed;
   bool loop = false;
-  Ns start{0};  // trajectory time at which playing begins; if negative, the body waits this long at the first pose
+  Ns start{0};  // trajectory time at which playing begins; if negative, the body first waits at the first pose
   bool operator==(const PlaybackRules&) const = default;
 };
 
@@ -54,7 +54,7 @@ class Playback {
     Ns at{0};         // time in the trajectory, 0 to its duration
     double rate = 0;  // seconds of the trajectory per second of the clock: 0 while paused, before the start, after the end
   };
-  /// A round of a loop lasts as long as the file. The end of a round is the start of the next one.
+  /// A round of a loop takes the trajectory's duration, in trajectory time. The end of a round is the start of the next one.
   Place place(Time clock) const;
 
   /// Pauses from the time `clock` on. After this call, place() may return different results for earlier times.

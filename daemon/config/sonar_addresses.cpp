@@ -68,7 +68,7 @@ struct Listening {
   bool gives_way = false;  // true: the address is a default, which is not used if the port is in use
   bool is_shared = false;  // true: other shared listeners may use the same port
 };
-/// True if two listeners would use the same port. 0.0.0.0 uses the port at all addresses.
+/// True if two listeners need the same port and cannot share it. 0.0.0.0 uses the port at all addresses.
 bool conflict(const Listening& a, const Listening& b) {
   const bool same_ip = a.at.ip == b.at.ip || a.at.ip == Ipv4{} || b.at.ip == Ipv4{};
   const bool same_kind = (a.udp && b.udp && !(a.is_shared && b.is_shared)) || (a.tcp && b.tcp);
@@ -99,7 +99,7 @@ void add_ports(std::vector<Listening>& all, const SonarConfig& sonar) {
     all.push_back({"observers.port of sonar \"" + sonar.name + "\"", {sonar.bind_ip, sonar.observer_port}, false, true});
 }
 
-/// Checks that an offset daemon uses no address or port of the daemon without an offset.
+/// Checks that no moved address, port or device id is that of another sonar or listener of the unmoved configuration.
 Result<void> check_apart(const Config& moved, const Config& unmoved) {
   const std::string instead = " without an offset; give another offset";
   for (const SonarConfig& a : moved.sonars)

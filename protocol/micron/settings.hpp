@@ -40,7 +40,7 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
 protocol::ChangeSettings change_to(const Settings& settings, const protocol::DeviceState& device);
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device);
 
-/// Returns the angle [rad] by which the sonar is rotated to port, so that it points in the direction of the head.
+/// Returns the angle [rad], positive to port, between the sonar's forward axis and the direction of the head.
 double head_rad(const Settings& settings);
 /// listening() returns the duration of a ping's bins, transfer() the time to send the scan line, turning() the time to turn.
 std::chrono::nanoseconds listening(const HeadCommand& command);

@@ -1,5 +1,5 @@
-"""The end and the restart of sonard, and its behaviour after signals, kill -9, full disks, closed outputs, and while it is
-frozen. Figures are recorded for the table of reliability in the folder that SONARD_RELIABILITY names. Times are asserted with
+"""How sonard stops, restarts, and behaves after signals, with full disks or closed outputs, and after a freeze; its exit codes.
+Figures for the reliability table are written to the folder that SONARD_RELIABILITY names. Times are asserted with
 room for a busy machine; the record states whether the promised time was met."""
 import contextlib
 import fcntl
@@ -21,7 +21,7 @@ from running_sonard import ROOT, SONARCTL, SONARD, Sonard, eventually, run
 from stopped_threads import stopped_threads
 
 sys.path.insert(0, str(ROOT / "tests/reliability"))
-from record import record  # noqa: E402  the folder above
+from record import record  # noqa: E402  from the path of the line above
 
 COMMAND = "python3 tests/acceptance/life_cycle_test.py"
 ROOM = 10  # factor on promised times, for busy machines
@@ -30,7 +30,7 @@ F_SETPIPE_SZ = 1031
 
 
 class Reader(threading.Thread):
-    """A client that reads to the end; `ending` states how the connection ended: FIN, reset, or stray bytes."""
+    """A client that reads to the end; `ending` states how the connection ended: FIN, reset, or broken, with the error."""
 
     def __init__(self, address, rate_hz=10):
         super().__init__(daemon=True)
@@ -68,7 +68,7 @@ class Reader(threading.Thread):
 
 
 def deaf_client(address):
-    """Requests pings and never reads; returns when the sonar cannot send more."""
+    """Requests pings and never reads, so that soon the sonar cannot send more. Does not wait for that."""
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     deaf.connect((address, 52100))
@@ -177,7 +177,7 @@ class Stop(unittest.TestCase):
             os.truncate(file, 1 << 40)
             viewer = Viewer(daemon.address, path="/?recording=cut.oculus").greeted()
             before = worked_s(daemon)
-            eventually(lambda: worked_s(daemon) > before + 0.2)  # wait until it uses the processor, which only the search does
+            eventually(lambda: worked_s(daemon) > before + 0.2)  # processor time means that the search runs
             code, seconds = daemon.stop(60)
             viewer.socket.close()
             self.assertEqual(code, 0, daemon.log())
@@ -220,7 +220,7 @@ class Stop(unittest.TestCase):
 
 
 class Undisturbed(unittest.TestCase):
-    """A client that reads loses no ping, even if the log cannot be written."""
+    """A client that reads loses no ping if outputs cannot be written."""
 
     def stream(self, daemon, pings=12):
         reader = Reader(daemon.address)
@@ -231,7 +231,7 @@ class Undisturbed(unittest.TestCase):
 
     @staticmethod
     def provoke_log_lines(address):
-        """A dozen excess clients are refused, with a log line each up to the log's limit."""
+        """A dozen excess clients are refused; each refusal is logged until the log's limit suppresses lines."""
         for _ in range(12):
             try:
                 with socket.create_connection((address, 52100), timeout=20) as visitor:
@@ -263,7 +263,7 @@ class Undisturbed(unittest.TestCase):
         reader.join(100)
         self.judge(reader, "closed-output", code)
 
-    def test_a_reader_of_the_log_that_ends_costs_no_ping(self):
+    def test_a_log_reader_that_exits_costs_no_ping(self):
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         daemon.process.stderr.readline()  # as head -1
         daemon.process.stderr.close()
@@ -274,7 +274,7 @@ class Undisturbed(unittest.TestCase):
 
     def test_a_log_that_nobody_reads_costs_no_ping(self):
         ours, theirs = os.pipe()
-        fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page of memory, which the banner fills
+        fcntl.fcntl(theirs, F_SETPIPE_SZ, 4096)  # one page of memory, which is not writable for poll() once the banner is in it
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=theirs)
         os.close(theirs)
         reader = self.stream(daemon)
@@ -286,7 +286,7 @@ class Undisturbed(unittest.TestCase):
         os.close(ours)
         self.judge(reader, code=code)
 
-    def test_a_recording_on_a_full_disk_ends_with_a_sentence_and_the_sonar_goes_on(self):
+    def test_a_recording_on_a_full_disk_ends_with_an_error_message_and_the_sonar_goes_on(self):
         with Sonard(mount=FOUR_CLIENTS) as daemon:
             reader = Reader(daemon.address)
             reader.wait_for(3)
@@ -298,7 +298,7 @@ class Undisturbed(unittest.TestCase):
             reader.join(100)
             self.judge(reader, code=code)
 
-    def test_a_render_on_a_full_disk_ends_with_a_sentence(self):
+    def test_a_render_that_cannot_write_ends_with_an_error_message(self):
         def small_disk():
             resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.RLIM_INFINITY))
         with tempfile.TemporaryDirectory() as folder:
@@ -326,7 +326,7 @@ class Frozen(unittest.TestCase):
             daemon.stop()
             reader.join(100)
         burst = sum(1 for at in reader.arrived[before:] if at - go_on < 1)
-        # A second has as many ticks as the rate; in addition, one may have been in progress, and one is due at once.
+        # One second has `rate_hz` ticks; add one ping that was in progress, and one that is due at once.
         good = burst <= rate_hz + 2 and reader.ending == "FIN"
         record("stop-continue", f"{burst} pings in the first second, ended by {reader.ending}", f"at most {rate_hz + 2}, whole", good, COMMAND)
         self.assertEqual(reader.ending, "FIN")
@@ -335,7 +335,7 @@ class Frozen(unittest.TestCase):
 
 
 class ExitCodes(unittest.TestCase):
-    """Kind of mistake, command, and the words that the sentence must contain."""
+    """Exit codes, and words that the error messages must contain."""
 
     def test_every_class_of_errors_has_its_exit_code(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -365,7 +365,7 @@ class ExitCodes(unittest.TestCase):
                     for word in words:
                         self.assertIn(word, result.stderr)
 
-    def test_a_wrong_variable_is_named_as_the_user_set_it(self):
+    def test_a_wrong_value_in_the_environment_names_the_variable(self):
         for variable, value in (("SONARD_THREADS", "abc"), ("SONARD_THREADS", "900"), ("SONARD_LOG_LEVEL", "loud"), ("SONARD_CLOCK", "x")):
             for words in (["run", "--demo"], ["--demo"]):
                 with self.subTest(variable=variable, value=value, words=words):

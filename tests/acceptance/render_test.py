@@ -249,7 +249,7 @@ class Render(unittest.TestCase):
                         "poses: {at: {frame: ENU_FLU, xyz_m: [0, 0, -2]}}\n", encoding="utf-8")
         self.config = file
         result = self.render("--quiet", "--format", "raw", "--pings", "1")
-        self.expect(result, 0, "range 25 m", "takes 0.1 to 10 m")
+        self.expect(result, 0, "range 25 m", "accepts 0.1 to 10 m")
         about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
         self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
 

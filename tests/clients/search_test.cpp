@@ -1,4 +1,4 @@
-// PingStream searches for sonars without a given port. Small test servers listen at the ports of some makes.
+// PingStream searches for a sonar if no port is given. Small test servers stand in for some makes.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -36,13 +36,13 @@ bool refuse_as_a_web_server(const Socket& client) {
   return write_all(client, std::as_bytes(std::span(reply.data(), reply.size()))).has_value();
 }
 
-/// A stand-in for a Ping360 that a host accepts; it stores the received messages.
+/// A stand-in for a Ping360, which answers if `answers` is set; it stores the ids of received messages.
 class Ping360 {
  public:
   explicit Ping360(bool answers) : socket_(bound(SOCK_DGRAM, 12345)) {
     thread_ = std::thread([this, answers] { serve(answers); });
   }
-  /// Returns the ids of all received datagrams.
+  /// Stops the server, and returns the ids of all received messages.
   std::vector<ping::Id> received() {
     if (thread_.joinable()) {
       const auto last = connect_udp({address, 12345});
@@ -85,7 +85,7 @@ Wanted with_rate() {
   return wanted;
 }
 
-TEST(Search, EndsWithoutACrashWhereNoAddressOrRouteIs) {
+TEST(Search, ReportsAnUnknownHostAndAMissingRoute) {
   for (const Make& make : protocol::makes()) {
     const auto unnamed = PingStream::open({"no-such-host.invalid", 0}, &make, {}, 100ms);
     ASSERT_FALSE(unnamed);
@@ -96,7 +96,7 @@ TEST(Search, EndsWithoutACrashWhereNoAddressOrRouteIs) {
   EXPECT_EQ(far.error().kind, ErrorKind::unavailable) << far.error().text;
 }
 
-TEST(Search, RefusesSettingsOnlyOfASonarThatIsThere) {
+TEST(Search, RefusesSettingsOnlyIfASonarAnswers) {
   for (const std::uint32_t mode : {0u, 1u}) {
     Wanted wanted = with_rate();
     wanted.settings.mode = mode;
@@ -134,7 +134,7 @@ TEST(Search, StopsOnlyScansThatItStarted) {
   }
 }
 
-TEST(Search, ASonarByUdpThatHasGoneIsNoticedWithoutARequest) {
+TEST(Search, NoticesWithoutARequestThatAUdpSonarIsGone) {
   auto sonar = std::make_unique<Ping360>(true);
   auto stream = PingStream::open({address, 0}, find_make("ping360"), {}, 60s);
   ASSERT_TRUE(stream) << stream.error().text;
@@ -159,7 +159,7 @@ TEST(Search, ContinuesBesideAWebServer) {
   EXPECT_EQ(requests, 1);
 }
 
-TEST(Search, DoesNotMistakeAWebServerForAMissingSonar) {
+TEST(Search, DoesNotMistakeAWebServerForASonar) {
   const SocketServer web(address, 80, refuse_as_a_web_server);
   const auto nothing = PingStream::open({address, 0}, nullptr, {}, 100ms);
   ASSERT_FALSE(nothing);
@@ -170,13 +170,13 @@ TEST(Search, DoesNotMistakeAWebServerForAMissingSonar) {
   EXPECT_THAT(named.error().text, HasSubstr("is not a Sonar 3D-15"));
 }
 
-/// After such an end the client may ask for the sonar's address for observers.
+/// If a sonar closes without an answer, the client may ask sonard where observers connect.
 TEST(Search, NamesASonarThatClosesTheConnectionWithoutAnAnswer) {
   for (const bool answers : {false, true}) {
     SCOPED_TRACE(answers);
     const SocketServer full(address, find_make("omniscan450")->ports.front().number, [answers](const Socket& client) {
       std::array<std::byte, 1024> request;
-      const std::array first{std::byte{'B'}};  // a message that never ends
+      const std::array first{std::byte{'B'}};  // the first byte of a message, without the rest
       if (!answers) return;
       static_cast<void>(read_some(client, request, 60s));
       static_cast<void>(write_all(client, first));
@@ -194,7 +194,7 @@ TEST(Search, NamesASonarThatClosesTheConnectionWithoutAnAnswer) {
   }
 }
 
-/// The time limit is longer than the test may run.
+/// With the limit of 1 h, the test ends in time only if the call does not wait.
 TEST(PingStream, AByteAtAnotherPortShowsThatTheSonarDoesNotReject) {
   std::array<int, 2> first{}, other{};
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, first.data()), 0);
@@ -212,7 +212,7 @@ TEST(PingStream, AByteAtAnotherPortShowsThatTheSonarDoesNotReject) {
   EXPECT_FALSE(ends_without_a_byte(silent_near, others, 1h));
 }
 
-TEST(WatchPings, KeepsWhatTheSonarRefuses) {
+TEST(WatchPings, KeepsTheReasonOfARefusal) {
   const SocketServer surveyor(address, 62312, [](const Socket& client) {
     std::array<std::byte, 1024> request;
     if (read_some(client, request, 60s).what != Wait::data) return;

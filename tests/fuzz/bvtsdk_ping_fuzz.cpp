@@ -1,6 +1,6 @@
-// Bytes of a sonar to the BlueView libraries, and of a recording. No input may crash the decoders, and accepted pings give images
-// and range lists of limited size. The first byte selects a ping's payload, a recording (R), or a recording whose checksums are
-// corrected first (r), so that the code after the checks is reached.
+// Feeds the BlueView libraries bytes as from a sonar or a recording. No input may crash the decoders, and accepted pings give
+// images and range lists of limited size. The first byte selects a ping's payload, a recording (R), or a recording whose
+// checksums are corrected first (r), so that the code after the checks is reached.
 #include <zlib.h>
 
 #include <algorithm>

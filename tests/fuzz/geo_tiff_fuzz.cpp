@@ -1,4 +1,4 @@
-// GeoTIFF as heights, and its keys alone, because the keys of a file with a changed byte are seldom readable.
+// Reads heights from a GeoTIFF, and its keys separately, because after a changed byte the keys of a file are seldom readable.
 #include <cstring>
 
 #include "core/scene/files/geo_keys.hpp"

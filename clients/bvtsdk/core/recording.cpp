@@ -14,7 +14,7 @@ constexpr std::uint16_t newest_version = 2;
 constexpr std::size_t file_header_size = 8;
 constexpr std::size_t crc_size = 4;
 constexpr std::size_t index_entry_size = 2 + 4 + 8 + 8;
-constexpr std::size_t most_lanes = 256;                // limits the search of add(): a damaged index may name any number of heads
+constexpr std::size_t most_lanes = 256;                // one for each type and head; a damaged index may name any number of heads
 constexpr std::size_t index_tail_size = 8 + crc_size;  // the index frame's own offset, and its checksum
 
 std::uint32_t checksum(BytesView header, BytesView payload) {
@@ -29,7 +29,8 @@ bool read_all(std::FILE* file, std::uint8_t* to, std::size_t size) { return std:
 
 bool write_all(std::FILE* file, const Bytes& bytes) { return std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size(); }
 
-/// Fills in the index entry of a frame. Returns false if frames of that type are not in the index, or the payload is too short.
+/// Fills in the index entry of a frame, except its offset. Returns false if frames of that type are not in the index, or the
+/// payload is too short.
 bool place_of(FrameType type, BytesView payload, FramePlace& place) {
   Reader reader(payload);
   place.type = type;
@@ -92,7 +93,7 @@ Code RecordingWriter::put_ping(std::int32_t head, const PolarPing& ping, BytesVi
   Bytes payload = encode_ping(ping, Packing::planes);
   Bytes number;
   put(number, head);
-  std::copy(number.begin(), number.end(), payload.begin());  // the head comes first
+  std::copy(number.begin(), number.end(), payload.begin());  // the head's number is the first field
   return put_frame(FrameType::ping_data, payload, head, ping.time_s);
 }
 

@@ -5,7 +5,7 @@
 // header and payload. The first frame is HELLO_OK. PING_DATA, NAV_DATA (u16 bitmap, values, f64 time) and EVENT_MARK (f64 time,
 // text key, text) follow in order of arrival. Another HELLO_OK precedes each ping with other settings than the ping before. A
 // closed file ends with an index frame: u32 entries, per entry u16 type, i32 head, f64 time, u64 offset of the frame, and at the
-// end the u64 offset of the index frame itself. Without the index, readers scan the file up to the last whole frame.
+// end the u64 offset of the index frame itself. Without the index, readers scan up to the first damaged frame.
 #pragma once
 
 #include <cstdint>
@@ -37,8 +37,9 @@ class RecordingWriter {
  public:
   /// Creates or overwrites the file. `hello`: payload of HELLO_OK. Returns file_create or file_write on failure.
   Code create(const std::string& path, BytesView hello);
-  /// Every call writes whole frames to the file, so that it can be read while it grows. Returns file_not_open or file_write on
-  /// failure. `head` replaces the head of the ping. `hello`: payload of HELLO_OK with the settings of the ping.
+  /// Every call writes whole frames to the file, so that it can be read while it grows. Returns file_not_open, file_write, or
+  /// bad_parameter (too long) on failure. `head` replaces the head of the ping. `hello`: payload of HELLO_OK with the settings of
+  /// the ping.
   Code put_ping(std::int32_t head, const PolarPing& ping, BytesView hello);
   Code put_nav(const NavData& nav, double time_s);
   Code put_event(const EventMark& mark);
@@ -66,13 +67,13 @@ class RecordingWriter {
 /// Reads a recording. Only one thread at a time may use it.
 class RecordingReader {
  public:
-  /// Returns file_open, file_too_new, or file_header_bad for a file of another kind, such as the vendor's .son. `why` is a line
-  /// for the log.
+  /// Errors: file_open, file_too_new, and file_header_bad (a damaged beginning, or a file of another kind, such as the vendor's
+  /// .son). `why` is a line for the log.
   Code open(const std::string& path, std::string* why = nullptr);
   Code open(File file, std::string* why = nullptr);
 
   const Bytes& hello() const { return hello_; }  // payload of the first HELLO_OK
-  /// Returns the payload of the description that is valid at ping n of a head, or the first one.
+  /// Returns the payload of the HELLO_OK that applies to ping n of a head; without such, of the first HELLO_OK.
   Bytes hello_of_ping(std::int32_t head, int n);
   std::uint64_t size_bytes() const { return size_; }
   /// False if the writer did not close the file, or if its end is damaged.
@@ -85,7 +86,7 @@ class RecordingReader {
   /// Returns ping_number_too_small or ping_number_too_large, and file_read or bad_ping for a damaged ping; `why` is then a line
   /// for the log.
   Code read_ping(std::int32_t head, int n, PolarPing& ping, std::string* why = nullptr);
-  /// Returns index_out_of_bounds or file_read on failure. `time_s`: time of the recording.
+  /// Returns index_out_of_bounds or file_read on failure. `time_s`: when it was recorded.
   Code read_nav(int n, NavData& nav, double& time_s);
   Code read_event(int n, EventMark& mark);
 

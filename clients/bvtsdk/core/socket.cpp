@@ -20,7 +20,7 @@ int milliseconds_until(Deadline deadline) {
   return static_cast<int>(std::clamp<decltype(left)>(left, 0, 3600000));
 }
 
-/// Returns 0, or the errno of the failure.
+/// Returns 0, the errno of the failure, or ETIMEDOUT if waiting fails.
 int finish_connecting(int fd, const addrinfo& address, Deadline deadline) {
   if (connect(fd, address.ai_addr, address.ai_addrlen) == 0) return 0;
   if (errno != EINPROGRESS) return errno;

@@ -10,7 +10,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Limit for the answer to a ping request, in addition to the travel time of sound and the ping interval.
+// Limit for the answer to a ping request, in addition to twice the two-way travel time of sound and twice the ping interval.
 constexpr milliseconds ping_patience{20000};
 constexpr std::size_t longest_mark_key = 80, longest_mark_text = 512;
 

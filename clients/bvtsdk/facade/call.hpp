@@ -1,5 +1,5 @@
-// The steps that all C functions of the facades share: they find the object of the handle, lock it, write every out-parameter
-// even on failure, and catch every exception.
+// Common steps of the facades' C functions: find the object of the handle, lock it, write out-parameters even on failure, and
+// catch every exception.
 #pragma once
 
 #include <cstring>

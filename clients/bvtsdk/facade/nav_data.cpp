@@ -1,5 +1,5 @@
-// The functions BVTNavData_* (navigation data) of both interfaces; 3.x has no time. clients/bvtsdk/README.md describes their
-// behaviour.
+// The functions BVTNavData_* (navigation data) of the interfaces 3.x and 4.x; 3.x has no NavTime. A value that was not set
+// returns nav_no_data; infinite and NaN values are refused.
 #include <cmath>
 
 #include "clients/bvtsdk/facade/getter.hpp"

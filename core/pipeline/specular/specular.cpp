@@ -15,7 +15,7 @@ constexpr double window_in_units = 5.7;  // four Fresnel radii; beyond it only e
 constexpr double window_in_radii = 0.5;
 constexpr int strips_per_cell = 4;
 
-/// One principal direction: the integral of exp(-i pi (q x)^2 / 2), which is 1 over all x. Beyond a focus the conjugate is
+/// One principal direction: the integral of exp(-i pi (q x)^2 / 2), scaled to 1 over all x. Beyond a focus the conjugate is
 /// integrated, which gives i over all x.
 struct Direction {
   double q = 1;
@@ -71,9 +71,9 @@ Complex along_strip(const Direction& d, const std::vector<double>& x, const Spec
 SpecularWindow make_window(const SpecularPoint& p, double wavelength_m) {
   SpecularWindow w;
   for (std::size_t k = 0; k < 2; ++k) {
-    // The window has four Fresnel radii around the foot, or around the nearest point of the surface.
+    // The window reaches four Fresnel radii to each side of the foot, or of the nearest point of the surface.
     double reach = window_in_units * fresnel_unit_m(wavelength_m, p.range_m, p.curvature[k]);
-    // Beyond half a radius of curvature [m] the surface is not a parabola, as eq. 19 assumes.
+    // Eq. 19 assumes a parabola, which does not hold beyond half a radius of curvature [m].
     if (p.curvature[k] != 0) reach = std::min(reach, window_in_radii / std::abs(p.curvature[k]));
     const double middle = std::clamp(0.0, p.from[k], p.to[k]);
     const double from = std::max(p.from[k], middle - reach), to = std::min(p.to[k], middle + reach);
@@ -95,7 +95,7 @@ Complex specular_factor(const SpecularPoint& p, double wavelength_m, const Specu
   // K_1 K_2 as a sum over strips. Each term is the integral over y of one strip times the integral over its intervals in x.
   const auto strip = [&](double from, double to, std::size_t row) {
     if (!(to > from)) return;
-    // An infinite strip has no middle. Therefore its extent is the extent at the foot.
+    // An infinite strip has no middle, so the extent of the surface in x at the foot (y = 0) is used.
     const double middle = std::isinf(from) || std::isinf(to) ? 0 : 0.5 * (from + to);
     crossings(p, middle, x);
     sum += up.part(from, to) * along_strip(across, x, w, row);
@@ -142,7 +142,7 @@ namespace {
 constexpr double least_reflection = 0.01;
 constexpr double least_factor = 0.01;   // least K_vis in eq. 7
 constexpr double sight_slack_m = 5e-3;  // tolerance: distance of facets from the true surface, and overlap of touching objects
-constexpr double bent_slack = 0.1;      // the same tolerance in radii of curvature
+constexpr double bent_slack = 0.1;      // tolerance added for curved surfaces, in radii of curvature
 constexpr double most_bent_slack_m = 0.2;
 constexpr std::size_t most_surfaces_of_a_mesh = 4;
 
@@ -154,7 +154,7 @@ class Sight {
 
   /// Returns a mask. Bit i is set if point i of the surface is the first hit of a ray towards it. At most 16 points.
   std::uint32_t seen(const SpecularPoint& point, std::span<const std::array<double, 2>> places) const {
-    // The distance of facets from the true surface grows with its curvature.
+    // The distance of facets from the true surface grows with its radius of curvature.
     double slack = sight_slack_m;
     const double sharpest = std::max(std::abs(point.curvature[0]), std::abs(point.curvature[1]));
     if (sharpest > 0) slack += std::min(bent_slack / sharpest, most_bent_slack_m);
@@ -192,8 +192,8 @@ double middle_of(const std::array<double, SpecularWindow::cells + 1>& edge, doub
   return edge[c] + part * (edge[c + 1] - edge[c]);
 }
 
-/// Determines whether all, a part or none of the surface is visible, from rays along the two principal directions and between
-/// them.
+/// Traces rays to points along the two principal directions and between them, to find whether all, a part or none of the surface
+/// is visible.
 enum class Part { none, some, all };
 Part glance(const SpecularPoint& point, const SpecularWindow& w, const Sight& sight) {
   constexpr std::size_t n = SpecularWindow::cells;
@@ -205,7 +205,7 @@ Part glance(const SpecularPoint& point, const SpecularWindow& w, const Sight& si
   }
   int looked = 0, met = 0;
   std::array<std::array<double, 2>, n> places{};
-  // 48 rays in all: along each principal direction, and over a 4 x 4 grid.
+  // At most 48 rays: to 16 points along each principal direction, and to a 4 x 4 grid.
   for (int pattern = 0; pattern < 3; ++pattern) {
     std::size_t count = 0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -248,7 +248,7 @@ void hide(const SpecularPoint& point, SpecularWindow& w, const Sight& sight) {
 
 /// K_vis with its phase, for the visible part of the surface.
 std::complex<double> visible_factor(const SpecularPoint& point, double wavelength_m, const Sight& sight) {
-  // K_1 K_2 of eq. 7 and 19 over the whole extent. If cells are hidden, they are left out.
+  // K_1 K_2 of eq. 7 and 19 over the whole extent
   const std::complex<double> whole = specular_factor(point, wavelength_m);
   if (point.outline.empty() && std::abs(whole) < least_factor) return 0;
   SpecularWindow window = make_window(point, wavelength_m);
@@ -261,7 +261,7 @@ std::complex<double> visible_factor(const SpecularPoint& point, double wavelengt
 
 /// Largest angle of columns from straight ahead, with a margin for a sonar that turns during the ping.
 double widest_direction_rad(const PingPlan& plan) {
-  // Bearings are measured at reception (eq. 29). A turning sonar receives echoes from farther aside, by at most this angle [rad].
+  // Bearings are measured at reception (eq. 29). A turning sonar receives echoes from up to this angle [rad] farther aside.
   constexpr double while_turning_rad = 0.05;
   const double sine = std::min(1.0, plan.columns.first_sine + plan.columns.spacing);
   return std::acos(std::sqrt(1 - sine * sine) * std::cos(std::min(plan.widest_about_axis_rad(plan.fan.reach_rad), pi / 2))) +
@@ -316,8 +316,8 @@ void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const 
   }
   mirrors_.assign(reflection_.size(), false);
   for (const std::uint16_t m : mesh.materials) mirrors_[m] = reflection_[m] != 0;
-  // Surfaces are stored by their set of reflecting materials, because this set depends on the frequency. So a ping does not
-  // depend on earlier pings.
+  // The set of reflecting materials depends on the frequency. Each set has its own surfaces, so that a ping does not get those
+  // of an earlier ping.
   auto at = std::find_if(mesh.surfaces.begin(), mesh.surfaces.end(),
                          [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
   if (at == mesh.surfaces.end()) {
@@ -334,7 +334,7 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
   SpecularQuery query;
   query.wavelength_m = s.sound_speed_mps / static_cast<double>(plan.mode.centre_hz);
   query.max_range_m = s.max_range_m;
-  // Feet outside this cone cannot be received in any column.
+  // Echoes of foot points outside this cone reach no column.
   query.widest_rad = widest_direction_rad(plan);
   reflection_.clear();
   for (const Material& m : scene.materials) reflection_.push_back(coherent_reflection(m, query.wavelength_m));
@@ -360,10 +360,10 @@ void SpecularEchoes::find(const PingContext& context, std::vector<PointEcho>& ec
       const Vec3d from_sonar = transform(world_in_sonar, transform(in_world, point.place(at[0], at[1])));
       const double r = length(from_sonar);
       // docs/acoustics.md, eq. 7, without the factors of point_echo (source, absorption, patterns, 1 / r^2, phase of its own
-      // range). The strength is Rc r^2 / (2 r sqrt((1 + r / R1) (1 + r / R2))), times K_1 K_2 (visible_factor).
+      // range). The strength is Rc r^2 / (2 r0 sqrt(|(1 + r0 / R1) (1 + r0 / R2)|)), with r0 = point.range_m, times K_1 K_2.
       const double bends = bending(point.range_m, point.curvature[0]) * bending(point.range_m, point.curvature[1]);
       const double strength = reflection * r * r / (2 * point.range_m * std::sqrt(std::abs(bends)));
-      // point_echo() applies the phase of range r. Eq. 7 has the phase of the foot's range, and K has the rest.
+      // point_echo() applies the phase of range r. Eq. 7 has the phase of the foot's range, so the difference is removed.
       const double beside_turns = (r - point.range_m) * s.turns_per_m;
       std::optional<PointEcho> echo = point_echo(from_sonar, std::polar(1.0, 2 * pi * fraction_of_turn(beside_turns)), plan, s);
       if (!echo) continue;

@@ -1,4 +1,4 @@
-// Common parts of readers of height grids with coordinates: cells without data, and degrees. Only these readers use the file.
+// Common parts of readers of height grids with coordinates: numbers, cells without data, and coordinate systems.
 #pragma once
 
 #include <cstdint>
@@ -22,9 +22,9 @@ constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 /// Recognises values that mean no data: nan, the declared value, and fill values beyond every height.
 class HeightValues {
  public:
-  /// `declared`: the no-data value in the file's header, which may have fewer digits than in the grid.
+  /// `declared`: the no-data value of the file. The grid may state the same value with more digits.
   explicit HeightValues(std::optional<std::string_view> declared);
-  /// Returns NaN for no data, and nullopt for a number that is neither a height nor a usual fill value.
+  /// Returns NaN for no data, and nullopt for a number that is neither a height nor a fill value beyond every height.
   std::optional<float> height_of(double value);
   std::size_t fill_values() const { return fill_values_; }
 
@@ -36,15 +36,15 @@ class HeightValues {
 
 /// Coordinates and heights as a file describes them.
 struct CoordinateSystem {
-  std::optional<bool> geographic = {};  // coordinates in degrees
+  std::optional<bool> geographic = {};  // coordinates are angles
   double unit_deg = 1;                  // unit of coordinates that are angles
   double prime_meridian_deg = 0;        // longitude of the prime meridian, east of Greenwich
-  double unit_m = 1;                    // unit of coordinates that are not degrees
+  double unit_m = 1;                    // unit of coordinates that are lengths
   double height_unit_m = 1;
-  bool web_mercator = false;  // its metres are longer than true metres
+  bool web_mercator = false;  // its metres are shorter on the ground than true metres
   /// The zone, if the datum agrees with WGS 84 within 2 m.
   std::optional<UtmZone> utm = {};
-  /// The name of the system in the file; empty for systems without a name, and for local coordinates.
+  /// The name of a system that is not UTM, Web Mercator or WGS 84; empty for these and for local coordinates.
   std::string name = {};
   std::string depths = {};   // the name of a vertical system that counts downwards; empty for all others
   bool other_datum = false;  // degrees that may differ from those of WGS 84 by about 100 m
@@ -68,7 +68,7 @@ struct RawHeights {
   void turn_rows(std::size_t columns);
 };
 
-/// Applies the scale, checks for holes, and sets the origin of degrees. Errors do not contain the file name.
+/// Removes fill values, converts units, notes holes, and sets the origin. Errors do not contain the file name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 
 /// Reads the .prj file beside the heights: WKT of version 1 or 2, or the lines that Arc/Info writes.
@@ -81,7 +81,7 @@ double prime_meridian_of_epsg(std::uint32_t code);
 std::optional<double> degrees_of_prime_meridian(std::uint32_t code);
 /// The zone of a projected system of the EPSG data set; nullopt for other projections, and for older datums.
 std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
-/// True for the codes, in the EPSG data set, of latitudes and longitudes within 2 m of WGS 84.
+/// True for EPSG codes of geographic systems that differ from WGS 84 by at most 2 m.
 bool agrees_with_wgs84(std::uint32_t code);
 /// True for GRS 80 and the ellipsoid of WGS 84, which all datums since about 1980 have.
 bool is_modern_ellipsoid(double semi_major_m, double inverse_flattening);

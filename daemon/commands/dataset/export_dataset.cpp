@@ -132,7 +132,7 @@ class Export {
   Result<void> put(std::uint64_t ping, const std::string& ending, std::span<const std::byte> contents) {
     const path split = folder_of(split_of_[ping - 1]);
     if (form_ == ExportForm::coco)
-      // COCO has all labels in one file, so only the picture of a ping is unpacked.
+      // COCO has all labels of a split in one file, so only pictures are unpacked.
       return ending == "samples.png" ? write_whole_file(split / name_of(ping), {contents}) : Result<void>{};
     const path folder = split / ending.substr(0, ending.find('.'));
     if (made_.insert(folder).second) {
@@ -244,7 +244,7 @@ std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const
   double sum = 0;
   for (const double share : shares) sum += share;
   // Splits consist of whole scenes: shares are rounded down, then the splits with the largest remainders get one more scene. Each
-  // split gets at least one scene if there are enough.
+  // split with a share gets at least one scene if there are enough.
   std::array<std::size_t, 3> count{};
   std::size_t left = scenes.size();
   for (std::size_t s = 0; s < count.size(); ++s) {

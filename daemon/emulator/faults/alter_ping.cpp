@@ -67,7 +67,7 @@ class Levels {
   std::uint32_t full() const { return full_; }
   bool are_of_ranges() const { return of_ranges_ != nullptr; }
 
-  /// Returns the code of a return with the range multiplied by `factor`; 0 (no return) beyond `most_m`.
+  /// Returns the pixel's code after its range is multiplied by `factor`; 0 (no return) beyond `most_m`.
   std::uint32_t at_range(std::uint32_t code, double factor, double most_m) const {
     const double range = static_cast<double>(code & most_range) * factor;
     if (range < 1 || range > std::min<double>(most_range, most_m / of_ranges_->range_unit_m)) return 0;

@@ -1,4 +1,4 @@
-// Errors of a machine, user or service that has too little memory or too few threads.
+// Errors when memory is short, or when a user or service may start no more threads.
 #pragma once
 
 #include <exception>
@@ -15,8 +15,8 @@ inline constexpr const char* not_enough_threads =
     "cannot start a thread: allow this user or service more threads (ulimit -u, TasksMax=) or more memory (ulimit -v, LimitAS=), "
     "whichever is limited";
 
-/// Returns whether an exception that std::thread, Boost or Embree threw means that no more threads can be started. The error code
-/// is the same if the limit of threads is reached and if there is no memory for a stack.
+/// Returns whether an exception that std::thread, Boost or Embree threw means that no more threads can be started. A reached
+/// limit of threads and missing memory for a stack give the same error code.
 inline bool is_short_of_threads(const std::exception& e) {
   if (std::string_view(e.what()).find("pthread_create") != std::string_view::npos) return true;  // from Embree
   if (const auto* error = dynamic_cast<const std::system_error*>(&e))

@@ -1,5 +1,5 @@
-"""Every function of both headers with handles that are null, stale, foreign, or of another type: none crashes, none succeeds, and
-every out-parameter is written nevertheless."""
+"""Calls the functions of both headers that begin with a handle, with null, stale, foreign and wrong handles: none crashes or
+succeeds, and every out-parameter is written nevertheless."""
 import ctypes
 import re
 import unittest

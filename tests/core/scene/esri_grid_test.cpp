@@ -20,7 +20,7 @@ const char* const small_grid =
     "ncols 3\nnrows 3\nxllcorner 500000\nyllcorner 5200000.5\ncellsize 2\nNODATA_value -9999\n"
     "1 2 3\n4 5 6\n7 8 -9999\n";
 
-TEST(EsriGrid, KeepsFarCoordinatesInTheCentre) {
+TEST(EsriGrid, LargeCoordinatesBecomeTheMeshCentre) {
   TemporaryFiles files;
   const auto grid = read_esri_heights(files.write("g.asc", small_grid), {});
   ASSERT_TRUE(grid) << grid.error().text;
@@ -115,11 +115,11 @@ TEST(EsriGrid, NoDataIsRecognisedInEveryForm) {
   };
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value nan", "nan"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre, "NaN"), false), "1");
-  EXPECT_EQ(holes_in("\xEF\xBB\xBF" + grid_of(metre, "-9999"), false), "1");  // as editors on Windows begin a text
+  EXPECT_EQ(holes_in("\xEF\xBB\xBF" + grid_of(metre, "-9999"), false), "1");  // byte order mark, as written by editors on Windows
   EXPECT_EQ(holes_in(grid_of(at + "dx 1\ndy 2", "-9999"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.40282e+38", "-3.4028234663852886e+38"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -3.4E+38", "-3.4028234663852886e+38"), false), "1");
-  for (const char* few_digits : {"1e20", "-1e38", "2e7"})  // one digit would make every height one of them
+  for (const char* few_digits : {"1e20", "-1e38", "2e7"})  // a tolerance of one digit would include every height
     EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value " + few_digits, few_digits), false), "1") << few_digits;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -99999.99", "-99999.9921875"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value 0", "0"), false), "1");
@@ -155,8 +155,8 @@ std::string degrees_of(const std::string& corner, const std::string& cell, int e
 
 TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
   TemporaryFiles files;
-  // Lengths of a degree at 60 degrees north: 111 412.4 m along the meridian, 55 799.8 m along the parallel (WGS84: the
-  // meridian's radius, and N cos(latitude)), here of 39 arc seconds.
+  // Lengths of a degree (WGS84): 111 412.4 m along the meridian in the middle, 55 799.8 m along the southernmost parallel. The
+  // grid spans 39 arc seconds.
   const std::string text = degrees_of("xllcorner 5.0\nyllcorner 60.0", "0.000277777778");
   const auto grid = read_esri_heights(files.write("g.asc", text), {});
   ASSERT_TRUE(grid) << grid.error().text;
@@ -170,11 +170,11 @@ TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
   for (const Vec3& v : mesh->mesh.vertices)
     low = {std::min(low.x, v.x), std::min(low.y, v.y), 0}, high = {std::max(high.x, v.x), std::max(high.y, v.y), 0};
   EXPECT_NEAR(high.y - low.y, 39 * 111412.4 / 3600, 0.1);
-  EXPECT_NEAR(high.x - low.x, 39 * 55799.8 / 3600, 0.2);  // the widest row is 19 arc seconds farther south
+  EXPECT_NEAR(high.x - low.x, 39 * 55799.8 / 3600, 0.2);  // the southernmost row is the widest
   EXPECT_NEAR(mesh->centre_m.x, 0, 0.1);
   EXPECT_NEAR(mesh->centre_m.y, 0, 0.1);
 
-  // Every vertex where the geodesy of poses puts the same place, its height apart.
+  // A vertex lies where the conversion of poses puts its place; its height is compared separately.
   const Geodetic origin{rad_from_deg(60.1), rad_from_deg(4.9), 0};
   const auto placed = read_esri_heights(files.write("g.asc", text), {.geographic = true, .origin = origin});
   ASSERT_TRUE(placed) << placed.error().text;
@@ -191,7 +191,7 @@ TEST(EsriGrid, DegreesBecomeMetresAboutAnOrigin) {
   }
 }
 
-TEST(EsriGrid, NamesCoordinatesThatItTreatsAsDegrees) {
+TEST(EsriGrid, DistinguishesDegreesFromMetres) {
   TemporaryFiles files;
   const auto is_geographic = [&](const std::string& text, const HeightOptions& options = {}) -> std::string {
     const auto grid = read_esri_heights(files.write("g.asc", text), options);
@@ -224,7 +224,7 @@ TEST(EsriGrid, NamesCoordinatesThatItTreatsAsDegrees) {
   EXPECT_EQ(is_geographic(degrees_of(near_zero, "0.004166667")), "metres");
 }
 
-TEST(EsriGrid, LengthsOfItsPrjBecomeMetres) {
+TEST(EsriGrid, UnitsOfItsPrjBecomeMetres) {
   TemporaryFiles files;
   const std::string grid_text = "ncols 2\nnrows 2\nxllcenter 1000\nyllcenter 2000\ncellsize 10\nNODATA -1\n-3 NA\n-5 -1\n";
   const auto read = [&](const std::string& prj) {

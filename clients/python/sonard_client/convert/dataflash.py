@@ -1,7 +1,7 @@
 """Reads ArduPilot's dataflash logs (.bin). Every message starts with A3 95 and its type; FMT messages, type 128, describe the
 others.
 
-Layouts are those of ArduPilot's AP_Logger. The descriptions in the log are used, so logs of any version are readable.
+The format characters are those of ArduPilot's AP_Logger. Layouts are read from the log, so logs of any version are readable.
 """
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .track import ConvertError, Place2, Source, Stream, Track, Warn, chosen, de
 MAGIC = b"\xa3\x95"
 FMT = 128
 _FMT = struct.Struct("<BB4s16s64s")  # type, length, name, format, labels
-# Format characters: struct's format and the scale factor.
+# Format characters: struct's format and the scale factor; 0 = not a number, left out.
 _KINDS: Dict[str, Tuple[str, float]] = {
     "a": ("64s", 0), "b": ("b", 1), "B": ("B", 1), "h": ("h", 1), "H": ("H", 1), "i": ("i", 1), "I": ("I", 1), "f": ("f", 1),
     "d": ("d", 1), "g": ("e", 1), "n": ("4s", 0), "N": ("16s", 0), "Z": ("64s", 0), "c": ("h", 0.01), "C": ("H", 0.01),
@@ -25,9 +25,9 @@ _KINDS: Dict[str, Tuple[str, float]] = {
 # In order of preference: the simulator's ground truth, then estimates.
 FULL = ("SIM", "XKF1", "NKF1", "EKF1", "AHR2")
 LOCAL = ("XKF1", "NKF1", "EKF1")  # metres from the filter's origin
-# Heights above the home, by message and field, of vehicles without a position; BARO:1 is ArduSub's external pressure sensor.
+# Messages and fields with the height above home, best first, without a position; BARO:1: ArduSub's external pressure sensor.
 HEIGHTS = (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO:1", "Alt"), ("BARO", "Alt"))
-STATES = {"XKF4": "XKF1", "NKF4": "NKF1"}  # messages with the number of the core in use, PI
+STATES = {"XKF4": "XKF1", "NKF4": "NKF1"}  # messages whose field PI is the core in use: the pose messages of that filter
 WANTED = FULL + ("ATT", "POS", "GPS", "ORGN", "CTUN", "BARO") + tuple(STATES)
 EKF_ORIGIN = 0  # type of an ORGN message; 1 is the home of the attitude system
 FIX_2D = 2
@@ -36,7 +36,7 @@ FIX_2D = 2
 class Format(NamedTuple):
     name: str
     length: int
-    body: Optional[struct.Struct]  # None if the description is inconsistent
+    body: Optional[struct.Struct]  # None if the description is inconsistent or has unknown characters; also for FMT
     labels: Tuple[str, ...]
     factors: Tuple[float, ...]
 
@@ -56,7 +56,7 @@ def _format(data: bytes, at: int) -> "Tuple[int, Format]":
 
 
 def records(data: bytes, warn: Warn) -> "Iterator[Tuple[str, Dict[str, float]]]":
-    """Yields the numbers of pose messages, scaled to degrees, metres and seconds. Unreadable bytes are skipped up to the next
+    """Yields the name and numeric fields of each wanted message, in degrees and metres. Unreadable bytes are skipped up to the next
     message and reported at the end."""
     formats: Dict[int, Format] = {FMT: Format("FMT", 3 + _FMT.size, None, (), ())}
     at, skipped, first_skipped = 0, 0, -1
@@ -145,7 +145,7 @@ class _Gathered:
             self.positions.setdefault(key, []).append((t, place))
 
     def cores(self, key: str) -> "Dict[str, int]":
-        """Returns the cores of a filter that the autopilot used, as sources, most used first; empty if the log names none."""
+        """Returns the source name and the count of each core of this filter that the autopilot used, most used first."""
         used = sorted(self._in_use.get(key.split(":")[0], {}).items(), key=lambda core: -core[1])
         return {f"{key.split(':')[0]}:{core}" if core else key.split(":")[0]: count for core, count in used}
 
