@@ -78,10 +78,8 @@ make_commands() {
 # Emulated programs also start the importer of meshes as a command of this machine.
 export SONARD_IMPORT_MESH=$PWD/$emulated/importer/sonard-import-mesh
 
-# If a program is missing, qemu-user starts nevertheless and ends with code 127. It enforces no limit of addresses.
+# If a program is missing, qemu-user starts nevertheless and ends with code 127.
 export GTEST_FILTER=-ChildProcess.AProgramThatIsNotThereIsNamed:HostileMeshes.WithoutTheImporterTheSentenceSaysWhatIsMissing
-GTEST_FILTER+=:StrictYamlHostile.ALackOfMemoryIsNoMistakeOfTheFile
-GTEST_FILTER+=:ParallelPoolLimits.AWorkerThatCannotStartIsAnException:RayScene.ASmallSceneFitsIntoFewAddresses
 
 # Prints one line for each program that passes, and the whole output of each that fails.
 run_tests() {

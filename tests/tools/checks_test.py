@@ -184,8 +184,7 @@ class Programs(unittest.TestCase):
 
 class Arm64(unittest.TestCase):
     def test_the_omitted_cases_exist(self):
-        left_out = ":".join(re.findall(r"GTEST_FILTER\+?=[-:](\S+)", (TOOLS / "arm64.sh").read_text())).split(":")
-        self.assertEqual(len(left_out), 5)
+        left_out = re.search(r"GTEST_FILTER=-(\S+)", (TOOLS / "arm64.sh").read_text())[1].split(":")
         sources = "".join(path.read_text() for path in (ROOT / "tests/core").rglob("*_test.cpp"))
         for case in left_out:
             suite, name = case.split(".")

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "core/base/memory_left.hpp"
-#include "tests/is_sanitized.hpp"
+#include "tests/memory_limit.hpp"
 
 namespace sonar {
 namespace {
@@ -93,7 +93,7 @@ rlim_t stack_bytes_of_a_thread() {
 
 // A child process whose limit of addresses leaves room for the stacks of a few workers, but not of all.
 TEST(ParallelPoolLimits, AWorkerThatCannotStartIsAnException) {
-  if (test::is_sanitized) GTEST_SKIP() << "sanitizers need terabytes of addresses";
+  if (!test::memory_is_limited()) GTEST_SKIP() << "sanitizers and emulated processors keep no limit of addresses";
   const pid_t child = ::fork();
   if (child == 0) {
     const rlim_t bytes = address_space_bytes().value() + 5 * stack_bytes_of_a_thread();

@@ -13,7 +13,7 @@
 #include "core/scene/ray_scene.hpp"
 #include "tests/core/held_variable.hpp"
 #include "tests/core/scene/scene_testing.hpp"
-#include "tests/is_sanitized.hpp"
+#include "tests/memory_limit.hpp"
 
 namespace sonar {
 namespace {
@@ -280,7 +280,7 @@ TEST(RayScene, RefusesAnUnknownInstructionSet) {
 
 // Embree's cache of tessellated surfaces, which no scene has, would take 128 MB.
 TEST(RayScene, ASmallSceneFitsIntoFewAddresses) {
-  if (test::is_sanitized) GTEST_SKIP() << "sanitizers need terabytes of addresses";
+  if (!test::memory_is_limited()) GTEST_SKIP() << "sanitizers and emulated processors keep no limit of addresses";
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto build = [] {
     ::alarm(60);

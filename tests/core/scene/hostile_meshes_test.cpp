@@ -20,6 +20,7 @@
 #include "core/scene/import/import_limits.hpp"
 #include "tests/core/held_variable.hpp"
 #include "tests/core/scene/temporary_files.hpp"
+#include "tests/memory_limit.hpp"
 
 namespace sonar {
 namespace {
@@ -28,29 +29,12 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-#ifdef SONAR_SANITIZED
-constexpr bool sanitized = true;
-#else
-constexpr bool sanitized = false;
-#endif
-
-/// True if the system enforces the memory limit of a process. Sanitizers enforce it themselves, and an emulated processor
-/// (tests/tools/arm64.sh) has none.
-bool memory_is_limited() {
-  rlimit before{}, now{};
-  if (sanitized || ::getrlimit(RLIMIT_AS, &before) != 0) return false;
-  const rlimit other{std::min<rlim_t>(before.rlim_max, rlim_t{1} << 46), before.rlim_max};
-  const bool limited = ::setrlimit(RLIMIT_AS, &other) == 0 && ::getrlimit(RLIMIT_AS, &now) == 0 && now.rlim_cur == other.rlim_cur;
-  ::setrlimit(RLIMIT_AS, &before);
-  return limited;
-}
-
 class HostileMeshes : public ::testing::Test {
  protected:
   HostileMeshes() {
     // If a test needs more than this, it has failed. It must not exhaust the memory of the computer.
     const rlimit most{std::uint64_t{4} << 30, RLIM_INFINITY};
-    EXPECT_TRUE(sanitized || ::setrlimit(RLIMIT_AS, &most) == 0);
+    EXPECT_TRUE(test::is_sanitized || ::setrlimit(RLIMIT_AS, &most) == 0);
   }
   std::string refusal(const std::string& name, const std::string& bytes) {
     const auto mesh = load_mesh({.file = files_.write(name, bytes)});
@@ -61,7 +45,7 @@ class HostileMeshes : public ::testing::Test {
 
 TEST_F(HostileMeshes, AreRefusedAndTheProgramContinues) {
   for (const auto& mesh : tests::hostile_meshes()) {
-    if (mesh.words == "MiB of memory" && !memory_is_limited()) continue;  // the sanitizer itself ends the importer
+    if (mesh.words == "MiB of memory" && !test::memory_is_limited()) continue;  // the sanitizer itself ends the importer
     const std::string text = refusal(mesh.name, mesh.bytes);
     EXPECT_THAT(text, StartsWith(mesh.name + ": "));
     EXPECT_THAT(text, HasSubstr(mesh.words));
@@ -155,14 +139,14 @@ std::string answer_of(Work&& work) {
 }
 
 TEST(ImportLimits, TooLittleMemoryEndsTheImportWithAnError) {
-  if (!memory_is_limited()) GTEST_SKIP() << "the system keeps no such limit";
+  if (!test::memory_is_limited()) GTEST_SKIP() << "the system keeps no such limit";
   const std::string text = answer_of([] { std::vector<char>().reserve(std::size_t{2} << 30); });
   EXPECT_THAT(text,
               AnyOf(HasSubstr("m.ply: takes more than 1122 MiB of memory to read"), HasSubstr("MiB of memory that are left")));
 }
 
 TEST(ImportLimits, MemoryIsGivenFreeForWhatComesAfterTheImport) {
-  if (sanitized) GTEST_SKIP() << "the sanitizer keeps this limit";
+  if (test::is_sanitized) GTEST_SKIP() << "the sanitizer keeps this limit";
   EXPECT_EQ(answer_of([] {
               release_import_memory();
               rlimit now{};
