@@ -84,7 +84,10 @@ class Client {
     for (;;) {
       while (auto message = decoder_.next())
         if (const auto* ping = std::get_if<oculus::DecodedPing>(&*message)) {
-          if (fire != nullptr && !answers(*fire, *ping) && ++skipped > 0) continue;
+          if (fire != nullptr && !answers(*fire, *ping)) {
+            ++skipped;
+            continue;
+          }
           rows = static_cast<int>(ping->rows());
           return read_at_s_;
         }
