@@ -22,13 +22,22 @@ bool is_answer(ping::Id id) {
   return ping::is_of_device(id) || id == device_information || id == protocol_version;
 }
 
+/// Returns the product's name in a log. unknown: the maker's name of an S500.
+const char* product_of(ping::Id first) {
+  switch (first) {
+    case ping::Id::os_mono_profile:
+      return "os450";
+    case ping::Id::s500_distance2:
+    case ping::Id::s500_profile6:
+      return "s500";
+    default:
+      return "mbes24016";
+  }
+}
+
 /// Returns the JSON text with which the maker's programs begin a log, without the parts that describe a computer.
 std::string beginning(ping::Id first) {
-  using enum ping::Id;
-  const char* const product = first == os_mono_profile                            ? "os450"
-                              : first == s500_profile6 || first == s500_distance2 ? "s500"  // unknown: the maker's name
-                                                                                  : "mbes24016";
-  return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") + product +
+  return std::string(R"({"session_id":1,"session_uptime":0.0,"session_devices":[{"product_id":")") + product_of(first) +
          R"("}],"is_recording":true})";
 }
 
