@@ -41,8 +41,8 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
   return triangles;
 }
 
-/// Keeps only the meshes that have this name or belong to nodes with this name; in a file with only one part, keeps this part. If
-/// there is no such part, returns the names of the parts, for an error.
+/// Keeps only the meshes that have this name or belong to nodes with this name; in a file with only one part, keeps this part.
+/// Without such a part, returns the names of the parts, for an error.
 std::string keep_part(aiScene& scene, const std::string& wanted) {
   std::vector<aiNode*> holders;  // nodes that show meshes
   const auto walk = [&](const auto& self, aiNode& node, unsigned depth) -> void {
