@@ -108,6 +108,7 @@ FORBIDDEN = [
     ("quiet grep", r"", None, r"\| *gr" + r"ep -\w*q", "it ends before its input does, and under pipefail the pipe then fails: test \"$(command)\" instead"),
     ("precompiled header", r"", None, r"target_precompile_headers\(\w+ (PRIVATE|PUBLIC|INTERFACE)[^)]*\s[^<\s)][^)]*\)",
      "name headers of other packages, <...>: a compiler cache may return the precompiled header of an older comment of ours"),
+    ("view", r".*\.(cpp|hpp)$", None, r"\bstd::(ranges::)?views::\w+", "clang 14 cannot compile the views of libstdc++ 12: use a loop or a projection"),
     ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]

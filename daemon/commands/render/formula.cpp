@@ -4,7 +4,6 @@
 #include <cctype>
 #include <cmath>
 #include <cstdio>
-#include <ranges>
 
 #include "core/base/geometry.hpp"
 #include "core/text/decimal.hpp"
@@ -144,7 +143,7 @@ class Parser {
     if (name == "pi") return pi;
     const auto value = values_.find(name);
     if (value != values_.end()) return value->second;
-    const std::string known = text::joined(std::views::keys(values_));
+    const std::string known = text::joined(values_, ", ", &Values::value_type::first);
     set_error("unknown name " + std::string(name) + "; known names: " + (known.empty() ? "none" : known));
     return 0;
   }
