@@ -68,8 +68,8 @@ bool DistanceRequests::set_interval_us(float wanted) {
 bool DistanceRequests::is_due(const DistanceSensor& measured) {
   const auto last = sent_.find(measured.sensor);
   const double passed_us = last == sent_.end() ? INFINITY : 1e3 * static_cast<double>(measured.boot_ms - last->second);
-  // Stamps are whole milliseconds, so an interval that has passed may seem up to half a millisecond too short.
-  const bool due = std::exchange(once_, false) || (interval_us_ && passed_us + 500 >= *interval_us_);
+  // Stamps are cut to whole milliseconds, so an interval that has passed may seem up to one millisecond too short.
+  const bool due = std::exchange(once_, false) || (interval_us_ && passed_us + 1000 >= *interval_us_);
   if (due) sent_[measured.sensor] = measured.boot_ms;
   return due;
 }

@@ -113,6 +113,15 @@ TEST(MavlinkDistances, AnIntervalHoldsForEachSensor) {
   EXPECT_FALSE(requests.wanted());
 }
 
+TEST(MavlinkDistances, AtTheRateOfThePingsNoneIsLeftOut) {
+  for (const double hz : {7., 15., 30., 60.}) {
+    DistanceRequests requests(false);
+    ASSERT_TRUE(requests.set_interval_us(static_cast<float>(1e6 / hz)));
+    for (int ping = 0; ping < 100; ++ping)
+      EXPECT_TRUE(requests.is_due(at_ms(static_cast<std::uint32_t>(1e3 * ping / hz)))) << ping << " at " << hz << " Hz";
+  }
+}
+
 struct MavlinkDistanceCommands : ::testing::Test {
   bool has_range_finder = true;
   MavlinkPoses poses{{}, {}, [this] { return has_range_finder; }};
