@@ -7,7 +7,7 @@ namespace {
 std::size_t natural_length(const MessageHeader& header) {
   switch (header.type) {
     case MessageType::fire:
-      return header.version == 2 ? fire_v2_size : fire_v1_size;
+      return header.version >= 2 ? fire_v2_size : fire_v1_size;
     case MessageType::user_config:
       return user_config_size;
     default:

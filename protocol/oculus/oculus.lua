@@ -405,7 +405,7 @@ end
 -- Messages and the stream -----------------------------------------------------------------------------------
 
 local function natural_length(kind, version)  -- of a client's message that announces no payload
-  if kind == 0x15 then return version == 2 and 89 or 53 end
+  if kind == 0x15 then return version >= 2 and 89 or 53 end
   return kind == 0x55 and 28 or HEADER
 end
 

@@ -56,8 +56,8 @@ TEST(Framer, ZeroPayloadMeansTheNaturalLength) {
     int type, version;
     std::size_t length;
   };
-  for (const Case& c :
-       {Case{0x15, 0, 53}, Case{0x15, 1, 53}, Case{0x15, 2, 89}, Case{0x55, 0, 28}, Case{0xFF, 0, 16}, Case{0x99, 0, 16}})
+  for (const Case& c : {Case{0x15, 0, 53}, Case{0x15, 1, 53}, Case{0x15, 2, 89}, Case{0x15, 3, 89}, Case{0x55, 0, 28},
+                        Case{0xFF, 0, 16}, Case{0x99, 0, 16}})
     EXPECT_EQ(message_length(header_of(header_bytes(c.type, c.version, 0)), Sender::client), c.length) << c.type;
 }
 
