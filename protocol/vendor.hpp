@@ -198,6 +198,35 @@ std::span<const std::shared_ptr<const SonarModel>> only_model() {
   return {&model, 1};
 }
 
+/// Returns the device of a make. `T` is made once.
+template <class T>
+const Vendor& only_vendor() {
+  static const T only;
+  return only;
+}
+
+/// A device whose make has these functions: models(), apply_override(), and, for faults, locate() for the fields and regions of
+/// a ping (null: there are none).
+template <auto models_of, auto override_of, std::optional<Field> (*field_of)(FieldName, BytesView) = nullptr,
+          std::optional<std::pair<std::size_t, std::size_t>> (*region_of)(Region, BytesView) = nullptr, class Base = Vendor>
+class VendorWith : public Base {
+ public:
+  using Base::Base;
+  std::span<const std::shared_ptr<const SonarModel>> models() const override { return models_of(); }
+  Result<ChangeSettings> apply_override(const SettingsOverride& wanted, const DeviceState& device) const override {
+    return override_of(wanted, device);
+  }
+  std::optional<Field> field(Part part, FieldName name, BytesView message) const override {
+    if constexpr (field_of != nullptr)
+      if (part == Part::ping) return field_of(name, message);
+    return {};
+  }
+  std::optional<std::pair<std::size_t, std::size_t>> region(Region region, BytesView ping) const override {
+    if constexpr (region_of != nullptr) return region_of(region, ping);
+    return {};
+  }
+};
+
 /// A sonar that sends pings without a request, from power-up on, to every client of one TCP port.
 class PushingVendor : public Vendor {
  public:

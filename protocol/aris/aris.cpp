@@ -16,20 +16,15 @@ constexpr std::array<protocol::Port, 3> port_table{
      {.kind = PortKind::udp_beacon, .number = beacon_port, .carries = "address, state", .period = 1000ms, .on_change = true},
      {.kind = PortKind::udp_stream, .any_group = true, .gap = 20us}}};
 
-class ArisVendor final : public protocol::Vendor {
+class ArisVendor final : public protocol::VendorWith<models, aris::apply_override, locate, locate> {
  public:
   std::string_view name() const override { return "aris"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return aris::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return aris::options(); }
   int default_max_clients() const override { return 1; }  // one controller is connected at a time
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(aris::initial_settings(device), device);
-  }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return aris::apply_override(wanted, device);
   }
   double gain_percent(const protocol::DeviceState& device) const override {
     return 100 / highest_gain_db * static_cast<double>(settings_from(device.settings.get(), device).acoustics.gain_db);
@@ -43,24 +38,14 @@ class ArisVendor final : public protocol::Vendor {
                                          const protocol::DeviceState& device) const override {
     return encode_frame(ping, device, settings_from(ping.request.vendor_settings.get(), device));
   }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // fields of the beacon have no fixed offset
-  }
   bool change_integer(protocol::Part part, protocol::FieldName name, const std::function<std::int64_t(std::int64_t)>& change,
                       protocol::Bytes& message) const override {
     return part == protocol::Part::ping ? change_part(name, change, message) : change_beacon(name, change, message);
-  }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate(region, ping);
   }
 };
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const ArisVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<ArisVendor>(); }
 
 }  // namespace sonar::aris

@@ -13,10 +13,9 @@ constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::tcp_stream, .number = tcp_port, .carries = "settings, pings"},
      {.kind = PortKind::udp_answer, .number = discovery_port, .carries = "discovery"}}};
 
-class BlueViewVendor final : public protocol::Vendor {
+class BlueViewVendor final : public protocol::VendorWith<models, blueview::apply_override, locate, locate> {
  public:
   std::string_view name() const override { return "blueview"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return blueview::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return blueview::options(); }
   int default_max_clients() const override { return 8; }
@@ -25,10 +24,6 @@ class BlueViewVendor final : public protocol::Vendor {
     const SonarSettings settings = initial_sonar_settings(device);
     return {ping_settings(settings, device), std::make_shared<SonarSettings>(settings),
             "initial settings: " + describe(settings, device)};
-  }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return blueview::apply_override(wanted, device);
   }
   double gain_percent(const protocol::DeviceState& device) const override {
     const SonarSettings settings = settings_from(device.settings.get(), device);
@@ -48,20 +43,10 @@ class BlueViewVendor final : public protocol::Vendor {
     const SonarSettings settings = settings_from(ping.request.vendor_settings.get(), device);
     return std::make_shared<const protocol::Bytes>(encode_ping(ping, device, settings));
   }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;  // a BlueView has no beacon
-  }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate(region, ping);
-  }
 };
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const BlueViewVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<BlueViewVendor>(); }
 
 }  // namespace sonar::blueview

@@ -19,12 +19,11 @@ constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::tcp_stream, .number = tcp_port, .carries = "settings, reports in JSON"},
      {.kind = PortKind::tcp_stream, .number = serial_port, .carries = "settings, serial sentences"}}};
 
-class DvlVendor final : public protocol::PushingVendor {
+class DvlVendor final : public protocol::VendorWith<models, dvl::apply_override, nullptr, nullptr, protocol::PushingVendor> {
  public:
-  DvlVendor() : PushingVendor(tcp_port) {}
+  DvlVendor() : VendorWith(tcp_port) {}
   std::string_view name() const override { return "dvl"; }
   std::span<const protocol::Port> ports() const override { return port_table; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return dvl::models(); }
   std::span<const protocol::Option> options() const override {
     static const std::array<protocol::Option, 1> all{
         {{report_delay,
@@ -37,10 +36,6 @@ class DvlVendor final : public protocol::PushingVendor {
   }
   bool keeps_settings() const override { return true; }  // DOC: one configuration, until a factory reset
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return dvl::apply_override(wanted, device);
-  }
   double gain_percent(const protocol::DeviceState&) const override { return 0; }  // the device sets its gain itself
   std::optional<protocol::ChangeSettings> after_ping(const Ping& ping, const protocol::DeviceState& device) const override {
     const Measurement measured = measured_in(ping);
@@ -86,9 +81,6 @@ class DvlVendor final : public protocol::PushingVendor {
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const DvlVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<DvlVendor>(); }
 
 }  // namespace sonar::dvl

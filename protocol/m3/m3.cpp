@@ -17,17 +17,12 @@ class SilentDialogue final : public protocol::Dialogue {
   void on_ping_queued(Time) override {}
 };
 
-class M3Vendor final : public protocol::PushingVendor {
+class M3Vendor final : public protocol::VendorWith<models, m3::apply_override, locate, locate, protocol::PushingVendor> {
  public:
-  M3Vendor() : PushingVendor(tcp_port) {}
+  M3Vendor() : VendorWith(tcp_port) {}
   std::string_view name() const override { return "m3"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return m3::models(); }
   std::span<const protocol::Option> options() const override { return m3::options(); }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override { return change_to({}, device); }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return m3::apply_override(wanted, device);
-  }
   double gain_percent(const protocol::DeviceState& device) const override {
     return m3::gain_percent(settings_from(device.settings.get()));
   }
@@ -37,20 +32,10 @@ class M3Vendor final : public protocol::PushingVendor {
   std::shared_ptr<const protocol::Bytes> frame(const Ping& ping, const protocol::DeviceState& device) const override {
     return std::make_shared<const protocol::Bytes>(encode_packet(ping, device));
   }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate(name, message) : std::nullopt;
-  }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate(region, ping);
-  }
 };
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const M3Vendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<M3Vendor>(); }
 
 }  // namespace sonar::m3

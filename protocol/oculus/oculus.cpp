@@ -15,10 +15,9 @@ constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::tcp_stream, .number = tcp_port, .carries = "settings, pings"},
      {.kind = PortKind::udp_beacon, .number = status_port, .carries = "address, state", .period = 1000ms}}};
 
-class OculusVendor final : public protocol::Vendor {
+class OculusVendor final : public protocol::VendorWith<models, oculus::apply_override, nullptr, locate> {
  public:
   std::string_view name() const override { return "oculus"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return oculus::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return oculus::options(); }
   int default_max_clients() const override { return 1; }  // the status message has room for one client's address
@@ -30,10 +29,6 @@ class OculusVendor final : public protocol::Vendor {
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     const FireRequest fire = stored_fire();
     return {resolve(fire, device).settings, std::make_shared<HeldFire>(fire), "stored configuration: " + describe(fire)};
-  }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return oculus::apply_override(wanted, device);
   }
   double gain_percent(const protocol::DeviceState& device) const override {
     return fire_of(device.settings.get()).settings.gain_percent;
@@ -53,16 +48,10 @@ class OculusVendor final : public protocol::Vendor {
                                        protocol::BytesView message) const override {
     return locate(part, name, message);
   }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate(region, ping);
-  }
 };
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const OculusVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<OculusVendor>(); }
 
 }  // namespace sonar::oculus

@@ -42,30 +42,19 @@ class OmniscanDialogue final : public StreamingConversation<Settings, settings_f
   bool comes_with_pings(Id wanted) const override { return wanted == Id::os_mono_profile && settings().parameters.enable != 0; }
 };
 
-class OmniscanVendor final : public StreamingVendor {
+class OmniscanVendor final
+    : public protocol::VendorWith<models, omniscan::apply_override, locate_omniscan, locate_omniscan, StreamingVendor> {
  public:
   std::string_view name() const override { return "omniscan450"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return omniscan::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return streaming_options(); }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState&) const override { return change_to(Settings{}); }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return omniscan::apply_override(wanted, device);
-  }
   double gain_percent(const protocol::DeviceState& device) const override {
     return 100.0 / 7 * std::max<int>(settings_from(device.settings.get()).parameters.gain, 0);
   }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
                                                Time) const override {
     return std::make_unique<OmniscanDialogue>(device, port);
-  }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate_omniscan(name, message) : std::nullopt;
-  }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate_omniscan(region, ping);
   }
 
  protected:
@@ -76,9 +65,6 @@ class OmniscanVendor final : public StreamingVendor {
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const OmniscanVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<OmniscanVendor>(); }
 
 }  // namespace sonar::ping::omniscan

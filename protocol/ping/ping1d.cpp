@@ -14,7 +14,7 @@ constexpr double housing_above_water_c = 8;  // assumed
 
 /// The dialogue with one host. Each setting has its own message; SoundingConversation fires the pings for the host's requests
 /// and streams.
-class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
+class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings, settings_from, results_of> {
  public:
   Ping1DDialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
       : SoundingConversation(device, port, {.revision = 1, .major = firmware_major, .minor = firmware_minor}, now) {}
@@ -61,21 +61,6 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
     }
   }
 
-  /// Sends results with the next ping, and other values at once.
-  bool on_wanted(Id wanted_id, Time now, Reaction& reaction) override {
-    const Settings s = settings_after(reaction);
-    if (const Results result = results_of(wanted_id); result != no_result) {
-      if (s.parameters.enable == 0)
-        reaction.replies.push_back(nack(wanted_id, id_, "pings are disabled"));
-      else
-        want_once(result, now, reaction);
-      return true;
-    }
-    if (Bytes message = message_of(wanted_id, s.parameters); !message.empty())
-      return reaction.replies.push_back(std::move(message)), true;
-    return false;
-  }
-
  private:
   /// True in manual mode. In automatic mode the device determines range and gain, so the request is refused.
   bool is_manual(const Frame& frame, Reaction& reaction) const {
@@ -117,7 +102,7 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
     set(frame, reaction, [&](Parameters& p) { p.*member = value; });
   }
 
-  Bytes message_of(Id id, const Parameters& p) const {
+  Bytes message_of(Id id, const Parameters& p) const override {
     switch (id) {
       case Id::ping1d_firmware_version:
         return framed_message(id, id_, FirmwareVersion{.major = firmware_major, .minor = firmware_minor});
@@ -155,10 +140,10 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
 // The port of the bridge with which vehicles serve the serial line.
 constexpr auto port_table = streaming_ports(9090, "settings, distances, profiles");
 
-class Ping1DVendor final : public StreamingVendor {
+class Ping1DVendor final
+    : public protocol::VendorWith<models, ping1d::apply_override, locate_ping1d, locate_ping1d, SoundingVendor> {
  public:
   std::string_view name() const override { return "ping1d"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return ping1d::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override {
     static const std::array<protocol::Option, 2> all{
@@ -166,10 +151,6 @@ class Ping1DVendor final : public StreamingVendor {
     return all;
   }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState&) const override { return change_to(Settings{}); }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return ping1d::apply_override(wanted, device);
-  }
   double gain_percent(const protocol::DeviceState& device) const override {
     return 100.0 / 6 * settings_from(device.settings.get()).parameters.gain;
   }
@@ -185,21 +166,9 @@ class Ping1DVendor final : public StreamingVendor {
     s.parameters = next;
     return change_to(s);
   }
-  bool measures_distance() const override { return true; }
-  std::optional<protocol::Distance> distance_in(const Ping& ping) const override {
-    const Echo echo = echo_in(ping);
-    return protocol::Distance{echo.range_m, echo.confidence};
-  }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
                                                Time now) const override {
     return std::make_unique<Ping1DDialogue>(device, port, now);
-  }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate_ping1d(name, message) : std::nullopt;
-  }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate_ping1d(region, ping);
   }
 
  protected:
@@ -208,9 +177,6 @@ class Ping1DVendor final : public StreamingVendor {
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const Ping1DVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<Ping1DVendor>(); }
 
 }  // namespace sonar::ping::ping1d

@@ -197,19 +197,14 @@ std::optional<protocol::StoredAddress> address_in(const std::string& text) {
   return protocol::StoredAddress{.ip = text::number_from_ipv4(ip), .netmask = 0, .dhcp = ip == protocol::Ipv4{}};
 }
 
-class Ping360Vendor final : public protocol::Vendor {
+class Ping360Vendor final : public protocol::VendorWith<models, ping360::apply_override, locate_ping360, locate_ping360> {
  public:
   std::string_view name() const override { return "ping360"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return ping360::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return ping360::options(); }
   int default_max_clients() const override { return 1; }  // the only client is the last sender
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(Settings{}, device);
-  }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return ping360::apply_override(wanted, device);
   }
   double gain_percent(const protocol::DeviceState& device) const override {
     return 50.0 * settings_from(device.settings.get()).ping.gain;
@@ -246,21 +241,11 @@ class Ping360Vendor final : public protocol::Vendor {
   std::vector<protocol::Bytes> datagrams(const protocol::Port&, const Ping& ping, const protocol::DeviceState&) const override {
     return {encode(settings_from(ping.request.vendor_settings.get()), ping.samples)};
   }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate_ping360(name, message) : std::nullopt;
-  }
   void reseal(protocol::BytesView before, protocol::Bytes& ping) const override { sonar::ping::reseal(before, ping); }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate_ping360(region, ping);
-  }
 };
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const Ping360Vendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<Ping360Vendor>(); }
 
 }  // namespace sonar::ping::ping360

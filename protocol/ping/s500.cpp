@@ -16,7 +16,7 @@ constexpr double processor_above_water_c = 20;  // assumed
 
 /// The dialogue with one host. One message, set_ping_params (1015), sets all except the sound speed, and starts or ends the
 /// pings; SoundingConversation fires the pings.
-class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, settings_from> {
+class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, settings_from, results_of> {
  public:
   S500Dialogue(const protocol::DeviceState& device, const protocol::Port& port, Time now)
       : SoundingConversation(device, port, {.major = firmware_major, .minor = firmware_minor}, now) {}
@@ -51,23 +51,8 @@ class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, s
     return frame.payload.empty();
   }
 
-  bool on_wanted(Id wanted_id, Time now, Reaction& reaction) override {
-    const Parameters p = settings_after(reaction).parameters;
-    if (const Results result = results_of(wanted_id); result != no_result) {
-      if (p.enable == 0)
-        reaction.replies.push_back(nack(wanted_id, id_, "pings are disabled"));
-      else
-        want_once(result, now, reaction);
-      return true;
-    }
-    Bytes message = message_of(wanted_id, p);
-    if (message.empty()) return false;
-    reaction.replies.push_back(std::move(message));
-    return true;
-  }
-
  private:
-  Bytes message_of(Id id, const Parameters& p) const {
+  Bytes message_of(Id id, const Parameters& p) const override {
     switch (id) {
       case Id::ping1d_firmware_version:
         return framed_message(id, id_, FirmwareVersion{.type = 0, .model = 0, .major = firmware_major, .minor = firmware_minor});
@@ -87,38 +72,21 @@ class S500Dialogue final : public SoundingConversation<Settings, HeldSettings, s
   }
 };
 
-class S500Vendor final : public StreamingVendor {
+class S500Vendor final : public protocol::VendorWith<models, s500::apply_override, locate_s500, locate_s500, SoundingVendor> {
  public:
   std::string_view name() const override { return "s500"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return s500::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return streaming_options(); }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState&) const override { return change_to(Settings{}); }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return s500::apply_override(wanted, device);
-  }
   double gain_percent(const protocol::DeviceState& device) const override {
     return s500::gain_percent(settings_from(device.settings.get()).parameters);
   }
   std::optional<protocol::ChangeSettings> after_ping(const Ping& ping, const protocol::DeviceState& device) const override {
     return change_to(after(ping, settings_from(device.settings.get())));
   }
-  bool measures_distance() const override { return true; }
-  std::optional<protocol::Distance> distance_in(const Ping& ping) const override {
-    const Echo echo = echo_in(ping);
-    return protocol::Distance{echo.range_m, echo.confidence};
-  }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
                                                Time now) const override {
     return std::make_unique<S500Dialogue>(device, port, now);
-  }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate_s500(name, message) : std::nullopt;
-  }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate_s500(region, ping);
   }
 
  protected:
@@ -129,9 +97,6 @@ class S500Vendor final : public StreamingVendor {
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const S500Vendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<S500Vendor>(); }
 
 }  // namespace sonar::ping::s500

@@ -12,8 +12,9 @@ namespace sonar::ping {
 
 /// A ping is requested while results are requested (`once_`, `streamed_`); the daemon fires it when the interval is over. The
 /// next ping is requested only after this ping has arrived or two seconds have passed. `Settings`: as for StreamingConversation,
-/// and with `results`, for which a ping is fired. `Held` has the settings.
-template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*)>
+/// and with `results`, for which a ping is fired. `Held` has the settings. results_of()
+/// returns the result in a message.
+template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*), Results (*results_of)(Id)>
 class SoundingConversation : public StreamingConversation<Settings, settings_from> {
   using Base = StreamingConversation<Settings, settings_from>;
   static constexpr auto longest_wait = std::chrono::seconds(2);  // time after which a ping counts as lost
@@ -55,6 +56,18 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
 
  protected:
   Bytes message_now(Id, Time) override { return {}; }
+  /// Returns a message that needs no ping; empty if the product has no such message.
+  virtual Bytes message_of(Id id, const decltype(Settings::parameters)& parameters) const = 0;
+  /// Sends results with the next ping, and other values at once.
+  bool on_wanted(Id id, Time now, protocol::Reaction& reaction) override {
+    const auto p = this->settings_after(reaction).parameters;
+    const Results result = results_of(id);
+    if (result != no_result && p.enable != 0) return want_once(result, now, reaction), true;
+    Bytes message = result != no_result ? nack(id, this->id_, "pings are disabled") : message_of(id, p);
+    if (message.empty()) return false;
+    reaction.replies.push_back(std::move(message));
+    return true;
+  }
 
   Results wanted() const { return once_ | streamed_; }
   void want_once(Results result, Time now, protocol::Reaction& reaction) { want(once_, result, now, reaction); }
@@ -91,6 +104,15 @@ class SoundingConversation : public StreamingConversation<Settings, settings_fro
   std::shared_ptr<const Held> fired_;                // the ping that is being computed
   Time fired_at_{};
   bool has_asked_ = false;
+};
+
+class SoundingVendor : public StreamingVendor {
+ public:
+  bool measures_distance() const override { return true; }
+  std::optional<protocol::Distance> distance_in(const Ping& ping) const override {
+    const Echo echo = echo_in(ping);
+    return protocol::Distance{echo.range_m, echo.confidence};
+  }
 };
 
 }  // namespace sonar::ping

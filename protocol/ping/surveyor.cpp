@@ -71,10 +71,10 @@ class SurveyorDialogue final : public StreamingConversation<Settings, settings_f
   bool has_asked_ = false;
 };
 
-class SurveyorVendor final : public StreamingVendor {
+class SurveyorVendor final
+    : public protocol::VendorWith<models, surveyor::apply_override, locate_surveyor, locate_surveyor, StreamingVendor> {
  public:
   std::string_view name() const override { return "surveyor240"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return surveyor::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return streaming_options(); }
   protocol::ChangeSettings initial_settings(const protocol::DeviceState&) const override {
@@ -82,23 +82,12 @@ class SurveyorVendor final : public StreamingVendor {
     s.parameters.end_mm = 5000;
     return change_to(s);
   }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return surveyor::apply_override(wanted, device);
-  }
   double gain_percent(const protocol::DeviceState& device) const override {
     return std::max<int>(settings_from(device.settings.get()).parameters.gain, 0);
   }
   std::unique_ptr<protocol::Dialogue> converse(const protocol::Port& port, const protocol::DeviceState& device,
                                                Time now) const override {
     return std::make_unique<SurveyorDialogue>(device, port, now);
-  }
-  std::optional<protocol::Field> field(protocol::Part part, protocol::FieldName name,
-                                       protocol::BytesView message) const override {
-    return part == protocol::Part::ping ? locate_surveyor(name, message) : std::nullopt;
-  }
-  std::optional<std::pair<std::size_t, std::size_t>> region(protocol::Region region, protocol::BytesView ping) const override {
-    return locate_surveyor(region, ping);
   }
 
  protected:
@@ -109,9 +98,6 @@ class SurveyorVendor final : public StreamingVendor {
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const SurveyorVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<SurveyorVendor>(); }
 
 }  // namespace sonar::ping::surveyor

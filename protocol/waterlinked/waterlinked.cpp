@@ -12,20 +12,15 @@ constexpr std::array<protocol::Port, 2> port_table{
     {{.kind = PortKind::http, .number = 80, .carries = "settings"},
      {.kind = PortKind::udp_stream, .carries = "range images", .group = multicast_group}}};
 
-class WaterLinkedVendor final : public protocol::Vendor {
+class WaterLinkedVendor final : public protocol::VendorWith<models, waterlinked::apply_override> {
  public:
   std::string_view name() const override { return "waterlinked"; }
-  std::span<const std::shared_ptr<const SonarModel>> models() const override { return waterlinked::models(); }
   std::span<const protocol::Port> ports() const override { return port_table; }
   std::span<const protocol::Option> options() const override { return waterlinked::options(); }
   int default_max_clients() const override { return 1; }  // has no effect, because this sonar has no TCP streams
 
   protocol::ChangeSettings initial_settings(const protocol::DeviceState& device) const override {
     return change_to(waterlinked::initial_settings(device), device);
-  }
-  Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted,
-                                                  const protocol::DeviceState& device) const override {
-    return waterlinked::apply_override(wanted, device);
   }
   double gain_percent(const protocol::DeviceState&) const override { return 0; }  // the device sets its gain itself
   bool pings_before_first_request(const protocol::DeviceState&) const override { return true; }
@@ -45,9 +40,6 @@ class WaterLinkedVendor final : public protocol::Vendor {
 
 }  // namespace
 
-const protocol::Vendor& vendor() {
-  static const WaterLinkedVendor only;
-  return only;
-}
+const protocol::Vendor& vendor() { return protocol::only_vendor<WaterLinkedVendor>(); }
 
 }  // namespace sonar::waterlinked
