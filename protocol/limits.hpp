@@ -2,6 +2,7 @@
 // brackets.
 #pragma once
 
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,6 +22,19 @@ inline std::string range_complaint(double range_m, std::string_view of, double l
   if (range_m >= low_m && range_m <= high_m) return {};
   return "the range of " + std::string(of) + text::format(" is %.4g to %.4g m, not %g m", low_m, high_m, range_m) +
          (field.empty() ? std::string() : " (" + std::string(field) + ")");
+}
+
+/// The same for the range of a request; empty if it has none.
+inline std::string range_complaint(const SettingsOverride& wanted, std::string_view of, double low_m, double high_m,
+                                   std::string_view field = {}) {
+  return wanted.range_m ? range_complaint(*wanted.range_m, of, low_m, high_m, field) : std::string();
+}
+
+/// Returns the first text that is not empty; if there is none, an empty text.
+inline std::string first_of(std::initializer_list<std::string> complaints) {
+  for (const std::string& one : complaints)
+    if (!one.empty()) return one;
+  return {};
 }
 
 /// Returns the refusal of the range in a message, such as "the range must start at 0 m or later, be at least 1 m long and end by

@@ -68,17 +68,13 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   using protocol::refused;
   Settings s = settings_from(device.settings.get());
-  if (wanted.range_m) {
-    if (const std::string why = protocol::range_complaint(*wanted.range_m, "an M3", 1, farthest_m); !why.empty())
-      return refused(why);
-    s.far_m = *wanted.range_m;
-  }
-  if (const std::string why = protocol::rate_complaint(wanted, "an M3", highest_rate_hz); !why.empty()) return refused(why);
+  const std::string why =
+      protocol::first_of({protocol::range_complaint(wanted, "an M3", 1, farthest_m),
+                          protocol::rate_complaint(wanted, "an M3", highest_rate_hz), protocol::gain_complaint(wanted)});
+  if (!why.empty()) return refused(why);
+  s.far_m = wanted.range_m.value_or(s.far_m);
   if (wanted.rate_hz) s.rate_hz = static_cast<float>(*wanted.rate_hz);
-  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
-  if (wanted.gain_percent) {
-    s.c_db = static_cast<float>(least_c_db + (most_c_db - least_c_db) * *wanted.gain_percent / 100);
-  }
+  if (wanted.gain_percent) s.c_db = static_cast<float>(least_c_db + (most_c_db - least_c_db) * *wanted.gain_percent / 100);
   if (wanted.mode.value_or(0) != 0) return refused("an M3 has one mode here, 0");
   if (wanted.beams.value_or(beam_count) != beam_count) return refused(text::format("an M3 forms %d beams", beam_count));
   if (wanted.sample_bits.value_or(32) != 32) return refused("an M3 sends samples of 32 bits");

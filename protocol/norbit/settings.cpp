@@ -81,25 +81,21 @@ protocol::ChangeSettings change_to(const Settings& settings, const protocol::Dev
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   using protocol::refused;
   Settings s = settings_from(device.settings.get());
-  if (wanted.range_m) {
-    const std::string why =
-        protocol::range_complaint(*wanted.range_m, "a Norbit", s.start_m + shortest_m, farthest_m, "set_range");
-    if (!why.empty()) return refused(why);
-    s.stop_m = *wanted.range_m;
-  }
-  if (const std::string why = protocol::rate_complaint(wanted, "a Norbit", device.model->max_rate_hz, "set_rate"); !why.empty())
-    return refused(why);
+  const std::string why = protocol::first_of(
+      {protocol::range_complaint(wanted, "a Norbit", s.start_m + shortest_m, farthest_m, "set_range"),
+       protocol::rate_complaint(wanted, "a Norbit", device.model->max_rate_hz, "set_rate"), protocol::gain_complaint(wanted)});
+  if (!why.empty()) return refused(why);
+  s.stop_m = wanted.range_m.value_or(s.stop_m);
   if (wanted.rate_hz) {
     s.power = *wanted.rate_hz > 0;
     if (s.power) s.rate_hz = *wanted.rate_hz;
   }
-  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) s.gain_db = most_gain_db * *wanted.gain_percent / 100;
   if (wanted.mode.value_or(0) != 0) return refused("a Norbit has one mode here, 0");
   if (wanted.beams) s.beams = static_cast<int>(*wanted.beams);
   if (wanted.sample_bits.value_or(16) != 16) return refused("a Norbit sends pixels of 16 bits");
   if (wanted.row_gains.value_or(false)) return refused("a Norbit sends no row gains");
-  if (const std::string why = complaint(s); !why.empty()) return refused("Norbit: " + why);
+  if (const std::string rule = complaint(s); !rule.empty()) return refused("Norbit: " + rule);
   return change_to(s, device);
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "core/base/geometry.hpp"
 #include "protocol/limits.hpp"
@@ -19,11 +18,6 @@ constexpr int most_gain = 7;
 constexpr double longest_m = 150;
 constexpr std::uint32_t least_length_mm = 100;
 constexpr double processing_s = 0.0018;  // time from the last echo to the next ping (recording of a 450 FS)
-
-constexpr double fastest_mps = 2000;  // highest sound speed that a host can set
-
-/// Returns the shortest time from one ping to the next.
-double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
 
 SonarModel make_model() {
   FrequencyMode mode;
@@ -42,7 +36,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "omniscan-450";
   model.name = "Omniscan 450";
-  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(1e-3 * least_length_mm, fastest_mps));
+  model.max_rate_hz = static_cast<float>(1 / (travel_s(1e-3 * least_length_mm, fastest_mps) + processing_s));
   model.modes = {mode};
   return model;
 }
@@ -102,7 +96,7 @@ PingSettings ping_settings(const Settings& settings) {
   s.range_bin_count = p.results;
   s.range_bin_m = length_m / p.results;
   s.pulse_width_m = static_cast<float>(std::max(static_cast<double>(p.pulse_part) * s.range_m, s.range_bin_m / 2));
-  const double shortest_s = shortest_period_s(s.range_m, static_cast<double>(settings.speed_mps));
+  const double shortest_s = travel_s(s.range_m, static_cast<double>(settings.speed_mps)) + processing_s;
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(db_per_gain * std::max<int>(p.gain, 0));
   s.tvg = false;  // powers are sent without a time-varied gain
@@ -113,35 +107,25 @@ PingSettings ping_settings(const Settings& settings) {
 
 protocol::ChangeSettings change_to(const Settings& settings) {
   const PingSettings s = ping_settings(settings);
-  char text[160];
-  std::snprintf(text, sizeof text, "%s, %.2f to %.2f m, %d results, %.4g Hz, sound speed %g m/s",
-                s.rate_hz > 0 ? "pings" : "standby", s.range_start_m, s.range_m, s.range_bin_count,
-                static_cast<double>(s.rate_hz), static_cast<double>(s.device_sound_speed_mps));
-  return {s, std::make_shared<HeldSettings>(settings), text};
+  return {s, std::make_shared<HeldSettings>(settings), text_of(s, "results")};
 }
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   Settings s = settings_from(device.settings.get());
   OsPingParams& p = s.parameters;
-  if (wanted.range_m) {
-    const double low_m = 1e-3 * (p.start_mm + least_length_mm);
-    const std::string why = protocol::range_complaint(*wanted.range_m, "an Omniscan", low_m, longest_m, "start_mm + length_mm");
-    if (!why.empty()) return refused(why);
-    p.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - p.start_mm;
-  }
-  if (const std::string why = protocol::rate_complaint(wanted, "an Omniscan", device.model->max_rate_hz, "msec_per_ping");
-      !why.empty())
-    return refused(why);
+  const double low_m = 1e-3 * (p.start_mm + least_length_mm);
+  const std::string why =
+      protocol::first_of({protocol::range_complaint(wanted, "an Omniscan", low_m, longest_m, "start_mm + length_mm"),
+                          protocol::rate_complaint(wanted, "an Omniscan", device.model->max_rate_hz, "msec_per_ping"),
+                          protocol::gain_complaint(wanted), one_beam_complaint(wanted, "an Omniscan", 16)});
+  if (!why.empty()) return refused(why);
+  if (wanted.range_m) p.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - p.start_mm;
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.period_ms = static_cast<std::uint32_t>(std::lround(period_ms(*wanted.rate_hz)));
   }
-  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
-  if (wanted.gain_percent) {
-    p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
-  }
-  if (const std::string why = one_beam_complaint(wanted, "an Omniscan", 16); !why.empty()) return refused(why);
-  if (const std::string why = complaint(p); !why.empty()) return refused("Omniscan: " + why);
+  if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
+  if (const std::string rule = complaint(p); !rule.empty()) return refused("Omniscan: " + rule);
   return change_to(s);
 }
 

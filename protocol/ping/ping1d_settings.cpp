@@ -99,28 +99,25 @@ protocol::ChangeSettings change_to(const Settings& settings) {
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   Settings s = settings_from(device.settings.get());
   Parameters& p = s.parameters;
+  const double low_m = 1e-3 * (p.range.start_mm + shortest_range_mm);
+  const std::string why =
+      protocol::first_of({protocol::range_complaint(wanted, "a Ping1D", low_m, 1e-3 * most_mm, "scan_start + scan_length"),
+                          protocol::rate_complaint(wanted, "a Ping1D", device.model->max_rate_hz, "ping_interval"),
+                          protocol::gain_complaint(wanted), one_beam_complaint(wanted, "a Ping1D", 8)});
+  if (!why.empty()) return refused(why);
   if (wanted.range_m) {
-    const double low_m = 1e-3 * (p.range.start_mm + shortest_range_mm);
-    const std::string why =
-        protocol::range_complaint(*wanted.range_m, "a Ping1D", low_m, 1e-3 * most_mm, "scan_start + scan_length");
-    if (!why.empty()) return refused(why);
     p.range.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - p.range.start_mm;
     p.mode_auto = 0;
   }
-  if (const std::string why = protocol::rate_complaint(wanted, "a Ping1D", device.model->max_rate_hz, "ping_interval");
-      !why.empty())
-    return refused(why);
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.interval_ms = static_cast<std::uint16_t>(std::lround(period_ms(*wanted.rate_hz)));
   }
-  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
   if (wanted.gain_percent) {
     p.gain = static_cast<std::uint8_t>(std::lround(*wanted.gain_percent / 100 * most_gain));
     p.mode_auto = 0;
   }
-  if (const std::string why = one_beam_complaint(wanted, "a Ping1D", 8); !why.empty()) return refused(why);
-  if (const std::string why = complaint(p); !why.empty()) return refused("Ping1D: " + why);
+  if (const std::string rule = complaint(p); !rule.empty()) return refused("Ping1D: " + rule);
   return change_to(s);
 }
 

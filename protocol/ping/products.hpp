@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 
+#include "core/text/format.hpp"
 #include "protocol/host.hpp"
 
 namespace sonar::ping {
@@ -49,9 +51,20 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
 recording::Codec codec();
 }  // namespace s500
 
-// Conversion of a ping rate to a period, for devices and hosts of the family.
+// Rates and settings of the devices and hosts of the family.
 
 /// Returns the period for a rate above 0 [ms], limited to 1 to 30000.
 inline double period_ms(double rate_hz) { return std::clamp(1000 / rate_hz, 1.0, 30000.0); }
+
+inline constexpr double fastest_mps = 2000;  // highest sound speed that a host can set
+/// Returns the time from a ping to its echo.
+inline double travel_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps; }
+
+/// Returns a text for the log, such as "pings, 0.00 to 5.00 m, 600 results, 15 Hz, sound speed 1500 m/s". `rows`: "results".
+inline std::string text_of(const PingSettings& s, const char* rows) {
+  return text::format("%s, %.2f to %.2f m, %d %s, %.4g Hz, sound speed %g m/s", s.rate_hz > 0 ? "pings" : "standby",
+                      s.range_start_m, s.range_m, s.range_bin_count, rows, static_cast<double>(s.rate_hz),
+                      static_cast<double>(s.device_sound_speed_mps));
+}
 
 }  // namespace sonar::ping

@@ -149,20 +149,16 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Settings s = settings_from(device.settings.get());
   Parameters& p = s.parameters;
   SetPingParams asked = p.ping;
-  if (wanted.range_m) {
-    const double low_m = 1e-3 * (asked.start_mm + shortest_range_mm);
-    const std::string why = protocol::range_complaint(*wanted.range_m, "an S500", low_m, 1e-3 * most_mm, "start_mm + length_mm");
-    if (!why.empty()) return refused(why);
-    asked.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - asked.start_mm;
-  }
-  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
+  const double low_m = 1e-3 * (asked.start_mm + shortest_range_mm);
+  const std::string why = protocol::first_of(
+      {protocol::range_complaint(wanted, "an S500", low_m, 1e-3 * most_mm, "start_mm + length_mm"),
+       protocol::gain_complaint(wanted), protocol::rate_complaint(wanted, "an S500", device.model->max_rate_hz, "msec_per_ping"),
+       one_beam_complaint(wanted, "an S500", 16)});
+  if (!why.empty()) return refused(why);
+  if (wanted.range_m) asked.length_mm = static_cast<std::uint32_t>(std::lround(1000 * *wanted.range_m)) - asked.start_mm;
   if (wanted.gain_percent) asked.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent / 100 * most_gain()));
-  if (const std::string why = protocol::rate_complaint(wanted, "an S500", device.model->max_rate_hz, "msec_per_ping");
-      !why.empty())
-    return refused(why);
   if (wanted.rate_hz && *wanted.rate_hz > 0) asked.period_ms = static_cast<std::int16_t>(std::lround(period_ms(*wanted.rate_hz)));
-  if (const std::string why = one_beam_complaint(wanted, "an S500", 16); !why.empty()) return refused(why);
-  if (const std::string why = complaint(asked); !why.empty()) return refused("S500: " + why);
+  if (const std::string rule = complaint(asked); !rule.empty()) return refused("S500: " + rule);
   const std::uint8_t enabled = p.enable;
   p = requested(p, asked);
   p.enable = wanted.rate_hz ? *wanted.rate_hz > 0 : enabled;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "core/base/geometry.hpp"
 #include "core/sonar/detections.hpp"
@@ -24,10 +23,6 @@ constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with
 constexpr double longest_m = 200, least_m = 0.01;  // highest end of the range; least length of the range
 constexpr double db_per_gain = 0.4;                // unknown: assumed
 constexpr double processing_s = 0.01;
-constexpr double fastest_mps = 2000;  // highest sound speed that a host can set
-
-/// Returns the shortest time from one ping to the next.
-double shortest_period_s(double range_m, double speed_mps) { return 2 * range_m / speed_mps + processing_s; }
 
 SonarModel make_model() {
   FrequencyMode mode;
@@ -46,7 +41,7 @@ SonarModel make_model() {
   SonarModel model;
   model.profile = "surveyor-240";
   model.name = "Surveyor 240-16";
-  model.max_rate_hz = static_cast<float>(1 / shortest_period_s(least_m, fastest_mps));
+  model.max_rate_hz = static_cast<float>(1 / (travel_s(least_m, fastest_mps) + processing_s));
   model.modes = {mode};
   return model;
 }
@@ -107,7 +102,7 @@ PingSettings ping_settings(const Settings& settings) {
   s.range_bin_count = p.steps;
   s.range_bin_m = (s.range_m - s.range_start_m) / p.steps;
   s.pulse_width_m = static_cast<float>(std::max(static_cast<double>(p.pulse_steps), 0.5) * s.range_bin_m);
-  const double shortest_s = shortest_period_s(s.range_m, speed);
+  const double shortest_s = travel_s(s.range_m, speed) + processing_s;
   s.rate_hz = p.enable == 0 ? 0 : static_cast<float>(1 / std::max(1e-3 * p.period_ms, shortest_s));
   s.gain_db = static_cast<float>(p.gain < 0 ? 0 : db_per_gain * p.gain);
   s.tvg = false;  // the detector compares with the median of a beam, so the noise must be the same at all ranges
@@ -118,37 +113,27 @@ PingSettings ping_settings(const Settings& settings) {
 
 protocol::ChangeSettings change_to(const Settings& settings) {
   const PingSettings s = ping_settings(settings);
-  char text[160];
-  std::snprintf(text, sizeof text, "%s, %.2f to %.2f m, %d steps, %.4g Hz, sound speed %g m/s",
-                s.rate_hz > 0 ? "pings" : "standby", s.range_start_m, s.range_m, s.range_bin_count,
-                static_cast<double>(s.rate_hz), static_cast<double>(s.device_sound_speed_mps));
-  return {s, std::make_shared<HeldSettings>(settings), text};
+  return {s, std::make_shared<HeldSettings>(settings), text_of(s, "steps")};
 }
 
 Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {
   Settings s = settings_from(device.settings.get());
   PingParameters& p = s.parameters;
-  if (wanted.range_m) {
-    const double low_m = 1e-3 * p.start_mm + least_m;
-    const std::string why = protocol::range_complaint(*wanted.range_m, "a Surveyor", low_m, longest_m, "end_mm");
-    if (!why.empty()) return refused(why);
-    p.end_mm = static_cast<std::int32_t>(std::lround(1000 * *wanted.range_m));
-  }
-  if (const std::string why = protocol::rate_complaint(wanted, "a Surveyor", device.model->max_rate_hz, "msec_per_ping");
-      !why.empty())
-    return refused(why);
+  const std::string why =
+      protocol::first_of({protocol::range_complaint(wanted, "a Surveyor", 1e-3 * p.start_mm + least_m, longest_m, "end_mm"),
+                          protocol::rate_complaint(wanted, "a Surveyor", device.model->max_rate_hz, "msec_per_ping"),
+                          protocol::gain_complaint(wanted)});
+  if (!why.empty()) return refused(why);
+  if (wanted.range_m) p.end_mm = static_cast<std::int32_t>(std::lround(1000 * *wanted.range_m));
   if (wanted.rate_hz) {
     p.enable = *wanted.rate_hz > 0 ? 1 : 0;
     if (p.enable != 0) p.period_ms = static_cast<std::int16_t>(std::lround(period_ms(*wanted.rate_hz)));
   }
-  if (const std::string why = protocol::gain_complaint(wanted); !why.empty()) return refused(why);
-  if (wanted.gain_percent) {
-    p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent));
-  }
+  if (wanted.gain_percent) p.gain = static_cast<std::int16_t>(std::lround(*wanted.gain_percent));
   if (wanted.mode && *wanted.mode != 0) return refused("a Surveyor has one mode, 0");
   if (wanted.beams && *wanted.beams != beams) return refused("the number of beams of a Surveyor is fixed");
   if (wanted.sample_bits || (wanted.row_gains && *wanted.row_gains)) return refused("a Surveyor sends points, no samples");
-  if (const std::string why = complaint(p); !why.empty()) return refused("Surveyor: " + why);
+  if (const std::string rule = complaint(p); !rule.empty()) return refused("Surveyor: " + rule);
   return change_to(s);
 }
 
