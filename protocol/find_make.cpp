@@ -4,11 +4,6 @@
 #include "protocol/vendor.hpp"
 
 namespace sonar::protocol {
-namespace {
-
-std::string in_quotes(std::string_view text) { return std::string("'").append(text).append("'"); }
-
-}  // namespace
 
 const Make* find_make(std::string_view name) {
   for (const Make& make : makes())
@@ -68,7 +63,8 @@ Result<Profile> find_profile(std::string_view profile) {
       names.push_back(model->profile);
     }
   }
-  return failure(ErrorKind::config, "unknown profile " + in_quotes(profile) + text::suggestion(profile, names, "profiles"));
+  return failure(ErrorKind::config,
+                 "unknown profile '" + std::string(profile) + "'" + text::suggestion(profile, names, "profiles"));
 }
 
 }  // namespace sonar::protocol
