@@ -121,22 +121,28 @@ void BeamTransformTables::transform_weights(const std::vector<double>& of_distan
   for (int i = 0; i < size; ++i) cosine.push_back(std::cos(2 * pi * i / size));
   // W is even: its transform is W_0 + 2 sum_d W_d cos(2 pi d f / size).
   for (std::size_t d = 0; d < of_distance.size(); ++d) weight.push_back(of_distance[d] * (d == 0 ? 1 : 2));
-  for (int k = 0; k < 4; ++k)
-    for (int place = 0; place < tables_.quarter; ++place) {
-      // The passes leave the frequencies in mixed-radix digit-reversed order. The response is stored in the same order.
-      int frequency = 0, step = 1, rest = place;
-      for (int l = 0; l < tables_.levels; ++l) {
-        const int part = tables_.level[l].size / tables_.level[l].radix;
-        frequency += step * (rest / part);
-        rest %= part;
-        step *= tables_.level[l].radix;
-      }
-      frequency = 4 * frequency + k;
-      double sum = 0;
-      for (std::size_t d = 0; d < weight.size(); ++d)
-        sum += weight[d] * cosine[d * static_cast<std::size_t>(frequency) % static_cast<std::size_t>(size)];
-      response_.push_back(static_cast<float>(sum / size));
+  response_.resize(static_cast<std::size_t>(size));
+  for (int place = 0; place < tables_.quarter; ++place) {
+    // The passes leave the frequencies in mixed-radix digit-reversed order. The response is stored in the same order.
+    int frequency = 0, step = 1, rest = place;
+    for (int l = 0; l < tables_.levels; ++l) {
+      const int part = tables_.level[l].size / tables_.level[l].radix;
+      frequency += step * (rest / part);
+      rest %= part;
+      step *= tables_.level[l].radix;
     }
+    // Four frequencies at once, because each sum waits for its last addition.
+    double sum[4] = {};
+    int turn[4] = {};  // d * frequency, modulo size
+    for (const double w : weight)
+      for (int k = 0; k < 4; ++k) {
+        sum[k] += w * cosine[static_cast<std::size_t>(turn[k])];
+        turn[k] += 4 * frequency + k;
+        turn[k] -= turn[k] < size ? 0 : size;
+      }
+    for (int k = 0; k < 4; ++k)
+      response_[static_cast<std::size_t>(k * tables_.quarter + place)] = static_cast<float>(sum[k] / size);
+  }
 }
 
 void BeamTransformTables::compute_interpolation(double aperture_in_spacings, const Columns& columns,
