@@ -28,15 +28,18 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
   std::vector<BaseElevation> base;
   for (const float angle : p.fan.elevation_rad) base.push_back({angle, std::cos(angle), std::sin(angle)});
   // Eq. 9: bands of weights, four beams for each panel. The device does not use the beam transform.
+  const BeamWeights weights = p.beam_weights.transform ? make_beam_weights(p.mode, p.columns, p.beam_sine, p.expected_power,
+                                                                           {.dropped_energy = 0, .transform = false})
+                                                       : p.beam_weights;
   std::vector<BeamWeightRow> rows;
-  for (const BeamPanel& panel : p.beam_weights.panels)
+  for (const BeamPanel& panel : weights.panels)
     rows.push_back({panel.first_column, panel.count, static_cast<std::uint32_t>(panel.weights), 0});
 
   view_.column_sines = memory_.put(sines);
   view_.base_elevations = memory_.put(base);
   view_.pulse_rows = memory_.put(p.pulse_rows);
   view_.transmit = memory_.put(p.columns.transmit);
-  view_.weights = memory_.put(p.beam_weights.weights);
+  view_.weights = memory_.put(weights.weights);
   view_.panels = memory_.put(rows);
   view_.beam_sines = memory_.put(p.beam_sine);
   view_.column_u = memory_.put(u);

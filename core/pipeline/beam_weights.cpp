@@ -61,6 +61,7 @@ BeamWeights make_beam_weights(const FrequencyMode& mode, const Columns& columns,
       c.transform = std::move(tables);
       c.half_band = columns.count - 1;
       c.weight_energy = band.total;
+      return c;
     }
   }
 

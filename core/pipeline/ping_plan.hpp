@@ -56,7 +56,7 @@ struct BeamWeights {
   int half_band = 0;  // number of columns on either side that a beam sums
   std::vector<BeamPanel> panels;
   std::vector<float> weights;
-  std::shared_ptr<const BeamTransformTables> transform;  // if set, used instead of panels: it sums all columns faster
+  std::shared_ptr<const BeamTransformTables> transform;  // if set, there are no panels: it sums all columns faster
   double weight_energy = 1;                              // sum_k W_jk^2 of a beam of the pattern's width
 };
 
