@@ -156,6 +156,56 @@ SONAR_CLONES bool own_block(const FacetTest& test, const Points& in, int which, 
   return true;
 }
 
+SONAR_CLONES bool find_splines(const double* const (&place_m)[3], double per_m, Splines& to) {
+  std::int32_t differ = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double* place = place_m[axis];
+    auto& weight = to.weight[axis];
+    std::int32_t* first = to.first[axis];
+    for (int l = 0; l < block; ++l) {
+      const double x = place[l] * per_m;
+      const auto whole = static_cast<std::int32_t>(x + 0.5);
+      // floor(x + 0.5), without a call
+      const double nearest = static_cast<double>(whole) - (static_cast<double>(whole) > x + 0.5 ? 1.0 : 0.0);
+      const double t = x - nearest;
+      const double w0 = 0.5 * (0.5 - t) * (0.5 - t), w1 = 0.75 - t * t, w2 = 0.5 * (0.5 + t) * (0.5 + t);
+      const double scale = 1 / std::sqrt(w0 * w0 + w1 * w1 + w2 * w2);
+      first[l] = static_cast<std::int32_t>(nearest) - 1;
+      weight[0][l] = static_cast<float>(w0 * scale);
+      weight[1][l] = static_cast<float>(w1 * scale);
+      weight[2][l] = static_cast<float>(w2 * scale);
+    }
+    for (int l = 0; l < block; ++l) differ |= first[l] ^ first[0];
+  }
+  return differ == 0;
+}
+
+SONAR_CLONES void multiply_by_field(const Splines& splines, const float (&normals)[27][block], const NormalTable& table,
+                                    double* root) {
+  const NormalTable t = table;
+  const auto& [wx, wy, wz] = splines.weight;
+  alignas(64) float steps[block];
+  for (int l = 0; l < block; ++l) {
+    float plane[3];
+    for (int k = 0; k < 3; ++k) {
+      float row[3];
+      for (int j = 0; j < 3; ++j) {
+        const int p = 9 * k + 3 * j;
+        row[j] = wx[0][l] * normals[p][l] + wx[1][l] * normals[p + 1][l] + wx[2][l] * normals[p + 2][l];
+      }
+      plane[k] = wy[0][l] * row[0] + wy[1][l] * row[1] + wy[2][l] * row[2];
+    }
+    const float normal = wz[0][l] * plane[0] + wz[1][l] * plane[1] + wz[2][l] * plane[2];
+    const float at = (normal + t.widest) * t.per_normal, low = at < 0.0f ? 0.0f : at;
+    steps[l] = t.last < low ? t.last : low;
+  }
+  for (int l = 0; l < block; ++l) {
+    const auto i = static_cast<std::int32_t>(steps[l]);
+    const float value = t.values[i] + (steps[l] - static_cast<float>(i)) * (t.values[i + 1] - t.values[i]);
+    root[l] *= static_cast<double>(value);
+  }
+}
+
 SONAR_CLONES float speckle(const std::uint32_t* a, const std::uint32_t* b, const double* root, int n, float* re, float* im) {
   alignas(64) float most[block] = {};
   for (int at = 0; at < n; at += block)

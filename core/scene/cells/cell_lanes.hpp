@@ -46,6 +46,24 @@ struct BlockHeights {
 /// or a surface that folds back), the function stores the result in `found`, changes nothing else and returns false.
 bool own_block(const FacetTest& test, const Points& in, int which, std::int64_t facet, Owners& owners, BlockHeights& found);
 
+/// Quadratic B-splines of a field (TextureField) at the cells of a block: on each axis the first of three lattice points about
+/// the cell, and their weights, whose squares add to one.
+struct Splines {
+  alignas(64) std::int32_t first[3][block];
+  alignas(64) float weight[3][3][block];
+};
+/// per_m: lattice points per metre. Returns true if all cells have the same lattice points.
+bool find_splines(const double* const (&place_m)[3], double per_m, Splines& to);
+
+/// Values at equal steps of a standard normal from -widest to widest, and the last value again.
+struct NormalTable {
+  const float* values;
+  float widest, per_normal, last;  // per_normal: steps per unit; last: number of steps
+};
+/// Multiplies the roots of a block by the value at each cell's normal: the weighted sum of its 27 lattice points (x changes
+/// fastest).
+void multiply_by_field(const Splines& splines, const float (&normals)[27][block], const NormalTable& table, double* root);
+
 /// Circular complex Gaussians with E|z|^2 = 1 from pairs of draws (Box-Muller, as complex_normal), multiplied by `root`. The
 /// error is about 2e-7 of their magnitude. n must be a multiple of `block`. Returns the largest |re| or |im|.
 float speckle(const std::uint32_t* a, const std::uint32_t* b, const double* root, int n, float* re, float* im);

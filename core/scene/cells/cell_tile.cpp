@@ -161,9 +161,11 @@ void find_roots(const Ownership& all, const TileAddress& a, const TextureField* 
   for (int n = 0; n < cells.size; ++n) cells.root[n] = all.facets[cells.facet[n]].root_area;
   for (const TextureField* field : {texture, grain}) {
     if (!field) continue;
-    TexturePatch patch(*field, a.object);
-    for (int n = 0; n < cells.size; ++n)
-      cells.root[n] *= static_cast<double>(patch.root_at(lattice::from_permuted(cells.u[n], cells.v[n], cells.w[n], a.axis)));
+    std::array<const double*, 3> places{};
+    places[static_cast<std::size_t>(lattice::u_axis(a.axis))] = cells.u;
+    places[static_cast<std::size_t>(lattice::v_axis(a.axis))] = cells.v;
+    places[static_cast<std::size_t>(a.axis)] = cells.w;
+    TexturePatch(*field, a.object).multiply(places, cells.padded, cells.root);
   }
 }
 

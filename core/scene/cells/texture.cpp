@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace sonar {
 namespace {
@@ -10,7 +9,6 @@ namespace {
 constexpr int quantiles = 256;       // intervals of the table of quantiles
 constexpr double widest_normal = 5;  // the table covers normals from -5 to 5
 constexpr double weakest = 1e-4;     // -40 dB; a cell with a lower value could not be distinguished from an empty cell
-constexpr int remembered_along = 16, remembered_up = 8;  // size of the cache of lattice points
 
 struct IncompleteGamma {
   double lower, upper;
@@ -53,21 +51,6 @@ double gamma_at_normal(double nu, double log_gamma_nu, double normal) {
   return std::exp(0.5 * (low + high)) / nu;
 }
 
-/// Quadratic B-spline: the three lattice points about x and their weights, scaled so that their squares add to one.
-struct Blend {
-  std::int32_t first;
-  float weight[3];
-};
-Blend blend_at(double x) {
-  const auto whole = static_cast<std::int32_t>(x + 0.5);
-  const std::int32_t nearest = whole - (whole > x + 0.5);  // floor(x + 0.5), without a call
-  const double t = x - nearest;
-  // Quadratic B-spline weights at distance t from the nearest lattice point.
-  const double w[3] = {0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)};
-  const double scale = 1 / std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  return {nearest - 1, {static_cast<float>(w[0] * scale), static_cast<float>(w[1] * scale), static_cast<float>(w[2] * scale)}};
-}
-
 }  // namespace
 
 TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, Seed seed, Domain domain)
@@ -93,24 +76,20 @@ float TextureField::normal_at(int object, std::int32_t i, std::int32_t j, std::i
   return 1.41421356f * complex_normal(draw.v[0], draw.v[1]).re;
 }
 
-float TextureField::root_of(float normal) const {
-  constexpr float per_normal = static_cast<float>(quantiles / (2 * widest_normal));
-  // Interpolates linearly between the tabulated quantiles.
-  const float at = std::clamp((normal + static_cast<float>(widest_normal)) * per_normal, 0.0f, static_cast<float>(quantiles));
-  const auto i = static_cast<std::size_t>(at);
-  return roots_[i] + (at - static_cast<float>(i)) * (roots_[i + 1] - roots_[i]);
+cell_lanes::NormalTable TextureField::roots() const {
+  return {roots_.data(), static_cast<float>(widest_normal), static_cast<float>(quantiles / (2 * widest_normal)), quantiles};
 }
 
 TexturePatch::TexturePatch(const TextureField& field, int object)
-    : field_(field),
-      object_(object),
-      points_(remembered_along * remembered_along * remembered_up, Point{std::numeric_limits<std::int32_t>::min(), 0, 0, 0}) {}
+    : field_(field), object_(object), points_(std::make_unique_for_overwrite<Point[]>(remembered)) {}
 
 float TexturePatch::normal_at(std::int32_t i, std::int32_t j, std::int32_t k) {
-  const auto slot = [](std::int32_t x, int size) { return static_cast<std::size_t>(x & (size - 1)); };
-  Point& p = points_[(slot(k, remembered_up) * remembered_along + slot(j, remembered_along)) * remembered_along +
-                     slot(i, remembered_along)];
-  if (p.i != i || p.j != j || p.k != k) p = {i, j, k, field_.normal_at(object_, i, j, k)};
+  const auto slot = [](std::int32_t x, std::size_t size) { return static_cast<std::size_t>(x) & (size - 1); };
+  const std::size_t at =
+      (slot(k, remembered_up) * remembered_along + slot(j, remembered_along)) * remembered_along + slot(i, remembered_along);
+  Point& p = points_[at];
+  if (!is_known_[at] || p.i != i || p.j != j || p.k != k) p = {i, j, k, field_.normal_at(object_, i, j, k)};
+  is_known_[at] = true;
   return p.normal;
 }
 
@@ -125,19 +104,31 @@ void TexturePatch::load_points(std::int32_t i, std::int32_t j, std::int32_t k) {
       for (int along = 0; along < 3; ++along) *to++ = normal_at(i + along, j + across, k + up);
 }
 
-float TexturePatch::root_at(Vec3d place_m) {
-  // Weighted sum of 27 lattice normals. The squares of the weights add to 1, so the result is again a standard normal.
+// Weighted sum of 27 lattice normals. The squares of the weights add to 1, so the result is again a standard normal.
+void TexturePatch::multiply(std::array<const double*, 3> place_m, int n, double* root) {
+  constexpr int block = cell_lanes::block;
   const double per_m = 1 / field_.lattice_m();
-  const Blend x = blend_at(place_m.x * per_m), y = blend_at(place_m.y * per_m), z = blend_at(place_m.z * per_m);
-  load_points(x.first, y.first, z.first);
-  const auto blend = [](const float* w, float a, float b, float c) { return w[0] * a + w[1] * b + w[2] * c; };
-  float plane[3];
-  for (int k = 0; k < 3; ++k) {
-    const float* n = near_.data() + 9 * k;
-    plane[k] =
-        blend(y.weight, blend(x.weight, n[0], n[1], n[2]), blend(x.weight, n[3], n[4], n[5]), blend(x.weight, n[6], n[7], n[8]));
+  const cell_lanes::NormalTable roots = field_.roots();
+  cell_lanes::Splines splines;
+  alignas(64) float normals[27][block];
+  for (int at = 0; at < n; at += block) {
+    const double* const here[3] = {place_m[0] + at, place_m[1] + at, place_m[2] + at};
+    const int different = cell_lanes::find_splines(here, per_m, splines) ? 1 : block;
+    const auto& [i, j, k] = splines.first;
+    for (int l = 0; l < different; ++l) {
+      load_points(i[l], j[l], k[l]);
+      for (int p = 0; p < 27; ++p) normals[p][l] = near_[static_cast<std::size_t>(p)];
+    }
+    for (int p = 0; different == 1 && p < 27; ++p) std::fill_n(normals[p], block, normals[p][0]);
+    cell_lanes::multiply_by_field(splines, normals, roots, root + at);
   }
-  return field_.root_of(blend(z.weight, plane[0], plane[1], plane[2]));
+}
+
+float TexturePatch::root_at(Vec3d place_m) {
+  std::array<double, cell_lanes::block> x, y, z, root;
+  x.fill(place_m.x), y.fill(place_m.y), z.fill(place_m.z), root.fill(1);
+  multiply({x.data(), y.data(), z.data()}, cell_lanes::block, root.data());
+  return static_cast<float>(root.front());
 }
 
 }  // namespace sonar

@@ -3,12 +3,15 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/base/geometry.hpp"
 #include "core/base/random.hpp"
 #include "core/base/units.hpp"
+#include "core/scene/cells/cell_lanes.hpp"
 #include "core/scene/scene.hpp"
 
 namespace sonar {
@@ -24,8 +27,8 @@ class TextureField {
   double lattice_m() const { return lattice_m_; }
   /// The standard normal draw of a lattice point. It depends only on (seed, texture seed, object, point).
   float normal_at(int object, std::int32_t i, std::int32_t j, std::int32_t k) const;
-  /// The root of the Gamma variable (mean 1) at the quantile of a standard normal.
-  float root_of(float normal) const;
+  /// The root of the Gamma variable (mean 1) at the quantiles of a standard normal.
+  cell_lanes::NormalTable roots() const;
 
  private:
   double lattice_m_;
@@ -33,12 +36,15 @@ class TextureField {
   std::vector<float> roots_;
 };
 
-/// Evaluates a field near one point of one object. It caches the lattice points that neighbouring cells share. Therefore only
-/// one thread may use it.
+/// Evaluates a field at the cells of one object. It caches the lattice points that neighbouring cells share. Therefore only one
+/// thread may use it.
 class TexturePatch {
  public:
   TexturePatch(const TextureField& field, int object);
-  /// The root of the field at a point in object coordinates. It is a factor of amplitudes.
+  /// Multiplies roots by the root of the field, which is a factor of amplitudes. place_m: x, y, z in object coordinates. n must
+  /// be a multiple of cell_lanes::block.
+  void multiply(std::array<const double*, 3> place_m, int n, double* root);
+  /// The root of the field at one point.
   float root_at(Vec3d place_m);
 
  private:
@@ -46,6 +52,8 @@ class TexturePatch {
     std::int32_t i, j, k;
     float normal;
   };
+  static constexpr std::size_t remembered_along = 16, remembered_up = 8,  // size of the cache of lattice points
+      remembered = remembered_along * remembered_along * remembered_up;
   float normal_at(std::int32_t i, std::int32_t j, std::int32_t k);
   void load_points(std::int32_t i, std::int32_t j, std::int32_t k);
 
@@ -54,7 +62,8 @@ class TexturePatch {
   bool stands_ = false;
   std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points around the last position
   std::array<float, 27> near_{};                       // their normals; i changes fastest
-  std::vector<Point> points_;
+  std::unique_ptr<Point[]> points_;                    // valid where is_known_
+  std::bitset<remembered> is_known_;
 };
 
 }  // namespace sonar
