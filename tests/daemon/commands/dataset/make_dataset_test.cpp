@@ -272,6 +272,8 @@ TEST_F(MakeDataset, ErrorsInAJobHaveAReason) {
   EXPECT_THAT(complaint(with("$y, -11.7", "$z, -11.7")), HasSubstr("unknown name z"));
   EXPECT_THAT(complaint(with("counts: {stone", "counts: {stoun")), HasSubstr("no object of that name or label"));
   EXPECT_THAT(complaint(with("gain_db: $gain", "gain_db: $gain, bits: 32")), HasSubstr("do not fit a PNG"));
+  EXPECT_THAT(complaint(with("beams: 32, rows: 64, gain_db: $gain}", "gain_db: $gain}, profile: waterlinked-3d15")),
+              HasSubstr("range images have no labels"));
   EXPECT_THAT(complaint(with(", bed: bed", "")), HasSubstr("needs bed"));
 }
 

@@ -172,18 +172,6 @@ TEST(RenderFile, WithAProfileBinsAndPulseScaleWithTheRange) {
   EXPECT_NEAR(static_cast<double>(half.settings.pulse_width_m), static_cast<double>(whole.settings.pulse_width_m) / 2, 1e-6);
 }
 
-TEST(RenderFile, ThePulseOfARangeImageIsThatOfTheMode) {
-  const auto settings = [](const std::string& ping) {
-    return parsed(point + "sonar: {profile: waterlinked-3d15, ping: {" + ping + "}}\n").jobs.at(0).settings;
-  };
-  for (const char* ping : {"range_m: 15", "range_m: 8", "range_m: 8, range_start_m: 3", "mode: low-frequency, range_m: 2"}) {
-    EXPECT_FLOAT_EQ(settings(ping).pulse_width_m, 0.02f) << ping;
-    EXPECT_EQ(settings(ping).range_bin_count, 64) << ping;
-  }
-  EXPECT_FLOAT_EQ(settings("mode: high-frequency, range_m: 8").pulse_width_m, 0.01f);
-  EXPECT_FLOAT_EQ(settings("range_m: 8, pulse_width_m: 0.03").pulse_width_m, 0.03f);
-}
-
 TEST(RenderFile, ASweepReadsTheFileOnceForEachStep) {
   const RenderInput input = parsed(R"(
 scene: {objects: [{type: point, target_strength_db: 0, pose: {xyz_m: [$r, 0, $(-2*r)]}}]}
