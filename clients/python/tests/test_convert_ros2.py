@@ -58,19 +58,21 @@ class RecordingsOfRos2(WithFolder):
     def test_a_folder_of_several_files_is_read(self):
         for kind in ("db3", "mcap"):
             with self.subTest(kind):
-                folder = self.folder_of(f"r_10.{kind}", f"r_9.{kind}")  # in this order, independent of their names
-                parts = [(f"r_10.{kind}", range(3)), (f"r_9.{kind}", range(3, 6))]
+                folder = self.folder_of(f"r_10.{kind}", f"r_9.{kind}")
+                parts = [(f"r_9.{kind}", range(3)), (f"r_10.{kind}", range(3, 6))]  # their times count, not their names
                 for name, steps in parts:
                     messages = [(100 + i, made.odometry(i)) for i in steps]
                     if kind == "db3":
                         made.db3(folder / name, [("/odom", "nav_msgs/msg/Odometry", messages)])
                     else:
                         (folder / name).write_bytes(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", messages)]))
-                for named in (folder, folder / "metadata.yaml"):
+                for named in (folder / "metadata.yaml", folder):
                     self.assertEqual(format_of(named), kind)
                     track = convert(named, warn=self.warned.append)
                     self.assertEqual(self.warned, [])
                     self.assert_track(track, range(6), t0=100, metres=1e-9, radians=1e-6)
+                (folder / "metadata.yaml").unlink()  # it is missing if the recorder was killed
+                self.assert_track(convert(folder), range(6), t0=100, metres=1e-9, radians=1e-6)
                 shutil.rmtree(folder)
 
     def test_folders_without_files_are_refused(self):

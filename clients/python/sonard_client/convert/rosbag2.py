@@ -149,7 +149,7 @@ def _warn_of_missing(folder: pathlib.Path, there: List[pathlib.Path], listed: Li
 
 
 def files_of(folder: pathlib.Path, warn: Warn = lambda text: None) -> List[pathlib.Path]:
-    """Returns the files of a recording's folder in the order of time: as the metadata lists them, else by name."""
+    """Returns the files of a recording's folder. Warns of files that its metadata lists and that are missing."""
     there = sorted(p for p in folder.iterdir() if p.suffix in (".db3", ".mcap") and p.is_file())
     try:
         with (folder / METADATA).open("rb") as file:
@@ -157,14 +157,13 @@ def files_of(folder: pathlib.Path, warn: Warn = lambda text: None) -> List[pathl
     except FileNotFoundError:
         text = ""
     listed = [name.rpartition("/")[2] for name in _PART.findall(text)]  # older versions write the folder, too
-    rank = {name: number for number, name in reversed(list(enumerate(listed)))}
     if not there:
         packed = sorted(p.name for p in folder.glob("*.zstd"))
         if packed:
             raise ConvertError(f"{folder}: {packed[0]} is compressed; unpack it first: zstd -d {folder / packed[0]}")
         raise ConvertError(f"{folder}: a folder without .db3 and .mcap files; give a log, or the folder of a recording")
     _warn_of_missing(folder, there, listed, warn)
-    return sorted(there, key=lambda p: (rank.get(p.name, len(rank)), p.name))
+    return there
 
 
 def recording_at(path: pathlib.Path) -> pathlib.Path:
@@ -174,10 +173,12 @@ def recording_at(path: pathlib.Path) -> pathlib.Path:
 
 def read_rosbag2(path: pathlib.Path, warn: Warn, topic: Optional[str] = None, frame: Optional[str] = None) -> Track:
     """Reads the poses of one topic of a file or a folder, ENU_FLU."""
-    messages = Kept()
+    parts: List[List[Recorded]] = []
     seen: Dict[str, str] = {}
     for file in files_of(path, warn) if path.is_dir() else [path]:
         with file.open("rb") as opened:
             is_mcap = opened.read(len(MCAP_MAGIC)) == MCAP_MAGIC
-        messages.extend(mcap_messages(file, warn, seen) if is_mcap else db3_messages(file, warn, seen))
+        parts.append(mcap_messages(file, warn, seen) if is_mcap else db3_messages(file, warn, seen))
+    parts.sort(key=lambda part: part[0].logged_s if part else 0.0)  # names do not sort by time: run_10.db3 precedes run_2.db3
+    messages = Kept(message for part in parts for message in part)
     return track_from(messages, str(path), warn, topic, seen, frame)
