@@ -48,6 +48,17 @@ class RecordingsOfRos2(WithFolder):
         self.assertEqual(len(self.convert(made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry", messages)])).rows), 5)
         self.assertRegex(self.warned[0], r"omitted .*: 20; the clock went back by 99\.4 s at pose 6: split the recording there$")
 
+    def test_a_simulated_clock_begins_at_0(self):
+        """The stamp 0 is a time only beside other small stamps."""
+        def recorded(t0s):
+            return made.mcap([("/odom", "cdr", "nav_msgs/msg/Odometry",
+                               [(1e9 + i, made.odometry(i, t0=t0)) for i, t0 in enumerate(t0s)])])
+        self.assert_track(self.convert(recorded([0] * 5)), range(5), metres=1e-9, radians=1e-6)
+        self.assertEqual(self.warned, [])
+        unset = -made.moment(1)[0]  # the second message has no stamp
+        self.assertEqual(len(self.convert(recorded([1e9, unset, 1e9, 1e9])).rows), 3)
+        self.assertEqual(self.warned, ["poses omitted because they have no time stamp, which others have: 1"])
+
     def folder_of(self, *names):
         folder = self.folder / "recording"
         folder.mkdir()

@@ -10,6 +10,7 @@ from .track import ConvertError, Row, Stream, Track, Warn, rising
 
 
 CLOCK_RESET_S = 1.0
+LONGEST_SIMULATION_S = 1e8  # 3 years; stamps of the UNIX clock are greater
 MOST_MESSAGE_BYTES = 16 << 20
 
 
@@ -48,7 +49,7 @@ class Kept(List[Recorded]):
 class _Topic:
     def __init__(self, rank: int, frame: str) -> None:
         self.rank, self.frame = rank, frame
-        self.rows: Stream[Found] = []
+        self.rows: Stream[Found] = []  # with the times of the recording
 
 
 def _others(seen: Mapping[str, str]) -> str:
@@ -72,6 +73,19 @@ def _choice(topics: Dict[str, _Topic], wanted: Optional[str], name: str, seen: M
     if len(candidates) > 1:
         raise ConvertError(f"{name}: several topics have poses: {listed}; select one with --topic")
     return candidates[0]
+
+
+def _timed(logged: Stream[Found], warn: Warn) -> Stream[Found]:
+    """Returns poses at their stamps. Without any stamp the times of the recording count. If only some poses have the stamp 0, it
+    is the start of a simulated clock, or the pose has no time."""
+    stamps = [pose.t_s for _, pose in logged if pose.t_s is not None]
+    if not stamps:
+        return logged
+    is_simulated = min(stamps) < LONGEST_SIMULATION_S
+    timed = [(pose.t_s or 0.0, pose) for _, pose in logged if is_simulated or pose.t_s is not None]
+    if len(timed) < len(logged):
+        warn(f"poses omitted because they have no time stamp, which others have: {len(logged) - len(timed)}")
+    return timed
 
 
 def _clock_reset(rows: Stream[Found]) -> str:
@@ -107,18 +121,18 @@ def track_from(messages: Iterable[Recorded], name: str, warn: Warn, topic: Optio
             continue
         for pose in found:
             there = topics.setdefault(pose.topic, _Topic(pose.rank, pose.frame))
-            there.rows.append((message.logged_s if pose.t_s is None else pose.t_s, pose))
+            there.rows.append((message.logged_s, pose))
     if faults:
         warn(f"{faults[0]}" + f"; messages omitted: {len(faults)}")
     chosen = _choice(topics, topic, name, seen)
     selected = topics[chosen]
-    rows = rising(selected.rows)
+    timed = _timed(selected.rows, warn)
+    rows = rising(timed)
     frame_id = selected.rows[0][1].frame_id
     if frame is None and frame_id and selected.frame == "NED_FRD":
         warn(f"its poses are in the frame {frame_id!r}, so the axes are NED_FRD; --frame ENU_FLU if they are not")
-    if selected.rank == KINDS.index("Path") and len(rows) == 1 and len(selected.rows) > 1:
+    if selected.rank == KINDS.index("Path") and len(rows) == 1 and len(timed) > 1:
         raise ConvertError(f"{name}: the poses of {chosen} have no time stamps, so they are not a track")
-    if len(rows) < len(selected.rows):
-        warn(f"poses of {chosen} omitted because their time does not increase: {len(selected.rows) - len(rows)}" +
-             _clock_reset(selected.rows))
+    if len(rows) < len(timed):
+        warn(f"poses of {chosen} omitted because their time does not increase: {len(timed) - len(rows)}" + _clock_reset(timed))
     return Track(frame or selected.frame, chosen, [Row(t, f.position_m, f.orientation) for t, f in rows])
