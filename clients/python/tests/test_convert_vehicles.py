@@ -143,6 +143,13 @@ class WithoutHorizontalPosition(WithFolder):
         with self.assertRaisesRegex(ValueError, "--at is for logs without horizontal position"):
             self.convert(both, at=(1, 2))
 
+    def test_a_source_with_poses_for_longer_is_named(self):
+        """The fix of a vehicle that dives is lost."""
+        fix = made.telemetry_log(("ATTITUDE", "GLOBAL_POSITION_INT"), steps=5)
+        track = self.convert(fix + made.telemetry_without_place(("ATTITUDE", "GLOBAL_POSITION_INT"), steps=100))
+        self.assertEqual(track.source, "ATTITUDE+GLOBAL_POSITION_INT")
+        self.assertIn("ATTITUDE+GLOBAL_POSITION_INT gives poses for 0.4 s only, --source ATTITUDE+depth for 9.9 s", self.warned)
+
     @staticmethod
     def dataflash(name, values):
         log = made.dataflash_format(name) + made.dataflash_format("ATT")

@@ -168,7 +168,7 @@ def read_dataflash(path: pathlib.Path, warn: Warn, source: Optional[str] = None,
     gathered = _Gathered()
     for name, fields in records(data, warn):
         gathered.add(name, fields)
-    wanted = chosen(gathered.sources(), source, str(path))
+    wanted = chosen(gathered.sources(), source, str(path), warn)
     local = wanted.name.split(":")[0] in LOCAL
     cores = gathered.cores(wanted.name)
     if cores and list(cores) != [wanted.name]:

@@ -325,7 +325,7 @@ def read_tlog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
     if choices:
         warn("several components send the same message; using the autopilot's, else the first, and another one "
              f"after {SILENCE_S:.0f} s of silence: {'; '.join(choices)}")
-    wanted = chosen(vehicle.sources(), source, str(path))
+    wanted = chosen(vehicle.sources(), source, str(path), warn)
     if wanted.held and vehicle.pressure_of_depth:
         warn(f"no message has the depth; it is that of {vehicle.pressure_of_depth} in sea water (1025 kg/m3) below "
              f"{SURFACE_HPA:g} hPa")

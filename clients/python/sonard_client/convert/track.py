@@ -58,8 +58,14 @@ def rising(stream: Stream[Value]) -> Stream[Value]:
     return kept
 
 
-def chosen(sources: Sequence[Source], wanted: Optional[str], name: str) -> Source:
-    """Returns the requested source, or the first with poses."""
+def _covered_s(source: Source) -> float:
+    """Returns the time in which the source has both attitudes and positions."""
+    a, p = source.attitudes, source.positions
+    return max(0.0, min(a[-1][0], p[-1][0]) - max(a[0][0], p[0][0]))
+
+
+def chosen(sources: Sequence[Source], wanted: Optional[str], name: str, warn: Warn) -> Source:
+    """Returns the requested source, or the first with poses. Warns if another source has poses for much longer."""
     there = [s for s in sources if s.attitudes and s.positions]
     if wanted is not None:
         for source in there:
@@ -70,7 +76,12 @@ def chosen(sources: Sequence[Source], wanted: Optional[str], name: str) -> Sourc
     if not there:
         lacks = [what for what, has in (("attitudes", any(s.attitudes for s in sources)),
                                         ("positions and depths", any(s.positions for s in sources))) if not has]
-        raise ConvertError(f"{name}: no poses: the file lacks {' and '.join(lacks) or 'attitudes and positions of one source'}")
+        raise ConvertError(f"{name}: no poses: the file lacks {' and '.join(lacks) or 'attitudes and positions of one source'}; "
+                           "docs/poses.md lists the messages that are read")
+    longest = max(there, key=_covered_s)
+    if _covered_s(longest) > 2 * _covered_s(there[0]) + LONG_LACK_S:
+        warn(f"{there[0].name} gives poses for {_covered_s(there[0]):.1f} s only, --source {longest.name} for "
+             f"{_covered_s(longest):.1f} s")
     return there[0]
 
 

@@ -166,7 +166,7 @@ def read_ulog(path: pathlib.Path, warn: Warn, source: Optional[str] = None, orig
     if not data.startswith(MAGIC):
         raise ConvertError(f"{path}: at byte 0: not a log of PX4: it does not begin with ULog")
     log = _Log(data, str(path), warn)
-    wanted = chosen(log.sources(), source, str(path))
+    wanted = chosen(log.sources(), source, str(path), warn)
     further = log.further_instances(wanted)
     if further:
         warn(f"without values of the first instance; used: {', '.join(further)}")
