@@ -259,7 +259,13 @@ class Command(WithFolder):
     def test_exit_codes_are_those_of_the_manual(self):
         log = self.file(made.dataflash_log(("SIM",), 3))
         self.assertEqual(self.run_main(self.folder / "none.bin", "-o", "-")[0], 66)
-        self.assertEqual(self.run_main(log, "-o", self.folder / "no" / "folder.csv")[0], 66)
+        code, _, said = self.run_main(log, "-o", self.folder / "no" / "folder.csv")
+        self.assertEqual((code, "folder.csv: its folder does not exist" in said), (66, True), said)
+        before = log.read_bytes()
+        for output, why in ((log, "is the log that is read"), (self.folder, "is a folder")):
+            code, _, said = self.run_main(log, "-o", output)
+            self.assertEqual((code, why in said), (64, True), said)
+        self.assertEqual(log.read_bytes(), before)
         self.assertEqual(self.run_main(log, "-o", "-", "--origin", "x")[0], 64)
         self.assertEqual(self.run_main(log, "-o", "-", "--component", "256")[0], 64)
         for place in ("1", "1,2,3", "a,b", "nan,0", "1,2"):  # the last: the log has positions

@@ -47,6 +47,19 @@ def _log(text: str) -> None:
     print(f"sonard_client.convert: {text}", file=sys.stderr)
 
 
+def _check_output(options: argparse.Namespace) -> None:
+    """Raises an error before the log is read, which may take minutes."""
+    output = pathlib.Path(options.output)
+    if options.output == "-":
+        return
+    if output.is_dir():
+        raise ValueError(f"-o {output} is a folder: name a file")
+    if output.exists() and options.file.exists() and output.samefile(options.file):
+        raise ValueError(f"-o {output} is the log that is read: name another file")
+    if not output.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {output}: its folder does not exist; make it first")
+
+
 def _write(track: Track, options: argparse.Namespace) -> None:
     if options.output == "-":
         write_csv(track, sys.stdout, options.body or "", options.keep_time)
@@ -78,6 +91,7 @@ def _run(options: argparse.Namespace) -> None:
         raise ValueError(f"body {options.body!r}: a name has at most 64 characters, without spaces, commas, quotes and #")
     if options.bottom is not None and options.depth_is_vehicle:
         raise ValueError("--bottom and --depth-is-vehicle exclude each other: give one")
+    _check_output(options)
     warned: List[str] = []
 
     def warn(text: str) -> None:
@@ -118,7 +132,7 @@ def main(arguments: Optional[List[str]] = None) -> int:
         _log(str(error))
         return 64
     except (FileNotFoundError, IsADirectoryError) as error:
-        _log(f"{error.filename}: file not found")
+        _log(f"{error.filename}: file not found" if error.filename else str(error))
         return 66
     except OSError as error:
         _log(str(error))
