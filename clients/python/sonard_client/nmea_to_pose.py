@@ -133,11 +133,12 @@ def run(options: argparse.Namespace, log: TextIO) -> int:
         raise ValueError("--bottom and --depth-is-vehicle exclude each other: give one")
     assumed = Assumptions(parse_origin(options.origin) if options.origin else None, tuple(options.at) if options.at else None,
                           options.heading, options.depth, options.depth_is_vehicle, options.bottom)
+    instruments = endpoint(options.listen, UDP_PORT, lowest=0)
     with PoseSender(options.to, vehicle=options.vehicle) as sender:
         bridge = Bridge(NmeaPoses(assumed), sender, log, options.without_checksum)
         try:
             if options.file is None:
-                _run_live(_from_udp(endpoint(options.listen, UDP_PORT, lowest=0), bridge), bridge, options.count)
+                _run_live(_from_udp(instruments, bridge), bridge, options.count)
             elif options.file == "-":
                 _run_live(iter(sys.stdin), bridge, options.count)
             else:
