@@ -4,7 +4,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import pathlib
+import socket
 import sys
 from typing import List, Optional
 
@@ -44,9 +46,14 @@ def _listen(options: argparse.Namespace) -> None:
         sonar.fire(range_m=options.range, rate_hz=options.rate, gain_percent=options.gain)
         for ping in sonar.pings(options.timeout, options.count):
             best = ping.strongest(beyond_m=0.5)
-            print(f"ping {ping.number}  {ping.rows} x {ping.beams}  {ping.frequency_hz / 1e6:.3f} MHz  "
-                  f"heading {ping.heading_deg or 0:.1f}  strongest {best.value:.0f} at {best.range_m:.2f} m, "
-                  f"{math.degrees(best.azimuth_rad):+.1f} deg to port", flush=True)
+            line = (f"ping {ping.number}  {ping.rows} x {ping.beams}  {ping.frequency_hz / 1e6:.3f} MHz  "
+                    f"heading {ping.heading_deg or 0:.1f}  strongest {best.value:.0f} at {best.range_m:.2f} m, "
+                    f"{math.degrees(best.azimuth_rad):+.1f} deg to port")
+            try:
+                print(line, flush=True)
+            except BrokenPipeError:  # the reader has ended, as `head` does
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the interpreter flushes once more
+                return
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -73,8 +80,14 @@ def main(arguments: Optional[List[str]] = None) -> int:
     except ValueError as error:
         print(f"sonard_client: {error}", file=sys.stderr)
         return 64
+    except socket.gaierror as error:
+        place = {"listen": "address", "discover": "listen", "pose": "to", "status": "host"}[options.command]
+        print(f"sonard_client: no address for {getattr(options, place)}: {error.strerror}", file=sys.stderr)
+        return 69
     except (ControlError, OSError) as error:
         words = error.strerror if isinstance(error, OSError) and not error.filename and error.strerror else error
+        if isinstance(error, OSError) and error.filename:
+            words = f"cannot read {error.filename}: {error.strerror}"
         print(f"sonard_client: {words}", file=sys.stderr)
         return 69
     return 0

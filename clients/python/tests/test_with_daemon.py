@@ -167,6 +167,10 @@ class Running(unittest.TestCase):
         self.assertIn('"front"', self.run_main("status", "--host", self.address)[1])
         self.assertIn("id 7001", self.run_main("discover", "--listen", self.address, "--enough", "1", "--seconds", "60")[1])
         self.assertEqual(self.run_main("pose", "0", "0", "nan", "--to", self.address)[0], 64)
+        code, text = self.run_main("pose", "0", "0", "0", "--to", "no host has spaces")
+        self.assertEqual((code, "no address for no host has spaces: " in text), (69, True), text)
+        code, text = self.run_main("status", "--token-file", "/none")
+        self.assertEqual((code, text), (69, "sonard_client: cannot read /none: No such file or directory\n"))
         with socket.socket() as unused:
             unused.bind(("127.0.0.1", 0))
             port = str(unused.getsockname()[1])
@@ -202,6 +206,15 @@ class Token(unittest.TestCase):
                     Control(daemon.address).status()
                 self.assertEqual(caught.exception.status, 401)
                 self.assertEqual(Control(daemon.address, token="0123456789abcdef0123").status()["sonars"][0]["name"], "front")
+
+
+    def test_a_reader_that_ends_is_no_error(self):
+        with Daemon(config(), SONARD) as daemon, subprocess.Popen(
+                [sys.executable, "-B", "-m", "sonard_client", "listen", daemon.address, "--timeout", "100"], stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE, env=dict(os.environ, PYTHONPATH=str(PACKAGE))) as listener:
+            self.assertIn(b"ping ", listener.stdout.readline())
+            listener.stdout.close()
+            self.assertEqual((listener.wait(100), listener.stderr.read()), (0, b""))
 
 
 class Starting(unittest.TestCase):
