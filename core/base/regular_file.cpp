@@ -111,8 +111,13 @@ int open_to_write(const std::filesystem::path& file, int flags) {
 
 std::string why_not_written(const std::filesystem::path& file, int error) {
   std::error_code ec;
-  return error == ENXIO && std::filesystem::is_fifo(file, ec) ? "it is a pipe that no program reads; start its reader first"
-                                                              : std::strerror(error);
+  if (error == ENXIO && std::filesystem::is_fifo(file, ec)) return "it is a pipe that no program reads; start its reader first";
+  const std::string why = std::strerror(error);
+  if (error == ENOSPC || error == EDQUOT || error == EFBIG) return why + "; make room";
+  if (error == EACCES || error == EPERM) return why + "; give this user the right to write there";
+  if (error == EROFS) return why + "; choose a place that can be written";
+  if (error == ENOENT && !std::filesystem::exists(file.parent_path(), ec)) return why + "; make its folder first";
+  return why;
 }
 
 namespace {

@@ -142,9 +142,7 @@ Result<void> write_png(const Raster& raster, const std::filesystem::path& file) 
   if (!bytes) return tl::make_unexpected(bytes.error());
   std::error_code error;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
-  const auto done = write_whole_file(file, {*bytes});
-  if (done) return done;
-  return failure(ErrorKind::io, done.error().text + "; check the free space and the folder's permissions");
+  return write_whole_file(file, {*bytes});
 }
 
 namespace {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/base/regular_file.hpp"
 #include "core/image/raster.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/nearest.hpp"
@@ -58,8 +59,8 @@ class Export {
 
  private:
   tl::unexpected<Error> cannot_write(const path& file, const std::error_code& why) const {
-    return failure(ErrorKind::io,
-                   "cannot write " + file.string() + ": " + why.message() + "; make room, and run the same command again");
+    return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(file, why.value()) +
+                                      "; then run the same command again");
   }
   bool is_there(std::size_t split) const { return exported_.pings[split] > 0; }
   path folder_of(std::size_t split) const { return unfinished_ / std::string(split_names[split]); }

@@ -34,8 +34,8 @@ std::string unfinished_name(const path& file) {
 }
 
 tl::unexpected<Error> cannot_write(const path& file, int why) {
-  return failure(ErrorKind::io, "cannot write " + file.string() + ": " + std::strerror(why) +
-                                    "; make room or choose another --out: finished shards are kept, run the same command again");
+  return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(file, why) +
+                                    "; finished shards are kept: run the same command again, or choose another --out");
 }
 
 /// Makes a header (POSIX.1-1988, ustar) of a regular file that all may read, with a time in 1970.

@@ -170,7 +170,7 @@ std::uint64_t OutputFolder::size_of(std::uint64_t number) const {
 Result<void> write_output(const path& file, std::initializer_list<std::span<const std::byte>> parts) {
   const auto done = write_whole_file(file, parts);
   if (done) return done;
-  return failure(done.error().kind, done.error().text + "; make room or choose another --out; what is finished is kept");
+  return failure(done.error().kind, done.error().text + "; what is finished is kept");
 }
 
 }  // namespace sonar::render

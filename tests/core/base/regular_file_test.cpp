@@ -75,5 +75,15 @@ TEST_F(RegularFile, AFifoWithoutAReaderIsNotWaitedForWhenItIsToBeWritten) {
   ::close(file);
 }
 
+TEST_F(RegularFile, AWriteErrorComesWithTheAdviceThatFitsIt) {
+  const auto why = [&](int error) { return why_not_written(folder / "none", error); };
+  EXPECT_EQ(why(ENOSPC), "No space left on device; make room");
+  EXPECT_EQ(why(EFBIG), "File too large; make room");
+  EXPECT_EQ(why(EACCES), "Permission denied; give this user the right to write there");
+  EXPECT_EQ(why(EROFS), "Read-only file system; choose a place that can be written");
+  EXPECT_EQ(why_not_written(folder / "none" / "file", ENOENT), "No such file or directory; make its folder first");
+  EXPECT_EQ(why(EIO), std::strerror(EIO));
+}
+
 }  // namespace
 }  // namespace sonar
