@@ -22,7 +22,7 @@ LENSES = {48: (15.879, -2.384), 96: (16.135, -2.404), 64: (15.024, -0.128), 128:
 
 
 def bearing_deg(beam, beams=128):
-    """Azimuths are clockwise."""
+    """Returns the bearing of a beam, clockwise from ahead."""
     a, b = LENSES[beams]
     x = 2 * beam / (beams - 1) - 1
     return -(a * x + b * x ** 3)
@@ -60,7 +60,7 @@ class ArisLink(unittest.TestCase):
         self.assertTrue(early, "at once, not with the next beacon, a second later")
 
     def is_early(self, beacons):
-        """Connects after a beacon that says free. Returns whether the one that says busy comes in less than a beacon's period."""
+        """Connects after a beacon with the state free. Returns whether one with the state busy comes before the next was due."""
         self.assertTrue(beacons.until_state(0, 30))
         begin_s = beacons.arrived_s
         with Controller(self.daemon.address):

@@ -44,8 +44,8 @@ def features(samples):
 
 
 def learned(x, y):
-    """Logistic regression by Newton's method, with equal total weights of things and of the rest. Returns the weight of each
-    feature."""
+    """Fits a logistic regression by Newton's method; labelled and other samples have equal total weights. Returns the weight of
+    each feature."""
     x = np.column_stack([x, np.ones(len(x))])
     counts = np.where(y, 0.5 / y.mean(), 0.5 / (1 - y.mean()))
     weights = np.zeros(x.shape[1])

@@ -63,7 +63,7 @@ NOTE_WORDS = """window.words = new Map();
     write.call(this, text, x, y);
   };
 }"""
-# The range labels of which a corner lies in the picture that sonard has drawn; undefined until they are written.
+# The range labels of which a corner lies in the picture that sonard has drawn; undefined until labels are written.
 LABELS_INSIDE = """(() => {
   const picture = document.querySelector('#drawn');
   const labels = [...window.words].filter(([text]) => / m$/.test(text));

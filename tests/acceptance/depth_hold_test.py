@@ -1,5 +1,5 @@
-"""Tests the distances that an autopilot gets from an altimeter by MAVLink: a controller requests them, and holds its altitude by
-them."""
+"""Tests the distances that an autopilot gets from an altimeter by MAVLink. A controller requests the distances to hold its
+altitude."""
 import pathlib
 import re
 import socket

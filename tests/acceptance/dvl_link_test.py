@@ -63,7 +63,7 @@ def crc8(data):
 
 
 class SerialDriver:
-    """The fields of sentences; checksums must be right."""
+    """Reads sentences from a serial line; their checksums must be right."""
 
     def __init__(self, line):
         self.line, self.waiting = line, b""

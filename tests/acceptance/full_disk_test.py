@@ -1,5 +1,5 @@
-"""Data sets, their exports and the farm on a disk that is full: the command names the file and the cure and ends with 74, nothing
-half-written counts as finished, and with more room the same command completes the same bytes. The disk is a small tmpfs."""
+"""Tests data sets, their exports and the farm on a full disk, a small tmpfs. The command names the file and the remedy, and ends
+with 74. A half-written file does not count as finished. With more room the same command completes the same bytes."""
 import os
 import pathlib
 import re
@@ -74,7 +74,7 @@ class FullDisk(unittest.TestCase):
         return run(SONARD, "dataset", self.job, "--out", self.disk / "set", "--quiet", "--export", "coco")
 
     def sizes(self):
-        """Sizes of disks, in the options of mount, from none to one that is just too small."""
+        """Returns sizes of disks as options of mount, from almost no room to just too little."""
         whole = sum((len(b) + 4095) // 4096 * 4096 for b in self.wanted.values())
         some = [f"size={max(4096, whole * part // 8)},nr_inodes=10000" for part in (0, 1, 2, 3, 5, 6, 7)]
         return some + [f"size=64m,nr_inodes={n}" for n in (2, 4, 7, 12, 17)]

@@ -115,7 +115,7 @@ class Vehicle(threading.Thread):
         self.socket.close()
 
     def was_in_time(self):
-        """Returns whether at most one message of 20, sent every 20 ms, was late."""
+        """Returns whether at most 5 % of the messages, due every 20 ms, were late."""
         late = [one for one, other in zip(self.sent, self.sent[1:]) if other[0] - one[0] > 0.03]
         return len(late) <= 0.05 * len(self.sent)
 

@@ -90,8 +90,8 @@ class Checked:
         self._check_summary()
 
     def read(self, topic):
-        """The messages of a topic, JSON or protobuf, by the schema that the file holds. Protobuf omits fields that are 0 or
-        empty."""
+        """Returns the messages of a topic, decoded from JSON, or from protobuf by the schema in the file. Protobuf omits fields
+        that are 0 or empty."""
         _, schema, _, encoding, _ = next(channel for channel in self.channels.values() if channel[2] == topic)
         _, name, _, described = self.schemas[schema]
         read = json.loads if encoding == "json" else lambda data: Schema(described).decode(name, data)

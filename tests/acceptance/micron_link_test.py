@@ -29,7 +29,7 @@ def command(left_deg, right_deg, control=0x2305, step=16, interval=26, bins=600,
 
 
 class Line:
-    """Tests a scan."""
+    """A scan line: the payload of mtHeadData."""
 
     def __init__(self, payload):
         (total, self.type, self.status, self.sweep, self.control, _, _, self.gain, _, _, _, _, self.interval, self.left, self.right, self.step,

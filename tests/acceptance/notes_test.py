@@ -7,7 +7,7 @@ from running_sonard import SONARCTL, SONARD, Sonard, run
 
 
 class Notes(unittest.TestCase):
-    def test_check_tells_what_was_probably_not_meant_and_is_content(self):
+    def test_check_notes_probable_mistakes_and_succeeds(self):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
             ship = ["v 0 0 0", "v 1200 0 0", "v 0 300 0", "v 0 0 250", "f 1 2 3", "f 1 2 4"]

@@ -53,7 +53,7 @@ class Ping:
 
     @functools.cached_property
     def _rows(self):
-        """The gain of each row (nothing if rows have none) and its samples. Computed at the first use, because it is slow."""
+        """For each row, a tuple of its gain (empty if rows have none), and its samples. Computed when first used: it is slow."""
         rows, at, width = [], 0, self.sample_bytes
         for _ in range(self.rows):
             gain = ()

@@ -190,7 +190,7 @@ class Package(Installed, unittest.TestCase):
                 self.assertEqual((shown.returncode, shown.stderr), (0, ""), page)
 
     def test_the_programs_name_no_folder_they_were_built_in(self):
-        """Strings that assertions would add, and a folder of scenes in the source tree."""
+        """Assertions, or a folder of scenes in the source tree, would add such names."""
         for name in ("sonard", "sonarctl"):
             self.assertNotIn(str(ROOT).encode(), self.program(name).read_bytes(), name)
             self.assertNotIn(str(BUILD).encode(), self.program(name).read_bytes(), name)

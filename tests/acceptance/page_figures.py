@@ -36,8 +36,8 @@ materials: {bright: {like: steel, lambert_db: -10}}
 objects:
   - {name: target, type: sphere, moving: true, material: bright, radius_m: 0.3, pose: {xyz_m: [4, 1, 0]}}
 """
-# moves(n): of n moves of the target to a place where the picture is dark, the milliseconds from the answer of the request to the
-# painted pixels, and from the ping's arrival to them.
+# moves(n): moves the target n times to a place where the picture is dark. Returns for each move the milliseconds from the answer
+# of the request, and from the ping's arrival, to the painted pixels.
 MOVES = """async (n) => {
   const { fan, facts } = sonardTest;
   const gl = fan.canvas.getContext('webgl2');
@@ -87,14 +87,15 @@ def click(page, selector):
 
 
 def delays(page, clicks):
-    """The times [ms] from each click to the next painted frame, and to the end of the page's scripts for it. The browser reports no
-    click whose frame comes within 16 ms. Without a graphics processor, painting takes most of the first time."""
+    """Returns the times [ms] from each click to the next painted frame, and to the end of the page's scripts for the click. The
+    browser does not report clicks whose frame comes within 16 ms; they count as 0. Without a graphics processor, painting takes
+    most of the first time."""
     reported = page.run("window.clicks ?? []")
     return [[0] * (clicks - len(reported)) + list(times) for times in zip(*reported)] or [[0] * clicks] * 2
 
 
 def keep_clicks(found, bounds_ms, where):
-    """The part of the scripts is an item of its own: a slow frame of the browser is no fault of the page."""
+    """Records the times. Those of scripts are a separate item, because the page does not cause a slow frame of the browser."""
     for times, (item, bound_ms) in zip(found, bounds_ms.items()):
         p50, p95 = part(times, 0.5), part(times, 0.95)
         kept(item, f"p50 {p50:.0f} ms, p95 {p95:.0f} ms of {len(times)}", f"p95 < {bound_ms} ms", p95 < bound_ms, where)
@@ -111,7 +112,7 @@ class FirstMinute(unittest.TestCase):
         return self.browser.open(f"http://{HTTP}:8088/", 1440, 900, **options)
 
     def test_first_picture(self):
-        """In a browser that runs, and in a new one, which starts its processes and graphics meanwhile."""
+        """Measures in a browser that already runs, and in new ones, which must first start their processes and graphics."""
         for item, openings in (("page-first-picture", OPENINGS), ("page-first-picture-new-browser", OPENINGS // 2)):
             took = []
             for _ in range(openings):

@@ -24,7 +24,7 @@ from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-impo
 
 BUDGET_BYTES = 190_000
 MOUNT = "{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}"
-STATES = {  # of the mock -> the page's name of it, what the user reads, the button
+STATES = {  # the mock's state -> the page's name of the state, the text that the user reads, the button
     "no client": ("no-client", "No driver is connected. Nothing is simulated without one. Point a driver at 127.0.0.2.", "Preview"),
     "standby": ("standby", "Standby: 192.0.2.7 set the rate to 0.", "Ask for 10 Hz"),
     "stepped": ("stepped-waits", "Time stands still at 41.600 s: it moves when 127.0.0.1:40122 has taken ping 12 896", ""),
@@ -477,8 +477,8 @@ class Page(PageChecks, unittest.TestCase):
                 page.close()
 
     def test_settings_come_first(self):
-        """The doctor is the first panel beside the picture, or of its tab on a phone: visible without scrolling, and the first
-        that Tab reaches."""
+        """The settings are the first panel beside the picture, or of their tab on a phone: visible without scrolling, and the
+        first that Tab reaches."""
         for width in (1600, 390):
             with self.subTest(width=width):
                 page = self.open(width, 844, touch=width < 800)

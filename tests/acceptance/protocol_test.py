@@ -39,8 +39,8 @@ class Served(unittest.TestCase):
                     self.expect_bearings(ping, 30 if mode == 2 else 65)
 
     def expect_bearings(self, ping, half_aperture_deg):
-        """The law of the capture; the truncation may differ by a hundredth of a degree where the value is very close to a whole
-        hundredth."""
+        """Compares with the law of the capture. Values very close to a whole hundredth of a degree may be truncated to the
+        neighbouring one."""
         differences = [abs(a - b) for a, b in zip(ping.bearings, expected_bearings(ping.beams, half_aperture_deg))]
         self.assertLessEqual(max(differences), 1)
         self.assertLessEqual(sum(differences), ping.beams // 100)

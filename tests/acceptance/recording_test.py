@@ -59,7 +59,7 @@ class Replay:
         self.wait_for("Ctrl-C stops")
 
     def wait_for(self, text):
-        """Waits until its log has the text, or it ends."""
+        """Waits until the log has the text, or the replay ends."""
         deadline = time.monotonic() + 60
         while text not in self.text() and self.process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.01)

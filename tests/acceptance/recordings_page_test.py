@@ -29,7 +29,7 @@ def is_message(topic):
 
 
 def record(maker, pings):
-    """A recording of the running demo, started and stopped as by the page, while a driver is connected."""
+    """Records the running demo while a driver is connected, with the requests that the page sends; returns the file's path."""
     with subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL,
                           stderr=subprocess.DEVNULL) as driver:
         name = f"{maker}.mcap"

@@ -51,7 +51,7 @@ class SceneCommand(unittest.TestCase):
         self.assertIn("m from everything in the scene", checked[1])
 
     def test_small_files_take_little_memory(self):
-        """Two points far apart; beside a scene that is not there, a file of 64 GiB without a line."""
+        """Loads a grid with one distant point, and a missing scene beside a file of 64 GiB whose name is similar."""
         (self.path / "far.xyz").write_text("0 0 1\n1 1 1\n2 2 1\n3 3 1\n19000000 19000000 1\n", encoding="utf-8")
         self.scene.write_text("objects: [{name: bed, type: heightmap, file: far.xyz, material: sand}]\n", encoding="utf-8")
         with open(self.path / "quax.yaml", "wb") as holes:

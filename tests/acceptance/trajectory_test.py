@@ -26,8 +26,8 @@ def depth_m(t):
 
 
 def dive():
-    """A trajectory of four seconds that begins eastwards, turns to port and descends, in uneven steps with stamps of a real
-    clock."""
+    """Returns a trajectory of four seconds that begins eastwards, turns to port and descends, in uneven steps, with stamps of a
+    real clock."""
     lines = ["# frame: ENU_FLU"]
     for t in (0, 0.3, 1, 1.1, 2.5, 4):
         half = math.radians(yaw_deg(t)) / 2
@@ -42,7 +42,7 @@ def daemon_with(file, text, trajectory, **more):
 
 
 def stepped_run(trajectory, *arguments):
-    """Pings that a client received, and the digest of its stream."""
+    """Returns the pings that a client received, and the digest of its stream."""
     arguments = ["--clock", "stepped", "--digest", "--exit-after-pings", PINGS, *arguments]
     with daemon_with("dive.tum", dive(), trajectory, arguments=arguments) as daemon:
         pings = []

@@ -15,7 +15,7 @@ DERIVED_PARTS = ("oculus.fire.flags.", "oculus.fire.extFlags.", "oculus.status.s
 
 
 def tshark(*arguments, dissector=DISSECTOR):
-    """Returns stdout; any complaint of Lua or tshark is an error. Ignores the user's preferences and plug-ins."""
+    """Returns stdout; any error message of Lua or tshark fails. Ignores the user's preferences and plug-ins."""
     with tempfile.TemporaryDirectory() as empty:
         done = subprocess.run(["tshark", *[str(a) for a in arguments], "-n", "-X", f"lua_script:{dissector}"],
                               env=os.environ | {"HOME": empty, "XDG_CONFIG_HOME": empty, "TZ": "UTC"}, stdin=subprocess.DEVNULL,

@@ -79,7 +79,7 @@ DEPENDENCIES = {
     r"tbb/|oneapi/": [],
     r"Eigen/": [],
 }
-# Name, files it is looked for in, files excepted, what must not appear, why.
+# Rules: name, searched files, excepted files, pattern that must not appear, reason.
 FORBIDDEN = [
     ("cast", r"protocol/", None, r"\breinterpret_cast\b", "bytes are read and written through protocol/wire"),
     ("packing", r"protocol/", None, r"#\s*pragma\s+pack|__attribute__\s*\(\(\s*packed", "bytes go through protocol/wire"),
@@ -112,9 +112,9 @@ FORBIDDEN = [
     ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]
-# A make of sonar is its folder and a line of makes.cpp; these files still name one. The list only gets shorter.
+# A make of sonar is its folder and a line of makes.cpp. The files in NAME_MAKES still name one; that list only gets shorter.
 ANY_FOLDER = "|".join(MAKE_FOLDERS)
-# In identifiers too: is_aris, ArisFrame, m3_packet. DVL is also a kind of instrument, and per_m3 a unit.
+# Also matches identifiers: is_aris, ArisFrame, m3_packet. "DVL" alone is a kind of instrument, and per_m3 a unit.
 MAKE = re.compile(rf"protocol/({ANY_FOLDER})/|\b({ANY_FOLDER})::"
                   r"|(?i:oculus|blueview|waterlinked|ping360|ping1d|(?<![a-z])s500|surveyor|omniscan|3d-?15|dvl-a|norbit)"
                   r"|(?<![A-Za-z])(aris|micron|dvl)(?![a-z])|(Aris|Micron|Dvl)(?![a-z])|(?<![A-Za-z])(ARIS|MICRON)(?![a-z])"

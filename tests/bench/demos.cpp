@@ -82,7 +82,7 @@ v1::SonarStatus status_of(Service& service, const Clock& clock) {
   return status.get_future().get();
 }
 
-/// Without `rate_hz` the rate is that of a usual driver.
+/// Measures a demo with a driver. Without `rate_hz` the rate is that of a usual driver.
 Result<json> serve(const protocol::Make& make, const std::string& profile, std::optional<double> rate_hz,
                    const ScenePointer& scene, const BenchOptions& options) {
   auto config = demo_of(profile, options);

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double published_reference_ms = 36;  // a frame, P1's size: IOES-Lab/dave, issue 44; on a device of its author's
+constexpr double published_reference_ms = 36;            // a frame of P1's size, on the author's device: IOES-Lab/dave, issue 44
 constexpr double most_warm_up_s = 1, most_rounds_s = 3;  // limits for one size of a batch; less for few pings
 constexpr std::size_t rounds = 5;
 
@@ -20,7 +20,7 @@ Result<std::unique_ptr<PingEngine>> engine_of(const ScenePointer& scene, Paralle
                                               bool steps) {
   cuda::DeviceEngineOptions device;
   device.batch = batch;
-  device.cpu_after_failure = false;  // otherwise its rate would be reported as the device's
+  device.cpu_after_failure = false;  // otherwise the CPU's rate would be reported as the device's
   return make_cuda_engine(scene, pool, {.simd = options.engine.simd, .now_s = steps ? now_s : nullptr}, device);
 }
 
@@ -73,8 +73,8 @@ Result<BatchRate> rate_of(const ScenePointer& scene, Parallel& pool, Pinger& pin
   return found;
 }
 
-/// The row of the table and of the report.
-json told(const BatchRate& found, const BenchCase& c, int threads, int batch) {
+/// Prints the row of the table; returns that of the report.
+json row_of(const BatchRate& found, const BenchCase& c, int threads, int batch) {
   std::printf(
       "P10  %-4s %2d thread%s %2d pings a launch: %7.1f pings/s  (ms a ping: %.3f; tiles and points by the CPU %.3f, the "
       "device's steps %.3f)\n",
@@ -105,7 +105,7 @@ Result<json> find_device_rates(const ScenePointer& scene, const BenchScene& wher
         if (static_cast<std::size_t>(batch) > requests.size()) continue;  // no such batch would be full
         const auto found = rate_of(scene, pool, pinger, requests, batch, options);
         if (!found) return tl::make_unexpected(found.error());
-        rates.push_back(told(*found, c, threads, batch));
+        rates.push_back(row_of(*found, c, threads, batch));
         if (c.name == "P1") best_of_p1 = std::max(best_of_p1, found->pings_per_second);
       }
     }

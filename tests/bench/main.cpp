@@ -58,7 +58,7 @@ Result<ScenePointer> scene_of(const BenchScene& where, const BenchOptions& optio
   return *loaded;
 }
 
-/// Options of the case: a device computes only cases that it can.
+/// Returns the options of the case. If the device cannot compute the case, they select the CPU.
 BenchOptions options_for(const BenchCase& c, const BenchOptions& options) {
   BenchOptions own = options;
   if (options.engine.device == EngineDevice::cpu) return own;
@@ -69,7 +69,7 @@ BenchOptions options_for(const BenchCase& c, const BenchOptions& options) {
   return own;
 }
 
-/// Warm pings of every case over one scene.
+/// Measures warm pings of every case over one scene.
 Result<void> time_pings(const BenchScene& where, const ScenePointer& loaded, const BenchOptions& options, json& report) {
   const auto scene = with_parts(loaded, options.given_parts);
   for (const BenchCase& c : bench_cases()) {
@@ -97,7 +97,7 @@ Result<void> time_pings(const BenchScene& where, const ScenePointer& loaded, con
   return {};
 }
 
-/// All other measurements, over the first scene.
+/// Makes all other measurements, over the first scene. Returns false if a bound is exceeded.
 Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, const BenchOptions& options, json& report) {
   bool all_hold = true;
   const auto asked = [&](const char* name) { return wanted(options.cases, name); };

@@ -19,7 +19,7 @@ namespace sonar::bench {
 double now_s();           // on the steady clock
 double processor_s();     // processor time of all threads of this process
 double this_thread_s();   // processor time of the calling thread
-std::string processor();  // its name and number
+std::string processor();  // its name, and the number of processors
 
 /// Minimum, median, percentiles and maximum of times.
 struct Times {

@@ -67,7 +67,7 @@ void detect_naively(const std::vector<float>& signal, const PingPlan& plan, std:
     }
 }
 
-/// Every ray of a sparse fan over P1's columns, `lanes` of a packet in use.
+/// Returns the time of all rays of a sparse fan over P1's columns, with `lanes` rays in each packet.
 double trace_ms(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int lanes) {
   return best_ms(3, [&] {
     RayPacket packet{};

@@ -377,7 +377,7 @@ def rates_title(report):
 
 
 def page(report, scene="local-search", other_rates=()):
-    """`other_rates`: lines of `other_machines`."""
+    """Returns the page. `other_rates`: lines of `other_machines`."""
     results, other_rates = report["results"], list(other_rates)
     times = [f"{name}: {r['pings_per_second'] / PAPER[0][1]:.0f}" for name, r in by_case_and_threads(report, scene)]
     lines = ["# Benchmarks", "",

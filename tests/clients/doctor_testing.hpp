@@ -67,7 +67,7 @@ inline Facts healthy() {
   return facts;
 }
 
-/// The only line of that check; an empty one when there is none, or several.
+/// Expects exactly one finding of that check, and returns it; otherwise returns an empty one.
 inline Finding line(const std::vector<Finding>& findings, const std::string& check) {
   std::vector<Finding> found;
   for (const Finding& f : findings)

@@ -44,7 +44,7 @@ void send_a_dummy(const Socket& client) {
   drain(client);
 }
 
-/// Answers requests with the status of an Oculus. After `answers` requests for it, connections are closed.
+/// Answers requests for the status with that of an Oculus. After `answers` of them, connections are closed.
 class Control {
  public:
   Control(const std::string& observers, int answers, const std::string& listens)

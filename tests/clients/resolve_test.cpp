@@ -62,7 +62,7 @@ TEST(Resolve, TheFirstSignalEndsALookupThatDoesNotEnd) {
   EXPECT_THAT(got.error().text, HasSubstr("interrupted before the address of slow was found"));
 }
 
-/// While it lives, no thread can start: new threads get stacks that no computer has addresses for.
+/// While an object exists, no thread can start: the stacks of new threads would be larger than any address space.
 class NoThreads {
  public:
   NoThreads() {

@@ -34,7 +34,7 @@ def seeds_of(profile):
 
 
 def resealed(message):
-    """Yields frames of the Ping protocol with their correct checksums."""
+    """Returns the message; frames of the Ping protocol at its start get correct checksums."""
     out, at = bytearray(message), 0
     while at + 10 <= len(out) and out[at:at + 2] == b"BR":
         end = at + 8 + struct.unpack_from("<H", out, at + 2)[0]

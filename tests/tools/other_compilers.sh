@@ -42,7 +42,7 @@ for number, (file, entry) in enumerate(sorted(files.items())):
 PYTHON
 }
 
-# check COMPILER
+# check COMPILER: reads the tree with this compiler. A warning or an error makes it fail.
 check() {
   local compiler=$1 folder=build/other/$1 made
   command -v "$compiler" >/dev/null || { echo "$compiler is not installed: apt-get install ${compiler/clang++/clang}" >&2; return 1; }

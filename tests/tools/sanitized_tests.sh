@@ -7,7 +7,7 @@
 #             Engines, their choice and their turns are left out, because they read no foreign data
 #   asan-all  the same over the whole functional suite, including the shipped programs and the BlueView call sequences
 #   tsan      threads: protocol, control, daemon, clients, the BlueView call sequences, the pool, and the CPU pipeline over analytic
-#             rays in place of Embree, alone (core_analytic_rays_test) and under a whole daemon (daemon_analytic_test, with the daemon's)
+#             rays in place of Embree, alone (core_analytic_rays_test) and under a whole daemon (daemon_analytic_test)
 # With targets it runs only those test programs. Reports are in the output; the exit status is 1 if there was any. Figures of
 # sanitized programs are not stored; SONARD_RELIABILITY gets only one line with the result of the whole run.
 set -u -o pipefail

@@ -10,8 +10,8 @@ product_packages=(
 )
 build_packages=("${product_packages[@]}" libeigen3-dev libgtest-dev libgmock-dev)
 
-# Sanitized programs and fuzzers are compiled with the system's clang (14 on Debian 12, 19 on Debian 13), which needs half to two
-# thirds of g++'s time, and linked with lld in a quarter of the time. So a second compiler also reads the tree.
+# Sanitized programs and fuzzers are compiled with the system's clang (14 on Debian 12, 19 on Debian 13) and linked with lld.
+# clang needs half to two thirds of g++'s time, and lld a quarter of the linking time. So a second compiler also reads the tree.
 clang_packages=(clang libclang-rt-dev lld)
 
 # Packages for the page of the live view; without them the daemon is built without the page.
@@ -116,7 +116,7 @@ build_jobs() {
 # Without this setting ccache does not cache compilations with precompiled headers.
 export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
 
-# configure PRESET [cmake arguments...]
+# configure PRESET [cmake arguments...]: configures build/PRESET. It prints only notes, or the whole log after a failure.
 configure() {
   local log preset=$1 python=() status
   shift
@@ -163,7 +163,7 @@ configure_sanitized() {
   fi
 }
 
-# build PRESET [targets...]
+# build PRESET [targets...]: builds in build/PRESET and shows the progress.
 build() {
   local preset=$1
   shift

@@ -140,7 +140,7 @@ def local_sums(values):
 
 
 def texture_statistics(image):
-    """Returns the picture minus its local mean."""
+    """Returns name -> value: statistics of the picture divided by its local mean."""
     sums, counts = local_sums(image)
     ratio = [value / max(total / count, 1e-9) for value, total, count in zip(image, sums, counts)]
     squares, _ = local_sums([v * v for v in image])

@@ -22,7 +22,7 @@ def elevation_of_bed(ping):
 
 
 def share_of_limit(sonard, *arguments):
-    """Compares a mode with itself at many rays: number of bins, percentage within 1 dB, largest difference."""
+    """Compares a mode with itself at many rays: number of bins, percentage of them within 1 dB, largest difference."""
     some, = sonard.expected("flat-sand", *arguments)
     mode = arguments[arguments.index("--mode") + 1]
     limit, = sonard.expected("flat-sand", "--mode", mode, "--fixed-fan", DENSE_ROWS)

@@ -25,7 +25,7 @@ def rate(result):
 
 
 def rows_of(scene, plain, pairs):
-    """`pairs`: part -> (result without it, result with it); `plain`: the default's result."""
+    """Returns the rows of the table. `pairs`: part -> (result without it, result with it); `plain`: the default's result."""
     rows = [[scene, "default", "", rate(plain), "", f"{thread_ms(plain):.1f}"]]
     for part, (off, on) in pairs.items():
         if part in OPT_IN:

@@ -56,7 +56,7 @@ def correlation(a, b):
 
 
 def shifted(patch, down, right):
-    """Returns the patch, and the patch shifted by so many rows and beams."""
+    """Returns the parts of the patch that overlap if it is shifted by this many rows and beams."""
     rows, beams = patch.shape
     left = max(0, -right)
     return patch[:rows - down, left:beams - max(0, right)], patch[down:, left + right:beams + min(0, right)]
@@ -97,7 +97,8 @@ def level_features(patch):
 
 
 def patches(pings):
-    """Features of all patches [patches][features], their places (ping, row, sector), and the features' names, texture first."""
+    """Returns the features of all patches [patches][features], the places of these (ping, row, sector), and the features' names,
+    texture first."""
     import numpy as np
 
     table, places, names = [], [], []
@@ -194,8 +195,8 @@ def render(program, seed, scene):
 
 
 def results(captured, ours, others, another):
-    """Rows of the table (name, accuracy, interval); the features that separate best, in the picture and near the floor; shares by
-    rows: name -> of each band."""
+    """Returns the rows of the table (name, accuracy, interval); the features that separate best, in the picture and near the
+    floor; and shares by rows (name -> share of each band)."""
     import numpy as np
 
     sets = [patches(p) for p in (captured, ours, others, another)]

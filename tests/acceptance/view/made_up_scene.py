@@ -31,7 +31,7 @@ def glb(vertices, normals, triangles, colour):
 
 
 def grid(u_count, v_count, place, colour):
-    """A surface place(u, v), u and v from 0 to 1; normals by differences."""
+    """Returns the mesh of a surface place(u, v), u and v from 0 to 1, with normals from differences."""
     vertices, normals, triangles = [], [], []
     for i in range(u_count + 1):
         for j in range(v_count + 1):
@@ -93,7 +93,7 @@ def bed(colour):
 
 
 def quaternion(roll_deg=0.0, pitch_deg=0.0, yaw_deg=0.0):
-    """Intrinsic Z-Y-X, as a dictionary of x y z w."""
+    """Returns the quaternion of intrinsic Z-Y-X angles, as a dictionary."""
     r, p, y = (math.radians(a) / 2 for a in (roll_deg, pitch_deg, yaw_deg))
     cr, sr, cp, sp, cy, sy = math.cos(r), math.sin(r), math.cos(p), math.sin(p), math.cos(y), math.sin(y)
     return {"w": cr * cp * cy + sr * sp * sy, "x": sr * cp * cy - cr * sp * sy,

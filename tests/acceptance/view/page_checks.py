@@ -51,7 +51,7 @@ WITHOUT_WEBGL = """window.Worker = class { constructor() { setTimeout(() => this
 HTMLCanvasElement.prototype.getContext = ((old) => function (kind, ...rest) {
   return kind === 'webgl2' ? null : old.call(this, kind, ...rest); })(HTMLCanvasElement.prototype.getContext)"""
 
-# The width that the names of the sonars lack.
+# The width [px] that the list of sonars lacks to show whole names.
 LACKING_PX = """((e) => {
   const whole = e.cloneNode(true);
   whole.style.cssText = 'position: absolute; max-width: none; width: max-content';
@@ -85,7 +85,7 @@ class PageChecks:
     open_pages = ()
 
     def opened(self, page):
-        """A page that the test opens. It is closed at the end; if the test or a part of it fails before, a picture is kept."""
+        """Returns the page, and closes it at the end of the test. If the test, or a part of it, fails, a picture is kept."""
         self.open_pages = (*self.open_pages, page)
         self.addCleanup(page.close)
         return page

@@ -57,7 +57,7 @@ class Heads(unittest.TestCase):
         self.assertEqual(self.head(sonar, 2), (NO_HEAD, 0))
 
     def ranges(self, head, threshold=None):
-        """Returns the bearings with a range in a new ping, and all bearings; threshold None: the library's default."""
+        """Returns how many bearings of a new ping have a range, and how many there are; threshold None: the library's default."""
         generator, ping, profile = self.sdk.BVTImageGenerator_Create(), ctypes.c_longlong(), ctypes.c_longlong()
         self.assertEqual(self.sdk.BVTImageGenerator_SetHead(generator, head), SUCCESS)
         if threshold is not None:

@@ -79,8 +79,8 @@ TEST(XyImage, HasTheSizesOfItsDefinition) {
 
 TEST(XyImage, PutsPixelsWhereTheVendorsLibraryPutThem) {
   // A public table of every pixel's range and bearing, from a 45 degree head with a requested range of 2 to 15 m and 640 x 480,
-  // follows x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m in 394 x 480. The sector and stop range that the ping had are
-  // the ones from which those four numbers follow.
+  // follows x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m in 394 x 480. It lacks the ping's sector and stop range; here
+  // they are those from which these numbers follow.
   PolarPing ping = make_ping(256, 500, 2, 0.02508f, [](int, int) { return 100; });
   ping.fov_min_deg = -20.95f;
   ping.fov_max_deg = 20.95f;

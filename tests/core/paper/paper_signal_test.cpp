@@ -164,10 +164,10 @@ TEST(PaperCorrection, IsTheReferenceCodes) {
   double energy = 0, row = 0;
   for (const float w : v) energy += static_cast<double>(w) * static_cast<double>(w);
   for (int k = 0; k < 512; ++k) row += static_cast<double>(v[static_cast<std::size_t>(255 * 512 + k)] / v[255 * 512 + 255]);
-  EXPECT_NEAR(energy, 1, 1e-4);                                                       // D8: energy of the whole matrix
-  EXPECT_NEAR(20 * std::log10(v[255 * 512 + 256] / v[255 * 512 + 255]), -17.8, 0.1);  // D6: width = spacing
+  EXPECT_NEAR(energy, 1, 1e-4);                                                       // energy of the whole matrix
+  EXPECT_NEAR(20 * std::log10(v[255 * 512 + 256] / v[255 * 512 + 255]), -17.8, 0.1);  // width = spacing
   EXPECT_NEAR(20 * std::log10(static_cast<double>(v[0])), -27.2, 0.5);  // -27.6 dB by 512 alone, minus the neighbours
-  EXPECT_GT(row, 2);                                                    // D5: |sinc| adds its side lobes in phase
+  EXPECT_GT(row, 2);                                                    // |sinc| adds its side lobes in phase
   const std::vector<float> squared = make_correction(fan.azimuth_rad, spacing, true);
   EXPECT_NEAR(squared[1], v[1] * v[1], 1e-9);
 }

@@ -28,7 +28,7 @@ struct Ray {
   Vec3d at(double t) const { return from + t * direction; }
 };
 
-/// The face across an axis, if `covers` is true there.
+/// Tries the plane across an axis; it counts as a hit where `covers` is true.
 template <class Covers>
 void try_face(const Ray& ray, int axis, double at_m, Hit& best, Covers&& covers) {
   const double speed = along(ray.direction, axis);
@@ -37,7 +37,7 @@ void try_face(const Ray& ray, int axis, double at_m, Hit& best, Covers&& covers)
   if (t > 0 && t < best.distance_m && covers(ray.at(t))) best = {t, unit(axis), axis, at_m};
 }
 
-/// A sphere. If the z of both vectors is omitted, the side of a cylinder.
+/// Tries a sphere, or, if the z of both vectors is 0, the side of a cylinder.
 template <class Covers>
 void try_round(const Ray& ray, Vec3d from, Vec3d direction, double radius_m, Hit& best, Covers&& covers) {
   const double a = dot(direction, direction), b = dot(from, direction), c = dot(from, from) - radius_m * radius_m;

@@ -200,7 +200,7 @@ TEST(Interference, IsAStreakOfItsPulseAtItsBearingAndLevel) {
   const int aside = s.beam_at(rad_from_deg(10.9));
   const double lobe = receive_pattern(s.mode().pattern)(std::sin(azimuth) - s.beam_sine(aside));
   EXPECT_NEAR(s.pressure(middle, aside), std::abs(lobe / weight) * s.pressure(middle, beam), 1e-3 * s.pressure(middle, beam));
-  // If the ping is fired 10 us later, the pulse appears 10 us earlier.
+  // If the ping is fired 100 us later, the pulse appears 100 us earlier.
   ping_at(s, fired_s + 1e-4);
   std::vector<int> later;
   for (int row = 0; row < s.rows(); ++row)

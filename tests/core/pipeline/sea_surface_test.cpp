@@ -75,7 +75,7 @@ TEST(SeaSurface, ARougherSurfaceMirrorsLessAndScattersMore) {
   EXPECT_NEAR(last, std::pow(10.0, -3.0), 1e-9);
 }
 
-/// A sonar under the surface that looks up.
+/// Depth and pitch of a sonar that looks up to the surface.
 constexpr double depth_m = 2, nose_up_rad = 0.25;
 
 TEST(SeaSurface, DiffuseEchoIsMuSquareSine) {

@@ -50,8 +50,8 @@ Sounding over_bed(const FrequencyMode& mode, double height = 2, double pulse_wid
       mode, native_rows(6 * height, pulse_width_m));
 }
 
-/// Expected values for a bed 2 m below, nose down: the mean over beams around the middle, over blocks of rows, divided by the
-/// closed form.
+/// Compares a bed 2 m below, nose down, with the closed form: the mean ratio in the beams around the middle, for blocks of
+/// rows.
 void expect_bed(const FrequencyMode& mode, bool side_lobes, bool speckle) {
   constexpr double height = 2;
   Sounding s = over_bed(mode);

@@ -39,7 +39,7 @@ inline double area(const Mesh& mesh) {
   return s;
 }
 
-// True if every edge occurs once in each direction.
+// Expects every edge once in each direction.
 inline void expect_closed(const Mesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (const auto& t : mesh.triangles) {

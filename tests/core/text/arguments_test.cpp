@@ -14,7 +14,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-/// A program with one command; returns its error for `words`, or empty.
+/// Runs a program with one command; returns its error for `words`, or an empty text.
 std::string complaint(const std::vector<std::string>& words) {
   CLI::App app("", "tool");
   app.require_subcommand(1);

@@ -25,7 +25,7 @@ control::SetSonar set_transmit(bool on) {
   return s;
 }
 
-/// Returns the first of at most a hundred pings for which `fine` is true.
+/// Returns true if `fine` is true for one of the next hundred pings.
 template <class Fine>
 bool sees(Client& client, Fine&& fine) {
   for (int i = 0; i < 100; ++i) {

@@ -1,5 +1,5 @@
-/* 3.x, C: retries on 1015 and on nothing else, takes head 1, sets and prints everything, listens without transmitting, then pings
- * at the sonar's rate and asks for pixels one past the end.
+/* 3.x, C: tries again only after a time-out (1015), sets and prints all values, and receives without transmitting. Then it pings
+ * at the sonar's rate, and requests pixels one past the end.
  * usage: c3_retry_settings_receive_only ADDRESS UNUSED_ADDRESS */
 #include <string.h>
 

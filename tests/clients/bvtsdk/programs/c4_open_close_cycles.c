@@ -1,4 +1,4 @@
-/* 4.x, C: opens, takes a head, now and then pings, and closes, a thousand times; neither descriptors, threads nor memory may
+/* 4.x, C: in each cycle opens the sonar, gets a head and closes; pings in every 50th. Descriptors, threads and memory must not
  * grow. usage: c4_open_close_cycles ADDRESS CYCLES */
 #include <dirent.h>
 #include <poll.h>

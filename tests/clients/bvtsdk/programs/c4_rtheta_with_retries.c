@@ -1,5 +1,5 @@
-/* 4.x, C: connects again and again until the sonar is there, destroys what was never made, then R-Theta images with the far end
- * in row 0.
+/* 4.x, C: tries to connect until the sonar answers, and destroys objects that were never made. Then it makes R-Theta images, with
+ * the far end in row 0.
  * usage: c4_rtheta_with_retries ADDRESS UNUSED_ADDRESS */
 #include "tests/clients/bvtsdk/programs/expect.h"
 
