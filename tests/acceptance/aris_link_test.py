@@ -155,7 +155,7 @@ class ArisLink(unittest.TestCase):
             link.command(RECEIVER, 3, field(1, 1) + field(2, b"0.0.0.0"))
             expect_quiet(link.udp)
 
-    def test_silence_ends_it(self):
+    def test_silence_ends_a_connection(self):
         self.until_free()
         start = time.monotonic()
         with self.controller(receiver=False) as link:

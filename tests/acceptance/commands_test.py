@@ -125,7 +125,7 @@ class Mistakes(unittest.TestCase):
             self.assertNotIn("\x1b", result.stderr)
             self.assertGreater(result.returncode, 0)
 
-    def test_what_is_wrong_with_a_line_is_said_in_one(self):
+    def test_a_wrong_command_line_gets_one_line(self):
         words = [(["--threads", "abc"], "--threads", '"abc" is not a whole number from 0 to 256'),
                  (["run", "--threads", "257"], "--threads", '"257" is not a whole number from 0 to 256', "sonard run --help"),
                  (["run", "--seed", "0x10"], "--seed", '"0x10" is not a whole number'),
@@ -232,7 +232,7 @@ class Mistakes(unittest.TestCase):
         if os.geteuid() != 0:  # the superuser has no such limit
             self.expect(short_of("ulimit -u 1"), 69, "cannot start a thread", "ulimit -u")
 
-    def test_a_token_that_never_comes_is_not_waited_for(self):
+    def test_a_token_from_a_fifo_is_refused_without_waiting(self):
         with tempfile.TemporaryDirectory() as folder:
             os.mkfifo(pathlib.Path(folder) / "token")
             for command in (["status"], ["recording", "start", "a.mcap"], ["fault", "list"]):
@@ -297,7 +297,7 @@ class CheckAndRun(unittest.TestCase):
         ran, checked = (result.stderr.splitlines()[-1] for result in results)
         self.assertEqual(ran, checked)
 
-    def test_all_of_the_configuration_itself(self):
+    def test_check_and_run_refuse_mistakes_in_the_configuration_alike(self):
         for more, code, *words in [
                 ("faults: {plan: [{do: L05}]}", 78, "faults.plan: faults act only when they are armed"),
                 ("faults: {armed: true, plan: [{do: L99}]}", 78, "is not a fault"),

@@ -381,7 +381,7 @@ class Used(Dissected):
         capture.tcp("device", golden("ping_v1") + golden("ping_v2"))
         return capture
 
-    def test_other_ports(self):
+    def test_other_ports_can_be_set(self):
         capture = self.capture(device_port=52200)
         self.assertEqual(self.dissect(capture), [], "not a port of ours")
         for way in (["-o", "oculus.tcp_ports:52100,52200-52203"], ["-d", "tcp.port==52200,oculus"]):

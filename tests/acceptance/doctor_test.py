@@ -93,7 +93,7 @@ class Doctor(unittest.TestCase):
         self.assertEqual(code, 69)
         self.assertLess(time.monotonic() - start, 30)  # 4 s on a quiet machine
 
-    def test_a_port_that_another_program_has_is_said_to_be(self):
+    def test_a_port_in_use_by_another_program_is_reported(self):
         address = "127.0.0.9"
         with socket.create_server((address, 52100)) as stream, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as datagrams:
             datagrams.bind((address, 52102))  # like a driver without SO_REUSEADDR
@@ -195,7 +195,7 @@ class Doctor(unittest.TestCase):
             self.expect(findings, "driver", "fail", f":{driver.getsockname()[1]} is connected to front and has not asked for pings")
             self.assertEqual(len(findings["driver"]), 1, found)  # not doctor's own connection
 
-    def test_a_driver_that_gets_pings_is_none(self):
+    def test_a_driver_that_gets_pings_is_no_error(self):
         with Sonard(scene="l-targets.yaml") as daemon:
             with subprocess.Popen([str(SONARCTL), "listen", daemon.address, "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL) as driver:
                 try:

@@ -30,7 +30,7 @@ class DriverExample(unittest.TestCase):
         self.assertIn("starting\nno such device\n", run.stdout)
         self.assertLess(time.monotonic() - begin, 60)  # well before the 100 s that a driver may take for its pings
 
-    def test_the_page_is_true(self):
+    def test_the_example_passes_its_five_tests(self):
         run = run_example("test_driver.py")
         self.assertEqual(run.returncode, 0, run.stdout)
         self.assertIn("Ran 5 tests", run.stdout)

@@ -133,7 +133,7 @@ class Farm(unittest.TestCase):
         self.wait_for(self.worker(None, "--until-empty"))
         self.assertIn("as they were written", self.farm("collect", made))
 
-    def test_a_poison_shard_ends_in_dead_and_the_rest_is_complete(self):
+    def test_a_shard_that_always_fails_is_listed_as_dead_and_the_rest_is_complete(self):
         _, made = self.submit(self.small_job(SMALL.replace("5, 5.2", "5, -50")))  # ping 7, in shard 3
         self.wait_for(self.worker(None, "--until-empty"), self.worker(None, "--until-empty"))
         status = self.status()
@@ -160,7 +160,7 @@ class Farm(unittest.TestCase):
         self.assertIn("start the worker with the same --out folder as", self.logs())
         self.assertIn("0 running, 6 queued, 0 dead", self.status())
 
-    def test_unequal_bytes_stop_the_job(self):
+    def test_unequal_bytes_of_a_shard_stop_the_job(self):
         _, made = self.submit(self.small_job())
         for name, text in (("tar", "other"), ("json", "{}"), ("tar.sha256", "00  shard-000002.tar\n")):
             (made / f"shard-000002.{name}").write_text(text)

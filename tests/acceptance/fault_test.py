@@ -68,13 +68,13 @@ class Faults(unittest.TestCase):
         self.does("reset")
         self.assertEqual(self.listed(), {})
 
-    def test_a_trouble_is_ended_by_its_name(self):
+    def test_a_trouble_is_removed_by_its_name(self):
         self.does("add", "electrical-noise", "--with", "severity=1")
         self.assertEqual(sorted(self.listed()), [f"electrical-noise.{n}" for n in (1, 2, 3)])
         self.does("remove", "electrical-noise")
         self.assertEqual(self.listed(), {})
 
-    def test_what_is_wrong_is_said(self):
+    def test_wrong_requests_are_refused_with_the_mistake(self):
         self.refuses(65, ("add", "silent-opne"), 'did you mean "silent-open"?')
         self.refuses(65, ("add", "F01", "--with", "bytes=0"), "bytes must be a whole number from 1 to 4096")
         self.refuses(65, ("add", "L05", "--sonar", "stern"), 'no sonar is called "stern"')
@@ -136,7 +136,7 @@ class Recorded(unittest.TestCase):
 
 
 class NotArmed(unittest.TestCase):
-    def test_nothing_is_taken(self):
+    def test_faults_are_refused(self):
         with Sonard() as daemon:
             control = ("--control", f"{daemon.address}:14770")
             refused = run(SONARCTL, "fault", "add", "L05", *control)

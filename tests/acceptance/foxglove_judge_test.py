@@ -118,7 +118,7 @@ class Foxglove(unittest.TestCase):
         with Sonard(arguments=["--clock", "lockstep"]) as daemon:
             judge("services", url(daemon))
 
-    def test_one_that_does_not_read_for_a_while(self):
+    def test_a_viewer_that_does_not_read_for_a_while(self):
         with Sonard() as daemon, Driver(daemon):
             judge("stalled", url(daemon))
 

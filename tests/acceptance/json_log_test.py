@@ -53,7 +53,7 @@ control: {{stream: off, http: off}}
                     self.assertRegex(text, r"(?m)^  tcp +127")
                     self.assertRegex(text, r"(?m)^resident memory ")
 
-    def test_complaints_too(self):
+    def test_errors_of_the_start_are_objects_too(self):
         missing = BUILD / "none.yaml"
         result = run(SONARD, "run", missing, "--log-format", "json")
         self.assertEqual(result.returncode, 66)

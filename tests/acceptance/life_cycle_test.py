@@ -67,7 +67,7 @@ class Reader(threading.Thread):
         return self.pings[-1] - self.pings[0] + 1 - len(self.pings)
 
 
-def deaf_client(address):
+def client_that_never_reads(address):
     """Requests pings and never reads, so that soon the sonar cannot send more. Does not wait for that."""
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -117,7 +117,7 @@ class Stop(unittest.TestCase):
             readers = [Reader(daemon.address, rate_hz=40) for _ in range(2)]
             for reader in readers:
                 reader.wait_for(3)
-            deaf = deaf_client(daemon.address)
+            deaf = client_that_never_reads(daemon.address)
             readers[0].wait_for(len(readers[0].pings) + 20)  # by now the buffers of the client that does not read are full
             code, seconds = daemon.stop()
             for reader in readers:
@@ -193,7 +193,7 @@ class Stop(unittest.TestCase):
         with Sonard(mount=FOUR_CLIENTS) as daemon:
             reader = Reader(daemon.address)
             reader.wait_for(3)
-            deaf = deaf_client(daemon.address)
+            deaf = client_that_never_reads(daemon.address)
             reader.wait_for(len(reader.pings) + 12)
             daemon.process.terminate()
             while "stopping" not in daemon.log():

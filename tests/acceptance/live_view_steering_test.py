@@ -182,7 +182,7 @@ class Preview(unittest.TestCase):
                 time.sleep(0.1)
             self.assertEqual(self.numbers(viewer, 1.5), [])
 
-    def test_only_in_real_time(self):
+    def test_there_is_no_preview_in_stepped_time(self):
         with Sonard(arguments=["--clock", "stepped"]) as daemon, Viewer(daemon.address) as viewer:
             self.assertNotIn("/front/preview", viewer.greeted().parameters())
             self.assertIsNone(viewer.set("/front/preview", True))
@@ -244,7 +244,7 @@ class Playback(unittest.TestCase):
                 self.assertGreater(plain.first_of("/front/image")["timestamp"]["seconds"], 10**9)
             self.assertTrue(all(ns == 5 * self.S for topic, ns, _ in viewer.messages if topic == "/front/image"))
 
-    def test_rounds_and_rights(self):
+    def test_loops_and_read_only_viewers(self):
         with follows_file(loop=True) as daemon:
             with Viewer(daemon.address, path="/?playback=rov", headers={"Origin": "https://look.example"}) as looker:
                 looker.greeted()

@@ -168,7 +168,7 @@ class Channels(unittest.TestCase):
             model = scene["entities"][0]["models"][0]
             self.assertEqual(struct.unpack_from("<4sII", model["data"]), (b"glTF", 2, len(model["data"])))
 
-    def test_truth_is_made_while_it_is_looked_at(self):
+    def test_a_subscriber_gets_the_truth_of_pings(self):
         with Sonard(scene="l-targets.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}", arguments=["--clock", "stepped"]) as daemon, \
                 Viewer(daemon.address) as viewer, Client(daemon.address) as client:
             viewer.greeted().subscribed("/front/truth")
@@ -212,7 +212,7 @@ class Channels(unittest.TestCase):
                     host.terminate()
             self.assertLess(max(int(dropped["/front/ping"]), int(dropped["/front/cloud"])), 200, dropped)
 
-    def test_who_comes_after_all_have_left_gets_geometry_too(self):
+    def test_a_viewer_after_all_others_have_left_gets_geometry(self):
         with Sonard() as daemon, Client(daemon.address) as client:
             client.send(fire_message(rate_hz=10))
             for _ in range(2):
@@ -237,7 +237,7 @@ class Channels(unittest.TestCase):
                 values = struct.unpack_from("<15d", viewer.wait_for(lambda kind, value: kind == "message")[2], 4)
             self.assertEqual(dict(zip(names, values))["z"], -3)
 
-    def test_the_log_reaches_newcomers(self):
+    def test_a_new_viewer_gets_the_log(self):
         with Sonard() as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribe("/log")
             self.assertEqual(viewer.first_of("/log")["level"], 2)
@@ -257,7 +257,7 @@ class Limits(unittest.TestCase):
                 viewer.receive()
         return closed.exception.code
 
-    def test_noise_is_not_listened_to(self):
+    def test_floods_and_wrong_messages_end_the_connection_or_are_reported(self):
         with Sonard() as daemon:
             with Viewer(daemon.address) as viewer:
                 for _ in range(10):
@@ -282,7 +282,7 @@ class Limits(unittest.TestCase):
                 self.assertIn("clientPublish", viewer.status()["message"])
             self.assertEqual(daemon.stop()[0], 0)
 
-    def test_what_a_slow_one_loses_is_counted(self):
+    def test_messages_that_a_slow_viewer_loses_are_counted(self):
         with Sonard() as daemon, Viewer(daemon.address, small_window=True) as viewer, Client(daemon.address) as client:
             viewer.greeted().subscribe("/front/image")
             client.send(fire_message(rate_hz=5))
@@ -295,7 +295,7 @@ class Limits(unittest.TestCase):
             viewers = json.loads(daemon.get("/api/v1/status"))["viewers"]
             self.assertGreaterEqual(int(viewers[0]["dropped"]["/front/image"]), int(count[1]))
 
-    def test_says_goodbye(self):
+    def test_a_stop_closes_connections_as_going_away(self):
         with Sonard() as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted()
             self.assertEqual(daemon.stop()[0], 0)

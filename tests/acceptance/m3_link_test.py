@@ -131,7 +131,7 @@ class Stream(unittest.TestCase):
             self.assertEqual(refused.returncode, 64)
             self.assertIn("--range does not apply to an M3, whose drivers set nothing: use `sonarctl set sonar`", refused.stderr)
 
-    def test_several_drivers_and_bytes_from_one(self):
+    def test_several_drivers_get_pings_and_bytes_from_one_are_logged(self):
         with sonar() as daemon, Driver(daemon.address) as one, Driver(daemon.address) as other:
             one.link.sendall(b"<Command><Operation>Get_Status</Operation></Command>")
             numbers = [[driver.next().number for _ in range(3)] for driver in (one, other)]

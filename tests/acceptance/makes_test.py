@@ -108,7 +108,7 @@ class Observed:
 class Makes(unittest.TestCase):
     maxDiff = None
 
-    def test_nothing_has_changed(self):
+    def test_every_make_behaves_as_recorded(self):
         expected = json.loads(EXPECTED.read_text(encoding="utf-8"))
         for profile in MAKES:
             seen = Observed(profile).seen

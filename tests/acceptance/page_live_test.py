@@ -104,7 +104,7 @@ class Live(PageChecks, unittest.TestCase):
     def open(self, daemon, width=1440, height=900, query="", **options):
         return self.opened(self.browser.open(url_of(daemon) + query, width, height, **options))
 
-    def test_fan_is_true(self):
+    def test_fan_equals_that_of_sonarctl_view(self):
         """The page draws a ping as `sonarctl view` draws the bytes that a driver received."""
         for settings, width in (({}, 1000), ({"bits": 16}, 300), ({"mode": 1, "range_m": 20}, 300)):
             with self.subTest(**settings), Sonard(mount=MOUNT, trajectory="orbit", arguments=["--clock", "stepped"]) as daemon, \

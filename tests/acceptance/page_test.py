@@ -143,7 +143,7 @@ class Page(PageChecks, unittest.TestCase):
     def open(self, width=1440, height=900, query="", **options):
         return self.opened(self.browser.open(self.url + query, width, height, **options))
 
-    def test_fan_is_true(self):
+    def test_fan_equals_that_of_sonarctl_view(self):
         """The page draws a ping as `sonarctl view` does: the usual picture, and smaller ones."""
         maps = [line for line in (ROOT / "core/image/colour_map.cpp").read_text().split('"') if line.isalpha() and line.islower()]
         self.assertIn("cividis", maps)

@@ -351,7 +351,7 @@ class OneIntoAnother(Files):
             with self.subTest(path.name), Replay(path, "--stepped") as replay:
                 self.assertEqual(replay.everything(), found[0].read_bytes())
 
-    def test_a_pipe_that_nobody_reads_is_not_waited_for(self):
+    def test_a_pipe_without_a_reader_is_refused_without_waiting(self):
         source = self.path("raw")
         source.write_bytes(self.made())
         os.mkfifo(self.folder / "pipe")

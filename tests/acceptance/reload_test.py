@@ -87,7 +87,7 @@ class Reload(unittest.TestCase):
             self.assertLess(time.monotonic(), deadline, daemon.log())
             time.sleep(0.02)
 
-    def test_untouched_sonar_streams_on_over_a_changed_scene(self):
+    def test_an_unchanged_sonar_continues_in_a_changed_scene(self):
         daemon = Sonard(pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")
         daemon.scene = pathlib.Path(daemon.folder.name) / "reload.yaml"
         daemon.scene.write_text(SCENE.format(x=3), encoding="utf-8")
@@ -169,7 +169,7 @@ class Reload(unittest.TestCase):
         ball, _, _ = ping.brightest(int(1.0 * rows_per_m), int(7.0 * rows_per_m))
         return ball
 
-    def test_the_demo_has_nothing_to_read(self):
+    def test_a_reload_of_the_demo_changes_nothing(self):
         with tempfile.TemporaryFile() as log:
             demo = subprocess.Popen([str(SONARD), "run", "--demo", "--bind", "127.0.0.9"], stdin=subprocess.DEVNULL, stdout=log,
                                     stderr=subprocess.STDOUT)

@@ -253,7 +253,7 @@ class Render(unittest.TestCase):
         about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
         self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
 
-    def test_a_part_of_a_run_is_the_same_pings(self):
+    def test_a_part_of_a_run_has_the_same_pings(self):
         options = ["--format", "raw,png"]
         self.expect(self.render("--pings", "4", *options), 0)
         part = self.path / "part"

@@ -27,14 +27,14 @@ class Reproducibility(unittest.TestCase):
         self.assertEqual(mission.digests[client], self.plain.digests[1])
         self.assertEqual(mission.sha256, self.plain.sha256, "the digest is of what arrives")
 
-    def test_again_and_with_any_number_of_threads(self):
+    def test_every_run_with_any_number_of_threads_is_the_same(self):
         self.assertEqual(self.plain.digests, {1: self.plain.sha256})
         self.assertEqual(len({hashlib.sha256(str(p.image).encode()).digest() for p in self.plain.pictures()}), PINGS, "things move")
         for threads in (1, 2, 4):
             with self.subTest(threads=threads), Mission(SECONDS, PINGS, "--threads", threads) as mission:
                 self.expect_the_same(mission.fly(keep=False))
 
-    def test_others_may_look_on(self):
+    def test_onlookers_change_nothing(self):
         for comes_at in (0, 5):
             with self.subTest(comes_at=comes_at), Mission(SECONDS, PINGS) as mission:
                 onlookers = []
@@ -111,7 +111,7 @@ class Reproducibility(unittest.TestCase):
         with Mission(SECONDS, PINGS) as again:
             self.expect_the_same(again.fly(keep=False))
 
-    def test_started_further_on_it_shows_the_same_pictures(self):
+    def test_a_later_start_gives_the_same_pictures(self):
         """Ping numbers and stamps count from the start of a run, and so does the receiver's noise, which is off here."""
         quiet = ("--noise", "off", "--leak", "off")
         later = 10

@@ -117,7 +117,7 @@ class Steering(unittest.TestCase):
         self.refuses(65, ("load", "no-such-scene.yaml"), "no-such-scene.yaml")
         self.does("load", ROOT / "scenes/demo.yaml")
 
-    def test_nobody_there_is_69(self):
+    def test_without_a_daemon_the_exit_code_is_69(self):
         result = run(SONARCTL, "status", "--control", "127.0.0.9:14770")
         self.assertEqual(result.returncode, 69)
         self.assertIn("no sonard answers on the control stream", result.stderr)

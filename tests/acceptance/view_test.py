@@ -60,7 +60,7 @@ class View(unittest.TestCase):
         self.assertGreater(len(lines), 8)
         self.assertRegex(lines[-1], r"^ping \d+  \d+\.\d\d m  2\.\d+ MHz  512 beams x \d+ rows$")
 
-    def test_a_terminal_gets_colours_and_is_given_back(self):
+    def test_a_terminal_shows_colours_and_is_restored_at_the_end(self):
         code, output = in_a_terminal([SONARCTL, "view", self.daemon.address, "--wait", "100", "--term", "--live"], b" Hz  ",
                                      lambda process: process.send_signal(signal.SIGINT))
         self.assertEqual(code, 0, output[-500:])

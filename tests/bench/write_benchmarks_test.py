@@ -57,7 +57,7 @@ class Page(unittest.TestCase):
         self.assertIn("4 of 40 ticks skipped | none skipped |  | **missed** |", page[1])
         self.assertIn("| aris-1200 | 12 Hz | 128 | 800 | 3.4 | 2.0 | 3.5 | 9.2 | 0 of 36 ticks skipped |", write_benchmarks.tables(report))
 
-    def test_everything_found_is_told(self):
+    def test_all_results_are_written(self):
         report = {"processor": "test", "load_average": 5.5, "results": [result("P1", 2, 80)],
                   "latency": {"rows": 437, "threads": 2, "triggers": 200, "latency": TIMES},
                   "clients": [{"clients": 10, "pings_per_second": 40.0, "dropped": 1, "sender_share": 0.1}],
@@ -151,7 +151,7 @@ class Page(unittest.TestCase):
         self.assertIn("| P1 | P1 described |  | 242 | 269 | 5.00 | 75 | 400 | holds |", page)
         self.assertIn("| P1 | P1 described |  | 140 | 156 | 5.00 | 75 | 160 | holds |", page)
 
-    def test_a_report_of_nothing_is_a_page(self):
+    def test_a_report_with_one_result_makes_a_page(self):
         self.assertIn("# Benchmarks", write_benchmarks.page({"processor": "test", "results": [result("P2", 1, 10)]}))
 
 
