@@ -95,7 +95,7 @@ class Container(unittest.TestCase):
         for path in ("build/release/x.o", "tests/core/x.cpp", "docs/__pycache__", ".git/HEAD"):
             self.assertTrue(ignored(path), path)
 
-    @unittest.skipIf(shutil.which("hadolint") is None, "hadolint is not here")
+    @unittest.skipIf(shutil.which("hadolint") is None, "hadolint is not installed")
     def test_hadolint_finds_nothing(self):
         result = run("hadolint", "--ignore", "DL3008", FILE)  # DL3008 requires fixed versions; the Debian release fixes ours
         self.assertEqual(result.returncode, 0, result.stdout)

@@ -42,7 +42,7 @@ def parse(example):
         elif url is None and word.startswith("http://"):
             url = word[len("http://"):]
         else:
-            raise AssertionError(f"{word}: not an option that this test knows")
+            raise AssertionError(f"{word}: this test does not know the option")
     host, _, path = url.partition("/")
     return method or ("GET" if body is None else "POST"), host, "/" + path, headers, body
 

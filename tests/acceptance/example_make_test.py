@@ -45,7 +45,7 @@ class ExampleMake(unittest.TestCase):
             for path in files.values():
                 self.ctl("view", "--from", path, "--ping", PINGS - 1, "--png", folder / "view.png")
                 shown.add((folder / "view.png").read_bytes())
-            self.assertEqual(len(shown), 1, "the same of every file")
+            self.assertEqual(len(shown), 1, "every file shows the same picture")
             for path in files.values():
                 with self.subTest(path=path.name), Replay(path, "--loop") as replay:
                     lines = self.ctl("listen", f"{replay.address}:{PORT}", "--pings", 2, *PATIENCE)

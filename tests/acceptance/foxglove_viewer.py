@@ -161,7 +161,7 @@ class Viewer:
             kind, value = self.receive()
             if wanted(kind, value):
                 return value
-        raise AssertionError("did not come")
+        raise AssertionError("the expected message did not come")
 
     def greeted(self):
         self.wait_for(lambda kind, value: kind == "word" and value["op"] == "advertise")

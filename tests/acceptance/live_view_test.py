@@ -25,7 +25,7 @@ def refusal(*arguments, **options):
         Viewer(*arguments, **options).socket.close()
     except Refused as refused:
         return refused
-    raise AssertionError("was let in")
+    raise AssertionError("the connection was accepted")
 
 
 def let_in(*arguments):

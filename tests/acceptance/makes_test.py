@@ -141,7 +141,7 @@ class Recordings(unittest.TestCase):
                     done = self.ctl("view", "--from", folder / f"run.{kind}", "--ping", pings - 1, "--png", folder / "view.png")
                     self.assertEqual(done.returncode, 0, kind + done.stderr)
                     shown.add(pixels_of(folder / "view.png"))
-                self.assertEqual(len(shown), 1, "the same of every file")
+                self.assertEqual(len(shown), 1, "every file shows the same picture")
                 for kind in kinds:
                     with self.subTest(profile=profile, kind=kind):
                         self.replay(folder / f"run.{kind}", port)

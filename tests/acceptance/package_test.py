@@ -197,7 +197,7 @@ class Package(Installed, unittest.TestCase):
 
     def test_lintian_finds_no_error(self):
         if shutil.which("lintian") is None:
-            self.skipTest("lintian is not here")
+            self.skipTest("lintian is not installed")
         for name, package in self.packages.items():
             result = run("lintian", "--fail-on", "error", "--allow-root", package)
             self.assertEqual(result.returncode, 0, f"{name}: {result.stdout}")

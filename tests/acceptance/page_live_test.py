@@ -258,7 +258,7 @@ class Live(PageChecks, unittest.TestCase):
             page.wait("document.querySelector('#announce').textContent.includes('fault: Deaf head')")
             time.sleep(2.5)  # screen readers get changes at most every 2 s
             announced = page.run("document.querySelector('#announce').textContent")
-            self.assertNotIn("A fault acts", announced, "named twice, and after its end")
+            self.assertNotIn("A fault acts", announced, "the finding already names the fault")
             page.click("#findings button.link")
             page.wait("!document.querySelector('.fault-card')")
             self.assertNotIn("A fault acts", page.text("#findings"), "although the daemon looks only every 2 s")

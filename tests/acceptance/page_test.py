@@ -518,7 +518,7 @@ class Page(PageChecks, unittest.TestCase):
         page.wait("/^(9|10)\\.\\d Hz$/.test(document.querySelector('#rate').innerText)")
         self.assertIn("rate, at most", page.text("#setting-rows"))
         self.assertNotIn("1000 Hz", page.run("document.body.innerText"))
-        self.assertFalse(page.run("document.querySelector('#frequency-chip').offsetWidth"), "it is not known")
+        self.assertFalse(page.run("document.querySelector('#frequency-chip').offsetWidth"), "the frequency is not known")
         self.mock.state("standby")
         page.wait("document.querySelector('#frequency-chip').offsetWidth")
         page.wait("document.querySelector('[name=\"/front/rate_hz\"]').placeholder === 'standby' && !document.querySelector('[name=\"/front/rate_hz\"]').value")

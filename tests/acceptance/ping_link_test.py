@@ -275,7 +275,7 @@ class OmniscanLink(unittest.TestCase):
                 pass
             tcp.close()
             time.sleep(0.5)
-        raise AssertionError("still held by a host that asks for no pings")
+        raise AssertionError("the sonar still belongs to a host that has disabled pings")
 
     def served_again(self, file, address):
         replay = subprocess.Popen([SONARD, "replay", file, "--ip", address], stderr=subprocess.PIPE, text=True)

@@ -103,7 +103,7 @@ class Unit(unittest.TestCase):
             counts = pathlib.Path(folder) / "calls"
             probe = run("strace", "-o", "/dev/null", "true")
             if probe.returncode != 0:
-                self.skipTest(f"strace may not watch: {probe.stderr.strip()}")
+                self.skipTest(f"strace may not trace: {probe.stderr.strip()}")
             picture = run("strace", "-f", "-qq", "-o", counts, SONARD, "render", ROOT / "scenes/sonard.yaml", "--out", folder, "--quiet")
             self.assertEqual(picture.returncode, 0, picture.stderr)
             served = self.serve_under_strace(pathlib.Path(folder))

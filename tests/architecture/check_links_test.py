@@ -76,7 +76,7 @@ class Planted(unittest.TestCase):
                 (root / "docs" / name).write_text("", encoding="utf-8")
             (root / ".gitignore").write_text("made.txt\n", encoding="utf-8")
             if subprocess.run(["git", "-C", folder, "init", "-q"], check=False, capture_output=True).returncode != 0:
-                self.skipTest("git is not here")
+                self.skipTest("git is not installed")
             self.assertEqual(check_links.dead_links(root), [f"{PAGE}:1: link: made.txt: does not exist"])
 
     def test_dead_symbolic_links_are_found(self):

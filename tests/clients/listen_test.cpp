@@ -163,11 +163,11 @@ TEST(Listen, ConnectsAgainInARunWithoutAnEnd) {
     const Result<void> done = live ? view(view_options) : listen(options);
     const std::string out = testing::internal::GetCapturedStdout(), err = testing::internal::GetCapturedStderr();
     std::filesystem::remove(view_options.png);
-    ASSERT_FALSE(done) << "it does not come back a third time";
+    ASSERT_FALSE(done) << "the device accepts no third connection";
     EXPECT_EQ(done.error().kind, ErrorKind::io);
     EXPECT_THAT(err, HasSubstr("; connecting again, for 1 s\nsonarctl: connected again to 127.0.0.2:"));
     if (!live) {
-      EXPECT_THAT(out, HasSubstr("pings 6")) << "of both connections";
+      EXPECT_THAT(out, HasSubstr("pings 6")) << "pings of both connections are counted";
     }
   }
 }

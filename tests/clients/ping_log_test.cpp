@@ -73,7 +73,7 @@ TEST(NoticeLog, KeepsTheFirstOfAKindAndThenFew) {
   EXPECT_THAT(
       kept, ElementsAre("ping 1 is late", "ping 2 is late", "ping 3 is late", "ping 10 is late  (the 10th message of this kind)",
                         HasSubstr("the 100th"), HasSubstr("the 1000th")));
-  EXPECT_THAT(log.kept({"ping 9 is early"}), ElementsAre("ping 9 is early")) << "of another kind";
+  EXPECT_THAT(log.kept({"ping 9 is early"}), ElementsAre("ping 9 is early")) << "a message of another kind";
   EXPECT_THAT(log.rest(), ElementsAre()) << "all of them have been reported";
   log.kept({"ping 1001 is late"});
   EXPECT_THAT(log.rest(), ElementsAre("ping 1001 is late  (the last of 1001 messages of this kind)"));
@@ -97,7 +97,7 @@ TEST(PingLog, PrintsTextAndJson) {
               testing::AllOf(HasSubstr("echoed as requested: ping 1"), HasSubstr("missing ids 5")));
   EXPECT_THAT(json_from(log.summary(counts), true),
               testing::AllOf(HasSubstr("\"echo_satisfied_at\":1"), HasSubstr("\"missing_ids\":5")));
-  EXPECT_THAT(json_from(log.summary(std::nullopt), false), HasSubstr("\"missing_ids\":null")) << "of a wire that does not number";
+  EXPECT_THAT(json_from(log.summary(std::nullopt), false), HasSubstr("\"missing_ids\":null")) << "this wire has no ping numbers";
 }
 
 TEST(PingLog, ReportsTheRateInTheUnitOfTheMake) {

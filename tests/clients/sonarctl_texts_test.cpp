@@ -51,7 +51,7 @@ TEST(ViewCaption, HasRateAndGaps) {
   figures.add(ping(11), missing(2), 100.2);
   EXPECT_THAT(figures.text(), HasSubstr("10.0 Hz  2 missed"));
   for (std::uint32_t i = 0; i < 50; ++i) figures.add(ping(12 + i), missing(2), 101.0 + 0.5 * i);
-  EXPECT_THAT(figures.text(), HasSubstr("  2.0 Hz")) << "of late, not of all time";
+  EXPECT_THAT(figures.text(), HasSubstr("  2.0 Hz")) << "the recent rate, not the mean";
   EXPECT_EQ(figures.pings(), 53u);
   ViewCaption unnumbered("lines/s");
   for (std::uint32_t i = 0; i < 2; ++i) unnumbered.add(ping(i), std::nullopt, i);

@@ -81,7 +81,7 @@ TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   machine.download(0, back, device, sizeof(int));
   *host = 2;
   machine.wait(0);
-  EXPECT_EQ(*back, -1) << "lane 0 need not wait for lane 2";
+  EXPECT_EQ(*back, -1) << "no order was set: lane 0 does not wait for lane 2";
   machine.order(0, 2);
   machine.download(0, back, device, sizeof(int));
   *host = 3;

@@ -86,7 +86,7 @@ run_tests() {
   local programs
   make_commands
   mapfile -t programs < <(tested)
-  [ -x "$folder/${programs[0]:-none}" ] || { echo "no tests in $folder: first the step build" >&2; return 66; }
+  [ -x "$folder/${programs[0]:-none}" ] || { echo "no tests in $folder: run the step build first" >&2; return 66; }
   printf '%s\0' "${programs[@]}" | xargs -0 -n 1 -P "${SONARD_TEST_JOBS:-$(nproc)}" bash -c '
     started=$SECONDS
     if output=$(timeout 3600 qemu-aarch64 "'"$folder"'/$0" --gtest_brief=1 2>&1 </dev/null); then

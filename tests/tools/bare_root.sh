@@ -7,7 +7,7 @@ make_bare_root() {
   local suite=$1 dir=$2 cache=${XDG_CACHE_HOME:-$HOME/.cache}/sonard-roots
   [ ! -e "$dir/etc/bare-$suite" ] || return 0
   [ "$(id -u)" = 0 ] || { echo "$dir: only root can make a Debian system there" >&2; return 77; }
-  [ -z "$(ls -A "$dir" 2>/dev/null)" ] || { echo "$dir is not empty and no bare $suite of this script: name another folder" >&2; return 73; }
+  [ -z "$(ls -A "$dir" 2>/dev/null)" ] || { echo "$dir is neither empty nor a bare $suite of this script: name another folder" >&2; return 73; }
   mkdir -p "$cache" "$dir"
   if [ ! -s "$cache/$suite.tar" ]; then
     command -v mmdebstrap >/dev/null || { echo "mmdebstrap not found: apt-get install mmdebstrap" >&2; return 69; }

@@ -77,4 +77,4 @@ done
 while [ $running -gt 0 ]; do ended; done
 say "fuzz targets"
 for name in "${names[@]}"; do cat "build/fuzz/$name.result"; done
-[ $failed -eq 0 ] || { echo "$failed of ${#names[@]} with a fault or short of their bound"; exit 1; }
+[ $failed -eq 0 ] || { echo "$failed of ${#names[@]} targets had a fault or tried too few inputs"; exit 1; }

@@ -50,7 +50,7 @@ do_pack() (
   tar -C "$stage" -cf - gpu_pack | gzip -9 >"$archive"
   bytes=$(stat -c %s "$archive")
   echo "gpu_check: $archive, $((bytes / 1000000)) MB"
-  [ "$bytes" -lt 57000000 ] || { echo "gpu_check: more than 57 MB do not travel" >&2; exit 1; }
+  [ "$bytes" -lt 57000000 ] || { echo "gpu_check: more than 57 MB are too much to transfer" >&2; exit 1; }
 )
 
 # The root has only the pack, the C library and its loader: no /usr, no /proc, no shell.
@@ -149,7 +149,7 @@ check() {
 ceiling() {
   # shellcheck disable=SC2046
   SONARD_TEST_DEVICE_IDLE=1 SONARD_CUDA_MODULE=$pack/bin/libhost_module.so bench 500 --case P10 --pings 128 $(thread_options) |
-    tee "$found/ceiling.txt" | grep -E 'P10|P11' || fail "the processor's share"
+    tee "$found/ceiling.txt" | grep -E 'P10|P11' || fail "P10 on an idle device"
 }
 
 rates() {
@@ -187,8 +187,8 @@ sanitize() {
 
 soak() {
   for i in 1 2 3; do
-    bench 180 --case P9 --threads 1 >"$found/soak_$i.txt" || fail "P9, time $i"
-    cmp <(digests "$found/soak_1.txt") <(digests "$found/soak_$i.txt") || fail "other bytes at time $i"
+    bench 180 --case P9 --threads 1 >"$found/soak_$i.txt" || fail "P9, run $i"
+    cmp <(digests "$found/soak_1.txt") <(digests "$found/soak_$i.txt") || fail "other bytes in run $i"
   done
 }
 
@@ -197,7 +197,7 @@ memory() {
   python3 -c "import torch,time;f=torch.cuda.mem_get_info()[0];x=torch.empty(f-(900<<20),dtype=torch.uint8,device='cuda');time.sleep(90)" &
   local hog=$!
   sleep 15
-  kill -0 $hog 2>/dev/null || { fail "no program here that fills the memory (python3 with torch)"; return; }
+  kill -0 $hog 2>/dev/null || { fail "python3 with torch is needed to fill the memory"; return; }
   bench 60 --case P1 --pings 8 --threads 1
   case $? in 0 | 69) ;; *) fail "a full device: neither pings nor exit code 69" ;; esac
   kill $hog

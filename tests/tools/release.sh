@@ -104,5 +104,5 @@ for step in "$@"; do
   case $step in
     source) source_archive ;;
     *) "$step" ;;
-  esac || { echo "release $version FAILED: $step; what was made before it is in $out" >&2; exit 1; }
+  esac || { echo "release $version FAILED: $step; results of earlier steps are in $out" >&2; exit 1; }
 done

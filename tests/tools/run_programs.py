@@ -30,7 +30,7 @@ def programs_of(build):
     """Returns the kinds and the command for each name."""
     path = pathlib.Path(build) / "tests/programs"
     if not path.is_file():
-        sys.exit(f"{path}: not there; configure the build folder first")
+        sys.exit(f"{path} does not exist; configure the build folder first")
     rows = [line.split() for line in path.read_text().splitlines()]
     return {pathlib.Path(row[1]).name: (set(row[0].split(",")), row[1:]) for row in rows}
 

@@ -59,7 +59,7 @@ end_aside() {
 # the rest.
 need_packages() {
   if ! command -v dpkg-query >/dev/null; then
-    echo "not a Debian-like system: expecting the equivalents of these packages: $*"
+    echo "not a Debian-like system: it must have the equivalents of these packages: $*"
     return 0
   fi
   local name missing=()
@@ -84,11 +84,11 @@ need_packages() {
   done
   [ ${#known[@]} -eq 0 ] || "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends \
     -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3 -o Dpkg::Use-Pty=0 install "${known[@]}" </dev/null || {
-    echo "apt-get could not install ${known[*]}: see its message above; with no network, install them by hand" >&2
+    echo "apt-get could not install ${known[*]}: see its message above. Without a network, install them by hand" >&2
     return 69
   }
   [ ${#unknown[@]} -eq 0 ] || {
-    echo "not in the package archives of this system: ${unknown[*]}; other systems: CONTRIBUTING.md" >&2
+    echo "not in the package archives of this system: ${unknown[*]}. CONTRIBUTING.md lists other systems" >&2
     return 69
   }
 }
@@ -96,7 +96,7 @@ need_packages() {
 # forget_figures: removes the figures that earlier runs left in the folder SONARD_RELIABILITY.
 forget_figures() {
   [ "$(realpath -m "$SONARD_RELIABILITY")" != "$(realpath -m tests/reliability/by_hand)" ] || {
-    echo "SONARD_RELIABILITY is tests/reliability/by_hand, whose figures no run makes anew: name another folder" >&2
+    echo "SONARD_RELIABILITY is tests/reliability/by_hand, whose figures no run can make again: name another folder" >&2
     return 64
   }
   rm -f "$SONARD_RELIABILITY"/*.json
@@ -158,7 +158,7 @@ configure_sanitized() {
   if clang_sanitizes; then
     configure "$1" -DSONAR_WERROR="${SONAR_WERROR:-OFF}"
   else
-    echo "no clang that links sanitized programs (${clang_packages[*]}): $(c++ --version | head -n 1) takes its place" >&2
+    echo "no clang that links sanitized programs (${clang_packages[*]}): compiling with $(c++ --version | head -n 1)" >&2
     configure "$1" -DCMAKE_C_COMPILER=cc -DCMAKE_CXX_COMPILER=c++ -DCMAKE_EXE_LINKER_FLAGS= -DSONAR_WERROR=OFF
   fi
 }
@@ -178,7 +178,7 @@ setup_and_build() {
   local packages=("${build_packages[@]}") testing=ON
   if [ -n "${product_only:-}" ] && [ ! -f build/release/tests/programs ]; then packages=("${product_packages[@]}") testing=OFF; fi
   need_packages "${packages[@]}" || return
-  need_packages "${page_packages[@]}" || echo "going on without: this sonard has no page for browsers"
+  need_packages "${page_packages[@]}" || echo "continuing without them: this sonard will have no page for browsers"
   say "building in build/release"
   configure release -DSONAR_WERROR="${SONAR_WERROR:-OFF}" -DBUILD_TESTING=$testing -DSONAR_TESTS_LEFT_OUT="${SONAR_TESTS_LEFT_OUT:-}" &&
     build release "$@"

@@ -30,7 +30,7 @@ if ! python=$(python_with_matplotlib); then
 fi
 # Only the classifier needs sklearn; without it that chapter is skipped.
 if [ -n "${SONARD_CAPTURES:-}" ] && ! "$python" -c 'import sklearn' 2>/dev/null; then
-  need_packages python3-sklearn || echo "going on without python3-sklearn"
+  need_packages python3-sklearn || echo "continuing without python3-sklearn"
 fi
 if [ -z "${SONARD_PROGRAM:-}" ]; then
   setup_and_build sonard sonard_bench || exit

@@ -75,7 +75,7 @@ class FiveMinutes(unittest.TestCase):
         self.assertEqual((result.returncode, result.stdout), (0, "first.ppm\n"), result.stderr)
         picture = (self.at / "first.ppm").read_bytes()
         self.assertTrue(picture.startswith(b"P6\n"))
-        self.assertGreater(len(set(picture[100:])), 50, "shades of an image")
+        self.assertGreater(len(set(picture[100:])), 50, "the image has many shades")
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ TEST_F(RegularFile, AFifoWithoutAReaderIsNotWaitedForWhenItIsToBeWritten) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_EQ(open_to_write(pipe, O_CREAT), -1);
   EXPECT_EQ(why_not_written(pipe, errno), "it is a pipe that no program reads; start its reader first");
-  EXPECT_EQ(why_not_written(folder / "none", ENXIO), std::strerror(ENXIO)) << "a socket or a terminal that is gone";
+  EXPECT_EQ(why_not_written(folder / "none", ENXIO), std::strerror(ENXIO)) << "no FIFO: a socket, or a terminal that has closed";
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK), writer = open_to_write(pipe, O_CREAT);
   ASSERT_GE(writer, 0);
   EXPECT_EQ(::fcntl(writer, F_GETFL) & O_NONBLOCK, 0) << "a full pipe makes writers wait, no bytes are lost";

@@ -205,7 +205,7 @@ void expect_the_same(const CellTile& found, const CellTile& expected, Compared& 
   }
 }
 
-/// All tiles of one patch with indices from -reach to reach.
+/// Compares all tiles of one patch with indices from -reach to reach.
 void compare(const Mesh& mesh, TileAddress a, int reach, const TextureField* texture, Compared& sum) {
   const std::vector<std::uint32_t> triangles = of_patch(mesh, a);
   for (a.i = -reach; a.i <= reach; ++a.i)

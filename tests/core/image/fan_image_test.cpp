@@ -89,7 +89,7 @@ TEST(Fan, ShowsNothingNearerThanItsStart) {
   std::fill(image.samples.begin(), image.samples.end(), 50.0f);
   const Raster fan = *draw_fan(image, plain_gray(800));
   const auto grey_at = [&](double range_m) { return fan.at(400, static_cast<int>(4 + (10 - range_m) / pixel_m)); };
-  EXPECT_EQ(grey_at(4.9).b, 23) << "the background";
+  EXPECT_EQ(grey_at(4.9).b, 23) << "nearer than the start is background";
   EXPECT_EQ(grey_at(5.1).b, 50);
 }
 
@@ -142,7 +142,7 @@ TEST(Fan, APainterDrawsPingsOfChangingShapesAsOneByOne) {
     EXPECT_EQ(painter.draw(image)->pixels, draw_fan(image, plain_gray(300))->pixels);
   EXPECT_FALSE(painter.draw(black_fan(10, 16, 190)));
   const PolarImage first = speckle(40, 60, 1);
-  EXPECT_EQ(painter.draw(first)->pixels, draw_fan(first, plain_gray(300))->pixels) << "after one that it refused";
+  EXPECT_EQ(painter.draw(first)->pixels, draw_fan(first, plain_gray(300))->pixels) << "drawing works after a refused image";
 }
 
 TEST(Fan, RefusesWhatCannotBeDrawn) {

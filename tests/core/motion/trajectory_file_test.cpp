@@ -288,7 +288,7 @@ TEST(TrajectoryFile, FindsAnglesThatAreNoRadians) {
   const auto largest = [](const std::string& unit, const std::string& values) {
     const std::string columns = "t_s,x_m,y_m,z_m,roll_" + unit + ",pitch_" + unit + ",yaw_" + unit + ",body\n";
     const TrajectoryFile file = parsed(columns + "0,0,0,0,0,0,1,a\n0,0,0,0,0,0,1,b\n1,0,0,0," + values + ",b\n");
-    EXPECT_EQ(file.bodies.at(0).largest_angle.rad, 0) << "of another body";
+    EXPECT_EQ(file.bodies.at(0).largest_angle.rad, 0) << "body a has no large angle";
     return file.bodies.at(1).largest_angle.rad;
   };
   EXPECT_EQ(largest("rad", "0,-10,90"), 90);

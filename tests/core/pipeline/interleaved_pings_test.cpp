@@ -187,7 +187,7 @@ TEST(InterleavedPings, ChannelsHaveTheirGains) {
                                      .ceiling_db = -22.5f};  // half a decibel per code
     each->ping();
   }
-  EXPECT_EQ(s.last().pressure_upa, even.last().pressure_upa) << "pressure is what arrives";
+  EXPECT_EQ(s.last().pressure_upa, even.last().pressure_upa) << "gains do not change the pressure";
   int compared = 0, exact = 0;
   for (int row = 0; row < rows; ++row)
     for (int j = 0; j < beams; ++j) {

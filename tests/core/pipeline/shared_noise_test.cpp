@@ -105,7 +105,7 @@ TEST_P(ChannelsShare, IsTheFocusedArraysSumOverItsChannels) {
         if (std::abs(u) < edge - 0.06) beside = std::max(beside, measured / power_from_db(level_db));
       }
     if (level_db < 20) {
-      EXPECT_LT(off, 0.03) << "what is left out, re the channels' own";
+      EXPECT_LT(off, 0.03) << "omitted power, relative to the channels' own noise";
       continue;
     }
     const std::string part = share > 0 ? "steady" : "changing";

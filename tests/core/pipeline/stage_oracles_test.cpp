@@ -310,7 +310,7 @@ TEST(StageOracles, Oracle44_AwkwardHitsGiveFiniteEchoes) {
       }
     }
   }
-  EXPECT_GE(sound, 4) << "the one good hit";
+  EXPECT_GE(sound, 4) << "the only valid hit has an echo in every case";
   record_oracle(44, "echoes that are not finite, of NaN, infinite, zero-range and grazing hits", 0, bad, 0, "");
 }
 

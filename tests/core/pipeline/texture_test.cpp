@@ -207,7 +207,8 @@ TEST(Grain, IsAddedToTheTexture) {
   const std::vector<float> grain = s.last().pressure_upa;
   Sounding texture(bed({2, 0.35f}), mode, default_rows(8, 640)), plain(bed({}), mode, default_rows(8, 640));
   texture.request.seed = plain.request.seed = s.request.seed;
-  EXPECT_NE(texture.ping_from({0, 0, height_m}, {0, tilt_rad, 0}).pressure_upa, grain) << "draws of its own";
+  EXPECT_NE(texture.ping_from({0, 0, height_m}, {0, tilt_rad, 0}).pressure_upa, grain)
+      << "grain and texture have different draws";
   s.request.switches.grain = false;
   EXPECT_EQ(s.ping().pressure_upa, plain.ping_from({0, 0, height_m}, {0, tilt_rad, 0}).pressure_upa);
 }

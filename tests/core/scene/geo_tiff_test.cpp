@@ -197,7 +197,8 @@ TEST_F(GeoTiff, CellsThatAMaskHidesAreHoles) {
   EXPECT_EQ(holes(masked(1, {0b10100000, 0b10000000})), "xooxox");
   EXPECT_EQ(holes(masked(8, {255, 255, 255, 255, 0, 255})), "xoxxxx");
   EXPECT_FLOAT_EQ(masked(8, {255, 255, 255, 255, 0, 255})->z_m[3], -1);
-  EXPECT_EQ(holes(masked(8, {0, 0, 0, 0, 0, 0}, 3, 5)), "xoxxxx") << "of a reduced picture; -9999 is far from all heights";
+  EXPECT_EQ(holes(masked(8, {0, 0, 0, 0, 0, 0}, 3, 5)), "xoxxxx")
+      << "a mask of a reduced picture is ignored; -9999 is far from all heights";
   EXPECT_THAT(masked(8, {255, 255, 255, 255}, 2).error().text, HasSubstr("a mask of another size or kind"));
   EXPECT_THAT(masked(4, {255, 255, 255, 255, 255, 255}).error().text, HasSubstr("gdalwarp -dstnodata"));
   files.write("g.tif.msk", "?");

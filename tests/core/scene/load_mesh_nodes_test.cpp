@@ -61,7 +61,7 @@ TEST_F(LoadMesh, TrianglesOutsideOfTheScenesOfGltfFilesAreCounted) {
   EXPECT_EQ(counts(gltf(two, R"({"nodes":[0]},{"nodes":[1]})", R"(,"scene":1)")), (Counts{2, 0, 2}));
   EXPECT_EQ(counts(gltf(R"({"children":[1,2]},{"mesh":0},{"mesh":0,"translation":[5,0,0]})", R"({"nodes":[0]})")),
             (Counts{4, 0, 2}));
-  EXPECT_EQ(counts(gltf(two, R"({"nodes":[0,1]})", "", "9")), (Counts{3, 1, 0})) << "a vertex that is not there";
+  EXPECT_EQ(counts(gltf(two, R"({"nodes":[0,1]})", "", "9")), (Counts{3, 1, 0})) << "a face with a vertex that does not exist";
 }
 
 TEST_F(LoadMesh, GltfExtensionsThatMoveSurfacesAreRefusedByName) {

@@ -145,7 +145,7 @@ TEST_F(LoadMesh, BinaryStlMayHaveBytesAfterItsTriangles) {
     return text + behind;
   };
   EXPECT_EQ(good("tail.stl", binary(2, 2, "made by hand")).lost, 0u);
-  EXPECT_EQ(good("more.stl", binary(1, 3, "")).lost, 2u) << "which the header does not count";
+  EXPECT_EQ(good("more.stl", binary(1, 3, "")).lost, 2u) << "triangles that the header does not count";
   for (const std::string& text : {binary(3, 2, ""), binary(0, 0, ""), std::string("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")})
     EXPECT_THAT(refusal("short.stl", text), HasSubstr("is not an STL file, or cut short"));
 }
@@ -211,7 +211,7 @@ TEST_F(LoadMesh, TrianglesThatAFileListsAndTheMeshHasNotAreCounted) {
   }
   EXPECT_EQ(good("before.obj", "f 1 2 3\nf 1 3 -1\n" + corners + "f -4 -3 -2\n").lost, 1u) << "vertices may follow their face";
   EXPECT_THAT(refusal("beyond.obj", corners + "f 1 2 9\n"), HasSubstr("no triangles"));
-  EXPECT_EQ(good("d.obj", corners + "f 1 2 3\nf 1 1 2\n").lost, 0u) << "without area is another count";
+  EXPECT_EQ(good("d.obj", corners + "f 1 2 3\nf 1 1 2\n").lost, 0u) << "triangles without area are counted separately";
   EXPECT_EQ(good("whole.stl", stl).lost, 0u);
   EXPECT_EQ(good("whole.ply", ply).lost, 0u);
   EXPECT_EQ(good("whole.glb", glb(3)).lost, 0u);

@@ -69,7 +69,7 @@ TEST(Materials, TheLibraryHasTheNamesWePromise) {
     const auto scene = parse_scene(a_ball_of(name), "s.yaml", ".");
     ASSERT_TRUE(scene) << name;
     const Material& m = library[name] = (*scene)->materials.at(0);
-    EXPECT_EQ(m.texture.shape, 0) << name << ": patches are for who asks for them";
+    EXPECT_EQ(m.texture.shape, 0) << name << ": no patches without a request";
     EXPECT_EQ(m.trend_db_per_decade, 0) << name;
     EXPECT_EQ(m.law, std::string(name).ends_with("_gsab") ? ScatteringLaw::gsab : ScatteringLaw::lambert) << name;
   }

@@ -70,7 +70,8 @@ TEST(XyzGrid, NorthingsInTheFirstColumnAreANote) {
   const auto exchanged = ::testing::Contains(HasSubstr("x and y may be exchanged"));
   EXPECT_THAT(notes(north_first), exchanged);
   EXPECT_THAT(notes("north east z\n" + north_first), ::testing::Not(exchanged));
-  EXPECT_THAT(notes("easting northing z\n" + north_first), ::testing::Not(exchanged)) << "such as feet of a state's plane";
+  EXPECT_THAT(notes("easting northing z\n" + north_first), ::testing::Not(exchanged))
+      << "named columns may be of another grid, such as state plane feet";
   EXPECT_THAT(notes("# E N z\n" + north_first), ::testing::Not(exchanged));
   for (const char* other : {"556000 6650000 -1\n556001 6650000 -2\n556000 6650002 -3\n", "0 0 -1\n1 0 -2\n0 1 -3\n1 1 -3\n",
                             "6650000 5560000 -1\n6650001 5560000 -2\n6650000 5560002 -3\n"})

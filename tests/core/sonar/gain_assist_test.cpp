@@ -36,7 +36,7 @@ TEST(GainAssist, ApproachesWithItsTimeConstant) {
   EXPECT_NEAR(next_gain_db(40, assisted_level / 2, 1, 0.3), 40 + (1 - std::exp(-1.0)) * 20 * std::log10(2.0), 1e-9);
   EXPECT_NEAR(next_gain_db(40, assisted_level, 1, 0.1), 40, 1e-9);
   EXPECT_NEAR(next_gain_db(40, assisted_level / 2, 0.5, 100), 40 + 40 * std::log10(2.0), 1e-9)
-      << "the power law halves what a sample tells";
+      << "the exponent 0.5 halves the decibels of a sample";
   EXPECT_EQ(next_gain_db(40, assisted_level / 2, 1, 0), 40);
   EXPECT_EQ(next_gain_db(95, 0, 1, 10), most_assisted_gain_db);
   EXPECT_EQ(next_gain_db(1, 1, 1, 10), least_assisted_gain_db);

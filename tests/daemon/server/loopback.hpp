@@ -95,7 +95,7 @@ struct DaemonSetup {
   bool config_file = false;                         // the configuration is in a file and can be read again
   std::function<void(Config&)> edit_config;         // called before the daemon starts
 };
-/// The configuration with which Daemon starts.
+/// Returns the configuration with which Daemon starts.
 std::string yaml_of(const DaemonSetup& setup);
 
 class Daemon {
@@ -120,7 +120,7 @@ class Daemon {
   /// Writes the configuration file (setup.config_file), which the next reload reads.
   void write_config(const std::string& yaml) const;
   std::string log_text();
-  /// Call it only after stop() or wait().
+  /// Returns the figures of the first sonar. Call it only after stop() or wait().
   DeviceFigures figures() const { return app_->devices().front().figures(); }
 
  private:
@@ -177,7 +177,7 @@ oculus::FireRequest fire_at(oculus::PingRate rate, double range_m = 2);
 void send_udp(const std::string& address, std::uint16_t port, const std::vector<std::byte>& bytes);
 std::vector<std::byte> bytes_of(const std::string& text);
 
-/// Polls until `done` or the deadline.
+/// Polls until `done` returns true, or the deadline. Returns whether it has returned true.
 template <class Done>
 bool eventually(Done&& done, milliseconds timeout = patience) {
   const auto deadline = Steady::now() + timeout;

@@ -84,7 +84,7 @@ TEST(BlueViewDiscovery, AnswersOnlyItsOwnQuery) {
   EXPECT_EQ(read_text(reader, "model"), "BlueView P900-90");
   EXPECT_EQ(read_text(reader, "serial"), "7001");
   question[4] = std::byte{2};
-  EXPECT_TRUE(answers().empty()) << "another version";
+  EXPECT_TRUE(answers().empty()) << "a query of another version gets no answer";
 }
 
 }  // namespace

@@ -124,7 +124,7 @@ TEST(LineParser, AfterAGapTheNextWholeLineIsReturned) {
       ASSERT_EQ(parser.next().value().text, "{\"a\":1}");
     }
     EXPECT_FALSE(parser.next());
-    EXPECT_TRUE(parser.may_become_object()) << "the begin of the line is not known";
+    EXPECT_TRUE(parser.may_become_object()) << "the beginning of the line is not known";
     parser.feed(bytes("5,6"));
     EXPECT_FALSE(parser.next());
     parser.feed(bytes("]}\n{\"c\":3}\n{\"d"));

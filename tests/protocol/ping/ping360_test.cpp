@@ -181,7 +181,7 @@ TEST(Ping360, ADatagramHasOneAnswerAndDevicesHaveNone) {
   EXPECT_EQ(talk.take().size(), 1u) << "a datagram that is one frame with a wrong sum is refused";
   for (const Bytes& of_a_device : {ack(Id::motor_off, 1), nack(Id::device_information, 1, "unknown message")}) {
     talk.say(of_a_device);
-    EXPECT_EQ(talk.take().size(), 0u) << "else two devices would answer each other endlessly";
+    EXPECT_EQ(talk.take().size(), 0u) << "otherwise two devices would answer each other endlessly";
   }
 }
 

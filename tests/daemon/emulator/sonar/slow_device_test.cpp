@@ -31,7 +31,7 @@ struct SlowDevice : ::testing::Test {
       if (message["type"] == "velocity") found.push_back(std::move(message));
       line.clear();
     }
-    EXPECT_TRUE(line.empty()) << "a line is cut";
+    EXPECT_TRUE(line.empty()) << "the last line is incomplete";
     received.clear();
     return found;
   }

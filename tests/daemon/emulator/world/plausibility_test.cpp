@@ -74,7 +74,7 @@ TEST(Plausibility, IntendedConfigurationsHaveNoNotes) {
   EXPECT_THAT(notes(*demo_config()), IsEmpty());
   EXPECT_THAT(notes(config_with("", "{frame: FRD, xyz_m: [0, 0, 0.1], rpy_deg: [0, -15, 180]}")), IsEmpty()) << "looking aft";
   EXPECT_THAT(notes(config_with("", "{frame: FRD, xyz_m: [0, 0, 0.1], rpy_deg: [90, -90, 0]}")), IsEmpty())
-      << "on its side, looking down";
+      << "mounted on its side, looks down";
 }
 
 TEST(Plausibility, AVehicleAboveTheWaterIsNoted) {
@@ -351,7 +351,7 @@ TEST(Plausibility, TheLastPoseIsCheckedAgainWhenTheSceneChanges) {
   EXPECT_THAT(plausibility.all(), IsEmpty());
   sample.pose.position_m = {480, 0, -9};
   EXPECT_EQ(plausibility.use(sample, {}).size(), 1u) << "below the ground of the other scene";
-  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "that the vehicle is far away was reported before";
+  EXPECT_THAT(plausibility.use(config, bed_scene()), IsEmpty()) << "the note that the vehicle is far away is not new";
   EXPECT_THAT(texts_of(plausibility.all()), ElementsAre(HasSubstr("m from everything in the scene")));
 }
 

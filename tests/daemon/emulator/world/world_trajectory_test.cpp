@@ -44,7 +44,7 @@ TEST(WorldTrajectory, TheVelocityGrowsWithThePlaybackSpeed) {
   const World w = with_rov({*motion::Speed::from(4), true, seconds(2)});
   EXPECT_EQ(x_at(w, 1), 6);
   EXPECT_DOUBLE_EQ(speed_at(w, 1), 4);
-  EXPECT_EQ(x_at(w, 2.5), 2) << "the second round";
+  EXPECT_EQ(x_at(w, 2.5), 2) << "the second pass of the loop";
 }
 
 TEST(WorldTrajectory, GivesWayToTheFirstPose) {

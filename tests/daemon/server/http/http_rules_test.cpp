@@ -100,7 +100,7 @@ TEST(HttpRules, ARequestIsDetectedInAnyPieces) {
   };
   for (std::size_t first = 0; first <= 12; ++first) {
     EXPECT_TRUE(detects("DELETE /x HT", first)) << first;
-    EXPECT_FALSE(detects("binary GET /", first)) << "only at the beginning";
+    EXPECT_FALSE(detects("binary GET /", first)) << "a method counts only at the beginning";
   }
 }
 
