@@ -152,7 +152,7 @@ class Preview(unittest.TestCase):
             shown = [viewer.decode(*viewer.wait_for(is_ping)[::2]) for _ in range(8)]
             self.assertEqual([(event["number"], event["preview"]) for event in shown], [(n, True) for n in range(2, 10)])
             first_ns, *_, last_ns = (int(event["fired_at_ns"]) for event in shown)
-            self.assertGreater(last_ns - first_ns, 0.9e9 * (len(shown) - 1) / 5, "at most 5 a second")
+            self.assertGreater(last_ns - first_ns, 0.9e9 * (len(shown) - 1) / 5, "at most 5 per second")
             status = json.loads(daemon.get("/api/v1/status"))
             self.assertTrue(status["sonars"][0]["preview"], status)
             eventually(lambda: re.search(r" Hz, preview [0-5]\.\d Hz  gain", run(SONARCTL, "status", "--control", f"{daemon.address}:14770").stdout))

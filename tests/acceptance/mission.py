@@ -60,7 +60,7 @@ class Mission:
         return self.folder / "recordings" / name
 
     def fly(self, keep=True, after=None):
-        """Reads to the end. after = (pings, function to call then, once). Without `keep`, only the hash of the stream is kept."""
+        """Reads to the end. `after`: a number of pings, and a function to call after them. Without `keep`, only a hash is kept."""
         taken, said = 0, hashlib.sha256()
         with Client(self.daemon.address, patience_s=120) as client:
             client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=1, flags=0x09))

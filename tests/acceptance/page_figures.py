@@ -1,7 +1,7 @@
 """Measures the page in a real browser and prints each figure beside its goal; tests/tools/long_checks.sh runs it (step page).
 
 page_figures.py FirstMinute   the first picture of the demo, clicks, the size of the page: a minute
-page_figures.py Long          memory over SONARD_PAGE_MINUTES (20), delays, pictures a second
+page_figures.py Long          memory over SONARD_PAGE_MINUTES (20), delays, pictures per second
 
 SONARD_RELIABILITY names a folder that keeps the figures. A missed goal is not a failure, because times depend on other programs
 of the computer.
@@ -126,7 +126,7 @@ class FirstMinute(unittest.TestCase):
     def test_clicks(self):
         with demo("oculus"), self.open(script=CLICKS) as page:
             shown(page)
-            page.wait("/\\d/.test(document.querySelector('#pose').textContent)")  # before it a new browser compiles its own shaders, 0.7 s in software
+            page.wait("/\\d/.test(document.querySelector('#pose').textContent)")  # until then a new browser compiles its own shaders: 0.7 s in software
             for selector in ROUNDS * CLICKED:
                 click(page, selector)
                 time.sleep(0.3)
@@ -189,7 +189,7 @@ class Long(unittest.TestCase):
             kept("page-pose-to-pixel", f"p50 {p50:.0f} ms, p95 {p95:.0f} ms of 100", "p50 < 100, p95 < 150 ms", p50 < 100 and p95 < 150)
             kept("page-socket-to-pixel", f"p50 {part(found['socket'], 0.5):.0f} ms, p95 {part(found['socket'], 0.95):.0f} ms of 100",
                  "p95 < 40 ms", part(found["socket"], 0.95) < 40)
-            kept("page-computing", f"{ask(daemon, 'status')['sonars'][0]['figures']['simulation_ms']:.0f} ms a ping", "< 20 ms", True)
+            kept("page-computing", f"{ask(daemon, 'status')['sonars'][0]['figures']['simulation_ms']:.0f} ms per ping", "< 20 ms", True)
 
     def test_pictures_a_second_and_clicks(self):
         scene = self.folder / "target.yaml"

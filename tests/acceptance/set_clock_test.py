@@ -95,7 +95,7 @@ class SetClock(unittest.TestCase):
                     self.assertEqual(recorder.wait(300), 0)
                 times = self.times_of(file.read_bytes())
                 self.assertLess(max(abs(after - before) for before, after in zip(times, times[1:])), 100)
-                self.assertGreaterEqual(len(set(times)), 30, "at least one a ping, also after the clock was set")
+                self.assertGreaterEqual(len(set(times)), 30, "at least one per ping, also after the clock was set")
 
     @staticmethod
     def times_of(pcap):

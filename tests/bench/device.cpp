@@ -76,7 +76,7 @@ Result<BatchRate> rate_of(const ScenePointer& scene, Parallel& pool, Pinger& pin
 /// Prints the row of the table; returns that of the report.
 json row_of(const BatchRate& found, const BenchCase& c, int threads, int batch) {
   std::printf(
-      "P10  %-4s %2d thread%s %2d pings a launch: %7.1f pings/s  (ms a ping: %.3f; tiles and points by the CPU %.3f, the "
+      "P10  %-4s %2d thread%s %2d pings per launch: %7.1f pings/s  (ms per ping: %.3f; tiles and points by the CPU %.3f, the "
       "device's steps %.3f)\n",
       c.name.c_str(), threads, threads == 1 ? " " : "s", batch, found.pings_per_second, 1e3 / found.pings_per_second,
       found.processor_ms, found.device_ms);
@@ -112,7 +112,7 @@ Result<json> find_device_rates(const ScenePointer& scene, const BenchScene& wher
   }
   const bool given = options.reference_ms > 0;
   const double reference_ms = given ? options.reference_ms : published_reference_ms, ratio = best_of_p1 * reference_ms / 1e3;
-  std::printf("P11  %.0f times the public reference code (%.1f ms a frame, %s)\n", ratio, reference_ms,
+  std::printf("P11  %.0f times the public reference code (%.1f ms per frame, %s)\n", ratio, reference_ms,
               given ? "as given for this device" : "as published, on another device");
   std::fflush(stdout);
   return json{{"name", cuda_status()},

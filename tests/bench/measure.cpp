@@ -151,7 +151,7 @@ void print(const Figures& f) {
   std::printf("%-4s %-34s %-13s %d thread%s  %6.1f pings/s   (ms: median %.2f, min %.2f, p90 %.2f, cold %.1f, processors %.2f)\n",
               f.case_name.c_str(), f.description.c_str(), f.scene.c_str(), f.threads, f.threads == 1 ? " " : "s",
               f.pings_per_second(), f.wall.median, f.wall.min, f.wall.p90, f.cold_ms, f.processor_ms);
-  std::printf("     thread ms a ping:");
+  std::printf("     thread ms per ping:");
   for (std::size_t s = 0; s < f.stage_ms.size(); ++s) std::printf(" %s %.2f", stage_names[s], f.stage_ms[s]);
   std::printf(" frame %.2f\n     %zu triangles, %zu rays, %zu cells in %zu tiles (%.1f MB kept), %zu echoes\n", f.frame_ms,
               f.scene_triangles, f.last.rays, f.last.cells, f.last.tiles, static_cast<double>(f.last.cell_bytes) / 1e6,

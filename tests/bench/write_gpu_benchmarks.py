@@ -11,7 +11,7 @@ import pathlib
 import re
 import sys
 
-# case: (required, goal) [pings/s], as for the CPU; P10 is the value for batches.
+# case: (required, goal) [pings/s]. The values of BATCH apply to P10, those of RATIO to P11.
 FLOORS = {"P1": (75, 250), "P3a": (40, 200), "P3b": (40, 160), "P3c": (40, 170), "P3d": (40, 100)}
 BATCH_FLOOR, BATCH_GOAL = 1000, 5000
 RATIO_FLOOR, RATIO_GOAL = 100, 1000
@@ -33,8 +33,9 @@ def alone(results):
     by_device = [r for r in results if r["engine"].startswith("cuda")]
     yield "## One ping at a time"
     yield ""
-    yield ("As a live sonar asks for them: a call, a ping, its bytes framed. Steps by the device's events, tiles and points by the "
-           "processor's clock, in a run of their own; what is left of the median is copying, launching and waiting.")
+    yield ("As for a live sonar: each call makes one ping, and its bytes are framed. A separate run times the steps with the "
+           "device's events, and tiles and points with the processor's clock. The rest of the median is copying, launching and "
+           "waiting.")
     yield ""
     stages = ["cull", "build cells", "specular", "trace", "scatter", "synthesize", "noise", "couple", "receive", "frame"]
     rows = []
@@ -53,23 +54,24 @@ def alone(results):
 def batches(device):
     yield "## In batches"
     yield ""
-    yield ("Four batches to a call, two of them under way at a time, framed; required 1,000 pings/s, goal 5,000 (P10); median of five "
-           "rounds after a second of warming up. Means a ping: by the clock on the wall; tiles and points, summed over the threads "
-           "that find them; the device's steps, by its events, in a run of their own. Copies, launches, taking results and framing "
-           "are in the first only.")
+    yield ("While the engine computes a batch, the pings of the previous one are framed. Required are 1,000 pings/s, the goal is "
+           "5,000 (P10). Rates are medians of up to five rounds, after a second of warming up. The last columns are means per "
+           "ping: wall time; tiles and points, summed over the threads that find them; and the device's steps, timed with its "
+           "events in a separate run. Only wall time includes copies, launches, results and framing.")
     yield ""
-    yield from table(["case", "threads", "pings a launch", "pings/s", "", "ms a ping: wall", "tiles and points", "device"],
+    yield from table(["case", "threads", "pings per launch", "pings/s", "", "ms per ping: wall", "tiles and points", "device"],
                      [[r["case"], r["threads"], r["batch"], f'{r["pings_per_second"]:.0f}',
                        verdict(r["pings_per_second"], BATCH_FLOOR, BATCH_GOAL), f'{1e3 / r["pings_per_second"]:.3f}',
                        f'{r["processor_ms"]:.3f}', f'{r["device_ms"]:.3f}'] for r in device["rates"]])
     reference = device["reference"]
     yield ""
     if reference["on_this_device"]:
-        yield (f'P11: {reference["ratio"]:.0f} times the public reference code on this device ({reference["ms"]:.1f} ms a frame): '
+        yield (f'P11: {reference["ratio"]:.0f} times the public reference code on this device ({reference["ms"]:.1f} ms per frame): '
                f'{verdict(reference["ratio"], RATIO_FLOOR, RATIO_GOAL)} (required {RATIO_FLOOR}, goal {RATIO_GOAL}).')
     else:
         yield (f'P11 is not measured: the public reference code has not run on this device. Against its published {reference["ms"]:.0f} ms '
-               f'a frame, on another device, P1 is {reference["ratio"]:.0f} times as fast. `GPU_CHECK_REFERENCE_MS=...` gives a measured one.')
+               f'per frame, on another device, P1 is {reference["ratio"]:.0f} times as fast. `GPU_CHECK_REFERENCE_MS` sets a '
+               'measured time.')
 
 
 def page(report, facts):
@@ -83,12 +85,12 @@ def page(report, facts):
                   f'P5, a daemon on loopback: median {t["median_ms"]:.2f} ms, p99 {t["p99_ms"]:.2f} ms (required 25, goal 10).']
     for found in report.get("hashes", []):
         same = "the same bytes" if found["same"] else "**different bytes**"
-        lines += ["", f'P9, {found["case"]}: {same} by 1, 2 and 4 threads and again.']
+        lines += ["", f'P9, {found["case"]}: {same} with 1, 2, 4 and again 1 threads.']
     if facts.get("distances"):
-        lines += ["", 'Beside the CPU engine with Embree (docs/cuda.md, "Equality with the CPU"), eight pings of P1:', "", "```",
-                  facts["distances"].strip(), "```"]
+        lines += ["", 'Differences from the CPU engine with Embree (docs/cuda.md, "Equality with the CPU") in eight pings of P1:',
+                  "", "```", facts["distances"].strip(), "```"]
     if facts.get("ceiling"):
-        lines += ["", "What the processor allows when the device takes no time (host module, steps left out):", "", "```",
+        lines += ["", "Rates that the processor allows if the device needs no time (host module without steps):", "", "```",
                   facts["ceiling"].strip(), "```"]
     return "\n".join(lines) + "\n"
 

@@ -37,7 +37,7 @@ class Page(unittest.TestCase):
         self.assertIn("| P1 | 4 | 32 | 5001 | goal | 0.200 | 0.200 | 0.150 |", lines)
         self.assertTrue(any(l.startswith("| P3d ") and "| **missed** |" in l for l in lines))
         self.assertFalse(any(l.startswith("| P2 ") for l in lines))
-        for words in ("P2: not for the device", "| driver | 580.1 |", "150 times the public reference code on this device (30.0 ms a frame): holds",
+        for words in ("P2: not for the device", "| driver | 580.1 |", "150 times the public reference code on this device (30.0 ms per frame): holds",
                       "p99 4.00 ms", "**different bytes**", "1: relative L2 1e-3"):
             self.assertIn(words, page)
 
@@ -59,7 +59,7 @@ class Page(unittest.TestCase):
             subprocess.run([sys.executable, "-B", write_gpu_benchmarks.__file__, found, page], check=True)
             text = page.read_text(encoding="utf-8")
             self.assertIn("| device | host loops |", text)
-            self.assertIn("30.0 ms a frame", text)
+            self.assertIn("30.0 ms per frame", text)
             self.assertEqual(text.count("| P3a |"), 2, "as many sizes of a batch as two pings fill")
             for row in ("| driver | none |", "| cuda_seam_test | [  PASSED  ] 2 tests. |", "| compute-sanitizer initcheck | not run |",
                         "| compute-sanitizer memcheck | ERROR SUMMARY: 0 errors |"):

@@ -4,9 +4,8 @@
 usage: run_programs.py BUILD_FOLDER NAME...        --list KIND... [--without KIND...] prints their names instead
 The names are listed in BUILD_FOLDER/tests/programs, which CMake writes: the kinds of a program, the program, and its
 arguments (tests/CMakeLists.txt).
-A GoogleTest program is run in parts (GTEST_TOTAL_SHARDS), before the others, which are short, so that no processor is idle
-at the end.
-Parts of all programs alternate, so that parts that wait for sockets or for time run beside parts that compute.
+GoogleTest programs are run in parts (GTEST_TOTAL_SHARDS), and before the others. The others are short, so that no processor is
+idle at the end. Parts of all programs alternate, so that parts that wait for sockets or for time run beside parts that compute.
 The tests that failed are added to the file that SONARD_FAILED names.
   SONARD_TEST_JOBS      programs at once (default: two per processor)
   SONARD_TEST_SECONDS   time limit of a program (default: 1800)

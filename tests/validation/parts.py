@@ -36,7 +36,7 @@ def rows_of(scene, plain, pairs):
     return rows
 
 
-HEADER = ["scene", "part", "by default", "pings/s with it", "without it", "thread ms a ping; of a part: more than without"]
+HEADER = ["scene", "part", "by default", "pings/s with it", "without it", "thread ms per ping; for a part: more than without it"]
 
 
 def chapter(sonard, folder):

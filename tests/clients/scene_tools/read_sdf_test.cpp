@@ -299,7 +299,7 @@ TEST(ReadSdf, ModelsNamedLikeFramesOrWaterAreReadWhereTheyAreFound) {
               ElementsAre("2 coordinate frames (a_frame, axes), 1 drawn water surface (ocean): without an echo"));
 }
 
-TEST(ReadSdf, CirclesAndDepthsEnd) {
+TEST(ReadSdf, CirclesAndDeepIncludesAreRefused) {
   Reading r;
   EXPECT_THAT(r.error(sdf(model("m", link("a", "<pose relative_to='b'/>") + link("b", "<pose relative_to='a'/>")))),
               HasSubstr("in a circle"));

@@ -37,7 +37,7 @@ TEST(ReadUrdf, LinksHangOnTheirJointsAtZero) {
   EXPECT_THAT(r.findings.left_out(), ElementsAre(HasSubstr("joint \"b\" (continuous): stays at zero")));
 }
 
-TEST(ReadUrdf, MeshesAndTheRest) {
+TEST(ReadUrdf, MeshesAreReadAndOtherElementsReported) {
   Reading r;
   const auto world = r.read(robot(part("base", "", "<mesh filename='package://arm/meshes/a.stl' scale='0.001 0.001 0.001'/>") +
                                   "<gazebo reference='base'/><transmission name='t'/><material name='steel'/>"));

@@ -42,7 +42,7 @@ TEST(Playback, SpeedIsExactForYears) {
   EXPECT_EQ(Speed::from(2.5)->millionths, 2'500'000);
 }
 
-TEST(Playback, LoopCountsItsClosingMomentOnce) {
+TEST(Playback, LoopShowsEachMomentOncePerPass) {
   const Playback p(seconds(10), looped(), Time{});
   std::multiset<Ns> moments;
   for (int ping = 0; ping < 300; ++ping) moments.insert(shown(p, 0.1 * ping));  // three rounds at 10 Hz
@@ -90,7 +90,7 @@ TEST(Playback, SeeksAndChangesSpeedWithoutAStep) {
   EXPECT_EQ(shown(p, 60), seconds(10));
 }
 
-TEST(Playback, AfterItsEndAnotherSpeedIsNoWayBack) {
+TEST(Playback, StaysAtItsEndAtAnotherSpeed) {
   Playback p(seconds(10), {}, at(0));
   p.use_speed(at(30), *Speed::from(0.5));
   EXPECT_EQ(shown(p, 31), seconds(10));

@@ -14,7 +14,7 @@ TEST(Stamp, KeepsEveryNanosecondOfUnixTime) {
   EXPECT_EQ(nanoseconds_of_nanoseconds("1.403636579763555584e+18"), 1403636579763555584);
 }
 
-TEST(Stamp, ReadsWhatPeopleWrite) {
+TEST(Stamp, ReadsDecimalsAndExponents) {
   EXPECT_EQ(nanoseconds_of_seconds("0"), 0);
   EXPECT_EQ(nanoseconds_of_seconds("-2.5"), -2'500'000'000);
   EXPECT_EQ(nanoseconds_of_seconds("+.5"), 500'000'000);
@@ -27,7 +27,7 @@ TEST(Stamp, ReadsWhatPeopleWrite) {
   EXPECT_EQ(nanoseconds_of_seconds("0e1000"), 0);
 }
 
-TEST(Stamp, RefusesTheRest) {
+TEST(Stamp, RefusesOtherTexts) {
   for (const char* text : {"", "-", ".", "e5", "1e", "1e+-5", "1e5x", "nan", "inf", "0x10", "1,5", "1 ", "--1", "+-1", "1e99999",
                            "4600000001", "1e30", "99999999999999999999999999"})
     EXPECT_FALSE(nanoseconds_of_seconds(text)) << text;

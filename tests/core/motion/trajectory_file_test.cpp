@@ -362,7 +362,7 @@ TEST(TrajectoryFile, TheManualsExamplesAreRead) {
 }
 
 /// An hour at 100 Hz. The deadline is about twenty times the time that a slow computer needs.
-TEST(TrajectoryFile, AnHourIsReadInNoTime) {
+TEST(TrajectoryFile, AnHourAt100HzIsReadQuickly) {
   constexpr int lines = 360000;
   const std::string name = testing::TempDir() + "hour" + std::to_string(getpid()) + ".tum";
   {

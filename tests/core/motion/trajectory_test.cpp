@@ -87,7 +87,7 @@ TEST(Trajectory, TurnsTheShortWay) {
   expect_near(ahead(way.at(milliseconds(500))), {std::sqrt(0.5), std::sqrt(0.5), 0});
 }
 
-TEST(Trajectory, IsTheSameOrNot) {
+TEST(Trajectory, EqualPosesAndStartsMakeItEqual) {
   Points other = bend();
   other.poses[1].position_m.z += 1e-12;
   EXPECT_TRUE(Trajectory(bend()) == Trajectory(bend()));

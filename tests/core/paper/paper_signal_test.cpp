@@ -91,7 +91,7 @@ TEST(PaperSum, FastAndDirectAgreeAndFollowTheDefinition) {
   }
 }
 
-TEST(PaperTransform, IsTheSumItSaysForAnyOffsetAndMoreFrequenciesThanSamples) {
+TEST(PaperTransform, EqualsItsDefinitionForAnyOffsetAndMoreFrequenciesThanSamples) {
   PingPlan plan = paper_plan();
   plan.samples = 60;
   plan.sample_offset = 0.2;

@@ -68,7 +68,7 @@ TEST(Leak, FallsFromItsLevelByItsDecay) {
   EXPECT_NEAR(db(ratio / n), 0, 0.3);
 }
 
-TEST(Leak, StaysFromPingToPingButForALittle) {
+TEST(Leak, ChangesLittleFromPingToPing) {
   Sounding s(SceneMaker().make(), oculus_high(), default_rows(2, 700));
   give_receiver(s, leaking());
   const auto first_rows = [&](std::uint32_t number) {

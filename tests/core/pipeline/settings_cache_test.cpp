@@ -54,7 +54,7 @@ TEST(SettingsCache, ForgetsWhatWasUsedLeastRecently) {
   }
 }
 
-TEST(SettingsCache, TheOnesInUseStayHoweverLarge) {
+TEST(SettingsCache, SettingsInUseStayEvenAboveTheLimit) {
   Drivers drivers(0);
   const auto& first = drivers.ask(2);
   EXPECT_TRUE(first.plan.shared_noise.is_audible());

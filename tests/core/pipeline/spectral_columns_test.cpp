@@ -129,7 +129,7 @@ TEST_P(EveryWay, Oracle18_SynthesisAgainstDirectSum) {
   }
 }
 
-TEST_P(EveryWay, Oracle43_WhatRingsInOrOutAtOneEndDoesNotComeOutAtTheOther) {
+TEST_P(EveryWay, Oracle43_EchoesAtOneEndDoNotWrapToTheOther) {
   const auto& [shape, exact, tolerance] = GetParam();
   for (const PingSettings& settings : grids()) {
     const PingPlan plan = plan_for(shape, exact, settings);

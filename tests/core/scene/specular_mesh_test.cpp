@@ -90,7 +90,7 @@ TEST(SpecularMesh, BoxIsSixFaces) {
   EXPECT_EQ(points[0].outline.size(), 2u * (2 + 4));  // only the rim, divided into quarters of a metre
 }
 
-TEST(SpecularMesh, FacetsWoundTheOtherWayBelongAllTheSame) {
+TEST(SpecularMesh, FacetsWoundTheOtherWayAreIncluded) {
   Mesh mesh = make_sphere(0.5, segments_for(0.5));
   for (std::size_t t = 0; t < mesh.triangles.size(); t += 3) std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
   const std::vector<SpecularPoint> points = on_mesh(mesh, {1, 2, 2});

@@ -66,7 +66,7 @@ TEST(Laws, GammaFollowsTheByte) {
   EXPECT_NEAR(gamma_from_byte(127), 0.5, 0.003);
 }
 
-TEST(Laws, GainEcho) {
+TEST(Laws, GainEchoFollowsModeFlagsAndOption) {
   const auto echo = [](int mode, int flags, double gain, const char* option) {
     return echoed_gain_percent(fire(0, mode, PingRate::hz10, flags, 5, gain).settings, option);
   };

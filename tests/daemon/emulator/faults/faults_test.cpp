@@ -315,7 +315,7 @@ TEST(Faults, SilenceLeavesTheConnectionOpenAndCountsWhatIsDropped) {
   const DeviceFigures f = run.time.sonar("front").figures();
   EXPECT_EQ(f.dropped_by[static_cast<std::size_t>(DropReason::fault)], run.journal.injected().size());
   EXPECT_EQ(f.offered, f.sent + f.dropped + f.waiting);
-  EXPECT_GT(numbers.back(), 15u) << "pings go on after a second";
+  EXPECT_GT(numbers.back(), 15u) << "pings continue after one second";
 }
 
 TEST(Faults, EveryAndProbabilityAndCount) {
