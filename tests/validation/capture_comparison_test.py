@@ -1,4 +1,4 @@
-"""Comparison with the captured pings: its statistics on made pictures, and the fit of our profile where the recordings are."""
+"""Tests the comparison with captured pings: its statistics with made-up pictures, and the fit of our profile with recordings."""
 import os
 import pathlib
 import random

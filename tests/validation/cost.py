@@ -33,9 +33,9 @@ def chapter(sonard, folder):
 INTRODUCTION = """## Cost of a ping
 
 Beside Table 3 of the paper (P900, 10 m, 512 beams; NVIDIA RTX 2080 Ti and Intel i9-9900K). Ours, no GPU: {machine}. By `sonard_bench
---case P1 --scene local-search --pings {pings}`: median rate over rough sand of {triangles} triangles, the sonar moving;
-stages are thread time over threads. Load average of the machine in the last minute: {load:.1f}; above the number of processors it
-lengthens these times. The paper's columns are ray signal, summation, correction and FFT. Our default has other stages, in the
-columns of the same work.
+--case P1 --scene local-search --pings {pings}`: median rate over rough sand of {triangles} triangles, with a moving sonar. Stages
+are thread time divided by threads. Load average of the machine in the last minute: {load:.1f}. A load above the number of
+processors lengthens these times. The paper's columns are ray signal, summation, correction and FFT. Our default has other stages;
+they are in the columns of the same work.
 
 """

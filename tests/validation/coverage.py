@@ -14,7 +14,7 @@ def rows_of(report):
     for line in lines:
         match = LINE.match(line)
         if match is None:
-            raise RuntimeError(f"a line of the coverage report that cannot be read: {line}")
+            raise RuntimeError(f"cannot read a line of the coverage report: {line}")
         rows.append([match["sonar"], match["beams"], f"{match['range']} m", match["rows"], f"{int(match['bins']):,}",
                      f"{match['share']} %", f"{match['worst']} dB", f"{match['mean']} dB"])
     if not rows:
@@ -31,9 +31,9 @@ def chapter(sonard, folder):
 
 INTRODUCTION = """## Coverage
 
-Every mode of every sonar, at its first range, over a level bed: how many bins of the bed lie within 1 dB of the closed form of
-their level. By `sonard render --report coverage` (method: docs/render.md). This is expected power, the mean over speckle, with
-surface cells 0.4 of a picture's each way. It shows that rays, patterns, pulse and gain leave no holes and no error; the effect of
-a picture's larger cells is in docs/acoustics.md, section 3.
+For every mode of every sonar, at its first range over a level bed, the table has the share of the bed's bins within 1 dB of the
+closed form of their level. `sonard render --report coverage` computes it (method: docs/render.md) in expected power, the mean
+over speckle, with surface cells 0.4 times as long and wide as in a picture. It shows that rays, patterns, pulse and gain leave no
+holes and no error. Section 3 of docs/acoustics.md has the effect of a picture's larger cells.
 
 """

@@ -11,7 +11,7 @@ KINDS = [("canonical", []), ("paper", ["--mode", "paper"]), ("raster", ["--mode"
 
 
 def grazing(sonard):
-    """Returns the level of a flat bed, paper mode minus canonical, by grazing angle; both without elevation pattern."""
+    """Returns the table of a flat bed's level, paper mode minus canonical, by grazing angle; both without elevation pattern."""
     canonical = sonard.expected("grazing", "--specular", "off")
     paper = sonard.expected("grazing", "--mode", "paper", "--fixed-fan", 20000)
     rows, first = [], None

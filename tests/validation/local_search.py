@@ -57,12 +57,12 @@ def chapter(sonard, folder):
 
 INTRODUCTION = """## Local search
 
-The paper: over a bottom with objects at 5 to 7 m, the older raster method (11 effective rows) drew arcs, and 300 rays filled
-them. It has pictures and no values.
+In the paper, the older raster method (11 effective rows) drew arcs over a bottom with objects at 5 to 7 m, and 300 rays filled
+them. The paper has pictures, but no values.
 
-Measured: the share of bottom bins with the correct level in expected power, for the same sonar (P900, 10 m, 512 beams, rows of
+We measure the share of bottom bins with the correct level in expected power, for the same sonar (P900, 10 m, 512 beams, rows of
 one inch, b = 29.5 kHz) 2 m above level sand, 0.25 rad nose down. Our scatterers are compared with the closed form (oracle 8,
 where the two-way pattern is above -20 dB). The comparison modes have another law and other beams, so they are compared with
-themselves at 20 000 rays a column.
+themselves at 20 000 rays per column.
 
 """

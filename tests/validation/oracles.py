@@ -16,7 +16,7 @@ def chapter(folder, partial=False):
         raise RuntimeError(f"oracle_table.py failed: {done.stderr.strip()}")
     faults = done.stderr.strip().splitlines()
     if done.returncode == 1 and not partial:
-        raise RuntimeError("the table of oracles is not whole; run ./test.sh without a choice of tests, or give --partial:\n" +
+        raise RuntimeError("the table of oracles is incomplete; run ./test.sh with all tests, or give --partial:\n" +
                            "\n".join(faults))
     warning = f"**Not a whole run:** {faults[-1]}.\n\n" if done.returncode == 1 else ""
     return INTRODUCTION + warning + done.stdout.strip() + "\n"
@@ -24,7 +24,7 @@ def chapter(folder, partial=False):
 
 INTRODUCTION = """## Oracles
 
-Closed forms that the tests hold the engine to (`./test.sh`). Of several measurements of one kind the worst is shown. The table is
-that of the last test run before this page was made.
+The tests (`./test.sh`) compare the engine with these closed forms. Of several measurements of one kind the worst is shown. The
+table is that of the last test run before this page was made.
 
 """

@@ -1,4 +1,4 @@
-"""Measures the cost of each part of the model, with only this part off (the opt-in part: on), in the format for 20 pings/s."""
+"""Measures the cost of each part of the model: only this part is on and off, in the format for 20 pings/s."""
 
 import os
 
@@ -31,7 +31,7 @@ def rows_of(scene, plain, pairs):
         if part in OPT_IN:
             usual = "off"
         else:
-            usual = "on" if part not in GIVEN or part in plain["parts_had"] else "on, nothing of it here"
+            usual = "on" if part not in GIVEN or part in plain["parts_had"] else "on, but no data for it"
         rows.append([scene, part, usual, rate(on), rate(off), f"{thread_ms(on) - thread_ms(off):+.1f}"])
     return rows
 
@@ -58,9 +58,9 @@ def chapter(sonard, folder):
 
 INTRODUCTION = """## Cost of the parts
 
-M1200d, high mode, 10 m, 512 beams x 720 rows, from pose to framed bytes, the sonar moving; {machine}. By `sonard_bench --case
-{case} --scene SCENE --pings {pings}` with `--PART on` and `off` in separate runs; rates are those of the median ping. A part that
-scene and sonar lack is added for its row (`--give PART`). Load average of the machine in the last minute: {load:.1f}; above its
-number of processors it lengthens these times. Differences of a few thread ms are chance.
+M1200d, high mode, 10 m, 512 beams x 720 rows, from pose to framed bytes, with a moving sonar; {machine}. `sonard_bench --case
+{case} --scene SCENE --pings {pings}` ran with `--PART on` and `off` separately; rates are those of the median ping. A part that
+scene and sonar lack is added for its row (`--give PART`). Load average of the machine in the last minute: {load:.1f}. A load
+above the number of processors lengthens these times. Differences of a few thread ms are chance.
 
 """

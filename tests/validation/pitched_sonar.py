@@ -83,11 +83,12 @@ def chapter(sonard, folder):
 
 INTRODUCTION = """## A sonar pitched down
 
-The paper's Figure 3: a sonar that looks down into a tank with a plate and a rod. By raster the floor has gaps, since the pixels have
-too few rows; with the plate near less of the floor is far, where rows are far apart. The paper gives no sizes; these are ours.
+In the paper's Figure 3 a sonar looks down into a tank with a plate and a rod. With raster sampling the floor has gaps, because
+the pixels have too few rows. If the plate is near, less of the floor is far away, where rows are far apart. The paper gives no
+sizes; these are ours.
 
-Measured in expected power, beside the default without mirrors, both re their own mean: the share of the floor's bins before the
-plate that are more than 6 dB too dark. "Rows alone" predicts it: each row of the model is one pulse where it meets the floor straight
-ahead.
+We measure the share of the floor's bins before the plate that are more than 6 dB too dark in expected power, compared with the
+default without mirrors, both relative to their own means. "Rows alone" predicts it: each row of the model is one pulse where it
+meets the floor straight ahead.
 
 """

@@ -95,7 +95,7 @@ def chapter(sonard, folder):
     text = table(["expected power, dB re 1 uPa: rod, wall", "canonical, Lambert part", "canonical with specular echoes", "paper mode"],
                       rows)
 
-    text += TOTALS + table(["", "measured", "predicted outside"], totals_table(lambert)[0])
+    text += TOTALS + table(["", "measured", "predicted"], totals_table(lambert)[0])
     text += DIFFERENCES + table(["validation", "calibration", "total", "predicted", "peak", "predicted", "peak in paper mode"],
                                      differences(lambert, paper))
 
@@ -133,22 +133,22 @@ shipped model's tapered array, measured here, collects a little less:
 """
 DIFFERENCES = """
 Validation minus calibration, Lambert part: total echo and peak. Each includes 0.65 dB from the lower absorption at 1.2 MHz. The
-predicted peaks are sums over bins of 2.5 mm and depend on where in its bin the front lies; ours are those of a pulse as long.
+predicted peaks are sums over bins of 2.5 mm and depend on where in its bin the front lies; ours are of a pulse of this length.
 Only the totals can be expected to agree:
 
 """
 INTRODUCTION = """## Tank: calibration and validation
 
-The paper: an M1200d at 2.1 MHz, 0.5 m from an aluminium rod in a round tank, gave by fit the source level (170 dB) and the
+In the paper, an M1200d at 2.1 MHz was 0.5 m from an aluminium rod in a round tank. A fit gave the source level (170 dB) and the
 strengths (rod 0.1, tank 0.2). With these numbers the picture at 1.2 MHz of the rod turned by 15 degrees matched "well" (Figures 7
 and 9). **The values of those figures are not published**; only the statement that they match can be compared. The paper does not
-state the direction of the 15 degrees, the sonar's place, or whether 0.5 m is to the rod's front. All three readings are here,
-with the sonar on a diameter at mid depth and the front at 0.5 m.
+state the direction of the 15 degrees, the sonar's place, or whether 0.5 m is to the rod's front. We measure three directions,
+with the sonar on a diameter at mid depth and the rod's front at 0.5 m.
 
-Measured: the absolute echo level along the centre line, with the paper's source level and strengths. The paper averaged 100
-pings. A still scene repeats its speckle here, so each of the 100 pings has a newly drawn tank. Paper-mode levels are lower
-because of its beam correction, which divides by the root of the sum over all beams. A polished rod gives a specular echo: square,
-it exceeds the speckle by tens of dB; turned, it misses the sonar, and only the weak diffuse part remains. The two canonical
-columns differ by it; the published model has no specular echoes.
+The values are absolute echo levels along the centre line, with the paper's source level and strengths. The paper averaged 100
+pings. Here a still scene repeats its speckle, so each of the 100 pings has a newly drawn tank. Paper-mode levels are lower
+because of its beam correction, which divides by the root of the sum over all beams. A polished rod gives a specular echo. If the
+rod is square, this echo exceeds the speckle by tens of dB; if it is turned, the echo misses the sonar, and only the weak diffuse
+part remains. The two canonical columns differ by this echo; the published model has none.
 
 """

@@ -5,7 +5,7 @@ The closer the accuracy is to one half, the more alike are the pictures.
 usage: tell_apart.py --program SONARD [--captures FOLDER]
 A random forest sees patches of 32 rows x 32 beams, half of them captured. It is judged on what it has not seen: a ping (trained on
 the other two) or a sector of the fan (trained on the other seven). Texture features do not change when a patch gets brighter; with
-"all" the forest sees brightness too. The control is the same game between two seeds of sonard. "Another bed" is a scene in which
+"all" the forest sees brightness too. The control is the same test between two seeds of sonard. "Another bed" is a scene in which
 nothing is placed or set after the recording. Needs python3-sklearn.
 """
 import argparse
@@ -242,7 +242,7 @@ def chapter(program, captures):
     for name, shares in bands.items():
         text += f"- {name}: " + "; ".join(f"{first} to {last} {100 * share:.1f} %" for first, last, share in shares) + "\n"
     for part, features in best.items():
-        text += f"\nWhat gives the {part} away most, each feature alone with its best threshold:\n\n"
+        text += f"\nFeatures that separate the {part} best, each alone with its best threshold:\n\n"
         text += "| feature | right, % | captured, median | sonard, median |\n|---|---|---|---|\n"
         text += "".join(f"| {name} | {100 * share:.1f} | {real:.3g} | {ours:.3g} |\n" for share, name, real, ours in features)
     return text

@@ -1,4 +1,4 @@
-"""Tests the classifier of captured and simulated pings on made pictures: it separates different ones only."""
+"""Tests the classifier of captured and simulated pings with made-up pictures: it separates only different ones."""
 import os
 import random
 import unittest

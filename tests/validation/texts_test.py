@@ -104,14 +104,14 @@ class Chapters(unittest.TestCase):
         self.assertEqual(rows[0], ["demo", "default", "", "25.0", "", "30.0"])
         self.assertEqual(rows[1], ["demo", "multipath", "off", "12.5", "25.0", "+35.0"])
         self.assertEqual(rows[2], ["demo", "leak", "on", "25.0", "26.0", "+1.0"])
-        self.assertEqual(rows[3], ["demo", "volume", "on, nothing of it here", "24.0", "25.0", "+3.0"])
+        self.assertEqual(rows[3], ["demo", "volume", "on, but no data for it", "24.0", "25.0", "+3.0"])
 
 
 class Summary(unittest.TestCase):
     def chapters(self):
         """Returns the minimum of every chapter that the summary reads."""
         return {
-            "tank": table(["", "measured", "predicted outside"], [["HF", "-24.44", "-24.06"], ["LF", "-22.47", "-22.11"]])
+            "tank": table(["", "measured", "predicted"], [["HF", "-24.44", "-24.06"], ["LF", "-22.47", "-22.11"]])
                     + "\n" + table(["validation", "calibration", "total", "predicted"], [["LF", "HF", "+2.63 dB", "+2.60 dB"]]),
             "two-cylinders": table(["", "lying, nearest point at 2.000 m", "upright, nearest point at 3.000 m"],
                                    [["default", "2.060 m", "3.010 m"]])

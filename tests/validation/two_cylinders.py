@@ -50,7 +50,8 @@ def verdict(share, median_db, raster_dark, ray_dark):
     equal = share >= EQUAL_SHARE and abs(raster_dark - ray_dark) < EQUAL_DARK
     return (f"\nVerdict: equal quality needs {EQUAL_SHARE} % of the bins within 3 dB, and dark floor within {EQUAL_DARK} "
             f"points. With 228 rows each, {share:.0f} % of the bins are within 3 dB (median distance {median_db:.1f} dB); "
-            f"dark floor: raster {raster_dark:.1f} %, ray {ray_dark:.1f} %: the claim {'holds' if equal else 'does not hold'} here.\n")
+            f"dark floor: raster {raster_dark:.1f} %, ray {ray_dark:.1f} %. "
+            f"The claim {'holds' if equal else 'does not hold'} here.\n")
 
 
 def chapter(sonard, folder):
@@ -77,18 +78,18 @@ def chapter(sonard, folder):
 
 
 EQUAL_QUALITY = """
-The paper claims that rays keep the quality of the raster. Below: expected power of bins within 40 dB of the
-brightest, less the pictures' median difference:
+The paper claims that rays keep the quality of the raster. The table compares the expected power of bins within 40 dB of the
+brightest, after subtracting the pictures' median difference:
 
 """
 INTRODUCTION = """## Two cylinders in a square tank
 
-The world of the paper's section 4.1: an upright and a lying cylinder under a P900. The paper gives only a rate: 3 Hz.
-We expect returns from both cylinders, shadows behind them, and walls bright over all beams. Sizes missing in the published
+The world of the paper's section 4.1 has an upright and a lying cylinder under a P900. The paper gives only a rate, 3 Hz.
+We expect returns from both cylinders, shadows beyond them, and walls bright over all beams. Sizes missing in the published
 world are ours.
 
-Measured: the range of the cylinders' peaks in the beam straight ahead (expected power, Lambert part, rows of one inch), and the
+We measure the range of the cylinders' peaks in the beam straight ahead (expected power, Lambert part, rows of one inch), and the
 share of the tank's floor that stays dark for lack of rays. A cylinder's echo spans all ranges of its surface in the beam, so
-peaks lie a little behind the nearest point.
+peaks lie a little beyond the nearest point.
 
 """
