@@ -3,7 +3,7 @@
 
 usage: make_drivers.py MAKE ADDRESS PORT [PLANT]
 MAKE: aris, blueview, dvl, m3, micron, norbit, omniscan, ping1d, ping360, s500, surveyor, waterlinked
-PLANT: drops (every fifth ping is not published), mirrors (every fifth ping is turned around)
+PLANT: drops (every fifth ping is not published), mirrors (every fifth ping is mirrored)
 """
 import json
 import socket
@@ -85,7 +85,7 @@ def micron(address, port):
         sonar.until(b"@")
         size = int(sonar.take(4), 16) + 1
         frame = sonar.take(size)
-        if frame[5] == 4:  # a head that sends no scan lines; bit 7: it has parameters
+        if frame[5] == 4:  # mtAlive: the head sends no lines; bit 7 of its state: it has parameters
             if not frame[8 + 7] & 0x80:
                 send(19, head)
             send(25, bytes(4))

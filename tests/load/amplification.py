@@ -1,5 +1,5 @@
 """Measures how much each emulated sonar sends after one datagram whose sender may be forged: the figures of
-tests/reliability/README.md, "Datagrams with a forged sender". By hand: SONARD_BUILD=build/release python3
+tests/reliability/README.md, "Datagrams with a forged sender". Run by hand: SONARD_BUILD=build/release python3
 tests/load/amplification.py [SECONDS]
 
 The sender's port stays open and silent, which is the worst case: a closed port ends a stream at once.

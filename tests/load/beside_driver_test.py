@@ -153,7 +153,7 @@ class BesideADriver(unittest.TestCase):
                 pings, served, dropped = (int(n) for n in said.groups())
             counted.append(f"{profile} {pings} pings, {served} served, {dropped} dropped, {received} received")
             good = good and served >= received and pings - served - dropped in (0, 1)
-        keep("datagrams", "; ".join(counted), "served + dropped, one under way at the end", good)
+        keep("datagrams", "; ".join(counted), "served + dropped, one in progress at the end", good)
         self.assertTrue(good, counted)
 
 

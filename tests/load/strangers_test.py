@@ -1,6 +1,6 @@
-"""The load that one untrusted client can cause. Work is counted, so that requests, frames and handshakes beyond the limit wait
-(docs/control.md, "Access"), 32 clients that send single bytes do not block /healthz, and poses of closed connections have
-no effect. Uses the shipped program.
+"""Tests the load that one untrusted client can cause. Requests, frames and handshakes beyond the limit of work wait
+(docs/control.md, "Access"). 32 clients that send single bytes do not block /healthz. Poses of closed connections have no effect.
+Uses the shipped program.
 
 In the suite (--quick) only the counts are asserted, relative to the time that passed. --measure SECONDS also prints the rate of a
 driver that requests 40 Hz, alternately without and with each stranger. A stranger is a process at the lowest priority, so that
@@ -126,7 +126,7 @@ def frame(first, payload=b""):
 
 
 def frames(begin, one, answer=None):
-    """Sends frames without end by the socket; returns how many were handled, counted by bytes or by answers."""
+    """Sends frames without end on a WebSocket; returns how many were handled, counted by bytes or by answers."""
     def run(address, stop):
         viewer, sent, pongs = opened(address), 0, 0
         viewer.sendall(begin)
@@ -299,7 +299,7 @@ class Strangers(unittest.TestCase):
             rows.append((name, alone, beside, stranger.done))
         with urllib.request.urlopen(f"http://{daemon.address}:8088/healthz", timeout=60) as answer:
             self.assertEqual(answer.read(), b"ok\n")
-        missing = driver.missing  # before the status: no ping that is dropped later counts
+        missing = driver.missing  # read before the status, so that no ping that is dropped later counts
         status = urllib.request.Request(f"http://{daemon.address}:8088/api/v1/status", headers={"Authorization": f"Bearer {TOKEN}"})
         with urllib.request.urlopen(status, timeout=60) as answer:
             dropped = int(json.load(answer)["sonars"][0]["clients"][0]["pings_dropped"])
