@@ -23,7 +23,7 @@ struct BenchCase {
   int fixed_fan = 0;  // rays per column, each a scatterer; 0 = surface cells
 };
 
-/// All cases, in the order of their names.
+/// Returns all cases, in the order of their names.
 std::vector<BenchCase> bench_cases();
 std::optional<BenchCase> find_case(std::string_view name);
 
@@ -35,9 +35,9 @@ struct BenchScene {
 };
 std::span<const BenchScene> bench_scenes();
 
-/// The pose at a time of the run. The vehicle moves at most 1 m/s and turns at most 20 deg/s, as the goals assume.
+/// Returns the pose at a time of the run. The vehicle moves at most 1 m/s and turns at most 20 deg/s, as the goals assume.
 Pose bench_pose(const BenchCase& c, const BenchScene& scene, double time_s);
-/// A pose with the height and tilt of the case at another position and heading.
+/// Returns a pose with the height and tilt of the case at another position and heading.
 Pose bench_pose_at(const BenchCase& c, const BenchScene& scene, double x_m, double y_m, double yaw_rad);
 
 }  // namespace sonar::bench

@@ -84,7 +84,7 @@ json curve(const char* name, const std::string& of, json points) {
   return {{"name", name}, {"case", of}, {"points", std::move(points)}};
 }
 
-/// The same bed, equally rough, on another grid or of another size; the sonar's place on it stays.
+/// Returns the same bed, equally rough, on another grid or of another size; the sonar's place on it stays.
 ScenePointer bed_of(const Scene& scene, double spacing_m, double size_m, double bed_z_m) {
   SeabedShape shape;
   shape.size_x_m = shape.size_y_m = shape.fine_x_m = shape.fine_y_m = size_m;

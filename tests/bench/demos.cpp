@@ -61,7 +61,7 @@ class Watched final : public PingEngine {
   const Clock& clock_;
 };
 
-/// The configuration of `sonard --profile`, on an address of this process and without further listeners.
+/// Returns the configuration of `sonard --profile`, on an address of this process and without further listeners.
 Result<Config> demo_of(const std::string& profile, const BenchOptions& options) {
   auto found = find_config("", true);
   if (!found) return tl::make_unexpected(found.error());

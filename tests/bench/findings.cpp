@@ -17,7 +17,7 @@ using nlohmann::json;
 
 constexpr int bodies = 100;
 
-/// The scene with boxes of 0.2 m over the bed ahead, ten rows of ten.
+/// Returns the scene with boxes of 0.2 m over the bed ahead, ten rows of ten.
 ScenePointer with_bodies(const Scene& scene, const BenchScene& where) {
   auto made = std::make_shared<Scene>(scene);
   auto box = make_box({0.2, 0.2, 0.2});

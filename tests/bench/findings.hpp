@@ -29,7 +29,7 @@ Result<nlohmann::json> find_empty_bins(const BenchOptions& options);
 /// ratio to the public reference code.
 Result<nlohmann::json> find_device_rates(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 
-/// The growth of the time of a ping with rays, rows, triangles, beams and sonars.
+/// Measures how the time of a ping grows with rays, rows, triangles, beams and sonars.
 nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 
 /// P0: the demo of every product through its socket, at the rate that a usual driver requests; that of each make's demo also at

@@ -11,7 +11,7 @@
 
 namespace sonar::bench {
 
-/// Minimum time of this thread in several runs of `work`.
+/// Returns the minimum time of this thread in several runs of `work`.
 template <class Work>
 double best_ms(int times, Work&& work) {
   double best = 1e9;

@@ -26,7 +26,7 @@ using nlohmann::json;
 constexpr std::uint16_t data_port = 52100;
 constexpr int patience_s = 20;
 
-/// `count` sonars of a product side by side on one vehicle, as a configuration lists them.
+/// Returns `count` sonars of a product on one vehicle, as a configuration lists them.
 std::string sonars_of(const std::string& profile, int count) {
   std::string list;
   for (int i = 0; i < count; ++i)

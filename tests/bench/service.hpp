@@ -18,7 +18,7 @@
 
 namespace sonar::bench {
 
-/// An address in one of the networks 127.64..127.191, chosen by the process id.
+/// Returns an address in one of the networks 127.64..127.191, chosen by the process id.
 inline std::string own_address(int sonar = 0) {
   const auto process = static_cast<unsigned>(::getpid());
   return "127." + std::to_string(64 + process / 250 % 128) + "." + std::to_string(1 + process % 250) + "." +
@@ -40,7 +40,7 @@ class Service {
     app_.request_stop();
     if (thread_.joinable()) thread_.join();
   }
-  /// Processor time of the thread that sends.
+  /// Returns the processor time of the thread that sends.
   double sender_s() {
     clockid_t clock{};
     timespec t{};

@@ -73,7 +73,7 @@ SONAR_CLONES void turn_phases(const Column& c, int count, float* __restrict re, 
   }
 }
 
-/// Relative rms difference of `other` from `truth`.
+/// Returns the relative rms difference of `other` from `truth`.
 double difference(const Sums& truth, const Sums& other) {
   double off = 0, all = 0;
   for (std::size_t i = 0; i < truth.size(); ++i) off += std::norm(truth[i] - other[i]), all += std::norm(truth[i]);

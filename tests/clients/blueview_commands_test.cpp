@@ -52,7 +52,7 @@ bvt::SonarDescription description() {
   return sonar;
 }
 
-/// 8 beams from -40 to 40 degrees, 20 bins from 2 to 4 m; beam 6 (to starboard) is bright at 3.05 m.
+/// Returns 8 beams from -40 to 40 degrees, 20 bins from 2 to 4 m; beam 6 (to starboard) is bright at 3.05 m.
 bvt::PolarPing ping_of(std::uint32_t number) {
   bvt::PolarPing ping;
   ping.head = 3, ping.number = number;

@@ -162,7 +162,7 @@ TEST(Doctor, AnHttpSonarThatSendsNothingToItsHostIsAnError) {
   expect(line(facts, "ping"), Level::fail, "no images are made, although 10.0.0.7 has set it up", "a mode to /udp");
 }
 
-/// A BlueView head that pings, and the daemon's report of it.
+/// Returns facts of a BlueView head that pings, and the daemon's report of it.
 Facts healthy_head() {
   Facts facts = healthy();
   facts.status.received.clear();  // heads send no status

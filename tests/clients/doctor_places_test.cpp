@@ -13,7 +13,7 @@ using testing::HasSubstr;
 using testing::Not;
 using Outcome = StreamFacts::Outcome;
 
-/// One sonar that hosts reach by UDP, at a port of this computer.
+/// Returns facts of one sonar that hosts reach by UDP, at a port of this computer.
 Facts facts_by_udp(const std::string& host, Outcome outcome) {
   Facts facts;
   SonarFacts& sonar = facts.sonars.emplace_back();

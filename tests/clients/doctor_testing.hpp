@@ -40,7 +40,7 @@ inline std::shared_ptr<const v1::DaemonStatus> daemon_of(const std::string& host
          sonars { name: "front" status_to: "192.0.2.255:52102" rate_hz: 10 listens: ")" +
       host + R"(:52100" advertised: ")" + host + R"(" })"));
 }
-/// The status of the daemon, to be changed.
+/// Returns the status of the daemon, to be changed.
 inline v1::DaemonStatus& daemon_in(Facts& facts) {
   const auto copy = std::make_shared<v1::DaemonStatus>(*facts.control.status);
   facts.control.status = copy;

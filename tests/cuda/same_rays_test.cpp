@@ -31,8 +31,8 @@ std::shared_ptr<const SonarModel> with_wide_beams(FrequencyMode mode, Waveform::
   return model_of(mode, shape, false);
 }
 
-/// All variants that the device computes, tones in the time domain included. Only one of them has ghosts, because the CPU
-/// computes these slowly.
+/// Returns all variants that the device computes, tones in the time domain included. Only one of them has ghosts, because the
+/// CPU computes these slowly.
 std::vector<std::pair<std::string, PingRequest>> on_device_turns() {
   auto all = turns();
   const auto tone = with_wide_beams(p900(), Waveform::Shape::cw), sweep = with_wide_beams(oculus_high(), Waveform::Shape::lfm);

@@ -13,7 +13,7 @@
 namespace sonar::test {
 namespace {
 
-/// "2 x Some Processor, Linux 6.1.0": without the name of the computer.
+/// Returns e.g. "2 x Some Processor, Linux 6.1.0", without the name of the computer.
 std::string machine() {
   std::string model = "processors";
   std::ifstream cpuinfo("/proc/cpuinfo");

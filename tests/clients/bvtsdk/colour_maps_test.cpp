@@ -33,7 +33,7 @@ MagImage image_with(std::vector<std::uint16_t> pixels) {
   return image;
 }
 
-/// A grey map, so that a mapped pixel shows its entry to a sixteenth.
+/// Returns a grey map, so that a mapped pixel shows its entry to a sixteenth.
 ColourMapper grey_mapper(PixelOrder order = PixelOrder::bgra) {
   ColourMap map;
   for (int i = 0; i < 4096; ++i) map.push_back({static_cast<std::uint8_t>(i / 16), 7, static_cast<std::uint8_t>(i % 16)});

@@ -25,7 +25,7 @@ struct Spot {
   std::uint16_t strongest = 0;
 };
 
-/// Centre of gravity of the bright pixels.
+/// Returns the centre of gravity of the bright pixels.
 Spot spot_of(const MagImage& image) {
   Spot spot;
   double weight = 0;

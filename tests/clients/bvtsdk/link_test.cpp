@@ -292,7 +292,7 @@ TEST(Link, ClosingEndsWaitingCalls) {
   EXPECT_EQ(code.get(), socket_closed);
 }
 
-/// Log lines of the library while `work` runs.
+/// Returns the log lines of the library while `work` runs.
 template <class F>
 std::string logged(const F& work) {
   const std::string path = testing::TempDir() + "bvtsdk_link_test.log";

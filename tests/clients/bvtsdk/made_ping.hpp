@@ -7,7 +7,7 @@
 
 namespace sonar::bvt {
 
-/// 90 degrees, `sample(beam, bin)` everywhere.
+/// Returns a ping of 90 degrees with the samples `sample(beam, bin)`.
 inline PolarPing make_ping(int beams, int bins, float start_m, float bin_m, const std::function<int(int, int)>& sample) {
   PolarPing p;
   p.head = 0;
@@ -25,7 +25,7 @@ inline PolarPing make_ping(int beams, int bins, float start_m, float bin_m, cons
   return p;
 }
 
-/// A ping with a single echo of `level`, `wide` beams and `deep` bins in size.
+/// Returns a ping with a single echo of `level`, `wide` beams and `deep` bins in size.
 inline PolarPing make_ping_with_target(double range_m, double bearing_deg, int level = 60000, int beams = 512, int bins = 400,
                                        float start_m = 1, float bin_m = 0.025f, double wide = 3, double deep = 3) {
   const PolarPing frame = make_ping(beams, bins, start_m, bin_m, [](int, int) { return 0; });

@@ -16,7 +16,7 @@ RangeList list_of(const PolarPing& ping, const RangeListSettings& settings = {})
   return list;
 }
 
-/// Beam 3 of 8: 20000 in bin 10, 40000 in bin 50.
+/// Returns a ping with two echoes in beam 3 of 8: 20000 in bin 10, 40000 in bin 50.
 PolarPing two_echoes() {
   return make_ping(8, 100, 1, 0.1f, [](int j, int k) { return j != 3 ? 5 : k == 10 ? 20000 : k == 50 ? 40000 : 5; });
 }

@@ -47,7 +47,7 @@ struct ImportScene : ::testing::Test {
     EXPECT_TRUE(loaded) << loaded.error().text << "\n" << text();
     return loaded ? *loaded : std::make_shared<Scene>();
   }
-  /// A link with a mesh in it.
+  /// Returns a link with a mesh in it.
   static std::string mesh(const std::string& uri, const std::string& scale = "1 1 1") {
     return std::string("<link name='l'><visual name='v'><geometry><mesh><uri>") + uri + "</uri><scale>" + scale +
            "</scale></mesh></geometry></visual></link>";

@@ -33,7 +33,7 @@ struct Reading {
 inline std::string sdf(const std::string& world) {
   return std::string("<sdf version=\"1.9\">\n<world name=\"w\">\n") + world + "\n</world>\n</sdf>";
 }
-/// A link with a box of 1 x 2 x 3 m; `more` goes into the link, `visual` into its visual.
+/// Returns a link with a box of 1 x 2 x 3 m; `more` goes into the link, `visual` into its visual.
 inline std::string link(const std::string& name, const std::string& more = "", const std::string& visual = "") {
   return std::string("<link name=\"") + name + "\">" + more + "<visual name=\"v\">" + visual +
          "<geometry><box><size>1 2 3</size></box></geometry></visual></link>";

@@ -15,7 +15,8 @@ namespace {
 
 constexpr Taper shaped[] = {Taper::uniform, Taper::taylor30, Taper::hamming, Taper::hann};
 
-/// Full width between the half-power points of a pattern that falls from 1 at 0. It is found by small steps, not by a formula.
+/// Returns the full width between the half-power points of a pattern that falls from 1 at 0. It is found by small steps, not
+/// by a formula.
 double half_power_width(const std::function<double(double)>& amplitude, double step) {
   double x = 0;
   while (amplitude(x) * amplitude(x) > 0.5) x += step;

@@ -12,7 +12,7 @@ constexpr double semi_minor_m = 6356752.314245;  // WGS84, as printed in tables
 Geodetic at_deg(double latitude, double longitude, double altitude_m = 0) {
   return {rad_from_deg(latitude), rad_from_deg(longitude), altitude_m};
 }
-/// Radii of curvature along the meridian and across it [m].
+/// Returns the radii of curvature along the meridian and across it [m].
 double meridian_m(double latitude_rad) {
   const double s = std::sin(latitude_rad), e2 = earth_eccentricity_squared;
   return earth_semi_major_m * (1 - e2) / std::pow(1 - e2 * s * s, 1.5);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double scale = 0.9996;
 
-/// Length of the meridian from the equator [m], by Simpson's rule.
+/// Returns the length of the meridian from the equator [m], by Simpson's rule.
 double meridian_arc_m(double latitude_rad) {
   constexpr int steps = 2000;
   const auto radius_m = [](double latitude) {

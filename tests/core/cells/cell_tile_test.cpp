@@ -33,8 +33,8 @@ struct Cell {
   float re, im;
 };
 
-/// The quarter of a cell in which its point lies, along one axis of a 4 x 4 block, from the position of the cell in the block:
-/// two binary digits, each flipped by random bits that depend on the digits before it (nested scrambling).
+/// Returns the quarter of a cell in which its point lies, along one axis of a 4 x 4 block, from the position of the cell in the
+/// block. Random bits that depend on the digits before it flip each of its two binary digits (nested scrambling).
 int quarter_of(int along, std::uint32_t scramble) {
   const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
   const int half = (along & 1) ^ bit(along >> 1);
@@ -167,7 +167,7 @@ CellTile built_plainly(const TileAddress& a, const Mesh& mesh, std::span<const s
   return tile;
 }
 
-/// All triangles whose normals have the axis as their largest component, on the side that the address names.
+/// Returns all triangles whose normals have the axis as their largest component, on the side that the address names.
 std::vector<std::uint32_t> of_patch(const Mesh& mesh, const TileAddress& a) {
   std::vector<std::uint32_t> triangles;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {

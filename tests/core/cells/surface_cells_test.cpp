@@ -20,7 +20,7 @@ namespace {
 
 using HeightAt = double (*)(double, double);
 
-/// A grid of `n` x `n` squares over [0, size]^2, each split along a diagonal that alternates.
+/// Returns a grid of `n` x `n` squares over [0, size]^2, each split along a diagonal that alternates.
 std::shared_ptr<Mesh> terrain(int n, double size, HeightAt height) {
   auto mesh = std::make_shared<Mesh>();
   for (int j = 0; j <= n; ++j)
@@ -72,7 +72,7 @@ std::shared_ptr<const Scene> scene_of(std::shared_ptr<const Mesh> mesh) {
   return scene;
 }
 
-/// A view of everything in front of a sonar that looks along +x from far behind, at one level.
+/// Returns a view of everything in front of a sonar that looks along +x from far behind, at one level.
 CellView whole_scene(int level, Vec3d from = {-200, 0, 0}) {
   CellView view;
   view.sonar_in_world.position_m = from;

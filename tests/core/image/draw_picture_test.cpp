@@ -22,7 +22,7 @@ PolarImage cells(std::size_t rows, std::size_t columns) {
   return image;
 }
 
-/// A full circle with one bright beam.
+/// Returns a full circle with one bright beam.
 SonarPicture sweep(std::size_t bright) {
   SonarPicture picture{.kind = PictureKind::sweep, .image = cells(100, 40)};
   for (std::size_t beam = 0; beam < 40; ++beam)
@@ -77,7 +77,7 @@ TEST(SonarPicture, AWaterfallBeginsOnTopAndIsEmptyBelow) {
   EXPECT_FALSE(PicturePainter(style()).draw(picture));
 }
 
-/// A waterfall whose rows are this far apart [s].
+/// Returns a waterfall whose rows are this far apart [s].
 SonarPicture aged(std::size_t rows, const std::vector<double>& between_s) {
   SonarPicture picture{.kind = PictureKind::waterfall, .image = cells(rows, 20)};
   for (double age_s = 0; picture.row_age_s.size() < rows;) {

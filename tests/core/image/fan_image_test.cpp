@@ -38,7 +38,7 @@ FanStyle plain_gray(int width = 400) { return {width, *find_colour_map("gray"), 
 struct Centroid {
   double x = 0, y = 0, brightness = 0;
 };
-/// Centroid of the pixels that are brighter than the background.
+/// Returns the centroid of the pixels that are brighter than the background.
 Centroid brightest_place(const Raster& raster) {
   Centroid c;
   for (int y = 0; y < raster.height; ++y) {

@@ -13,7 +13,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-/// A fan of 60 degrees and 10 m. The nearest half is bright to port, the farthest half to starboard.
+/// Returns a fan of 60 degrees and 10 m. The nearest half is bright to port, the farthest half to starboard.
 PolarImage two_patches() {
   PolarImage image;
   image.rows = 40;

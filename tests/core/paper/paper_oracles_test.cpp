@@ -42,12 +42,12 @@ std::size_t loudest(const Ping& ping) {
   return static_cast<std::size_t>(std::max_element(ping.pressure_upa.begin(), ping.pressure_upa.end()) -
                                   ping.pressure_upa.begin());
 }
-/// Azimuth of the sample with the highest level.
+/// Returns the azimuth of the sample with the highest level.
 double loudest_azimuth_deg(const Ping& ping) {
   return deg_from_rad(static_cast<double>(ping.beam_azimuth_rad[loudest(ping) % ping.beam_azimuth_rad.size()]));
 }
 
-/// A range of 60 inches in a narrow sector, which is fast.
+/// Returns settings with few rows and beams up to 4 m, which are fast.
 PingSettings small_settings(int beams = 64) {
   PingSettings s = native_rows(4, 0.0254);
   s.beam_count = beams;

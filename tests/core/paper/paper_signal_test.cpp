@@ -24,7 +24,7 @@ FrequencyMode p900() {
   return mode;
 }
 
-/// b = 29.5 kHz and rows of one inch, as in the paper.
+/// Returns a plan with b = 29.5 kHz and rows of one inch, as in the paper.
 PingPlan paper_plan(int beams = 512) {
   PingSettings s;
   s.beam_count = beams;

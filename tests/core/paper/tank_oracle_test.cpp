@@ -37,7 +37,7 @@ FrequencyMode untapered(FrequencyMode mode) {
   return silent(mode);  // no absorption
 }
 
-/// Energy of the whole echo in the axis beam, as the sum of sigma D^2 / (mu r^4) [dB re 1 / m^2].
+/// Returns the energy of the whole echo in the axis beam, as the sum of sigma D^2 / (mu r^4) [dB re 1 / m^2].
 double total_db(const std::string& rpy_deg, const FrequencyMode& mode) {
   PingSettings settings = native_rows(1, 0.0025);
   settings.beam_count = 513;  // one of these beams is at azimuth 0

@@ -33,8 +33,8 @@ Sounding with(const std::function<void(ReceiverModel&)>& change, const SceneMake
   return {maker.make(), mode, settings};
 }
 
-/// Response of a beam at sine `beam` to a point at sine `u`: the sum over the aperture with a phase error of edge_rad (2 x /
-/// L)^2.
+/// Returns the response of a beam at sine `beam` to a point at sine `u`: the sum over the aperture with a phase error of
+/// edge_rad (2 x / L)^2.
 double array_sum(const ReceivePattern& pattern, double u, double beam, double edge_rad) {
   constexpr int elements = 2000;
   std::complex<double> sum = 0;
@@ -119,7 +119,7 @@ TEST(Defocus, IsTheSumOverItsTapsInEveryInstructionSet) {
     }
 }
 
-/// Correlation of the complex noise of two beams, as a mean over all pairs with this distance.
+/// Returns the correlation of the complex noise of two beams, as a mean over all pairs with this distance.
 double beam_correlation(const Sounding& s, int apart) {
   const auto& signal = s.last().beam_signal_upa;
   std::complex<double> product = 0;

@@ -20,7 +20,7 @@ namespace {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
 
-/// A round upright rod at the origin.
+/// Returns a round upright rod at the origin.
 Mesh pole(double radius_m, double half_height_m, int sides) {
   Mesh mesh;
   for (int i = 0; i < sides; ++i) {

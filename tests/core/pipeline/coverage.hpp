@@ -66,7 +66,8 @@ class TabulatedBed {
   }
 
   double pattern(double range_m, double cosine) const { return pattern_(range_m * cosine); }
-  /// The power averaged over the pulse's energy, because it changes within a pulse near the fan's edge and the first return.
+  /// Returns the power averaged over the pulse's energy: it changes within a pulse near the fan's edge and the first
+  /// return.
   double power(double range_m, double cosine) const {
     double sum = 0, weights = 0;
     for (int i = -6; i <= 6; ++i) {
@@ -76,7 +77,7 @@ class TabulatedBed {
     }
     return sum / weights;
   }
-  /// The difference of the tables from the closed form at one place.
+  /// Returns the difference of the tables from the closed form at one place.
   double error_db(double range_m, double sine) const {
     return db(range_(range_m) * across_(range_m * std::sqrt(1 - sine * sine))) - bed_.db(range_m, sine);
   }

@@ -7,7 +7,7 @@
 namespace sonar::reference {
 namespace {
 
-/// Distance between a point at range r and direction sine u and an element at y, minus r.
+/// Returns the distance between a point at range r and direction sine u and an element at y, minus r.
 double detour_m(double range_m, double sine, double element_y_m) {
   const double way = std::sqrt(range_m * range_m - 2 * range_m * sine * element_y_m + element_y_m * element_y_m);
   return (element_y_m * element_y_m - 2 * range_m * sine * element_y_m) / (way + range_m);

@@ -38,7 +38,7 @@ Agreement compare(const Signals& got, const Signals& truth) {
   return {std::sqrt(error / power), 10 * std::log10(got_power / power)};
 }
 
-/// The complex beam signals of the engine's last ping.
+/// Returns the complex beam signals of the engine's last ping.
 Signals beam_signals(const Sounding& s) {
   Signals out(static_cast<std::size_t>(s.beams()), std::vector<Complex>(static_cast<std::size_t>(s.rows())));
   for (std::size_t j = 0; j < out.size(); ++j)
@@ -135,7 +135,8 @@ TEST(Elements, ColumnsAndBeamWeightsMatchTheArray) {
   record_oracle(no_number, "columns and coupling against the array's elements, level", 0, a.level_db, 0.1, "dB");
 }
 
-/// Highest level of a point at azimuth 45 degrees, dB re its own beam, in beams whose sine differs by more than 0.1.
+/// Returns the highest level of a point at azimuth 45 degrees, dB re its own beam, in beams whose sine differs by more than
+/// 0.1.
 double loudest_elsewhere_db(double pitch_wavelengths, double& at_sine) {
   const FrequencyMode mode = p900();
   const ElementArray array(mode, 1500, pitch_wavelengths);

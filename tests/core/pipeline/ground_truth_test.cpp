@@ -10,7 +10,7 @@
 namespace sonar::test {
 namespace {
 
-/// A box to port at 4 m in front of a wall at 6 m. The wall covers only the port half.
+/// Returns a box to port at 4 m in front of a wall at 6 m. The wall covers only the port half.
 std::shared_ptr<const Scene> box_before_half_a_wall() {
   return SceneMaker().add(box({0.5, 0.5, 3}), -20, {4.5, 1.5, 0}).add(wall(10, 10), -20, {6, 10, 0}).make();
 }

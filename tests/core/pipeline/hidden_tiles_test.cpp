@@ -16,7 +16,7 @@
 namespace sonar::test {
 namespace {
 
-/// A bed 2 m below the sonar, a box that hides other boxes, and a sphere nearby.
+/// Returns a bed 2 m below the sonar, a box that hides other boxes, and a sphere nearby.
 std::shared_ptr<const Scene> crowded_scene() {
   SceneMaker scene;
   scene.add(height_field(-2, 12, -8, 8, 0.2, rough_relief(0.1, 20)), -25, {0, 0, -2});

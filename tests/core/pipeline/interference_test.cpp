@@ -150,7 +150,7 @@ TEST(Leak, ContinuesAfterANullOfItsTable) {
   EXPECT_NEAR(db(mean_row_power(s, row)), 160 - 5 - 25 * (at - 2), 0.1);
 }
 
-/// The record of a ping fired `after_s` after the epoch.
+/// Returns the record of a ping fired `after_s` after the epoch.
 const Ping& ping_at(Sounding& s, double after_s) {
   s.request.fired_at = Time(std::chrono::nanoseconds(static_cast<std::int64_t>(after_s * 1e9)));
   return s.ping();

@@ -16,7 +16,7 @@ namespace {
 constexpr int beams = 96, rows = 120, pings = 3;
 constexpr double interval_s = 0.03;
 
-/// A sonar 2 m above a bed. The beams are as wide as their spacing.
+/// Returns a sonar 2 m above a bed. The beams are as wide as their spacing.
 Sounding over_bed(int interleaved, std::vector<float> channel_gain_db = {}) {
   FrequencyMode mode = p900();
   mode.interleaved_pings = interleaved;
@@ -34,7 +34,7 @@ Sounding over_bed(int interleaved, std::vector<float> channel_gain_db = {}) {
   return s;
 }
 
-/// Mean of s_j conj(s_j+1) divided by the mean power, for beams j equal to `of` modulo the number of pings.
+/// Returns the mean of s_j conj(s_j+1) divided by the mean power, for beams j equal to `of` modulo the number of pings.
 double correlation_with_next(const Ping& ping, int of) {
   std::complex<double> sum = 0;
   double power = 0;

@@ -8,7 +8,7 @@
 
 namespace sonar::test {
 
-/// The different kernel sets that this processor can run.
+/// Returns the different kernel sets that this processor can run.
 inline std::vector<const simd::Kernels*> kernel_sets() {
   std::vector<const simd::Kernels*> sets;
   for (const SimdLevel level : {SimdLevel::portable, SimdLevel::avx2, SimdLevel::avx512}) {

@@ -12,7 +12,7 @@
 namespace sonar::test::labels_test {
 namespace {
 
-/// A scene of these objects. Each has a label except the first.
+/// Returns a scene of these objects. Each has a label except the first.
 std::shared_ptr<const Scene> labelled(const SceneMaker& maker) {
   auto scene = std::make_shared<Scene>(*maker.make());
   for (std::size_t i = 1; i < scene->objects.size(); ++i) scene->objects[i].label = "thing";

@@ -20,14 +20,14 @@ std::shared_ptr<const Scene> flat_bed(double lambert_db) {
   return SceneMaker().add(height_field(-2, 40, -40, 40, 2, [](double, double) { return 0.0; }), lambert_db).make();
 }
 
-/// integral of E|s|^2 dt of a beam, over rows [from, to).
+/// Returns the integral of E|s|^2 dt of a beam over rows [from, to).
 double beam_energy(const Sounding& s, int beam, int from, int to) {
   double sum = 0;
   for (int row = from; row < to; ++row) sum += s.power(row, beam);
   return sum * 2 * s.request.settings.range_bin_m / 1500;
 }
 
-/// Mean over the beams within `azimuth_deg` of straight ahead.
+/// Returns the mean over the beams within `azimuth_deg` of straight ahead.
 template <class Value>
 double mean_over_beams(const Sounding& s, double azimuth_deg, Value&& value) {
   double sum = 0;
@@ -96,8 +96,8 @@ TEST(LevelOracles, Oracle08_AbsoluteSeabedLevel) {
   }
 }
 
-/// The sum of sigma_i / r_i^4 from the beams of a whole ping. The sum of E|s|^2 over rows and beams counts every echo theta_eff
-/// tau_eff times.
+/// Returns the sum of sigma_i / r_i^4 from the beams of a whole ping. The sum of E|s|^2 over rows and beams counts every echo
+/// theta_eff tau_eff times.
 double echo_per_m2(const Sounding& s) {
   double sum = 0;
   for (int j = 0; j < s.beams(); ++j) sum += beam_energy(s, j, 0, s.rows());
@@ -128,7 +128,7 @@ TEST(LevelOracles, Oracle09_LambertSphere) {
   }
 }
 
-/// Mean power of a ping between two ranges, in beams within 30 degrees.
+/// Returns the mean power of a ping between two ranges, in beams within 30 degrees.
 double mean_power(const Sounding& s, double from_m, double to_m) {
   const int from = static_cast<int>(s.row_of_range(from_m)), to = static_cast<int>(s.row_of_range(to_m));
   return mean_over_beams(s, 30, [&](int j) { return beam_energy(s, j, from, to); });

@@ -16,7 +16,7 @@ Mesh bed() {
   return height_field(-2, 30, -20, 20, 2, [](double, double) { return 0.0; });
 }
 
-/// Mean power of the beams around `azimuth_deg` between two ranges.
+/// Returns the mean power of the beams around `azimuth_deg` between two ranges.
 double mean_power(const Sounding& s, double from_m, double to_m, double azimuth_deg = 0) {
   double sum = 0;
   int n = 0;
@@ -86,7 +86,7 @@ TEST(Moving, ABodyFartherAwayEchoesFartherAndTakesItsShadowAlong) {
   EXPECT_NEAR(10 * std::log10(mean_power(s, 5.0, 6.2) / open_near), 0, 1);
 }
 
-/// The objects of a scene file in front of a sonar at z = -2 that looks level along +x, 90 degrees wide.
+/// Returns the objects of a scene file in front of a sonar at z = -2 that looks level along +x, 90 degrees wide.
 Sounding sounding_of(const std::string& objects, double height_m = -2) {
   auto scene = parse_scene(objects, "test.yaml", {});
   EXPECT_TRUE(scene) << scene.error().text;

@@ -29,7 +29,7 @@ std::shared_ptr<Scene> with_mirrors(const SceneMaker& maker, std::size_t count, 
   return scene;
 }
 
-/// Sum of |s|^2 over beams [from, to) and over the rows of a range interval.
+/// Returns the sum of |s|^2 over beams [from, to) and over the rows of a range interval.
 double energy(const Sounding& s, double from_m, double to_m, int first_beam, int last_beam) {
   double sum = 0;
   for (int n = static_cast<int>(s.row_of_range(from_m)); n <= static_cast<int>(s.row_of_range(to_m)); ++n)
@@ -59,7 +59,7 @@ TEST(MultipathCells, GhostsOfALambertSphereHaveTheirLevel) {
                 10 * std::log10(energy_at(mirrored) / direct), 0.3, "dB");
 }
 
-/// An object with corners and slopes and without any symmetry.
+/// Adds objects with corners and slopes, without any symmetry.
 SceneMaker& add_things(SceneMaker& maker, double wall_y, bool mirrored) {
   const double side = mirrored ? -1 : 1;
   const auto at = [&](double x, double y, double z) { return Vec3d{x, wall_y + side * y, z}; };
@@ -156,7 +156,7 @@ TEST(MultipathCells, BothDirectionsOfAPathHaveTheSameSpeckle) {
                 10 * std::log10(mean / expected), 0.3, "dB");
 }
 
-/// Six smooth walls and two objects.
+/// Returns six smooth walls and two objects.
 std::shared_ptr<const Scene> tank() {
   SceneMaker maker;
   maker.add(make_box({6, 5, 3}, 5), -25).add(sphere(0.3, 4), -20, {1.5, 0.4, 0.2}).add(box({0.2, 0.3, 0.4}), -20, {1, -1, -0.6});

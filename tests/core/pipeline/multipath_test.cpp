@@ -21,7 +21,7 @@ Quatd upright_along_x() { return quat_from_rpy({pi / 2, 0, 0}); }  // turns a le
 struct SpecularMaterial {
   float reflection = -1, roughness_m = 0;
 };
-/// The scene with its first `count` materials as mirrors.
+/// Returns the scene with its first `count` materials as mirrors.
 std::shared_ptr<const Scene> mirrored(const SceneMaker& maker, std::size_t count, SpecularMaterial as = {}) {
   auto scene = std::make_shared<Scene>(*maker.make());
   for (std::size_t m = 0; m < count; ++m) {
@@ -37,7 +37,7 @@ FrequencyMode without_patterns(FrequencyMode mode) {
   return without_elevation_pattern(mode);
 }
 
-/// Peak of a beam's echo within 5 rows of a range.
+/// Returns the peak of a beam's echo within 5 rows of a range.
 Peak peak_near(const Sounding& s, double range_m, int beam) {
   const int middle = static_cast<int>(std::lround(s.row_of_range(range_m)));
   int best = middle;

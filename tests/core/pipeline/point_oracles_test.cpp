@@ -20,7 +20,7 @@ Vec3d at(double range_m, double azimuth_rad, double elevation_rad = 0) {
           range_m * std::sin(elevation_rad)};
 }
 
-/// The row with the highest level within 5 rows of `row` in a beam.
+/// Returns the row with the highest level within 5 rows of `row` in a beam.
 int loudest_near(const Sounding& s, double row, int beam) {
   int best = static_cast<int>(std::lround(row));
   for (int n = best - 5; n <= std::lround(row) + 5; ++n) {
@@ -29,7 +29,7 @@ int loudest_near(const Sounding& s, double row, int beam) {
   return best;
 }
 
-/// Fractional row and height of the strongest echo near `row` in a beam.
+/// Returns the fractional row and height of the strongest echo near `row` in a beam.
 Peak peak_near(const Sounding& s, double row, int beam) {
   const int best = loudest_near(s, row, beam);
   Peak p = log_parabola(s.pressure(best - 1, beam), s.pressure(best, beam), s.pressure(best + 1, beam));
@@ -37,7 +37,7 @@ Peak peak_near(const Sounding& s, double row, int beam) {
   return p;
 }
 
-/// Azimuth of the middle beam. The targets of most tests lie in it.
+/// Returns the azimuth of the middle beam. The targets of most tests lie in it.
 double middle_azimuth(const FrequencyMode& mode, const PingSettings& settings) {
   Sounding empty(SceneMaker().make(), mode, settings);
   return static_cast<double>(empty.ping().beam_azimuth_rad[static_cast<std::size_t>(settings.beam_count / 2)]);

@@ -202,8 +202,8 @@ TEST(PulseOracles, ExactIsTheSamePictureByAnotherWay) {
   }
 }
 
-/// Range at which a point 5 m straight ahead appears while the sonar moves. Motion within the ping is off, so that only Doppler
-/// shifts it.
+/// Returns the range at which a point 5 m straight ahead appears while the sonar moves. Motion within the ping is off, so that
+/// only Doppler shifts it.
 double apparent_range(const Waveform& waveform, const Twist& twist, bool doppler, int fixed_fan = 0, bool motion = false) {
   PingSettings settings = native_rows(8, 0.0254);
   settings.beam_count = 65;

@@ -14,8 +14,8 @@ namespace sonar::test {
 
 inline constexpr double measured_b_hz = 30e3;
 
-/// An asymmetric complex pulse like that of a real receiver: a Gaussian with a residual sweep, plus a delayed, weaker copy with
-/// another phase. The peak is p(0) = 1 within a part in 1e7.
+/// Returns an asymmetric complex pulse like that of a real receiver: a Gaussian with a residual sweep, plus a delayed, weaker
+/// copy with another phase. The peak is p(0) = 1 within a part in 1e7.
 inline std::complex<double> measured_envelope(double time_s) {
   const double x = measured_b_hz * time_s, late = x - 4;
   return std::polar(std::exp(-x * x), 0.7 * x * x) + std::polar(0.1 * std::exp(-late * late), 1.0);

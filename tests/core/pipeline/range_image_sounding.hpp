@@ -35,12 +35,12 @@ class RangeImageSounding {
   RangeImageGrid grid() { return RangeImageGrid(request()); }
   RangePixel at(int column, int row) const { return range_pixel(last(), static_cast<std::size_t>(row * 256 + column)); }
   double range_m(int column, int row) const { return at(column, row).range * wanted->range_unit_m; }
-  /// Forward, left, up [m].
+  /// Returns the place of a pixel: forward, left, up [m].
   Vec3d place(int column, int row) {
     const double a = grid().azimuth_rad(column), e = grid().elevation_rad(row), r = range_m(column, row);
     return {r * std::cos(e) * std::cos(a), r * std::cos(e) * std::sin(a), r * std::sin(e)};
   }
-  /// Mean column and row of the pixels with a return.
+  /// Returns the mean column and row of the pixels with a return.
   std::pair<double, double> middle() {
     double columns = 0, rows = 0, n = 0;
     for (int row = 0; row < 64; ++row)

@@ -19,7 +19,7 @@ namespace {
 
 std::shared_ptr<const Scene> plane_ahead(double x_m) { return SceneMaker().add(wall(40, 40), -20, {x_m, 0, 0}).make(); }
 
-/// Share of the pixels with a return that lie on the plane x = `x_m`, within 3 cm.
+/// Returns the share of the pixels with a return that lie on the plane x = `x_m`, within 3 cm.
 double share_on_plane(RangeImageSounding& s, double x_m) {
   int valid = 0, on = 0;
   for (int row = 0; row < 64; ++row)
@@ -144,7 +144,7 @@ TEST(RangeImage, NoiseAloneHasFewFalseAlarms) {
   EXPECT_NEAR(alarms / 16384.0, 1 - std::pow(1 - std::exp(-8), 777), 0.02);
 }
 
-/// A picture of noise: a quarter of the pixels report random ranges.
+/// Returns a picture of noise: a quarter of the pixels report random ranges.
 RangeImageSounding of_noise() {
   RangeImageSounding s(SceneMaker().make());
   s.request().switches.noise = true;

@@ -21,7 +21,7 @@ struct Pole {
 };
 constexpr double pole_lambert_db = -8;
 
-/// The power [uPa^2], by Lambert's law, that a beam receives from the pole when its axis points at the pole.
+/// Returns the power [uPa^2], by Lambert's law, that a beam receives from the pole when its axis points at the pole.
 double power_of(const Pole& pole, const PingRequest& request) {
   constexpr int along = 200, around = 200;
   const double alpha_db = absorption_db_per_m(request.water, 0, 1.2e6);
@@ -83,7 +83,7 @@ TEST(ThinRangeImage, ReportsThinPolesAtAnyPlace) {
       }
 }
 
-/// Mean power of the picture of a pole of 2 cm at 4.5 m, and of the other objects that `add` adds.
+/// Returns the mean power of the picture of a pole of 2 cm at 4.5 m, and of the other objects that `add` adds.
 double power_with_pole(const std::function<void(SceneMaker&)>& add, Bearings bearings = Bearings::are_true) {
   SceneMaker scene;
   add(scene);

@@ -33,7 +33,7 @@ Both both_of(PingEngine& engine, PingRequest r) {
   both.window = std::move(engine.run({&r, 1}).front());
   return both;
 }
-/// Relative L2 over the window's rows.
+/// Returns the relative L2 difference of the window's rows.
 double apart(const Both& b) {
   const std::size_t before = skipped * b.whole.beam_azimuth_rad.size();
   double apart = 0, all = 0;

@@ -62,7 +62,7 @@ class SeabedLevel {
   SeabedLevel(const FrequencyMode& mode, const Medium& medium, double envelope_hz, double lambert_db, double height_m,
               double tilt_rad);
   double db(double range_m, double sine = 0) const;
-  /// The angle about the array axis at which a beam sees the bottom at a range, and the two-way pattern at this angle.
+  /// Return the angle about the array axis at which a beam sees the bottom at a range, and the two-way pattern at this angle.
   double psi_rad(double range_m, double sine = 0) const;
   double pattern(double range_m, double sine = 0) const;
 

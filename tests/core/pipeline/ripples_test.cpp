@@ -37,7 +37,7 @@ double two_way_power(const FrequencyMode& mode, double psi_rad) {
   return std::abs(x) < 1e-9 ? 1 : std::pow(std::sin(pi * x) / (pi * x), 4);
 }
 
-/// The beams that the mean includes.
+/// Returns the beams that the mean includes.
 std::vector<int> beams_of_mean(const Sounding& s) {
   std::vector<int> beams;
   for (int j = 0; j < s.beams(); ++j)
@@ -63,8 +63,8 @@ class MeanPattern {
   std::vector<double> power_;
 };
 
-/// Mean of E|s|^2 over some beams, for each row. The surface is divided into pieces of 4 mm by 0.003 rad. Their power is summed
-/// by range and weighted by the squared pulse.
+/// Returns the mean of E|s|^2 over some beams, for each row. The surface is divided into pieces of 4 mm by 0.003 rad. Their
+/// power is summed by range and weighted by the squared pulse.
 std::vector<double> arcs_of(const Sounding& s, const std::vector<int>& beams, const Ripples& ripples) {
   constexpr double step = 0.004, turn = 0.003, bin = 0.002;
   const MeanPattern heard(s, beams);

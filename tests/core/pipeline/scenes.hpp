@@ -8,13 +8,13 @@
 
 namespace sonar::test {
 
-/// Height field z(x, y) over a rectangle, with two triangles per square of about `step_m`.
+/// Returns a height field z(x, y) over a rectangle, with two triangles per square of about `step_m`.
 Mesh height_field(double x0, double x1, double y0, double y1, double step_m, const std::function<double(double, double)>& z);
-/// A two-sided wall in the plane x = 0.
+/// Returns a two-sided wall in the plane x = 0.
 Mesh wall(double half_width_m, double half_height_m);
-/// Axis-aligned box about the origin.
+/// Returns an axis-aligned box about the origin.
 Mesh box(Vec3d half_size_m);
-/// Sphere about the origin: an octahedron halved `halvings` times, vertices on the sphere (8 * 4^halvings triangles).
+/// Returns a sphere about the origin: an octahedron halved `halvings` times, vertices on the sphere (8 * 4^halvings triangles).
 Mesh sphere(double radius_m, int halvings);
 
 /// A relief of `waves` plane waves with random directions, wavelengths (0.3 to 3 m) and slopes, and the given rms height. It is

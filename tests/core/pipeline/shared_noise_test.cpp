@@ -39,8 +39,8 @@ const auto loud = [](ReceiverModel& law) { law.shared_noise.level_db = 60; };
 
 constexpr int all = -1;
 
-/// Sum over channels with alternating signs, whose delays focus at `r` and sine `u`: over all channels, or over group `g`. The
-/// weights of a group are half a period of a sine. The next group begins half a group later.
+/// Returns the sum over channels with alternating signs, whose delays focus at `r` and sine `u`: over all channels, or over
+/// group `g`. The weights of a group are half a period of a sine. The next group begins half a group later.
 std::complex<double> focused(const FrequencyMode& mode, double r, double u, int g) {
   const SharedNoise& law = mode.receiver.shared_noise;
   const double wavelength_m = 1500 / static_cast<double>(mode.centre_hz),
@@ -59,15 +59,15 @@ int groups(const FrequencyMode& mode) {
   return 2 * law.channels / law.group + 1;
 }
 double focused_power(const FrequencyMode& mode, double r, double u) { return std::norm(focused(mode, r, u, all)); }
-/// E[a b*] of two beams, divided by a channel's power.
+/// Returns E[a b*] of two beams, divided by a channel's power.
 std::complex<double> in_common(const FrequencyMode& mode, double r, double u, double v) {
   std::complex<double> sum = 0;
   for (int g = 0; g < groups(mode); ++g) sum += focused(mode, r, u, g) * std::conj(focused(mode, r, v, g));
   return sum;
 }
 
-/// Fraction of the power that is left at range `r`. It fades from 2 to 3 times the range at which the whole array's part leaves
-/// the sector.
+/// Returns the fraction of the power that is left at range `r`. It fades from 2 to 3 times the range at which the whole
+/// array's part leaves the sector.
 double fade(const FrequencyMode& mode, double r) {
   const SharedNoise& law = mode.receiver.shared_noise;
   const double sine = static_cast<double>(law.sine), widest = std::sin(static_cast<double>(mode.horizontal_aperture_rad) / 2),
@@ -100,7 +100,7 @@ TEST_P(ChannelsShare, IsTheFocusedArraysSumOverItsChannels) {
         const double measured = s.power(row, j) / (own_upa * own_upa) - 1;
         most = std::max(most, expected);
         off = std::max(off, std::abs(measured - expected));
-        // The shadow of the aperture: dark within the dome by rays.
+        // Within the dome is the aperture's shadow, which is dark by ray geometry.
         const double edge = sine - law.channels / 2.0 * wavelength_m / (2 * sine) * (1 - sine * sine) / r;
         if (std::abs(u) < edge - 0.06) beside = std::max(beside, measured / power_from_db(level_db));
       }
@@ -182,7 +182,7 @@ TEST(SharedNoise, FadesOutBeyondTheSector) {
 }
 
 // Correlation of two beams, over 30 pings and 50 rows, compared with the sum over groups. Two pings are not correlated.
-TEST(SharedNoise, IsOneDrawAGroupNewInEveryPing) {
+TEST(SharedNoise, IsOneDrawPerGroupNewInEveryPing) {
   Sounding s = with(loud);
   s.request.switches.keep_beams = true;
   std::vector<std::complex<float>> before;

@@ -40,7 +40,7 @@ TEST(SideLobes, PointsEchoAllAround) {
 
 constexpr double tilt = 0.1, lambert_db = -20;  // nose down; strength of the beds
 
-/// A flat bed `height` below a sonar, up to a range of six heights.
+/// Returns a flat bed `height` below a sonar, up to a range of six heights.
 Sounding over_bed(const FrequencyMode& mode, double height = 2, double pulse_width_m = 0.0254) {
   const double size = height / 2;
   return Sounding(

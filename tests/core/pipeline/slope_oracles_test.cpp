@@ -19,7 +19,7 @@ constexpr double dr = 0.0254;
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
 
-/// A few beams straight ahead, so that only a small surface needs cells.
+/// Returns the mode without elevation pattern and 4 degrees wide, so that only a small surface needs cells.
 FrequencyMode narrow(FrequencyMode mode) {
   mode = without_elevation_pattern(mode);
   mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(4));
@@ -84,7 +84,7 @@ std::vector<double> levels_of(const Octaves& o) {
   return levels;
 }
 
-/// Least squares over octaves [dB/decade].
+/// Returns the slope over octaves by least squares [dB/decade].
 double slope_of(const std::vector<double>& levels) {
   const auto n = static_cast<double>(levels.size());
   double x_mean = (n - 1) / 2, y_mean = 0, xy = 0, xx = 0;

@@ -12,7 +12,7 @@
 namespace sonar::test {
 namespace {
 
-/// Azimuth of the beam with the highest level near a range, interpolated between beams [deg].
+/// Returns the azimuth of the beam with the highest level near a range, interpolated between beams [deg].
 double bearing_deg(const Sounding& s, double range_m) {
   const int row = static_cast<int>(std::lround(s.row_of_range(range_m)));
   const int beam = s.loudest_beam(row);
@@ -21,7 +21,7 @@ double bearing_deg(const Sounding& s, double range_m) {
   return deg_from_rad(std::asin(s.beam_sine(beam) + peak.offset * step));
 }
 
-/// Mean azimuth of all power from slightly before a range on [deg].
+/// Returns the mean azimuth of all power from slightly before a range on [deg].
 double centroid_deg(const Sounding& s, double range_m) {
   double sum = 0, turned = 0;
   for (int row = static_cast<int>(s.row_of_range(range_m - 0.1)); row < s.row_of_range(range_m + 0.3); ++row)
@@ -29,7 +29,7 @@ double centroid_deg(const Sounding& s, double range_m) {
   return deg_from_rad(turned / sum);
 }
 
-/// An upright, round, closed surface about the origin.
+/// Returns an upright, round, closed surface about the origin.
 Mesh pole(double radius_m, double half_height_m) {
   constexpr std::uint32_t sides = 64;
   Mesh mesh;
@@ -46,7 +46,7 @@ Mesh pole(double radius_m, double half_height_m) {
   return mesh;
 }
 
-/// Two upright poles, 2 cm thick, on boresight at 2 and 10 m. The far pole is visible above the near one.
+/// Returns two upright poles, 2 cm thick, on boresight at 2 and 10 m. The far pole is visible above the near one.
 std::shared_ptr<const Scene> two_poles() {
   SceneMaker maker;
   maker.add(box({0.01, 0.01, 0.1}), -10, {2.01, 0, -0.15});

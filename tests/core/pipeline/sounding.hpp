@@ -66,7 +66,7 @@ struct Peak {
   double offset = 0, height = 0;
 };
 Peak log_parabola(double before, double middle, double after);
-/// Pearson correlation.
+/// Returns the Pearson correlation.
 double correlation(const std::vector<double>& a, const std::vector<double>& b);
 
 }  // namespace sonar::test

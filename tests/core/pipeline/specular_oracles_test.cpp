@@ -15,7 +15,7 @@ namespace {
 class BothWays : public testing::TestWithParam<bool> {
  protected:
   bool as_meshes() const { return GetParam(); }
-  /// Tolerance: 0.1 dB for exact shapes, 1 dB for shapes that are recovered from facets.
+  /// Returns the tolerance: `exact` for exact shapes, 1 dB for shapes that are recovered from facets.
   double within_db(double exact) const { return as_meshes() ? 1.0 : exact; }
   void record(int number, const std::string& what, double expected_db, double measured_db, double tolerance_db) const {
     record_oracle(number, what + (as_meshes() ? ", as a mesh" : ""), expected_db, measured_db, within_db(tolerance_db), "dB");
@@ -38,7 +38,7 @@ TEST_P(BothWays, Oracle10_SphereAtAnyRange) {
   record(10, "sphere, far: TS = 20 log(a / 2)", db(0.05 / 2), db(s.strength_per_m(34)) + 40 * std::log10(34.0), 0.1);
 }
 
-/// The wall of a cylinder at distance d from its axis, length L along z about z0.
+/// Returns the echo of a cylinder's wall of radius `a`. Its axis is at distance `axis_m`, its length along z about `z0_m`.
 double rod_echo(double wavelength_m, double a, double length_m, double axis_m, double z0_m = 0) {
   return kirchhoff_per_m(wavelength_m, 4000, std::max(400, static_cast<int>(length_m * 4000)), [&](double u, double v) {
     const double angle = (u - 0.5) * 0.5 * pi;  // the quarter that faces the sonar

@@ -54,7 +54,7 @@ class Plate {
     sounding_->request.switches.specular = true;
     row_ = static_cast<int>(std::lround(sounding_->row_of_range(2)));
   }
-  /// |s|^2 of the sample nearest to the plate, in the middle beam.
+  /// Returns |s|^2 of the sample nearest to the plate, in the middle beam.
   double intensity(std::uint64_t seed, bool expected = false) {
     sounding_->request.seed = Seed{seed};
     sounding_->request.switches.expected_power = expected;

@@ -12,7 +12,7 @@
 
 namespace sonar::test {
 
-/// A material that only reflects: it is smooth and has no diffuse echo.
+/// Returns a material that only reflects: it is smooth and has no diffuse echo.
 Material mirror(double reflection = 1);
 
 struct Mirror {
@@ -21,7 +21,7 @@ struct Mirror {
   Pose in_world = {};
   Material material = mirror();
 };
-/// A scene of such objects. With `as_meshes` it has no primitives.
+/// Returns a scene of such objects. With `as_meshes` it has no primitives.
 std::shared_ptr<const Scene> world_of(std::vector<Mirror> mirrors, bool as_meshes = false);
 
 // Mirrors in their own axes, as mesh and as primitive.
@@ -40,9 +40,9 @@ class SpecularSounding {
  public:
   SpecularSounding(std::shared_ptr<const Scene> scene, const FrequencyMode& mode, const PingSettings& settings);
   Sounding& sounding() { return sounding_; }
-  /// Amplitude of the strongest echo of the middle beam within `slack_m` of a range [uPa]; 0 without an echo.
+  /// Returns the amplitude of the strongest echo of the middle beam within `slack_m` of a range [uPa]; 0 without an echo.
   double peak_upa(double range_m, double slack_m = 0.05);
-  /// That amplitude as a pressure re the source at 1 m, without absorption: eq. 7 without exp(-2 alpha r).
+  /// Returns this amplitude as a pressure re the source at 1 m, without absorption: eq. 7 without exp(-2 alpha r).
   double strength_per_m(double range_m, double slack_m = 0.05);
   /// Turns the sonar by this much more to port.
   void turn(double yaw_rad);

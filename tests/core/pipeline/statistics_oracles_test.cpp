@@ -59,7 +59,7 @@ TEST(StatisticsOracles, NoiseBelongsToPingSonarAndSeed) {
   differs([&] { s.request.seed = Seed{99}; });
 }
 
-/// |rho| of the complex samples of a Gaussian field, from the correlation of their intensities: corr(I1, I2) = |rho|^2.
+/// Returns |rho| of the complex samples of a Gaussian field, from the correlation of their intensities: corr(I1, I2) = |rho|^2.
 double coherence(const std::vector<double>& power_a, const std::vector<double>& power_b) {
   return std::sqrt(std::max(0.0, correlation(power_a, power_b)));
 }
@@ -279,8 +279,8 @@ TEST(StatisticsOracles, Oracle35_LateralShiftDecorrelates) {
   }
 }
 
-/// Correlation of intensities in a patch between two pings. The patch of the second ping is `shift` rows nearer and `beams`
-/// beams farther along.
+/// Returns the correlation of intensities in a patch between two pings. The patch of the second ping is `shift` rows nearer
+/// and `beams` beams farther along.
 double patch_correlation(const Sounding& s, const std::vector<float>& before, const std::vector<float>& after, double from_m,
                          double to_m, double azimuth_deg, int row_shift, int beam_shift) {
   std::vector<double> a, b;

@@ -154,7 +154,7 @@ TEST(Texture, WithoutTheSwitchAndInExpectedPowerTheMeanIsUsed) {
   EXPECT_EQ(patchy.ping().pressure_upa, plain.ping().pressure_upa);
 }
 
-/// Intensity divided by its mean, where the beams hit the bed.
+/// Visits the intensity divided by its mean, where the beams hit the bed.
 template <class Visit>
 void visit_intensities(const Sounding& s, const reference::SeabedLevel& level, int beam_step, int row_step, Visit&& visit) {
   const auto pulse = static_cast<double>(s.request.settings.pulse_width_m);

@@ -25,7 +25,7 @@ struct Look {
   FrequencyMode mode;
   double range_m, pulse_m;
 };
-/// The products' beams, also with the pulses of their longest ranges.
+/// Returns the products' beams, also with the pulses of their longest ranges.
 std::vector<Look> looks() {
   return {{"P900, 5 m", p900(), 5, 0.0254},
           {"M1200d HF, 9 m", oculus_high(), 9, 0.9 * 10 / 437},
@@ -56,7 +56,7 @@ double echo_per_m2(const Sounding& s) {
   return sum * 2 * s.request.settings.range_bin_m / 1500 * du / (theta * energy_width_s(s.envelope_hz()) * source * source);
 }
 
-/// An upright closed cylinder about the origin.
+/// Returns an upright closed cylinder about the origin.
 Mesh closed_pole(double radius_m, double half_height_m) {
   constexpr std::uint32_t sides = 96;
   Mesh mesh;
@@ -212,8 +212,8 @@ TEST(ThinObjects, WhichMeshesAreClosed) {
   EXPECT_FALSE(encloses(soup, {1.1, 0, 0}));
 }
 
-/// Energy of a plate with the screen before it divided by that without [dB]. The numbers of the two objects differ by the
-/// parameter.
+/// Returns the energy of a plate with the screen before it divided by that without [dB]. The numbers of the two objects differ
+/// by the parameter.
 double heard_behind_screen_db(const Look& look, double yaw, double gap_m, int apart, SimdLevel level = SimdLevel::automatic) {
   const auto heard = [&](bool screened) {
     const Quatd turn = quat_from_rpy({0, 0, yaw});

@@ -36,7 +36,7 @@ double closed_form_db(const Sounding& s, double volume_db, double range_m) {
          10 * std::log10(volume_m3);
 }
 
-/// Mean power [dB] over beams with |azimuth| below `azimuth_deg`.
+/// Returns the mean power [dB] over beams with |azimuth| below `azimuth_deg`.
 double level_db(const Sounding& s, int row, double azimuth_deg) {
   double sum = 0;
   int n = 0;

@@ -36,7 +36,7 @@ std::string replaced(std::string text, const std::string& old, const std::string
 
 class CutMeshes : public ::testing::Test {
  protected:
-  /// "4 triangles", or the error.
+  /// Returns e.g. "4 triangles", or the error.
   std::string loaded(const std::string& name, const std::string& text) {
     const auto mesh = load_mesh({.file = files_.write(name, text)});
     return mesh ? std::to_string(mesh->centred.mesh.triangles.size()) + " triangles" : mesh.error().text;

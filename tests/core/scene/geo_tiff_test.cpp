@@ -109,7 +109,7 @@ TEST_F(GeoTiff, ASystemOfDepthsIsNoted) {
   EXPECT_THAT(notes(1, 5714), ::testing::IsEmpty());  // heights above mean sea level
 }
 
-/// A stream of zlib with one block that is not compressed.
+/// Returns a stream of zlib with one block that is not compressed.
 std::string zlib_of(const std::string& data) {
   std::uint32_t a = 1, b = 0;
   for (const char c : data) a = (a + static_cast<unsigned char>(c)) % 65521, b = (b + a) % 65521;

@@ -23,7 +23,7 @@ template <class T>
 std::string bytes_of(const std::vector<T>& values) {
   return {reinterpret_cast<const char*>(values.data()), sizeof(T) * values.size()};
 }
-/// Three corners, with further bytes between them.
+/// Returns three corners, with further bytes between them.
 template <class T>
 std::string corners(const std::array<T, 9>& xyz, std::size_t stride) {
   std::string bytes(3 * stride, '\x55');
@@ -76,7 +76,7 @@ struct Triangle {
 struct GltfFloats : ::testing::Test {
   TemporaryFiles files;
 
-  /// The vertices of the triangle, in the axes of the file.
+  /// Returns the vertices of the triangle, in the axes of the file.
   std::vector<Vec3d> vertices(const std::string& name, const std::string& bytes) {
     const auto mesh = load_mesh({.file = files.write(name, bytes)});
     if (!mesh) {

@@ -24,7 +24,7 @@ inline std::string collada_scene(const std::string& nodes, const std::string& li
          "</visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
 }
 
-/// `nodes` nodes, each of which contains the next one `times` times.
+/// Returns `nodes` nodes, each of which contains the next one `times` times.
 inline std::string gltf_nodes(int nodes, int times) {
   std::string list;
   for (int i = 1; i <= nodes; ++i) {
@@ -35,7 +35,7 @@ inline std::string gltf_nodes(int nodes, int times) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[)" + list + "{}]}";
 }
 
-/// One triangle. Its corners are in the file that `uri` names.
+/// Returns one triangle. Its corners are in the file that `uri` names.
 inline std::string gltf_with_buffer(const std::string& uri) {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"byteLength":36,"uri":")" +

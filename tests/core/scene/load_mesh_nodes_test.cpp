@@ -23,7 +23,7 @@ TEST_F(LoadMesh, NodesThatShowTheSameMeshAreCountedBeforeTheyTakeMemory) {
   EXPECT_EQ(few, "accepted");
 }
 
-/// A glTF file of two squares at x = 0 and 2, its meshes 0 and 1. `rest` replaces the text that follows the parts.
+/// Returns a glTF file of two squares at x = 0 and 2, its meshes 0 and 1. `rest` replaces the text that follows the parts.
 std::string gltf(const std::string& nodes, const std::string& scenes, const std::string& rest = "",
                  const std::string& last_index = "3") {
   std::string data;
@@ -90,7 +90,7 @@ TEST_F(LoadMesh, GltfMorphTargetsThatMoveVerticesAreRefused) {
   EXPECT_EQ(good("a.gltf", with_weights("0,0.0")).centred.mesh.triangles.size(), 2u);
 }
 
-/// A COLLADA file of a square whose corners follow one bone at `bone`. The node of the skin is at another position.
+/// Returns a COLLADA file of a square whose corners follow one bone at `bone`. The node of the skin is at another position.
 std::string skinned_collada(const std::string& bone) {
   const auto source = [](const char* id, const char* kind, int count, const std::string& values, int stride, const char* type) {
     return std::string("<source id='") + id + "'><" + kind + "_array id='" + id + "a' count='" + std::to_string(count) + "'>" +

@@ -67,7 +67,7 @@ struct TiffFile {
     shorts(34735, words), text(34737, value + "|");
     return *this;
   }
-  /// The same heights with further bands; `extra`: the kind of each, 2 for an alpha band.
+  /// Adds further bands with the same heights; `extra`: the kind of each, 2 for an alpha band.
   TiffFile& bands(const std::vector<std::uint16_t>& extra) {
     without(277).shorts(277, {static_cast<std::uint16_t>(extra.size() + 1)}).shorts(338, extra);
     return *this;

@@ -20,7 +20,7 @@ using tests::TemporaryFiles;
 const Geodetic origin{rad_from_deg(60), rad_from_deg(15), 0};
 constexpr double northing_m = 6'651'411.19;  // latitude 60 degrees, in the middle of a zone
 
-/// 21 x 21 heights, 100 m apart, around a position.
+/// Returns 21 x 21 heights, 100 m apart, around a position.
 std::string grid_about(double easting_m, double at_northing_m) {
   std::string text =
       text::format("ncols 21\nnrows 21\nxllcenter %.2f\nyllcenter %.2f\ncellsize 100\n", easting_m - 1000, at_northing_m - 1000);

@@ -17,7 +17,8 @@ namespace {
 constexpr int beams = 64, directions = 16;
 constexpr double above_db = 15, width_rad = 7 * pi / 180;
 
-/// Pattern of 21 elements with Hamming weights, 7 degrees wide at -3 dB, as a function of the difference of two sines.
+/// Returns the pattern of 21 elements with Hamming weights, 7 degrees wide at -3 dB, as a function of the difference of two
+/// sines.
 double pattern(double sines) {
   static const std::vector<double> table = [] {
     std::vector<double> values;
@@ -68,7 +69,7 @@ class Sounding {
             pattern(std::sin(static_cast<double>(ping_.beam_azimuth_rad[static_cast<std::size_t>(j)])) - std::sin(s.azimuth_rad));
     }
   }
-  /// A surface that scatters evenly. `range_m` is a function of the azimuth.
+  /// Adds a surface that scatters evenly. `range_m` is a function of the azimuth.
   void add_floor(const std::function<double(double)>& range_m) {
     for (int i = -600; i <= 600; ++i) {
       const double azimuth = i * rad_from_deg(0.08);
@@ -94,7 +95,7 @@ class Sounding {
 
 int direction_of(const Detection& p) { return static_cast<int>(std::floor((40 - deg_from_rad(p.azimuth_rad)) / 5)); }
 
-/// Every direction has a point on the floor. The error is at most two and a half pulses, usually half a pulse.
+/// Expects a point on the floor in every direction. The error is at most two and a half pulses, usually half a pulse.
 void expect_floor(double altitude_m, double slope_deg) {
   for (const double row_m : {0.012, 0.024, 0.048})
     for (unsigned seed = 1; seed <= 4; ++seed) {

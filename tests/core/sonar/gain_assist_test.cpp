@@ -43,7 +43,7 @@ TEST(GainAssist, ApproachesWithItsTimeConstant) {
   EXPECT_LT(next_gain_db(40, 1, 1, 10), 30) << "a saturated picture does not say how far it is over";
 }
 
-/// A device over a scene whose 99th percentile is the fraction `scene` of full scale at gain 0 dB. It pings every `period`.
+/// Returns the gain after `pings` pings, one per `period`. At gain 0 dB the 99th percentile is the part `scene` of full scale.
 double settled_gain_db(double scene, double gamma, float from_db, int pings, milliseconds period) {
   GainAssist assist;
   PingSettings settings;

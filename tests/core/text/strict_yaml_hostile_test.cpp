@@ -135,7 +135,7 @@ TEST(StrictYamlHostile, TruncationsAndMutationsGiveAValueOrAnError) {
   }
 }
 
-/// The error of a child process whose limit of addresses leaves room for 8 MiB; "" if there is none.
+/// Returns the error of a child process whose limit of addresses leaves room for 8 MiB; "" if there is none.
 std::string error_with_little_memory(const std::function<Result<Document>()>& read) {
   std::array<int, 2> ends{};
   if (::pipe(ends.data()) != 0) return "no pipe";

@@ -109,7 +109,7 @@ TEST(ConfigMistakes, NamesAMistypedKeyThatSeveralSonarsShare) {
   EXPECT_THAT(why(world + "vehicles: [{nmae: a}, {nmae: b}]\n" + sonar), HasSubstr("did you mean \"name\"?"));
 }
 
-/// The shipped example with another product, and nothing else changed.
+/// Returns the shipped example with another product, and nothing else changed.
 Result<Config> example_with(const std::string& profile) {
   std::ifstream file(std::filesystem::path(SONARD_SOURCE_DIR) / "scenes/sonard.yaml");
   std::string text(std::istreambuf_iterator<char>(file), {});

@@ -13,7 +13,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// The error of a configuration with this plan, which begins in line 7, or "".
+/// Returns the error of a configuration with this plan, which begins in line 7, or "".
 std::string why(const std::string& plan) {
   const std::string directory = ::testing::TempDir();
   std::ofstream(directory + "/scene.yaml") << "name: test\n";

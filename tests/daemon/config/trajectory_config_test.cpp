@@ -19,7 +19,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-/// A folder with files of every kind.
+/// Returns a folder with files of every kind.
 std::string directory() {
   static const std::string made = [] {
     std::string d = ::testing::TempDir() + "trajectoriesXXXXXX";  // a folder of this process, because others run beside it

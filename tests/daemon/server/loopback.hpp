@@ -25,7 +25,7 @@ using Steady = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 constexpr milliseconds patience{20000};  // time limit of every expected event
 
-/// A path in the folder for temporary files that no other test uses, in this process or another one.
+/// Returns a path in the folder for temporary files that no other test uses, in this process or another one.
 std::string own_path(const std::string& name);
 
 /// An engine without physics: each sample is a pattern of ping number, row and beam. It stores its requests.

@@ -29,7 +29,7 @@ DaemonSetup with_file() {
   return setup;
 }
 
-/// One more sonar, for DaemonSetup::sonar_lines.
+/// Returns one more sonar, for DaemonSetup::sonar_lines.
 std::string sonar(const std::string& name, const std::string& address, int device_id, const std::string& more = {}) {
   return "  - name: " + name + "\n    profile: oculus-m1200d\n    bind_ip: " + address + "\n    status_to: ['" + address +
          ":9']\n    device_id: " + std::to_string(device_id) + "\n" + more;

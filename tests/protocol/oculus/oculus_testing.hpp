@@ -63,7 +63,7 @@ class Exact {
 
 inline Time at(double seconds_since_epoch) { return Time{} + nanoseconds_from(seconds_since_epoch); }
 
-/// A device at 5 m depth in fresh water of 15 deg C; options that are not given have their defaults.
+/// Returns a device at 5 m depth in fresh water of 15 deg C; options that are not given have their defaults.
 inline protocol::DeviceState device(const char* profile = "oculus-m1200d", const protocol::OptionValues& options = {}) {
   const auto found = protocol::find_profile(profile);
   if (!found) throw std::runtime_error(found.error().text);

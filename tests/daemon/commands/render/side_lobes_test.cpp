@@ -41,7 +41,7 @@ double two_way(const FrequencyMode& mode, double psi_rad) {
 
 double db(double power_ratio) { return 10 * std::log10(power_ratio); }
 
-/// Mean power of beams within 10 degrees of the middle, in rows between two true ranges.
+/// Returns the mean power of beams within 10 degrees of the middle, in rows between two true ranges.
 double mean_power(const RenderJob& job, const Ping& ping, double from_m, double to_m) {
   const PingSettings& s = job.settings;
   const double true_over_device = true_sound_speed_mps(job.config.water, depth_m) / static_cast<double>(s.device_sound_speed_mps);

@@ -13,7 +13,8 @@ struct Images final : RangeImageSettings {
   bool equals(const VendorSettings&) const override { return true; }
 };
 
-/// A range image of 2 x 2 pixels: strength 100 at 5 m, no return, 200 at 10 m, 50 at 1 m. The unit of range is a millimetre.
+/// Returns a range image of 2 x 2 pixels: strength 100 at 5 m, no return, 200 at 10 m, 50 at 1 m. The unit of range is a
+/// millimetre.
 Ping range_image() {
   const auto settings = std::make_shared<Images>();
   settings->range_unit_m = 0.001;
@@ -45,7 +46,7 @@ std::pair<std::uint32_t, std::uint32_t> at(const Ping& ping, std::size_t index) 
 }
 using Pixel = std::pair<std::uint32_t, std::uint32_t>;
 
-/// Two beams by two rows of a byte, with signals of the same numbers.
+/// Returns two beams by two rows of a byte, with signals of the same numbers.
 Ping with_signals() {
   Ping ping;
   ping.request.settings.format.bits = 8;

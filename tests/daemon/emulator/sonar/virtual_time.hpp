@@ -104,7 +104,7 @@ class VirtualTime {
         sonars.emplace_back(around(), s, ++last_index, now);
   }
 
-  /// A ping of a few rows, as the engine might make it.
+  /// Returns a ping of a few rows, as the engine might make it.
   static std::shared_ptr<const Ping> computed(PingRequest request) {
     auto ping = std::make_shared<Ping>();
     PingSettings& s = request.settings;

@@ -32,7 +32,7 @@ Config config_with(const std::string& vehicle, const std::string& mount = "{fram
   return *std::move(config);
 }
 
-/// A bed of 40 x 30 m at z = -5, and further objects.
+/// Returns a bed of 40 x 30 m at z = -5, and further objects.
 Scene bed_scene(std::vector<Object> more = {}) {
   auto mesh = std::make_shared<Mesh>();
   mesh->vertices = {{-20, -15, 0}, {20, -15, 0}, {20, 15, 0}, {-20, 15, 0}};
@@ -44,7 +44,7 @@ Scene bed_scene(std::vector<Object> more = {}) {
   for (Object& o : more) scene.objects.push_back(std::move(o));
   return scene;
 }
-/// A box with edges of this size around this position.
+/// Returns a box with edges of this size around this position.
 Object box(const std::string& name, Vec3 size_m, Vec3d at_m) {
   auto mesh = std::make_shared<Mesh>();
   mesh->vertices = {-0.5f * size_m, 0.5f * size_m, {0, 0, 0}};

@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A wall 0.2 m thick, perpendicular to the sonar's axis, and a ball behind the sonar.
+/// Returns a wall 0.2 m thick, perpendicular to the sonar's axis, and a ball behind the sonar.
 ScenePointer wall_at(double x_m) {
   auto scene = parse_scene(
       "objects:\n  - {name: wall, type: box, material: concrete, size_m: [0.2, 2, 2], pose: {xyz_m: [" + std::to_string(x_m) +
@@ -29,7 +29,7 @@ ScenePointer wall_at(double x_m) {
   return *scene;
 }
 
-/// The same scene below a water surface; only the height of the surface matters here.
+/// Returns the same scene below a water surface; only the height of the surface matters here.
 ScenePointer wall_below_the_surface() {
   Scene scene = *wall_at(1.8);
   scene.sea_surface.present = true;

@@ -73,7 +73,7 @@ TEST(RecordingName, HasAKnownExtensionAndNoFolder) {
     EXPECT_THAT(RecordingFile::kind_of(name, "oculus").error().text, HasSubstr("by its end")) << name;
 }
 
-/// A message of an Oculus with this number of bytes, at most 271: the header, and a payload of ones.
+/// Returns a message of an Oculus with this number of bytes, at most 271: the header, and a payload of ones.
 protocol::Bytes oculus_message(std::size_t bytes) {
   protocol::Bytes message(bytes, std::byte{1});
   std::fill_n(message.begin(), 16, std::byte{0});
