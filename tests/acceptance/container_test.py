@@ -36,7 +36,7 @@ def setup_packages():
 
 
 def ignored(path):
-    """True if docker ignores a file of the tree: the last line that matches the file, or a folder above it, decides."""
+    """Returns whether docker ignores a file of the tree. The last line that matches it, or a folder above it, decides."""
     path, decided = pathlib.PurePosixPath(path), False
     for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines():
         anywhere, pattern = "**/" in line, line.lstrip("!").removeprefix("**/")

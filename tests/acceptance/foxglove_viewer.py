@@ -91,7 +91,7 @@ class Viewer:
         self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
 
     def frame(self):
-        """The next message: (is_text, payload). Each message must be one frame. WebSocket pings do not extend the timeout."""
+        """Returns the next message: (is_text, payload). Each message must be one frame. WebSocket pings do not extend the timeout."""
         deadline = time.monotonic() + self.socket.gettimeout()
         while time.monotonic() < deadline:
             first, second = self._take(2)

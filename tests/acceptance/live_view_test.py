@@ -198,7 +198,7 @@ class Channels(unittest.TestCase):
             self.assertLessEqual(set(stamps["/front/ping"][:20]), set(stamps["/front/cloud"]))
 
     def test_fast_lines_come_without_loss(self):
-        """A sonar with 100 lines a second loses none by limits; a busy computer may lose some because queues are full."""
+        """A sonar with 100 lines per second loses none by limits; a busy computer may lose some because queues are full."""
         with Sonard(profile="ping1d") as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribed("/front/ping", "/front/cloud")
             with subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "ping1d", "--range", "1", "--rate", "100"],

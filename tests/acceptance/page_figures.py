@@ -133,7 +133,7 @@ class FirstMinute(unittest.TestCase):
             keep_clicks(delays(page, ROUNDS * len(CLICKED)), {"page-demo-clicks": 150, "page-demo-clicks-scripts": SCRIPTS_MS}, "FirstMinute")
 
     def test_size(self):
-        """The size of everything that the page loads until it shows its picture."""
+        """Measures the size of everything that the page loads until it shows its picture."""
         with demo("oculus"), self.open() as page:
             shown(page)
             packed = raw = 0

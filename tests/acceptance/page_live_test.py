@@ -124,7 +124,7 @@ class Live(PageChecks, unittest.TestCase):
                 page.close()
 
     def test_first_picture_comes_within_a_second(self):
-        """The time to open the page; the best of several tries, because other programs run too."""
+        """Checks the time to open the page; the best of several tries, because other programs run too."""
         with Sonard(mount=MOUNT, trajectory="orbit") as daemon, Driver(daemon.address) as driver:
             self.patiently(lambda: driver.read > 5)
             best = 1e9
@@ -303,7 +303,7 @@ class Live(PageChecks, unittest.TestCase):
             self.assertIn("recording: {folder: DIR}", page.text("#refusal"))
 
     def test_all_parts_work_at_once(self):
-        """Two drivers, one of them slow, a trajectory and a fault: so that all panels have content."""
+        """There are two drivers, one of them slow, a trajectory and a fault, so that all panels have content."""
         trajectory = f"{{file: {self.circle()}, loop: true}}"
         with Sonard(mount=MOUNT, trajectory=trajectory, arguments=["--faults", "--clients", "2"]) as daemon, \
                 Driver(daemon.address, rate_hz=RATE_HZ), Driver(daemon.address, reads_hz=0.7 * RATE_HZ, rate_hz=RATE_HZ):

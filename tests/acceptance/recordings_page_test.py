@@ -112,8 +112,8 @@ class Recordings(PageChecks, unittest.TestCase):
                         self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
 
     def test_a_recorded_refusal_of_another_request_stops_no_host(self):
-        """A host that does not know the product at the port may ask for the other one first; then the recording contains the
-        refusal."""
+        """A host that does not know the product at the port may send a request for the other one first. Then the recording
+        contains the refusal."""
         with demo("s500"):
             self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--wait", 100, "--pings", 20).returncode, 0)
         with Replay(pathlib.Path("run.mcap"), "--loop") as replay:

@@ -69,7 +69,7 @@ TEST(DoctorPlaces, ListsWhatEachAddressOfASonarCarries) {
       << "an older daemon";
 }
 
-TEST(DoctorPlaces, AUdpAddressThatDoesNotAnswerIsNoMatterOfTcp) {
+TEST(DoctorPlaces, ForASilentUdpAddressAFirewallIsSuggested) {
   Facts facts = facts_by_udp("127.0.0.2", Outcome::unreachable);
   facts.sonars[0].stream.error = "no answer";
   EXPECT_THAT(text_from(run_checks(facts)), HasSubstr("a firewall on this computer may drop udp "));

@@ -15,5 +15,5 @@ def prefix(abi):
 
 
 def l_targets(**more):
-    """The daemon with a P900-90 in front of the L targets."""
+    """Returns the daemon with a P900-90 in front of the L targets."""
     return Sonard(scene="l-targets.yaml", profile="blueview-p900-90", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}", **more)

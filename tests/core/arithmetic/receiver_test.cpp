@@ -108,7 +108,7 @@ TEST(Receiver, TvgHasAMinimumRangeAndACeiling) {
   EXPECT_NEAR(tvg_db(law, 30, 0.4954), 88.8, 0.1);  // gain that LF at 30 m would need
 }
 
-TEST(Receiver, FullScale) {
+TEST(Receiver, FullScaleBecomesOne) {
   ReceiverModel law;
   law.full_scale_upa = 200;
   EXPECT_NEAR(full_scale_factor(law, 20) * 20, 1, 1e-9);

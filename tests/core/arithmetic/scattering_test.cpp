@@ -37,7 +37,7 @@ TEST(Scattering, LambertCoefficientFollowsTheStrength) {
   EXPECT_NEAR(lambert_coefficient(largest_lambert_db), largest_lambert, 2e-4);
 }
 
-TEST(Scattering, CarrierTurnsFold) {
+TEST(Scattering, TurnsOfTheCarrierAreFoldedToOne) {
   const double turns_per_m = 2 * 2.1e6 / 1500;
   EXPECT_NEAR(fraction_of_turn(7.25), 0.25, 1e-9);
   EXPECT_NEAR(fraction_of_turn(-7.25), 0.75, 1e-9);

@@ -120,7 +120,7 @@ TEST_F(Geometry, HeadingRunsClockwiseFromNorth) {
   EXPECT_NEAR(heading_rad(quat_from_rpy({0, 0, pi})), 1.5 * pi, 1e-12);
 }
 
-TEST_F(Geometry, FiniteChecks) {
+TEST_F(Geometry, OnlyFiniteNumbersPassTheCheck) {
   EXPECT_TRUE(is_finite(Vec3d{1, 2, 3}));
   EXPECT_FALSE(is_finite(Vec3d{1, std::nan(""), 3}));
   EXPECT_FALSE(is_finite(Quatd{HUGE_VAL, 0, 0, 0}));

@@ -58,7 +58,7 @@ TEST(Utm, AKnownPlaceHasItsCoordinates) {  // the CN Tower: 43 deg 38' 33.24" no
   EXPECT_NEAR(deg_from_rad(tower.longitude_rad), -(79 + 23 / 60.0 + 13.7 / 3600), 1e-5);
 }
 
-TEST(Utm, NamesOfZones) {
+TEST(Utm, NamesOfZonesAreReadAndWritten) {
   EXPECT_EQ(utm_zone_from("33N"), (UtmZone{33, false}));
   EXPECT_EQ(utm_zone_from("1 south"), (UtmZone{1, true}));
   EXPECT_EQ(utm_zone_from("60_s"), (UtmZone{60, true}));

@@ -125,7 +125,7 @@ TEST_F(LoadMesh, SkinsFollowTheirBonesAtRest) {
   EXPECT_LT(length(there.high - Vec3d{1, 8, -3}), 1e-5);
 }
 
-TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfACollada) {
+TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfAColladaAreCounted) {
   const auto changed = [](const std::string& from, const std::string& to) {
     std::string text = collada("Z_UP");
     return text.replace(text.find(from), from.size(), to);

@@ -159,7 +159,7 @@ TEST(EncodePing, EnvironmentFollowsTheRequest) {
   EXPECT_EQ(fixed.frequency_hz, 1.2e6);
 }
 
-TEST(EncodePing, StartTimeUnits) {
+TEST(EncodePing, TheUnitOfTheStartTimeIsAnOption) {
   // Fired 12.25 s after power-up.
   EXPECT_EQ(answer(device(), fire(2, 1, PingRate::hz10, 0x49, 5, 50)).head.fixed.ping_start_time_s, 12.25);
   EXPECT_EQ(answer(device(), fire(0, 1, PingRate::hz10, 0x49, 5, 50)).head.ping_start_counter,
