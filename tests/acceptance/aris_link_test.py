@@ -1,4 +1,4 @@
-"""Tests an emulated ARIS with a controller: beacons, frames, cookies, one controller at a time; and with tshark."""
+"""Tests an emulated ARIS with a controller (beacons, frames, cookies, one controller at a time) and with tshark."""
 import math
 import pathlib
 import shutil

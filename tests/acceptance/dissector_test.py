@@ -1,8 +1,8 @@
 """Tests the Wireshark dissector (protocol/oculus/oculus.lua) with tshark: three decoders in three languages must read the same
 values.
 
-Every field of every message is compared with a reader in Python (oculus_fields) and with our own decoder (dump_oculus): in a run
-recorded from sonard, in the hand-made golden messages, and in captured pings of a real device if SONARD_CAPTURES is set.
+Every field of every message is compared with a reader in Python (oculus_fields) and with our own decoder (dump_oculus). The
+messages are a recorded run of sonard, the golden messages, and captured pings of a real device if SONARD_CAPTURES is set.
 """
 import json
 import os

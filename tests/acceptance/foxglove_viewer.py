@@ -19,7 +19,7 @@ class Refused(Exception):
 
 
 class Closed(Exception):
-    """The server closed the connection; code 0: without a close frame."""
+    """The server closed the connection. Code 0 means without a close frame."""
 
     def __init__(self, code):
         super().__init__(code)
@@ -91,7 +91,7 @@ class Viewer:
         self.socket.sendall(head + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(payload)))
 
     def frame(self):
-        """Returns the next message: (is_text, payload). Each message must be one frame. WebSocket pings do not extend the timeout."""
+        """Returns the next message: (is_text, payload). It must be one frame. WebSocket pings do not extend the timeout."""
         deadline = time.monotonic() + self.socket.gettimeout()
         while time.monotonic() < deadline:
             first, second = self._take(2)

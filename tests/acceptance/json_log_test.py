@@ -1,5 +1,5 @@
-"""Tests `sonard run --log-format json`: every line of the log stream is an object, from the banner to the last line; the text format is
-unchanged."""
+"""Tests `sonard run --log-format json`. Every line of the log stream is an object, from the banner to the last line. The text
+format is unchanged."""
 import json
 import pathlib
 import subprocess

@@ -9,7 +9,7 @@ from oculus_reader import Client, fire_message
 from running_sonard import Sonard, eventually
 
 A, B, C, BELOW = (3.9, -20), (3.9, 10), (6.9, -8), (4.9, 0)  # range m, bearing deg: positive to starboard
-VERBATIM_GAIN = 0x59  # metres, simple result, 512 beams; bit 4: the gain is used unchanged, also in mode 2
+VERBATIM_GAIN = 0x59  # metres, simple result, 512 beams, and bit 4: the gain is used unchanged, also in mode 2
 UNASSISTED = "oculus-m1200d\n    options: {gain_assist: off}"
 SALINITY = 30.0  # that of the water; otherwise the device assumes another sound speed, and its ranges are wrong by a few per cent
 LEVEL, BOW_DOWN, BOW_UP = "0,0,0", "0,25,0", "0,-25,0"      # east-north-up, forward-left-up

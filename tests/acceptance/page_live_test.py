@@ -1,7 +1,7 @@
 """Tests the page of the live view in a real browser, with sonard and a driver. Skipped without browser or page.
 
-SONARD_SHOTS names a folder for pictures; without it there are only those of tests that fail
-(SONARD_SHOT_HZ: at that rate, for slow computers).
+SONARD_SHOTS names a folder for pictures; without it there are only those of tests that fail. SONARD_SHOT_HZ sets the rate of
+pings for them, for slow computers.
 """
 import collections
 import json

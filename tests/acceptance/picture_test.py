@@ -1,8 +1,8 @@
 """Checks by statistics of the samples (`sonarctl stats`) that the demo's picture resembles that of a real sonar.
 
-The picture is that of the demo's first pose, with 256 beams as in the captured pings of a real M1200d. The figures of these
-pings: adjacent beams have a correlation of 0.80, adjacent rows 0.58; the near field is quiet, with a mean of 8; noise rises
-towards the far end. In the 512 format, which the demo uses, beams are equally wide but half as far apart (0.117 degrees; a beam
+The picture is that of the demo's first pose, with 256 beams as in the captured pings of a real M1200d. In these pings adjacent
+beams have a correlation of 0.80, and adjacent rows 0.58. The near field is quiet, with a mean of 8, and noise rises towards
+the far end. In the 512 format, which the demo uses, beams are equally wide but half as far apart (0.117 degrees; a beam
 is 0.4 degrees wide), so neighbours are more similar.
 """
 import json

@@ -1,4 +1,4 @@
-"""A vehicle follows a trajectory file: in stepped time every ping shows its position, with the same bytes in every run; a running
+"""A vehicle follows a trajectory file. In stepped time every ping shows its position, with the same bytes in every run. A running
 daemon pauses, seeks and speeds it up on request, and a reload does not disturb it."""
 import json
 import math

@@ -1,4 +1,4 @@
-"""Tests sonarctl view in the terminal and live: letters for pipes, colours for terminals; at the end the terminal is restored."""
+"""Tests sonarctl view in the terminal and live: letters for pipes, and colours for terminals, which are restored at the end."""
 import os
 import pathlib
 import pty

@@ -1,4 +1,4 @@
-"""Tests an emulated Sonar 3D-15 with a program: settings over HTTP, images by multicast and unicast; and with tshark."""
+"""Tests an emulated Sonar 3D-15 with a program (settings over HTTP, images by multicast and unicast) and with tshark."""
 import json
 import pathlib
 import socket

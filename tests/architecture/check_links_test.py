@@ -19,7 +19,7 @@ FILES = {
 
 
 def found_in(files, installed=False, links=()):
-    """Returns the dead links of a tree that holds these files, {name: text}; `links`: symbolic ones, (name, where to)."""
+    """Returns the dead links of a tree with these files, {name: text}. `links`: symbolic links, (name, target)."""
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder) / "tree"
         for name, text in files.items():

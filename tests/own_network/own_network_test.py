@@ -1,4 +1,4 @@
-"""Tests in_own_network: its programs' addresses do not collide; without namespaces the programs run one after the other."""
+"""Tests in_own_network. The addresses of its programs do not collide. Without namespaces the programs run one after the other."""
 import os
 import pathlib
 import select

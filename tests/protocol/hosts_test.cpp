@@ -1,5 +1,5 @@
-// The host of each make against the device of the same make, in memory and virtual time: settings have effect and pings arrive
-// for any split of the bytes; cut or foreign bytes cause neither a ping nor a crash.
+// The host of each make with the device of the same make, in memory and virtual time. Settings have effect and pings arrive for
+// any split of the bytes. Cut or foreign bytes cause neither a ping nor a crash.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

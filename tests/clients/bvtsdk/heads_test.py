@@ -1,5 +1,5 @@
-"""Sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library; the settings
-in their recordings; the positions of ranges."""
+"""Sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library. Also the
+settings in their recordings, and the positions of ranges."""
 import ctypes
 import pathlib
 import tempfile

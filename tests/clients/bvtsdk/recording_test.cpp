@@ -1,4 +1,4 @@
-// Recordings: written pings are read back, also from files that were not closed or were cut; other files are refused.
+// Written pings are read back from recordings, also from files that were not closed or were cut. Other files are refused.
 #include "clients/bvtsdk/core/recording.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// Conditions of every mesh: indices in range, triangles with area; and, for solids, closed with its normals outwards.
+// Conditions of every mesh: indices in range, triangles with area, and, for solids, closed with normals outwards.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// A host's conversation with an emulated Ping1D, without a socket: settings, measurements, streams, refusals; its detector and
-// its automatic mode.
+// A host's conversation with an emulated Ping1D, without a socket: settings, measurements, streams, refusals, the detector and
+// the automatic mode.
 #include <gmock/gmock.h>
 
 #include "protocol/ping/ping1d_settings.hpp"

@@ -1,5 +1,5 @@
-// A host's conversation with an emulated S500, without a socket: single pings, streams, refusals; distances over several pings
-// and its automatic range and gain.
+// A host's conversation with an emulated S500, without a socket: single pings, streams, refusals, distances over several pings,
+// and the automatic range and gain.
 #include <gmock/gmock.h>
 
 #include <variant>

@@ -1,4 +1,4 @@
-// A small data set: made at once, in parts, with more threads, and after an interruption; and refused data sets.
+// A small data set is made at once, in parts, with more threads, and after an interruption. Wrong data sets are refused.
 #include "daemon/commands/dataset/make_dataset.hpp"
 
 #include <gmock/gmock.h>

@@ -42,8 +42,8 @@ TEST(InputRate, NoRateIsNoLimit) {
   EXPECT_EQ(rate.pause_after(std::size_t{1} << 40, Steady::time_point{}).count(), 0);
 }
 
-/// Bytes read within 20 s from `floods` clients that flood, and from one that sends `modest` bytes every 100 ms; `waited`: that
-/// client's waiting time.
+/// The bytes read within 20 s from `floods` clients that flood, and the waiting time of one client that sends `modest` bytes
+/// every 100 ms.
 struct Shared {
   std::size_t of_floods = 0;
   Steady::duration waited{};

@@ -1,5 +1,5 @@
 // The whole daemon with the real CPU engine over analytic shapes in place of Embree, so that the thread sanitizer checks all of
-// its code: pings are sent while control requests status, adds and moves objects, and while the configuration is read again.
+// its code. Pings are sent while control requests status, adds and moves objects, and while the configuration is read again.
 #include <gmock/gmock.h>
 #include <unistd.h>
 

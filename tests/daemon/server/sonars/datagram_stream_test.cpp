@@ -37,7 +37,7 @@ struct SilentHost : ::testing::Test, QuietParent {
   udp::socket socket{io, udp::v4()};
   std::shared_ptr<DatagramStream> stream = std::make_shared<DatagramStream>(*this, socket, 1, std::chrono::nanoseconds(0));
   int looks = 0;
-  int answered_look = 0;  // the host's computer answers every nth probe, where n is this number; 0: no probe
+  int answered_look = 0;  // n: the host's computer answers every nth probe; 0: it answers none
 };
 
 TEST_F(SilentHost, IsGivenUpAfterTheLimitWhenNothingAnswers) {
