@@ -233,8 +233,8 @@ def slope(points):
 
 
 def exponents(points):
-    """Returns (before, index of the knee, after): exponents of the two straight lines through a common point that fit best. Returns
-    (all, None, all) if they differ by less than 0.2, or with fewer than three points."""
+    """Returns (before, index of the knee, after): exponents of the two straight lines through a common point that fit best.
+    Returns (all, None, all) if they differ by less than 0.2, or with fewer than three points."""
     splits = [(slope(points[:i + 1]), i, slope(points[i:])) for i in range(1, len(points) - 1)]
     if splits:
         before, knee, after = min(splits, key=lambda split: split[0][1] + split[2][1])
