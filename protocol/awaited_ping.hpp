@@ -21,7 +21,7 @@ class AwaitedPing {
     fired_ = std::move(with);
     fired_at_ = now;
   }
-  /// Call it at lost_at(). Returns false if the computation of the ping has not begun (`ping_pending`); then the wait starts
+  /// Called at lost_at(). Returns false if the computation of the ping has not begun (`ping_pending`); then the wait starts
   /// again.
   bool lose(bool ping_pending, Time now) {
     if (ping_pending) return fired_at_ = now, false;

@@ -1,5 +1,5 @@
-// The dialogue of one client with the emulated device. It gets bytes and times, and returns replies, and events that affect the
-// device.
+// The dialogue of one client with the emulated device. Its inputs are bytes and times; it returns replies to the client, and
+// events for the device.
 #pragma once
 
 #include <chrono>
@@ -63,7 +63,7 @@ struct StoredAddress {
 struct StoreAddress {
   StoredAddress address;
 };
-/// A line for the log at a limited rate, for example that bytes were skipped or a request was refused.
+/// A line for the log, for example about skipped bytes or a refused request. The log limits the rate of such lines.
 struct Notice {
   std::string text;
 };

@@ -16,7 +16,7 @@ enum class FaultStage { payload, device, time, framing, stream, link, clients, s
 inline constexpr std::array<std::string_view, 9> fault_stage_names = {"payload", "device",  "time",   "framing",  "stream",
                                                                       "link",    "clients", "status", "datagrams"};
 
-/// Effects of kinds in the engine (daemon/emulator/faults/).
+/// The effects of kinds; daemon/emulator/faults/ produces them.
 enum class FaultEffect {
   // link and clients
   close_ports,
@@ -121,7 +121,7 @@ struct FaultKind {
   std::array<FaultParameter, 4> parameters = {};  // unused parameters have no name
   std::string_view touches = {};  // the changed part of a message or device; two faults that change the same part conflict
 
-  /// True if the fault acts on single pings, false if it acts during a time.
+  /// True if the fault acts on single pings, false if it acts for a time.
   bool per_ping() const { return default_s == 0; }
   std::span<const FaultParameter> given() const;
 };

@@ -100,7 +100,7 @@ class Host {
   virtual bool is_open() const { return true; }
   /// Returns a text such as "an ARIS" or "a BlueView P900-90, serial 7001".
   virtual std::string about() const = 0;
-  /// Counts of skipped bytes and missing pings, for protocols that recognise messages and number pings.
+  /// Counts of skipped bytes and missing pings, for protocols with framed messages and numbered pings.
   struct Counts {
     std::uint64_t messages = 0, dummies = 0, junk_bytes = 0, missing_pings = 0;
   };

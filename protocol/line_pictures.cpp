@@ -16,7 +16,7 @@ constexpr float silent_db = -std::numeric_limits<float>::infinity();
 }  // namespace
 
 PolarImage empty_fan(double half_rad, double range_m) {
-  constexpr std::size_t rows = 300, beams = 100;  // a picture shows half a beam outside of the outermost ones
+  constexpr std::size_t rows = 300, beams = 100;  // a picture extends half a beam beyond the outermost beams
   PolarImage image{rows, beams, range_m / rows, {}, std::vector<float>(rows * beams)};
   for (std::size_t i = 0; i < beams; ++i) image.azimuth_rad.push_back(half_rad * (1 - 2 * static_cast<double>(i) / (beams - 1)));
   return image;
@@ -68,7 +68,7 @@ double Sweep::bearing_rad(std::size_t direction) const {
   return (all / 2 - static_cast<double>(direction)) * 2 * pi / all;
 }
 
-// A scan of the half circle ahead would fill only half of a round picture, so the picture shows only that half. With the first
+// A scan of the half circle ahead would fill only half of a round picture, so the picture shows only that half. Once there is a
 // line outside that half, the picture shows a whole turn.
 PolarImage Sweep::shown() const {
   bool only_ahead = lines_.size() % 4 == 0;

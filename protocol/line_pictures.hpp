@@ -19,8 +19,8 @@ class Waterfall {
  public:
   /// `shown_db`: levels down to this far below the strongest echo are shown.
   explicit Waterfall(float shown_db = 60) : shown_db_(shown_db) {}
-  /// Adds a line and puts the drawing into `ping`; it has the ranges of this line, also for earlier lines, which may have had
-  /// others. `received_at`: for the times beside the picture.
+  /// Adds a line and puts the drawing of all lines into `ping`. The drawing has the ranges of this line; earlier lines, which may
+  /// have had other ranges, are resampled. `received_at`: for the times beside the picture.
   void add(Line line, double start_m, double row_m, Time received_at, HostPing& ping);
 
  private:

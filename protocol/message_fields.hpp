@@ -44,7 +44,7 @@ enum class FieldName {
   connected_address,
   mac,
 };
-/// fields() of a message marks the meaning of a field with these: visit("pingId", m.ping_id, means::ping_id).
+/// fields() of a message states the meaning of a field with such a name: visit("pingId", m.ping_id, means::ping_id).
 namespace means {
 using enum FieldName;
 }

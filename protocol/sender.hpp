@@ -19,8 +19,8 @@ std::optional<SentBy> sender_of(const RecordedMessage& message);
 /// Returns the index of the port at which a host of the make receives messages of this carrier; nullopt if there is none.
 std::optional<std::size_t> host_port(const protocol::Make& make, Carrier by);
 
-/// Returns the framing if all recorded TCP bytes of the device have it. Returns null if the make has no framing, or if several
-/// TCP ports are recorded, because those of the others, such as a port for commands, have none.
+/// Returns the framing of the device's TCP bytes. Returns null if the make has no framing, or has several TCP ports: the bytes of
+/// some ports, such as a port for commands, have none.
 inline const Framing* common_framing(const protocol::Make& make) {
   const auto streams = std::count_if(make.ports.begin(), make.ports.end(),
                                      [](const auto& port) { return port.kind == protocol::HostPort::Kind::tcp; });

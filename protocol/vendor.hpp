@@ -34,7 +34,7 @@ namespace sonar::protocol {
 /// A property that no source states; users set it under `options:` of a sonar in the configuration.
 struct Option {
   std::string_view name;
-  std::vector<std::string_view> allowed;  // the first is the default; empty = a number or the word of default_value
+  std::vector<std::string_view> allowed;  // the first is the default; empty = a number, `word` or the default
   std::string_view default_value;
   std::string_view meaning;
   double lowest = 0, highest = 0;  // limits of a number, inclusive
@@ -84,12 +84,12 @@ struct DeviceState {
   std::shared_ptr<const VendorSettings> settings;  // present settings; null = Vendor::initial_settings
   std::uint32_t last_ping = 0;                     // number of the last fired ping
   Time framed_at{};                                // stamp of the previously framed ping; Time{} = none
-  std::chrono::nanoseconds skipped{0};             // lead of the stamps of pings over the dialogues' time
+  std::chrono::nanoseconds skipped{0};             // stamps of pings minus the time of the dialogues
   bool simulated_time = false;                     // true: time may stop while clients wait
   StoredAddress stored_address;
 };
 
-/// The transport of pings to a host: a TCP connection, datagrams (frame() returns null), or the one with which the host connects.
+/// The transport of pings to a host: a TCP connection, datagrams (frame() returns null), or that of the host's requests.
 enum class PingsBy { stream, datagrams, either };
 
 /// The distance that a range finder, such as an altimeter, measures with one ping.
@@ -179,7 +179,7 @@ class Vendor {
   /// nullopt if the message has no such field or is too short.
   virtual std::optional<Field> field(Part /*part*/, FieldName /*name*/, BytesView /*message*/) const { return {}; }
   /// Replaces an integer without a fixed offset in the message, such as a varint, with `change(integer)`. Returns false if the
-  /// message has no such integer or, if `message` is empty, if no message of this kind has it.
+  /// message has no such integer; for an empty `message`, returns false if no message of this kind has one.
   virtual bool change_integer(Part /*part*/, FieldName /*name*/, const std::function<std::int64_t(std::int64_t)>& /*change*/,
                               Bytes& /*message*/) const {
     return false;

@@ -83,14 +83,14 @@ class ArisFileReader final : public RecordingReader {
                    " is damaged: its version or number of samples is not the file's");
       return true;
     }
-    // Frames are converted to datagrams again, so that the host for live frames reads files too.
+    // Frames are converted to datagrams, so that the host for live frames can read files too.
     at_ = Time(std::chrono::microseconds(header.frame_time_us % longest_time_us));
     for (Bytes& part : aris::parts_of(++frames_, bytes.first(aris::header_size), bytes.subspan(aris::padded_header_size)))
       parts_.push_back(std::move(part));
     return true;
   }
 
-  static constexpr std::uint64_t longest_time_us = std::uint64_t{1} << 52;  // about 142 years, which fit into nanoseconds
+  static constexpr std::uint64_t longest_time_us = std::uint64_t{1} << 52;  // 142 years; in nanoseconds this fits into 64 bits
   std::unique_ptr<Source> source_;
   Scan scan_;
   FileHeader header_;

@@ -176,7 +176,7 @@ class ArisDialogue final : public protocol::Dialogue {
 
   const DeviceState& device_;
   std::shared_ptr<const VendorSettings> seen_;                 // the settings of the device at the last call
-  std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // settings of later commands, oldest first
+  std::deque<std::shared_ptr<const VendorSettings>> waiting_;  // settings that the device does not have yet, oldest first
   std::uint32_t first_ping_;
   bool streaming_ = false;             // true: this controller has set a receiver
   std::vector<std::string> refusals_;  // refusals of SET_ACOUSTICS since the last command of another type

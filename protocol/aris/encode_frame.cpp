@@ -30,8 +30,8 @@ void for_each_sample(std::size_t samples, int pings, auto copy) {
       for (std::size_t channel = 0; channel < channels; ++channel) copy(raw++, sample * beams + sixteenth[channel] * n + ping);
 }
 
-/// Repeats the acoustic settings of the controller, after the limits of judge(). Only window and sound speed are from
-/// PingSettings, because they are those at the time of the ping.
+/// Copies the controller's acoustic settings, which judge() has limited. Only window and sound speed are from PingSettings,
+/// because they are those at the time of the ping.
 void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, const Product& product) {
   const Acoustics& a = s.acoustics;
   h.window_start_m = static_cast<float>(used.range_start_m);
@@ -62,7 +62,7 @@ void set_settings(FrameHeader& h, const Settings& s, const PingSettings& used, c
 void set_attitude(FrameHeader& h, const Quatd& sonar_in_world) {
   const RollPitchYaw angles = rpy_from_quat(sonar_in_world);
   h.compass_heading_deg = static_cast<float>(deg_from_rad(heading_rad(sonar_in_world)));
-  h.compass_pitch_deg = static_cast<float>(-deg_from_rad(angles.pitch_rad));  // about y to port, positive is bow down
+  h.compass_pitch_deg = static_cast<float>(-deg_from_rad(angles.pitch_rad));  // a positive pitch_rad is bow down
   h.compass_roll_deg = static_cast<float>(deg_from_rad(angles.roll_rad));
   const Vec3d down = rotate(conjugate(sonar_in_world), Vec3d{0, 0, -1});
   h.acceleration_g = {static_cast<float>(down.x), static_cast<float>(down.y), static_cast<float>(down.z)};

@@ -97,7 +97,7 @@ class ArisHost final : public protocol::Host {
   explicit ArisHost(const protocol::Wanted& wanted) : wanted_(wanted) {}
 
   /// Sends settings for each product, because only beacons state the product, and beacons may not arrive here. The device refuses
-  /// settings for other products. An ARIS 1800 also accepts settings for a 1200, so its settings are sent after those. Frames
+  /// settings for other products. An ARIS 1800 also accepts settings for a 1200, so those for a 1200 are sent first. Frames
   /// begin when the receiver is set. The first frame states the product; if this product cannot have the requested settings, the
   /// host gives up.
   HostActions on_open(std::span<const std::uint16_t> own, Time now) override {

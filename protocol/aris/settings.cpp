@@ -279,7 +279,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   if (wanted.range_m || wanted.mode || wanted.beams) a.cycle_us = shortest_cycle_us(a);
   const Product& product = product_of(*device.model);
   a.frame_rate_hz = std::min(a.frame_rate_hz, static_cast<float>(highest_frame_rate_hz(product, a, std::nullopt)));
-  // judge() refuses a cookie of 0, which the settings have before a controller has sent any.
+  // judge() refuses a cookie of 0, which the settings have until a controller has sent a SET_ACOUSTICS.
   Acoustics numbered = a;
   numbered.cookie = std::max(a.cookie, 1u);
   const Verdict verdict = judge(numbered, product, true);

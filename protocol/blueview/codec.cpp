@@ -51,7 +51,7 @@ recording::Codec codec() {
           .sender = sender_of,
           .message =
               [](wire::BytesView payload) {
-                return make_frame(FrameType::ping_data, 0, payload);  // id 0: no request caused it
+                return make_frame(FrameType::ping_data, 0, payload);  // id 0: not the answer to a request
               },
           .ping_part = ping_part,
           .answer =

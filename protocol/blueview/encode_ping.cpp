@@ -26,8 +26,8 @@ void set_nav(PingHead& to, const PingRequest& request) {
   const RollPitchYaw angles = rpy_from_quat(vehicle.orientation);
   to.nav_time_s = utc_seconds(request.fired_at);
   to.depth_m = static_cast<float>(depth_from_z(vehicle.position_m.z));
-  to.pitch_deg = static_cast<float>(-deg_from_rad(angles.pitch_rad));  // about y to port, positive is bow down
-  to.roll_deg = static_cast<float>(deg_from_rad(angles.roll_rad));     // about x ahead, positive lifts port
+  to.pitch_deg = static_cast<float>(-deg_from_rad(angles.pitch_rad));  // a positive pitch_rad is bow down
+  to.roll_deg = static_cast<float>(deg_from_rad(angles.roll_rad));     // a positive roll_rad is port up
   to.heading_deg = static_cast<float>(deg_from_rad(heading_rad(vehicle.orientation)));
 }
 

@@ -87,7 +87,7 @@ class Framer {
   std::string broken_;
 };
 
-/// Returns a zlib stream (RFC 1950) of the fastest level; empty if zlib has no memory.
+/// Returns a zlib stream (RFC 1950), compressed at the fastest level; empty if zlib has no memory.
 wire::Bytes deflated(wire::BytesView plain);
 
 /// Decompresses a stream of exactly `size` bytes; returns an empty buffer if it has another size or is damaged.

@@ -75,7 +75,7 @@ struct Catalogue {
   std::vector<std::shared_ptr<const SonarModel>> models;
   std::vector<std::vector<HeadPreset>> presets;
 };
-/// Models and presets are made from one table, so that a head has the same index in both.
+/// Makes models and presets from one table, so that a head has the same index in both.
 const Catalogue& catalogue() {
   static const Catalogue only = [] {
     Catalogue c;

@@ -1,6 +1,6 @@
-// Checks JSON text: its depth, and, with the descriptor of a control message, the mistakes in the JSON form of that message.
-// protobuf 3.21 reports mistakes only as an English sentence, because its status has one code for all mistakes, and the interface
-// that reports field and value is not installed.
+// Checks JSON text: its depth, and whether it is the JSON form of a control message. Our own check finds the field and value of
+// a mistake: protobuf 3.21 states them only in an English sentence, because its status has one code for all mistakes, and the
+// interface that reports them is not installed.
 #pragma once
 
 #include <string>

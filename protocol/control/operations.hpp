@@ -126,7 +126,7 @@ struct Hello {
   std::string name;
   std::string token = {};  // the content of control.token_file
 };
-struct Unsupported {  // a request that this version does not know
+struct Unsupported {  // an unknown request, for example of a newer client
 };
 struct Request {
   std::uint64_t id = 0;

@@ -202,7 +202,7 @@ class SonarJudge {
         std::string(make_.remedy), client.address());
   }
 
-  /// Reports a driver that does not read, and so loses pings: a pause is a fault, slow reading a warning.
+  /// Reports a driver that loses pings: as a fault if it does not read at all, as a warning if it reads too slowly.
   void check_reading(const v1::ClientStatus& client) {
     const v1::ClientStatus* const earlier = find(before_, client.address());
     const std::uint64_t dropped =

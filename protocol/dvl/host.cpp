@@ -129,7 +129,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
     return tl::unexpected(accepted.error());
   if (wanted.settings.mode.value_or(0) > 0) return failure(ErrorKind::usage, "a DVL has one mode only");
   if (wanted.settings.rate_hz.value_or(0) > 0)
-    return failure(ErrorKind::usage, "a DVL sets its rate by altitude: leave --rate out, or --rate standby");
+    return failure(ErrorKind::usage, "a DVL sets its rate by altitude: leave --rate out, or give --rate standby");
   return std::make_unique<DvlHost>(wanted);
 }
 

@@ -49,8 +49,8 @@ Beam beam_of(const Ping& ping, std::size_t index, Vec3d velocity_mps) {
   return beam;
 }
 
-/// Returns the distance along the device's axis to the plane through the ends of the beams: for a pair of opposite beams the
-/// harmonic mean of their distances, times the cosine of the tilt. Returns -1 if no pair of opposite beams is valid.
+/// Returns the distance along the device's axis to the plane through the ends of the beams. A pair of opposite beams gives the
+/// harmonic mean of their distances, times the cosine of the tilt. Returns the mean of valid pairs; -1 if there is none.
 double altitude_of(const std::array<Beam, beam_count>& beams) {
   double sum = 0;
   int pairs = 0;

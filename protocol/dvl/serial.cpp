@@ -179,7 +179,7 @@ class SerialDialogue final : public Session {
     return format("wrw,%s,%s,%s", device().model->profile.c_str(), info["version_short"].get<std::string>().c_str(),
                   info["chipid"].get<std::string>().c_str());
   }
-  /// Returns the sentence as in the table of DOC; the examples of DOC have seconds, and 0 or 1.
+  /// Returns the sentence as in the table of DOC, with microseconds, and y or n; its examples have seconds, and 0 or 1.
   std::string time_status(Time now, const Settings& s) const {
     return format("wrs,%lld,y,%s,%lld", static_cast<long long>(microseconds(now)), s.ntp_address.c_str(),
                   static_cast<long long>(std::chrono::duration_cast<std::chrono::seconds>(now - device().powered_up_at).count()));

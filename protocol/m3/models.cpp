@@ -25,7 +25,7 @@ SonarModel make_model() {
   for (int i = 0; i < beam_count; ++i)
     mode.beam_azimuths_rad.push_back(rad_from_deg((0.5 * (beam_count - 1) - i) * beam_spacing_deg));
   mode.horizontal_aperture_rad = static_cast<float>(rad_from_deg(beam_count * beam_spacing_deg));
-  mode.pattern.azimuth_width_rad = static_cast<float>(0.886 * 2 / elements);  // half a wavelength apart: 1.6 degrees
+  mode.pattern.azimuth_width_rad = static_cast<float>(0.886 * 2 / elements);  // elements at half a wavelength: 1.6 degrees
   mode.pattern.elevation_width_rad = static_cast<float>(rad_from_deg(elevation_deg));
   mode.waveform.shape = Waveform::Shape::cw;  // PKT: a tone burst
   mode.receiver.tvg_slope_db = 20;            // PKT, with the absorption of the settings

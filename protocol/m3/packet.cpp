@@ -57,7 +57,7 @@ void set_text(std::array<char, size>& to, std::string_view text) {
 
 void set_attitude(DataBack& to, const PingRequest& request) {
   const auto pitch = [](const RollPitchYaw& a) { return static_cast<float>(-deg_from_rad(a.pitch_rad)); };  // positive: bow up
-  const auto roll = [](const RollPitchYaw& a) { return static_cast<float>(deg_from_rad(a.roll_rad)); };     // starboard down
+  const auto roll = [](const RollPitchYaw& a) { return static_cast<float>(deg_from_rad(a.roll_rad)); };     // positive: port up
   const Quatd &vehicle = request.vehicle_in_world.orientation, &head = request.sonar_in_world.orientation;
   const RollPitchYaw angles = rpy_from_quat(vehicle), own = rpy_from_quat(head);
   to.heading_deg = static_cast<float>(deg_from_rad(heading_rad(vehicle)));
@@ -95,11 +95,11 @@ DataHeader header_of(const Ping& ping, const protocol::DeviceState& device) {
 
   DataBack& back = header.back;
   back.sample_interval_s = static_cast<float>(window.interval_s);
-  back.mode_id = 118;  // PKT: of "Imaging 3"
+  back.mode_id = 118;  // PKT: "Imaging 3"
   back.frequency_hz = static_cast<std::uint32_t>(device.model->modes.front().centre_hz);
   back.pulse_us = static_cast<std::uint32_t>(window.pulse_us);
   back.ping_number = static_cast<std::uint32_t>(r.number);
-  // In PKT the filter has half the sampling rate, and the resolution is that of the pulse at about 1450 m/s.
+  // In PKT the bandwidth is half the sampling rate, and the resolution is half the length of the pulse at about 1450 m/s.
   back.filter_hz = static_cast<float>(0.5 / window.interval_s);
   back.resolution_m = static_cast<float>(1e-6 * window.pulse_us * 1450 / 2);
   back.ping_rate_hz = r.settings.rate_hz;

@@ -31,7 +31,7 @@ Window window_of(double near_m, double far_m) {
   const double length_s = 2 * far_m / slowest_mps - window.start_s;
   while (length_s > most_samples * window.interval_s) {
     window.interval_s *= 2;
-    window.pulse_us *= 2;  // unknown: beyond 10 m
+    window.pulse_us *= 2;  // unknown: the pulse for ranges beyond 10 m
   }
   window.samples = samples_multiple * static_cast<int>(std::ceil(length_s / window.interval_s / samples_multiple - 1e-9));
   return window;

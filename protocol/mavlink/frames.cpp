@@ -96,8 +96,8 @@ bool FrameReader::begins_a_frame(std::size_t at) const {
   return at == rest_.size() || rest_[at] == magic_1 || rest_[at] == magic_2;
 }
 
-/// Returns the whole frame if it is valid; otherwise counts and skips it. A frame with a wrong size is skipped completely, and
-/// so is an unknown message before another frame or the end. Otherwise one byte is skipped: a frame may begin at the next byte.
+/// Returns the frame if it is valid; otherwise counts the error. A frame with a wrong size is skipped completely, and so is an
+/// unknown message before another frame or the end. In other cases one byte is skipped, because a frame may begin after it.
 std::optional<Frame> FrameReader::checked(const Header& h) {
   const MessageInfo* const message = find_message(h.frame.id);
   if (message == nullptr || !h.readable) {

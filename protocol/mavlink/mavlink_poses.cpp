@@ -233,7 +233,7 @@ void MavlinkPoses::on_frame(const Frame& frame, Moment at) {
   }
 }
 
-/// Finds the autopilot: component 1, or else the first component that states an autopilot, as gimbals and cameras may do too.
+/// Finds the autopilot: component 1, else the first that states an autopilot, because gimbals and cameras may state one too.
 void MavlinkPoses::handle(const Heartbeat& m, const Frame& frame) {
   if (m.autopilot == Heartbeat::no_autopilot) return;
   if (!has_autopilot_ || frame.component == first_autopilot) autopilot_component_ = frame.component;

@@ -12,7 +12,7 @@ using protocol::Reaction;
 
 constexpr auto alive_period = std::chrono::seconds(1);
 constexpr auto boot_time = std::chrono::seconds(2);  // unknown; assumed, because hosts wait 2.5 s before they read
-constexpr int recentring_alives = 2;                 // Alive::head_info after a restart: 5D, 4D, then 4A (ENS)
+constexpr int recentring_alives = 2;                 // mtAlive messages before the head is centred: 5D, 4D, then 4A (ENS)
 constexpr std::size_t user_size = 250, calibration_size = 66, fpga_version_size = 14;  // sizes of the payloads; ROCK, ENS
 constexpr std::size_t notices_per_call = 8;  // bounds the log output that a hostile host can cause
 

@@ -54,8 +54,8 @@ HeadCommand command_of(const HeadData& line) {
   return c;
 }
 
-/// The head keeps the parameters of the last driver. If it has some, the host first requests a line, which states them, and puts
-/// them back when it leaves.
+/// The head keeps the parameters of the last driver. If it has parameters, the host first requests a line, which states them. It
+/// restores them when it leaves.
 class MicronHost final : public protocol::Host {
  public:
   explicit MicronHost(std::optional<HeadCommand> command) : command_(std::move(command)) {}

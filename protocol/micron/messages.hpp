@@ -113,7 +113,7 @@ constexpr void fields(auto& visit, wire::Like<HeadCommand> auto& m) {
 static_assert(wire::wire_size<HeadCommand>() == 52);
 inline constexpr std::uint8_t whole_command = 0x01, long_command = 0x1D, reverse_command = 0x0F;
 
-/// `size` bytes of bins follow.
+/// The front of a scan line; `size` bytes of bins follow.
 struct HeadData {
   std::uint16_t total = 0;  // size of the payload, including the bins
   std::uint8_t device_type = 0, head_status = 0, sweep = 0;

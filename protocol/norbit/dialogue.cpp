@@ -109,7 +109,7 @@ class CommandDialogue final : public protocol::Dialogue {
       else if (line_.size() < longest_line)
         line_ += c;
     }
-    // Simulated time may not advance while a host waits for the reply, so there the received bytes end a line.
+    // Simulated time may not advance while a host waits for the reply, so in simulated time each piece of bytes ends a line.
     ends_at_ = line_.empty() ? Time::max() : now + end_of_line;
     if (device_.simulated_time) end_line(reaction);
     return reaction;

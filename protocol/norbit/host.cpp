@@ -117,7 +117,7 @@ class NorbitHost final : public protocol::Host {
           parts->column_bytes = std::move(whole->bytes);  // a move keeps the address, which `column` needs
           parts->column = std::move(column);
         }
-      } else if (port == 1) {  // not at port 0: a recording is one stream there, also with replies to commands
+      } else if (port == 1) {  // not counted at port 0, where a recording is one stream, also with replies to commands
         counts_.junk_bytes += whole->bytes.size();
       }
       show(std::nullopt, actions);

@@ -50,8 +50,8 @@ inline Settings settings_from(const VendorSettings* held) { return protocol::set
 /// Returns the reason why a sonar cannot have these settings; empty if it can.
 std::string complaint(const Settings& settings);
 
-/// Sample numbers count at sample_hz from the transmission. Rows of the ping are `step` samples apart, rows of the water column
-/// `thin` rows of the ping.
+/// The grids of samples and rows. Samples are counted from the transmission, at sample_hz. Rows of the ping are `step` samples
+/// apart; rows of the water column are `thin` rows of the ping apart.
 struct Grid {
   int first = 0, step = 1, rows = 0;  // first: a multiple of step * thin
   int thin = 1;

@@ -39,8 +39,8 @@ class OculusDialogue final : public protocol::Dialogue {
   Reaction on_bytes(protocol::BytesView received, Time now) override {
     Reaction reaction;
     notices_ = 0;
-    // The daemon carries out the events of this call after the call has returned. So `stored_` lets a read request see a write
-    // request that arrived before it in the same call.
+    // The daemon carries out the events of this call after the call has returned. So `stored_` keeps the address of a write
+    // request for a read request that follows it in the same call.
     stored_ = device_.stored_address;
     const std::uint64_t skipped_before = framer_.skipped_bytes();
     framer_.append(received);

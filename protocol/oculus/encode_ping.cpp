@@ -13,8 +13,8 @@
 namespace sonar::oculus {
 namespace {
 
-/// Added before the truncation to 0.01 deg, because a float near 65 deg has an error of 4e-4 of that unit: 29.99999 deg must give
-/// 3000. All other values of the capture's formula are farther from an integer than this.
+/// Added before the truncation to 0.01 deg, because a float near 65 deg has an error of 4e-6 deg: 29.99999 deg must give 3000.
+/// All other bearings of the formula that fits the captured pings are farther from an integer than this.
 constexpr double truncation_guard_cdeg = 1e-3;
 
 /// Converts to the short form of versions 0 and 1, which has no extension and no attitude, and states the start time as a 32-bit
@@ -74,7 +74,7 @@ std::uint16_t reply_version(const FireRequest& fire, std::string_view option) {
 void set_attitude(PingResultV2& fixed, const Quatd& vehicle_in_world) {
   const RollPitchYaw angles = rpy_from_quat(vehicle_in_world);
   fixed.heading_deg = deg_from_rad(heading_rad(vehicle_in_world));
-  fixed.pitch_deg = -deg_from_rad(angles.pitch_rad);  // about y to port, positive is bow down; the packet uses bow up
+  fixed.pitch_deg = -deg_from_rad(angles.pitch_rad);  // a positive pitch_rad is bow down, a positive pitch_deg bow up
   fixed.roll_deg = deg_from_rad(angles.roll_rad);
 }
 
@@ -244,7 +244,7 @@ wire::Bytes make_status(const protocol::DeviceState& device) {
   status.ip_mask = device.netmask;
   status.connected_ip = device.connected_client;
   status.mac = device.mac;
-  // All eight sensors read the temperature of the water. A warmer electronics would be realistic, but ENS commands standby at 35
+  // All eight sensors read the temperature of the water. Warmer electronics would be realistic, but ENS commands standby at 35
   // degrees.
   status.temperature_c.fill(device.water.temperature_c);
   status.pressure_bar = absolute_pressure_bar(device.water, device.depth_m);

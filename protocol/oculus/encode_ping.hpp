@@ -1,6 +1,6 @@
 // Encodes a ping as a ping result: sizes, echo of the request, and bearings, which are positive to starboard (our azimuths are
 // positive to port). Vendor::frame calls it once per ping; tests encode captured pings again with the function for PingBlocks.
-// Encodes also the small messages that a device sends besides pings.
+// This header also encodes the small messages that a device sends besides pings.
 #pragma once
 
 #include <optional>

@@ -18,8 +18,8 @@ struct FireRequest {
 /// Parses a whole message; returns nullopt if it is too short to be a fire message. Missing fields of version 2 read as 0.
 std::optional<FireRequest> parse_fire(wire::BytesView message);
 
-/// Makes the message: 53 bytes (versions 0, 1) or 89 bytes (version 2 and above). `payload_size_zero`: state a payload size of 0,
-/// as several public clients do.
+/// Makes the message: 53 bytes (versions 0, 1) or 89 bytes (version 2 and above). `payload_size_zero`: the header states a
+/// payload size of 0, as that of several public clients does.
 wire::Bytes make_fire(const FireRequest& fire, std::uint16_t destination = 0, bool payload_size_zero = false);
 
 /// Returns the configuration stored in the device, which is used until a client sends a fire message. Its version is 0, because

@@ -27,7 +27,7 @@ Result<PolarImage> picture_of(const DecodedPing& ping) {
   for (std::size_t row = 0; row < image.rows; ++row)
     for (std::size_t beam = 0; beam < image.beams; ++beam) image.samples.push_back(static_cast<float>(ping.sample(row, beam)));
   image.full_scale = 254;  // samples of 8 bits saturate there
-  // Wider samples are seldom near their maximum, so with that scale the picture would be black.
+  // Wider samples are seldom near their maximum, so with their maximum as full scale the picture would be black.
   if (ping.bytes_per_sample() > 1) image.full_scale = image.brightest(999);
   return image;
 }

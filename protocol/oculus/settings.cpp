@@ -131,7 +131,7 @@ double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo)
   return high_frequency && mapped ? 40 + 0.6 * fire.gain_percent : fire.gain_percent;
 }
 
-/// Returns the gain used plus 20 log r, which is close to the row gains that an M750d stated (docs/protocols/oculus.md, 5.2).
+/// Returns the gain used plus 20 log r, close to the row gains of FIL's M750d (docs/decisions/0025-oculus-evidence.md).
 std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings) {
   std::vector<std::uint32_t> gains;
   gains.reserve(static_cast<std::size_t>(settings.range_bin_count));

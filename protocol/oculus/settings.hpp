@@ -49,7 +49,7 @@ Result<std::shared_ptr<const SonarModel>> tuned(std::shared_ptr<const SonarModel
 inline constexpr double row_rate_hz = 37.5e6 / 143.0;
 inline constexpr double db_per_percent = 0.96;    // vendor note quoted in liboculus issue 13: 0-100 % is 0-96 dB
 inline constexpr int row_limit = 720;             // liboculus node README, measured by its authors
-inline constexpr double row_gain_from_m = 0.58;   // fitted to FIL's row gains, docs/protocols/oculus.md, 5.2
+inline constexpr double row_gain_from_m = 0.58;   // fitted to FIL's row gains, docs/decisions/0025-oculus-evidence.md
 inline constexpr double native_pulse_m = 0.0025;  // the finest range resolution in the data sheets
 
 /// Rows of a ping (docs/protocols/oculus.md, 5.4): c / (2 fs) doubled until at most 720 rows cover the range.
@@ -72,8 +72,8 @@ double echoed_gain_percent(const FireSettings& fire, std::string_view gain_echo)
 /// True if flag bit 4 leaves the gain to the device; option gain_assist states which value of the bit does, if any.
 bool asks_for_gain_assist(const FireSettings& fire, std::string_view option);
 
-/// Returns the row gains of option `row_gain: digital`: the power gain 10^((gain_db + 20 log r) / 10), r at least
-/// row_gain_from_m, in 1 to 2^32 - 1. 32-bit samples have no time-varied gain: 10^(gain_db / 10).
+/// Returns the row gains of option `row_gain: digital`. They are power gains, 10^((gain_db + 20 log r) / 10), limited to 1 to
+/// 2^32 - 1; r is at least row_gain_from_m. 32-bit samples have no time-varied gain, so theirs are 10^(gain_db / 10).
 std::vector<std::uint32_t> digital_row_gains(const PingSettings& settings);
 
 /// True if a double in the message is NaN or infinite. Such a message must be ignored.

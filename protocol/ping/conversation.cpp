@@ -24,8 +24,8 @@ protocol::Reaction Conversation::on_bytes(protocol::BytesView received, Time now
   return reaction;
 }
 
-/// Answers with one datagram that is only a little longer than the received one, because its sender may be forged, and the answer
-/// would then go to another computer.
+/// Answers with one datagram that is only a little longer than the received one. The sender's address may be forged; the answer
+/// then goes to another computer, which long answers would flood.
 protocol::Reaction Conversation::on_datagram(std::size_t size, Time now) {
   protocol::Reaction reaction;
   Bytes answers;

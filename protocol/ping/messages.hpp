@@ -197,7 +197,7 @@ constexpr void fields(auto& visit, wire::Like<Transducer> auto& m) {
   visit("reserved", m.reserved);
 }
 
-/// `count` samples of one byte each follow.
+/// A scan line, or the state of the head; `count` samples of one byte each follow.
 struct DeviceData {
   std::uint8_t mode = 1, gain = 0;
   std::uint16_t angle = 0, transmit_us = 0, period = 0, khz = 0, samples = 0, count = 0;
@@ -231,7 +231,7 @@ constexpr void fields(auto& visit, wire::Like<AutoTransmit> auto& m) {
   visit("delay", m.delay_ms);
 }
 
-/// `count` samples of one byte each follow.
+/// A line of a scan that auto_transmit requested; `count` samples of one byte each follow.
 struct AutoDeviceData {
   std::uint8_t mode = 1, gain = 0;
   std::uint16_t angle = 0, transmit_us = 0, period = 0, khz = 0, start = 0, stop = 0;
@@ -285,7 +285,7 @@ constexpr void fields(auto& visit, wire::Like<PingParameters> auto& m) {
   visit("pulse_len_steps", m.pulse_steps);
 }
 
-/// `points` structs AtofPoint follow.
+/// The points of a ping as angles and times; `points` structs AtofPoint follow.
 struct AtofPointData {
   std::uint32_t power_up_ms = 0;
   std::uint64_t utc_ms = 0;
@@ -317,7 +317,7 @@ constexpr void fields(auto& visit, wire::Like<AtofPoint> auto& m) {
   visit("reserved", m.reserved);
 }
 
-/// `points` pairs of y (to port) and z (up) [m] follow.
+/// The points of a ping; `points` pairs of y (to port) and z (up) [m] follow.
 struct YzPointData {
   std::uint32_t power_up_ms = 0, ping = 0;
   float speed_mps = 0;

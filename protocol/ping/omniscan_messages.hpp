@@ -27,7 +27,7 @@ constexpr void fields(auto& visit, wire::Like<OsPingParams> auto& m) {
   visit("reserved_3", m.reserved1);
 }
 
-/// `results` powers follow; 0 to 65535 mean lowest_db to highest_db.
+/// The profile of a ping; `results` powers follow, of which 0 to 65535 mean lowest_db to highest_db.
 struct OsMonoProfile {
   std::uint32_t ping = 0, start_mm = 0, length_mm = 0, power_up_ms = 0, hz = 0;
   std::uint16_t gain = 0, results = 0, speed_dmps = 0;  // tenths of a metre per second

@@ -63,7 +63,7 @@ constexpr void fields(auto& visit, wire::Like<Distance> auto& m) {
   visit("gain_setting", m.gain, means::gain);
 }
 
-/// `count` strengths of one byte each follow.
+/// The distance, and the profile of the ping; `count` strengths of one byte each follow.
 struct Profile : Distance {
   std::uint16_t count = 0;
 };

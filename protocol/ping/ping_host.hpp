@@ -48,8 +48,8 @@ class PingHost : public protocol::Host {
   void ask(protocol::HostActions& actions) const {
     if (request_) actions.emplace_back(protocol::HostSend{0, *request_});
   }
-  /// Adds to HostPing::limited if the gain of the ping, `step` of 0 to `most`, is not the wanted one, because a gain has few
-  /// steps.
+  /// Adds a text to HostPing::limited if the gain of the ping, step `step` of 0 to `most`, is not the requested gain. There are
+  /// only a few steps.
   void compare_gain(int step, int most, protocol::HostPing& ping) const;
   virtual void on_frame(const Frame&, protocol::HostActions&) {}
   /// Returns the reason of the error; nullopt = no error, for example if the host sends another request. `why`: the sonar's text.

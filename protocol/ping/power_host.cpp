@@ -1,5 +1,6 @@
-// The host of an Omniscan and of an S500, which have the same port. For an S500 it sends the request at once. For an Omniscan it
-// first requests a message that only an S500 has. While the sonar is silent, it repeats this, and sends the other request once.
+// The host of an Omniscan and of an S500, which have the same port. To an S500 it sends the request for pings at once. To an
+// Omniscan it first sends a question, the request for a message that only an S500 has. If no answer comes, it repeats the
+// question, and sends the request for pings once.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -116,7 +117,8 @@ class PowerHost final : public PingHost {
   void keep_product(HostActions& actions) {
     if (std::exchange(ask_at_, std::nullopt) && !has_requested_) request_pings(actions);
   }
-  /// An answer may come after the request of an Omniscan was sent. Pings may come before, if another host has requested them.
+  /// The answer to the question may come after the request for pings was sent. Pings may come before it, if another host has
+  /// requested them.
   void on_frame(const Frame& frame, HostActions& actions) override {
     const Id id = frame.header.id;
     if (ask_at_ && (id == only_s500_has || id == s500_product.ping_id)) return switch_to_other(actions);
@@ -167,12 +169,12 @@ class PowerHost final : public PingHost {
     return format("distance %.3f m, confidence %d %%", static_cast<double>(data.depth_m), data.confidence);
   }
 
-  const Product* product_;  // whose request was sent last, or is sent first
+  const Product* product_;  // the product whose request for pings was sent last, or will be sent first
   const Product* other_;
   std::string refusal_;     // why the request of the first product was refused
   std::string_view shown_;  // the product that a ping, an answer or a refusal has shown; empty: not known
   protocol::SettingsOverride settings_;
-  std::optional<Time> ask_at_;  // when the question is repeated; nullopt: never
+  std::optional<Time> ask_at_;  // time at which the question is repeated; nullopt: never
   bool has_requested_ = false, has_switched_ = false;
   protocol::Waterfall waterfall_;
 };

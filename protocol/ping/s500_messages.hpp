@@ -41,7 +41,7 @@ constexpr void fields(auto& visit, wire::Like<Distance2> auto& m) {
   visit("timestamp", m.power_up_ms);
 }
 
-/// `results` powers follow; 0 to 65535 mean lowest_db to highest_db.
+/// The profile of a ping; `results` powers follow, of which 0 to 65535 mean lowest_db to highest_db.
 struct Profile6 {
   std::uint32_t ping = 0, start_mm = 0, length_mm = 0, start_hz = 0, end_hz = 0, sampling_hz = 0, power_up_ms = 0, spare = 0;
   float pulse_s = 0, analog_gain = 0, highest_db = 0, lowest_db = 0, depth_m = 0, smooth_depth_m = 0, spare2 = 0;

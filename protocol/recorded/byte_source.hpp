@@ -1,5 +1,5 @@
 // Byte sources and sinks of recordings: read at an offset, append at the end. All formats use only these, so that recordings
-// can be in memory or in files. Only byte_source.cpp opens files in protocol/.
+// can be in memory or in files. In protocol/, only byte_source.cpp opens files.
 #pragma once
 
 #include <cstdint>

@@ -68,9 +68,9 @@ struct Codec {
   std::optional<Samples> (*samples)(BytesView message) = nullptr;
   /// Converts the bytes of Vendor::frame() to the message that a client receives. Null: they are equal.
   Bytes (*message)(BytesView framed) = nullptr;
-  /// Finds the ping, or the part of a ping, in a message. It is set for makes whose hosts request each
-  /// ping, or whose sonars send parts of a ping from several ports; a replay then emulates the whole device with the recorded
-  /// pings. nullopt: the message has no part of a ping.
+  /// Finds the ping, or the part of a ping, in a message; returns nullopt if there is none. If this function is set, a replay
+  /// emulates the whole device with the recorded pings: drivers of the make must send requests or connect to several ports. Null:
+  /// a replay sends the recorded messages to every driver.
   std::optional<PingPart> (*ping_part)(BytesView message) = nullptr;
   /// Converts a message that has a PingPart to the messages that Vendor::frame() or Vendor::datagrams() would make of a ping that
   /// was requested with `request`, in order. Null: the same bytes.

@@ -1,4 +1,4 @@
-// The functions of zlib that recordings need: decompression (.oculus files) and CRC-32 (MCAP).
+// Functions of zlib for recordings and packets: decompression (.oculus files), CRC-32 (MCAP, packets of a sonar).
 #pragma once
 
 #include <cstdint>

@@ -71,7 +71,7 @@ std::string file_endings() {
   return endings;
 }
 
-// The first bytes of a file determine its format, never its name.
+// The first bytes of a file determine its format; its name has no influence.
 Result<Recording> open_recording(std::unique_ptr<Source> source, const std::string& sonar) {
   std::array<std::byte, 16> front{};
   const std::size_t there = source->read_at(0, front);
@@ -136,7 +136,7 @@ Result<RecordedPings> RecordedPings::open(std::unique_ptr<RecordingReader> reade
 }
 
 /// The host decodes messages of a recording as it decodes those of a sonar. `as_it_is`: there is no sonar to send settings to. A
-/// new host accepts any number of the next ping, and begins a new picture of a scan.
+/// new host accepts any number for the next ping, and begins a new picture of a scan.
 Result<void> RecordedPings::make_host() {
   protocol::Wanted wanted;
   wanted.as_it_is = true;

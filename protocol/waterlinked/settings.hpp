@@ -26,8 +26,8 @@ inline constexpr bool range_of_loudest = true;
 inline constexpr int block_rows = 16;
 /// 69 % of the pixels have the median of their range and those of eight neighbours; 3 % have the largest or the smallest.
 inline constexpr int median_passes = 1;
-/// The device drops returns that no neighbour confirms: 0.3 % of the pixels have no return if the ranges around them span less
-/// than 4 mm, 4 % if 16 to 64 mm, 8 % if more; the strength of the neighbours has no influence. Fitted on rough slopes.
+/// The device drops returns that no neighbour confirms. Where the ranges around a pixel span less than 4 mm, 0.3 % of the pixels
+/// have no return; 16 to 64 mm: 4 %, more: 8 %. The strength of the neighbours has no influence. Fitted on rough slopes.
 inline constexpr int least_confirming = 1;
 inline constexpr double confirming_m = 0.007;
 /// Most ranges in SMP are multiples of this range.
