@@ -1,6 +1,6 @@
 -- Wireshark dissector for Blueprint Oculus sonars: the stream on TCP 52100, the status datagrams on UDP 52102.
 -- It shares nothing with the C++ code, so that each can check the other (tests/acceptance/dissector_test.py). The layouts are
--- those of docs/protocols/oculus.md; use: clients/wireshark/README.md. One file, because it is installed by copying.
+-- those of docs/protocols/oculus.md; use: clients/wireshark/README.md. It is one file, because users install it by copying.
 
 local oculus = Proto("oculus", "Blueprint Oculus sonar")
 local oculus_status = Proto("oculus_status", "Blueprint Oculus sonar, status datagram")  -- its packets go to the one above
@@ -490,8 +490,8 @@ local function missing_bytes(tvb, at, to_device)
   return length and length > tvb:len() - at and length - (tvb:len() - at) or nil
 end
 
--- Not dissect_tcp_pdus: it refuses units shorter than the header, which runs of junk may be. Junk is shown only when the
--- message after it is whole, because TCP may pass the same bytes again until then, and nothing must be shown twice.
+-- dissect_tcp_pdus is not used, because it refuses units shorter than the header, as runs of junk may be. Junk is shown only when
+-- the message after it is whole: until then TCP may pass the same bytes again, and nothing must be shown twice.
 function oculus.dissector(tvb, pinfo, tree)
   local to_device, at = pinfo.dst_port == pinfo.match_uint, 0
   while at < tvb:len() do
