@@ -1,5 +1,5 @@
-// Converts model poses of a Gazebo world to JSON lines of poses for sonard. It does not need Gazebo, so tests can use it. It is
-// used by the bridge's main.cpp. Gazebo's world is ENU and its bodies FLU, as sonard's: only formatting and checks are needed.
+// Converts model poses of a Gazebo world to JSON lines of poses for sonard, for main.cpp. This header does not need Gazebo, so
+// tests can use it. The axes are those of sonard (world ENU, bodies FLU), so only formatting and checks are needed.
 #pragma once
 
 #include <cmath>
@@ -29,7 +29,7 @@ inline Result<FollowedModel> parse_followed(const std::string& text) {
   return followed;
 }
 
-/// Returns the line of a pose, in ENU and FLU axes, with the simulation's time; nullopt if it is not finite or not a rotation.
+/// Returns the line of a pose, in ENU and FLU axes, with the simulation's time; nullopt for NaN, infinity, or no rotation.
 inline std::optional<std::string> json_line(const Pose& body_in_world, std::int64_t stamp_ns, const std::string& vehicle) {
   const Vec3d& p = body_in_world.position_m;
   const Quatd& q = body_in_world.orientation;
@@ -44,8 +44,8 @@ inline std::optional<std::string> json_line(const Pose& body_in_world, std::int6
 }
 
 /// Returns the lines of one message; `Message` is ignition.msgs.Pose_V, or a type with the same members. If several poses have
-/// one name, the first is used: models precede their links, whose poses are relative to the model. Skips a repeated time: Gazebo
-/// repeats the last message while paused.
+/// one name, the first is used, because models precede their links, whose poses are relative to the model. A repeated time is
+/// skipped, because Gazebo repeats the last message while paused.
 template <class Message>
 std::vector<std::string> lines_from(const Message& message, std::vector<FollowedModel>& followed) {
   std::vector<std::string> lines;

@@ -1,5 +1,5 @@
 // Reads and writes little-endian fields of byte buffers, for frames, pings and recordings.
-// Bytes from outside are always checked: a Reader remembers the first failure and yields zeros from then on.
+// Bytes from outside are always checked: after the first failure, a Reader returns only zeros, and ok() is false.
 #pragma once
 
 #include <cstddef>

@@ -17,7 +17,7 @@ double ramp(double t) { return std::clamp(t, 0.0, 1.0); }
 
 Rgb hot(double t) { return {ramp(t * 8 / 3), ramp((t - 0.375) * 8 / 3), ramp((t - 0.75) * 4)}; }
 
-/// Computes a colour by the usual formula of the palette; t is 0 for the weakest echo and 1 for the strongest.
+/// Computes a colour with the usual formula of the palette; t is 0 for the weakest echo and 1 for the strongest.
 Rgb colour_at(std::string_view name, double t) {
   if (name == "jet") return {ramp(1.5 - std::abs(4 * t - 3)), ramp(1.5 - std::abs(4 * t - 2)), ramp(1.5 - std::abs(4 * t - 1))};
   if (name == "bone") {  // grey, with an eighth of the map `hot` in reverse order of colours

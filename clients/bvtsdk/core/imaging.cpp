@@ -55,12 +55,13 @@ int rows_by_resolution(const Extent& extent, const ImageSettings& settings, doub
   return std::max(1, to_int(std::min(std::round(rows), std::floor(usual))));
 }
 
-/// Verified with a public table of the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2 to 15 m
-/// requested, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows short of the sonar,
-/// and the distances of pixels from the sonar are whole numbers of rows and columns. Inferred: the bottom passes through the
-/// sector's nearest corners, at start * cos(half angle); the top is at the stop range, and the sides touch the widest points of
-/// the sector. Unknown: sector and stop range of that ping. With a half angle of 20.9 to 21 degrees and stop 14.54 m, rounding
-/// down the number of rows below the image gives both 70 rows and 197 columns. With rounding to nearest, no sector gives both.
+/// Plans an XY image. Verified: a public table has the range and bearing of every pixel of one image (SDK 3.x, 45 degree head, 2
+/// to 15 m requested, 394 x 480): x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m. So the image ends 70 rows above the
+/// sonar, and the distances of pixels from the sonar are whole numbers of rows and columns. Inferred: the bottom passes through
+/// the sector's nearest corners, at start * cos(half angle); the top is at the stop range, and the sides touch the widest points
+/// of the sector. Unknown: sector and stop range of that ping. With a half angle of 20.9 to 21 degrees and stop 14.54 m, rounding
+/// down the number of rows below the image gives 70 rows and 197 columns. With rounding to nearest, no sector gives these
+/// numbers.
 void plan_xy(const Extent& extent, const ImageSettings& settings, ImageGeometry& g) {
   const double half_deg = std::max(std::abs(static_cast<double>(g.fov_min_deg)), std::abs(static_cast<double>(g.fov_max_deg)));
   const double half_rad = std::min(half_deg, 90.0) / degrees;

@@ -26,8 +26,8 @@ enum class XyBottom { sector, sonar };
 /// Reads the environment variable BVE_XY (sector or sonar); the default is sector.
 XyBottom xy_bottom_from_environment();
 
-/// Smoothing of a finished image. If several flags are set, the lowest applies (the values are verified; that the finished image
-/// is filtered is our choice).
+/// Smoothing of a finished image. If several flags are set, the lowest applies. The values are verified; to filter the finished
+/// image, not the samples, is our choice.
 enum FilterFlags : int { no_filter = 0, mean_3x3 = 2, mean_9x2 = 16 };
 
 struct ImageSettings {
@@ -39,9 +39,10 @@ struct ImageSettings {
   int requested_height = 0, requested_width = 0;  // XY keeps the height and adjusts the width (verified); a width alone sets both
   int r_theta_width = 0;                          // columns; has priority over requested_width
   int filter_flags = no_filter;
-  float noise_threshold = 0;         // fraction of full scale below which samples become 0
-  float clipping_threshold = 0;      // fraction of full scale above which samples are cut to it; 0 = off
-  int sound_speed_override_mps = 0;  // 0 = the ping's; ranges are scaled by override / ping's
+  float noise_threshold = 0;     // fraction of full scale below which samples become 0
+  float clipping_threshold = 0;  // fraction of full scale above which samples are cut to it; 0 = off
+  int sound_speed_override_mps =
+      0;  // 0 = that of the ping; otherwise ranges are multiplied by override / sound speed of the ping
 };
 
 /// Geometry of the pixels of an image. Row-major (verified), angles clockwise from ahead in degrees (verified).

@@ -38,8 +38,8 @@ class Link {
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// Sends a request and waits for its reply. Returns the sonar's code if it refuses, socket_read_timeout if no reply comes in
-  /// time, the cause (socket_closed, socket_read_timeout, ...) if the link is lost.
+  /// Sends a request and waits for its reply. Returns the sonar's code if the sonar refuses, socket_read_timeout if no reply
+  /// comes in time, or the cause (socket_closed, socket_read_timeout, ...) if the link is lost.
   int ask(FrameType request, const Bytes& payload, Bytes& answer, std::chrono::milliseconds patience);
   int ask(FrameType request, const Bytes& payload, Bytes& answer) { return ask(request, payload, answer, patience_.request); }
 

@@ -134,7 +134,7 @@ Bytes bytes_of(const std::vector<std::uint16_t>& samples, Packing packing) {
   return out;
 }
 
-/// Inflates exactly `size` bytes. Returns none if the stream is shorter or longer.
+/// Inflates exactly `size` bytes. Returns no bytes if the stream is shorter or longer.
 Bytes inflated(BytesView body, std::size_t size) {
   if (size > deflate_at_best * body.size + 64) return {};
   Bytes out(size);

@@ -86,7 +86,7 @@ class RecordingReader {
   /// Returns ping_number_too_small or ping_number_too_large, and file_read or bad_ping for a damaged ping; `why` is then a line
   /// for the log.
   Code read_ping(std::int32_t head, int n, PolarPing& ping, std::string* why = nullptr);
-  /// Returns index_out_of_bounds or file_read on failure. `time_s`: when it was recorded.
+  /// Returns index_out_of_bounds or file_read on failure. `time_s`: time of the recording, seconds since 1970 UTC.
   Code read_nav(int n, NavData& nav, double& time_s);
   Code read_event(int n, EventMark& mark);
 

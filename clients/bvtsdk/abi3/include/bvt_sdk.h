@@ -10,9 +10,9 @@ extern "C" {
 
 #define BVT_API __attribute__((visibility("default")))
 
-/* Handles. They are numbers, not addresses: never dereference them. Functions that destroy an object accept null. All handles have
- * one pointer type, because handles of the earlier 3.x were all void*, and its hosts may keep one kind in a variable of another.
- * Calls return BVT_INVALID_PTR for a handle of the wrong kind. Hosts of the later 3.x use the names of the structs. */
+/* Handles. They are numbers, not addresses: never dereference them. Functions that destroy an object accept null. All handles
+ * have one pointer type, because handles of the earlier 3.x were all void*, and its hosts may keep one kind in a variable of
+ * another. Calls return BVT_INVALID_PTR for a handle of the wrong kind. Hosts of the later 3.x use the names of the structs. */
 typedef struct BVTOpaqueHandle BVTOpaqueSonar, BVTOpaqueHead, BVTOpaquePing, BVTOpaqueMagImage, BVTOpaqueColorImage,
     BVTOpaqueColorMapper, BVTOpaqueNavData, BVTOpaqueSonarDiscoveryAgent, BVTOpaqueRangeData;
 typedef BVTOpaqueSonar* BVTSonar;
@@ -35,7 +35,7 @@ enum {
   BVTHEAD_RES_AUTO = 4
 };
 
-/* Cartesian, or rows of equal range and columns of equal bearing. */
+/* The layout of an image: Cartesian, or rows of equal range and columns of equal bearing. */
 enum { BVTHEAD_IMAGE_XY = 0, BVTHEAD_IMAGE_RTHETA = 1 };
 
 /* The fluid around the sonar. */

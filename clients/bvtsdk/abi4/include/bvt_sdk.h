@@ -32,7 +32,7 @@ enum {
   BVT_IMAGERES_AUTO = 4
 };
 
-/* Cartesian, or rows of equal range and columns of equal bearing. */
+/* The layout of an image: Cartesian, or rows of equal range and columns of equal bearing. */
 enum { BVT_IMAGETYPE_XY = 0, BVT_IMAGETYPE_RTHETA = 1 };
 
 /* The fluid around the sonar. */
@@ -202,7 +202,8 @@ BVT_API RetVal BVTColorMapper_SetAutoMode(BVTColorMapper self, int on);
 BVT_API RetVal BVTColorMapper_GetAutoMode(BVTColorMapper self, int* out);
 
 /* RangeProfile: one range per bearing, left to right; metres and degrees clockwise from ahead. A range above 999 means no echo
- * above the threshold. The threshold is 10000 of 65535 unless BVTImageGenerator_SetRangeProfileIntensityThreshold sets another. */
+ * above the threshold. The threshold is 10000 of 65535 unless BVTImageGenerator_SetRangeProfileIntensityThreshold sets another.
+ */
 BVT_API void BVTRangeProfile_Destroy(BVTRangeProfile self);
 BVT_API RetVal BVTRangeProfile_GetCount(BVTRangeProfile self, int* out);
 BVT_API RetVal BVTRangeProfile_GetValidCount(BVTRangeProfile self, int* out);
