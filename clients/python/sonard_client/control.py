@@ -240,8 +240,8 @@ class Control:
 
     # ---- time
     def step(self, dt_s: float, timeout: float = 330.0) -> Json:
-        """With clock: lockstep, advances the daemon's time by dt_s. Returns when every client has received the pings due in it:
-        {"now_ns": the daemon's time, "pings": their number}. A ping due exactly at the end belongs to the next step."""
+        """With clock: lockstep, advances the daemon's time by dt_s and waits until every client has received the pings due in it.
+        Returns {"now_ns": the daemon's time, "pings": their number}. A ping due exactly at the end belongs to the next step."""
         return dict(_read_json(self._post("step", {"dt_s": dt_s}, timeout)))
 
     # ---- HTTP

@@ -57,9 +57,9 @@ class Fault:
 
     def noticed_within(self, seconds: float) -> bool:
         """True if a client of an affected sonar closed its connection, or connected, within `seconds` after the first
-        injection (after the beginning, for a fault without injections). Waits at most for that time, and for the same time for the
-        first injection. A connection that the fault itself ended does not count; a request on an open connection is not
-        detected."""
+        injection (after the beginning, for a fault without injections). Waits at most `seconds` for the first injection, then at
+        most `seconds` for the client. A connection that the fault itself ended does not count. A request on an open connection
+        is not detected."""
         give_up = time.monotonic() + seconds
         with self._news:
             while True:

@@ -103,7 +103,7 @@ def _address_lost(lab: "Lab", given: Mapping[str, str]) -> None:
     where = [f"{address}/24", "broadcast", "10.77.0.255", "dev", link]
     _run(*space, "ip", "addr", "del", *where)
     if not at_device:
-        lab.undo.append(lab.add_route)  # the kernel removes it with the address
+        lab.undo.append(lab.add_route)  # the kernel removes the route with the address
     lab.undo.append(lambda: _run(*space, "ip", "addr", "add", *where))
 
 
@@ -273,7 +273,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def check() -> List[str]:
-    """Returns a line for each part of the laboratory that works here or does not."""
+    """Returns a line for each part of the laboratory, with whether it works here."""
     lacking = missing()
     lines = [f"{'no' if lacking else 'ok':<4} {'namespaces' if not lacking else lacking}"]
     for code, fault in FAULTS.items():

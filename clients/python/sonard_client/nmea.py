@@ -228,7 +228,7 @@ class NmeaPoses:
         return (north, east, down), angles
 
     def unknown(self) -> List[str]:
-        """Describes each value of the poses that was assumed."""
+        """Describes each value of the poses that no sentence has given."""
         now, assumed = self.instruments, self.assumed
         out = []
         if now.place is None:

@@ -75,7 +75,7 @@ class Bridge:
         return True
 
     def report_unknown(self) -> None:
-        """Logs the assumed values, once and after each change."""
+        """Logs which values are missing, once and after each change."""
         unknown = self.poses.unknown()
         if unknown != self._reported:
             self._reported = unknown

@@ -110,8 +110,8 @@ class OculusClient:
 
     def pings_during(self, act: Callable[[], Any], settle: float = 0.1) -> List[Ping]:
         """Runs act() in another thread. Returns the pings received until none arrives for `settle` seconds after act().
-        Exceptions of act() are raised here. Use it with clock: lockstep or follow, where time waits for readers and one thread
-        alone would deadlock: sonar.pings_during(lambda: control.step(0.5))"""
+        Exceptions of act() are raised here. With clock: lockstep or follow, time waits for readers, so one thread alone would
+        deadlock. Example: sonar.pings_during(lambda: control.step(0.5))"""
         pings: List[Ping] = []
         with ThreadPoolExecutor(1) as executor:
             future = executor.submit(act)
@@ -136,7 +136,7 @@ class OculusClient:
                 received = self._socket.recv(1 << 18)
             except socket.timeout:
                 return None
-            except ConnectionError:  # closed before our request was read
+            except ConnectionError:  # the sonar closed the connection before it read the request
                 received = b""
             if not received:
                 raise self._closed()

@@ -4,8 +4,8 @@
         with start_my_driver(sonard.address), sonard.control.fault("silent-open", seconds=6) as fault:
             assert fault.noticed_within(2)
 
-The daemon runs the configuration that the ini option sonard_config or the mark sonard("FILE") names, else the demo, beside other
-daemons (`sonard --offset`). The program is the environment variable SONARD, else sonard in the PATH.
+The daemon runs the configuration that the mark sonard("FILE") names, else that of the ini option sonard_config, else the demo.
+Other daemons may run too (`sonard --offset`). The program is the environment variable SONARD, else sonard in the PATH.
 """
 from __future__ import annotations
 

@@ -44,8 +44,8 @@ def read_status(data: bytes, sender: str = "") -> Optional[SonarFound]:
 
 def discover(seconds: float = 2.5, listen: str = "0.0.0.0", port: int = layouts.STATUS_PORT,
              enough: Optional[int] = None) -> List[SonarFound]:
-    """Returns the latest status of each sonar received within `seconds`, or until `enough` sonars are found, sorted by address.
-    Sonars send it once a second.
+    """Receives for `seconds`, or until `enough` sonars are found. Returns the latest status of each sonar, sorted by address.
+    Sonars send a status once a second.
 
     Drivers may share the port: all of them receive broadcasts, but only one receives unicast status datagrams. Raises OSError
     if another program has bound the port exclusively."""

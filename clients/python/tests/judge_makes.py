@@ -1,5 +1,5 @@
-"""Requirements for the judge's reader of each make. A test has `make` and `messages`: two pings as sent, of different samples,
-each a list of datagrams or of one message; `samples`: forms in which a driver may publish the first one."""
+"""Requirements for the judge's reader of each make. A test class has `make`, `messages` (two pings with different samples, each
+a list of its datagrams or of one message) and `samples` (the forms in which a driver may publish the first ping)."""
 import random
 import zlib
 
@@ -20,7 +20,7 @@ class Checks:
         return [ping.crcs for ping in self.found(*message)]
 
     def shows(self, pings, message):
-        """Returns true if a ping of this message is among these."""
+        """Returns whether `pings` contains a ping of this message."""
         wanted = self.crcs(message)
         assert wanted
         return any(ping.crcs in wanted for ping in pings)

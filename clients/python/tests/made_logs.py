@@ -363,7 +363,7 @@ ROS2_TOPICS = [("/odom", "nav_msgs/msg/Odometry", [(100 + i, odometry(i)) for i 
 
 
 def telemetry_without_place(kinds, submarine=True, steps=20):
-    """Returns a tlog of messages of these kinds; positions have the depth only."""
+    """Returns a tlog of messages of these kinds. Their positions contain only the depth."""
     log = bytearray()
     for step in range(steps):
         t, _, _, down, *angles = moment(step)

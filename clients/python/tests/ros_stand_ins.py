@@ -1,4 +1,4 @@
-"""Modules with the names that the ROS 2 bridge imports, for tests without ROS: they record and do not check ROS itself."""
+"""Modules with the names that the ROS 2 bridge imports, for tests without ROS. They record calls and do not test ROS itself."""
 import contextlib
 import importlib
 import sys

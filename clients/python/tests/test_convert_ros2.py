@@ -1,4 +1,4 @@
-"""Conversion of recordings of ROS 2, .db3 files and folders: poses are compared with their source; damaged ones give one
+"""Conversion of recordings of ROS 2, .db3 files and folders. Poses are compared with their source. A damaged file gives one
 error."""
 import contextlib
 import shutil
@@ -160,7 +160,7 @@ class RecordingsOfRos2(WithFolder):
                     convert(path)
 
     def repeating(self, topic_id):
-        """Writes a file of some kB whose tree of messages lists the same pages again and again; returns its path."""
+        """Writes a file of some kB and returns its path. Its table of messages is a tree that lists the same pages many times."""
         path = self.folder / "log"
         with contextlib.closing(sqlite3.connect(path)) as base:
             base.execute("PRAGMA page_size=512")
@@ -188,7 +188,7 @@ class RecordingsOfRos2(WithFolder):
         return path
 
     def test_tables_longer_than_the_file_are_refused(self):
-        for topic_id, steps in ((1, rosbag2.STEPS_PER_BYTE), (2, 0.05)):  # its messages are read or skipped
+        for topic_id, steps in ((1, rosbag2.STEPS_PER_BYTE), (2, 0.05)):  # messages of topic 1 are read, of topic 2 skipped
             path = self.repeating(topic_id)
             with self.subTest(topic_id), mock.patch.object(rosbag2, "STEPS_PER_BYTE", steps), \
                     mock.patch.object(rosbag2, "_STEPS_AT_ONCE", 1000), \

@@ -288,7 +288,7 @@ class TimeLeft(unittest.TestCase):
 
 
 class Clock:
-    """Replaces the clock: time advances only during a sleep, and more if the computer is to stall."""
+    """Replaces the clock. Time advances only during a sleep, and a stall of the computer makes the sleep longer."""
 
     def __init__(self, stalls=()):
         self.now, self.stalls, self.sleeps = 1000.0, dict(stalls), 0

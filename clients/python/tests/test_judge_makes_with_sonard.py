@@ -1,4 +1,4 @@
-"""The judge reads each make: a small driver passes, and a planted fault in it is found. SONARD_JUDGE_CASES=some runs all."""
+"""The judge reads each make: a small driver passes, and a planted fault is found. SONARD_JUDGE_CASES=some runs all tests."""
 import concurrent.futures
 import json
 import os

@@ -1,4 +1,4 @@
-"""The judge's verdicts are right: a correct driver passes, and each planted fault is found by its case and by no other MUST.
+"""The judge's verdicts are right: a correct driver passes, and each planted fault fails its case and no unexpected MUST.
 
 SONARD_JUDGE_CASES=some runs the proof, which takes minutes; =all runs every case with the correct driver."""
 import contextlib

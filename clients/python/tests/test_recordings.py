@@ -13,7 +13,7 @@ from sonard_client.convert import ConvertError, compression
 
 
 class ModuleStandIn:
-    """Replaces lz4.frame and compression.zstd, which may not be installed: decompresses by reversing."""
+    """Replaces lz4.frame and compression.zstd, which may not be installed. It decompresses by reversing the bytes."""
     class LZ4FrameDecompressor:
         eof = True
 

@@ -1,4 +1,4 @@
-"""The ROS 2 bridge with a running sonard, and stand-ins for ROS: frames by a target to port, mounts, clouds, scans, the clock."""
+"""The ROS 2 bridge with a running sonard, and stand-ins for ROS: frames (a target to port), mounts, clouds, scans, the clock."""
 import contextlib
 import math
 import pathlib
@@ -135,7 +135,7 @@ class ASurveyor(WithSonard):
 
 
 class OneBeamAtATime(WithSonard):
-    """A scanning sonar and a DVL. Their echoes are weak parts of the full scale."""
+    """A scanning sonar and a DVL. Their echoes are a small part of the full scale."""
 
     def listen(self, daemon, make):
         host = subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", make, *WAIT], stdin=subprocess.DEVNULL,
@@ -157,8 +157,8 @@ class OneBeamAtATime(WithSonard):
         self.assertEqual([(y, z) for _, y, z in points], [(0.0, 0.0)] * len(points))  # in the axes of the head
 
     def test_the_head_turns_about_the_axis_of_its_mount(self):
-        """Upside down: the head turns to port. Its clouds lie, by /tf, on the wall to port, which takes up a large part of a turn,
-        because a busy computer leaves out lines."""
+        """The mount is upside down, so the head turns to port. With /tf its clouds lie on the wall to port. The wall takes up a
+        large part of a turn, because a busy computer leaves out lines."""
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         scene = pathlib.Path(folder.name) / "wall.yaml"
@@ -203,7 +203,7 @@ class Mounts(WithSonard):
         mount = wait_for(lambda: ros.static[1:])[0][0]
         self.assertAlmostEqual(mount.transform.translation.y, 0.2)
         ahead = c.rotate(c.wxyz([getattr(mount.transform.rotation, axis) for axis in "xyzw"]), (1, 0, 0))
-        self.assertAlmostEqual(ahead[2], -0.5)  # bow down, as FLU has a positive pitch
+        self.assertAlmostEqual(ahead[2], -0.5)  # in FLU a positive pitch lowers the bow
         Control(daemon.address).mount_sonar("front", position=(0.5, -0.2, 0))
         moved = wait_for(lambda: ros.static[2:])[0][0]
         self.assertAlmostEqual(moved.transform.translation.y, -0.2)

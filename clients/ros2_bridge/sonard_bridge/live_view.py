@@ -1,5 +1,5 @@
 """A client of sonard's live view (docs/live-view.md) that runs in its own thread and needs no ROS. It has a WebSocket, the part of
-the Foxglove protocol that the bridge uses, and a decoder of protobuf by the field numbers in protocol/foxglove/schemas."""
+the Foxglove protocol that the bridge uses, and a decoder of protobuf with the field numbers of protocol/foxglove/schemas."""
 from __future__ import annotations
 
 import base64
@@ -16,7 +16,7 @@ from .polling import WANTS_TOKEN
 
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 LONGEST = 64 << 20   # limit for a message [bytes]
-SILENCE_S = 30.0     # after such a silence the connection counts as lost, because sonard sends a message every second
+SILENCE_S = 30.0     # after this silence the connection counts as lost, because sonard sends a message every second
 RETRY_S = 1.0
 
 

@@ -25,9 +25,9 @@ _KINDS: Dict[str, Tuple[str, float]] = {
 # In order of preference: the simulator's ground truth, then estimates.
 FULL = ("SIM", "XKF1", "NKF1", "EKF1", "AHR2")
 LOCAL = ("XKF1", "NKF1", "EKF1")  # metres from the filter's origin
-# Messages and fields with the height above home, best first, without a position; BARO:1: ArduSub's external pressure sensor.
+# For logs without positions: messages and fields with the height above home, best first. BARO:1: ArduSub's outer pressure sensor.
 HEIGHTS = (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO:1", "Alt"), ("BARO", "Alt"))
-STATES = {"XKF4": "XKF1", "NKF4": "NKF1"}  # messages whose field PI is the core in use: the pose messages of that filter
+STATES = {"XKF4": "XKF1", "NKF4": "NKF1"}  # message whose field PI is the core in use: pose message of the same filter
 WANTED = FULL + ("ATT", "POS", "GPS", "ORGN", "CTUN", "BARO") + tuple(STATES)
 EKF_ORIGIN = 0  # type of an ORGN message; 1 is the home of the attitude system
 FIX_2D = 2

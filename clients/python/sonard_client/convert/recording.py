@@ -25,7 +25,7 @@ class Recorded(NamedTuple):
 
 
 class Kept(List[Recorded]):
-    """The messages of a recording. Of paths, which grow from message to message, only the last one is kept."""
+    """The messages of a recording. A path grows from message to message, so only the last path of each topic is kept."""
 
     def __init__(self, messages: Iterable[Recorded] = ()) -> None:
         super().__init__()
@@ -95,7 +95,7 @@ def _clock_reset(rows: Stream[Found]) -> str:
 
 
 def _unpacked(message: Recorded, name: str) -> bytes:
-    """Decompresses a message if needed, because some recordings of ROS 2 compress each one."""
+    """Decompresses a message if needed, because some recordings of ROS 2 compress each message."""
     if message.encoding != "cdr" or not message.data.startswith(ZSTD_MAGIC):
         return message.data
     try:

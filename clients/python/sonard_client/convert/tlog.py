@@ -63,7 +63,8 @@ def _quaternion(f: Dict[str, float]) -> Optional[Quaternion]:
 
 
 def _is_supported(f: Dict[str, float]) -> bool:
-    """Returns whether an ODOMETRY's frames are supported. A world frame as child_frame_id concerns velocity; the body is FRD."""
+    """Returns whether an ODOMETRY's frames are supported. If child_frame_id is a world frame, only the velocity is in it, and
+    the body is FRD."""
     bodies = (*FRD_BODIES, BODY_FLU)
     if f["frame_id"] in (*NED_WORLDS, LOCAL_FRD):
         return f["child_frame_id"] in (*bodies, f["frame_id"])
@@ -124,7 +125,7 @@ class _Vehicle:
         self._boot: "Optional[Tuple[float, float]]" = None  # the latest time since start, and its time of receipt
         self._before_s = 0.0  # offset of times since start, after restarts
         self._current: "Dict[str, Tuple[int, float]]" = {}  # by message: its component and its last time of receipt
-        # By message: the components used, in sequence, and the lengths of the message's streams when each began.
+        # By message: the components used, in sequence, each with the lengths of the message's streams at its first message.
         self._runs: "Dict[str, List[Tuple[int, List[int]]]]" = {}
         self._used: "Dict[str, Dict[int, int]]" = {}  # by message: the number of messages of each component used
         self.omitted: "Dict[str, Dict[int, int]]" = {}  # by message: the other components and their number of messages
@@ -190,8 +191,8 @@ class _Vehicle:
             self.positions.setdefault(name, []).append((t, position))
 
     def _is_used(self, name: str, logged: Logged) -> bool:
-        """Uses one of several components that send the same message, so that their tracks are not mixed: the autopilot, else
-        the first."""
+        """Returns whether a message is used. Of the components that send it only one is used at a time, so that their tracks are
+        not mixed: the autopilot, else the first."""
         component = logged.frame.component
         self.senders.add(component)
         if self.component is not None and component != self.component:
@@ -258,7 +259,7 @@ class _Vehicle:
         return bool(self._local_headings)
 
     def _since_start(self, boot_s: float, received_s: float) -> float:
-        """Returns the time since the first start. After a restart the time of receipt continues it."""
+        """Returns the time since the first start. The pause of a restart is taken from the times of receipt."""
         if self._boot is not None and boot_s < self._boot[0] - RESTART_S:
             self._before_s += self._boot[0] - boot_s + max(0.0, received_s - self._boot[1])
             self.restarts += 1

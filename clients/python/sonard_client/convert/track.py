@@ -48,7 +48,7 @@ class Source(NamedTuple):
 
 
 def rising(stream: Stream[Value]) -> Stream[Value]:
-    """Drops items whose time decreases; an item replaces the one before if both have the same time."""
+    """Drops items whose time decreases. Of consecutive items with equal times, the last is kept."""
     kept: Stream[Value] = []
     for item in stream:
         if kept and item[0] == kept[-1][0]:

@@ -104,7 +104,7 @@ class Case:
 
     @property
     def tail_s(self) -> float:
-        """How long the fault still acts after its end in the journal, which counts a pause at the ping in which it begins."""
+        """How long the fault still acts after its end in the journal. The journal ends a pause (S06) at the interrupted ping."""
         return float(self.given["seconds"]) if self.kind == "S06" else 0.0
 
     def record(self) -> Dict[str, Any]:
@@ -119,7 +119,7 @@ def row(number: str, given: Dict[str, Any], duration: str, sentence: str, **more
 _FREE = {"lost": None}                        # the fault itself loses pings
 _LONG = {"recover_s": 5.0, "lost": None}      # a reboot takes a few seconds
 _CHANGED = {"lost": None, "rss_mib": 64.0}    # pings of another size need new buffers
-_LEAN = {"rss_mib": 256.0}                    # limits as in `must`: a driver must not allocate the size in a length field
+_LEAN = {"rss_mib": 256.0}                    # for `must`: a driver must not allocate the size that a length field states
 
 CASES: List[Case] = [
     row("N00.1", {}, "2 s", "Nothing is wrong.", measured=True),

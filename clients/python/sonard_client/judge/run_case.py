@@ -26,7 +26,7 @@ from .wire import Capture, DatagramFlow, Seen
 
 NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # without a fault, a working driver gets this many pings in this time
 _SETTLE_S = 0.52
-_STILL_S = 20.0          # after such a time without any activity the judge stops waiting for the fault
+_STILL_S = 20.0          # after this time without any activity the judge stops waiting for the fault
 _EARLY_S = 0.02          # the journal's entry may be this much later than its ping
 _DEVICE_ID = 7001
 

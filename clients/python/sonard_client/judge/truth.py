@@ -1,4 +1,4 @@
-"""Finds the intact pings in the bytes that a sonar sends, despite injected faults; a driver may publish only these. Each make has a row
+"""Finds the intact pings among the bytes that a sonar sends under faults. A driver may publish only these. Each make has a row
 in makes/__init__.py and a file beside it."""
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Reader(Protocol):
 
 
 class NoPings:
-    """Reads a transport of a make that carries no pings."""
+    """Reads a transport over which a make sends no pings."""
 
     def feed(self, received: bytes) -> List[TruePing]:
         return []
@@ -38,7 +38,7 @@ class Make(NamedTuple):
     is_request: Callable[[bytes], bool] = bool   # whether bytes of a driver are settings or a request for pings
     needs_request: bool = True                   # False: the sonar pings as soon as a client connects
     is_pushed: Optional[Callable[[bytes], bool]] = None  # whether an unrequested datagram belongs to a ping
-    numbered: bool = True                        # False: its pings have no numbers, or others than the journal
+    numbered: bool = True                        # False: its pings have no numbers, or other numbers than the journal's
     sonar: Mapping[str, object] = {}             # additional keys of the sonar's configuration
 
 
@@ -99,7 +99,7 @@ class WholeMessages:
         return found
 
     def unnumbered(self) -> int:
-        """Returns the number of a ping that has none: from -1 downwards, which no driver prints."""
+        """Returns a number for a ping that has none: -1, -2 and so on, which no driver prints."""
         self._unnumbered -= 1
         return self._unnumbered
 

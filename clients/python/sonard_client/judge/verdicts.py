@@ -143,7 +143,7 @@ def judge(seen: Observation, must: Mapping[str, float], should: Mapping[str, Opt
     for name, wanted in limits.items():
         if wanted is None or name in must or (name == "notice_s" and not wants_notice) or (name == "lost" and not seen.tapped):
             continue
-        if name == "rss_mib" and name not in measured:  # the driver ended before its memory was measured twice
+        if name == "rss_mib" and name not in measured:  # the driver ended before its memory was measured under the fault
             continue
         _check(verdict.should, name, wanted, measured.get(name))
     return verdict
@@ -162,7 +162,7 @@ def _ending(seen: Observation) -> str:
 
 def _judge_data(verdict: Verdict, seen: Observation, good: Sequence[Published], stale: Sequence[Published],
                 false: Sequence[Published]) -> int:
-    """Sets the data verdict; returns the pings lost beyond those that the fault touched."""
+    """Sets the data verdict. Returns the number of lost pings that the fault did not touch."""
     if not seen.tapped or not seen.truth_known:
         verdict.data = "UNSEEN"
         return 0

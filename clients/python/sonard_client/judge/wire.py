@@ -99,9 +99,9 @@ class Connection:
 
 
 class DatagramFlow(Connection):
-    """Datagrams between the sonar and one port of the driver, or of a group. It begins with the driver's first datagram, or with
-    the first of a ping that the sonar pushes; its end is not visible. Data on the wire count as delivered, because UDP has no
-    acknowledgement."""
+    """Datagrams between the sonar and one port of the driver, or of a multicast group. The flow begins with the driver's first
+    datagram or the first one that the sonar pushes. Its end is not visible. Data on the wire count as delivered, because UDP has
+    no acknowledgement."""
 
     def __init__(self, number: int, peer: str, mono: float, reader: Reader) -> None:
         super().__init__(number, peer, mono, reader)
@@ -115,8 +115,8 @@ class DatagramFlow(Connection):
 class Capture(threading.Thread):
     """Captures packets from start() to stop(). It needs CAP_NET_RAW, which a process has in its own network namespace.
 
-    interface: "lo" or our end of the veth pair. device: the sonar's address. port: where a driver connects first; tcp_ports:
-    further ones. make: None reads no pings."""
+    interface: "lo" or the sonar's end of the veth pair. device: the sonar's address. port: where a driver connects first;
+    tcp_ports: further ones. make: None reads no pings."""
 
     def __init__(self, interface: str, device: str, port: int, make: Optional[Make], tcp_ports: Collection[int] = ()) -> None:
         super().__init__(daemon=True)
@@ -223,7 +223,7 @@ class Capture(threading.Thread):
         if offset == 0 and not more:
             return packet[at:end]
         key = (packet[ip + 12:ip + 16], packet[ip + 16:ip + 20], packet[ip + 4:ip + 6])
-        if len(self._fragments) > _MOST_FRAGMENTED:  # drops also those that can never be completed
+        if len(self._fragments) > _MOST_FRAGMENTED:  # otherwise datagrams that lost a fragment would accumulate
             self._fragments.clear()
         parts = self._fragments.setdefault(key, {})
         parts[offset] = packet[at:end]

@@ -57,7 +57,7 @@ class OculusReader:
         header = layouts.read_header(bytes(data[at:at + layouts.HEADER_BYTES]))
         if header.type != layouts.PING:
             return 1
-        version = min(header.version, 2)  # later versions: as the last known one
+        version = min(header.version, 2)  # later versions are read as version 2
         head = layouts.ping_head_bytes(version)
         if len(data) - at < head:
             return 0
@@ -68,7 +68,7 @@ class OculusReader:
         image_bytes = f.rows * (row_bytes + (4 if has_gains else 0))
         end = f.image_offset + image_bytes
         declared = {f.message_bytes, header.payload_bytes + layouts.HEADER_BYTES}
-        row_short = end - row_bytes - (4 if has_gains else 0)  # all lengths mean one row fewer: a driver may accept or refuse this
+        row_short = end - row_bytes - (4 if has_gains else 0)  # all lengths lack the last row: a driver may accept or refuse this
         if end not in declared and declared == {row_short}:
             end, image_bytes = row_short, row_short - f.image_offset
         elif end not in declared:
