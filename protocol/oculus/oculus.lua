@@ -251,7 +251,7 @@ local function check_values(items, values)
   if bit_set(values.flags, 0) then
     local covered = values.nRanges * values.rangeResolution
     say(items.rangeResolution, expert.note, math.abs(covered - values.range) <= values.rangeResolution,
-      "rows cover " .. short(covered) .. " m, asked for were " .. short(values.range) .. " m")
+      "rows cover " .. short(covered) .. " m, the requested range is " .. short(values.range) .. " m")
   end
 end
 
@@ -381,7 +381,7 @@ read[0x55] = function(tree, message)
   local values, items = {}, {}
   if not add_layout(tree, message, HEADER, "config", values, items) then return "user configuration, too short" end
   say(tree, expert.note, message:len() == 28, "a user configuration has 28 bytes")
-  if values.ipAddr == 0 then return "user configuration: asks for the stored one" end
+  if values.ipAddr == 0 then return "user configuration: requests the stored one" end
   return "user configuration: " .. tostring(message(16, 4):le_ipv4())
 end
 
@@ -442,7 +442,7 @@ local function dissect_message(message, pinfo, tree, length)
                   part_number = values.partNumber}
   header_item:set_text("header: " .. (message_names[header.kind] or "unknown message") .. ", version " .. header.version)
   item:add(fields.length, message(0, HEADER), length):set_generated()
-  say(items.payloadSize, expert.note, header.payload + HEADER == length, "the message has " .. length .. " bytes all the same")
+  say(items.payloadSize, expert.note, header.payload + HEADER == length, "the message nevertheless has " .. length .. " bytes")
   say(item, expert.short, message:len() == length, "cut short by the capture: " .. message:len() .. " of " .. length .. " bytes")
   local summary
   if read[header.kind] then
