@@ -50,6 +50,26 @@ class SceneCommand(unittest.TestCase):
         self.assertIn("note: the scene is 111.4 km from world.origin; vehicles", checked[1])
         self.assertIn("m from everything in the scene", checked[1])
 
+    def checked(self, keys, code=0):
+        """Returns the output for a scene of one object with these keys."""
+        self.scene.write_text(f"objects: [{{name: bed, material: sand, {keys}}}]\n", encoding="utf-8")
+        return self.ctl("check", self.scene, code=code)
+
+    def test_values_far_from_all_heights(self):
+        """Usual fill values are missing heights. Others remain, with a note."""
+        def with_one(value):
+            (self.path / "g.asc").write_text("ncols 10\nnrows 10\nxllcorner 0\nyllcorner 0\ncellsize 1\n" +
+                                             "-10 " * 45 + value + " -10" * 53 + " -9.5\n", encoding="utf-8")
+            return self.checked("type: heightmap, file: g.asc")
+        for fill in ("9999", "-999.99", "-9999.9", "99999.99", "65535"):
+            text = with_one(fill)
+            self.assertIn(f"1 cell of {fill}, far from all heights, treated as missing", text)
+            self.assertIn("z -10..-9.5 m", text)
+        for odd in ("-888", "-12345.6", "5000"):
+            self.assertIn(f"1 cell of {odd}, ", with_one(odd))
+            self.assertIn("away from all other heights: missing values?", with_one(odd))
+        self.assertNotIn("cell of", with_one("8"))
+
     def test_small_files_take_little_memory(self):
         """Loads a grid with one distant point, and a missing scene beside a file of 64 GiB whose name is similar."""
         (self.path / "far.xyz").write_text("0 0 1\n1 1 1\n2 2 1\n3 3 1\n19000000 19000000 1\n", encoding="utf-8")

@@ -12,50 +12,7 @@
 namespace sonar {
 namespace {
 
-constexpr double highest_m = 1e7, least_fill = 1e20;
 constexpr double farthest_deg = 5, nearest_pole_deg = 89;
-constexpr float none = std::numeric_limits<float>::quiet_NaN();
-/// Usual fill values that could also be heights.
-constexpr std::array<float, 14> usual_fills{-9999, -32768, -32767, 32767,  -99999,   99999,  -999999,
-                                            65535, -999,   9999,   -10000, -9999999, 999999, 9999999};
-/// Limits of 32-bit integers. No height is as large.
-constexpr std::array<double, 4> ends_of_32_bits{-2147483648.0, -2147483647.0, 2147483647.0, 4294967295.0};
-
-/// The value of one unit in the last digit of a number as it is written.
-double last_digit(std::string_view word, double value) {
-  int digits = 0;
-  for (const char c : word.substr(0, word.find_first_of("eE"))) digits += (c >= '0' && c <= '9') && (digits > 0 || c != '0');
-  return std::pow(10.0, std::floor(std::log10(std::abs(value))) - std::max(digits, 1) + 1);
-}
-
-struct Span {
-  float low = std::numeric_limits<float>::infinity(), high = -std::numeric_limits<float>::infinity();
-};
-
-/// Removes undeclared fill values: usual fill values that are far outside of all other heights.
-void take_out_fills(RawHeights& raw, std::vector<std::string>& notes) {
-  const auto is_usual = [](float z) { return std::find(usual_fills.begin(), usual_fills.end(), z) != usual_fills.end(); };
-  Span rest;
-  for (const float z : raw.z)
-    if (!std::isnan(z) && !is_usual(z)) rest = {std::min(rest.low, z), std::max(rest.high, z)};
-  if (rest.low > rest.high) return;
-  std::array<std::size_t, usual_fills.size()> cells{};
-  constexpr float gap_m = 100;
-  for (float& z : raw.z) {
-    const auto fill = std::find(usual_fills.begin(), usual_fills.end(), z);
-    if (fill == usual_fills.end() || (z > rest.low - gap_m && z < rest.high + gap_m)) continue;
-    ++cells[static_cast<std::size_t>(fill - usual_fills.begin())];
-    z = none;
-  }
-  for (std::size_t k = 0; k < cells.size(); ++k)
-    if (cells[k] > 0)
-      notes.push_back(
-          text::format("%zu cell%s of %.0f, far from all heights, treated as missing, although the file does not declare it",
-                       cells[k], cells[k] == 1 ? "" : "s", static_cast<double>(usual_fills[k])));
-  if (raw.fill_values > 0)
-    notes.push_back(text::format("%zu cell%s beyond every height treated as missing, although the file does not declare it",
-                                 raw.fill_values, raw.fill_values == 1 ? "" : "s"));
-}
 
 bool could_be_degrees(const RawHeights& raw) {
   return raw.x.front() >= -180 && raw.x.back() <= 360 && raw.y.front() >= -90 && raw.y.back() <= 90;
@@ -303,29 +260,6 @@ std::optional<double> height_number(std::string_view s) {
   while (zeros + 1 < s.size() && s[zeros] == '0' && s[zeros + 1] >= '0' && s[zeros + 1] <= '9') ++zeros;
   if (zeros == sign) return std::nullopt;
   return text::parse_decimal(std::string(s.substr(0, sign)) + std::string(s.substr(zeros)));
-}
-
-HeightValues::HeightValues(std::optional<std::string_view> declared) {
-  if (!declared) return;
-  declared_ = height_number(*declared);
-  if (!declared_ || std::isnan(*declared_)) {
-    declared_.reset();
-    return;
-  }
-  // Accepts the same value in single precision. A value beyond every height may also have been rounded to few digits. The
-  // tolerance is limited, so that no height counts as missing: without the limit, the tolerance of 1e20 would include 0.
-  const double size = std::abs(*declared_);
-  tolerance_ = size > highest_m ? std::min(last_digit(*declared, *declared_), 0.5 * (size - highest_m)) : 1e-6 * size;
-}
-
-std::optional<float> HeightValues::height_of(double value) {
-  if (std::isnan(value) || (declared_ && std::abs(value - *declared_) <= tolerance_)) return none;
-  if (std::abs(value) <= highest_m) return static_cast<float>(value);
-  const bool is_end = std::any_of(ends_of_32_bits.begin(), ends_of_32_bits.end(),
-                                  [&](double end) { return std::abs(value - end) <= 1; });  // single precision rounds them
-  if (std::abs(value) < least_fill && !is_end) return std::nullopt;
-  ++fill_values_;
-  return none;
 }
 
 void RawHeights::turn_rows(std::size_t columns) {

@@ -68,6 +68,8 @@ struct RawHeights {
   void turn_rows(std::size_t columns);
 };
 
+/// Removes undeclared fill values: usual ones that are far outside of all other heights. Notes them, and other far values.
+void take_out_fills(RawHeights& raw, std::vector<std::string>& notes);
 /// Removes fill values, converts units, notes holes, and sets the origin. Errors do not contain the file name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);
 
