@@ -22,7 +22,7 @@ constexpr std::string_view points =
 constexpr std::string_view soundings = "holds pings of a multibeam sonar, not a grid; make a grid of them (MB-System: mbgrid)";
 constexpr std::string_view netcdf = "is NetCDF; convert it: gdal_translate -of GTiff IN OUT.tif";
 
-constexpr std::array<Kind, 22> kinds{
+constexpr std::array<Kind, 23> kinds{
     {{0, "\x1f\x8b"sv, "is compressed with gzip; unpack it (gunzip)"},
      {0, "PK\x03\x04"sv, "is a zip archive; unpack it (unzip)"},
      {0, "BZh"sv, "is compressed with bzip2; unpack it (bunzip2)"},
@@ -43,6 +43,7 @@ constexpr std::array<Kind, 22> kinds{
      {8, "GSF-v"sv, soundings},
      {4, "#IIP"sv, soundings},
      {2, "\0\0\x02I"sv, soundings},
+     {0, "\xff\xd8\xff"sv, "is a JPEG picture; a height map needs PNG: gdal_translate -of PNG IN OUT.png"},
      {0, "%PDF"sv, "is a PDF document"},
      {0, "\xff\xfe"sv, "is text in UTF-16; save it as UTF-8"},
      {0, "\xfe\xff"sv, "is text in UTF-16; save it as UTF-8"},

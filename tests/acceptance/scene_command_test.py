@@ -70,6 +70,15 @@ class SceneCommand(unittest.TestCase):
             self.assertIn("away from all other heights: missing values?", with_one(odd))
         self.assertNotIn("cell of", with_one("8"))
 
+    def test_the_content_of_a_height_map_counts_not_its_name(self):
+        (self.path / "t.png").write_bytes(b"II*\0")
+        self.assertIn("TIFF", self.checked("type: heightmap, file: t.png", 65))
+        (self.path / "p.tif").write_bytes(b"\x89PNG\r\n\x1a\n")
+        self.assertIn("size_m", self.checked("type: heightmap, file: p.tif", 65))
+        self.assertIn("cut short", self.checked("type: heightmap, file: p.tif, size_m: [1, 1], height_m: [0, 1]", 65))
+        (self.path / "j.png").write_bytes(b"\xff\xd8\xff\xe0")
+        self.assertIn("is a JPEG picture", self.checked("type: heightmap, file: j.png, size_m: [1, 1], height_m: [0, 1]", 65))
+
     def test_small_files_take_little_memory(self):
         """Loads a grid with one distant point, and a missing scene beside a file of 64 GiB whose name is similar."""
         (self.path / "far.xyz").write_text("0 0 1\n1 1 1\n2 2 1\n3 3 1\n19000000 19000000 1\n", encoding="utf-8")

@@ -23,7 +23,8 @@ struct Picture {
 };
 
 void on_error(png_structp png, png_const_charp message) {
-  static_cast<Picture*>(png_get_error_ptr(png))->error = message;
+  const bool is_short = std::strcmp(message, "Read Error") == 0;  // libpng's only word for it
+  static_cast<Picture*>(png_get_error_ptr(png))->error = is_short ? "it is cut short; fetch or export it again" : message;
   png_longjmp(png, 1);
 }
 void on_warning(png_structp, png_const_charp) {}
@@ -60,7 +61,7 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
       const bool hidden = has_alpha && alpha[0] == 0 && (!wide || alpha[1] == 0);
       if (has_alpha) picture.transparent[j * columns + i] = hidden;
       if (!grey && !hidden && (std::memcmp(at, at + sample, sample) != 0 || std::memcmp(at, at + 2 * sample, sample) != 0))
-        png_error(png, "not a grey image: it has colours, where red, green and blue differ; heights need one channel");
+        png_error(png, "not a grey image: it has colours, where red, green and blue differ; save it in grey");
       const unsigned v = wide ? (unsigned{at[0]} << 8 | at[1]) : at[0] * 257u;
       picture.grey[j * columns + i] = static_cast<std::uint16_t>(v);
     }

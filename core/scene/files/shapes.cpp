@@ -44,6 +44,7 @@ std::string grid_by_content(const std::filesystem::path& file) {
   if (!head) return {};
   for (const std::string_view magic : {"II*\0"sv, "MM\0*"sv, "II+\0"sv, "MM\0+"sv})
     if (head->starts_with(magic)) return ".tif";
+  if (head->starts_with("\x89PNG"sv)) return ".png";
   if (head->starts_with(byte_order_mark)) head->erase(0, byte_order_mark.size());
   head->erase(0, head->find_first_not_of(" \t\r\n"));
   const std::string word = small_letters(head->substr(0, head->find_first_of(" \t\r\n=:")));
@@ -222,7 +223,8 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   }
   const Node file = keys.required("file");
   const std::filesystem::path path = folder / file.text(1024);
-  std::string extension = mesh_extension(path);
+  const std::string own = mesh_extension(path), by_content = grid_by_content(path);
+  std::string extension = by_content.empty() ? own : by_content;
   std::error_code no_size;
   const std::uintmax_t bytes = std::filesystem::file_size(path, no_size);
   begin_load_step("reading " + path.filename().string(), no_size ? 0 : bytes / 4);
@@ -250,9 +252,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   if (!is_usable()) return {};
   static constexpr std::array<std::string_view, 4> of_tables{".csv", ".txt", ".dat",
                                                              ".pts"};  // read as points, unless the content is a grid
-  const bool table = std::find(of_tables.begin(), of_tables.end(), extension) != of_tables.end();
-  if (const std::string by_content = grid_by_content(path); !by_content.empty() || !readers.contains(extension))
-    extension = by_content.empty() && table ? ".xyz" : by_content;
+  if (std::find(of_tables.begin(), of_tables.end(), extension) != of_tables.end()) extension = ".xyz";
   if (const auto reader = readers.find(extension); reader != readers.end()) {
     HeightOptions options{.z_scale = keys.optional("z_scale").number_or(1, Range::between(-1000, 1000))};
     const bool centred = options.centred = keys.optional("centred").boolean_or(false);
@@ -271,7 +271,7 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
     return from_grid(grid, material, file, centred);
   }
   static constexpr std::array<std::string_view, 8> pictures{".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif", ".webp"};
-  const std::string own = mesh_extension(path), name = path.filename().string(), stem = path.stem().string();
+  const std::string name = path.filename().string(), stem = path.stem().string();
   if (std::find(pictures.begin(), pictures.end(), own) != pictures.end())
     return file.fail("a picture whose format is not read; convert it: gdal_translate -of PNG " + name + " " + stem + ".png"),
            Shape{};
