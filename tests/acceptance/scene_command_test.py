@@ -3,6 +3,7 @@ import json
 import math
 import os
 import pathlib
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -78,6 +79,26 @@ class SceneCommand(unittest.TestCase):
         self.assertIn("cut short", self.checked("type: heightmap, file: p.tif, size_m: [1, 1], height_m: [0, 1]", 65))
         (self.path / "j.png").write_bytes(b"\xff\xd8\xff\xe0")
         self.assertIn("is a JPEG picture", self.checked("type: heightmap, file: j.png, size_m: [1, 1], height_m: [0, 1]", 65))
+
+    def test_the_unit_of_a_geotiffs_heights(self):
+        def with_unit(unit):
+            text = f'<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">{unit}</Item></GDALMetadata>\0'.encode()
+            tags = [(256, 3, [2]), (257, 3, [2]), (258, 3, [32]), (262, 3, [1]), (273, 4, [8]), (277, 3, [1]), (278, 3, [2]),
+                    (279, 4, [16]), (339, 3, [3]), (33550, 12, [1, 1, 0]), (33922, 12, [0, 0, 0, 500, 500, 0]), (42112, 2, text)]
+            data, entries = struct.pack("<4f", -300, -200, -100, -100), b""
+            for tag, kind, values in tags:
+                packed = struct.pack(f"<{len(values)}{'?BBHI???????d'[kind]}", *values)
+                place = packed.ljust(4, b"\0") if len(packed) <= 4 else struct.pack("<I", 8 + len(data))
+                data += packed if len(packed) > 4 else b""
+                entries += struct.pack("<HHI", tag, kind, len(values)) + place
+            (self.path / "g.tif").write_bytes(struct.pack("<2sHI", b"II", 42, 8 + len(data)) + data +
+                                              struct.pack("<H", len(tags)) + entries + bytes(4))
+            return self.checked("type: heightmap, file: g.tif")
+        for unit, low, high in (("Metres", "-300", "-100"), ("cm", "-3", "-1"), ("mm", "-0.3", "-0.1"), ("fathoms", "-549", "-183")):
+            self.assertIn(f"z {low}..{high} m", with_unit(unit))
+        text = with_unit("cubits")
+        self.assertIn("z -300..-100 m", text)
+        self.assertIn("the unit of its heights, cubits, is not known: they are read as metres", text)
 
     def test_small_files_take_little_memory(self):
         """Loads a grid with one distant point, and a missing scene beside a file of 64 GiB whose name is similar."""

@@ -51,6 +51,12 @@ Result<double> length_unit(std::optional<std::uint16_t> key) {
       return 1200.0 / 3937;
     case unit_kilometre:
       return 1000;
+    case unit_centimetre:
+      return 0.01;
+    case unit_millimetre:
+      return 0.001;
+    case unit_fathom:
+      return 1.8288;
     default:
       return failure(ErrorKind::bad_data,
                      "is in units of length of code " + std::to_string(*key) + "; convert it to metres: gdalwarp -t_srs");
@@ -222,13 +228,19 @@ std::string_view attribute(std::string_view tag, std::string_view name) {
   return {};
 }
 
-std::optional<std::uint16_t> unit_called(std::string_view word) {
-  if (word == "ft" || word == "foot" || word == "feet" || word == "international foot") return unit_foot;
-  if (word == "US survey foot" || word == "ftUS" || word == "us-ft") return unit_us_survey_foot;
-  if (word == "km" || word == "kilometre" || word == "kilometer") return unit_kilometre;
-  return word == "m" || word == "metre" || word == "meter" || word == "metres" || word == "meters"
-             ? std::optional<std::uint16_t>(unit_metre)
-             : std::nullopt;
+std::optional<std::uint16_t> unit_called(std::string_view name) {
+  const std::string word = small_letters(name);
+  const auto is_one_of = [&](std::initializer_list<std::string_view> names) {
+    return std::find(names.begin(), names.end(), word) != names.end();
+  };
+  if (is_one_of({"ft", "foot", "feet", "international foot"})) return unit_foot;
+  if (is_one_of({"us survey foot", "ftus", "us-ft"})) return unit_us_survey_foot;
+  if (is_one_of({"km", "kilometre", "kilometer"})) return unit_kilometre;
+  if (is_one_of({"cm", "centimetre", "centimeter"})) return unit_centimetre;
+  if (is_one_of({"mm", "millimetre", "millimeter"})) return unit_millimetre;
+  if (is_one_of({"fathom", "fathoms"})) return unit_fathom;
+  if (is_one_of({"m", "metre", "meter", "metres", "meters"})) return unit_metre;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -244,7 +256,7 @@ GdalMetadata gdal_metadata_of(std::string_view text) {
                            value = trimmed(text.substr(close + 1, text.find('<', close) - close - 1), " \t\r\n");
     if (!sample.empty() && sample != "0") continue;
     const auto number = [&] { return height_number(value).value_or(NAN); };
-    if (role == "unittype") metadata.height_unit = unit_called(value);
+    if (role == "unittype") metadata.height_unit = unit_called(value), metadata.unit_name = value;
     if (role == "scale") metadata.scale = number();
     if (role == "offset") metadata.offset = number();
   }

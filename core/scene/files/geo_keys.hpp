@@ -42,13 +42,22 @@ class GeoKeys {
 Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::uint16_t> height_unit);
 
 /// Codes of units of length.
-enum : std::uint16_t { unit_metre = 9001, unit_foot = 9002, unit_us_survey_foot = 9003, unit_kilometre = 9036 };
+enum : std::uint16_t {
+  unit_millimetre = 1025,
+  unit_centimetre = 1033,
+  unit_metre = 9001,
+  unit_foot = 9002,
+  unit_us_survey_foot = 9003,
+  unit_fathom = 9014,
+  unit_kilometre = 9036
+};
 
 // Reads TIFF tag 42112, in which GDAL stores the unit, scale and offset of a band.
 
 /// The metadata of the first band. A height is scale * value + offset.
 struct GdalMetadata {
-  std::optional<std::uint16_t> height_unit = {};  // code of the unit of length; other units, as of a sensor, are ignored
+  std::optional<std::uint16_t> height_unit = {};  // code of the unit of length; none if the unit is missing or unknown
+  std::string unit_name = {};                     // as in the file
   double scale = 1, offset = 0;                   // NaN if they are not finite numbers
 };
 

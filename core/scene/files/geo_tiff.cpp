@@ -215,6 +215,9 @@ class GeoTiffReader {
     auto system = system_of_keys(keys, metadata.height_unit);
     if (!system) return tl::make_unexpected(system.error());
     raw_.system = *std::move(system);
+    if (!metadata.unit_name.empty() && !metadata.height_unit)
+      raw_.notes.push_back("the unit of its heights, " + text::printable(metadata.unit_name) +
+                           ", is not known: they are read as metres; z_scale converts them");
 
     Georeference place;
     const auto scale = values_of<double>(tiff_, pixel_scale, TIFF_DOUBLE),
@@ -228,7 +231,9 @@ class GeoTiffReader {
         return bad("is rotated against its axes; straighten it: gdalwarp IN OUT.tif");
       place = {matrix[3], matrix[7], matrix[0], matrix[5]};
     } else if (const auto beside = world_file()) {
+      const double height_unit_m = raw_.system.height_unit_m;
       if (!raw_.system.geographic) raw_.system = system_by_prj(file_);
+      if (metadata.height_unit) raw_.system.height_unit_m = height_unit_m;
       return check(*beside);
     } else if (tie.size() > 6) {
       return bad("has control points instead of a regular grid; make a grid of them: gdalwarp IN OUT.tif");
