@@ -1,4 +1,5 @@
 """Tests sonarctl scene: a Gazebo world is converted to a scene, and its box has an echo at the position of its poses."""
+import base64
 import json
 import math
 import os
@@ -99,6 +100,19 @@ class SceneCommand(unittest.TestCase):
         text = with_unit("cubits")
         self.assertIn("z -300..-100 m", text)
         self.assertIn("the unit of its heights, cubits, is not known: they are read as metres", text)
+
+    def test_a_skin_without_matrices_is_read(self):
+        """glTF defines the matrices that are left out; the importer crashed without them."""
+        data = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
+        (self.path / "m.gltf").write_text(json.dumps({
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+            "nodes": [{"mesh": 0, "skin": 0, "translation": [1, 2, 3]}, {"name": "bone"}], "skins": [{"joints": [1]}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "buffers": [{"byteLength": 36, "uri": "data:;base64," + base64.b64encode(data).decode()}]}), encoding="utf-8")
+        self.assertIn("1 triangle", self.checked("type: mesh, file: m.gltf"))
+        self.assertIn("x 1..2, y -3..-3, z 2..3 m", self.checked("type: mesh, file: m.gltf"))
 
     def test_small_files_take_little_memory(self):
         """Loads a grid with one distant point, and a missing scene beside a file of 64 GiB whose name is similar."""

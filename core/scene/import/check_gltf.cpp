@@ -36,7 +36,8 @@ class GltfWalk final : public Json::json_sax_t {
   };
   std::map<std::string, Accessor> accessors;
   std::vector<std::string> required, used;  // extensions
-  bool is_morphed = false;                  // a weight of a morph target, which moves vertices, is not 0
+  std::size_t skins = 0, skins_with_matrices = 0;
+  bool is_morphed = false;  // a weight of a morph target, which moves vertices, is not 0
 
   bool null() override { return value({}); }
   bool boolean(bool) override { return value({}); }
@@ -94,6 +95,7 @@ class GltfWalk final : public Json::json_sax_t {
       if (levels_.size() == 6 && levels_[4].key == "attributes" && levels_[5].key.starts_with("WEIGHTS_"))
         p->weights.push_back(v);
     }
+    skins_with_matrices += is_at(3, "skins", "inverseBindMatrices");
     if (is_at(3, "nodes", "mesh")) mesh_of[levels_[1].name()] = v;
     if (levels_.size() == 2 && levels_[0].key == "extensionsRequired") required.push_back(v);
     if (levels_.size() == 2 && levels_[0].key == "extensionsUsed") used.push_back(v);
@@ -117,6 +119,7 @@ class GltfWalk final : public Json::json_sax_t {
   bool open(bool array) {
     if (levels_.size() == 2 && levels_[0].key == "scenes") scenes.emplace_back();
     if (levels_.size() == 2 && levels_[0].key == "nodes") children[levels_[1].name()];
+    skins += levels_.size() == 2 && levels_[0].key == "skins";
     levels_.push_back({array, 0, {}});
     if (levels_.size() > deepest_nesting)
       fault = "nests its JSON deeper than " + std::to_string(deepest_nesting) + " levels; it is damaged, export it again";
@@ -228,7 +231,7 @@ MeshFault check_gltf(std::string_view file, ListedFaces* faces, const std::funct
   if (MeshFault fault = unread_extension(walk)) return fault;
   if (faces) {
     *faces = faces_of(walk, graph, number, roots);
-    faces->whole_numbers = has_whole_numbers(walk);
+    faces->needs_floats = has_whole_numbers(walk) || walk.skins > walk.skins_with_matrices;
   }
   return std::nullopt;
 }

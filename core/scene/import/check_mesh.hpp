@@ -42,9 +42,9 @@ using MeshFault = std::optional<std::string>;
 
 /// Numbers of triangles that the text of a file with named parts contains.
 struct ListedFaces {
-  std::uint64_t shown = 0;     // triangles in the file's scene, counted as often as they are shown
-  std::uint64_t hidden = 0;    // triangles of parts that the scene does not refer to
-  bool whole_numbers = false;  // positions or weights of a glTF file of version 2 are not floating-point numbers
+  std::uint64_t shown = 0;    // triangles in the file's scene, counted as often as they are shown
+  std::uint64_t hidden = 0;   // triangles of parts that the scene does not refer to
+  bool needs_floats = false;  // for glTF, version 2: gltf_with_floats() must write positions, weights or matrices of skins
 };
 
 /// Checks the counts of a header against the size of its file.

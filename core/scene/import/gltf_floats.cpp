@@ -71,6 +71,7 @@ class Rewriter {
     out_["asset"] = {{"version", "2.0"}};
     for (const char* key : {"scene", "scenes", "nodes", "skins"})
       if (const auto found = in_.find(key); found != in_.end()) out_[key] = *found;
+    if (auto r = complete_skins(); !r) return tl::make_unexpected(r.error());
     if (out_.contains("nodes") && out_["nodes"].is_array())
       for (Json& node : out_["nodes"])
         if (node.is_object())
@@ -179,6 +180,31 @@ class Rewriter {
     return {};
   }
 
+  /// Gives unit matrices to skins without matrices, as glTF requires. The importer would crash on these skins.
+  Result<void> complete_skins() {
+    if (!out_.contains("skins") || !out_["skins"].is_array()) return {};
+    for (Json& skin : out_["skins"]) {
+      if (!skin.is_object() || skin.contains("inverseBindMatrices")) continue;
+      const std::size_t joints = list_in(skin, "joints").size(), numbers = 16;
+      align();
+      const std::size_t at = data_.size();
+      if (auto r = make_room(bytes_of_float * numbers * joints); !r) return r;
+      data_.resize(at + bytes_of_float * numbers * joints);
+      constexpr float one = 1;
+      for (std::size_t k = 0; k < numbers * joints; ++k)
+        if (k % numbers % 5 == 0) std::memcpy(data_.data() + at + bytes_of_float * k, &one, bytes_of_float);
+      skin["inverseBindMatrices"] = out_["accessors"].size();
+      out_["accessors"].push_back(accessor_of(at, joints, "MAT4"));
+    }
+    return {};
+  }
+
+  /// Returns an accessor of the numbers that were written from `at` to the end of the data.
+  Json accessor_of(std::size_t at, std::uint64_t count, const std::string& kind) {
+    out_["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", data_.size() - at}});
+    return {{"bufferView", out_["bufferViews"].size() - 1}, {"componentType", type_float}, {"count", count}, {"type", kind}};
+  }
+
   /// Converts the numbers of an accessor, unless they are floating-point numbers already.
   Result<void> make_floats(const Json& index, const std::string& kind) {
     Json& accessors = out_["accessors"];
@@ -212,8 +238,7 @@ class Rewriter {
         const auto value = static_cast<float>(normalized ? std::max(stored / component.full, -1.0) : stored);
         std::memcpy(data_.data() + at + bytes_of_float * (v * per_vertex + k), &value, bytes_of_float);
       }
-    accessor = {{"bufferView", views.size()}, {"componentType", type_float}, {"count", count}, {"type", kind}};
-    out_["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", data_.size() - at}});
+    accessor = accessor_of(at, count, kind);
     return {};
   }
 

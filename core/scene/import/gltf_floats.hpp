@@ -1,5 +1,5 @@
 // Rewrites glTF files whose vertices are whole numbers (KHR_mesh_quantization), which the importer would read as floating-point
-// numbers.
+// numbers, and files with skins without matrices, on which it would crash.
 #pragma once
 
 #include <cstdint>

@@ -207,7 +207,7 @@ Result<LoadedMesh> import_mesh(const MeshFile& request, const ImportHooks& hooks
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, dae && request.up.has_value());
   std::string held;
   std::string_view in_memory = request.in_memory, kind = std::string_view(extension).substr(1);
-  if (faces.whole_numbers) {
+  if (faces.needs_floats) {
     if (in_memory.empty()) in_memory = held = files->bytes_of(request.file.filename()).value_or("");
     auto with_floats = gltf_with_floats(in_memory, [&](const std::string& name) { return files->bytes_of(name); });
     if (fault) return tl::make_unexpected(*std::move(fault));
