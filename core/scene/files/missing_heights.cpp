@@ -66,7 +66,7 @@ void note_far_value(const RawHeights& raw, float sign, std::vector<std::string>&
   }
   constexpr float least_gap = 50, spans_apart = 10;
   const float gap = others.low - end;
-  const bool is_rarer = 2 * cells < all || others.low < others.high;  // of two values that are far apart, the rarer is noted
+  const bool is_rarer = 2 * cells < all || others.low < others.high;  // the rarer one, if there are two values
   if (is_rarer && std::isfinite(gap) && gap > std::max(least_gap, spans_apart * (others.high - others.low)))
     notes.push_back(cells_text(cells, sign * end) +
                     text::format(", %.4g away from all other heights: missing values? Declare them in the file (NODATA_value; "
