@@ -56,8 +56,11 @@ class SurveyorDialogue final : public StreamingConversation<Settings, settings_f
         return false;
     }
   }
-  Bytes message_now(Id wanted, Time now) override {
+  bool on_wanted(Id wanted, Time now, Reaction&) override {
     if (wanted == Id::utc_request) ask_utc_at_ = now;
+    return wanted == Id::utc_request;
+  }
+  Bytes message_now(Id wanted, Time) override {
     return wanted == Id::water_stats ? framed_message(wanted, id_, water_stats(device_)) : Bytes{};
   }
   bool comes_with_pings(Id wanted) const override {

@@ -92,6 +92,15 @@ TEST(Surveyor, TheDeviceRequestsTheTimeAfterEnable) {
   EXPECT_EQ(other.take().size(), 1u) << "after 10 s the device requests the time even if no pings are enabled";
 }
 
+TEST(Surveyor, TheAnswerToARequestForTheTimeRequestIsThatRequest) {
+  Talk talk("surveyor-240");
+  talk.say(general(Id::utc_request), 3);
+  talk.run_to(3);
+  const auto said = talk.take();
+  ASSERT_EQ(said.size(), 1u) << "no refusal";
+  EXPECT_EQ(said[0].header.id, Id::utc_request);
+}
+
 TEST(Surveyor, SendsOneFramePerDatagramAndTheSameFramesOverTcp) {
   Talk talk("surveyor-240");
   talk.state.powered_up_at = at_s(0);
