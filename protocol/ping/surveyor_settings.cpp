@@ -195,8 +195,9 @@ std::vector<Bytes> frames_of(const Ping& ping, const protocol::DeviceState& devi
     frames.push_back(framed(Id::yz_point_data, s.id, payload_of(data, yz)));
   }
   // After the first ping of each second, the temperature and pressure of the water are sent.
-  const auto period_ms = static_cast<std::uint32_t>(std::lround(1000 / std::max(static_cast<double>(made.rate_hz), 1e-3)));
-  if (power_up_ms % 1000 < period_ms) frames.push_back(framed_message(Id::water_stats, s.id, water));
+  const auto second_of = [&](Time ping_at) { return std::chrono::floor<std::chrono::seconds>(ping_at - device.powered_up_at); };
+  if (device.framed_at == Time{} || second_of(device.framed_at) != second_of(at))
+    frames.push_back(framed_message(Id::water_stats, s.id, water));
   return frames;
 }
 
