@@ -81,9 +81,8 @@ bool same_settings(const Settings& a, const Settings& b) {
 }
 
 std::string complaint(const PingParameters& p) {
-  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > longest_m || p.start_mm >= 1000 * end_m(p))
-    return text::format("the range must start at 0 m or later, and end after its start and at most at %g m (start_mm, end_mm)",
-                        longest_m);
+  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > longest_m || p.start_mm > 1000 * (end_m(p) - least_m))
+    return protocol::range_rule(least_m, longest_m, "start_mm, end_mm");
   if (!(p.speed_mps >= 1000 && p.speed_mps <= 2000)) return "sos_mps is not in 1000..2000";
   if (p.gain < -1 || p.gain > 100) return "gain_index is not in -1..100";
   if (p.period_ms < 0) return "msec_per_ping is negative";

@@ -191,15 +191,18 @@ TEST(Surveyor, TheHostReadsThePointsOfAPingOnceFromEitherMessage) {
 TEST(Surveyor, RefusesWrongRequests) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (const PingParameters& p :
-       {PingParameters{.end_mm = -1}, PingParameters{.end_mm = 300000}, PingParameters{.start_mm = 6000, .end_mm = 5000},
-        PingParameters{.speed_mps = nan}, PingParameters{.gain = 101}, PingParameters{.steps = 199},
-        PingParameters{.pulse_steps = nan}, PingParameters{.period_ms = -1}}) {
+       {PingParameters{.end_mm = -1}, PingParameters{.end_mm = 9}, PingParameters{.end_mm = 300000},
+        PingParameters{.start_mm = 6000, .end_mm = 5000}, PingParameters{.speed_mps = nan}, PingParameters{.gain = 101},
+        PingParameters{.steps = 199}, PingParameters{.pulse_steps = nan}, PingParameters{.period_ms = -1}}) {
     Talk talk("surveyor-240");
     talk.say(pings(p));
     const auto replies = talk.take();
     ASSERT_EQ(replies.size(), 1u);
     EXPECT_EQ(replies[0].header.id, Id::nack);
   }
+  Talk talk("surveyor-240");
+  talk.say(pings({.end_mm = 10, .speed_mps = 2000, .period_ms = 0, .enable = 1}));
+  EXPECT_FLOAT_EQ(talk.settings.rate_hz, talk.state.model->max_rate_hz) << "the shortest range has the highest rate";
 }
 
 TEST(Surveyor, ASilentUdpHostIsDroppedEarlierIfItEnablesNoPings) {
