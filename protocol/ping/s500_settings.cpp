@@ -92,8 +92,8 @@ bool same_settings(const Settings& a, const Settings& b) {
 
 // A length of 0 selects the automatic range, a gain of -1 the automatic gain (DEF).
 std::string complaint(const SetPingParams& p) {
-  if ((p.length_mm != 0 && p.length_mm < shortest_range_mm) || p.length_mm > most_mm || p.start_mm > most_mm ||
-      p.start_mm + p.length_mm > most_mm)
+  const std::uint32_t length_mm = p.length_mm != 0 ? p.length_mm : shortest_range_mm;
+  if (length_mm < shortest_range_mm || p.start_mm > most_mm || length_mm > most_mm - p.start_mm)
     return protocol::range_rule(1e-3 * shortest_range_mm, 1e-3 * most_mm, "length_mm; 0: automatic");
   if (p.gain < -1 || p.gain > most_gain()) return "gain_index is not in -1..13";
   if (p.period_ms < -1) return "msec_per_ping is not in -1..32767";
@@ -109,7 +109,7 @@ Parameters requested(const Parameters& before, const SetPingParams& wanted) {
   p.enable = wanted.report == Id{} ? 0 : 1;
   if (wanted.length_mm != 0) p.reach.length_mm = wanted.length_mm;
   if (wanted.gain >= 0) p.reach.gain = wanted.gain;
-  p.reach.length_mm = std::min(p.reach.length_mm, std::max(most_mm - wanted.start_mm, shortest_range_mm));
+  p.reach.length_mm = std::min(p.reach.length_mm, most_mm - wanted.start_mm);
   return p;
 }
 
@@ -173,12 +173,14 @@ Settings after(const Ping& ping, const Settings& now) {
   Settings next = now;
   next.earlier = with(now.earlier, echo);
   Parameters& p = next.parameters;
-  const Reach made_with = settings_from(ping.request.vendor_settings.get()).parameters.reach;
+  const Parameters made_with = settings_from(ping.request.vendor_settings.get()).parameters;
+  const std::uint32_t start_mm = p.ping.start_mm;
   // If a host has changed range or gain since, the ping does not show whether the new values fit.
-  if (made_with.length_mm != p.reach.length_mm || made_with.gain != p.reach.gain) return next;
-  const Reach chosen = adjusted(made_with, echo, {gains(), most_mm});
-  if (p.ping.length_mm == 0)
-    p.reach.length_mm = std::min(chosen.length_mm, std::max(most_mm - p.ping.start_mm, shortest_range_mm));
+  if (made_with.ping.start_mm != start_mm || made_with.reach.length_mm != p.reach.length_mm ||
+      made_with.reach.gain != p.reach.gain)
+    return next;
+  const Reach chosen = adjusted({start_mm + p.reach.length_mm, p.reach.gain}, echo, {gains(), most_mm});
+  if (p.ping.length_mm == 0) p.reach.length_mm = std::max(chosen.length_mm, start_mm + shortest_range_mm) - start_mm;
   if (p.ping.gain < 0) p.reach.gain = chosen.gain;
   return next;
 }

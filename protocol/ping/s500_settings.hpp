@@ -16,7 +16,7 @@ std::span<const std::shared_ptr<const SonarModel>> models();
 
 struct Parameters {
   SetPingParams ping;              // requested parameters
-  Reach reach{.length_mm = 5000};  // present range and gain, requested or chosen by the device
+  Reach reach{.length_mm = 5000};  // present range from start_mm on, and gain; requested or chosen by the device
   std::uint32_t speed_mm_per_s = 1500000;
   std::uint8_t enable = 1;
 };

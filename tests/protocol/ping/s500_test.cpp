@@ -107,8 +107,9 @@ TEST(S500, ValuesAreReadBack) {
 TEST(S500, RefusesWrongRequests) {
   for (const SetPingParams& wrong :
        {SetPingParams{.length_mm = 999, .report = Id::s500_profile6}, SetPingParams{.length_mm = 142001},
-        SetPingParams{.start_mm = 4294967295u, .length_mm = 4294967295u}, SetPingParams{.gain = 14}, SetPingParams{.gain = -2},
-        SetPingParams{.period_ms = -2}, SetPingParams{.report = Id::ping1d_profile}, SetPingParams{.chirp = 2}}) {
+        SetPingParams{.start_mm = 4294967295u, .length_mm = 4294967295u}, SetPingParams{.start_mm = 141001, .length_mm = 0},
+        SetPingParams{.gain = 14}, SetPingParams{.gain = -2}, SetPingParams{.period_ms = -2},
+        SetPingParams{.report = Id::ping1d_profile}, SetPingParams{.chirp = 2}}) {
     Talk talk("s500");
     talk.say(params(wrong));
     EXPECT_THAT(ids_in(talk.take()), ElementsAre(Id::nack)) << complaint(wrong);
@@ -207,6 +208,25 @@ TEST(S500, OnlyAutomaticSettingsFollowAPing) {
   now.parameters = requested(now.parameters, {.length_mm = 0});
   const Ping before = profile_with(Settings{}, 900, 5);
   EXPECT_EQ(after(before, now).parameters.reach.length_mm, 10000u) << "the ping has older settings";
+}
+
+TEST(S500, TheAutomaticRangeCountsFromTheSonar) {
+  const auto next = [](std::uint32_t start_mm, std::uint32_t length_mm, int row, double echo_db) {
+    Settings s;
+    s.parameters.reach = {length_mm, 5};
+    s.parameters = requested(s.parameters, {.start_mm = start_mm, .length_mm = 0});
+    return after(profile_with(s, row, echo_db), s).parameters.reach.length_mm;
+  };
+  EXPECT_EQ(next(10000, 10000, 400, 5), 10000u) << "13.9 m is at 70 % of 20 m";
+  EXPECT_EQ(next(10000, 10000, 900, 5), 21500u) << "18.8 m is at 60 % of 31.5 m";
+  EXPECT_EQ(next(20000, 40000, 20, 5), 15000u) << "20.8 m is at 60 % of 35 m";
+  EXPECT_EQ(next(10000, 10000, 400, -100), 30000u) << "without an echo 40 m follow 20 m";
+  EXPECT_EQ(next(100000, 42000, 400, -100), 1000u) << "after the farthest end comes the shortest range";
+  Settings now;
+  now.parameters = requested(now.parameters, {.start_mm = 10000, .length_mm = 0});
+  Settings before = now;
+  before.parameters.ping.start_mm = 0;
+  EXPECT_EQ(after(profile_with(before, 100, 5), now).parameters.reach.length_mm, 5000u) << "the ping has another start";
 }
 
 /// The host of both products at port 51200 does not know which one answers.
