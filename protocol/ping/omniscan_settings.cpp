@@ -15,8 +15,8 @@ using protocol::refused;
 
 constexpr double db_per_gain = 6;  // unknown: assumed, as are full scale and the source level
 constexpr int most_gain = 7;
-constexpr double longest_m = 150;
-constexpr std::uint32_t least_length_mm = 100;
+constexpr std::uint32_t least_length_mm = 100, longest_mm = 150000;
+constexpr double longest_m = 1e-3 * longest_mm;
 constexpr double processing_s = 0.0018;  // time from the last echo to the next ping (recording of a 450 FS)
 
 SonarModel make_model() {
@@ -78,7 +78,7 @@ double heading_deg(const Pose& sonar_in_world) {
 std::span<const std::shared_ptr<const SonarModel>> models() { return protocol::only_model<make_model>(); }
 
 std::string complaint(const OsPingParams& p) {
-  if (p.length_mm < least_length_mm || 1e-3 * p.start_mm + 1e-3 * p.length_mm > longest_m)
+  if (p.length_mm < least_length_mm || p.start_mm > longest_mm || p.length_mm > longest_mm - p.start_mm)
     return protocol::range_rule(1e-3 * least_length_mm, longest_m, "start_mm, length_mm");
   if (p.gain < -1 || p.gain > most_gain) return "gain_index is not in -1..7";
   if (p.results < 200 || p.results > 1200) return "num_results is not in 200..1200";

@@ -134,6 +134,10 @@ TEST(Omniscan, RefusesWrongRequests) {
     talk.say(pings(p));
     EXPECT_EQ(talk.take().at(0).header.id, Id::nack);
   }
+  for (std::uint32_t start_mm = 0; start_mm < 150000; ++start_mm) {
+    ASSERT_EQ(complaint({.start_mm = start_mm, .length_mm = 150000 - start_mm}).empty(), start_mm <= 149900) << start_mm;
+    ASSERT_NE(complaint({.start_mm = start_mm, .length_mm = 150001 - start_mm}), "") << start_mm;
+  }
   Talk talk("omniscan-450");
   talk.say(framed_message(Id::set_sound_speed, 0, SoundSpeed{1500}));
   EXPECT_EQ(talk.take().at(0).header.id, Id::nack);
