@@ -202,6 +202,10 @@ Reckoning reckoned(const Reckoning& before, const Measurement& measured, const P
     // Trapezoidal rule: the mean of both velocities over the time between the pings.
     now.position_m = before.position_m + passed_s / 2 * (before.velocity_mps + now.velocity_mps);
     now.std_m = before.std_m + fom * passed_s;
+  } else {  // after a gap the position continues where the reports of the gap ended
+    const Reckoning reported = extrapolated(before, request.fired_at);
+    now.position_m = reported.position_m;
+    now.std_m = reported.std_m;
   }
   if (measured.is_valid) now.velocity_mps = rotate(conjugate(now.first) * now.last, measured.velocity_mps);
   now.fom = measured.is_valid ? measured.fom : drift_mps;

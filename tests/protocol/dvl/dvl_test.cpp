@@ -197,6 +197,27 @@ TEST(DvlReckoning, IntegratesInTheAxesOfItsStart) {
   EXPECT_NEAR(extrapolated(r, r.at + 500ms).position_m.y, 1.5, 1e-9);
 }
 
+TEST(DvlReckoning, AfterAGapThePositionContinuesWhereItStayed) {
+  const protocol::DeviceState state = device();
+  Settings s;
+  s.mode = 1;
+  const Ping ping = ping_of(level, s, state);
+  const Reckoning last{.is_started = true,
+                       .at = ping.request.fired_at - 10s,
+                       .first = {},
+                       .last = {},
+                       .position_m = {5, 0, 0},
+                       .velocity_mps = {1, 0, 0},
+                       .std_m = 0.5,
+                       .fom = 0.1};
+  const Reckoning reported = extrapolated(last, ping.request.fired_at);
+  EXPECT_NEAR(reported.position_m.x, 8, 1e-9) << "after 3 s the position stays";
+  const Reckoning next = reckoned(last, measure(ping), ping.request, s);
+  EXPECT_NEAR(next.position_m.x, 8, 1e-9);
+  EXPECT_NEAR(next.std_m, reported.std_m, 1e-9);
+  EXPECT_NEAR(next.velocity_mps.x, 0, 0.01) << "the velocity is that of the new ping";
+}
+
 // ---- lines
 
 TEST(DvlLines, AVelocityReportHasTheMembersOfTheDocumentation) {
