@@ -100,7 +100,7 @@ class ArisDialogue final : public protocol::Dialogue {
   void on_date_time(const Command& command, Time now, Reaction& reaction) {
     const auto date_time = parse_date_time(command.date_time ? command.date_time->text : std::string());
     if (!date_time) return notice(reaction, "ignored a date and time that cannot be read");
-    settings_.clock_offset = *date_time - now;
+    settings_.clock_offset = *date_time - (now + device_.skipped);  // it is added to the stamps of pings
     changed_ = true;
   }
 

@@ -67,7 +67,7 @@ class JsonDialogue final : public Session {
   }
 
  private:
-  Bytes position_report(Time now) const override { return position_line(extrapolated(settings().reckoning, now), now); }
+  Bytes position_report(Time stamp) const override { return position_line(extrapolated(settings().reckoning, stamp), stamp); }
 
   void on_object(const std::string& object, Time now, Reaction& reaction) {
     const Json message = Json::parse(object, nullptr, false);

@@ -102,9 +102,9 @@ class SerialDialogue final : public Session {
   Time next_tick() const override { return std::min(Session::next_tick(), breaks_off_at_); }
 
  private:
-  Bytes position_report(Time now) const override {
+  Bytes position_report(Time stamp) const override {
     const Settings s = settings();
-    return s.serial_output == SerialOutput::none ? Bytes{} : position_sentence(extrapolated(s.reckoning, now), now);
+    return s.serial_output == SerialOutput::none ? Bytes{} : position_sentence(extrapolated(s.reckoning, stamp), stamp);
   }
 
   void end_sentence(Time now, Reaction& reaction) {
@@ -153,7 +153,7 @@ class SerialDialogue final : public Session {
       case 'N':
         return "wrN," + settings_after(reaction).ntp_address;
       case 't':
-        return time_status(now, settings_after(reaction));
+        return time_status(stamp_of(now), settings_after(reaction));
       default:
         return std::string(no_sentence);
     }

@@ -90,7 +90,7 @@ Reaction Session::on_tick(Time now, bool ping_pending) {
   Reaction reaction;
   if (now < due_) return reaction;
   due_ = next_report_after(now);
-  protocol::Bytes report = device_.model == replayed_model(*device_.model) ? protocol::Bytes{} : position_report(now);
+  protocol::Bytes report = device_.model == replayed_model(*device_.model) ? protocol::Bytes{} : position_report(stamp_of(now));
   if (!report.empty()) reaction.replies.push_back(std::move(report));
   if (waiting_ > 0 && now - requested_at_ > longest_wait && !ping_pending) {
     requested_at_ = now;
@@ -113,7 +113,7 @@ std::optional<Outcome> Session::execute(const std::string& command, const Json& 
   Settings s = settings_after(reaction);
   if (command == "trigger_ping") return trigger(std::move(s), now, reaction);
   const auto before = s.configured();
-  auto outcome = carry_out(command, parameters, device_, now, s);
+  auto outcome = carry_out(command, parameters, device_, stamp_of(now), s);
   if (s.configured() != before || command == "reset_dead_reckoning") reaction.events.emplace_back(change_to(s, device_));
   if (s.acoustics) waiting_ = 0;  // enabled acoustics drop the triggers that wait
   return outcome;

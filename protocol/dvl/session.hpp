@@ -37,10 +37,12 @@ class Session : public protocol::Dialogue {
   protocol::Delivery on_ping(const VendorSettings*, std::size_t, Time now) override;
 
  protected:
-  /// Returns the report of dead reckoning; empty = none.
-  virtual protocol::Bytes position_report(Time now) const = 0;
+  /// Returns the report of dead reckoning with this stamp; empty = none.
+  virtual protocol::Bytes position_report(Time stamp) const = 0;
 
   const protocol::DeviceState& device() const { return device_; }
+  /// Returns the stamp of a ping that is fired now.
+  Time stamp_of(Time now) const { return now + device_.skipped; }
   Settings settings() const { return settings_from(device_.settings.get()); }
   /// Returns the settings after the daemon has carried out `reaction`.
   Settings settings_after(const protocol::Reaction& reaction) const {

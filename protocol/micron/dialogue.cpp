@@ -147,7 +147,7 @@ class MicronDialogue final : public protocol::Dialogue {
     knows_parameters_ = s.has_parameters;
     recentring_ = std::max(recentring_ - 1, 0);
     constexpr auto day = std::chrono::hours(24);
-    const auto of_day = std::chrono::duration_cast<std::chrono::milliseconds>(now.time_since_epoch() % day);
+    const auto of_day = std::chrono::duration_cast<std::chrono::milliseconds>((now + device_.skipped).time_since_epoch() % day);
     const Alive message{.lacks_parameters = static_cast<std::uint8_t>((info & no_parameters) != 0 ? 0x80 : 0),
                         .time_ms = static_cast<std::uint32_t>(of_day.count()),
                         .bearing = static_cast<std::uint16_t>(scan_.bearing),

@@ -190,6 +190,16 @@ TEST(ArisDialogue, SalinityFocusClockAndLensCanBeSet) {
   EXPECT_EQ(tests::at_s(10) + talk.held().clock_offset, Time(std::chrono::seconds(1391212695)));
 }
 
+TEST(ArisDialogue, TheClockIsSetAlsoAfterAJumpOfSteppedTime) {
+  Talk talk;
+  talk.state.skipped = std::chrono::seconds(30);
+  Command command;
+  command.date_time = DateTime{"2014-Jan-31 23:58:15"};
+  talk.say(command, 10);
+  EXPECT_EQ(tests::at_s(40) + talk.held().clock_offset, Time(std::chrono::seconds(1391212695)))
+      << "a ping now has the stamp 40 s";
+}
+
 TEST(ArisDialogue, WrongDatesAreRefused) {
   EXPECT_EQ(parse_date_time("1970-Jan-01 00:00:01"), Time(std::chrono::seconds(1)));
   for (const char* bad : {"", "2014-01-31 23:58:15", "2014-anF-31 23:58:15", "2014-Feb-30 00:00:00", "2014-Jan-31 24:00:00"})

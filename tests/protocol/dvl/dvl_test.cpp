@@ -347,6 +347,20 @@ TEST(DvlCommands, DeadReckoningIsReportedFiveTimesPerSecondAndReset) {
   EXPECT_EQ(client.answers.at(0)["x"], 0.0);
 }
 
+TEST(DvlCommands, TimesHaveTheJumpsOfSteppedTime) {
+  Client client;
+  client.state.skipped = 1h;
+  Settings s;
+  s.reckoning = {.is_started = true, .at = client.now + 1h, .first = {}, .last = {}, .position_m = {}, .velocity_mps = {1, 0, 0}};
+  client.state.settings = change_to(s, client.state).vendor_settings;
+  EXPECT_EQ(client.ask(R"({"command":"get_time_status"})")["result"]["system_time"], "2023-11-14T23:13:20Z");
+  client.now = client.dialogue->next_tick();
+  client.answers.clear();
+  client.take(client.dialogue->on_tick(client.now, false));
+  EXPECT_NEAR(client.answers.at(0)["ts"].get<double>(), 1'700'003'600.2, 1e-3);
+  EXPECT_NEAR(client.answers.at(0)["x"].get<double>(), 0.15, 1e-6);
+}
+
 TEST(DvlCommands, VersionAndTimeAreAnswered) {
   Client client;
   const Json info = client.ask(R"({"command":"get_version_info"})")["result"];

@@ -72,6 +72,16 @@ TEST(Micron, AliveMessagesHaveTheStateOfTheHead) {
   EXPECT_EQ(talk.dialogue->next_tick(), Time::max());
 }
 
+TEST(Micron, AliveMessagesHaveTheTimeOfThePings) {
+  Talk talk;
+  talk.run_to(1);
+  const auto before = read_front<Alive>(read_frame(talk.take().at(0))->payload);
+  talk.state.skipped = std::chrono::seconds(5);
+  talk.run_to(2);
+  const auto after = read_front<Alive>(read_frame(talk.take().at(0))->payload);
+  EXPECT_EQ(after->time_ms, before->time_ms + 6000) << "stepped time has jumped by 5 s";
+}
+
 TEST(Micron, ALineComesForEachRequest) {
   Talk talk;
   talk.say(request());
