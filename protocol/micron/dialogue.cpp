@@ -45,7 +45,7 @@ class MicronDialogue final : public protocol::Dialogue {
 
   Reaction on_tick(Time now, bool ping_pending) override {
     Reaction reaction;
-    if (now >= next_alive_) {
+    if (now >= alive_tick()) {
       reaction.replies.push_back(alive(now));
       next_alive_ = now + alive_period;
     }
@@ -61,7 +61,7 @@ class MicronDialogue final : public protocol::Dialogue {
     reaction.events.emplace_back(protocol::RequestPing{.joins = false, .head_rad = head_rad(s), .with = with});
     return reaction;
   }
-  Time next_tick() const override { return std::min(next_alive_, ping_tick()); }
+  Time next_tick() const override { return std::min(alive_tick(), ping_tick()); }
   std::optional<Time> next_ping_request() const override {
     return wanted_ > 0 && !awaited_.is_under_way() ? std::optional(ping_tick()) : std::nullopt;
   }
@@ -70,7 +70,6 @@ class MicronDialogue final : public protocol::Dialogue {
     const auto arrival = awaited_.arrive(made_with);
     if (arrival == protocol::AwaitedPing::Arrival::other) return {};
     if (arrival == protocol::AwaitedPing::Arrival::awaited) advance(now);
-    next_alive_ = now + alive_period;  // unknown: assumed, because drivers expect only scan lines during a scan
     return {{Bytes{}}, {}};
   }
 
@@ -96,11 +95,11 @@ class MicronDialogue final : public protocol::Dialogue {
         const int lines = protocol::text_option(device_.options, option_name::lines) == "2" ? 2 : 1;
         // At most two requests wait: a driver that repeats its request after a time-out must not get more and more lines.
         wanted_ = std::min(wanted_ + lines, 2 * lines);
-        next_alive_ = now + alive_period;
+        stops_alives_ = false;
         return;
       }
       case Id::stop_alives:
-        next_alive_ = Time::max();
+        stops_alives_ = true;
         return;
       default:
         notice("unknown message " + std::to_string(static_cast<int>(message.header.id)), reaction);
@@ -131,7 +130,7 @@ class MicronDialogue final : public protocol::Dialogue {
     boots_until_ = now + boot_time;
     recentring_ = recentring_alives;
     next_alive_ = arrives_ = boots_until_;
-    knows_parameters_ = false;
+    knows_parameters_ = stops_alives_ = false;
     reaction.events.emplace_back(change_to(Settings{}, device_));
   }
 
@@ -159,6 +158,7 @@ class MicronDialogue final : public protocol::Dialogue {
   /// slow link (option link_rate) limits the rate of the scan.
   void advance(Time now) {
     --wanted_;
+    next_alive_ = now + alive_period;
     const HeadCommand command = settings().command;
     const auto after = listening(command) + transfer(command, device_.options);
     // After a late ping the scan does not catch up; the next ping is due now at the earliest.
@@ -174,6 +174,9 @@ class MicronDialogue final : public protocol::Dialogue {
   Settings settings_after(const Reaction& reaction) const {
     return settings_from(protocol::settings_after(reaction, device_.settings.get()));
   }
+  /// Returns the time of the next mtAlive. unknown: that none is sent while lines are requested; assumed, because drivers then
+  /// expect only scan lines.
+  Time alive_tick() const { return stops_alives_ || wanted_ > 0 ? Time::max() : next_alive_; }
   Time ping_tick() const {
     if (wanted_ == 0) return Time::max();
     return awaited_.is_under_way() ? awaited_.lost_at() : arrives_;
@@ -185,11 +188,12 @@ class MicronDialogue final : public protocol::Dialogue {
   const protocol::DeviceState& device_;
   recording::MessageSplitter splitter_{recording::Origin::client, framing};
   Time next_alive_{}, boots_until_{};
-  int recentring_ = 0;     // number of mtAlive messages that still have to report the return of the head to its centre
-  Scan scan_;              // the bearing that the head has, or to which it turns
-  Time arrives_{};         // time at which the head has that bearing
-  bool knows_parameters_;  // true: an mtAlive has reported that parameters were received
-  int wanted_ = 0;         // scan lines that were requested and not sent yet
+  bool stops_alives_ = false;  // true: a host has sent mtStopAlives, and has not requested lines since
+  int recentring_ = 0;         // number of mtAlive messages that still have to report the return of the head to its centre
+  Scan scan_;                  // the bearing that the head has, or to which it turns
+  Time arrives_{};             // time at which the head has that bearing
+  bool knows_parameters_;      // true: an mtAlive has reported that parameters were received
+  int wanted_ = 0;             // scan lines that were requested and not sent yet
   protocol::AwaitedPing awaited_;
 };
 

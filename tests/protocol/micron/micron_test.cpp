@@ -72,6 +72,26 @@ TEST(Micron, AliveMessagesHaveTheStateOfTheHead) {
   EXPECT_EQ(talk.dialogue->next_tick(), Time::max());
 }
 
+TEST(Micron, AliveMessagesPauseWhileALineIsRequested) {
+  Talk talk;
+  HeadCommand c = sector();
+  c.left = 6384;
+  c.right = 32;
+  talk.say(command(c));
+  talk.say(request());
+  talk.run_to(1.7);
+  EXPECT_THAT(talk.bearings(), ElementsAre(6384)) << "half a turn takes 1.6 s";
+  EXPECT_EQ(talk.dialogue->next_tick(), at_s(talk.last_ping_s + 1));
+  talk.say(request(), 1.8);
+  talk.say(from_host(Id::stop_alives, {}), 1.8);
+  talk.run_to(1.9);
+  EXPECT_EQ(talk.take().size(), 1u);
+  EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "the line that was requested before starts no alive messages";
+  talk.say(request(), 2);
+  talk.run_to(3.5);
+  EXPECT_EQ(talk.take().size(), 2u) << "a line and an alive message";
+}
+
 TEST(Micron, AliveMessagesHaveTheTimeOfThePings) {
   Talk talk;
   talk.run_to(1);
