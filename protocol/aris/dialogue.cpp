@@ -90,11 +90,11 @@ class ArisDialogue final : public protocol::Dialogue {
         return on_focus(command.focus.value_or(Focus{}), now);
       case CommandType::home_focus:
         return move_focus(0, now);
-      default:
-        break;  // keep-alives and FORCE_FOCUS have no effect; a rotator and a log receiver are not emulated
+      case CommandType::ping:
+        return;
+      default:  // FORCE_FOCUS, a rotator and a log receiver are not emulated
+        return notice(reaction, "ignored a command of type " + std::to_string(static_cast<unsigned>(command.type)));
     }
-    if (command.type > CommandType::set_syslog_receiver)
-      notice(reaction, "ignored a command of type " + std::to_string(static_cast<unsigned>(command.type)));
   }
 
   void on_date_time(const Command& command, Time now, Reaction& reaction) {

@@ -200,6 +200,21 @@ TEST(ArisDialogue, TheClockIsSetAlsoAfterAJumpOfSteppedTime) {
       << "a ping now has the stamp 40 s";
 }
 
+TEST(ArisDialogue, CommandsWithoutEffectAreNamed) {
+  Talk talk;
+  for (std::uint32_t type = 0; type <= 17; ++type) {
+    if (type == static_cast<std::uint32_t>(CommandType::set_acoustics)) continue;
+    Command command;
+    command.type = static_cast<CommandType>(type);
+    talk.notices.clear();
+    talk.say(command);
+    const bool has_no_effect = type == 7 || (type >= 9 && type <= 13) || type >= 15;
+    const auto named = std::ranges::count_if(
+        talk.notices, [&](const std::string& text) { return text == "ignored a command of type " + std::to_string(type); });
+    EXPECT_EQ(named, has_no_effect ? 1 : 0) << type;
+  }
+}
+
 TEST(ArisDialogue, WrongDatesAreRefused) {
   EXPECT_EQ(parse_date_time("1970-Jan-01 00:00:01"), Time(std::chrono::seconds(1)));
   for (const char* bad : {"", "2014-01-31 23:58:15", "2014-anF-31 23:58:15", "2014-Feb-30 00:00:00", "2014-Jan-31 24:00:00"})
