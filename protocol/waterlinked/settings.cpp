@@ -54,9 +54,10 @@ PingSettings ping_settings(const Settings& settings, const protocol::DeviceState
   s.range_bin_m = (s.range_m - s.range_start_m) / rows;
   s.pulse_width_m = static_cast<float>(mode.range_cell_m);
   // The device makes images only while acoustics are enabled and there is a receiver. A rate below that of the mode is from an
-  // override.
+  // override, which may have been made in a faster mode.
   const bool sends = settings.acoustics && settings.udp != disabled;
-  s.rate_hz = !sends ? 0 : settings.rate_hz > 0 ? static_cast<float>(settings.rate_hz) : mode.rate_hz;
+  const float rate_hz = settings.rate_hz > 0 ? std::min(static_cast<float>(settings.rate_hz), mode.rate_hz) : mode.rate_hz;
+  s.rate_hz = sends ? rate_hz : 0;
   s.gain_db = first_gain_db;
   s.gain_assist = true;
   double speed = settings.speed_of_sound_mps;

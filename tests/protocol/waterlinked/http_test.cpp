@@ -156,6 +156,11 @@ TEST(WaterLinkedOverride, EqualsTheSettingsThatAClientPosts) {
   EXPECT_EQ(change->settings.range_m, 8);
   EXPECT_FLOAT_EQ(change->settings.rate_hz, 10);
   wanted.rate_hz = 0;
+  unit.device.settings = change->vendor_settings;
+  unit.post("/acoustics/mode", "\"low-frequency\"");
+  EXPECT_FLOAT_EQ(unit.settings.rate_hz, 5) << "the highest rate of the other mode";
+  unit.post("/acoustics/mode", "\"high-frequency\"");
+  EXPECT_FLOAT_EQ(unit.settings.rate_hz, 10);
   EXPECT_EQ(apply(wanted)->settings.rate_hz, 0);
   wanted = {};
   wanted.range_m = 20;
