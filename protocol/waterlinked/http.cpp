@@ -142,7 +142,7 @@ Outcome set_udp(Call& call, const Json& posted) {
     const auto to = text::parse_ipv4(ip.get<std::string>());
     if (!to || port == 0) return malformed("unicast needs a destination");
     constexpr unsigned first_multicast = 224;
-    if ((*to)[0] >= first_multicast) return malformed("a unicast destination is the address of one computer");
+    if ((*to)[0] == 0 || (*to)[0] >= first_multicast) return malformed("a unicast destination is the address of one computer");
   }
   call.settings.udp = mode.get<std::string>();
   call.settings.unicast_ip = ip.get<std::string>();

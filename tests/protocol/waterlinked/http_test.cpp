@@ -72,6 +72,7 @@ TEST(WaterLinkedHttp, RefusesBodiesThatAreNotInTheSchema) {
       {"/udp", "\"multicast\""},
       {"/udp", R"({"mode":"broadcast"})"},
       {"/udp", R"({"mode":"unicast","unicast_destination_ip":"","unicast_destination_port":1})"},
+      {"/udp", R"({"mode":"unicast","unicast_destination_ip":"0.0.0.0","unicast_destination_port":1})"},
       {"/udp", R"({"mode":"unicast","unicast_destination_ip":"1.2.3.4","unicast_destination_port":0})"},
       {"/udp", R"({"mode":"unicast","unicast_destination_ip":"1.2.3.4","unicast_destination_port":65536})"},
       {"/time/ntp", "{}"},
@@ -155,12 +156,12 @@ TEST(WaterLinkedOverride, EqualsTheSettingsThatAClientPosts) {
   ASSERT_TRUE(change) << change.error().text;
   EXPECT_EQ(change->settings.range_m, 8);
   EXPECT_FLOAT_EQ(change->settings.rate_hz, 10);
-  wanted.rate_hz = 0;
   unit.device.settings = change->vendor_settings;
   unit.post("/acoustics/mode", "\"low-frequency\"");
   EXPECT_FLOAT_EQ(unit.settings.rate_hz, 5) << "the highest rate of the other mode";
   unit.post("/acoustics/mode", "\"high-frequency\"");
   EXPECT_FLOAT_EQ(unit.settings.rate_hz, 10);
+  wanted.rate_hz = 0;
   EXPECT_EQ(apply(wanted)->settings.rate_hz, 0);
   wanted = {};
   wanted.range_m = 20;
