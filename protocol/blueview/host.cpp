@@ -18,12 +18,14 @@ using protocol::HostActions;
 constexpr auto host_keep_alive_after = 2s;  // time since the last message of this host
 constexpr std::uint16_t abi_of_sdk = 4;     // the sonar reads this number and ignores it
 
-/// Returns the text of an error frame, such as "no head 3 (code 2010)".
-std::string text_of_error(wire::BytesView payload) {
+/// Returns the error of an error frame of `sonar`, such as "P900-90 refuses a request: no head 3 (code 2010)".
+Error error_in(wire::BytesView payload, const std::string& sonar) {
   wire::Reader reader(payload);
-  std::int32_t code = 0;
+  Code code{};
   reader("code", code);
-  return read_text(reader, "text") + " (code " + std::to_string(code) + ")";
+  const std::string text = read_text(reader, "text") + " (code " + std::to_string(static_cast<int>(code)) + ")";
+  if (code == Code::timeout) return {ErrorKind::unavailable, sonar + " sends no ping: " + text};
+  return {ErrorKind::usage, sonar + " refuses a request: " + text};
 }
 
 struct GreetedHead {
@@ -215,8 +217,7 @@ class BlueViewHost final : public protocol::Host {
   /// triggers the next SET; after the last SET the host is open.
   void on_answer(const Frame& frame, Time now, HostActions& actions) {
     const auto fail = [&actions](ErrorKind kind, std::string text) { actions.emplace_back(Error{kind, std::move(text)}); };
-    if (frame.header.type == FrameType::error)
-      return fail(ErrorKind::usage, about() + " refuses a request: " + text_of_error(frame.payload));
+    if (frame.header.type == FrameType::error) return actions.emplace_back(error_in(frame.payload, about())), void();
     if (is_open_) {
       if (frame.header.type == FrameType::ping_data && asked_) on_ping(frame, actions);
       return;

@@ -244,6 +244,17 @@ TEST(BlueViewHost, ARefusalIsAnErrorOfUsage) {
   EXPECT_EQ(refusal->text.find("a BlueView sonar refuses a request: no such head"), 0u) << refusal->text;
 }
 
+TEST(BlueViewHost, ATimeOutIsNoRefusal) {
+  const auto host = *make_host({});
+  host->on_open({}, at_s(0));
+  const auto actions = host->on_bytes(0, make_error(1, Code::timeout, "no ping in the time given"), at_s(0.1));
+  ASSERT_EQ(actions.size(), 1u);
+  const auto* late = std::get_if<Error>(&actions[0]);
+  ASSERT_NE(late, nullptr);
+  EXPECT_EQ(late->kind, ErrorKind::unavailable);
+  EXPECT_EQ(late->text.find("a BlueView sonar sends no ping: no ping in the time given"), 0u) << late->text;
+}
+
 TEST(BlueViewDialogue, NoMoreThanEightTriggersWait) {
   auto device = test::device();
   Host host(device);
