@@ -30,6 +30,9 @@ std::optional<double> number_in(const Value& value) {
 
 Applied refused(Code code, std::string text) { return {std::nullopt, {code, std::move(text)}}; }
 
+/// Returns the length of the shortest window.
+float shortest_of(const FrequencyMode& mode) { return std::max(0.1f, 0.01f * mode.max_range_m); }
+
 /// Sets start and stop together, because the start must be less than the stop. Values out of range are clamped, or refused if
 /// `strict`; the answer has the applied values.
 Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, float stop, bool strict, Key key) {
@@ -39,7 +42,7 @@ Applied apply_range(HeadSettings& head, const FrequencyMode& mode, float start, 
   std::snprintf(text, sizeof text, "range %g to %g m is not within %g to %g m", static_cast<double>(start),
                 static_cast<double>(stop), static_cast<double>(mode.min_range_m), static_cast<double>(mode.max_range_m));
   if (!fine && strict) return refused(Code::bad_range, text);
-  const float shortest = std::max(0.1f, 0.01f * mode.max_range_m);
+  const float shortest = shortest_of(mode);
   // The stop is clamped first, then the start, so that the window is at least `shortest`.
   head.stop_m = std::clamp(stop, mode.min_range_m + shortest, mode.max_range_m);
   head.start_m = std::clamp(start, 0.0f, head.stop_m - shortest);
@@ -86,8 +89,6 @@ using protocol::refused;
 
 constexpr double half_gain_db = 48;  // assumed: 0 to 100 % are -48 to 48 dB, a span like that of an Oculus
 
-constexpr double least_window_m = 0.01;
-
 Result<void> set(SonarSettings& all, Key key, const Value& value, const protocol::DeviceState& device) {
   const Applied applied = apply(all, all.active_head, key, value, device);
   if (!applied.value) return refused(applied.refusal.text);
@@ -97,8 +98,8 @@ Result<void> set(SonarSettings& all, Key key, const Value& value, const protocol
 Result<void> set_range(SonarSettings& all, double range_m, const protocol::DeviceState& device) {
   const FrequencyMode& mode = device.model->modes[static_cast<std::size_t>(all.active_head)];
   const double start_m = static_cast<double>(all.heads[static_cast<std::size_t>(all.active_head)].start_m);
-  const std::string why = protocol::range_complaint(range_m, device.model->name + " with this head",
-                                                    std::max(start_m + least_window_m, static_cast<double>(mode.min_range_m)),
+  const double low_m = std::max(start_m, static_cast<double>(mode.min_range_m)) + static_cast<double>(shortest_of(mode));
+  const std::string why = protocol::range_complaint(range_m, device.model->name + " with this head", low_m,
                                                     static_cast<double>(mode.max_range_m), "stop_range");
   if (!why.empty()) return refused(why);
   return set(all, Key::stop_range, static_cast<float>(range_m), device);

@@ -217,7 +217,7 @@ TEST(BlueViewOverride, SettingsBeyondTheProductAreRefusedWithThePermittedOnes) {
     return change ? "" : change.error().text;
   };
   EXPECT_THAT(why(set().range(1000)), HasSubstr("not 1000 m (stop_range)"));
-  EXPECT_THAT(why(set().range(1)), HasSubstr("is 2.01 to"));
+  EXPECT_THAT(why(set().range(2.5)), HasSubstr("is 3 to")) << "the range starts at 2 m, and its window is at least 1 m long";
   EXPECT_THAT(why(set().rate(0)), HasSubstr("no standby"));
   EXPECT_THAT(why(set().of_mode(1)), HasSubstr("1 mode(s)"));
   EXPECT_THAT(why(set().with_beams(256)), HasSubstr("512 beams"));
