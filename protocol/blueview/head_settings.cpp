@@ -150,7 +150,10 @@ Applied apply(SonarSettings& settings, int head_index, Key key, const Value& val
   if (key == Key::name) {
     const auto* text = std::get_if<std::string>(&value);
     if (text == nullptr) return refused(Code::bad_parameter, "a name must be a text");
-    settings.name = text->substr(0, 64);
+    // The end must not split a character of UTF-8, whose further bytes begin with the bits 10.
+    std::size_t size = std::min<std::size_t>(text->size(), 64);
+    while (size > 0 && size < text->size() && ((*text)[size] & 0xC0) == 0x80) --size;
+    settings.name = text->substr(0, size);
     return {Value(settings.name), {}};
   }
   if (is_range(key)) {

@@ -57,6 +57,19 @@ TEST(HeadSettings, RangesAreLimitedToThoseOfTheProductOrRefused) {
   EXPECT_EQ(before.heads[0].stop_m, initial_sonar_settings(strict).heads[0].stop_m) << "a refused setting changes nothing";
 }
 
+TEST(HeadSettings, ALongNameEndsWithAWholeCharacter) {
+  const auto device = test::device();
+  SonarSettings all = initial_sonar_settings(device);
+  const auto named = [&](const std::string& name) {
+    apply(all, 0, Key::name, name, device);
+    return all.name;
+  };
+  EXPECT_EQ(named(std::string(63, 'x') + "\u00e9"), std::string(63, 'x'));
+  EXPECT_EQ(named(std::string(62, 'x') + "\u00e9y"), std::string(62, 'x') + "\u00e9");
+  EXPECT_EQ(named(std::string(62, 'x') + "\u00e9"), std::string(62, 'x') + "\u00e9");
+  EXPECT_EQ(named(std::string(70, '\x80')).size(), 0u) << "these bytes begin no character";
+}
+
 TEST(HeadSettings, WrongKindsHeadsAndKeysAreRefused) {
   const auto device = test::device();
   SonarSettings all = initial_sonar_settings(device);
