@@ -123,7 +123,14 @@ class MavlinkPoses {
     Reaction& out;
   };
 
-  static constexpr std::size_t most_reported = 16;  // limit of reported_ignored_
+  /// A sender that was reported as ignored: the text of the notice, and the time of its last message.
+  struct Ignored {
+    std::string text;
+    Time last{};
+  };
+
+  static constexpr std::size_t most_reported = 16;                                       // limit of reported_ignored_
+  static constexpr std::chrono::nanoseconds forgotten_after = std::chrono::seconds(60);  // silence of a sender that leaves it
   /// True if only vehicles or their simulators, not ground stations, send this message.
   static bool contains_pose(std::uint32_t id);
   /// True if only a vehicle sends this frame: the heartbeat of an autopilot, or a pose.
@@ -188,10 +195,8 @@ class MavlinkPoses {
   std::optional<bool> reported_;    // true: the last report said that poses arrive
   std::chrono::nanoseconds reminder_period_{0};
   std::optional<std::pair<int, int>> ignored_;  // system and component of the last message that is not from the vehicle
-  /// Senders (system, component) that were reported as ignored since the vehicle was selected, with the text of the notice.
-  std::map<std::pair<int, int>, std::string> reported_ignored_;
-  std::pair<int, int> rival_{};  // the last of these senders that is not in the vehicle's system
-  Time rival_at_{};
+  std::map<std::pair<int, int>, Ignored> reported_ignored_;  // by system and component, since the vehicle was selected
+  std::pair<int, int> rival_{};                              // the last of these senders that is not in the vehicle's system
   std::map<std::uint32_t, Arrival> received_;
 
   Attitudes attitudes_;

@@ -105,14 +105,22 @@ void MavlinkPoses::note_ignored(const Frame& frame, Moment at) {
 }
 
 /// Reports each ignored system and component once, because two vehicles at one port are a mistake that is not visible otherwise.
+/// If too many have been reported, the one that has been silent longest leaves its place.
 void MavlinkPoses::report_ignored(const Frame& frame, Moment at) {
   const std::pair<int, int> sender(frame.system, frame.component);
-  if (!reported_ignored_.contains(sender) && reported_ignored_.size() >= most_reported) return;
-  if (frame.system != *system_) {
-    rival_ = sender;
-    rival_at_ = at.now;
+  const auto reported = reported_ignored_.find(sender);
+  const bool is_new = reported == reported_ignored_.end();
+  if (is_new && reported_ignored_.size() >= most_reported) {
+    const auto oldest = std::min_element(reported_ignored_.begin(), reported_ignored_.end(),
+                                         [](const auto& a, const auto& b) { return a.second.last < b.second.last; });
+    if (at.now - oldest->second.last < forgotten_after) return;
+    reported_ignored_.erase(oldest);
   }
-  if (reported_ignored_.contains(sender)) return;
+  if (frame.system != *system_) rival_ = sender;
+  if (!is_new) {
+    reported->second.last = at.now;
+    return;
+  }
   const auto name_of = [](int system, int component) {
     return "system " + std::to_string(system) + ", component " + std::to_string(component);
   };
@@ -122,13 +130,13 @@ void MavlinkPoses::report_ignored(const Frame& frame, Moment at) {
                            " and is ignored: " + name_of(*system_, steering) + " steers " + settings_.vehicle +
                            (frame.system == *system_ ? "; component_id selects another"
                                                      : "; give each vehicle a port of its own, or select one by system_id");
-  reported_ignored_.emplace(sender, text);
+  reported_ignored_.emplace(sender, Ignored{text, at.now});
   at.out.notices.push_back(text);
 }
 
 std::string MavlinkPoses::rival(Time now) const {
   const auto report = reported_ignored_.find(rival_);
-  return report != reported_ignored_.end() && now - rival_at_ <= system_silence ? report->second : std::string();
+  return report != reported_ignored_.end() && now - report->second.last <= system_silence ? report->second.text : std::string();
 }
 
 /// Returns the reason why x and y do not change, and the messages that would change them.

@@ -248,6 +248,14 @@ TEST(MavlinkReports, IgnoredSendersAreNamedOnce) {
     const auto notices = poses.on_datagram(more(odometry(1, 0)), at_s(0.5)).notices;
     EXPECT_EQ(notices.empty(), system >= 23) << system;
   }
+  Sender late{{240, 1, 0}};
+  for (int s = 4; s <= 60; s += 4)
+    for (Sender* const speaks : {&one, &two})
+      poses.on_datagram((*speaks)(odometry(1'000'000ull * static_cast<unsigned>(s), 0)), at_s(s));
+  EXPECT_THAT(poses.on_datagram(late(odometry(1, 0)), at_s(61)).notices, ElementsAre(HasSubstr("system 240, component 1 sends")))
+      << "a sender that has been silent for a minute leaves its place";
+  EXPECT_THAT(poses.on_datagram(two(odometry(61'000'000, 0)), at_s(62)).notices, IsEmpty()) << "system 8 was not silent";
+  EXPECT_THAT(poses.rival(at_s(62)), HasSubstr("system 8"));
 }
 
 TEST(MavlinkReports, ExcludedSendersAreNotNamed) {
