@@ -6,6 +6,8 @@
 #include <optional>
 #include <sstream>
 
+#include "core/text/format.hpp"
+
 namespace sonar::doctor {
 namespace {
 
@@ -21,6 +23,27 @@ std::optional<std::uint32_t> hexadecimal(std::string_view text) {
 std::string ipv4_text(std::uint32_t word) {
   return std::to_string(word & 0xff) + "." + std::to_string(word >> 8 & 0xff) + "." + std::to_string(word >> 16 & 0xff) + "." +
          std::to_string(word >> 24);
+}
+
+/// Returns the text of an IPv6 address, "[fe80::1]" (RFC 5952). Each word is printed as a number of this computer, as in IPv4.
+std::string ipv6_text(const std::array<std::uint32_t, 4>& words) {
+  std::array<unsigned, 8> groups{};
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const std::uint32_t half = words[i / 2] >> (i % 2 * 16);
+    groups[i] = (half & 0xff) << 8 | (half >> 8 & 0xff);
+  }
+  std::size_t begin = groups.size(), length = 1;  // "::" stands for the first longest run of at least two zeros
+  for (std::size_t i = 0, run = 0; i < groups.size(); ++i) {
+    run = groups[i] == 0 ? run + 1 : 0;
+    if (run > length) length = run, begin = i + 1 - run;
+  }
+  std::string text = "[";
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (i == begin) text += "::";
+    if (i >= begin && i < begin + length) continue;
+    text += text::format(i > 0 && i != begin + length ? ":%x" : "%x", groups[i]);
+  }
+  return text + "]";
 }
 
 /// Reads an address and a port such as "0200007F:CB84"; an IPv6 address has 32 digits.
@@ -42,7 +65,7 @@ bool read_endpoint(std::string_view text, std::string& host, std::uint16_t& port
   else if (mapped)
     host = ipv4_text(words[3]);
   else
-    host = words == std::array<std::uint32_t, 4>{} ? "[::]" : "[IPv6]";
+    host = ipv6_text(words);
   return true;
 }
 

@@ -9,7 +9,7 @@
 namespace sonar::doctor {
 
 struct SocketLine {
-  std::string local_host, remote_host;  // such as "127.0.0.2", also if mapped to IPv6; otherwise "[::]" or "[IPv6]"
+  std::string local_host, remote_host;  // such as "127.0.0.2", also if mapped to IPv6, or "[fe80::1]"
   std::uint16_t local_port = 0, remote_port = 0;
   int state = 0;  // the kernel's number of the state
   std::uint64_t inode = 0;

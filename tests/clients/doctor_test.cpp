@@ -243,8 +243,10 @@ TEST(ProcNet, ReadsSocketsAsTheKernelPrintsThem) {
       "garbage\n"
       "   2: 00000000000000000000000000000000:CB86 00000000000000000000000000000000:0000 07 0:0 00:0 0 0 0 77\n"
       "   3: 0000000000000000FFFF00000500007F:CB86 00000000000000000000000000000000:0000 07 0:0 00:0 0 0 0 78\n"
-      "   4: 0200007F:CB84\n");
-  ASSERT_EQ(sockets.size(), 4u);
+      "   4: 000080FE000000000000000001000000:CB86 B80D012000000001000000000000EFBE:0050 01 0:0 00:0 0 0 0 79\n"
+      "   5: 00000000000000000000000001000000:CB86 04030201080706050C0B0A09100F0E0D:0051 01 0:0 00:0 0 0 0 80\n"
+      "   6: 0200007F:CB84\n");
+  ASSERT_EQ(sockets.size(), 6u);
   EXPECT_EQ(sockets[0].local_host, "127.0.0.2");
   EXPECT_EQ(sockets[0].local_port, 52100);
   EXPECT_EQ(sockets[0].state, listening);
@@ -253,6 +255,10 @@ TEST(ProcNet, ReadsSocketsAsTheKernelPrintsThem) {
   EXPECT_EQ(sockets[1].state, established);
   EXPECT_EQ(sockets[2].local_host, "[::]");
   EXPECT_EQ(sockets[3].local_host, "127.0.0.5");
+  EXPECT_EQ(sockets[4].local_host, "[fe80::1]");
+  EXPECT_EQ(sockets[4].remote_host, "[2001:db8:100::beef:0]");
+  EXPECT_EQ(sockets[5].local_host, "[::1]");
+  EXPECT_EQ(sockets[5].remote_host, "[102:304:506:708:90a:b0c:d0e:f10]");
   const PortHolder holder = holder_of(sockets[0], {{4242, {12, "sonard"}}});
   EXPECT_EQ(holder.at, "127.0.0.2:52100");
   EXPECT_EQ(holder.program, "sonard");
