@@ -1,4 +1,4 @@
-// Checks of what users request: options of a product, settings of a ping.
+// Checks of what users request: options of a product, settings of a ping. The settings that a host puts back.
 #include "protocol/host.hpp"
 
 #include <algorithm>
@@ -76,6 +76,24 @@ Result<void> accept_settings(const Wanted& wanted, std::string_view title, std::
                                          ", which has --" + text::joined(known, ", --"));
   }
   return {};
+}
+
+std::optional<std::string> ChangedSetting::on_answer(const std::string& value) {
+  switch (++answers) {
+    case 1:  // the sonar may still have what a host set that has lost it
+      if (before.empty() || (!ours.empty() && ours != value)) before = value;
+      ours.clear();
+      break;
+    case 2:
+      ours = value;
+      break;
+    case 3:
+      if (value == ours && value != before) return before;
+      break;
+    default:
+      break;
+  }
+  return std::nullopt;
 }
 
 }  // namespace sonar::protocol

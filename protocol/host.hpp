@@ -23,12 +23,23 @@
 
 namespace sonar::protocol {
 
+/// A setting that a host changes in a sonar that keeps settings, in the words of the make. The host asks for it before and after
+/// the change, and when it leaves.
+struct ChangedSetting {
+  std::string before, ours;  // empty: not known yet
+  int answers = 0;
+  /// Returns the value to put back, after the third answer; nullopt if another driver has changed the setting.
+  std::optional<std::string> on_answer(const std::string& value);
+};
+using ChangedSettings = std::map<std::string, ChangedSetting, std::less<>>;  // by name
+
 /// The settings that a user requests. For an unset value the sonar keeps its own, or the host sends that of a usual driver.
 struct Wanted {
   bool as_it_is = false;                         // true: sends no settings, and requests pings only if the make needs it
   bool stamped = false;                          // true: prefers messages that state when a ping was fired
   SettingsOverride settings;                     // settings that all makes share
   std::map<std::string, std::string> more = {};  // settings of one make: name of sonarctl's option without dashes, and value
+  ChangedSettings changed = {};                  // Host::changed() of a host that has lost the sonar
 };
 
 struct PingFacts {
@@ -93,8 +104,11 @@ class Host {
   virtual std::optional<Time> next_tick() const { return std::nullopt; }
   /// Called whenever the caller waits for a ping. Hosts that must request each ping then send a request.
   virtual HostActions on_demand(Time /*now*/) { return {}; }
-  /// Called before the ports are closed.
+  /// Called before the ports are closed. The host puts back the settings that it has changed, except for those that another
+  /// driver has changed since. If it must ask for the present ones first, has_left() is false until it has the answers.
   virtual HostActions on_leave() { return {}; }
+  virtual bool has_left() const { return true; }
+  virtual ChangedSettings changed() const { return {}; }
 
   /// True if the sonar has answered and its settings have been requested.
   virtual bool is_open() const { return true; }

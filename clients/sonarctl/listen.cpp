@@ -50,7 +50,7 @@ class Listener {
         return ran;
       const Endpoint device = opened_->again;
       before_ = counts();
-      outage_.begins();
+      outage_.begins(opened_->stream);
       opened_.reset();  // frees its ports for the next connection
       auto again =
           open_again(options_.source, device, outage_, ran.error(), [](const std::string& line) { print_notices({line}); });

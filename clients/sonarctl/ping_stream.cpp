@@ -133,6 +133,8 @@ PingStream::~PingStream() {
   if (last.empty()) return;
   ended_.reset();  // the connection may be usable although the command has failed
   carry_out(std::move(last));
+  for (const auto until = Clock::now() + answer_patience; !host_->has_left() && !ended_ && Clock::now() < until;)
+    receive(left_until(until));
   const auto until = Clock::now() + leave_patience;
   for (std::size_t port = 0; port < sockets_.size() && !ended_; ++port) {
     if (make_->ports[port].kind != Kind::tcp || !sockets_[port]) continue;

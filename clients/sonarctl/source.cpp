@@ -198,8 +198,9 @@ bool Silence::is_over() {
   return !is_served && interrupted == 0;
 }
 
-void Outage::begins() {
+void Outage::begins(const PingStream& lost) {
   if (!since_) since_ = Clock::now();
+  changed_ = lost.host().changed();
 }
 
 double Outage::left_s(const SourceOptions& source) const {
@@ -207,9 +208,10 @@ double Outage::left_s(const SourceOptions& source) const {
   return std::max(0.0, source.return_limit_s - seconds_since(*since_));
 }
 
-Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
+Result<OpenedStream> open_again(SourceOptions source, const Endpoint& device, Outage& outage, const Error& why,
                                 const std::function<void(const std::string&)>& say) {
   using Clock = std::chrono::steady_clock;
+  source.wanted.changed = outage.changed();
   const double left_s = outage.left_s(source);
   const auto until = Clock::now() + milliseconds_from(left_s);
   if (left_s > 0) say(why.text + "; connecting again, for " + text::format("%.0f s", left_s));

@@ -66,20 +66,23 @@ class Outage {
  public:
   using Clock = std::chrono::steady_clock;
 
-  void begins();  // no effect during an outage
+  /// The time begins now, unless there is an outage already.
+  void begins(const PingStream& lost);
   void ends() { since_.reset(); }
-  double left_s(const SourceOptions& source) const;  // time until source.return_limit_s is over
+  double left_s(const SourceOptions& source) const;                      // time until source.return_limit_s is over
+  const protocol::ChangedSettings& changed() const { return changed_; }  // by the host that has lost the sonar
   /// Returns when the next attempt may begin: at most once a second, also if the device ends each connection at once.
   Clock::time_point next_attempt() { return last_attempt_ = std::max(Clock::now(), last_attempt_ + std::chrono::seconds(1)); }
 
  private:
   std::optional<Clock::time_point> since_;
+  protocol::ChangedSettings changed_;
   Clock::time_point last_attempt_;
 };
 
 /// Connects again after the stream was lost (`why`), within the remaining time of the outage; reports loss and return to `say`.
 /// After Ctrl-C the error is `why`; otherwise it states that the device did not return.
-Result<OpenedStream> open_again(const SourceOptions& source, const Endpoint& device, Outage& outage, const Error& why,
+Result<OpenedStream> open_again(SourceOptions source, const Endpoint& device, Outage& outage, const Error& why,
                                 const std::function<void(const std::string&)>& say);
 
 /// Writes to standard error.

@@ -98,8 +98,8 @@ class LiveView {
         ran = draw(screen, has_screen);
         if (!lost_ || interrupted != 0 || options_.pings > 0 || figures_.pings() == 0) break;
         const Endpoint device = opened_->again;
+        outage_.begins(opened_->stream);
         opened_.reset();  // frees its ports for the next connection
-        outage_.begins();
         auto again = open_again(options_.source, device, outage_, ran.error(), [&](const std::string& line) {
           if (has_screen)
             static_cast<void>(screen.show({line}));

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/text/format.hpp"
 #include "protocol/dvl/dvl.hpp"
@@ -16,19 +18,19 @@ constexpr std::string_view title = "a DVL";
 constexpr std::size_t points = 200;  // points of a line of the waterfall
 constexpr float silent_db = -2000;   // below every echo, so that lines without an echo are dark
 
-Bytes set_config(bool acoustics, const std::string& range_mode) {
-  const nlohmann::ordered_json message{{"command", "set_config"},
-                                       {"parameters", {{"acoustic_enabled", acoustics}, {"range_mode", range_mode}}}};
-  return line_of(message.dump());
+constexpr auto learning = std::chrono::milliseconds(2500);  // longest wait for the settings that the device has
+constexpr const char *acoustics = "acoustic_enabled", *range_mode_name = "range_mode";
+
+Bytes get_config() { return line_of(R"({"command":"get_config"})"); }
+
+Bytes set_config(const nlohmann::ordered_json& parameters) {
+  return line_of(nlohmann::ordered_json{{"command", "set_config"}, {"parameters", parameters}}.dump());
 }
 
-/// Makes the commands. The first reads the settings that on_leave() restores, because the device would keep ours.
-Bytes request(const protocol::SettingsOverride& wanted, const Product& product) {
-  Bytes all = line_of(R"({"command":"get_config"})");
-  const Bytes ours =
-      set_config(wanted.rate_hz.value_or(1) > 0, wanted.range_m ? range_mode_for(*wanted.range_m, product) : "auto");
-  all.insert(all.end(), ours.begin(), ours.end());
-  return all;
+/// Makes the parameters that the host sets.
+nlohmann::ordered_json parameters_of(const protocol::SettingsOverride& wanted, const Product& product) {
+  return {{acoustics, wanted.rate_hz.value_or(1) > 0},
+          {range_mode_name, wanted.range_m ? range_mode_for(*wanted.range_m, product) : "auto"}};
 }
 
 /// Returns the reach of the shortest range mode that covers the distance. The picture has this range, so that its scale is
@@ -46,13 +48,19 @@ double window_m(double distance_m) {
 class DvlHost final : public protocol::Host {
  public:
   explicit DvlHost(const protocol::Wanted& wanted) {
-    if (!wanted.as_it_is) request_ = request(wanted.settings, product_);
+    if (!wanted.as_it_is) parameters_ = parameters_of(wanted.settings, product_);
+    changed_ = wanted.changed;
+    for (auto& [name, setting] : changed_) setting.answers = 0;
     if (wanted.settings.range_m) window_m_ = window_m(*wanted.settings.range_m / altitude_per_distance);
   }
-  HostActions on_open(std::span<const std::uint16_t>, Time) override {
-    if (!request_) return {};
-    return {protocol::HostSend{0, *request_}};
+  /// Asks for the settings first, because the device keeps those of the host.
+  HostActions on_open(std::span<const std::uint16_t>, Time now) override {
+    if (!parameters_) return {};
+    learns_until_ = now + learning;
+    return {protocol::HostSend{0, get_config()}};
   }
+  HostActions on_tick(Time now) override { return learns_until_ && now >= *learns_until_ ? begin() : HostActions{}; }
+  std::optional<Time> next_tick() const override { return learns_until_; }
   /// Reads reports, which end with CR LF. A line that is too long is dropped, and reading continues after the next line end.
   HostActions on_bytes(std::size_t, BytesView received, Time now) override {
     HostActions actions;
@@ -68,18 +76,41 @@ class DvlHost final : public protocol::Host {
     return actions;
   }
   HostActions on_leave() override {
-    if (!before_ || !before_->acoustics) return {};
-    return {protocol::HostSend{0, set_config(*before_->acoustics, before_->range_mode)}};
+    if (!parameters_ || std::exchange(learns_until_, std::nullopt) || answers() == 0) return {};
+    leaves_ = true;
+    return {protocol::HostSend{0, get_config()}};
   }
+  bool has_left() const override { return !leaves_ || answers() >= 3; }
+  protocol::ChangedSettings changed() const override { return changed_; }
   std::string about() const override { return std::string(title); }
 
  private:
   void on_line(HostActions& actions, Time now) {
     const Line line = read_line(line_);
     if (line.velocity) actions.emplace_back(ping_from(line.velocity->measured, now));
-    if (line.response && request_ && line.response->to == "get_config" && !before_) before_ = line.response;
+    if (line.response && line.response->to == "get_config" && line.response->acoustics && parameters_)
+      on_settings(*line.response, actions);
     if (line.response && !line.response->success && line.response->to != "get_config")
       actions.emplace_back(Error{ErrorKind::usage, "the DVL refuses " + line.response->to + ": " + line.response->error});
+  }
+
+  /// Sets the parameters, and asks what the device made of them.
+  HostActions begin() {
+    learns_until_.reset();
+    return {protocol::HostSend{0, set_config(*parameters_)}, protocol::HostSend{0, get_config()}};
+  }
+
+  int answers() const {
+    const auto setting = changed_.find(range_mode_name);
+    return setting != changed_.end() ? setting->second.answers : 0;
+  }
+  void on_settings(const Response& found, HostActions& actions) {
+    nlohmann::ordered_json back;
+    if (const auto value = changed_[acoustics].on_answer(found.acoustics.value_or(false) ? "true" : "false"))
+      back[acoustics] = *value == "true";
+    if (const auto value = changed_[range_mode_name].on_answer(found.range_mode)) back[range_mode_name] = *value;
+    if (leaves_ && !back.empty()) actions.emplace_back(protocol::HostSend{0, set_config(back)});
+    if (learns_until_) std::ranges::move(begin(), std::back_inserter(actions));
   }
 
   HostPing ping_from(const Measurement& report, Time now) {
@@ -113,9 +144,11 @@ class DvlHost final : public protocol::Host {
   }
 
   const Product& product_ = product_of(*models().front());  // the first product, because reports do not name the model
-  std::optional<Bytes> request_;
-  std::optional<Response> before_;  // settings that the device had
-  double window_m_ = 0;             // least range of the picture, from the wanted range
+  std::optional<nlohmann::ordered_json> parameters_;        // nullopt: this host sends nothing
+  protocol::ChangedSettings changed_;                       // by the name of the parameter
+  std::optional<Time> learns_until_;                        // set while the host waits for the settings that the device has
+  bool leaves_ = false;
+  double window_m_ = 0;  // least range of the picture, from the wanted range
   Bytes line_;
   std::uint32_t number_ = 0;
   protocol::Waterfall waterfall_;

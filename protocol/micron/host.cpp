@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <tuple>
 #include <utility>
 
 #include "core/text/format.hpp"
@@ -17,6 +18,7 @@ using protocol::HostPing;
 
 constexpr double usual_range_m = 10, sound_mps = 1500;      // bins are intervals of time; drivers assume 1500 m/s
 constexpr auto patience = std::chrono::milliseconds(500);   // time after which a request without a scan line is repeated
+constexpr std::string_view setting = "parameters";          // the name of the only changed setting
 constexpr auto learning = std::chrono::milliseconds(2500);  // longest wait for the parameters that the head has
 
 /// Makes the parameters for a scan of the half circle ahead in steps of a grad.
@@ -54,11 +56,23 @@ HeadCommand command_of(const HeadData& line) {
   return c;
 }
 
+/// True if two commands have equal values of what drivers choose. A scan line does not state all parameters.
+bool is_alike(const HeadCommand& a, const HeadCommand& b) {
+  const auto chosen = [](const HeadCommand& c) {
+    return std::tuple(c.range_dm, c.left, c.right, c.gain, c.step, c.interval, c.bins);
+  };
+  return chosen(a) == chosen(b);
+}
+
 /// The head keeps the parameters of the last driver. If it has parameters, the host first requests a line, which states them. It
 /// restores them when it leaves.
 class MicronHost final : public protocol::Host {
  public:
-  explicit MicronHost(std::optional<HeadCommand> command) : command_(std::move(command)) {}
+  /// `changed`: by a host that has lost the sonar.
+  MicronHost(std::optional<HeadCommand> command, const protocol::ChangedSettings& changed) : command_(std::move(command)) {
+    if (const auto known = changed.find(setting); known != changed.end())
+      earlier_ = read_front<HeadCommand>(std::as_bytes(std::span(known->second.before)));
+  }
 
   HostActions on_open(std::span<const std::uint16_t>, Time now) override {
     if (command_) learns_until_ = now + learning;
@@ -74,7 +88,11 @@ class MicronHost final : public protocol::Host {
     return learns_until_ ? learns_until_ : std::optional(requested_at_ + patience);
   }
   HostActions on_leave() override {
-    if (!before_) return {};
+    learns_until_.reset();
+    const auto ours = std::exchange(command_, std::nullopt);  // no further requests
+    if (!ours || !before_) return {};
+    const bool is_anothers = seen_ && !is_alike(*seen_, *ours) && !is_alike(*seen_, *before_);
+    if (is_anothers) return {};
     return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*before_))}};
   }
   HostActions on_bytes(std::size_t, BytesView received, Time now) override {
@@ -91,16 +109,26 @@ class MicronHost final : public protocol::Host {
       if (message->header.id != Id::head_data) continue;
       if (learns_until_) {
         if (const auto line = read_front<HeadData>(message->payload)) before_ = command_of(*line);
+        if (before_ && earlier_ && is_alike(*before_, *command_)) before_ = earlier_;
         std::ranges::move(begin(now), std::back_inserter(actions));
         continue;
       }
       if (auto ping = ping_from(message->payload)) {
         ping->facts.message_size = whole->bytes.size();
+        if (const auto line = read_front<HeadData>(message->payload)) seen_ = command_of(*line);
         actions.emplace_back(*std::move(ping));
       }
       if (command_) actions.emplace_back(request(now));
     }
     return actions;
+  }
+  protocol::ChangedSettings changed() const override {
+    const auto& before = before_ ? before_ : earlier_;
+    if (!before) return {};
+    const Bytes bytes = wire::bytes_of(*before);
+    std::string text;
+    for (const std::byte b : bytes) text += std::to_integer<char>(b);
+    return {{std::string(setting), {text, {}}}};
   }
   std::string about() const override { return "a Micron"; }
   std::optional<Counts> counts() const override { return counts_; }
@@ -159,6 +187,8 @@ class MicronHost final : public protocol::Host {
 
   std::optional<HeadCommand> command_;  // nullopt: this host sends nothing, as for a recording
   std::optional<HeadCommand> before_;   // parameters that the head had
+  std::optional<HeadCommand> earlier_;  // those that it had before a host that has lost the sonar
+  std::optional<HeadCommand> seen_;     // those of the last line, once ours were sent
   std::optional<Time> learns_until_;    // set while the host waits for before_
   recording::MessageSplitter splitter_{recording::Origin::device, framing};
   protocol::Sweep sweep_{400};
@@ -177,7 +207,8 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   const double farthest = static_cast<double>(models().front()->modes.front().max_range_m);
   const std::string why = protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Micron", 0, farthest);
   if (!why.empty()) return failure(ErrorKind::usage, why);
-  return std::make_unique<MicronHost>(wanted.as_it_is ? std::nullopt : std::optional(command_of(wanted.settings)));
+  return std::make_unique<MicronHost>(wanted.as_it_is ? std::nullopt : std::optional(command_of(wanted.settings)),
+                                      wanted.changed);
 }
 
 }  // namespace sonar::micron

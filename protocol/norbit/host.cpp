@@ -3,7 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <deque>
-#include <map>
+#include <iterator>
 #include <set>
 #include <string>
 #include <string_view>
@@ -28,23 +28,22 @@ constexpr double usual_range_m = 10, usual_rate_hz = 10;
 constexpr auto patience = std::chrono::seconds(2);  // time for which a packet waits for the packet of the other port
 constexpr std::size_t most_waiting = 1024, most_waiting_bytes = 64u << 20;
 
-constexpr std::array<std::string_view, 4> set_by_us{"set_range", "set_gain", "set_rate", "set_power"};
+constexpr auto learning = std::chrono::milliseconds(2500);  // longest wait for the settings that the sonar has
 
 Bytes bytes_of(std::string_view text) {
   const auto bytes = std::as_bytes(std::span(text));
   return Bytes(bytes.begin(), bytes.end());
 }
 
-/// Makes the commands. The first ones read the settings that on_leave() restores, because the sonar keeps settings.
-Bytes request_of(const protocol::SettingsOverride& wanted) {
-  std::string text;
-  for (const std::string_view name : set_by_us) text.append(name).append("\r\n");
-  text += format("set_range 0 %g\r\n", wanted.range_m.value_or(usual_range_m));
-  if (wanted.gain_percent) text += format("set_gain %g\r\n", most_gain_db * *wanted.gain_percent / 100);
+using NamedValues = std::pair<std::string, std::string>;  // name of a command, and its values
+
+std::vector<NamedValues> lines_of(const protocol::SettingsOverride& wanted) {
+  std::vector<NamedValues> lines{{"set_range", format("0 %g", wanted.range_m.value_or(usual_range_m))}};
+  if (wanted.gain_percent) lines.emplace_back("set_gain", format("%g", most_gain_db * *wanted.gain_percent / 100));
   const double rate_hz = wanted.rate_hz.value_or(usual_rate_hz);
-  if (rate_hz != 0) text += format("set_rate %g\r\n", rate_hz);
-  text += rate_hz == 0 ? "set_power 0\r\n" : "set_power 1\r\n";
-  return bytes_of(text);
+  if (rate_hz != 0) lines.emplace_back("set_rate", format("%g", rate_hz));
+  lines.emplace_back("set_power", rate_hz == 0 ? "0" : "1");
+  return lines;
 }
 
 std::vector<std::pair<double, double>> points_of(const Bathymetry& bathymetry) {
@@ -94,18 +93,24 @@ double elevation_of(int sonar_mode) { return sonar_mode == 0 ? 0 : -pi / 2; }
 /// arrive much later than those of the other connection.
 class NorbitHost final : public protocol::Host {
  public:
-  explicit NorbitHost(std::optional<Bytes> request) : request_(std::move(request)) {}
+  /// `lines`: nullopt = sends nothing. `changed`: by a host that has lost the sonar.
+  NorbitHost(std::optional<std::vector<NamedValues>> lines, protocol::ChangedSettings changed)
+      : lines_(std::move(lines)), changed_(std::move(changed)) {
+    for (auto& [name, setting] : changed_) setting.answers = 0;
+  }
 
+  /// Asks for the settings first, because the sonar keeps those of the host.
   HostActions on_open(std::span<const std::uint16_t>, Time now) override {
     begun_ = now;
-    if (!request_) return {};
-    return {protocol::HostSend{command_port_index, *request_}};
+    if (!lines_) return {};
+    learns_until_ = now + learning;
+    return ask();
   }
   HostActions on_bytes(std::size_t port, BytesView received, Time now) override {
     HostActions actions;
     if (!begun_) begun_ = now;
     if (port < kinds) received_at_[port] = now;
-    if (port == command_port_index && request_) return on_replies(received);
+    if (port == command_port_index && lines_) return on_replies(received);
     auto& splitter = splitters_[std::min(port, splitters_.size() - 1)];  // a recording has the packets of all ports in one stream
     splitter.append(now, received);
     while (auto whole = splitter.next()) {
@@ -127,27 +132,50 @@ class NorbitHost final : public protocol::Host {
   /// Shows waiting pings. All ports have been read before a tick, even after a pause of the reader.
   HostActions on_tick(Time now) override {
     HostActions actions;
+    if (learns_until_ && now >= *learns_until_) actions = begin();
     show(now, actions);
     return actions;
   }
   std::optional<Time> next_tick() const override {
-    if (waiting_.empty()) return std::nullopt;
-    return given_up_at(waiting_.front());
+    if (waiting_.empty()) return learns_until_;
+    return std::min(learns_until_.value_or(Time::max()), given_up_at(waiting_.front()));
   }
   HostActions on_leave() override {
-    std::string text;
-    for (const auto& [name, values] : before_) text.append(name).append(" ").append(values).append("\r\n");
-    if (text.empty()) return {};
-    return {protocol::HostSend{command_port_index, bytes_of(text)}};
+    if (!lines_ || std::exchange(learns_until_, std::nullopt)) return {};  // has changed nothing
+    std::erase_if(*lines_, [this](const NamedValues& c) { return changed_[c.first].answers == 0; });
+    leaves_ = true;
+    return ask();
   }
+  bool has_left() const override { return !leaves_ || have_answers(3); }
+  protocol::ChangedSettings changed() const override { return changed_; }
   std::string about() const override { return "a Norbit"; }
   std::optional<Counts> counts() const override { return counts_; }
 
  private:
   static constexpr std::size_t command_port_index = std::size(host_ports) - 1;
 
-  /// The first reply with a name has the values before our settings: "set_range 0 10 # m".
+  /// A name without values is a question.
+  HostActions ask() const {
+    std::string text;
+    for (const auto& [name, values] : *lines_) text += name + "\r\n";
+    return {protocol::HostSend{command_port_index, bytes_of(text)}};
+  }
+  HostActions begin() {
+    learns_until_.reset();
+    std::string text;
+    for (const auto& [name, values] : *lines_) text.append(name).append(" ").append(values).append("\r\n");
+    return {protocol::HostSend{command_port_index, bytes_of(text)}};
+  }
+  bool have_answers(int count) const {
+    return std::ranges::all_of(*lines_, [&](const NamedValues& c) {
+      const auto setting = changed_.find(c.first);
+      return setting != changed_.end() && setting->second.answers >= count;
+    });
+  }
+
+  /// Reads replies such as "set_range 0 10 # m". The sonar answers the commands in order.
   HostActions on_replies(BytesView received) {
+    HostActions actions;
     for (const std::byte b : received) {
       const char c = std::to_integer<char>(b);
       if (c != '\n' && reply_.size() < longest_reply) reply_ += c;
@@ -155,10 +183,13 @@ class NorbitHost final : public protocol::Host {
       const std::string line = std::exchange(reply_, {});
       const std::size_t space = line.find(' '), end = std::min(line.find_first_of("#\r"), line.size());
       if (space >= end) continue;
-      const auto name = std::ranges::find(set_by_us, std::string_view(line).substr(0, space));
-      if (name != set_by_us.end()) before_.try_emplace(*name, line.substr(space + 1, end - space - 1));
+      const std::string name = line.substr(0, space);
+      if (std::ranges::find(*lines_, name, &NamedValues::first) == lines_->end()) continue;
+      if (const auto back = changed_[name].on_answer(line.substr(space + 1, end - space - 1)); back && leaves_)
+        actions.emplace_back(protocol::HostSend{command_port_index, bytes_of(name + " " + *back + "\r\n")});
     }
-    return {};
+    if (learns_until_ && have_answers(1)) std::ranges::move(begin(), std::back_inserter(actions));
+    return actions;
   }
 
   enum Kind : std::size_t { of_bottom, of_column, kinds };  // packets, by their port
@@ -284,9 +315,11 @@ class NorbitHost final : public protocol::Host {
     actions.emplace_back(std::move(ping));
   }
 
-  std::optional<Bytes> request_;
-  std::string reply_;                               // the beginning of a reply
-  std::map<std::string_view, std::string> before_;  // settings that the sonar had, by the name of their command
+  std::optional<std::vector<NamedValues>> lines_;
+  protocol::ChangedSettings changed_;  // by the name of the command
+  std::optional<Time> learns_until_;   // set while the host waits for the settings that the sonar has
+  bool leaves_ = false;
+  std::string reply_;  // the beginning of a reply
   static recording::MessageSplitter splitter() { return {recording::Origin::device, framing}; }
   std::array<recording::MessageSplitter, 3> splitters_{splitter(), splitter(), splitter()};
   std::deque<Parts> waiting_;  // begins with a ping that lacks a packet
@@ -310,7 +343,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
        {protocol::range_complaint(wanted.settings.range_m.value_or(usual_range_m), "a Norbit", shortest_m, farthest_m),
         protocol::rate_complaint(wanted.settings, "a Norbit", models().front()->max_rate_hz)})
     if (!why.empty()) return failure(ErrorKind::usage, why);
-  return std::make_unique<NorbitHost>(wanted.as_it_is ? std::nullopt : std::optional(request_of(wanted.settings)));
+  return std::make_unique<NorbitHost>(wanted.as_it_is ? std::nullopt : std::optional(lines_of(wanted.settings)), wanted.changed);
 }
 
 }  // namespace sonar::norbit

@@ -2,8 +2,10 @@
 (docs/protocols/norbit.md)."""
 import math
 import pathlib
+import signal
 import socket
 import struct
+import subprocess
 import tempfile
 import unittest
 import zlib
@@ -102,6 +104,22 @@ class Link(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
                 with Driver(daemon.address) as driver:
                     self.assertEqual([driver.say(f"{name.split()[0]}\r\n") for name in wanted], settings, command[0])
+
+    def test_sonarctl_leaves_what_another_driver_has_set_since(self):
+        with Sonard(profile="norbit-wbms") as daemon:
+            with Driver(daemon.address) as driver:
+                before = [driver.say(f"{command}\r\n") for command in ("set_rate 3", "set_gain 11")]
+            command = (SONARCTL, "listen", f"{daemon.address}:{BATHYMETRY}", "--range", "5", "--rate", "4", "--gain", "50", "--wait", "100")
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as listener:
+                for line in listener.stdout:
+                    if line.startswith("ping "):
+                        break
+                with Driver(daemon.address) as driver:
+                    ours = driver.say("set_range 0 9\r\n")
+                listener.send_signal(signal.SIGINT)
+                listener.communicate(timeout=PATIENCE_S)
+            with Driver(daemon.address) as driver:
+                self.assertEqual([driver.say(f"{name}\r\n") for name in ("set_rate", "set_gain", "set_range")], [*before, ours])
 
     def test_sonarctl_lists_points_over_a_floor(self):
         with Sonard(scene="demo.yaml", profile="norbit-wbms", mount="{frame: FRD, xyz_m: [0, 0, 0], rpy_deg: [0, -90, 0]}") as daemon:

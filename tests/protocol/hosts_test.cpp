@@ -267,20 +267,85 @@ TEST_P(Hosts, RequestSlowPingsForRatesBelowTheLowestOnTheWire) {
   }
 }
 
+/// A sonar that keeps settings, as another driver has left it with a range of 7 m; then a host opens that wants 3 m.
+class KeptSettings {
+ public:
+  /// `held_after`: number of messages of the sonar that arrive at once; later ones arrive with talk.release().
+  explicit KeptSettings(const Make& make, std::size_t held_after = SIZE_MAX) : talk(make, all_that_is_known(make, 7)) {
+    talk.run(12);
+    found = talk.state.settings;
+    talk.pings.clear();
+    talk.held_after = held_after;
+    talk.open(*make.host(all_that_is_known(make, range_m)));
+  }
+  void leave() {
+    talk.carry_out(talk.host->on_leave());
+    talk.release();
+    EXPECT_TRUE(talk.host->has_left());
+  }
+
+  Talk talk;
+  std::shared_ptr<const VendorSettings> found;
+};
+bool keeps_settings(const Make& make) { return make.device->keeps_settings() && !sets_nothing(make); }
+
 /// A doctor or a viewer must not change what the next driver finds.
 TEST_P(Hosts, LeaveASonarThatKeepsItsSettingsAsTheyFoundIt) {
-  if (!GetParam().device->keeps_settings() || sets_nothing(GetParam())) return;
-  Talk talk(GetParam(), all_that_is_known(GetParam(), 7));
-  talk.run(30);
-  const auto found = talk.state.settings;
-  talk.pings.clear();
-  talk.open(*GetParam().host(all_that_is_known(GetParam(), range_m)));
-  talk.run(30);
-  ASSERT_FALSE(talk.error) << talk.error->text;
-  EXPECT_FALSE(talk.pings.empty());
-  EXPECT_FALSE(talk.state.settings->equals(*found)) << "the host has set nothing";
-  talk.carry_out(talk.host->on_leave());
-  EXPECT_TRUE(talk.state.settings->equals(*found));
+  if (!keeps_settings(GetParam())) return;
+  KeptSettings sonar(GetParam());
+  sonar.talk.run(30);
+  ASSERT_FALSE(sonar.talk.error) << sonar.talk.error->text;
+  EXPECT_FALSE(sonar.talk.pings.empty());
+  EXPECT_FALSE(sonar.talk.state.settings->equals(*sonar.found)) << "the host has set nothing";
+  sonar.leave();
+  EXPECT_TRUE(sonar.talk.state.settings->equals(*sonar.found));
+}
+
+/// Ctrl-C may come at any moment.
+TEST_P(Hosts, LeaveSettingsAsTheyFoundThemEvenIfNoAnswerHasArrivedYet) {
+  if (!keeps_settings(GetParam())) return;
+  std::size_t changed = 0;
+  for (std::size_t held_after = 0; held_after < 8; ++held_after) {
+    KeptSettings sonar(GetParam(), held_after);
+    sonar.talk.run(12);
+    changed += sonar.talk.state.settings->equals(*sonar.found) ? 0 : 1;
+    sonar.leave();
+    EXPECT_TRUE(sonar.talk.state.settings->equals(*sonar.found)) << "after " << held_after << " messages";
+  }
+  EXPECT_GT(changed, 3u);
+}
+
+TEST_P(Hosts, KeepWhatAnotherDriverHasSetSince) {
+  if (!keeps_settings(GetParam())) return;
+  KeptSettings sonar(GetParam());
+  sonar.talk.run(30);
+  auto ours = std::move(sonar.talk.host);
+  sonar.talk.open(*GetParam().host(all_that_is_known(GetParam(), 30)));
+  sonar.talk.run(30);
+  const double anothers_m = sonar.talk.settings.range_m;
+  ASSERT_GT(anothers_m, 8);
+  sonar.talk.host = std::move(ours);
+  sonar.talk.run(10);
+  sonar.leave();
+  EXPECT_EQ(sonar.talk.settings.range_m, anothers_m);
+}
+
+TEST_P(Hosts, PutBackTheFirstSettingsAfterALostConnection) {
+  if (!keeps_settings(GetParam())) return;
+  for (const std::size_t held_after : {SIZE_MAX, std::size_t{5}, std::size_t{0}}) {
+    KeptSettings sonar(GetParam(), held_after);
+    sonar.talk.run(12);  // not so long that the host gives up waiting for the settings
+    for (int lost = 0; lost < 2; ++lost) {
+      Wanted again = all_that_is_known(GetParam(), range_m);
+      again.changed = sonar.talk.host->changed();
+      sonar.talk.forget_held();
+      sonar.talk.open(*GetParam().host(again));
+      sonar.talk.run(30);
+    }
+    EXPECT_FALSE(sonar.talk.state.settings->equals(*sonar.found));
+    sonar.leave();
+    EXPECT_TRUE(sonar.talk.state.settings->equals(*sonar.found)) << held_after;
+  }
 }
 
 TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -107,6 +108,17 @@ class Talk {
     }
   }
 
+  /// Delivers the messages that are held, and all later ones.
+  void release() {
+    held_after = SIZE_MAX;
+    for (const auto& [port, bytes] : std::exchange(held_, {})) deliver(port, bytes);
+  }
+  /// Drops the held messages, as a lost connection does, and delivers the later ones.
+  void forget_held() {
+    held_after = SIZE_MAX;
+    held_.clear();
+  }
+
   const Make& make;
   const Vendor& device;
   std::size_t piece_;
@@ -117,8 +129,9 @@ class Talk {
   std::vector<HostPing> pings;
   std::vector<std::pair<std::size_t, Bytes>> sent;  // bytes that the device sent, with the index of the host's port
   std::optional<Error> error;
-  bool only_port = false;  // echoes are in some rows of the outermost quarter of the beams to port
-  double head_rad = 0;     // head angle of the last request
+  std::size_t held_after = SIZE_MAX;  // number of messages to the host that are still delivered at once
+  bool only_port = false;             // echoes are in some rows of the outermost quarter of the beams to port
+  double head_rad = 0;                // head angle of the last request
 
  private:
   struct Line {
@@ -150,6 +163,8 @@ class Talk {
   }
 
   void deliver(std::size_t port, const Bytes& bytes) {
+    if (held_after == 0) return held_.emplace_back(port, bytes), void();
+    if (held_after != SIZE_MAX) --held_after;
     sent.emplace_back(port, bytes);
     in_pieces(port, bytes, [&](BytesView part) { carry_out(host->on_bytes(port, part, now)); });
   }
@@ -202,6 +217,7 @@ class Talk {
   }
 
   std::vector<Line> lines_;
+  std::vector<std::pair<std::size_t, Bytes>> held_;
   std::shared_ptr<const VendorSettings> with_;
   int requested_ = 0;
 };
