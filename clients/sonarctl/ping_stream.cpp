@@ -275,8 +275,8 @@ void PingStream::read_port(std::size_t port) {
   const auto received = std::span<const std::byte>(chunk_).first(size);
   if (record_.is_open() && port == 0) {
     for (const std::byte b : received) record_.put(static_cast<char>(b));
-    if (!record_) {
-      ended_ = Error{ErrorKind::io, "the recording can no longer be written: check that the disk is not full"};
+    if (!record_.flush()) {
+      ended_ = Error{ErrorKind::io, "cannot write more to " + raw_file_.string() + ": " + why_not_written(raw_file_, errno)};
       return;
     }
   }
@@ -339,7 +339,7 @@ PingStream::Item PingStream::next(milliseconds patience) {
       items_.pop_front();
       return item;
     }
-    if (ended_) return {Wait::closed, {}, {}, std::exchange(kept_, {}), ended_->text, ended_->kind};
+    if (ended_) return {Wait::closed, {}, {}, std::exchange(kept_, {}), ended_->text, ended_->kind, record_.fail()};
     if (!receive(left_until(deadline))) return {Wait::interrupted, {}, {}, {}, {}};
     if (items_.empty() && !ended_ && Clock::now() >= deadline) return {};
   }
@@ -373,6 +373,7 @@ Result<void> PingStream::record_to(const std::filesystem::path& file) {
   const int error = errno;
   if (opened < 0) return failure(ErrorKind::io, "cannot write " + file.string() + ": " + why_not_written(file, error));
   record_.open(file, std::ios::binary | std::ios::trunc);
+  raw_file_ = file;
   ::close(opened);
   if (!record_) return failure(ErrorKind::io, "cannot write " + file.string() + ": check that its folder exists and is writable");
   return {};

@@ -55,6 +55,7 @@ class PingStream {
     std::vector<recording::RecordedMessage> messages = {};
     std::string error;
     ErrorKind kind = ErrorKind::io;  // kind of the error
+    bool is_not_recorded = false;    // true: the error is about the file of record_to(), not about the connection
   };
   /// Returns the next ping or message, or what happened instead within `patience`. Requests a ping if the make requires that.
   Item next(std::chrono::milliseconds patience);
@@ -111,6 +112,7 @@ class PingStream {
   bool is_turned_away_ = false;                       // the sonar closed the connection before it answered
   bool is_started_ = false;                           // the destructor must send what on_leave() returns
   std::ofstream record_;
+  std::filesystem::path raw_file_;  // to which record_ writes
   bool keeps_ = false;
   std::vector<recording::RecordedMessage> kept_;  // messages since the last item
   // While messages are kept: a splitter per port, so that messages of different ports are not mixed.

@@ -248,7 +248,7 @@ std::string reason_for_silence(const SourceOptions& source, bool observes) {
 }  // namespace
 
 Error closed(const PingStream::Item& item, std::uint64_t pings) {
-  if (item.kind == ErrorKind::usage) return {item.kind, item.error};
+  if (item.kind == ErrorKind::usage || item.is_not_recorded) return {item.kind, item.error};
   if (!item.error.empty()) return {ErrorKind::io, "the connection broke: " + item.error};
   return {ErrorKind::io, "the device closed the connection after " + std::to_string(pings) +
                              " pings: it stopped, or another client holds it (clients.max)"};

@@ -114,6 +114,17 @@ TEST(Listen, AcceptsAGoodDeviceAndDrawsAPing) {
   std::filesystem::remove(options.record);
 }
 
+TEST(Listen, TellsThatTheRecordingCannotBeWritten) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP();
+  FakeDevice device(5, [](std::uint32_t i, const oculus::FireSettings& echo) { return ping_bytes(i + 1, echo); });
+  ListenOptions options = quiet(device.endpoint(), 5);
+  options.record = "/dev/full";
+  const Result<void> done = listen(options);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().text, "cannot write more to /dev/full: No space left on device; make room");
+  EXPECT_EQ(done.error().kind, ErrorKind::io);
+}
+
 TEST(Listen, AcceptsAnEchoThatTakesOnePing) {
   FakeDevice device(4, [](std::uint32_t i, oculus::FireSettings echo) {
     if (i == 0) echo.range = 7;
