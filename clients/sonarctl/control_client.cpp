@@ -5,6 +5,7 @@
 
 #include "clients/sonarctl/commands.hpp"
 #include "core/base/regular_file.hpp"
+#include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
 
 namespace sonar::clients {
@@ -68,7 +69,7 @@ Result<ControlClient> ControlClient::open(const ControlOptions& options, bool* t
                        ". Is sonard running there? Its banner names the address (--control HOST:PORT; for poses --to)");
   if (!socket) return tl::unexpected(socket.error());
   ControlClient client(std::move(*socket), *at);
-  const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, greeting_patience);
+  const auto met = client.request(control::Hello{control::protocol_version, "sonarctl", *token}, options.greeting_patience);
   if (!met && token->empty() && client.unauthenticated_) {
     if (token_required != nullptr) *token_required = true;
     return failure(met.error().kind, "sonard at " + text_from(*at) +
@@ -90,7 +91,8 @@ Result<ControlClient::Response> ControlClient::request(Operation operation, std:
       return failure(ErrorKind::unavailable, "interrupted before sonard at " + text_from(at_) +
                                                  " answered: sonard completes the request, sonarctl does not wait for it");
     if (!*answer && last_id_ == 1)  // the answer to Hello
-      return tl::unexpected(no_control_stream("no greeting within " + std::to_string(patience.count() / 1000) + " s"));
+      return tl::unexpected(
+          no_control_stream("no greeting within " + text::format("%g s", 1e-3 * static_cast<double>(patience.count()))));
     if (!*answer)
       return failure(ErrorKind::unavailable, "sonard at " + text_from(at_) + " did not answer within " +
                                                  std::to_string(patience.count() / 1000) + " s: is it busy, or suspended?");

@@ -22,6 +22,8 @@ struct ControlOptions {
   std::string address;               // HOST:PORT, empty = 127.0.0.1:14770
   std::filesystem::path token_file;  // the daemon's control.token_file, if it has one
   std::chrono::milliseconds connect_patience{2000};
+  /// sonard answers Hello at once, even if busy. No answer within this time means that another service listens there.
+  std::chrono::milliseconds greeting_patience{2000};
 };
 
 class ControlClient {
@@ -29,8 +31,6 @@ class ControlClient {
   using Operation = decltype(control::Request::op);
   using Response = std::shared_ptr<const v1::Response>;
   static constexpr std::chrono::milliseconds usual_patience{10000};
-  /// sonard answers Hello at once, even if busy. No answer within this time means that another service listens there.
-  static constexpr std::chrono::milliseconds greeting_patience{2000};
 
   /// Connects and sends Hello. Returns an error if there is no connection, another service answers, or the token is missing or
   /// wrong. `token_required` is set if sonard requires a token but no token file is given.

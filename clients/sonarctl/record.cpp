@@ -25,8 +25,10 @@ constexpr int most_status_at_once = 32;
 
 /// Connects to the sonard that serves the device, and subscribes to its pings.
 Result<Served> ask_sonard(const SourceOptions& source, const Make* make, const Endpoint& device) {
-  const std::chrono::milliseconds patience = source.control.empty() ? 300ms : ControlOptions().connect_patience;
-  auto served = served_at({source.control, source.token_file, patience}, make, device);
+  ControlOptions options{source.control, source.token_file};
+  // The sonar may have no sonard, and its pings wait meanwhile.
+  if (source.control.empty()) options.connect_patience = 300ms, options.greeting_patience = 1000ms;
+  auto served = served_at(options, make, device);
   if (!served) return served;
   control::Subscribe subscription;
   subscription.pings = true;

@@ -186,6 +186,14 @@ class Recorded(Files):
         self.assertEqual([data for topic, data in topics if topic == "/sonar/device"], sent)
 
 
+    def test_a_silent_service_at_the_usual_port_of_control_delays_little(self):
+        with Sonard(scene="tank-rod.yaml") as daemon, socket.create_server(("127.0.0.1", 14770)):
+            done = run(SONARCTL, "record", daemon.address, "--range", "1", "--wait", "100", "--pings", "2", "--mcap", self.path("mcap"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("no poses will be recorded: the service at tcp 127.0.0.1:14770 does not answer as sonard's control stream "
+                      "(no greeting within 1 s)", done.stderr)
+
+
 class Inside(Files):
     """sonard writes the file itself."""
 
