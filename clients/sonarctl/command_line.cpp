@@ -203,6 +203,10 @@ Result<SourceOptions> SourceArguments::finish() const {
   SourceOptions source;
   Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
   if (!at) return tl::unexpected(at.error());
+  std::error_code ec;
+  if (at->host.find('/') != std::string::npos || std::filesystem::is_regular_file(at->host, ec))
+    return failure(ErrorKind::usage, "\"" + device.address + "\" is a file, not the address of a sonar: view, stats and record " +
+                                         "read a recording with --from FILE");
   source.make = make.empty() ? nullptr : protocol::find_make(make);
   if (device.discover && !make.empty() && source.make != &protocol::makes().front())
     return failure(ErrorKind::usage, "--discover finds " + std::string(protocol::makes().front().title) +

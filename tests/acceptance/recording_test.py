@@ -394,6 +394,9 @@ class OneIntoAnother(Files):
 
     def test_wrong_commands_are_refused(self):
         self.path("raw").write_bytes(b"nothing of the kind")
+        done = run(SONARCTL, "record", self.path("raw"), "--mcap", self.path("mcap"))
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (64, 1), done.stderr)
+        self.assertIn("is a file, not the address of a sonar: view, stats and record read a recording with --from FILE", done.stderr)
         for code, words in [(64, ["record", "127.0.0.2"]), (66, ["record", "--from", self.folder / "none", "--raw", "x"]),
                             (65, ["record", "--from", self.path("raw"), "--oculus", self.path("oculus")]),
                             (64, ["record", "--from", self.path("raw"), "--raw", self.path("raw")])]:
