@@ -48,9 +48,10 @@ int say_stopped(const DatasetProgress& p) {
 }
 
 void say_exported(const Exported& e, const DatasetCommand& command) {
-  std::fprintf(stderr, "%s: train %llu, val %llu, test %llu pings of %zu scenes\n", e.folder.c_str(),
+  std::fprintf(stderr, "%s: train %llu, val %llu, test %llu pings of %zu scenes%s\n", e.folder.c_str(),
                static_cast<unsigned long long>(e.pings[0]), static_cast<unsigned long long>(e.pings[1]),
-               static_cast<unsigned long long>(e.pings[2]), e.scenes);
+               static_cast<unsigned long long>(e.pings[2]), e.scenes,
+               e.divided_scenes > 0 ? (", " + std::to_string(e.divided_scenes) + " of them in several splits").c_str() : "");
   if (e.scenes < split_names.size() && command.split_by.empty())
     std::fprintf(stderr,
                  "there are too few different scenes for three splits; give --split-by a draw that differs between pings\n");

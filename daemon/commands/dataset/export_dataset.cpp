@@ -10,6 +10,7 @@
 #include "core/base/regular_file.hpp"
 #include "core/image/raster.hpp"
 #include "core/text/decimal.hpp"
+#include "core/text/format.hpp"
 #include "core/text/nearest.hpp"
 #include "daemon/commands/dataset/dataset_card.hpp"
 #include "daemon/commands/dataset/shards.hpp"
@@ -66,31 +67,37 @@ class Export {
   path folder_of(std::size_t split) const { return unfinished_ / std::string(split_names[split]); }
   static std::string name_of(std::uint64_t ping) { return ping_key(ping) + ".png"; }
 
-  /// Pings of equal scenes go into one split, so that a model is not tested on a scene that it was trained on.
+  /// Pings of a group go into one split. Without --split-by a group is a scene, so that a model is not tested on a scene that it
+  /// was trained on; else it has equal values of these draws.
   Result<void> find_splits() {
-    std::vector<std::string> scenes;  // in the order of the pings
-    std::vector<std::size_t> scene_of;
+    std::vector<std::string> groups;  // in the order of the pings
+    std::vector<std::size_t> group_of;
     std::map<std::string, std::size_t> known;
+    std::map<std::string, std::set<std::size_t>> groups_of;  // by scene
     for (std::uint64_t shard = 0; shard < job_.shards(); ++shard) {
       const auto part = read_part(set_, shard);
       if (!part) return tl::make_unexpected(part.error());
       count_instances(*part, instances_);
       for (const json& image : (*part)["images"]) {
-        std::string scene = image["scene"].get<std::string>();
-        // With --split-by, pings with equal values of these draws count as one scene.
-        if (!split_.by.empty()) scene.clear();
+        const std::string scene = image["scene"].get<std::string>();
+        std::string group = split_.by.empty() ? scene : "";
         for (const std::string& name : split_.by) {
           if (!image["draws"].contains(name)) return unknown_draw(name);
-          scene += image["draws"][name].dump() + ",";
+          group += image["draws"][name].dump() + ",";
         }
-        const auto [place, is_new] = known.try_emplace(scene, scenes.size());
-        if (is_new) scenes.push_back(scene);
-        scene_of.push_back(place->second);
+        const auto [place, is_new] = known.try_emplace(group, groups.size());
+        if (is_new) groups.push_back(group);
+        group_of.push_back(place->second);
+        groups_of[scene].insert(place->second);
       }
     }
-    const std::vector<std::size_t> splits = splits_of(scenes, split_.shares);
-    for (const std::size_t scene : scene_of) split_of_.push_back(splits[scene]), ++exported_.pings[splits[scene]];
-    exported_.folder = folder_, exported_.scenes = scenes.size();
+    const std::vector<std::size_t> splits = splits_of(groups, split_.shares);
+    for (const std::size_t group : group_of) split_of_.push_back(splits[group]), ++exported_.pings[splits[group]];
+    exported_.folder = folder_, exported_.scenes = groups_of.size();
+    exported_.divided_scenes = static_cast<std::size_t>(std::ranges::count_if(groups_of, [&](const auto& scene) {
+      const std::size_t first = splits[*scene.second.begin()];
+      return std::ranges::any_of(scene.second, [&](std::size_t group) { return splits[group] != first; });
+    }));
     return {};
   }
 
@@ -187,6 +194,13 @@ class Export {
     return file->commit();
   }
 
+  std::string about_scenes() const {
+    const std::string all = std::to_string(exported_.scenes) + " scenes ";
+    const std::string by = split_.by.empty() ? "" : "Pings with equal " + text::joined(split_.by, ", ") + " are in one split. ";
+    if (exported_.divided_scenes == 0) return by + "None of the " + all + "is in two splits.";
+    return by + "Of the " + all + std::to_string(exported_.divided_scenes) + " have pings in two or three splits.";
+  }
+
   Result<void> write_card() {
     std::vector<FilesOfSplit> files;
     std::string table = "| split | pings |\n|---|---|\n";
@@ -205,8 +219,8 @@ class Export {
     return write_durably(unfinished_ / "README.md",
                          card_head(job_, form_ == ExportForm::folder ? files : std::vector<FilesOfSplit>{}, false) + "# " +
                              job_.name + "\n\n" + (job_.about.empty() ? "" : job_.about + "\n\n") + "License: " + job_.license +
-                             "\n\n" + what + "\n" + table + "\nNone of the " + std::to_string(exported_.scenes) +
-                             " scenes is in two splits. The echoes are simulated, not recorded: "
+                             "\n\n" + what + "\n" + table + "\n" + about_scenes() +
+                             " The echoes are simulated, not recorded: "
                              "only tests on real data show how useful a model trained on them is.\n");
   }
 

@@ -81,7 +81,7 @@ std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const
 
 struct Exported {
   std::filesystem::path folder;
-  std::size_t scenes = 0;
+  std::size_t scenes = 0, divided_scenes = 0;  // divided: with pings in two or three splits, because Split::by permits it
   std::array<std::uint64_t, 3> pings{};
 };
 /// Writes the folder `folder` or `coco` into a set that is complete. Errors: usage if the folder exists, or Split::by has an

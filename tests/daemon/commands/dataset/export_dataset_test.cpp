@@ -109,7 +109,6 @@ TEST_F(ExportDataset, NoSceneIsInTwoSplits) {
   ASSERT_TRUE(make("set"));
   const auto done = export_dataset(job_, folder_ / "set", ExportForm::coco, *parse_split("50,25,25", "bed_seed"));
   ASSERT_TRUE(done) << done.error().text;
-  EXPECT_EQ(done->scenes, 3u);
   std::map<std::string, std::set<std::string>> splits_of_bed;
   std::size_t images = 0;
   for (const std::string split : {"train", "val", "test"}) {
@@ -124,6 +123,29 @@ TEST_F(ExportDataset, NoSceneIsInTwoSplits) {
   EXPECT_EQ(images, 14u);
   ASSERT_EQ(splits_of_bed.size(), 3u);
   for (const auto& [bed, splits] : splits_of_bed) EXPECT_EQ(splits.size(), 1u) << "bed " << bed;
+  EXPECT_EQ(done->divided_scenes, 0u);
+  EXPECT_THAT(contents("set/coco/README.md"), HasSubstr("Pings with equal bed_seed are in one split. None of the " +
+                                                        std::to_string(done->scenes) + " scenes is"));
+}
+
+// A draw of the sonar, not of the scene, separates pings of equal scenes.
+TEST_F(ExportDataset, TheCardCountsScenesThatADrawDivides) {
+  ASSERT_TRUE(make("set"));
+  const auto whole = export_dataset(job_, folder_ / "set", ExportForm::coco, *parse_split("50,25,25", ""));
+  const auto done = export_dataset(job_, folder_ / "set", ExportForm::folder, *parse_split("50,25,25", "heading"));
+  ASSERT_TRUE(whole && done);
+  std::map<std::string, std::set<std::string>> splits_of_scene;
+  for (const std::string split : {"train", "val", "test"})
+    for (const auto& file : std::filesystem::directory_iterator(folder_ / "set/folder" / split / "samples"))
+      splits_of_scene[draw_ping(job_, std::stoull(file.path().stem()))->scene_key].insert(split);
+  const auto divided = std::ranges::count_if(splits_of_scene, [](const auto& scene) { return scene.second.size() > 1; });
+  ASSERT_GT(divided, 0);
+  EXPECT_EQ(done->scenes, splits_of_scene.size());
+  EXPECT_EQ(done->divided_scenes, static_cast<std::size_t>(divided));
+  EXPECT_EQ(std::make_pair(whole->scenes, whole->divided_scenes), std::make_pair(done->scenes, std::size_t{0}));
+  EXPECT_THAT(contents("set/coco/README.md"), HasSubstr("\nNone of the " + std::to_string(done->scenes) + " scenes is in two"));
+  EXPECT_THAT(contents("set/folder/README.md"), HasSubstr("Of the " + std::to_string(done->scenes) + " scenes " +
+                                                          std::to_string(divided) + " have pings in two or"));
 }
 
 // The fields of the published format (cocodataset.org, "Data format": object detection) with their types.
