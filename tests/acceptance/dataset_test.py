@@ -106,6 +106,9 @@ class Dataset(unittest.TestCase):
 
     def test_exports_stand_beside_the_shards(self):
         self.job.write_text(small_job(6, 3), encoding="utf-8")
+        result = run(SONARD, "dataset", self.job, "--out", self.path / "set", "--export", "coco", "--split-by", "bed_sed")
+        self.assertEqual((result.returncode, 'did you mean "bed_seed"' in result.stderr), (64, True), result.stderr)
+        self.assertFalse((self.path / "set").exists(), "a mistake is found before the set is made")
         words = self.make("set", "--export", "coco", "--split", "60,20,20", "--split-by", "bed_seed")
         self.assertRegex(words, r"set/coco: train \d, val \d, test \d pings of \d scenes")
         ids = []

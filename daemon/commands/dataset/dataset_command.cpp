@@ -69,6 +69,9 @@ Result<int> run_dataset(const DatasetCommand& command) {
   if (!split) return tl::make_unexpected(split.error());
   const auto job = load_job(command.job);
   if (!job) return tl::make_unexpected(job.error());
+  const ExportForm form = command.export_form == "coco" ? ExportForm::coco : ExportForm::folder;
+  if (!command.export_form.empty())
+    if (const auto able = check_export(*job, command.out, form, *split); !able) return tl::make_unexpected(able.error());
   options.stop = &stopping;
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, on_stop);
   const auto begin = Clock::now();
@@ -98,7 +101,6 @@ Result<int> run_dataset(const DatasetCommand& command) {
   if (command.export_form.empty()) return 0;
   if (!done->whole)
     return failure(ErrorKind::usage, "--export needs a complete set: " + shard_name(done->missing.value_or(0)) + " is missing");
-  const ExportForm form = command.export_form == "coco" ? ExportForm::coco : ExportForm::folder;
   const auto exported = export_dataset(*job, command.out, form, *split);
   if (!exported) return tl::make_unexpected(exported.error());
   if (!command.quiet) say_exported(*exported, command);

@@ -33,6 +33,17 @@ std::vector<std::string> words_of(const std::string& list) {
   return words;
 }
 
+path export_folder(const path& set, ExportForm form) {
+  return set / std::string(export_form_names[static_cast<std::size_t>(form)]);
+}
+
+tl::unexpected<Error> unknown_draw(const DatasetJob& job, const std::string& name) {
+  std::vector<std::string_view> names;
+  for (const Variation& v : job.variations) names.push_back(v.name);
+  return failure(ErrorKind::usage,
+                 "--split-by " + name + ": the job draws no such value" + text::suggestion(name, names, "values"));
+}
+
 /// Writes one export, under a temporary name until it is complete.
 class Export {
  public:
@@ -41,15 +52,14 @@ class Export {
         set_(set),
         form_(form),
         split_(split),
-        folder_(set / std::string(export_form_names[static_cast<std::size_t>(form)])),
+        folder_(export_folder(set, form)),
         unfinished_(folder_.string() + ".unfinished") {}
 
   // An unfinished export of an earlier run is removed. The folder gets its name when it is complete.
   Result<Exported> run() {
-    std::error_code ec;
-    if (std::filesystem::exists(folder_, ec))
-      return failure(ErrorKind::usage, folder_.string() + " exists already; remove it to export again");
+    if (const auto able = check_export(job_, set_, form_, split_); !able) return tl::make_unexpected(able.error());
     if (const auto done = find_splits(); !done) return tl::make_unexpected(done.error());
+    std::error_code ec;
     std::filesystem::remove_all(unfinished_, ec);
     for (const auto step : {&Export::make_folders, &Export::unpack, &Export::write_annotations, &Export::write_card})
       if (const auto done = (this->*step)(); !done) return tl::make_unexpected(done.error());
@@ -82,7 +92,7 @@ class Export {
         const std::string scene = image["scene"].get<std::string>();
         std::string group = split_.by.empty() ? scene : "";
         for (const std::string& name : split_.by) {
-          if (!image["draws"].contains(name)) return unknown_draw(name);
+          if (!image["draws"].contains(name)) return unknown_draw(job_, name);
           group += image["draws"][name].dump() + ",";
         }
         const auto [place, is_new] = known.try_emplace(group, groups.size());
@@ -99,13 +109,6 @@ class Export {
       return std::ranges::any_of(scene.second, [&](std::size_t group) { return splits[group] != first; });
     }));
     return {};
-  }
-
-  tl::unexpected<Error> unknown_draw(const std::string& name) const {
-    std::vector<std::string_view> names;
-    for (const Variation& v : job_.variations) names.push_back(v.name);
-    return failure(ErrorKind::usage,
-                   "--split-by " + name + ": the job draws no such value" + text::suggestion(name, names, "values"));
   }
 
   Result<void> make_folders() {
@@ -252,6 +255,8 @@ Result<Split> parse_split(const std::string& shares, const std::string& by) {
       return failure(ErrorKind::usage, "--split " + shares + " is not three shares of train, val and test, such as 80,10,10");
   }
   split.by = words_of(by);
+  if (std::ranges::find(split.by, "") != split.by.end())
+    return failure(ErrorKind::usage, "--split-by " + by + " has an empty name: give names of draws, such as bed_seed,coat");
   return split;
 }
 
@@ -287,6 +292,15 @@ std::vector<std::size_t> splits_of(const std::vector<std::string>& scenes, const
   for (std::size_t s = 0, at = 0; s < count.size(); ++s)
     for (std::size_t i = 0; i < count[s]; ++i) splits[order[at++].second] = s;
   return splits;
+}
+
+Result<void> check_export(const DatasetJob& job, const path& set, ExportForm form, const Split& split) {
+  std::error_code ec;
+  if (const path folder = export_folder(set, form); std::filesystem::exists(folder, ec))
+    return failure(ErrorKind::usage, folder.string() + " exists already; remove it to export again");
+  for (const std::string& name : split.by)
+    if (std::ranges::find(job.variations, name, &Variation::name) == job.variations.end()) return unknown_draw(job, name);
+  return {};
 }
 
 Result<Exported> export_dataset(const DatasetJob& job, const path& set, ExportForm form, const Split& split) {

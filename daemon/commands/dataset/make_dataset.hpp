@@ -84,8 +84,9 @@ struct Exported {
   std::size_t scenes = 0, divided_scenes = 0;  // divided: with pings in two or three splits, because Split::by permits it
   std::array<std::uint64_t, 3> pings{};
 };
-/// Writes the folder `folder` or `coco` into a set that is complete. Errors: usage if the folder exists, or Split::by has an
-/// unknown name; io; bad_data.
+/// Checks what can be checked before the set is made. Error usage: the folder exists, or Split::by has an unknown name.
+Result<void> check_export(const DatasetJob& job, const std::filesystem::path& set, ExportForm form, const Split& split);
+/// Writes the folder `folder` or `coco` into a set that is complete. Errors: those of check_export(), io, bad_data.
 Result<Exported> export_dataset(const DatasetJob& job, const std::filesystem::path& set, ExportForm form, const Split& split);
 
 }  // namespace sonar::dataset

@@ -234,6 +234,7 @@ TEST_F(ExportDataset, RefusalsHaveAReason) {
   EXPECT_THAT(parse_split("80,20", "").error().text, HasSubstr("three shares"));
   EXPECT_FALSE(parse_split("80,-10,30", ""));
   EXPECT_FALSE(parse_split("0,0,0", ""));
+  EXPECT_THAT(parse_split("", "bed_seed,").error().text, HasSubstr("has an empty name"));
   const auto unknown = export_dataset(job_, folder_ / "set", ExportForm::coco, *parse_split("", "bed_sed"));
   EXPECT_THAT(unknown.error().text, HasSubstr("did you mean \"bed_seed\""));
   ASSERT_TRUE(export_dataset(job_, folder_ / "set", ExportForm::coco, {}));
