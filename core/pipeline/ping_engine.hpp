@@ -26,7 +26,7 @@ struct EngineOptions {
 
 enum class Stage { specular, multipath, cull, build_cells, trace, scatter, synthesize, noise, form_beams, receive, stages };
 inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::stages)> stage_names{
-    "specular", "multipath", "cull", "build cells", "trace", "scatter", "synthesize", "noise", "couple", "receive"};
+    "specular", "multipath", "cull", "build cells", "trace", "scatter", "synthesize", "noise", "form beams", "receive"};
 
 /// Counts and times of one ping, for the benchmark. Times stay 0 without a clock.
 struct PingStatistics {

@@ -30,7 +30,7 @@ GOALS = {
     "P4b": (25, {"avx512": 80, "avx2": 30}),
 }
 # Thread ms of the prototype's stages for P1 (2 processors with AVX-512), from which the goal was derived.
-FLOOR = {"trace": 2.9 + 0.44, "cull": 0.09, "scatter": 1.9, "synthesize": 1.4, "noise": 0.17, "couple": 0.42, "receive": 0.2}
+FLOOR = {"trace": 2.9 + 0.44, "cull": 0.09, "scatter": 1.9, "synthesize": 1.4, "noise": 0.17, "form beams": 0.42, "receive": 0.2}
 NAME = "benchmarks"  # of both pages
 PEER = "## Beside a peer"  # a chapter that is written by hand
 # Reasons for the cost of a ping, by the quantity that grows.

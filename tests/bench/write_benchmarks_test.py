@@ -1,5 +1,6 @@
 """The pages of benchmarks agree with the results: verdicts, missing parts, and pictures that are valid XML."""
 
+import re
 import unittest
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -15,6 +16,15 @@ def result(case, threads, rate):
 
 
 TIMES = {"min_ms": 1.0, "median_ms": 2.0, "p90_ms": 3.0, "p95_ms": 3.5, "p99_ms": 4.0, "max_ms": 5.0}
+
+
+class Stages(unittest.TestCase):
+    def test_stages_are_named_as_in_the_program(self):
+        header = (Path(__file__).resolve().parents[2] / "core/pipeline/ping_engine.hpp").read_text(encoding="utf-8")
+        enumerators = re.search(r"enum class Stage \{([^}]*), stages \};", header)[1].split(", ")
+        names = re.findall(r'"([^"]*)"', re.search(r"stage_names\{([^}]*)\};", header)[1])
+        self.assertEqual(names, [name.strip().replace("_", " ") for name in enumerators])
+        self.assertLessEqual(set(write_benchmarks.FLOOR), set(names))
 
 
 class Page(unittest.TestCase):

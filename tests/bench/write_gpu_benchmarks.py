@@ -37,7 +37,7 @@ def alone(results):
            "device's events, and tiles and points with the processor's clock. The rest of the median is copying, launching and "
            "waiting.")
     yield ""
-    stages = ["cull", "build cells", "specular", "trace", "scatter", "synthesize", "noise", "couple", "receive", "frame"]
+    stages = ["cull", "build cells", "specular", "trace", "scatter", "synthesize", "noise", "form beams", "receive", "frame"]
     rows = []
     for r in by_device:
         floor, goal = FLOORS.get(r["case"], (0, 0))

@@ -10,7 +10,7 @@ import unittest
 import write_gpu_benchmarks
 
 TIMES = {"median_ms": 2.0, "p99_ms": 4.0}
-STAGES = {s: 0.1 for s in ("cull", "build cells", "specular", "multipath", "trace", "scatter", "synthesize", "noise", "couple", "receive",
+STAGES = {s: 0.1 for s in ("cull", "build cells", "specular", "multipath", "trace", "scatter", "synthesize", "noise", "form beams", "receive",
                            "frame")}
 
 

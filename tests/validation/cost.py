@@ -13,7 +13,7 @@ RUNS = [
     ("300 fixed rays, our pulse and beams", ["--fixed-fan", "300"]),
     ("default: surface cells", []),
 ]
-STAGES = [("cull", "build cells", "trace", "scatter"), ("synthesize", "noise"), ("couple",), ("receive",)]
+STAGES = [("cull", "build cells", "trace", "scatter"), ("synthesize", "noise"), ("form beams",), ("receive",)]
 PINGS = 30
 
 
