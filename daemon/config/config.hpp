@@ -14,7 +14,7 @@
 #include "core/base/geodesy.hpp"
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
-#include "core/motion/playback.hpp"
+#include "core/motion/trajectory.hpp"
 #include "core/pipeline/ping_engine.hpp"
 #include "core/sonar/water.hpp"
 #include "daemon/config/addresses.hpp"

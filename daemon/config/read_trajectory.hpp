@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "core/motion/playback.hpp"
+#include "core/motion/trajectory.hpp"
 #include "core/motion/trajectory_file.hpp"
 #include "core/text/strict_yaml.hpp"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/motion/playback.hpp"
+#include "core/motion/trajectory.hpp"
 #include "protocol/foxglove/foxglove_frames.hpp"
 #include "protocol/recording/recording.hpp"
 

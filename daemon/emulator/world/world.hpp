@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/motion/playback.hpp"
+#include "core/motion/trajectory.hpp"
 #include "core/sonar/ping.hpp"
 #include "daemon/emulator/world/pose_history.hpp"
 #include "protocol/control/operations.hpp"

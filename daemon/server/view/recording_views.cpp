@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "core/motion/playback.hpp"
+#include "core/motion/trajectory.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/emulator/view/recording_player.hpp"
 #include "daemon/server/view/view_messages.hpp"

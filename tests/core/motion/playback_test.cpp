@@ -1,5 +1,5 @@
 // Position of a playback at a given time: exact in nanoseconds, also with loops, pauses and seeks.
-#include "core/motion/playback.hpp"
+#include "core/motion/trajectory.hpp"
 
 #include <gtest/gtest.h>
 
