@@ -9,6 +9,10 @@
 
 #include "protocol/vendor.hpp"
 
+namespace sonar::v1 {
+class FaultKind;
+class Trouble;
+}  // namespace sonar::v1
 namespace sonar {
 
 /// The stage at which a fault acts; active faults act in this order.
@@ -142,5 +146,12 @@ struct Trouble {
   std::array<Part, 4> parts = {};  // unused parts have no code
 };
 std::span<const Trouble> troubles();
+
+// Fills messages with the table of faults, for reports of the daemon and for sonarctl if no daemon runs.
+
+/// Fills all fields except `without_effect`.
+void fill(v1::FaultKind& out, const FaultKind& kind);
+/// Fills the name, the sentence and the codes.
+void fill(v1::Trouble& out, const Trouble& trouble);
 
 }  // namespace sonar

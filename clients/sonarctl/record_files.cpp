@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 
 namespace sonar::clients {
 

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "protocol/control/json_checks.hpp"
-#include "protocol/control/refused.hpp"
+#include "protocol/control/control_json.hpp"
 
 namespace sonar::control {
 namespace {

@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "core/base/units.hpp"
+#include "protocol/control/answers.hpp"
 #include "protocol/control/messages.hpp"
-#include "protocol/control/refused.hpp"
 
 namespace sonar::control {
 namespace {

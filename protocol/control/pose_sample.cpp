@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "protocol/control/refused.hpp"
-
 namespace sonar::control {
 namespace {
 

@@ -7,11 +7,15 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "core/base/geometry.hpp"
 #include "core/base/result.hpp"
 
 namespace sonar::control {
+
+/// Returns the error with which readers of the control protocol refuse their input.
+inline tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::bad_data, std::move(text)); }
 
 /// An orientation quaternion whose length differs from 1 by more than this is refused.
 inline constexpr double largest_norm_error = 1e-3;

@@ -5,8 +5,8 @@
 #include <array>
 #include <charconv>
 
+#include "protocol/control/answers.hpp"
 #include "protocol/control/messages.hpp"
-#include "protocol/control/refused.hpp"
 
 namespace sonar::control {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
+#include "protocol/dvl/dialogue.hpp"
 #include "protocol/dvl/dvl.hpp"
 #include "protocol/dvl/reports.hpp"
-#include "protocol/dvl/session.hpp"
 
 namespace sonar::dvl {
 namespace {

@@ -16,7 +16,7 @@
 #include "core/base/units.hpp"
 #include "core/image/sonar_picture.hpp"
 #include "core/sonar/ping.hpp"
-#include "protocol/doctor/check_status.hpp"
+#include "protocol/doctor/judge.hpp"
 #include "protocol/foxglove/foxglove_words.hpp"
 #include "protocol/wire/wire.hpp"
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "protocol/control/json_checks.hpp"
+#include "protocol/control/control_json.hpp"
 
 namespace sonar::foxglove {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "protocol/m3/m3.hpp"
 #include "protocol/m3/settings.hpp"
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 
 namespace sonar::m3 {
 namespace {

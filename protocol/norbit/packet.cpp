@@ -7,7 +7,7 @@
 #include "core/sonar/detections.hpp"
 #include "core/sonar/ping.hpp"
 #include "protocol/norbit/settings.hpp"
-#include "protocol/recorded/zlib.hpp"
+#include "protocol/recorded/byte_source.hpp"
 
 namespace sonar::norbit {
 namespace {

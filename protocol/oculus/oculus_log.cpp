@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "protocol/oculus/framer.hpp"
-#include "protocol/recorded/zlib.hpp"
+#include "protocol/recorded/byte_source.hpp"
 
 namespace sonar::recording {
 namespace {

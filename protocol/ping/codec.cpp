@@ -4,11 +4,11 @@
 #include <initializer_list>
 
 #include "protocol/ping/messages.hpp"
-#include "protocol/ping/ping1d_settings.hpp"
+#include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping360_settings.hpp"
 #include "protocol/ping/ping_log.hpp"
 #include "protocol/ping/products.hpp"
-#include "protocol/ping/s500_settings.hpp"
+#include "protocol/ping/s500.hpp"
 
 namespace sonar::ping {
 namespace {

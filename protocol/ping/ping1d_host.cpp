@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "core/text/format.hpp"
-#include "protocol/ping/ping1d_settings.hpp"
+#include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping_host.hpp"
 #include "protocol/ping/products.hpp"
 

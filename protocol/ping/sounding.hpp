@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "protocol/ping/conversation.hpp"
 #include "protocol/ping/echo.hpp"
-#include "protocol/ping/streaming.hpp"
 
 namespace sonar::ping {
 

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 
+#include "protocol/recorded/byte_source.hpp"
 #include "protocol/recorded/recorded_message.hpp"
 
 namespace sonar::recording {
@@ -82,5 +84,13 @@ class JunkReport {
   std::uint64_t count_ = 0;
   std::string place_;
 };
+
+// The plain byte stream of a device: successive messages without times (docs/recording.md).
+
+/// Reads a raw dump. Errors: bad_data if the source does not begin with a message of this framing. `framing` must outlive the
+/// reader.
+Result<std::unique_ptr<RecordingReader>> read_raw_dump(std::unique_ptr<Source> source, const Framing& framing);
+/// Writes all bytes that the device sent with the carrier `by`, and nothing else.
+std::unique_ptr<RecordingWriter> write_raw_dump(std::unique_ptr<Sink> sink, Carrier by = Carrier::stream);
 
 }  // namespace sonar::recording

@@ -5,7 +5,7 @@
 #include <variant>
 
 #include "core/text/ipv4.hpp"
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 

@@ -1,7 +1,7 @@
 // The messages and files of Water Linked sonars, for recordings.
 #include <array>
 
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/waterlinked/messages.hpp"
 #include "protocol/waterlinked/settings.hpp"
 #include "protocol/waterlinked/sonar_file.hpp"

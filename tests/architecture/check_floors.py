@@ -14,7 +14,7 @@ MAKE_FOLDERS = ("aris", "blueview", "dvl", "m3", "micron", "norbit", "oculus", "
 DEVICE = ["core/base/", "core/image/sonar_picture.hpp", "core/sonar/", "core/text/", "protocol/awaited_ping.hpp", "protocol/dialogue.hpp",
           "protocol/held_settings.hpp", "protocol/host.hpp", "protocol/limits.hpp",
           "protocol/message_fields.hpp", "protocol/recorded/", "protocol/serial_line.hpp",
-          "protocol/line_pictures.hpp", "protocol/transport.hpp", "protocol/vendor.hpp", "protocol/wire/"]
+          "protocol/line_pictures.hpp", "protocol/vendor.hpp", "protocol/wire/"]
 # Folder -> prefixes of our own files it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
@@ -65,7 +65,7 @@ DEPENDENCIES = {
     r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
     r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp", "core/image/raster.cpp"],
     r"tiffio\.h": ["core/scene/files/geo_tiff.cpp", "core/scene/files/tiff_file.cpp"],
-    r"zlib\.h": ["protocol/blueview/frames.cpp", "protocol/waterlinked/messages.cpp", "protocol/recorded/zlib.cpp", "clients/bvtsdk/", "core/image/"],
+    r"zlib\.h": ["protocol/blueview/frames.cpp", "protocol/waterlinked/messages.cpp", "protocol/recorded/byte_source.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
     r"boost/asio\.hpp": ["daemon/server/system/asio.hpp"],
     r"spdlog/|fmt/": ["daemon/", "clients/"],

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "tests/example_make/example.hpp"
 #include "tests/example_make/messages.hpp"
 

@@ -2,7 +2,7 @@
 #include "protocol/oculus/messages.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/oculus_log.hpp"
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "protocol/oculus/fire.hpp"
-#include "protocol/ping/omniscan_settings.hpp"
-#include "protocol/ping/surveyor_settings.hpp"
+#include "protocol/ping/omniscan.hpp"
+#include "protocol/ping/surveyor.hpp"
 #include "protocol/vendor.hpp"
 #include "tests/protocol/blueview/blueview_testing.hpp"
 

@@ -8,7 +8,7 @@
 #include "clients/sonarctl/control/status_text.hpp"
 #include "core/text/arguments.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/fault_report.hpp"
+#include "protocol/fault_kinds.hpp"
 
 namespace sonar::clients {
 namespace {

@@ -4,7 +4,7 @@
 #include "clients/sonarctl/doctor/checks.hpp"
 #include "core/text/format.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/doctor/check_status.hpp"
+#include "protocol/doctor/judge.hpp"
 
 namespace sonar::clients::doctor {
 namespace {

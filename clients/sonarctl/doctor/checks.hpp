@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "clients/sonarctl/doctor/facts.hpp"
-#include "protocol/doctor/check_status.hpp"
+#include "protocol/doctor/judge.hpp"
 
 namespace sonar::clients::doctor {
 

@@ -7,7 +7,7 @@
 #include "daemon/config/fault_support.hpp"
 #include "daemon/server/operations/operation_results.hpp"
 #include "protocol/control/answers.hpp"
-#include "protocol/fault_report.hpp"
+#include "protocol/fault_kinds.hpp"
 
 namespace sonar {
 namespace {

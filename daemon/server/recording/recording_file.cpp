@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar {

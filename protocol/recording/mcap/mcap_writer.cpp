@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "protocol/recorded/zlib.hpp"
+#include "protocol/recorded/byte_source.hpp"
 
 namespace sonar::recording::mcap {
 

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "protocol/recording/mcap/mcap_records.hpp"
+#include "protocol/recording/mcap/mcap_reader.hpp"
 
 namespace sonar::recording::mcap {
 

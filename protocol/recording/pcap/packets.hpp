@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <compare>
 #include <cstdint>
+#include <deque>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/base/units.hpp"
 #include "protocol/recorded/byte_source.hpp"
 #include "protocol/recorded/recorded_message.hpp"
 #include "protocol/wire/wire.hpp"
@@ -72,8 +75,7 @@ inline std::uint32_t u32_at(wire::BytesView bytes, std::size_t offset, wire::End
   return number_at<std::uint32_t>(bytes, offset, endian);
 }
 
-// Extracts the TCP segment or UDP datagram of a captured packet. Second step of reading a capture; tcp_stream.hpp orders
-// segments.
+// Extracts the TCP segment or UDP datagram of a captured packet. Second step of reading a capture; TcpStream orders segments.
 
 struct IpEnd {
   std::uint32_t address = 0;  // such as 0x7F000002 for 127.0.0.2
@@ -103,5 +105,49 @@ bool begins_fragments(std::uint32_t link_type, wire::BytesView packet);
 
 /// True for link types that parse_packet supports.
 bool is_known_link_type(std::uint32_t link_type);
+
+// Reassembles one direction of a TCP connection: drops retransmitted bytes, holds early segments, reports lost segments. Third
+// step of reading a capture; its output goes to a MessageSplitter.
+
+class TcpStream {
+ public:
+  static constexpr std::size_t most_waiting_bytes = 8u << 20;  // early segments; beyond this the missing bytes count as lost
+  static constexpr std::size_t most_waiting = 8192;
+
+  struct Run {
+    Time at{};
+    wire::Bytes bytes;
+    std::uint64_t missing_before = 0;  // bytes that the capture lacks here
+    bool from_middle = false;          // true: the capture began after the start of the connection
+  };
+
+  /// Adds a segment. `sequence`: the sequence number of its first byte or, in a SYN, of the SYN.
+  void add(Time at, std::uint32_t sequence, wire::BytesView payload, bool syn);
+  /// Ends the connection or the capture: releases held segments.
+  void finish();
+  std::optional<Run> next();
+  /// Returns the memory of early segments, including overhead.
+  std::size_t held_bytes() const { return waiting_bytes_ + waiting_.size() * 128; }
+  /// True if a SYN with this number begins another connection.
+  bool is_other(std::uint32_t syn_sequence) const { return begun_ && (!saw_syn_ || first_ != syn_sequence + 1); }
+
+ private:
+  struct Early {
+    Time at{};
+    wire::Bytes bytes;
+  };
+  void begin(std::uint32_t sequence, bool syn);
+  void give(Time at, wire::BytesView bytes);
+  void give_what_follows();
+  void skip_to_first_waiting();
+
+  bool begun_ = false, saw_syn_ = false, from_middle_ = false;
+  std::uint32_t first_ = 0;     // sequence number of the first byte
+  std::uint64_t position_ = 0;  // position of the next byte, counted from the first
+  std::uint64_t missing_ = 0;
+  std::map<std::uint64_t, Early> waiting_;
+  std::size_t waiting_bytes_ = 0;
+  std::deque<Run> ready_;
+};
 
 }  // namespace sonar::recording

@@ -6,7 +6,6 @@
 #include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/pcap/packets.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
-#include "protocol/recording/pcap/tcp_stream.hpp"
 #include "protocol/sender.hpp"
 
 namespace sonar::recording {

@@ -16,7 +16,7 @@
 #include "daemon/commands/replay/requested_replay.hpp"
 #include "protocol/ping/messages.hpp"
 #include "protocol/ping/ping_log.hpp"
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/recording.hpp"
 
 namespace sonar::requested_replay_test {

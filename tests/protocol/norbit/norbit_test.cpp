@@ -6,7 +6,7 @@
 
 #include "core/image/draw_picture.hpp"
 #include "protocol/norbit/norbit.hpp"
-#include "protocol/recorded/zlib.hpp"
+#include "protocol/recorded/byte_source.hpp"
 #include "tests/protocol/norbit/norbit_testing.hpp"
 
 namespace sonar::norbit {

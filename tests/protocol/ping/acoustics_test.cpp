@@ -5,11 +5,11 @@
 #include <cmath>
 #include <tuple>
 
-#include "protocol/ping/omniscan_settings.hpp"
-#include "protocol/ping/ping1d_settings.hpp"
+#include "protocol/ping/omniscan.hpp"
+#include "protocol/ping/ping1d.hpp"
 #include "protocol/ping/ping360_settings.hpp"
-#include "protocol/ping/s500_settings.hpp"
-#include "protocol/ping/surveyor_settings.hpp"
+#include "protocol/ping/s500.hpp"
+#include "protocol/ping/surveyor.hpp"
 #include "tests/core/pipeline/scenes.hpp"
 #include "tests/core/pipeline/sounding.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"

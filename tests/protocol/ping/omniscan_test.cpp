@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "protocol/ping/omniscan_settings.hpp"
+#include "protocol/ping/omniscan.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
 namespace sonar::ping::omniscan {

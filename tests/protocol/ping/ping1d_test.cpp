@@ -2,7 +2,7 @@
 // the automatic mode.
 #include <gmock/gmock.h>
 
-#include "protocol/ping/ping1d_settings.hpp"
+#include "protocol/ping/ping1d.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
 namespace sonar::ping::ping1d {

@@ -7,7 +7,7 @@
 #include "protocol/ping/omniscan_messages.hpp"
 #include "protocol/ping/ping1d_messages.hpp"
 #include "protocol/ping/products.hpp"
-#include "protocol/ping/s500_settings.hpp"
+#include "protocol/ping/s500.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
 namespace sonar::ping::s500 {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "protocol/ping/products.hpp"
-#include "protocol/ping/surveyor_settings.hpp"
+#include "protocol/ping/surveyor.hpp"
 #include "tests/protocol/ping/ping_testing.hpp"
 
 namespace sonar::ping::surveyor {

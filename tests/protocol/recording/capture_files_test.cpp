@@ -2,7 +2,6 @@
 // pcapng.
 #include "protocol/ping/messages.hpp"
 #include "protocol/recording/pcap/packets.hpp"
-#include "protocol/recording/pcap/tcp_stream.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::tests {

@@ -4,7 +4,7 @@
 
 #include "protocol/foxglove/foxglove_messages.hpp"
 #include "protocol/oculus/decode.hpp"
-#include "protocol/recorded/zlib.hpp"
+#include "protocol/recorded/byte_source.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::tests {

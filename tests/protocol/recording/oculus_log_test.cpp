@@ -1,7 +1,7 @@
 // .oculus log files, compared byte by byte with those of other programs.
 #include <zlib.h>
 
-#include "protocol/recorded/zlib.hpp"
+#include "protocol/recorded/byte_source.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"
 
 namespace sonar::recording::tests {

@@ -13,7 +13,7 @@
 #include "protocol/oculus/encode_ping.hpp"
 #include "protocol/oculus/fire.hpp"
 #include "protocol/oculus/oculus_log.hpp"
-#include "protocol/recorded/raw_dump.hpp"
+#include "protocol/recorded/message_splitter.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "protocol/recording/pcap/pcap.hpp"
 #include "protocol/recording/recording.hpp"

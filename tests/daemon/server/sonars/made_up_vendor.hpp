@@ -1,4 +1,4 @@
-// A made-up make of sonar with a port of every kind, to test the transports of protocol/transport.hpp end to end.
+// A made-up make of sonar with a port of every kind, to test the transports of protocol/vendor.hpp end to end.
 #pragma once
 
 #include "protocol/vendor.hpp"
