@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "core/base/regular_file.hpp"
-#include "daemon/config/effective_switches.hpp"
+#include "daemon/config/products.hpp"
 #include "daemon/config/scene_file.hpp"
 
 namespace sonar {

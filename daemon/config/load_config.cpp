@@ -11,7 +11,7 @@
 #include "core/text/strict_yaml.hpp"
 #include "daemon/config/config_parts.hpp"
 #include "daemon/config/products.hpp"
-#include "daemon/config/read_trajectory.hpp"
+#include "daemon/config/scene_file.hpp"
 #include "protocol/host.hpp"
 
 namespace sonar {

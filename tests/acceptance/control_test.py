@@ -92,7 +92,7 @@ class Page(unittest.TestCase):
 
     def test_every_path_has_an_example(self):
         paths = " ".join(parse(e)[2] for e in examples())
-        rules = (ROOT / "daemon/server/http/http_rules.cpp").read_text(encoding="utf-8")
+        rules = (ROOT / "daemon/server/http/http_router.cpp").read_text(encoding="utf-8")
         operations = re.findall(r'"(\w+)"', re.search(r" operations = \{(.*?)\};", rules, re.S)[1])
         self.assertGreater(len(operations), 10)
         for name in [*operations, "status", "events", "sonars", "objects", "faults", "faults/kinds", "faults/journal", "faults/reset"]:

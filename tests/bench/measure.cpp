@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "core/paper/paper_engine.hpp"
-#include "daemon/config/effective_switches.hpp"
+#include "daemon/config/products.hpp"
 #include "daemon/emulator/sonar/ping_request.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
 #include "tests/bench/parts.hpp"

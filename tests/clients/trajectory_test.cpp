@@ -1,5 +1,5 @@
 // Paths of `sonarctl pose`: places, directions and speeds at times where they are known.
-#include "clients/sonarctl/trajectory.hpp"
+#include "clients/sonarctl/pose.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/text/format.hpp"
-#include "daemon/emulator/connections/metrics.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
 #include "tests/is_sanitized.hpp"
 #include "tests/load/ping_reader.hpp"
 #include "tests/reliability/record.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/emulator/connections/metrics.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
 
 namespace sonar::load {
 

@@ -7,7 +7,7 @@
 #include <array>
 #include <thread>
 
-#include "daemon/server/system/process_figures.hpp"
+#include "daemon/server/control/prometheus.hpp"
 #include "tests/load/load_case.hpp"
 #include "tests/load/load_daemon.hpp"
 

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/server/system/process_figures.hpp"
+#include "daemon/server/control/prometheus.hpp"
 #include "tests/load/load_case.hpp"
 #include "tests/load/load_daemon.hpp"
 

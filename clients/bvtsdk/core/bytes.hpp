@@ -4,7 +4,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -97,5 +99,12 @@ class Reader {
   std::size_t at_ = 0;
   bool ok_ = true;
 };
+
+// A pointer to a C stream that closes the stream when it is destroyed.
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
 
 }  // namespace sonar::bvt

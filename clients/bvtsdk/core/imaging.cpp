@@ -7,7 +7,7 @@
 #include <limits>
 #include <new>
 
-#include "clients/bvtsdk/core/degrees.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
 
 namespace sonar::bvt {
 namespace {

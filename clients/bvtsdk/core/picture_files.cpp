@@ -3,7 +3,6 @@
 
 #include "clients/bvtsdk/core/bytes.hpp"
 #include "clients/bvtsdk/core/colour_maps.hpp"
-#include "clients/bvtsdk/core/file.hpp"
 
 namespace sonar::bvt {
 namespace {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/bvtsdk/core/degrees.hpp"
 #include "clients/bvtsdk/core/frame.hpp"
 
 namespace sonar::bvt {

@@ -11,6 +11,10 @@
 
 namespace sonar::bvt {
 
+// The interface of the libraries has angles in degrees; the code inside uses radians.
+
+inline constexpr double degrees = 57.29577951308232;  // degrees in a radian
+
 /// The samples of a ping, beam after beam; at least 2 beams and 2 bins.
 struct PolarGrid {
   const std::uint16_t* samples = nullptr;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <new>
 
-#include "clients/bvtsdk/core/degrees.hpp"
+#include "clients/bvtsdk/core/polar_ping.hpp"
 
 namespace sonar::bvt {
 namespace {

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "clients/bvtsdk/core/bytes.hpp"
 #include "clients/bvtsdk/core/codes.hpp"
-#include "clients/bvtsdk/core/file.hpp"
 #include "clients/bvtsdk/core/frame.hpp"
 #include "clients/bvtsdk/core/polar_ping.hpp"
 

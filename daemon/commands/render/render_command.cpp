@@ -16,7 +16,6 @@
 #include "daemon/commands/render/coverage.hpp"
 #include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/render_pings.hpp"
-#include "daemon/config/effective_switches.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 

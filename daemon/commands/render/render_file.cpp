@@ -5,10 +5,9 @@
 #include "core/text/format.hpp"
 #include "core/text/strict_yaml.hpp"
 #include "daemon/commands/render/render_job.hpp"
-#include "daemon/commands/render/sonar_keys.hpp"
 #include "daemon/config/config_parts.hpp"
 #include "daemon/config/load_config.hpp"
-#include "daemon/config/read_trajectory.hpp"
+#include "daemon/config/scene_file.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 #include "protocol/host.hpp"
 

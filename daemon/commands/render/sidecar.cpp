@@ -8,7 +8,7 @@
 #include "core/pipeline/water_line.hpp"
 #include "core/sonar/range_image.hpp"
 #include "daemon/commands/options/sonar_version.hpp"
-#include "daemon/config/effective_switches.hpp"
+#include "daemon/config/products.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 #include "daemon/server/system/sha256.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "daemon/config/sonar_addresses.hpp"
 #include "daemon/emulator/connections/outbox.hpp"
-#include "daemon/server/http/http_rules.hpp"
+#include "daemon/server/http/http_router.hpp"
 #include "daemon/server/system/listen.hpp"
 #include "daemon/server/time/clock.hpp"
 

@@ -5,19 +5,73 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
-#include "daemon/commands/replay/played_pings.hpp"
+#include "core/base/result.hpp"
 #include "daemon/commands/replay/read_ahead.hpp"
 #include "daemon/commands/replay/replay_device.hpp"
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "daemon/commands/replay/replay_server.hpp"
-#include "daemon/server/connections/connection_listener.hpp"
+#include "daemon/emulator/connections/actions.hpp"
 #include "daemon/server/connections/http_connection.hpp"
+#include "daemon/server/connections/listener.hpp"
 #include "daemon/server/sonars/device.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/view/recording_views.hpp"
+#include "protocol/recorded/codec.hpp"
 
 namespace sonar {
+
+// Returns the pings of a recording for a sonar whose hosts request pings: in order or, for a mechanical scan, by direction.
+
+struct PlayedPing {
+  Time at{};
+  PartsByPort parts;
+};
+
+class PlayedPings {
+ public:
+  static constexpr std::size_t most_scan_bytes = 512u << 20;  // limit, because a scan is kept in memory
+
+  /// `codec` must have ping_part. `reader` and `codec` must outlive the object.
+  PlayedPings(recording::RecordingReader& reader, const recording::Codec& codec) : reader_(reader), codec_(codec) {}
+  /// Reads the first ping, or all lines of a scan. Errors (bad_data) name `file`: it has no ping, or a scan is too long.
+  Result<void> open(const std::string& file);
+  /// True for a mechanical scan, whose lines nearest() finds; next() returns the pings of all other recordings.
+  bool is_scan() const { return !lines_.empty(); }
+
+  /// Returns the next ping; nullopt at the end. Packets of different ports that follow each other are one ping.
+  /// If a ping has several messages, the one with the most content is returned.
+  std::optional<PlayedPing> next();
+  /// True if next() has returned the last ping.
+  bool at_end() const { return !ahead_; }
+  void rewind();
+  /// Returns the line whose direction is nearest to `head_rad`; among equally near lines, the next one after the last returned
+  /// line, cyclically.
+  const PlayedPing& nearest(double head_rad);
+
+ private:
+  struct Part {
+    Time at{};
+    recording::PingPart part;
+    recording::Bytes bytes;
+  };
+  struct Line {
+    double head_rad = 0;
+    PlayedPing ping;
+  };
+  std::optional<Part> read();
+  recording::Bytes take_richest();
+
+  recording::RecordingReader& reader_;
+  const recording::Codec& codec_;
+  std::unique_ptr<recording::MessageSplitter> splitter_;  // for a make whose stream delimits messages
+  std::optional<Part> ahead_;                             // the first part of the next ping
+  std::vector<Line> lines_;
+  std::size_t after_ = 0;  // index of the line after the last returned line
+};
 
 class RequestedReplay final : public DeviceParent {
  public:

@@ -11,7 +11,7 @@
 #include "daemon/emulator/world/world_parts.hpp"
 #include "daemon/server/connections/token.hpp"
 #include "daemon/server/engine/choose_engine.hpp"
-#include "daemon/server/faults/journal_file.hpp"
+#include "daemon/server/faults/fault_log.hpp"
 #include "daemon/server/http/page.hpp"
 #include "daemon/server/system/log.hpp"
 #include "daemon/server/system/real_time.hpp"

@@ -5,7 +5,6 @@
 #include <cstdlib>
 
 #include "daemon/commands/run/prepare_run.hpp"
-#include "daemon/config/effective_switches.hpp"
 #include "daemon/config/load_config.hpp"
 #include "daemon/config/products.hpp"
 #include "daemon/server/app.hpp"

@@ -12,7 +12,6 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/connections/actions.hpp"
-#include "daemon/emulator/connections/metrics.hpp"
 #include "daemon/emulator/connections/outbox.hpp"
 
 namespace sonar {

@@ -9,7 +9,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/connections/actions.hpp"
-#include "daemon/emulator/connections/metrics.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
 #include "daemon/emulator/faults/journal.hpp"
 #include "daemon/emulator/sonar/ping_request.hpp"
 #include "daemon/emulator/world/world.hpp"

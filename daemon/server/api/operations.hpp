@@ -7,7 +7,7 @@
 #include <string>
 
 #include "daemon/emulator/world/world.hpp"
-#include "daemon/server/time/has_left.hpp"
+#include "daemon/server/time/clock.hpp"
 #include "protocol/control/operations.hpp"
 
 namespace sonar {

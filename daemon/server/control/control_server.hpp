@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "daemon/server/connections/connection_listener.hpp"
 #include "daemon/server/connections/http_connection.hpp"
+#include "daemon/server/connections/listener.hpp"
 #include "daemon/server/control/stream_connection.hpp"
 #include "daemon/server/http/http_router.hpp"
 #include "daemon/server/http/operation_answer.hpp"

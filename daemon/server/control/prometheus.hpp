@@ -2,17 +2,26 @@
 // Operations::metrics() calls metrics_text, and docs/operations.md explains the counters.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "daemon/emulator/connections/metrics.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
 #include "daemon/emulator/view/viewer.hpp"
-#include "daemon/server/poses/link_figures.hpp"
-#include "daemon/server/system/process_figures.hpp"
+#include "daemon/server/poses/pose_intake.hpp"
 
 namespace sonar {
+
+// Measures memory, descriptors, threads and processor time of this process, for /metrics and the status.
+
+struct ProcessFigures {
+  std::uint64_t resident_bytes = 0, open_descriptors = 0, descriptor_limit = 0, threads = 0;
+  double processor_s = 0;
+};
+/// Reads /proc; unreadable values are 0.
+ProcessFigures figures_of_this_process();
 
 /// Writes families in sequence: the head of a family, then all its samples.
 class PrometheusText {

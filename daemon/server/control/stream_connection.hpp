@@ -12,7 +12,7 @@
 #include "daemon/server/api/operations.hpp"
 #include "daemon/server/connections/connection_services.hpp"
 #include "daemon/server/connections/input_rate.hpp"
-#include "daemon/server/http/http_rules.hpp"
+#include "daemon/server/http/http_router.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "protocol/control/control.hpp"
 

@@ -7,7 +7,6 @@
 
 #include "core/text/decimal.hpp"
 #include "daemon/server/http/http_router.hpp"
-#include "daemon/server/http/http_rules.hpp"
 
 namespace sonar {
 namespace {

@@ -12,7 +12,6 @@
 #include "daemon/config/config.hpp"
 #include "daemon/emulator/connections/actions.hpp"
 #include "daemon/server/connections/port_guard.hpp"
-#include "daemon/server/poses/link_figures.hpp"
 #include "daemon/server/poses/pose_intake.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/log.hpp"

@@ -11,7 +11,7 @@
 
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"
-#include "daemon/server/connections/connection_slots.hpp"
+#include "daemon/server/connections/connection_services.hpp"
 #include "daemon/server/connections/input_rate.hpp"
 #include "daemon/server/connections/listener.hpp"
 #include "daemon/server/connections/port_guard.hpp"

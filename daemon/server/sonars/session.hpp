@@ -15,7 +15,7 @@
 #include "daemon/emulator/connections/actions.hpp"
 #include "daemon/emulator/connections/connections.hpp"
 #include "daemon/server/connections/input_rate.hpp"
-#include "daemon/server/http/http_rules.hpp"
+#include "daemon/server/http/http_router.hpp"
 #include "daemon/server/system/asio.hpp"
 #include "daemon/server/system/sha256.hpp"
 

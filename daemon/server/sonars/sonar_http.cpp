@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/server/http/http_rules.hpp"
+#include "daemon/server/http/http_router.hpp"
 
 namespace sonar {
 

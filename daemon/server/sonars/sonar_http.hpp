@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/server/connections/connection_listener.hpp"
 #include "daemon/server/connections/http_connection.hpp"
+#include "daemon/server/connections/listener.hpp"
 
 namespace sonar {
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 
 #include "core/base/units.hpp"
 
@@ -41,5 +42,10 @@ class Clock {
   std::chrono::nanoseconds skipped_{0};
   Time origin_;  // real time: the UNIX time at started_; stepped time: now
 };
+
+// The function with which a step of stepped time tests whether its client has left.
+
+/// Returns true once the client has closed its end of the connection, or half of it.
+using HasLeft = std::function<bool()>;
 
 }  // namespace sonar

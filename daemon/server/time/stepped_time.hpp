@@ -10,7 +10,6 @@
 #include "daemon/config/runtime_options.hpp"
 #include "daemon/emulator/world/world.hpp"
 #include "daemon/server/time/clock.hpp"
-#include "daemon/server/time/has_left.hpp"
 
 namespace sonar {
 

@@ -10,7 +10,6 @@
 #include "core/motion/trajectory.hpp"
 #include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/emulator/view/recording_player.hpp"
-#include "daemon/server/view/view_messages.hpp"
 #include "daemon/server/view/view_parameters.hpp"
 #include "protocol/control/answers.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"

@@ -15,8 +15,6 @@
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <boost/beast/websocket/stream.hpp>
 
-#include "daemon/server/view/frame_work.hpp"
-
 namespace sonar {
 namespace {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "daemon/emulator/view/ping_payloads.hpp"
-#include "daemon/server/view/view_messages.hpp"
+#include "daemon/server/view/view_parameters.hpp"
 #include "protocol/foxglove/foxglove_messages.hpp"
 
 namespace sonar {

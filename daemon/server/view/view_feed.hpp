@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "daemon/config/config.hpp"
-#include "daemon/emulator/view/driver_picture.hpp"
+#include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/emulator/view/recording_player.hpp"
 #include "daemon/emulator/view/viewer.hpp"
 #include "daemon/emulator/world/world.hpp"
@@ -143,7 +143,7 @@ class ViewFeed final : public ViewerHost {
   void give(Viewer& viewer, std::uint32_t channel, const ViewPayloadPointer& payload);
   void give(Viewer& viewer, const Slow& slow);
   static double threshold_of(const Viewer& viewer, const Slow& slow) { return viewer.choice(slow.threshold, usual_threshold); }
-  // Playback (view_playback.cpp).
+  // Playback (view_steering.cpp).
   const motion::Playback* playback_of(const std::string& vehicle) const;
   std::string begin_playback(Viewer& viewer, const std::string& vehicle);
   void watch_playback(const Viewer* but = nullptr);

@@ -7,13 +7,28 @@
 
 #include "core/base/result.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/emulator/view/ping_payloads.hpp"
 #include "daemon/emulator/world/world.hpp"
+#include "daemon/server/sonars/device.hpp"
 #include "daemon/server/sonars/fleet.hpp"
 #include "daemon/server/time/clock.hpp"
 #include "protocol/control/operations.hpp"
 #include "protocol/foxglove/foxglove_words.hpp"
 
 namespace sonar {
+
+// Encodes messages of control.proto for viewers.
+
+namespace v1 {  // from control.pb.h
+class DaemonStatus;
+class FaultReport;
+}  // namespace v1
+
+ViewPayloadPointer ping_payload(const Device& of, const PingQueued& queued);
+/// Returns the figures of a ping for plots, in CDR.
+ViewPayloadPointer figures_payload(const Device& of, const PingQueued& queued);
+ViewPayloadPointer status_payload(Time now, const v1::DaemonStatus& status);
+ViewPayloadPointer faults_payload(Time now, const v1::FaultReport& report);
 
 struct ParameterSource {
   const Config& config;

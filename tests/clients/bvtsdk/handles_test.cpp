@@ -1,4 +1,4 @@
-#include "clients/bvtsdk/core/handles.hpp"
+#include "clients/bvtsdk/core/sonar.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Histograms and the Prometheus text: bounds, quantiles, escaping, and lines that a scraper accepts.
-#include "daemon/emulator/connections/metrics.hpp"
+#include "daemon/emulator/connections/outbox.hpp"
 
-#include "daemon/server/system/process_figures.hpp"
+#include "daemon/server/control/prometheus.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -12,8 +12,7 @@
 #include <set>
 #include <sstream>
 
-#include "daemon/emulator/connections/recent_rate.hpp"
-#include "daemon/server/control/prometheus.hpp"
+#include "daemon/emulator/connections/pacer.hpp"
 
 namespace sonar {
 namespace {

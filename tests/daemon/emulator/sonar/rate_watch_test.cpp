@@ -1,5 +1,5 @@
 // If computing takes too long for the rate of a sonar, one line reports the possible rate; otherwise there is no line.
-#include "daemon/emulator/sonar/rate_watch.hpp"
+#include "daemon/emulator/sonar/ping_source.hpp"
 
 #include <gmock/gmock.h>
 

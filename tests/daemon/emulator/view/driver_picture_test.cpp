@@ -1,12 +1,10 @@
 // The pictures of pings that viewers get. For each make, they are those that the host of the make draws.
-#include "daemon/emulator/view/driver_picture.hpp"
+#include "daemon/emulator/view/ping_payloads.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
-
-#include "daemon/emulator/view/ping_payloads.hpp"
 
 namespace sonar::driver_picture_test {
 namespace {

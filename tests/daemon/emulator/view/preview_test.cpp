@@ -1,5 +1,5 @@
 // A preview in virtual time: its rate, its end, and that a preview does not change the bytes for the first driver.
-#include "daemon/emulator/view/driver_picture.hpp"
+#include "daemon/emulator/view/ping_payloads.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // Compares interpolated, extrapolated and held poses with closed forms.
-#include "daemon/emulator/world/pose_history.hpp"
+#include "daemon/emulator/world/world.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The choice of the connection that is evicted for a new one.
-#include "daemon/server/connections/connection_slots.hpp"
+#include "daemon/server/connections/connection_services.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/server/view/frame_work.hpp"
+#include "daemon/server/view/view_connection.hpp"
 
 namespace sonar {
 namespace {

@@ -1,6 +1,6 @@
 // Several sonars on one engine: a quick ping interrupts a long one, a sonar that has used more time waits, and a sonar that
 // paused has no advantage later.
-#include "daemon/server/engine/fair_turns.hpp"
+#include "daemon/server/engine/simulator.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,6 @@
 #include <stdexcept>
 #include <thread>
 #include <vector>
-
-#include "daemon/server/engine/simulator.hpp"
 
 namespace sonar {
 namespace {

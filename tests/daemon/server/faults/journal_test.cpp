@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "daemon/server/faults/journal_file.hpp"
+#include "daemon/server/faults/fault_log.hpp"
 #include "protocol/control/answers.hpp"
 #include "tests/daemon/server/loopback.hpp"
 #include "tests/small_disk.hpp"

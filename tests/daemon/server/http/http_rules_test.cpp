@@ -1,5 +1,5 @@
 // Which targets, hosts, origins and routes are accepted and which are refused.
-#include "daemon/server/http/http_rules.hpp"
+#include "daemon/server/http/http_router.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // A silent UDP host: when the daemon sends a probe to its computer, and when the host counts as disconnected.
-#include "daemon/server/sonars/datagram_stream.hpp"
+#include "daemon/server/sonars/datagram_port.hpp"
 
 #include <gtest/gtest.h>
 
