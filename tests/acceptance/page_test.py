@@ -16,14 +16,11 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent / "view"))
 
-from browser import Browser  # noqa: E402
-from page_checks import FAINT_WORDS, LACKING_PX, LAID_OUT, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, WITHOUT_WEBGL, PageChecks, shown  # noqa: E402
+from mocked_page import MockedPage  # noqa: E402
+from page_checks import FAINT_WORDS, LACKING_PX, LAID_OUT, NAMELESS_CONTROLS, PAGE, SMALL_TARGETS, WHY_NOT, WITHOUT_WEBGL, shown  # noqa: E402
 from running_sonard import ROOT, Sonard  # noqa: E402
 
-from sonard_client import OculusClient  # noqa: E402  pylint: disable=wrong-import-order
-
 BUDGET_BYTES = 190_000
-MOUNT = "{frame: FRD, xyz_m: [0.3, 0, 0.1], rpy_deg: [0, -15, 0]}"
 STATES = {  # the mock's state -> the page's name of the state, the text that the user reads, the button
     "no client": ("no-client", "No driver is connected. Nothing is simulated without one. Point a driver at 127.0.0.2.", "Preview"),
     "standby": ("standby", "Standby: 192.0.2.7 set the rate to 0.", "Ask for 10 Hz"),
@@ -97,52 +94,9 @@ DRAWN_OUTSIDE = """window.outside = [], window.inside = new Set();
   }
 }"""
 
-# Settings whose field is covered by another element.
-COVERED_SETTINGS = """[...document.querySelectorAll('#setting-rows :is(input, select)')].filter((e) => {
-  e.scrollIntoView({ block: 'nearest' });
-  const r = e.getBoundingClientRect();
-  return document.elementFromPoint(r.left + r.width / 2, r.top + r.height / 2) !== e;
-}).map((e) => e.name)"""
-
-
-def ping_about(ping, full_scale=254):
-    """Converts a ping of the Python client for the mock: (samples, description)."""
-    rows, beams = ping.samples.shape
-    return ping.samples.tobytes(), {
-        "settings": {"rows": rows, "beams": beams, "max_code": full_scale}, "row_spacing_m": ping.row_m,
-        "beam_azimuth_rad": [float(a) for a in ping.azimuths_rad],
-        "vehicle_in_world": {"wxyz": [1, 0, 0, 0], "xyz_m": [-7, 0, -3]}}
-
 
 @unittest.skipIf(WHY_NOT, WHY_NOT)
-class Page(PageChecks, unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        from mock_daemon import MockDaemon  # pylint: disable=import-outside-toplevel
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.pings, cls.raw = {}, {}
-        with Sonard(mount=MOUNT) as daemon:
-            for name, settings in {"60 degrees, 8 bit": {}, "60 degrees, 16 bit": {"bits": 16}, "130 degrees, 8 bit": {"mode": 1}}.items():
-                with OculusClient(daemon.address) as sonar:
-                    sonar.fire(rate_hz=5, range_m=10 if "mode" not in settings else 20, **settings)
-                    ping = sonar.ping(90)
-                cls.pings[name] = ping_about(ping)
-                cls.raw[name] = pathlib.Path(cls.folder.name) / name.replace(" ", "-")
-                cls.raw[name].write_bytes(ping.data)
-        cls.mock = MockDaemon(PAGE, [cls.pings["60 degrees, 8 bit"]]).start()
-        cls.addClassCleanup(cls.mock.stop)
-        cls.url = f"http://127.0.0.1:{cls.mock.port}/"
-        cls.browser = cls.enterClassContext(Browser())
-
-    def setUp(self):
-        self.mock.token = ""
-        self.mock.pings = [self.pings["60 degrees, 8 bit"]]
-        self.mock.state("fine")
-
-    def open(self, width=1440, height=900, query="", **options):
-        return self.opened(self.browser.open(self.url + query, width, height, **options))
-
+class Page(MockedPage, unittest.TestCase):
     def test_fan_equals_that_of_sonarctl_view(self):
         """The page draws a ping as `sonarctl view` does: the usual picture, and smaller ones."""
         maps = [line for line in (ROOT / "core/image/colour_map.cpp").read_text().split('"') if line.isalpha() and line.islower()]
@@ -422,106 +376,6 @@ class Page(PageChecks, unittest.TestCase):
                         self.assertEqual(page.run(SMALL_TARGETS), [])
                     self.picture(page, f"{theme}{'-phone' if touch else ''}")
                     page.close()
-
-    def test_settings_are_requested_and_refusals_shown(self):
-        page = self.open()
-        page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
-        change = "(v) => {{ const f = document.querySelector('[name=\"/front/range_m\"]'); f.value = v; f.dispatchEvent(new Event('change')); }}"
-        page.run(f"({change.replace('{{', '{').replace('}}', '}')})('7.5')")
-        self.patiently(lambda: self.mock.parameters["/front/range_m"] == 7.5)
-        page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")
-        page.run(f"({change.replace('{{', '{').replace('}}', '}')})('400')")
-        page.wait("document.querySelector('#refusal').innerText.includes('range_m must be')")
-        page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")
-        self.mock.parameters["/front/range_m"] = 10.0
-
-    def test_settings_take_keys(self):
-        page = self.open()
-        field = "document.querySelector('[name=\"/front/%s\"]')"
-        page.wait(field % "range_m" + "?.value === '10'")
-        page.run((field % "range_m") + ".focus(), document.activeElement.select()")
-        for key in ("9", "9", "Backspace", "Backspace", "7", ".", "5"):
-            page.press(key)
-        self.assertEqual(page.run((field % "range_m") + ".value"), "7.5")
-        page.press("Enter")
-        self.patiently(lambda: self.mock.parameters["/front/range_m"] == 7.5)
-        page.press("ArrowUp")
-        page.press("Tab")
-        self.assertEqual(page.run("document.activeElement.name"), "/front/rate_hz")
-        self.patiently(lambda: self.mock.parameters["/front/range_m"] == 8.5)
-        self.mock.set_calls.clear()
-        page.run("document.activeElement.select()")
-        before = page.run("document.activeElement.value")
-        page.press("3")
-        page.press("Escape")
-        self.assertEqual(page.run((field % "rate_hz") + ".value"), before, "Escape gives it up")
-        self.assertEqual(page.run("document.activeElement === document.body"), True)
-        page.press("f")
-        self.assertEqual(page.text("#freeze"), "Go on", "the page's own keys again")
-        self.assertEqual(self.mock.set_calls, [])
-        self.mock.parameters["/front/range_m"] = 10.0
-
-    def test_settings_are_two_presses_away(self):
-        """The panels can be reached by a key, and by a link for users of Tab; on phones they are in another tab."""
-        for width, way in ((1440, ("r",)), (1440, ("Tab", "Tab", "Enter")), (390, ("r",))):
-            with self.subTest(width=width, way=way):
-                page = self.open(width, 844)
-                page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
-                for key in way:
-                    page.press(key)
-                self.assertEqual(page.run("document.activeElement.name"), "/front/range_m")
-                self.assertTrue(page.run("document.activeElement.offsetWidth > 0 && document.activeElement.getBoundingClientRect().bottom <= innerHeight"))
-                page.press("Escape")
-                page.press("?")
-                self.assertIn("to the settings", page.text("#help-keys"))
-                page.close()
-
-    def test_settings_come_first(self):
-        """The settings are the first panel beside the picture, or of their tab on a phone: visible without scrolling, and the
-        first that Tab reaches."""
-        for width in (1600, 390):
-            with self.subTest(width=width):
-                page = self.open(width, 844, touch=width < 800)
-                page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
-                page.wait("!!document.querySelector('#troubles button')")
-                if width < 800:
-                    page.click("#tabs [data-tab=clients]")  # the click moves the focus
-                tops = page.run("[...document.querySelectorAll('#rail > .panel')].filter((p) => p.offsetHeight > 0).map((p) => [p.getBoundingClientRect().top, p.id]).sort((a, b) => a[0] - b[0])")
-                self.assertEqual(tops[0][1], "settings", tops)
-                self.assertEqual(page.run("document.querySelector('#rail').scrollTop"), 0)
-                self.assertTrue(page.run("document.querySelector('#settings').getBoundingClientRect().bottom <= document.querySelector('#rail').getBoundingClientRect().bottom"))
-                for key in ("Tab", "Enter", "Tab"):  # the link to the panels
-                    page.press(key)
-                self.assertEqual(page.run("document.activeElement.name"), "/front/range_m")
-                self.picture(page, f"settings-{width}")
-                page.close()
-
-    def test_a_refusal_covers_no_other_setting(self):
-        for width in (1600, 390):
-            with self.subTest(width=width):
-                page = self.open(width, 844)
-                page.wait("document.querySelector('[name=\"/front/range_m\"]')?.value === '10'")
-                page.press("r")
-                for key in "400":
-                    page.press(key)
-                page.press("Enter")
-                page.wait("document.querySelector('#refusal').innerText.includes('range_m must be')")
-                self.assertEqual(page.run("document.querySelector('#refusal').previousSibling.innerText.trim().split(/\\s/)[0]"), "range")
-                self.assertEqual(page.run(COVERED_SETTINGS), [])
-                self.picture(page, f"refusal-{width}")
-                page.close()
-
-    def test_a_rate_on_request_is_measured(self):
-        self.mock.state("on request")
-        page = self.open()
-        page.wait("/^9|^10/.test(document.querySelector('#measured')?.innerText)")
-        page.wait("/^(9|10)\\.\\d Hz$/.test(document.querySelector('#rate').innerText)")
-        self.assertIn("rate, at most", page.text("#setting-rows"))
-        self.assertNotIn("1000 Hz", page.run("document.body.innerText"))
-        self.assertFalse(page.run("document.querySelector('#frequency-chip').offsetWidth"), "the frequency is not known")
-        self.mock.state("standby")
-        page.wait("document.querySelector('#frequency-chip').offsetWidth")
-        page.wait("document.querySelector('[name=\"/front/rate_hz\"]').placeholder === 'standby' && !document.querySelector('[name=\"/front/rate_hz\"]').value")
 
     def test_numbers_are_true(self):
         page = self.open()

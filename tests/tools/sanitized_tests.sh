@@ -32,7 +32,7 @@ preset=${kind%-all}
 #   load.descriptors                                   the undefined behaviour sanitizer reads memory through a pipe, and reports
 #                                                      every object as invalid if no descriptor is left for the pipe
 #   the Python client alone and without numpy          they run no program of ours
-acceptance=(commands protocol mirror blueview_link aris_link waterlinked_link ping_link life_cycle control reload status fault doctor view completion scene_command
+acceptance=(commands protocol mirror blueview_link aris_link waterlinked_link ping_link ping_tools life_cycle control reload status fault doctor view completion scene_command
   dissector driver_example first_minutes recording live_view)
 programs="^acceptance\.($(IFS='|'; echo "${acceptance[*]}"))\$"
 programs+='|^load\.real_pings$|^python_client\.with_daemon$|^bvtsdk\.sequences$'
