@@ -131,8 +131,11 @@ class Ping360Link(unittest.TestCase):
         acked, took_s = host.ask(frame(2903), 1)
         self.assertEqual(acked, struct.pack("<H", 2903))
         self.assertLess(took_s, 5)
-        host.udp.settimeout(0.5)
-        self.assertRaises(socket.timeout, host.udp.recv, 4096)
+        # Replies are sent before waiting pings, so one line may follow the acknowledgement.
+        lines = 0
+        while select.select([host.udp], [], [], 0.5)[0]:
+            lines += [kind for kind, _ in read(host.udp.recv(4096))].count(2301)
+        self.assertLessEqual(lines, 1)
 
     def test_targets_are_at_their_bearings(self):
         host = Host(self.daemon.address, PING360)
