@@ -29,7 +29,8 @@ std::string read_option(const Node& value, const protocol::Option& option) {
   return value.text(64);
 }
 
-constexpr double hot_c = 30;  // a widely used driver sends the sonar to standby above this (docs/protocols/oculus.md, section 4)
+constexpr double hot_c = 30;  // a widely used driver warns from here on, and commands standby later
+constexpr const char* effect_of_heat = "from 30 C on a real driver warns, at 35 C it commands standby; ";
 
 Pose pose_from(const std::array<double, 3>& xyz_m, const std::array<double, 3>& rpy_deg) {
   return {{xyz_m[0], xyz_m[1], xyz_m[2]},
@@ -86,7 +87,7 @@ Water read_water(const Node& node, bool* allow_hot) {
   const bool hot_is_meant = map.optional("allow_hot").boolean_or(false);
   if (allow_hot != nullptr) *allow_hot = hot_is_meant;
   if (!hot_is_meant && water.temperature_c >= hot_c)
-    temperature.fail("30 C or more sends a real driver to standby; add allow_hot: true if that is what you want");
+    temperature.fail(std::string(effect_of_heat) + "add allow_hot: true if that is what you want");
   return water;
 }
 
@@ -97,7 +98,7 @@ std::string why_no_water(const Water& water, bool allow_hot) {
   if (water.sound_speed_mps != 0 && !(water.sound_speed_mps >= 1000 && water.sound_speed_mps <= 2000))
     return "sound_speed_mps must be 0 (computed from the rest) or from 1000 to 2000";
   if (water.temperature_c >= hot_c && !allow_hot)
-    return "30 C or more sends a real driver to standby; world.water.allow_hot: true in the configuration allows it";
+    return std::string(effect_of_heat) + "world.water.allow_hot: true in the configuration allows it";
   return {};
 }
 

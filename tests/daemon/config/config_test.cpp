@@ -284,7 +284,8 @@ TEST(Config, EveryErrorHasTheMistakeAndTheLine) {
   EXPECT_THAT(with("clock: folow\n"), HasSubstr("did you mean \"follow\""));
   EXPECT_THAT(with("log: {level: loud}\n"), HasSubstr("log.level"));
   const std::string hot = "world: {scene: scene.yaml, water: {temperature_c: 30}}\n";
-  EXPECT_THAT(why(hot + vehicles + sonar), HasSubstr("world.water.temperature_c: 30 C or more"));
+  EXPECT_THAT(why(hot + vehicles + sonar),
+              HasSubstr("world.water.temperature_c: from 30 C on a real driver warns, at 35 C it commands standby;"));
   EXPECT_EQ(why("world: {scene: scene.yaml, water: {temperature_c: 30, allow_hot: true}}\n" + vehicles + sonar), "accepted");
   EXPECT_THAT(why("world: {scene: scene.yaml, water: {sound_speed_mps: 340}}\n" + vehicles + sonar),
               HasSubstr("sound_speed_mps"));
