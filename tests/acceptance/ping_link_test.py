@@ -111,6 +111,20 @@ class Ping360Link(unittest.TestCase):
         host.udp.settimeout(0.2)
         self.assertRaises(socket.timeout, host.udp.recv, 4096)
 
+    def test_a_search_from_the_sonars_own_address_is_answered(self):
+        """A host on sonard's computer that has the port at all addresses sends from the computer's first address, which may be
+        the sonar's."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as host:
+            for option in (socket.SO_REUSEADDR, socket.SO_BROADCAST):
+                host.setsockopt(socket.SOL_SOCKET, option, 1)
+            host.bind(("0.0.0.0", DISCOVERY))
+            host.settimeout(30)
+            ip_pktinfo, source = 8, struct.pack("=I4s4s", 0, socket.inet_aton(self.daemon.address), bytes(4))
+            host.sendmsg([b"Discovery"], [(socket.IPPROTO_IP, ip_pktinfo, source)], 0, ("127.255.255.255", DISCOVERY))
+            self.assertEqual(host.recvfrom(99), (b"Discovery", (self.daemon.address, DISCOVERY)))  # its own broadcast
+            answer, place = host.recvfrom(4096)
+            self.assertEqual((answer[:7], place), (b"PING360", (self.daemon.address, DISCOVERY)))
+
     def test_the_head_takes_time_to_turn(self):
         host = Host(self.daemon.address, PING360)
         host.udp.send(b"\x00\xff")  # a host sends this first

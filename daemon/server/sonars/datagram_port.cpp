@@ -49,13 +49,14 @@ Result<void> DatagramPort::open(const SonarConfig& sonar, std::uint16_t port, bo
   number_ = port;
   Socket& own = sockets_.emplace_back(io_);
   // If there are `groups`, broadcasts are enabled, because only the system has the list of all broadcast addresses.
-  if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, !sonar.groups.empty(), shared); !r) return r;
+  if (auto r = bind_udp(own.socket, {sonar.bind_ip, port}, shared || !sonar.groups.empty(), shared); !r) return r;
   send_multicast_from(own.socket, sonar.bind_ip);
   return {};
 }
 
 void DatagramPort::receive_broadcasts(const SonarConfig& sonar) {
   if (sonar.bind_ip == Ipv4{}) return;
+  broadcast_ = {address_of(broadcast_of(sonar)), number_};
   for (const Ipv4& broadcast : {broadcast_of(sonar), Ipv4{255, 255, 255, 255}}) {
     if (broadcast == sonar.bind_ip) continue;
     Socket& all = sockets_.emplace_back(io_);
@@ -101,7 +102,8 @@ void DatagramPort::stop() {
   }
 }
 
-/// Answers a datagram from the sonar's own address, so that hosts learn this address. An unreachable host gets no answer. Returns
+/// Answers a datagram from the sonar's own address, so that hosts learn this address. An unreachable host gets no answer. A host
+/// of this computer with the same port at all addresses may send from the sonar's address; only a broadcast reaches it. Returns
 /// false if the datagram was dropped.
 bool DatagramPort::take(Socket& at, std::size_t size) {
   if (!answer_ || !at.from.address().is_v4()) return false;
@@ -109,7 +111,9 @@ bool DatagramPort::take(Socket& at, std::size_t size) {
   const auto answers = answer_(from, std::span(at.datagram).first(size));
   if (!answers) return false;
   error_code ignored;
-  for (const protocol::Bytes& answer : *answers) socket().send_to(asio::buffer(answer), at.from, 0, ignored);
+  const bool is_own = broadcast_.port() != 0 && at.from == socket().local_endpoint(ignored);
+  for (const protocol::Bytes& answer : *answers)
+    socket().send_to(asio::buffer(answer), is_own ? broadcast_ : at.from, 0, ignored);
   return true;
 }
 

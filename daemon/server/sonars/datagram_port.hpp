@@ -62,6 +62,7 @@ class DatagramPort {
   Answer answer_;
   std::function<void(Endpoint host)> closed_;
   std::list<Socket> sockets_;
+  udp::endpoint broadcast_;  // port 0: broadcasts are not received
   DatagramRate rate_{most_per_s};
   std::uint16_t number_ = 0;  // the requested port number
   bool stopping_ = false;
