@@ -1,6 +1,7 @@
 #include "clients/sonarctl/ping_log.hpp"
 
 #include <algorithm>
+#include <cinttypes>
 #include <cmath>
 
 #include <nlohmann/json.hpp>
@@ -11,8 +12,6 @@ namespace sonar::clients {
 namespace {
 
 using text::format;
-
-unsigned long long wide(std::uint64_t value) { return value; }
 
 std::string echo_text(const PingSummary& summary) {
   if (!summary.echo_satisfied_at) return "never";
@@ -108,10 +107,10 @@ std::string line_from(const HostPing& ping) {
 }
 
 std::string text_from(const PingSummary& s, bool asked, std::string_view rate_unit) {
-  std::string text = format("pings %llu", wide(s.pings));
+  std::string text = "pings " + std::to_string(s.pings);
   if (s.of_wire)
-    text += format(", missing ids %llu, identity errors %llu, junk bytes %llu, dummies %llu", wide(s.of_wire->missing_pings),
-                   wide(s.identity_errors), wide(s.of_wire->junk_bytes), wide(s.of_wire->dummies));
+    text += format(", missing ids %" PRIu64 ", identity errors %" PRIu64 ", junk bytes %" PRIu64 ", dummies %" PRIu64,
+                   s.of_wire->missing_pings, s.identity_errors, s.of_wire->junk_bytes, s.of_wire->dummies);
   text += "\n";
   text += format("rate %.2f %s, interval p50 %.1f ms, p99 %.1f ms, longest %.1f ms, %.2f MB/s", s.rate_hz,
                  std::string(rate_unit).c_str(), s.interval_p50_ms, s.interval_p99_ms, s.interval_max_ms,
