@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <tuple>
+#include <unordered_map>
 
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
@@ -262,6 +264,30 @@ Document::Document(std::unique_ptr<YamlTree> tree) : tree_(std::move(tree)) {}
 Document::Document(Document&&) noexcept = default;
 Document& Document::operator=(Document&&) noexcept = default;
 Document::~Document() = default;
+
+Result<Document> Document::changed(const std::function<Result<std::string>(const std::string& text, int line)>& change) const {
+  auto tree = std::make_unique<YamlTree>();
+  tree->name = tree_->name, tree->error_kind = tree_->error_kind;
+  std::unordered_map<const YamlNode*, YamlNode*> copies;
+  for (const YamlNode& node : tree_->nodes) {  // in document order: each parent comes before its children
+    YamlNode& copy = tree->nodes.emplace_back();
+    copies[&node] = &copy;
+    copy.kind = node.kind, copy.line = node.line, copy.column = node.column, copy.quoted = node.quoted;
+    copy.key_line = node.key_line, copy.key_column = node.key_column, copy.index = node.index;
+    for (const auto& [from, line, to] :
+         {std::tuple{&node.key, node.key_line, &copy.key}, {&node.scalar, node.line, &copy.scalar}}) {
+      auto text = change(*from, line);
+      if (!text) return tl::make_unexpected(text.error());
+      *to = *std::move(text);
+    }
+    if (node.parent == nullptr) continue;
+    YamlNode* parent = copies.at(node.parent);
+    copy.parent = parent;
+    parent->children.push_back(&copy);
+  }
+  tree->root = copies.at(tree_->root);
+  return Document(std::move(tree));
+}
 
 Map Document::root() const { return Node(tree_.get(), tree_->root, nullptr, {}).map(); }
 std::optional<Error> Document::error() const { return tree_->first_error; }

@@ -182,17 +182,18 @@ Result<DrawnPing> draw_ping(const DatasetJob& job, std::uint64_t number, const K
     ping.scene_key = scene_key_of(job, ping.draws, lines, number);
     const bool is_known = known.scene && known.key == ping.scene_key;
     if (is_known) filled = replaced(std::move(filled), lines, "scene: {objects: []}\n");
-    auto input = render::parse_render_file(with_sweep(filled, sweep_of(ping.draws)), job.source, job.folder, known.shapes);
-    if (!input) return tl::make_unexpected(input.error());
-    ping.job = std::move(input->jobs.front());
+    const auto outline =
+        text::parse_yaml(with_sweep(std::move(filled), sweep_of(ping.draws)), job.source, {.error_kind = ErrorKind::config});
+    if (!outline) return tl::make_unexpected(outline.error());
+    auto jobs = render::read_render_jobs(*outline, job.source, job.folder, known.shapes);
+    if (!jobs) return tl::make_unexpected(jobs.error());
+    ping.job = std::move(jobs->front());
     if (is_known) ping.job.scene = known.scene;
     ping.whole_scene = ping.job.scene;
     // Names are looked up before objects are hidden.
     if (std::string why = why_unknown(job.constraints, job.targets, *ping.job.scene); !why.empty())
       return failure(ErrorKind::config, job.source + ": " + why);
-    const auto numbers = render::substitute(filled, ping.job.values, job.source);
-    if (!numbers) return tl::make_unexpected(numbers.error());
-    const auto document = text::parse_yaml(*numbers, job.source, {.error_kind = ErrorKind::config});
+    const auto document = render::with_numbers(*outline, ping.job.values, job.source);
     if (!document) return tl::make_unexpected(document.error());
     auto scene = with_counts(job, *document, ping, number);
     if (!scene) return tl::make_unexpected(scene.error());

@@ -175,7 +175,7 @@ std::size_t end_of_reference(std::string_view text, std::size_t at) {
 
 Result<double> evaluate(std::string_view formula, const Values& values) { return Parser(formula, values).run(); }
 
-Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name) {
+Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name, int first_line) {
   std::string out;
   std::size_t at = 0;
   for (;;) {
@@ -192,7 +192,7 @@ Result<std::string> substitute(std::string_view text, const Values& values, cons
     const auto value = evaluate(text.substr(dollar + 1, end - dollar - 1), values);
     if (!value) {
       // The error has the line of the file, and the formula.
-      const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(dollar), '\n');
+      const auto line = first_line + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(dollar), '\n');
       return failure(ErrorKind::config, name + ":" + std::to_string(line) + ": " + value.error().text);
     }
     // The value is written with 15 digits, so that 0.1 stays 0.1.

@@ -17,7 +17,8 @@ using Values = std::map<std::string, double, std::less<>>;
 /// finite.
 Result<double> evaluate(std::string_view formula, const Values& values);
 
-/// Returns the text with every $name and $(formula) replaced by its number. Errors start with `name`:line.
-Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name);
+/// Returns the text with every $name and $(formula) replaced by its number. Errors start with `name`:line; the text begins at
+/// first_line.
+Result<std::string> substitute(std::string_view text, const Values& values, const std::string& name, int first_line = 1);
 
 }  // namespace sonar::render

@@ -119,11 +119,9 @@ Result<std::shared_ptr<const Scene>> read_scene_of(const Node& node, const std::
 }
 
 /// Reads the scene last, because its errors are of another kind.
-Result<RenderJob> read_job(const std::string& text, const std::string& name, const std::filesystem::path& folder,
+Result<RenderJob> read_job(const text::Document& document, const std::string& name, const std::filesystem::path& folder,
                            const Values& values, ShapeCache* known) {
-  const auto document = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
-  if (!document) return tl::make_unexpected(document.error());
-  Map root = document->root();
+  Map root = document.root();
   RenderJob job;
   job.values = values;
   job.name = root.optional("name").text_or(std::filesystem::path(name).stem().string(), 200);
@@ -139,8 +137,8 @@ Result<RenderJob> read_job(const std::string& text, const std::string& name, con
   root.optional("let").map().entries();
   // Keys of a data set's job, and of an oracle (tests/oracles).
   for (const char* key : {"dataset", "vary", "constraints", "counts", "expect"}) root.optional(key);
-  if (auto error = document->finish()) return tl::make_unexpected(*error);
-  auto scene = read_scene_of(scene_node, folder, job.name, *document, known);
+  if (auto error = document.finish()) return tl::make_unexpected(*error);
+  auto scene = read_scene_of(scene_node, folder, job.name, document, known);
   if (!scene) return tl::make_unexpected(scene.error());
   job.scene = *std::move(scene);
   return job;
@@ -216,21 +214,31 @@ std::string what_to_do_with_a_scene(const std::filesystem::path& file) {
 
 }  // namespace
 
-Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder,
-                                      ShapeCache* known) {
+Result<text::Document> with_numbers(const text::Document& outline, const Values& values, const std::string& name) {
+  return outline.changed([&](const std::string& text, int line) { return substitute(text, values, name, line); });
+}
+
+Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder) {
   const auto outline = text::parse_yaml(text, name, {.error_kind = ErrorKind::config});
   if (!outline) return tl::make_unexpected(outline.error());
-  const auto steps = read_steps(*outline);
+  auto jobs = read_render_jobs(*outline, name, folder);
+  if (!jobs) return tl::make_unexpected(jobs.error());
+  return RenderInput{name, *std::move(jobs), std::string(text)};
+}
+
+Result<std::vector<RenderJob>> read_render_jobs(const text::Document& outline, const std::string& name,
+                                                const std::filesystem::path& folder, ShapeCache* known) {
+  const auto steps = read_steps(outline);
   if (!steps) return tl::make_unexpected(steps.error());
-  RenderInput input{name, {}, std::string(text)};
+  std::vector<RenderJob> jobs;
   for (const Values& values : *steps) {
-    const auto filled = substitute(text, values, name);
+    const auto filled = with_numbers(outline, values, name);
     if (!filled) return tl::make_unexpected(filled.error());
     auto job = read_job(*filled, name, folder, values, known);
     if (!job) return tl::make_unexpected(job.error());
-    input.jobs.push_back(*std::move(job));
+    jobs.push_back(*std::move(job));
   }
-  return input;
+  return jobs;
 }
 
 /// Loads a file, whose kind depends on a key: `world` is in a configuration, `objects` in a scene, `dataset` in a job; other

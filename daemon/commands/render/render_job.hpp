@@ -74,9 +74,13 @@ struct RenderInput {
 
 /// Reads a configuration (recognised by its key `world`) or a render file. `sonar`: selects one of a configuration's sonars.
 Result<RenderInput> load_render_input(const std::filesystem::path& file, const std::string& sonar = {});
-/// Parses the text of a render file; paths in it are relative to `folder`. `known`: shapes of files that were read before.
-Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder,
-                                      ShapeCache* known = nullptr);
+/// Parses the text of a render file; paths in it are relative to `folder`.
+Result<RenderInput> parse_render_file(std::string_view text, const std::string& name, const std::filesystem::path& folder);
+/// Reads the jobs of a parsed render file. `known`: shapes of files that were read before.
+Result<std::vector<RenderJob>> read_render_jobs(const text::Document& outline, const std::string& name,
+                                                const std::filesystem::path& folder, ShapeCache* known = nullptr);
+/// Returns the document with every $name and $(formula) replaced by its number.
+Result<text::Document> with_numbers(const text::Document& outline, const Values& values, const std::string& name);
 
 /// Returns a note for the user if the real sonar cannot be set to the range of the job (pings are rendered anyway); else empty.
 std::string note_of_range(const RenderJob& job);

@@ -233,6 +233,31 @@ TEST(StrictYaml, NamedEntriesAcceptAnyKey) {
   EXPECT_FALSE(d.finish());
 }
 
+TEST(StrictYaml, AChangedCopyKeepsPositionsAndIsNotReadYet) {
+  const auto document = parse_yaml("a: X1\nX: [2, {b: X, c: 'X'}]\n", "f.yaml");
+  ASSERT_TRUE(document);
+  document->root().optional("a").number();  // an error of the first reader
+  std::vector<int> lines;
+  const auto copy = document->changed([&](const std::string& text, int line) -> Result<std::string> {
+    if (text.find('X') == std::string::npos) return text;
+    lines.push_back(line);
+    return "3" + text.substr(1);
+  });
+  ASSERT_TRUE(copy);
+  EXPECT_EQ(lines, (std::vector{1, 2, 2, 2}));
+  Map root = copy->root();
+  EXPECT_EQ(root.required("a").number(), 31);
+  const auto items = root.required("3").items();
+  ASSERT_EQ(items.size(), 2u);
+  EXPECT_EQ(items[1].map().required("b").number(), 3);
+  EXPECT_FALSE(copy->error());
+  items[1].map().required("c").number();
+  ASSERT_TRUE(copy->error());
+  EXPECT_THAT(copy->error()->text, HasSubstr("f.yaml:2:18: 3[1].c")) << "a text in quotes is no number";
+  EXPECT_FALSE(
+      document->changed([](const std::string&, int) -> Result<std::string> { return failure(ErrorKind::config, "no"); }));
+}
+
 TEST(StrictYaml, MapsThatWereNotOpenedAreNotSearched) {
   EXPECT_EQ(read("a: {b: 1}", [](Map m) { m.optional("a"); }), "ok");
 }
