@@ -1,15 +1,37 @@
 // sonarctl: the tool for users of a sonar.
+#include <atomic>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
+#include <ctime>
 
 #include "clients/sonarctl/command_line.hpp"
 #include "core/base/program_start.hpp"
 
+namespace {
+
+/// The first signal sets `interrupted`, and the command ends in order. A later one ends the program, because some commands do not
+/// check `interrupted`, such as a check of a scene. `timeout` sends two signals in a row, to the program and to its group.
+void on_signal(int number) {
+  static std::atomic<std::int64_t> first_ms;
+  static_assert(std::atomic<std::int64_t>::is_always_lock_free);
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  const std::int64_t now_ms = std::int64_t{1000} * now.tv_sec + now.tv_nsec / 1'000'000;
+  std::int64_t first = 0;
+  if (first_ms.compare_exchange_strong(first, now_ms)) {
+    sonar::clients::interrupted = 1;
+  } else if (now_ms > first + 500) {
+    std::signal(number, SIG_DFL);
+    std::raise(number);
+  }
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   struct sigaction on_interrupt {};
-  on_interrupt.sa_handler = [](int) { sonar::clients::interrupted = 1; };
-  on_interrupt.sa_flags = static_cast<int>(
-      SA_RESETHAND);  // a second Ctrl-C ends commands that do not check `interrupted`, such as a check of a scene
+  on_interrupt.sa_handler = on_signal;
   sigaction(SIGINT, &on_interrupt, nullptr);
   sigaction(SIGTERM, &on_interrupt, nullptr);
   struct sigaction on_hangup {};

@@ -116,7 +116,8 @@ class Link(unittest.TestCase):
                         break
                 with Driver(daemon.address) as driver:
                     ours = driver.say("set_range 0 9\r\n")
-                listener.send_signal(signal.SIGINT)
+                for number in (signal.SIGINT, signal.SIGTERM):  # `timeout` signals twice
+                    listener.send_signal(number)
                 listener.communicate(timeout=PATIENCE_S)
             with Driver(daemon.address) as driver:
                 self.assertEqual([driver.say(f"{name}\r\n") for name in ("set_rate", "set_gain", "set_range")], [*before, ours])
