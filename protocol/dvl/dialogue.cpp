@@ -1,6 +1,8 @@
 #include "protocol/dvl/dialogue.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "core/text/format.hpp"
@@ -25,6 +27,11 @@ std::string time_text(Time at) {
   return text::format("%04d-%02u-%02uT%02d:%02d:%02dZ", static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
                       static_cast<unsigned>(date.day()), static_cast<int>(s / 3600), static_cast<int>(s / 60 % 60),
                       static_cast<int>(s % 60));
+}
+
+/// True for a text that the sentences of the serial line can contain as one word.
+bool is_address(std::string_view text) {
+  return text.size() <= 255 && std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < 0x7F && c != ','; });
 }
 
 Json time_status(const protocol::DeviceState& device, Time now, const Settings& settings) {
@@ -157,8 +164,8 @@ std::optional<Outcome> carry_out(const std::string& command, const Json& paramet
   if (command == "get_time_ntp") return Outcome{{{"ntp_address", settings.ntp_address}}};
   if (command == "set_time_ntp") {
     const auto address = parameters.is_object() ? parameters.find("ntp_address") : parameters.end();
-    if (address == parameters.end() || !address->is_string() || address->get_ref<const std::string&>().size() > 255)
-      return Outcome{.error = "ntp_address must be a text of up to 255 characters"};
+    if (address == parameters.end() || !address->is_string() || !is_address(address->get_ref<const std::string&>()))
+      return Outcome{.error = "ntp_address must be a text of up to 255 letters, digits and signs, without commas and spaces"};
     settings.ntp_address = address->get<std::string>();
     return Outcome{};
   }

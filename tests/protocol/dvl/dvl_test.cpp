@@ -369,6 +369,11 @@ TEST(DvlCommands, VersionAndTimeAreAnswered) {
   EXPECT_EQ(info["is_ready"], true);
   EXPECT_EQ(client.ask(R"({"command":"get_time_status"})")["result"]["system_time"], "2023-11-14T22:13:20Z");
   EXPECT_EQ(client.ask(R"({"command":"set_time_ntp","parameters":{"ntp_address":"192.168.0.10"}})")["success"], true);
+  for (const char* splits_sentences : {"a,b", "a b", "a\\r\\nwrx", "\\u00e9"})
+    EXPECT_EQ(client.ask(std::string(R"({"command":"set_time_ntp","parameters":{"ntp_address":")") + splits_sentences +
+                         R"("}})")["success"],
+              false)
+        << splits_sentences;
   EXPECT_EQ(client.ask(R"({"command":"get_time_ntp"})")["result"]["ntp_address"], "192.168.0.10");
   EXPECT_EQ(client.ask(R"({"command":"set_time_manual","parameters":{"now":"2026-04-20T09:04:13Z"}})")["success"], false);
 }
