@@ -292,7 +292,7 @@ class Undisturbed(unittest.TestCase):
             reader.wait_for(3)
             result = daemon.ctl("listen", "--record", "/dev/full", "--pings", "3", "--seconds", "30", "--quiet")
             self.assertEqual(result.returncode, 74, result.stdout + result.stderr)
-            self.assertRegex(result.stderr, "recording.*disk is not full")
+            self.assertRegex(result.stderr, "/dev/full: No space left on device; make room")
             reader.wait_for(len(reader.pings) + 3)
             code, _ = daemon.stop()
             reader.join(100)
