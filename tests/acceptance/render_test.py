@@ -182,6 +182,14 @@ class Render(unittest.TestCase):
         about = json.loads((self.path / "at1/render.json").read_text(encoding="utf-8"))
         self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
 
+    def test_equal_stamps_are_counted(self):
+        poses = self.path / "poses.tum"
+        poses.write_text("# frame: ENU_FLU\n" + "".join(f"{t} 0 0 -1 0 0 0 1\n" for t in (0, 0.1, 0.1, 0.2)), encoding="utf-8")
+        result = self.render("--poses", poses, "--format", "raw", "--quiet")
+        self.expect(result, 0, "poses.tum: 1 pose replaced by the next of the same stamp")
+        about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
+        self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
+
     def test_snapshots_do_not_smear(self):
         """Poses too far apart for a vehicle: the sonar is at rest in each ping, with one note, also in render.json."""
         snapshots = self.path / "snapshots.csv"

@@ -96,7 +96,8 @@ Result<RenderInput> input_of(const RenderCommand& command) {
   }
   std::set<std::string> once;  // each note once, although a sweep repeats it for every step
   for (const RenderJob& job : input->jobs) {
-    if (std::string note = note_of_range(job); !note.empty()) once.insert(std::move(note));
+    for (const std::string& note : {note_of_range(job), job.poses_note})
+      if (!note.empty()) once.insert(note);
     for (std::string& note : notes_of_config(job.config)) once.insert(std::move(note));
   }
   input->notes.insert(input->notes.end(), once.begin(), once.end());

@@ -285,6 +285,8 @@ Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const st
   if (!trajectory) return tl::make_unexpected(trajectory.error());
   job.snapshots = are_snapshots(**trajectory);
   job.begins_at = Time{} + file.begins_at;
+  if (file.replaced > 0)
+    job.poses_note = name + ": " + text::counted(file.replaced, "pose") + " replaced by the next of the same stamp";
   // The poses of the file replace the initial pose and the trajectory of the vehicle.
   job.vehicle() = {.name = job.vehicle().name,
                    .initial_pose = {},

@@ -53,6 +53,7 @@ struct RenderJob {
   std::size_t sonar_index = 0;  // in config.sonars; the random noise depends on it, as in the daemon
   PingSettings settings;
   Time begins_at{};           // the time stamp at which trajectories begin
+  std::string poses_note;     // a remark on the file of the poses; empty = none
   bool snapshots = false;     // true if the poses are unrelated; the sonar then does not move during a ping
   bool wants_motion = false;  // true if the file contains `engine: {motion: on}`
   Values values;              // values of the sweep and of `let`
