@@ -123,10 +123,19 @@ TEST(EsriGrid, NoDataIsRecognisedInEveryForm) {
     EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value " + few_digits, few_digits), false), "1") << few_digits;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -99999.99", "-99999.9921875"), false), "1");
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value 0", "0"), false), "1");
-  for (const char* fill :
-       {"-32768", "-99999", "-9999999", "-2147483648", "2147483647", "4294967295", "-3.4028234663852886e+38", "9.96921e+36"})
+  for (const char* fill : {"-32768", "-99999", "-9999999", "-999.99", "-9999.9", "99999.99", "65535", "-2147483648", "2147483647",
+                           "4294967295", "-3.4028234663852886e+38", "9.96921e+36"})
     EXPECT_EQ(holes_in(grid_of(metre, fill), true), "1") << fill;
   EXPECT_EQ(holes_in(grid_of(metre + "\nNODATA_value -32768", "-9999"), true), "1");
+  // Other values remain heights, but one far from all others is noted.
+  for (const char* far : {"-888", "-12345.6", "5000"}) {
+    const auto grid = read_esri_heights(files.write("g.asc", grid_of(metre, far)), {});
+    ASSERT_TRUE(grid);
+    EXPECT_THAT(grid->notes, ::testing::Contains(HasSubstr(std::string("1 cell of ") + far + ", "))) << far;
+  }
+  const auto near = read_esri_heights(files.write("g.asc", grid_of(metre, "8")), {});
+  ASSERT_TRUE(near);
+  EXPECT_TRUE(near->notes.empty()) << near->notes[0];
   // Among such depths -9999 m is ground, not a hole.
   const auto trench = read_esri_heights(
       files.write("g.asc",

@@ -65,11 +65,20 @@ TEST_F(GeoTiff, HeightsInFeetBecomeMetres) {
   const auto unit = [&](const std::string& word) {
     TiffFile tiff = good();
     tiff.text(42112, R"(<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">)" + word + "</Item></GDALMetadata>");
+    const auto grid = read(tiff);
+    if (grid && word == "cubits") {
+      EXPECT_THAT(grid->notes, ::testing::Contains(HasSubstr("cubits, is not known")));
+    }
     return first(tiff);
   };
   EXPECT_NEAR(unit("ft"), -0.3048, 1e-6);
   EXPECT_NEAR(unit("US survey foot"), -0.3048006, 1e-6);
   EXPECT_NEAR(unit("metre"), -1, 1e-6);
+  EXPECT_NEAR(unit("Metres"), -1, 1e-6);
+  EXPECT_NEAR(unit("cm"), -0.01, 1e-6);
+  EXPECT_NEAR(unit("millimetre"), -0.001, 1e-6);
+  EXPECT_NEAR(unit("fathoms"), -1.8288, 1e-6);
+  EXPECT_NEAR(unit("cubits"), -1, 1e-6);
   const auto lengths = read(good().keys({{{1024, 1}, {3076, 9003}}}));
   ASSERT_TRUE(lengths);
   EXPECT_NEAR(lengths->z_m[3], -1, 1e-6);

@@ -176,6 +176,11 @@ TEST_F(GltfFloats, WeightsOfBonesAreRead) {
   d["scenes"][0]["nodes"] = {0, 1};
   d["skins"] = {{{"joints", {1}}, {"inverseBindMatrices", 3}}};
   expect_vertices(vertices("a.glb", triangle.glb()), {{5, 6, 7}, {6, 6, 7}, {5, 7, 7}});
+  d["skins"][0].erase("inverseBindMatrices");  // the matrices are then unit matrices
+  expect_vertices(vertices("a.glb", triangle.glb()), {{5, 6, 7}, {6, 6, 7}, {5, 7, 7}});
+  d["meshes"][0]["primitives"][0]["attributes"] = {{"POSITION", 0}};
+  d["nodes"][0]["translation"] = {1, 2, 3};
+  expect_vertices(vertices("a.glb", triangle.glb()), {{1, 2, 3}, {2, 2, 3}, {1, 3, 3}});
 }
 
 TEST_F(GltfFloats, DamagedFilesAreRefused) {

@@ -232,6 +232,14 @@ objects:
   files.write("g.bin", std::string("II*\0", 4));
   EXPECT_THAT(refusal(object("type: heightmap, file: g.bin, material: sand"), files.folder()),
               ::testing::Not(HasSubstr("unknown height format")));
+  // The content of a file counts, not its extension.
+  files.write("t.png", std::string("II*\0", 4));
+  EXPECT_THAT(refusal(object("type: heightmap, file: t.png, material: sand"), files.folder()), HasSubstr("TIFF"));
+  files.write("p.tif", "\x89PNG\r\n\x1a\n");
+  EXPECT_THAT(refusal(object("type: heightmap, file: p.tif, material: sand"), files.folder()), HasSubstr("size_m"));
+  files.write("j.png", "\xff\xd8\xff\xe0");
+  EXPECT_THAT(refusal(object("type: heightmap, file: j.png, material: sand, size_m: [1, 1], height_m: [0, 1]"), files.folder()),
+              HasSubstr("is a JPEG picture"));
 }
 
 TEST(LoadScene, LostTrianglesOfAMeshAreANote) {

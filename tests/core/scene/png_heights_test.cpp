@@ -55,6 +55,7 @@ TEST(PngHeights, WrongFilesAreRefused) {
   const auto good = write_png(files, 3, 2, PNG_FORMAT_GRAY, colour);
   EXPECT_EQ(refusal(good), "accepted");
   const std::string bytes = files.read(good);
+  EXPECT_THAT(refusal(files.write("cut.png", bytes.substr(0, 30))), HasSubstr("cut short; fetch or export it again"));
   for (std::size_t n = 0; n + 12 < bytes.size(); ++n) {  // if only the last chunk is missing, the picture is whole
     EXPECT_THAT(refusal(files.write("cut.png", bytes.substr(0, n))), HasSubstr("not usable as heights")) << n;
   }
