@@ -210,10 +210,11 @@ class Talk {
       }
       apply(delivery.events);
     }
-    if (by_stream) return;
     const std::size_t to = make.ports.size() - 1;
-    for (const Bytes& datagram : device.datagrams(stream != nullptr ? *stream : *lines_.front().port, made, state))
-      deliver(to, datagram);
+    if (!by_stream)
+      for (const Bytes& datagram : device.datagrams(stream != nullptr ? *stream : *lines_.front().port, made, state))
+        deliver(to, datagram);
+    state.framed_at = made.request.fired_at;
   }
 
   std::vector<Line> lines_;
