@@ -58,6 +58,10 @@ class Verdicts(unittest.TestCase):
         self.assertTrue(found.must_holds and found.should_holds)
         self.assertEqual(colour(found), "good")
 
+    def test_pings_sent_before_the_end_show_no_recovery(self):
+        before = [(t, n) for t, n in TICKS if t < 4]
+        self.assertEqual(self.words([(t + 1, n) for t, n in before], before)[1], "NEVER")
+
     def test_an_outage_has_its_length(self):
         kept = [(t, n) for t, n in TICKS if not 2 <= t < 4.5]
         found = verdict(observed(kept, kept, connections=[(0.0, 4.0, "device FIN"), (4.4, None, "")]))

@@ -126,7 +126,7 @@ def judge(seen: Observation, must: Mapping[str, float], should: Mapping[str, Opt
         list(seen.published), [], [])
     times = [p.mono for p in good] if seen.tapped else list(seen.wire_times) or [s.mono for s in seen.delivered]
     lost = _judge_data(verdict, seen, good, stale, false)
-    _judge_recovery(verdict, seen, times)
+    _judge_recovery(verdict, seen, times, _sent_later(seen, good) if seen.tapped and seen.truth_known else times)
 
     alive = verdict.recovery != "CRASH"
     back = verdict.recovery in ("NONE NEEDED", "BACK")
@@ -186,11 +186,19 @@ def _judge_data(verdict: Verdict, seen: Observation, good: Sequence[Published], 
     return lost
 
 
-def _judge_recovery(verdict: Verdict, seen: Observation, times: Sequence[float]) -> None:
+def _sent_later(seen: Observation, good: Sequence[Published]) -> List[float]:
+    """Returns the times at which pings were published that the sonar sent after the fault. A slow driver still publishes earlier
+    ones then, which shows no recovery."""
+    later = {(number, crc) for s in seen.true_pings if s.mono >= seen.ended for crc in s.ping.crcs for number in (None, s.ping.number)}
+    return [p.mono for p in good if (p.number, p.crc) in later]
+
+
+def _judge_recovery(verdict: Verdict, seen: Observation, times: Sequence[float], later: Sequence[float]) -> None:
+    """times: when pings were published. later: the times of those that the sonar sent after the fault."""
     if seen.exit_code is not None and seen.exit_code != 0:
         verdict.recovery = "CRASH"
         return
-    back = back_at(times, seen.ended) if seen.exit_code is None else None
+    back = back_at(later, seen.ended) if seen.exit_code is None else None
     if back is None:
         verdict.recovery = "OPERATOR" if seen.restarted_well else "NEVER"
         return
