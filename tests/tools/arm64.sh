@@ -81,18 +81,23 @@ export SONARD_IMPORT_MESH=$PWD/$emulated/importer/sonard-import-mesh
 # If a program is missing, qemu-user starts nevertheless and ends with code 127.
 export GTEST_FILTER=-ChildProcess.AProgramThatIsNotThereIsNamed:HostileMeshes.WithoutTheImporterTheSentenceSaysWhatIsMissing
 
-# Prints one line for each program that passes, and the whole output of each that fails.
+# Runs each program as four shards, so that the longest one uses all processors. Prints one line for each shard that passes, and the
+# whole output of each that fails.
 run_tests() {
-  local programs
+  local program programs
   make_commands
   mapfile -t programs < <(tested)
   [ -x "$folder/${programs[0]:-none}" ] || { echo "no tests in $folder: run the step build first" >&2; return 66; }
-  printf '%s\0' "${programs[@]}" | xargs -0 -n 1 -P "${SONARD_TEST_JOBS:-$(nproc)}" bash -c '
+  for program in "${programs[@]}"; do printf '%s\0' "$program" 0 "$program" 1 "$program" 2 "$program" 3; done |
+    xargs -0 -n 2 -P "${SONARD_TEST_JOBS:-$(nproc)}" bash -c '
     started=$SECONDS
-    if output=$(timeout 3600 qemu-aarch64 "'"$folder"'/$0" --gtest_brief=1 2>&1 </dev/null); then
-      printf "%s: %s, %d s\n" "${0##*/}" "$(tail -n 1 <<<"$output")" $((SECONDS - started))
+    output=$(GTEST_TOTAL_SHARDS=4 GTEST_SHARD_INDEX=$1 timeout 3600 qemu-aarch64 "'"$folder"'/$0" --gtest_brief=1 2>&1 </dev/null)
+    code=$?
+    if [ $code = 0 ]; then
+      printf "%s %d/4: %s, %d s\n" "${0##*/}" "$(($1 + 1))" "$(tail -n 1 <<<"$output")" $((SECONDS - started))
     else
-      printf "%s FAILED\n%s\n" "$0" "$output"
+      [ $code != 124 ] || output+="stopped after 3600 s"
+      printf "%s %d/4 FAILED\n%s\n" "$0" "$(($1 + 1))" "$output"
       exit 1
     fi'
 }
