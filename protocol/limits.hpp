@@ -15,11 +15,14 @@ namespace sonar::protocol {
 
 inline tl::unexpected<Error> refused(std::string text) { return failure(ErrorKind::usage, std::move(text)); }
 
+/// Tolerance of limits of ranges: a double cannot hold most decimal fractions, so 0.3 - 0.2 is less than 0.1.
+inline constexpr double rounding_m = 1e-5;
+
 /// Returns the refusal of a range, such as "the range of a Surveyor is 0.01 to 200 m, not 400 m (end_mm)"; empty if `range_m` is
 /// from `low_m` to `high_m`. `of`: the sonar, such as "a Surveyor".
 inline std::string range_complaint(double range_m, std::string_view of, double low_m, double high_m,
                                    std::string_view field = {}) {
-  if (range_m >= low_m && range_m <= high_m) return {};
+  if (range_m >= low_m - rounding_m && range_m <= high_m + rounding_m) return {};
   return "the range of " + std::string(of) + text::format(" is %.4g to %.4g m, not %g m", low_m, high_m, range_m) +
          (field.empty() ? std::string() : " (" + std::string(field) + ")");
 }

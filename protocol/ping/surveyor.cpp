@@ -17,13 +17,14 @@ namespace {
 
 using protocol::refused;
 
-constexpr int beams = 64, directions = 16;         // a point is sought in as many directions as there are receive elements
-constexpr double swath_deg = 80;                   // from memory, as is the number of elements
-constexpr double beam_width_deg = 7;               // width for an array of 16 elements half a wavelength apart
-constexpr double above_db = 15;                    // unknown: assumed; level of a point above the median of its beam
-constexpr double usual_end_m = 20;                 // assumed for end_mm 0, with which the device follows the bottom
-constexpr double longest_m = 200, least_m = 0.01;  // highest end of the range; least length of the range
-constexpr double db_per_gain = 0.4;                // unknown: assumed
+constexpr int beams = 64, directions = 16;    // a point is sought in as many directions as there are receive elements
+constexpr double swath_deg = 80;              // from memory, as is the number of elements
+constexpr double beam_width_deg = 7;          // width for an array of 16 elements half a wavelength apart
+constexpr double above_db = 15;               // unknown: assumed; level of a point above the median of its beam
+constexpr std::int32_t usual_end_mm = 20000;  // assumed for end_mm 0, with which the device follows the bottom
+constexpr std::int32_t longest_mm = 200000, least_mm = 10;  // highest end of the range; least length of the range
+constexpr double longest_m = 1e-3 * longest_mm, least_m = 1e-3 * least_mm;
+constexpr double db_per_gain = 0.4;  // unknown: assumed
 constexpr double processing_s = 0.01;
 
 SonarModel make_model() {
@@ -48,7 +49,7 @@ SonarModel make_model() {
   return model;
 }
 
-double end_m(const PingParameters& p) { return p.end_mm > 0 ? 1e-3 * p.end_mm : usual_end_m; }
+std::int32_t end_mm(const PingParameters& p) { return p.end_mm > 0 ? p.end_mm : usual_end_mm; }
 
 std::uint64_t milliseconds_of(std::chrono::nanoseconds t) {
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::milliseconds>(t).count());
@@ -83,7 +84,7 @@ bool same_settings(const Settings& a, const Settings& b) {
 }
 
 std::string complaint(const PingParameters& p) {
-  if (p.start_mm < 0 || p.end_mm < 0 || end_m(p) > longest_m || p.start_mm > 1000 * (end_m(p) - least_m))
+  if (p.start_mm < 0 || p.end_mm < 0 || end_mm(p) > longest_mm || p.start_mm > end_mm(p) - least_mm)
     return protocol::range_rule(least_m, longest_m, "start_mm, end_mm");
   if (!(p.speed_mps >= 1000 && p.speed_mps <= 2000)) return "sos_mps is not in 1000..2000";
   if (p.gain < -1 || p.gain > 100) return "gain_index is not in -1..100";
@@ -98,7 +99,7 @@ PingSettings ping_settings(const Settings& settings) {
   const double speed = static_cast<double>(p.speed_mps);
   PingSettings s;
   s.beam_count = beams;
-  s.range_m = end_m(p);
+  s.range_m = 1e-3 * end_mm(p);
   s.range_start_m = std::max(1e-3 * p.start_mm, 0.05 * s.range_m);  // DEF: at least 5 % of the end
   s.range_bin_count = p.steps;
   s.range_bin_m = (s.range_m - s.range_start_m) / p.steps;
@@ -121,7 +122,7 @@ Result<protocol::ChangeSettings> apply_override(const protocol::SettingsOverride
   Settings s = settings_from(device.settings.get());
   PingParameters& p = s.parameters;
   const std::string why =
-      protocol::first_of({protocol::range_complaint(wanted, "a Surveyor", 1e-3 * p.start_mm + least_m, longest_m, "end_mm"),
+      protocol::first_of({protocol::range_complaint(wanted, "a Surveyor", 1e-3 * (p.start_mm + least_mm), longest_m, "end_mm"),
                           protocol::rate_complaint(wanted, "a Surveyor", device.model->max_rate_hz, "msec_per_ping"),
                           protocol::gain_complaint(wanted)});
   if (!why.empty()) return refused(why);

@@ -105,7 +105,7 @@ Outcome set_range(Call& call, const Json& posted) {
   if (!posted.is_object() || !posted.value("min", Json()).is_number() || !posted.value("max", Json()).is_number())
     return malformed("not {\"min\": number, \"max\": number}");
   const double least = posted["min"].get<double>(), most = posted["max"].get<double>();
-  if (!(least >= 0 && least + least_window_m <= most && most <= longest_range_m))
+  if (!(least >= 0 && most - least >= least_window_m - protocol::rounding_m && most <= longest_range_m))
     return malformed(protocol::range_rule(least_window_m, longest_range_m, "min, max"));
   call.settings.range_min_m = least;
   call.settings.range_max_m = most;

@@ -5,6 +5,7 @@
 #include <regex>
 #include <string>
 
+#include "protocol/limits.hpp"
 #include "protocol/oculus/fire.hpp"
 #include "protocol/ping/omniscan.hpp"
 #include "protocol/ping/surveyor.hpp"
@@ -61,6 +62,16 @@ TEST(Overrides, AreRefusedWithThePermittedRangeOfEachProduct) {
       EXPECT_THAT(why(set().rate(-1)), testing::AnyOf(HasSubstr("not -1 Hz"), HasSubstr("cannot be set"),
                                                       HasSubstr("sets its rate"), HasSubstr("has no rate")));
     }
+}
+
+/// Sums of decimal fractions are not exact: 0.2 + 0.1 is above 0.3.
+TEST(Overrides, AcceptTheLimitsOfARange) {
+  for (int mm = 1; mm < 3000; ++mm) {
+    EXPECT_EQ(protocol::range_complaint(0.001 * mm + 0.1, "it", (mm + 100) / 1000.0, 9), "") << mm;
+    EXPECT_EQ(protocol::range_complaint((mm + 100) / 1000.0, "it", 0.001 * mm + 0.1, 9), "") << mm;
+    EXPECT_EQ(protocol::range_complaint((mm + 100) / 1000.0, "it", 0, 0.001 * mm + 0.1), "") << mm;
+    EXPECT_NE(protocol::range_complaint((mm + 99) / 1000.0, "it", 0.001 * mm + 0.1, 9), "") << mm;
+  }
 }
 
 /// A rate that is too high for the range is not refused; the sonar then pings as fast as it can.

@@ -310,6 +310,13 @@ TEST(NorbitCommands, ACommandWithoutAnEndOfLineEndsAfterSilence) {
   EXPECT_THAT(talk.take(), StartsWith("set_power 1")) << "in simulated time, such a command ends at once";
 }
 
+TEST(NorbitCommands, TheShortestRangeIsAMetreWhereverItBegins) {
+  for (int cm = 0; cm < 1000; ++cm) {
+    EXPECT_EQ(complaint({.start_m = cm / 100.0, .stop_m = (cm + 100) / 100.0}), "") << cm;
+    EXPECT_NE(complaint({.start_m = cm / 100.0, .stop_m = (cm + 99) / 100.0}), "") << cm;
+  }
+}
+
 TEST(NorbitCommands, ValuesOutsideTheLimitsChangeNothing) {
   Talk talk;
   talk.tick(0);

@@ -41,6 +41,15 @@ TEST(Surveyor, TheEnableFieldStartsAndEndsASession) {
   EXPECT_EQ(talk.settings.rate_hz, 0);
 }
 
+TEST(Surveyor, TheShortestRangeHasTenMillimetresWhereverItBegins) {
+  for (std::int32_t start_mm = 0; start_mm <= 199990; start_mm += 10) {
+    EXPECT_EQ(complaint({.start_mm = start_mm, .end_mm = start_mm + 10}), "") << start_mm;
+    EXPECT_NE(complaint({.start_mm = start_mm, .end_mm = start_mm + 9}), "") << start_mm;
+  }
+  EXPECT_NE(complaint({.start_mm = 0, .end_mm = 200001}), "");
+  EXPECT_NE(complaint({.start_mm = 2147483647, .end_mm = 2147483647}), "");
+}
+
 TEST(Surveyor, RequestsForMessagesOfEachPingAreAnsweredByTheNextPing) {
   Talk talk("surveyor-240");
   const auto answered = [&](Id id) {

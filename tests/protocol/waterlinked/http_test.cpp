@@ -36,6 +36,7 @@ TEST(WaterLinkedHttp, PostedValuesAreReadBack) {
   Unit unit;
   const std::pair<const char*, const char*> values[] = {
       {"/acoustics/enabled", "true"},
+      {"/acoustics/range", R"({"max":0.3,"min":0.2})"},
       {"/acoustics/range", R"({"max":3.0,"min":2.0})"},
       {"/acoustics/speed_of_sound", "1442.0"},
       {"/acoustics/mode", "\"high-frequency\""},
@@ -63,6 +64,7 @@ TEST(WaterLinkedHttp, RefusesBodiesThatAreNotInTheSchema) {
       {"/acoustics/enabled", "{"},
       {"/acoustics/range", "[0, 5]"},
       {"/acoustics/range", R"({"min":5,"max":5})"},
+      {"/acoustics/range", R"({"min":5,"max":5.09})"},
       {"/acoustics/range", R"({"min":0,"max":16})"},
       {"/acoustics/range", R"({"min":-1,"max":5})"},
       {"/acoustics/speed_of_sound", "999"},
