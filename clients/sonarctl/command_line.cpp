@@ -204,7 +204,12 @@ Result<SourceOptions> SourceArguments::finish() const {
   Result<Endpoint> at = parse_endpoint(device.address, {"127.0.0.2", device.port});
   if (!at) return tl::unexpected(at.error());
   std::error_code ec;
-  if (at->host.find('/') != std::string::npos || std::filesystem::is_regular_file(at->host, ec))
+  // A file may have the name of a host.
+  const auto is_no_host = [&at] {
+    const auto found = resolve(*at);
+    return !found && found.error().kind == ErrorKind::usage;
+  };
+  if (at->host.find('/') != std::string::npos || (std::filesystem::is_regular_file(at->host, ec) && is_no_host()))
     return failure(ErrorKind::usage, "\"" + device.address + "\" is a file, not the address of a sonar: view, stats and record " +
                                          "read a recording with --from FILE");
   source.make = make.empty() ? nullptr : protocol::find_make(make);

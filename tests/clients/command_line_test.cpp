@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
 
 #include "core/text/arguments.hpp"
 
@@ -20,7 +22,8 @@ std::string complaint(const std::vector<std::string>& words) {
   CLI::App app("", "sonarctl");
   app.require_subcommand(1);
   app.set_version_flag("--version", "1");
-  const std::vector<Run> commands{add_view(app), add_pose(app), add_set(app)};  // they own the variables of the options
+  const std::vector<Run> commands{add_view(app), add_pose(app),
+                                  add_set(app)};  // they own the variables of the options
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
   } catch (const CLI::ParseError& error) {
@@ -70,6 +73,26 @@ TEST(CommandLine, DiscoveryFindsOneMakeOnly) {
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().kind, ErrorKind::usage);
   EXPECT_EQ(done.error().text, "--discover finds an Oculus only: leave it out, and give the address of a BlueView sonar");
+}
+
+/// A file may have the name of a host.
+TEST(CommandLine, ASonarIsNotAFile) {
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(testing::TempDir());
+  for (const char* name : {"localhost", "no host has spaces"}) std::ofstream(name) << "x";
+  const auto finished = [](const std::string& address) {
+    SourceArguments arguments;
+    arguments.device.address = address;
+    return arguments.finish();
+  };
+  EXPECT_TRUE(finished("localhost"));
+  for (const char* file : {"no host has spaces", "./localhost"}) {
+    const auto refused = finished(file);
+    ASSERT_FALSE(refused) << file;
+    EXPECT_THAT(refused.error().text, HasSubstr("is a file, not the address of a sonar"));
+  }
+  for (const char* name : {"localhost", "no host has spaces"}) std::filesystem::remove(name);
+  std::filesystem::current_path(before);
 }
 
 TEST(CommandLine, GoodLinesAreAccepted) {
