@@ -30,6 +30,7 @@ constexpr auto connect_patience = 2000ms;      // for streams, before other kind
 constexpr auto probe_after = 500ms;            // without a datagram; a restart of sonard takes longer
 constexpr auto longest_pause = 160ms;          // between attempts
 constexpr auto leave_patience = 1000ms;        // for the sonar to close the connection too
+constexpr auto lost_patience = 200ms;          // for the answers of a sonar that has probably gone
 constexpr int receive_buffer_bytes = 4 << 20;  // a few pings
 constexpr const char* is_sonard_there = ". Is sonard running there? Its banner names the address of each sonar";
 
@@ -133,9 +134,10 @@ PingStream::~PingStream() {
   if (last.empty()) return;
   ended_.reset();  // the connection may be usable although the command has failed
   carry_out(std::move(last));
-  for (const auto until = Clock::now() + answer_patience; !host_->has_left() && !ended_ && Clock::now() < until;)
+  for (const auto until = Clock::now() + (is_lost_ ? lost_patience : answer_patience);
+       !host_->has_left() && !ended_ && Clock::now() < until;)
     receive(left_until(until));
-  const auto until = Clock::now() + leave_patience;
+  const auto until = Clock::now() + (is_lost_ ? lost_patience : leave_patience);
   for (std::size_t port = 0; port < sockets_.size() && !ended_; ++port) {
     if (make_->ports[port].kind != Kind::tcp || !sockets_[port]) continue;
     ::shutdown(sockets_[port]->fd(), SHUT_WR);
@@ -145,8 +147,6 @@ PingStream::~PingStream() {
     }
   }
 }
-
-std::string PingStream::place() const { return (make_->is_by_udp() ? "udp " : "tcp ") + text_from(device_); }
 
 Result<Socket> PingStream::open_port(std::size_t port, milliseconds patience) {
   const protocol::HostPort& wanted = make_->ports[port];
@@ -356,12 +356,8 @@ bool PingStream::is_rejected(milliseconds patience) const {
 std::string PingStream::own() const {
   if (!sockets_.front()) return {};
   const sockaddr_in at = own_address(*sockets_.front());
-  std::array<char, INET_ADDRSTRLEN> host{};
-  ::inet_ntop(AF_INET, &at.sin_addr, host.data(), host.size());
-  return text_from({host.data(), ntohs(at.sin_port)});
+  return text_from({text::format_ipv4(text::ipv4_from_number(ntohl(at.sin_addr.s_addr))), ntohs(at.sin_port)});
 }
-
-std::string PingStream::about() const { return text_from(device_) + ", " + host_->about(); }
 
 Result<void> PingStream::record_to(const std::filesystem::path& file) {
   if (make_->ports.size() != 1 || make_->ports.front().kind != Kind::tcp)

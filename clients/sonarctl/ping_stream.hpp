@@ -47,6 +47,8 @@ class PingStream {
   PingStream(PingStream&&) = default;
   ~PingStream();
 
+  /// Shortens the waits of the destructor, because the sonar has probably gone.
+  void count_as_lost() { is_lost_ = true; }
   struct Item {
     Wait what = Wait::timed_out;
     std::optional<HostPing> ping;      // set only with Wait::data; unset then: another message
@@ -74,7 +76,7 @@ class PingStream {
   /// Returns our address at the first port, such as "127.0.0.1:41022"; empty for HTTP.
   std::string own() const;
   /// Returns "127.0.0.2:14750, a BlueView P900-90, serial 7001".
-  std::string about() const;
+  std::string about() const { return text_from(device_) + ", " + host_->about(); }
 
  private:
   PingStream(const Make& make, Endpoint device, std::unique_ptr<protocol::Host> host, bool keeps_messages)
@@ -96,7 +98,8 @@ class PingStream {
   /// UDP has no connection whose end would show that a silent sonar has gone, but a closed port refuses a datagram. An
   /// empty datagram is not a request, so it does not take the sonar from another driver.
   void probe(bool is_silent);
-  std::string place() const;  // "tcp 127.0.0.2:14750"
+  /// Returns "tcp 127.0.0.2:14750".
+  std::string place() const { return (make_->is_by_udp() ? "udp " : "tcp ") + text_from(device_); }
 
   const Make* make_;
   Endpoint device_;
@@ -106,6 +109,7 @@ class PingStream {
   std::chrono::milliseconds answer_patience_{};
   std::chrono::steady_clock::time_point probe_at_{};  // time of the next probe
   std::deque<Item> items_;                            // items that next() has not returned yet
+  bool is_lost_ = false;
   std::string limits_;                                // HostPing::limited of the last ping
   std::optional<Error> ended_;                        // set when the conversation has ended; empty text: the sonar closed it
   bool has_answered_ = false;                         // a byte arrived at the first port

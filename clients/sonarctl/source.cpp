@@ -198,8 +198,9 @@ bool Silence::is_over() {
   return !is_served && interrupted == 0;
 }
 
-void Outage::begins(const PingStream& lost) {
+void Outage::begins(PingStream& lost) {
   if (!since_) since_ = Clock::now();
+  lost.count_as_lost();
   changed_ = lost.host().changed();
 }
 

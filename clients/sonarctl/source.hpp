@@ -66,8 +66,8 @@ class Outage {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// The time begins now, unless there is an outage already.
-  void begins(const PingStream& lost);
+  /// The time begins now, unless there is an outage already. The lost stream then waits less when it is destroyed.
+  void begins(PingStream& lost);
   void ends() { since_.reset(); }
   double left_s(const SourceOptions& source) const;                      // time until source.return_limit_s is over
   const protocol::ChangedSettings& changed() const { return changed_; }  // by the host that has lost the sonar

@@ -1,0 +1,79 @@
+// A stream of pings whose sonar falls silent.
+#include "clients/sonarctl/ping_stream.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <array>
+#include <chrono>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "clients/sonarctl/source.hpp"
+#include "tests/clients/bound_socket.hpp"
+
+namespace sonar::clients::ping_stream_test {
+namespace {
+
+using namespace std::chrono_literals;
+
+std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
+
+/// A DVL with settings of another driver, and a stream that has changed them.
+class Dvl {
+ public:
+  Dvl() {
+    ::listen(listener_.fd(), 16);
+    Wanted wanted;
+    wanted.settings.range_m = 5;
+    auto opened = PingStream::open({"127.0.0.2", ntohs(own_address(listener_).sin_port)}, find_make("dvl"), wanted, 20s);
+    EXPECT_TRUE(opened) << (opened ? "" : opened.error().text);
+    if (!opened) return;
+    stream.emplace(*std::move(opened));
+    client_.emplace(::accept4(listener_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
+    answer("auto");
+    hear("set_config");
+  }
+  void say(std::string_view line) { EXPECT_TRUE(write_all(*client_, bytes_of(line))); }
+  /// Answers get_config.
+  void answer(const std::string& range_mode) {
+    say(R"({"response_to":"get_config","success":true,"error_message":"","type":"response","format":"json_v3.3",)"
+        R"("result":{"acoustic_enabled":true,"range_mode":")" +
+        range_mode + "\"}}\r\n");
+  }
+  /// Runs the stream until the device has received `text`. Returns all that it has received since the last call.
+  std::string hear(std::string_view text) {
+    std::string heard;
+    for (const auto until = std::chrono::steady_clock::now() + 20s; std::chrono::steady_clock::now() < until;) {
+      if (stream) stream->next(1ms);
+      std::array<std::byte, 4096> chunk;
+      const Read read = read_some(*client_, chunk, 1ms);
+      for (std::size_t i = 0; i < read.size; ++i) heard += std::to_integer<char>(chunk[i]);
+      if (heard.find(text) != std::string::npos) return heard;
+    }
+    ADD_FAILURE() << "the device has not received " << text << " but " << heard;
+    return heard;
+  }
+
+  std::optional<PingStream> stream;
+
+ private:
+  Socket listener_ = bound_socket("127.0.0.2", SOCK_STREAM, 0);
+  std::optional<Socket> client_;
+};
+
+TEST(PingStream, ASilentSonarDelaysTheNextConnectionLittle) {
+  Dvl dvl;
+  ASSERT_TRUE(dvl.stream);
+  Outage outage;
+  outage.begins(*dvl.stream);
+  const auto begin = std::chrono::steady_clock::now();
+  dvl.stream.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, 2500ms) << "3 s is the wait for the answer of a sonar that is there";
+}
+
+}  // namespace
+}  // namespace sonar::clients::ping_stream_test
