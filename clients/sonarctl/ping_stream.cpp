@@ -229,6 +229,7 @@ void PingStream::carry_out(protocol::HostActions actions) {
       notices.push_back(std::move(notice->text));
     } else if (auto* error = std::get_if<Error>(&action)) {
       ended_ = std::move(*error);
+      ended_by_host_ = true;
       if (ended_->kind != ErrorKind::usage) ended_->text = place() + " " + ended_->text;
     }
   }
@@ -339,7 +340,8 @@ PingStream::Item PingStream::next(milliseconds patience) {
       items_.pop_front();
       return item;
     }
-    if (ended_) return {Wait::closed, {}, {}, std::exchange(kept_, {}), ended_->text, ended_->kind, record_.fail()};
+    if (ended_)
+      return {Wait::closed, {}, {}, std::exchange(kept_, {}), ended_->text, ended_->kind, record_.fail(), ended_by_host_};
     if (!receive(left_until(deadline))) return {Wait::interrupted, {}, {}, {}, {}};
     if (items_.empty() && !ended_ && Clock::now() >= deadline) return {};
   }

@@ -45,10 +45,11 @@ class PingStream {
   static Result<PingStream> open(const Endpoint& device, const Make* make, const Wanted& wanted,
                                  std::chrono::milliseconds patience, bool keeps_messages = false, Rejection* rejection = nullptr);
   PingStream(PingStream&&) = default;
+  /// Puts back the settings, and waits for the sonar to answer and to close the connection.
   ~PingStream();
-
   /// Shortens the waits of the destructor, because the sonar has probably gone.
   void count_as_lost() { is_lost_ = true; }
+
   struct Item {
     Wait what = Wait::timed_out;
     std::optional<HostPing> ping;      // set only with Wait::data; unset then: another message
@@ -58,6 +59,7 @@ class PingStream {
     std::string error;
     ErrorKind kind = ErrorKind::io;  // kind of the error
     bool is_not_recorded = false;    // true: the error is about the file of record_to(), not about the connection
+    bool is_from_host = false;       // true: the error is a whole sentence about what the sonar has sent
   };
   /// Returns the next ping or message, or what happened instead within `patience`. Requests a ping if the make requires that.
   Item next(std::chrono::milliseconds patience);
@@ -107,11 +109,12 @@ class PingStream {
   std::vector<std::optional<Socket>> sockets_;  // by port; nullopt for HTTP
   std::uint32_t device_ip_ = 0;                 // in network order
   std::chrono::milliseconds answer_patience_{};
+  bool is_lost_ = false;
   std::chrono::steady_clock::time_point probe_at_{};  // time of the next probe
   std::deque<Item> items_;                            // items that next() has not returned yet
-  bool is_lost_ = false;
   std::string limits_;                                // HostPing::limited of the last ping
   std::optional<Error> ended_;                        // set when the conversation has ended; empty text: the sonar closed it
+  bool ended_by_host_ = false;                        // true: the host has made the error ended_
   bool has_answered_ = false;                         // a byte arrived at the first port
   bool is_turned_away_ = false;                       // the sonar closed the connection before it answered
   bool is_started_ = false;                           // the destructor must send what on_leave() returns

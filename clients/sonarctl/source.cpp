@@ -250,6 +250,7 @@ std::string reason_for_silence(const SourceOptions& source, bool observes) {
 
 Error closed(const PingStream::Item& item, std::uint64_t pings) {
   if (item.kind == ErrorKind::usage || item.is_not_recorded) return {item.kind, item.error};
+  if (item.is_from_host) return {ErrorKind::io, item.error};
   if (!item.error.empty()) return {ErrorKind::io, "the connection broke: " + item.error};
   return {ErrorKind::io, "the device closed the connection after " + std::to_string(pings) +
                              " pings: it stopped, or another client holds it (clients.max)"};

@@ -18,13 +18,13 @@ using protocol::HostActions;
 constexpr auto host_keep_alive_after = 2s;  // time since the last message of this host
 constexpr std::uint16_t abi_of_sdk = 4;     // the sonar reads this number and ignores it
 
-/// Returns the error of an error frame of `sonar`, such as "P900-90 refuses a request: no head 3 (code 2010)".
+/// Returns the error of an error frame of `sonar`, such as "P900-90 refuses a request: no head 3 (code 2010)", as in HostAction.
 Error error_in(wire::BytesView payload, const std::string& sonar) {
   wire::Reader reader(payload);
   Code code{};
   reader("code", code);
   const std::string text = read_text(reader, "text") + " (code " + std::to_string(static_cast<int>(code)) + ")";
-  if (code == Code::timeout) return {ErrorKind::unavailable, sonar + " sends no ping: " + text};
+  if (code == Code::timeout) return {ErrorKind::unavailable, "sends no ping: " + text};
   return {ErrorKind::usage, sonar + " refuses a request: " + text};
 }
 

@@ -1,4 +1,4 @@
-// A stream of pings whose sonar falls silent.
+// A stream of pings whose sonar falls silent or sends an error.
 #include "clients/sonarctl/ping_stream.hpp"
 
 #include <gmock/gmock.h>
@@ -14,6 +14,7 @@
 
 #include "clients/sonarctl/source.hpp"
 #include "tests/clients/bound_socket.hpp"
+#include "tests/protocol/blueview/blueview_testing.hpp"
 
 namespace sonar::clients::ping_stream_test {
 namespace {
@@ -73,6 +74,34 @@ TEST(PingStream, ASilentSonarDelaysTheNextConnectionLittle) {
   const auto begin = std::chrono::steady_clock::now();
   dvl.stream.reset();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 2500ms) << "3 s is the wait for the answer of a sonar that is there";
+}
+
+TEST(PingStream, AnErrorOfTheSonarIsNotReportedAsABrokenConnection) {
+  const SocketServer sonar("127.0.0.2", 0, [](const Socket& client) {
+    auto device = blueview::test::device();
+    const auto dialogue = blueview::vendor().converse(blueview::vendor().ports().front(), device, Time{});
+    std::array<std::byte, 4096> chunk;
+    for (int requests = 1;; ++requests) {
+      const Read read = read_some(client, chunk, 20s);
+      if (read.what != Wait::data) return;
+      if (requests > 1) {  // after the greeting, the request for a ping
+        static_cast<void>(write_all(client, blueview::make_error(2, blueview::Code::timeout, "no ping in the time given")));
+        continue;
+      }
+      for (const wire::Bytes& reply : dialogue->on_bytes(std::span<const std::byte>(chunk).first(read.size), Time{}).replies)
+        static_cast<void>(write_all(client, reply));
+    }
+  });
+  auto stream = PingStream::open(*parse_endpoint(sonar.at(), {}), find_make("blueview"), {}, 20s);
+  ASSERT_TRUE(stream) << stream.error().text;
+  PingStream::Item item;
+  for (const auto until = std::chrono::steady_clock::now() + 20s;
+       item.what != Wait::closed && std::chrono::steady_clock::now() < until;)
+    item = stream->next(100ms);
+  ASSERT_EQ(item.what, Wait::closed);
+  const Error why = closed(item, 3);
+  EXPECT_EQ(why.kind, ErrorKind::io);
+  EXPECT_THAT(why.text, testing::StartsWith("tcp " + sonar.at() + " sends no ping: no ping in the time given"));
 }
 
 }  // namespace
