@@ -5,10 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 
 #include "core/text/arguments.hpp"
+#include "protocol/control/answers.hpp"
+#include "protocol/control/control.hpp"
+#include "tests/clients/bound_socket.hpp"
 
 namespace sonar::clients {
 namespace {
@@ -22,7 +27,7 @@ std::string complaint(const std::vector<std::string>& words) {
   CLI::App app("", "sonarctl");
   app.require_subcommand(1);
   app.set_version_flag("--version", "1");
-  const std::vector<Run> commands{add_view(app), add_pose(app),
+  const std::vector<Run> commands{add_view(app), add_listen(app), add_pose(app),
                                   add_set(app)};  // they own the variables of the options
   try {
     app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
@@ -73,6 +78,44 @@ TEST(CommandLine, DiscoveryFindsOneMakeOnly) {
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().kind, ErrorKind::usage);
   EXPECT_EQ(done.error().text, "--discover finds an Oculus only: leave it out, and give the address of a BlueView sonar");
+}
+
+TEST(CommandLine, ModesAreCountedFromOne) {
+  EXPECT_THAT(complaint({"listen", "--mode", "0"}), HasSubstr("\"0\" is not a whole number from 1"));
+  EXPECT_THAT(complaint({"set", "sonar", "--mode", "0"}), HasSubstr("\"0\" is not a whole number from 1"));
+  SettingArguments listen;
+  CLI::App app("", "sonarctl");
+  listen.add_to(app);
+  app.parse("--mode 2");
+  EXPECT_EQ(listen.settings.mode, 1u);
+  std::atomic<std::uint32_t> mode = 99;
+  const SocketServer sonard("127.0.0.1", 0, [&mode](const Socket& client) {
+    control::DelimitedParser parser;
+    std::array<std::byte, 4096> chunk;
+    for (;;) {
+      const Read read = read_some(client, chunk, std::chrono::seconds(20));
+      if (read.what != Wait::data) return;
+      parser.feed(std::span<const std::byte>(chunk).first(read.size));
+      while (const auto message = parser.next()) {
+        if (!*message) break;
+        const auto request = control::decode_request(**message);
+        if (!request) return;
+        v1::Response response = control::response_of(request->id, control::StatusCode::ok);
+        if (const auto* set = std::get_if<control::SetSonar>(&request->op)) {
+          mode = set->mode.value_or(99);
+          response = control::response_of(request->id, control::StatusCode::refused, "1 mode(s), counted from 0");
+        }
+        static_cast<void>(write_all(client, control::delimited(control::encode_response(std::move(response)))));
+      }
+    }
+  });
+  CLI::App whole("", "sonarctl");
+  const auto run = add_set(whole);
+  whole.parse("set sonar --mode 2 --control " + sonard.at());
+  const Result<void> refused = run();
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("1 mode(s), counted from 0 (--mode counts from 1)"));
+  EXPECT_EQ(mode, 1u);
 }
 
 /// A file may have the name of a host.

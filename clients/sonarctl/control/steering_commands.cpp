@@ -96,7 +96,11 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
   add_optional(command, "--rate", s.rate_hz, "ping rate [Hz], rounded to a rate that the product has; 0 = standby")
       ->check(number());
   add_optional(command, "--gain", s.gain_percent, "per cent")->check(number());
-  add_optional(command, "--mode", s.mode, "frequency mode, from 0: lowest first")->check(whole_number(0, 255));
+  command
+      .add_option_function<std::uint32_t>(
+          "--mode", [&s](std::uint32_t given) { s.mode = given - 1; },
+          "number from 1 of a frequency or a head, in the order of the sonar's model")
+      ->check(whole_number(1, 100));
   add_optional(command, "--beams", s.beams, "number of beams; depends on the product")->check(whole_number(0, 65535));
   command.add_option("--transmit", arguments->transmit, "on, or off: receive only noise, for all clients")
       ->check(one_of({"on", "off"}));
@@ -114,8 +118,11 @@ void add_set_sonar(CLI::App& set, const std::shared_ptr<Steering>& steering) {
     steering->what = [steering, arguments]() -> Result<void> {
       const Result<control::SetSonar> wanted = arguments->finish();
       if (!wanted) return tl::unexpected(wanted.error());
-      return steer(steering->control, *wanted,
-                   name_or_its(wanted->sonar) + " is set; sonarctl status shows the resulting settings");
+      const Result<void> done =
+          steer(steering->control, *wanted, name_or_its(wanted->sonar) + " is set; sonarctl status shows the resulting settings");
+      if (!done && wanted->mode && done.error().text.find("counted from 0") != std::string::npos)
+        return failure(done.error().kind, done.error().text + " (--mode counts from 1)");
+      return done;
     };
   });
 }
