@@ -29,10 +29,12 @@ struct Command {
   void (*set)(Settings&, const std::vector<double>&);
   std::size_t arguments;
   std::string_view comment;
+  bool is_whole = false;  // true: its numbers have no fractions
 };
 constexpr std::array<Command, 6> commands{{
-    {"set_power", [](const Settings& s) { return std::string(s.power ? "1" : "0"); },
-     [](Settings& s, const std::vector<double>& a) { s.power = a[0] != 0; }, 1, "1: pings"},
+    {"set_power", [](const Settings& s) { return std::to_string(s.power); },
+     [](Settings& s, const std::vector<double>& a) { s.power = static_cast<int>(std::clamp(a[0], -1.0, 2.0)); }, 1, "1: pings",
+     true},
     {"set_range", [](const Settings& s) { return format("%g %g", s.start_m, s.stop_m); },
      [](Settings& s, const std::vector<double>& a) { s.start_m = a[0], s.stop_m = a[1]; }, 2, "m"},
     {"set_rate", [](const Settings& s) { return format("%g", s.rate_hz); },
@@ -44,7 +46,7 @@ constexpr std::array<Command, 6> commands{{
        s.samples = static_cast<int>(std::clamp(a[0], -1.0, 1e6));
        s.beams = static_cast<int>(std::clamp(a[1], -1.0, 1e6));
      },
-     2, "samples, beams"},
+     2, "samples, beams", true},
     {"sound_velocity", [](const Settings& s) { return format("%g", s.sound_mps); },
      [](Settings& s, const std::vector<double>& a) { s.sound_mps = a[0]; }, 1, "m/s, -1: measured"},
 }};
@@ -166,7 +168,10 @@ class CommandDialogue final : public protocol::Dialogue {
       Settings wanted = s;
       const auto numbers = numbers_of(given);
       std::string why = format("it has %zu numbers", command.arguments);
-      if (numbers && numbers->size() == command.arguments) {
+      const auto is_whole = [](double number) { return std::trunc(number) == number; };
+      if (numbers && command.is_whole && !std::ranges::all_of(*numbers, is_whole)) {
+        why = "its numbers have no fractions";
+      } else if (numbers && numbers->size() == command.arguments) {
         command.set(wanted, *numbers);
         why = complaint(wanted);
       }

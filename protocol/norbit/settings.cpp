@@ -20,6 +20,7 @@ constexpr auto processing = std::chrono::milliseconds(5);
 std::string complaint(const Settings& s) {
   if (!(s.start_m >= 0 && s.stop_m <= farthest_m && s.stop_m - s.start_m >= shortest_m - protocol::rounding_m))
     return protocol::range_rule(shortest_m, farthest_m, "start, stop");
+  if (s.power != 0 && s.power != 1) return "the power must be 0 or 1";
   if (s.rate_hz != -1 && !(s.rate_hz > 0 && s.rate_hz <= fastest_hz))
     return text::format("the rate must be above 0 and at most %g Hz, or -1", fastest_hz);
   if (!(s.gain_db >= 0 && s.gain_db <= most_gain_db)) return text::format("the gain must be 0 to %g dB", most_gain_db);

@@ -34,7 +34,7 @@ inline constexpr SampleFormat sample_format{
     .bits = 16, .max_code = 65535, .scale = SampleFormat::Scale::logarithmic, .floor_db = -120, .ceiling_db = 40};
 
 struct Settings {
-  bool power = false;
+  int power = 0;                    // 0 = off, 1 = pings
   double start_m = 0, stop_m = 10;  // our choice; stop_m in DFD: 50, or the product's value
   double rate_hz = -1;              // -1 = the highest rate that the range permits
   double gain_db = 20;

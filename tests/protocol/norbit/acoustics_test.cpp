@@ -16,7 +16,7 @@ using namespace sonar::test;
 /// Returns the bathymetry of a ping of this scene. As in the engine's tests, the sonar looks ahead and port is +y.
 Bathymetry bathymetry_of(std::shared_ptr<const Scene> scene) {
   const protocol::DeviceState state = device();
-  const Settings settings{.power = true, .stop_m = 6};
+  const Settings settings{.power = 1, .stop_m = 6};
   Sounding sounding(std::move(scene), models().front()->modes[0], ping_settings(settings, state));
   sounding.request.water = state.water;
   sounding.request.model = state.model;

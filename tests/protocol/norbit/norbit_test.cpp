@@ -26,7 +26,7 @@ T at(BytesView bytes, std::size_t offset) {
 
 /// Packets of a ping with an echo in row 100 of beam 10 of 256, which is to port.
 struct Packets : testing::Test {
-  Settings settings{.power = true, .stop_m = 12};
+  Settings settings{.power = 1, .stop_m = 12};
   protocol::DeviceState state = device();
   Ping ping = ping_with(settings, state, 100, 10);
   Bytes bathymetry = encode_bathymetry(ping, state), column = encode_column(ping, state);
@@ -323,7 +323,8 @@ TEST(NorbitCommands, ValuesOutsideTheLimitsChangeNothing) {
   talk.take();
   for (const char* wrong : {"set_range 5 5", "set_range -1 20", "set_range 0 700", "set_range 5", "set_range a b",
                             "set_range nan 5", "set_rate 0", "set_rate 61", "set_gain 41", "set_resolution 256 100",
-                            "set_resolution 1e300 128", "sound_velocity 100", "set_power 1 2"}) {
+                            "set_resolution 1e300 128", "sound_velocity 100", "set_power 1 2", "set_power 2", "set_power 0.5",
+                            "set_power -0.5", "set_power 1e300", "set_resolution 256.5 128", "set_resolution 256 128.5"}) {
     talk.say(std::string(wrong) + "\n");
     EXPECT_THAT(talk.take(), HasSubstr("unchanged: ")) << wrong;
   }
@@ -341,7 +342,7 @@ TEST(NorbitCommands, ValuesOutsideTheLimitsChangeNothing) {
 
 TEST(Norbit, EachPortHasItsOwnPackets) {
   const protocol::DeviceState state = device();
-  const Ping ping = ping_with({.power = true, .stop_m = 5}, state, 50, 10);
+  const Ping ping = ping_with({.power = 1, .stop_m = 5}, state, 50, 10);
   const auto parts_at = [&](std::uint16_t number) {
     const auto port = std::ranges::find(vendor().ports(), number, &protocol::Port::number);
     return vendor().datagrams(*port, ping, state);
@@ -358,7 +359,7 @@ TEST(Norbit, EachPortHasItsOwnPackets) {
 
 TEST(Norbit, TheBottomIsDetectedOnce) {
   const protocol::DeviceState state = device();
-  Ping ping = ping_with({.power = true, .stop_m = 5}, state, 50, 10);
+  Ping ping = ping_with({.power = 1, .stop_m = 5}, state, 50, 10);
   const auto port = std::ranges::find(vendor().ports(), bathymetry_port, &protocol::Port::number);
   const auto bottom = [&] {
     std::vector<std::uint32_t> samples;
