@@ -227,10 +227,12 @@ class Ping1DDialogue final : public SoundingConversation<Settings, HeldSettings,
       case Id::ping1d_set_gain:
         if (is_manual(frame, reaction)) set_value(frame, reaction, &Parameters::gain);
         return true;
-      case Id::ping1d_set_enable:
+      case Id::ping1d_set_enable: {
+        const std::uint8_t before = settings_after(reaction).parameters.enable;
         set_value(frame, reaction, &Parameters::enable);
-        forget_ping(now);  // a requested ping may not come any more
+        if (settings_after(reaction).parameters.enable != before) forget_ping(now);  // a requested ping may not come any more
         return true;
+      }
       case Id::ping1d_continuous_start:
       case Id::ping1d_continuous_stop:
         set_stream(frame, now, reaction);

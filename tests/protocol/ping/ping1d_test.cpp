@@ -149,6 +149,16 @@ TEST(Ping1D, NoMeasurementIsMadeWhilePingsAreDisabled) {
   EXPECT_EQ(talk.dialogue->next_tick(), at_s(3)) << "the stream continues";
 }
 
+TEST(Ping1D, ARequestThatDoesNotChangeEnableKeepsThePingThatIsBeingComputed) {
+  for (const auto same : {std::uint8_t{2}, std::uint8_t{1}}) {  // refused, and as it is
+    Talk talk("ping1d");
+    talk.say(setting(Id::ping1d_continuous_start, Id::ping1d_distance));
+    talk.apply(talk.dialogue->on_tick(at_s(0), false));
+    talk.say(setting<std::uint8_t>(Id::ping1d_set_enable, same), 0.5);
+    EXPECT_EQ(talk.dialogue->next_tick(), at_s(2)) << "no further ping is requested before that ping counts as lost";
+  }
+}
+
 TEST(Ping1D, RefusesWrongRequests) {
   for (const Bytes& wrong :
        {framed_message(Id::ping1d_set_range, 0, ScanRange{0, 999}),
