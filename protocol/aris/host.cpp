@@ -19,6 +19,7 @@ using protocol::HostActions;
 constexpr auto ping_after = 1s;                   // keep-alive; the device disconnects a controller after 10 s of silence
 constexpr double nominal_sound_speed_mps = 1490;  // converts the requested range to time; no frame has stated the speed yet
 constexpr std::uint32_t most_pulse_us = 80;
+constexpr double nearest_end_m = 1.1;            // the shortest start delay, 930 us, and the fewest and shortest samples
 constexpr std::size_t commands = 0, frames = 1;  // indices of ports
 
 /// Settings for a product. `refusal`: reason why the product cannot have the requested settings (empty: it can); `acoustics` are
@@ -47,10 +48,13 @@ Choice choice_for(const SonarModel& model, const protocol::SettingsOverride& wan
   }
   if (wanted.gain_percent) a.gain_db = static_cast<float>(highest_gain_db * *wanted.gain_percent / 100);
   if (wanted.range_m) {
-    const double least_m = static_cast<double>(model.modes.front().min_range_m);
-    if (refusal.empty()) refusal = protocol::range_complaint(*wanted.range_m, "an " + model.name, least_m, product.window_end_m);
-    const double range_m = std::min(*wanted.range_m, product.window_end_m);
-    const double window_us = 2e6 * range_m / nominal_sound_speed_mps - a.start_delay_us;
+    if (refusal.empty())
+      refusal = protocol::range_complaint(*wanted.range_m, "an " + model.name, nearest_end_m, product.window_end_m);
+    const double range_m = std::clamp(*wanted.range_m, nearest_end_m, product.window_end_m);
+    const double end_us = 2e6 * range_m / nominal_sound_speed_mps;
+    // A short range begins nearer, so that the fewest samples fit into it.
+    a.start_delay_us = std::min(a.start_delay_us, static_cast<std::uint32_t>(end_us) - shortest_period_us * least_samples);
+    const double window_us = end_us - a.start_delay_us;
     a.sample_period_us = static_cast<std::uint32_t>(std::clamp(std::ceil(window_us / 2000), 4.0, 100.0));
     a.samples_per_beam =
         static_cast<std::uint32_t>(std::clamp<double>(window_us / a.sample_period_us, least_samples, most_samples));
@@ -201,7 +205,7 @@ Result<std::unique_ptr<protocol::Host>> make_host(const protocol::Wanted& wanted
   if (!wanted.as_it_is && std::none_of(models().begin(), models().end(), fits))
     return failure(
         ErrorKind::usage,
-        "no ARIS has this range and mode: an ARIS 1200 has modes 1 and 2, others 1 to 4, and its range of 0.7 to 100 m is the "
+        "no ARIS has this range and mode: an ARIS 1200 has modes 1 and 2, others 1 to 4, and its range of 1.1 to 100 m is the "
         "longest");
   return std::make_unique<ArisHost>(wanted);
 }

@@ -45,7 +45,7 @@ std::string out_of_range(const Acoustics& a, const Product& product) {
 
 using protocol::refused;
 
-constexpr std::uint32_t shortest_period_us = 4, longest_period_us = 100, longest_pulse_us = 80;
+constexpr std::uint32_t longest_period_us = 100, longest_pulse_us = 80;
 
 /// Sets the requested mode, or the ping mode with the requested number of beams.
 Result<void> set_mode(Settings& s, const protocol::SettingsOverride& wanted, const protocol::DeviceState& device) {

@@ -16,6 +16,7 @@ namespace sonar::aris {
 
 inline constexpr double highest_rate_hz = 15, highest_gain_db = 24;
 inline constexpr std::uint32_t least_samples = 128, most_samples = 4096;  // per beam
+inline constexpr std::uint32_t shortest_period_us = 4;
 
 /// All values that a controller has set. They are kept in addition to PingSettings, because the headers of frames repeat them.
 struct Settings {

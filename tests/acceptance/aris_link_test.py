@@ -237,8 +237,8 @@ class Tools(unittest.TestCase):
 
     def test_sonarctl_says_what_the_product_cannot_do(self):
         with Sonard(scene="l-targets.yaml", profile="aris-3000") as daemon:
-            for settings, why in ((("--range", 60), "the range of an ARIS 3000 is 0.7 to 20 m, not 60 m"),
-                                  (("--mode", 4, "--range", 21), "the range of an ARIS 3000 is 0.7 to 20 m, not 21 m"),
+            for settings, why in ((("--range", 60), "the range of an ARIS 3000 is 1.1 to 20 m, not 60 m"),
+                                  (("--mode", 4, "--range", 21), "the range of an ARIS 3000 is 1.1 to 20 m, not 21 m"),
                                   (("--mode", 5), "no ARIS has this range and mode: an ARIS 1200 has modes 1 and 2, others 1 to 4")):
                 for command in (("listen", "--pings", 1), ("record", "--pings", 1, "--pcap", f"{daemon.folder.name}/run.pcap"),
                                 ("view", "--png", f"{daemon.folder.name}/fan.png"), ("view", "--live", "--term")):

@@ -160,6 +160,22 @@ TEST(ArisDialogue, SettingsOfEachProductCauseNoWarning) {
   }
 }
 
+TEST(ArisDialogue, HostsSetShortRangesOrRefuseThem) {
+  for (const double range_m : {0.9, 1.1, 1.2, 1.3, 1.5, 2.0}) {
+    Talk talk;
+    protocol::Wanted wanted;
+    wanted.settings.range_m = range_m;
+    const auto host = make_host(wanted);
+    ASSERT_EQ(host.has_value(), range_m > 1) << range_m;
+    if (!host) continue;
+    const std::uint16_t own[] = {4000, 4001};
+    for (const protocol::HostAction& action : (*host)->on_open(own, tests::at_s(0)))
+      if (const auto* send = std::get_if<protocol::HostSend>(&action)) talk.say(send->bytes);
+    EXPECT_NEAR(talk.settings.range_m, range_m, 0.05 * range_m);
+    EXPECT_THAT(talk.notices, testing::IsEmpty()) << range_m;
+  }
+}
+
 TEST(ArisDialogue, SalinityFocusClockAndLensCanBeSet) {
   Talk talk("aris-1800");
   talk.say(tests::set_acoustics({1, 12, 1000, 1360, 5720, 4, 6, 3, true, Frequency::high, true, 18}));
