@@ -278,6 +278,8 @@ void PingStream::read_port(std::size_t port) {
     for (const std::byte b : received) record_.put(static_cast<char>(b));
     if (!record_.flush()) {
       ended_ = Error{ErrorKind::io, "cannot write more to " + raw_file_.string() + ": " + why_not_written(raw_file_, errno)};
+      record_.close();       // the destructor continues to receive
+      take(port, received);  // an answer among the bytes may be necessary to put back settings
       return;
     }
   }

@@ -1,4 +1,4 @@
-// A stream of pings whose sonar falls silent or sends an error.
+// A stream of pings whose sonar falls silent, sends an error, or leaves a recording without space.
 #include "clients/sonarctl/ping_stream.hpp"
 
 #include <gmock/gmock.h>
@@ -7,6 +7,8 @@
 
 #include <array>
 #include <chrono>
+#include <future>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,6 +22,7 @@ namespace sonar::clients::ping_stream_test {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::HasSubstr;
 
 std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span(text)); }
 
@@ -58,6 +61,8 @@ class Dvl {
     ADD_FAILURE() << "the device has not received " << text << " but " << heard;
     return heard;
   }
+
+  void leave() { client_.reset(); }
 
   std::optional<PingStream> stream;
 
@@ -102,6 +107,25 @@ TEST(PingStream, AnErrorOfTheSonarIsNotReportedAsABrokenConnection) {
   const Error why = closed(item, 3);
   EXPECT_EQ(why.kind, ErrorKind::io);
   EXPECT_THAT(why.text, testing::StartsWith("tcp " + sonar.at() + " sends no ping: no ping in the time given"));
+}
+
+TEST(PingStream, AFailedRecordingDoesNotKeepTheSettingsFromBeingPutBack) {
+  Dvl dvl;
+  ASSERT_TRUE(dvl.stream);
+  ASSERT_TRUE(dvl.stream->record_to("/dev/full"));
+  dvl.answer("0<=2");  // the settings of the stream, which cannot be recorded
+  PingStream::Item item;
+  for (const auto until = std::chrono::steady_clock::now() + 20s;
+       item.what != Wait::closed && std::chrono::steady_clock::now() < until;)
+    item = dvl.stream->next(100ms);
+  ASSERT_TRUE(item.is_not_recorded) << item.error;
+  auto last = std::make_unique<PingStream>(*std::move(dvl.stream));
+  dvl.stream.reset();
+  const auto left = std::async(std::launch::async, [&last] { last.reset(); });
+  dvl.hear("get_config");
+  dvl.answer("0<=2");
+  EXPECT_THAT(dvl.hear("set_config"), HasSubstr(R"("range_mode":"auto")"));
+  dvl.leave();
 }
 
 }  // namespace
