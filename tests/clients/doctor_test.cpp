@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "clients/sonarctl/doctor/probes.hpp"
+#include "clients/sonarctl/ping_stream.hpp"
 #include "tests/clients/doctor_testing.hpp"
 
 namespace sonar::clients::doctor {

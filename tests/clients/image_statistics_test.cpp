@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "clients/sonarctl/ping_stream.hpp"
+#include "clients/sonarctl/source.hpp"
 #include "core/base/random.hpp"
 
 namespace sonar::clients {
