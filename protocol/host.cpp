@@ -82,7 +82,6 @@ std::optional<std::string> ChangedSetting::on_answer(const std::string& value) {
   switch (++answers) {
     case 1:  // the sonar may still have what a host set that has lost it
       if (before.empty() || (!ours.empty() && ours != value)) before = value;
-      ours.clear();
       break;
     case 2:
       ours = value;
@@ -94,6 +93,11 @@ std::optional<std::string> ChangedSetting::on_answer(const std::string& value) {
       break;
   }
   return std::nullopt;
+}
+
+bool ChangedSetting::ends_early() {
+  answers = ours.empty() ? 0 : 2;
+  return answers > 0;
 }
 
 }  // namespace sonar::protocol

@@ -30,6 +30,9 @@ struct ChangedSetting {
   int answers = 0;
   /// Returns the value to put back, after the third answer; nullopt if another driver has changed the setting.
   std::optional<std::string> on_answer(const std::string& value);
+  /// For a host that leaves before it has set anything: the next answer counts as the third if a host that has lost the sonar has
+  /// set something. Returns whether this is so.
+  bool ends_early();
 };
 using ChangedSettings = std::map<std::string, ChangedSetting, std::less<>>;  // by name
 

@@ -76,9 +76,11 @@ class DvlHost final : public protocol::Host {
     return actions;
   }
   HostActions on_leave() override {
-    if (!parameters_ || std::exchange(learns_until_, std::nullopt) || answers() == 0) return {};
-    leaves_ = true;
-    return {protocol::HostSend{0, get_config()}};
+    if (!parameters_) return {};
+    const bool has_set = !std::exchange(learns_until_, std::nullopt);
+    leaves_ = has_set && answers() > 0;
+    for (auto& [name, setting] : changed_) leaves_ = (has_set ? !setting.before.empty() : setting.ends_early()) || leaves_;
+    return leaves_ ? HostActions{protocol::HostSend{0, get_config()}} : HostActions{};
   }
   bool has_left() const override { return !leaves_ || answers() >= 3; }
   protocol::ChangedSettings changed() const override { return changed_; }

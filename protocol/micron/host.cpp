@@ -90,10 +90,11 @@ class MicronHost final : public protocol::Host {
   HostActions on_leave() override {
     learns_until_.reset();
     const auto ours = std::exchange(command_, std::nullopt);  // no further requests
-    if (!ours || !before_) return {};
-    const bool is_anothers = seen_ && !is_alike(*seen_, *ours) && !is_alike(*seen_, *before_);
+    const auto& first = before_ ? before_ : earlier_;
+    if (!ours || !first) return {};
+    const bool is_anothers = seen_ && !is_alike(*seen_, *ours) && !is_alike(*seen_, *first);
     if (is_anothers) return {};
-    return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*before_))}};
+    return {protocol::HostSend{0, from_host(Id::head_command, wire::bytes_of(*first))}};
   }
   HostActions on_bytes(std::size_t, BytesView received, Time now) override {
     HostActions actions;

@@ -141,10 +141,14 @@ class NorbitHost final : public protocol::Host {
     return std::min(learns_until_.value_or(Time::max()), given_up_at(waiting_.front()));
   }
   HostActions on_leave() override {
-    if (!lines_ || std::exchange(learns_until_, std::nullopt)) return {};  // has changed nothing
-    std::erase_if(*lines_, [this](const NamedValues& c) { return changed_[c.first].answers == 0; });
-    leaves_ = true;
-    return ask();
+    if (!lines_) return {};
+    const bool has_set = !std::exchange(learns_until_, std::nullopt);
+    std::erase_if(*lines_, [&](const NamedValues& c) {
+      protocol::ChangedSetting& setting = changed_[c.first];
+      return has_set ? setting.answers == 0 && setting.before.empty() : !setting.ends_early();
+    });
+    leaves_ = !lines_->empty();
+    return leaves_ ? ask() : HostActions{};
   }
   bool has_left() const override { return !leaves_ || have_answers(3); }
   protocol::ChangedSettings changed() const override { return changed_; }

@@ -348,6 +348,21 @@ TEST_P(Hosts, PutBackTheFirstSettingsAfterALostConnection) {
   }
 }
 
+TEST_P(Hosts, PutBackTheFirstSettingsEvenIfTheyLeaveSoonAfterALostConnection) {
+  if (!keeps_settings(GetParam())) return;
+  for (std::size_t held_after = 0; held_after < 8; ++held_after) {
+    KeptSettings sonar(GetParam());
+    sonar.talk.run(30);
+    Wanted again = all_that_is_known(GetParam(), range_m);
+    again.changed = sonar.talk.host->changed();
+    ASSERT_FALSE(sonar.talk.state.settings->equals(*sonar.found));
+    sonar.talk.held_after = held_after;
+    sonar.talk.open(*GetParam().host(again));
+    sonar.leave();
+    EXPECT_TRUE(sonar.talk.state.settings->equals(*sonar.found)) << "after " << held_after << " messages";
+  }
+}
+
 TEST_P(Hosts, SendNoSettingsWhenTheSonarIsToBeLeftAsItIs) {
   Wanted nothing;
   nothing.as_it_is = true;
