@@ -88,7 +88,9 @@ class MicronHost final : public protocol::Host {
     return learns_until_ ? learns_until_ : std::optional(requested_at_ + patience);
   }
   HostActions on_leave() override {
-    learns_until_.reset();
+    leaves_ = std::exchange(learns_until_, std::nullopt) && command_ && earlier_;
+    // The line shows whose parameters the head has.
+    if (leaves_) return {protocol::HostSend{0, from_host(Id::send_data, Bytes(4))}};
     const auto ours = std::exchange(command_, std::nullopt);  // no further requests
     const auto& first = before_ ? before_ : earlier_;
     if (!ours || !first) return {};
@@ -108,6 +110,10 @@ class MicronHost final : public protocol::Host {
       ++counts_.messages;
       if (message->header.id == Id::alive) on_alive(message->payload, now, actions);
       if (message->header.id != Id::head_data) continue;
+      if (std::exchange(leaves_, false)) {
+        if (const auto line = read_front<HeadData>(message->payload)) seen_ = command_of(*line);
+        std::ranges::move(on_leave(), std::back_inserter(actions));
+      }
       if (learns_until_) {
         if (const auto line = read_front<HeadData>(message->payload)) before_ = command_of(*line);
         if (before_ && earlier_ && is_alike(*before_, *command_)) before_ = earlier_;
@@ -123,6 +129,7 @@ class MicronHost final : public protocol::Host {
     }
     return actions;
   }
+  bool has_left() const override { return !leaves_; }
   protocol::ChangedSettings changed() const override {
     const auto& before = before_ ? before_ : earlier_;
     if (!before) return {};
@@ -151,6 +158,7 @@ class MicronHost final : public protocol::Host {
     const auto alive = read_front<Alive>(payload);
     if (!alive || !command_) return;
     const bool has_parameters = (alive->head_info & head_info::received_parameters) != 0;
+    if (leaves_) return;
     if (learns_until_ && has_parameters)
       actions.emplace_back(request(now));
     else if (learns_until_)
@@ -191,6 +199,7 @@ class MicronHost final : public protocol::Host {
   std::optional<HeadCommand> earlier_;  // those that it had before a host that has lost the sonar
   std::optional<HeadCommand> seen_;     // those of the last line, once ours were sent
   std::optional<Time> learns_until_;    // set while the host waits for before_
+  bool leaves_ = false;                 // true: the host waits for a line before it restores earlier_
   recording::MessageSplitter splitter_{recording::Origin::device, framing};
   protocol::Sweep sweep_{400};
   Time requested_at_{};
