@@ -7,6 +7,7 @@
 #include "protocol/blueview/encode_ping.hpp"
 #include "protocol/blueview/frames.hpp"
 #include "protocol/blueview/head_settings.hpp"
+#include "protocol/blueview/models.hpp"
 #include "protocol/limits.hpp"
 
 namespace sonar::blueview {

@@ -4,6 +4,7 @@
 #include "core/text/format.hpp"
 #include "protocol/limits.hpp"
 #include "protocol/oculus/decode.hpp"
+#include "protocol/oculus/models.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/settings.hpp"
 
