@@ -84,6 +84,12 @@ class Dataset(unittest.TestCase):
         self.assertEqual([p.name for p in out.glob("*.tmp*")], [])
         for shard in json.loads((out / "manifest.json").read_text())["shards"]:
             self.assertEqual(hashlib.sha256((out / shard["name"]).read_bytes()).hexdigest(), shard["sha256"])
+        unreadable = out / "shard-000000.tar.sha256"
+        unreadable.unlink()
+        unreadable.mkdir()
+        refused = run(SONARD, "dataset", self.job, "--out", out)
+        self.assertIn(f"{unreadable}: is a folder, not a regular file", refused.stderr)
+        self.assertEqual(refused.returncode, 66)
 
     def test_interrupted_it_says_so_and_goes_on_with_the_same_pings(self):
         self.job.write_text(small_job(24, 24), encoding="utf-8")

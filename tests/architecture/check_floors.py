@@ -109,6 +109,8 @@ FORBIDDEN = [
     ("precompiled header", r"", None, r"target_precompile_headers\(\w+ (PRIVATE|PUBLIC|INTERFACE)[^)]*\s[^<\s)][^)]*\)",
      "name headers of other packages, <...>: a compiler cache may return the precompiled header of an older comment of ours"),
     ("view", r".*\.(cpp|hpp)$", None, r"\bstd::(ranges::)?views::\w+", "clang 14 cannot compile the views of libstdc++ 12: use a loop or a projection"),
+    ("iterator of a file", r"(core|protocol|daemon|clients)/", None, r"\bistreambuf_iterator\b",
+     "it throws where reading fails, for example about a process that has ended: use read_regular()"),
     ("mark", r"", None, r"\b(TO" + r"DO|FIX" + r"ME|X" + r"XX)\b", "finish it, or write an issue"),
     ("machine path", r"", None, r"(?<![\w./~-])/(wo" + r"rk|ho" + r"me|ro" + r"ot|t" + r"mp|Users)/[\w.]", "paths of one machine do not belong in the tree"),
 ]

@@ -12,9 +12,9 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "clients/sonarctl/net.hpp"
+#include "core/base/regular_file.hpp"
 #include "core/text/ipv4.hpp"
 
 namespace sonar::clients::doctor {
@@ -223,10 +223,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string content_of(const fs::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
+/// Returns an empty text for the file of a process that has ended.
+std::string content_of(const fs::path& file) { return read_regular(file, std::size_t{64} << 20).value_or(std::string()); }
 
 std::vector<SocketLine> sockets_of(const char* protocol) {
   std::vector<SocketLine> all;

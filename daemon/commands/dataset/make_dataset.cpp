@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/parallel.hpp"
+#include "core/base/regular_file.hpp"
 #include "core/pipeline/simd/kernels.hpp"
 #include "daemon/commands/dataset/dataset_card.hpp"
 #include "daemon/commands/dataset/labelled_ping.hpp"
@@ -109,13 +110,13 @@ class Folder final : public DatasetFolder {
     const auto digest = digest_of_file(file);
     if (!digest) return tl::make_unexpected(digest.error());
     const std::string line = *digest + "  " + file.filename().string() + "\n";
-    std::ifstream in(noted, std::ios::binary);
-    if (!in) {
+    if (is_absent(noted)) {
       if (const auto done = write_durably(noted, line); !done) return tl::make_unexpected(done.error());
       return true;
     }
-    const std::string there{std::istreambuf_iterator<char>(in), {}};
-    if (there == line) return true;
+    const auto there = read_regular(noted, line.size());
+    if (!there) return tl::make_unexpected(there.error());
+    if (*there == line) return true;
     differs_ = true;
     return failure(ErrorKind::bad_data, file.string() + " differs from " + noted.filename().string() +
                                             ": it was changed or damaged; remove both, and run the same command again");
