@@ -1,7 +1,7 @@
-"""Tests all demos at the same time: each previews while a viewer looks, stops for a driver, resumes after it, and shows echoes.
-The page shows the product's kind of picture, with nothing over it, and all controls can be reached and used by keys.
+"""Tests the demos: each shows echoes in its preview. The preview stops for a driver and resumes after it.
+On the page, nothing covers the product's kind of picture, and the Tab key reaches all controls.
 
-The page's part is skipped without browser or page. SONARD_SHOTS names a folder for pictures.
+The tests of the page are skipped without browser or page. SONARD_SHOTS names a folder for pictures.
 """
 import pathlib
 import re
@@ -136,7 +136,7 @@ class Preview(unittest.TestCase):
                     if not event.get("preview"):
                         numbers.append(event["number"])
                     else:
-                        self.assertEqual(numbers, [], "no preview beside a driver")
+                        self.assertEqual(numbers, [], "no preview while a driver is connected")
                 self.assertEqual(numbers[0], 1, "previews do not change the first driver's numbers")
                 driver.terminate()
             viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/ping" and viewer.decode(*value[::2]).get("preview"))
@@ -152,7 +152,7 @@ class Preview(unittest.TestCase):
             eventually(lambda: "preview ends" in daemon.log())
             self.assertNotIn("viewer connected", daemon.log())
 
-    def test_a_host_that_has_left_is_no_error(self):
+    def test_a_host_that_has_left_is_not_an_error(self):
         payload = struct.pack("<BBHHHHHBB", 1, 1, 0, 100, 88, 740, 1200, 1, 0)  # a scan line
         request = b"BR" + struct.pack("<HHBB", len(payload), 2601, 0, 0) + payload
         request += struct.pack("<H", sum(request) & 0xFFFF)
@@ -238,7 +238,7 @@ class EachDemo(PageChecks, unittest.TestCase):
                 unreached = wanted - set(page.run(REACHED))
                 if not unreached:
                     break
-            self.assertEqual(unreached, set(), f"Tab does not come there; tab {tab}")
+            self.assertEqual(unreached, set(), f"the Tab key does not reach these; tab {tab}")
 
 
 @unittest.skipIf(WHY_NOT, WHY_NOT)
@@ -301,7 +301,7 @@ class Pages(PageChecks, unittest.TestCase):
             page.wait("document.querySelector('#rate-word').textContent === 'preview'")
             page.wait("document.querySelector('#latency').textContent === '–'")
             page.wait("sonardTest.facts.preview")
-            page.run("window.begun = sonardTest.facts.history.at(-1).time_s")  # earlier rates are also of pings of the driver
+            page.run("window.begun = sonardTest.facts.history.at(-1).time_s")  # earlier rates include pings of the driver
             page.wait("sonardTest.facts.history.some((h) => h.time_s > window.begun + 2 && h.rate > 0)")
             page.close()
 
@@ -335,7 +335,7 @@ class Pages(PageChecks, unittest.TestCase):
                 page.wait(LABELS_INSIDE + " === 'none'")  # the first words may be of a smaller picture
                 page.close()
 
-    def test_a_setting_by_keys_shows_its_refusal(self):
+    def test_a_setting_typed_with_keys_shows_its_refusal(self):
         for width, height in ((1600, 1000), (390, 844)):
             with self.subTest(width=width), demo("oculus"):
                 page = self.opened(self.browser.open(f"http://{HTTP}:8088/", width, height, touch=width < 800))

@@ -47,7 +47,7 @@ def framed(kind, version, payload):
 
 
 def same(shown, value):
-    """Returns the text that tshark prints for a value, in which floating-point numbers have 15 digits."""
+    """Returns whether tshark shows this value; it prints floating-point numbers with 15 digits."""
     if isinstance(value, float):
         return float(shown) == value or abs(float(shown) - value) <= 1e-14 * abs(value)
     return int(shown, 0) == value if isinstance(value, int) else shown == value
@@ -185,7 +185,7 @@ class RecordedRun(Dissected):
         return got
 
     def until_made_with(self, client, fire):
-        """Messages up to the second ping made with these settings."""
+        """Returns messages up to the second ping made with these settings."""
         got, matching = [], 0
         while matching < 2:
             got += self.until(client, 0x23)
@@ -269,7 +269,7 @@ class HandMade(Dissected):
         self.assertEqual((len(found), len(ours)), (2 * len(cases), 2 * len(cases)))
         for number, (_, expected) in enumerate(cases):
             with self.subTest(expected):
-                self.assertEqual(found[2 * number].experts, [], "a dummy")
+                self.assertEqual(found[2 * number].experts, [], "a dummy has no fault")
                 told = found[2 * number + 1].experts
                 self.assertTrue(any(expected in text for _, text in told), told)
                 self.assertNotEqual(ours[2 * number + 1]["violations"], [], "our decoder must find a fault, too")
@@ -360,7 +360,7 @@ class Malformed(Dissected):
                 del capture.packets[-1]  # the capture does not contain it
         self.assertEqual(self.dissect(capture)[-1].title, "Oculus, dummy")
 
-    def test_status_of_every_length_and_of_others(self):
+    def test_a_status_of_every_length_and_foreign_datagrams(self):
         capture = Capture()
         for size in range(142):
             capture.udp(golden("status")[:size])
@@ -383,7 +383,7 @@ class Used(Dissected):
 
     def test_other_ports_can_be_set(self):
         capture = self.capture(device_port=52200)
-        self.assertEqual(self.dissect(capture), [], "not a port of ours")
+        self.assertEqual(self.dissect(capture), [], "by default this port is not dissected")
         for way in (["-o", "oculus.tcp_ports:52100,52200-52203"], ["-d", "tcp.port==52200,oculus"]):
             titles = [m.title for m in self.dissect(capture, *way)]
             self.assertEqual([title.split()[1].rstrip(":") for title in titles], ["fire", "ping", "ping"])

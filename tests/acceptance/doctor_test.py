@@ -60,7 +60,7 @@ class Doctor(unittest.TestCase):
                        "--http", f"{daemon.address}:8088", *PATIENT)
             self.assertRegex(text.stdout, r"\n\d+ checks, 0 errors, \d+ warnings?\n$")
 
-    def test_http_is_asked_where_the_daemon_serves_it(self):
+    def test_http_is_requested_where_the_daemon_serves_it(self):
         with Sonard() as daemon:
             code, findings, _ = doctor_by_control(daemon)
             self.expect(findings, "http", "ok", f"http://{daemon.address}:8088/healthz returns ok")
@@ -68,7 +68,7 @@ class Doctor(unittest.TestCase):
         with Sonard(http="off") as daemon:
             self.expect(doctor_by_control(daemon)[1], "http", "ok", "HTTP is not served")
 
-    def test_a_token_that_was_not_given_is_a_warning_that_says_how(self):
+    def test_a_missing_token_is_a_warning_that_names_the_option(self):
         with tempfile.TemporaryDirectory() as folder:
             token = pathlib.Path(folder) / "token"
             token.write_text("0123456789abcdef01234567\n", encoding="utf-8")
@@ -84,7 +84,7 @@ class Doctor(unittest.TestCase):
                 code, findings, _ = doctor_by_control(daemon, "--token-file", token)
                 self.expect(findings, "control", "fail", "is not that of control.token_file")
 
-    def test_nothing_running_says_what_to_do(self):
+    def test_without_a_daemon_doctor_says_what_to_do(self):
         start = time.monotonic()
         code, findings, _ = doctor("127.0.0.9")
         self.expect(findings, "ping", "fail", "refuses the connection: no program listens there")
@@ -110,7 +110,7 @@ class Doctor(unittest.TestCase):
         self.expect(findings, "status", "warn", "cannot listen on udp 52102, held without address reuse by", f"pid {os.getpid()}")
         self.assertEqual(command.returncode, 69)
 
-    def test_the_rate_is_that_which_was_set(self):
+    def test_the_expected_rate_is_the_one_that_was_set(self):
         with Sonard(profile="m3") as daemon:
             done = run(SONARCTL, "set", "sonar", "--rate", 2, "--control", f"{daemon.address}:14770")
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -123,7 +123,7 @@ class Doctor(unittest.TestCase):
             self.assertTrue(driver.recv(16))  # dummies arrive, so the driver is served
             code, findings, _ = doctor(daemon.address, *PATIENT)
             self.expect(findings, "ping", "ok", "is busy", f":{driver.getsockname()[1]}", "not connecting")
-            # The same result without the control stream, from the kernel and the status message.
+            # Without the control stream the result is the same; it comes from the kernel and the status message.
             _, findings, _ = doctor(daemon.address, *PATIENT, control_port=1)
             self.expect(findings, "ping", "ok", "is busy", "not connecting")
             self.assertNotIn("client refused", daemon.log())
@@ -152,7 +152,7 @@ class Doctor(unittest.TestCase):
             return findings, "is connected" in findings["driver"][0]["text"]
 
     def test_a_driver_that_gets_no_ping_is_an_error_for_every_make(self):
-        # Port, whether other bytes leave the connection open, and what a driver must send.
+        # Port, whether other bytes leave the connection open, the name of a request, and what a driver must send.
         makes = {"oculus-m1200d": (52100, True, "fire message", "0x15"), "blueview-p900-90": (14750, False, "", "request for a ping"),
                  "aris-3000": (56888, False, "", "SET_ACOUSTICS"), "surveyor-240": (62312, True, "request", "ping_enable"),
                  "omniscan-450": (51200, True, "request", "os_ping_params"), "ping1d": (9090, True, "request", "continuous_start"),
@@ -171,7 +171,7 @@ class Doctor(unittest.TestCase):
                     findings, is_connected = self.examine_driver(daemon, port, b"")
                 self.expect(findings, "driver", "fail", "is connected to front and has not asked for pings: it has sent nothing", remedy)
 
-    def test_a_host_by_http_that_gets_no_image_is_an_error(self):
+    def test_an_http_host_that_gets_no_image_is_an_error(self):
         with Sonard(scene="l-targets.yaml", profile="waterlinked-3d15") as daemon:
             code, findings, found = doctor(daemon.address, *PATIENT)
             self.expect(findings, "ping", "warn", "no images are made", "post true to /acoustics/enabled")
@@ -195,7 +195,7 @@ class Doctor(unittest.TestCase):
             self.expect(findings, "driver", "fail", f":{driver.getsockname()[1]} is connected to front and has not asked for pings")
             self.assertEqual(len(findings["driver"]), 1, found)  # not doctor's own connection
 
-    def test_a_driver_that_gets_pings_is_no_error(self):
+    def test_a_driver_that_gets_pings_is_not_an_error(self):
         with Sonard(scene="l-targets.yaml") as daemon:
             with subprocess.Popen([str(SONARCTL), "listen", daemon.address, "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL) as driver:
                 try:
@@ -206,7 +206,7 @@ class Doctor(unittest.TestCase):
                 finally:
                     driver.terminate()
 
-    def test_an_address_of_nowhere_is_explained(self):
+    def test_an_address_of_no_host_is_explained(self):
         alone = ["unshare", "--user", "--map-root-user", "--net"]  # in a separate network, which no packet leaves
         try:
             subprocess.run([*alone, "true"], check=True, capture_output=True, timeout=30)

@@ -19,7 +19,7 @@ class Refused(Exception):
 
 
 class Closed(Exception):
-    """The server closed the connection. Code 0 means without a close frame."""
+    """The server closed the connection. Code 0 means that no close frame came."""
 
     def __init__(self, code):
         super().__init__(code)
@@ -95,14 +95,14 @@ class Viewer:
         deadline = time.monotonic() + self.socket.gettimeout()
         while time.monotonic() < deadline:
             first, second = self._take(2)
-            assert first & 0x70 == 0 and second & 0x80 == 0, "reserved bits, or a mask"
+            assert first & 0x70 == 0 and second & 0x80 == 0, "the frame has reserved bits or a mask"
             opcode, length = first & 15, second & 127
             if length == 126:
                 length = struct.unpack(">H", self._take(2))[0]
-                assert length >= 126, "length not as short as it can be"
+                assert length >= 126, "the length has more bytes than it needs"
             elif length == 127:
                 length = struct.unpack(">Q", self._take(8))[0]
-                assert length >= 65536, "length not as short as it can be"
+                assert length >= 65536, "the length has more bytes than it needs"
             payload = self._take(length)
             if opcode == 9:
                 self.send_frame(10, payload)
@@ -130,7 +130,7 @@ class Viewer:
                 self.info = word
             elif word["op"] == "advertise":
                 for channel in word["channels"]:
-                    assert channel["id"] not in self.channels, "an id twice"
+                    assert channel["id"] not in self.channels, "the same id twice"
                     self.channels[channel["id"]] = channel
             elif word["op"] == "unadvertise":
                 for channel in word["channelIds"]:
@@ -179,13 +179,13 @@ class Viewer:
         self.say(op="subscribe", subscriptions=new)
 
     def subscribed(self, *topics):
-        """Subscribes, and waits until the server has handled it."""
+        """Subscribes, and waits until the server has handled the subscription."""
         self.subscribe(*topics)
         self.parameters("subscribed", "/none")  # answered after the subscription
         return self
 
     def parameters(self, request="all", *names):
-        """Returns values by name; those of all parameters if no name is given."""
+        """Returns the values of these parameters by name, or of all parameters if no name is given."""
         self.say(op="getParameters", parameterNames=list(names), id=request)
         return {p["name"]: p.get("value") for p in self._values_for(request)}
 
@@ -205,7 +205,7 @@ class Viewer:
         self.send_frame(2, struct.pack("<BIII", 2, service, call, 4) + b"json" + payload)
 
     def call(self, name, payload, call=1):
-        """Returns the answer of a service or the reason of its failure, and the kind: answer or failure."""
+        """Returns the answer of a service and "answer", or the message of its failure and "word"."""
         self.request(name, payload, call)
         kinds = []
 
@@ -284,7 +284,7 @@ class Schema:
                 self._add(name, value)
 
     def decode(self, name, data):
-        """Fields by name, without missing ones; repeated fields are lists. Unknown fields are an error."""
+        """Returns fields by name, without missing ones; repeated fields are lists. Unknown fields are an error."""
         known = self.messages["." + name]
         out = {}
         for number, wire, value in fields(data):

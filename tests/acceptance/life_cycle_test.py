@@ -1,4 +1,4 @@
-"""How sonard stops, restarts, and behaves after signals, with full disks or closed outputs, and after a freeze; its exit codes.
+"""Tests how sonard stops, restarts, and behaves after signals and freezes, and with full disks or closed outputs; its exit codes.
 Figures for the reliability table are written to the folder that SONARD_RELIABILITY names. Times are asserted with
 room for a busy machine; the record states whether the promised time was met."""
 import contextlib
@@ -68,7 +68,7 @@ class Reader(threading.Thread):
 
 
 def client_that_never_reads(address):
-    """Requests pings and never reads, so that soon the sonar cannot send more. Does not wait for that."""
+    """Returns a client that requests pings and never reads, so that the sonar soon cannot send more."""
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     deaf.connect((address, 52100))
@@ -106,7 +106,7 @@ class Started:
 
 
 def worked_s(daemon):
-    """Returns the used processor time [s]."""
+    """Returns the processor time that sonard has used [s]."""
     fields = pathlib.Path(f"/proc/{daemon.process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -136,7 +136,7 @@ class Stop(unittest.TestCase):
             self.assertIn("did not receive its last message in time", daemon.log())
 
     def test_terminate_is_quick_with_119_open_descriptors(self):
-        """9 drivers, 8 viewers, 20 event streams, 64 other control and pose connections, a recording."""
+        """There are 9 drivers, 8 viewers, 20 event streams, 64 other control and pose connections, and a recording."""
         more = "recording: {folder: .}\nlimits: {control_clients: 64}"
         with Sonard(mount=FOUR_CLIENTS.replace("4", "9"), more=more) as daemon, contextlib.ExitStack() as stack:
             readers = [Reader(daemon.address) for _ in range(9)]
@@ -265,7 +265,7 @@ class Undisturbed(unittest.TestCase):
 
     def test_a_log_reader_that_exits_costs_no_ping(self):
         daemon = Started(self, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-        daemon.process.stderr.readline()  # as head -1
+        daemon.process.stderr.readline()  # like head -1
         daemon.process.stderr.close()
         reader = self.stream(daemon)
         code = daemon.stop()
@@ -286,7 +286,7 @@ class Undisturbed(unittest.TestCase):
         os.close(ours)
         self.judge(reader, code=code)
 
-    def test_a_recording_on_a_full_disk_ends_with_an_error_message_and_the_sonar_goes_on(self):
+    def test_a_recording_on_a_full_disk_ends_with_an_error_message_and_the_sonar_continues(self):
         with Sonard(mount=FOUR_CLIENTS) as daemon:
             reader = Reader(daemon.address)
             reader.wait_for(3)
@@ -312,7 +312,7 @@ class Undisturbed(unittest.TestCase):
 
 
 class Frozen(unittest.TestCase):
-    def test_stop_and_continue_bring_no_burst_and_no_corruption(self):
+    def test_a_freeze_causes_no_burst_and_no_corruption(self):
         rate_hz, frozen_s = 10, 3
         with Sonard() as daemon:
             reader = Reader(daemon.address, rate_hz=rate_hz)
@@ -375,7 +375,7 @@ class ExitCodes(unittest.TestCase):
                     self.assertIn(variable, result.stderr)
                     self.assertNotIn("--" + variable[7:].lower().replace("_", "-"), result.stderr)
 
-    def test_a_hangup_while_it_stops_changes_nothing(self):
+    def test_a_hangup_while_sonard_stops_changes_nothing(self):
         with Sonard() as daemon:
             daemon.process.send_signal(signal.SIGTERM)
             while daemon.process.poll() is None:

@@ -60,7 +60,7 @@ class Reload(unittest.TestCase):
             self.assertEqual(viewer.set("/front/preview", True), True)
             viewer.wait_for(lambda kind, value: kind == "message" and value[0] == "/front/picture"
                             and viewer.decode(*value[::2])["kind"] == "points")
-            # Clouds of one beam are queued, clouds of a fan replace each other: the channel is another one.
+            # Clouds of one beam are queued, clouds of a fan replace each other, so the channel must be another one.
             viewer.wait_for(lambda *_: any(c["topic"] == "/front/cloud" and id != lines for id, c in viewer.channels.items()))
             self.assertNotIn(lines, viewer.channels)
             viewer.messages.clear()
@@ -143,7 +143,7 @@ class Preview(unittest.TestCase):
                 seen.append((event["number"], event.get("preview", False)))
         return seen
 
-    def test_pings_for_viewers_until_a_driver_connects(self):
+    def test_viewers_get_pings_until_a_driver_connects(self):
         with Sonard() as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribe("/front/ping", "/front/image", "/status")
             self.assertEqual(self.numbers(viewer, 1), [])
@@ -159,7 +159,7 @@ class Preview(unittest.TestCase):
             self.assertEqual((status["sonars"][0]["figures"]["pings"], status["sonars"][0]["clients"]), ("0", []))
             with Client(daemon.address) as client:
                 client.send(fire_message())
-                self.assertEqual(client.ping().id, 1, "a driver's first ping")
+                self.assertEqual(client.ping().id, 1, "a driver's first ping has the number 1")
                 deadline = time.monotonic() + 60  # the live view checks this ten times a second
                 while viewer.parameters("now", "/front/preview")["/front/preview"]:
                     self.assertLess(time.monotonic(), deadline)
@@ -170,7 +170,7 @@ class Preview(unittest.TestCase):
             self.assertEqual([e["number"] for e in events if not e.get("preview")][0], 1)
             self.assertIn("preview ends", daemon.log())
 
-    def test_ends_with_its_viewer(self):
+    def test_a_preview_ends_with_its_viewer(self):
         with Sonard(control=ORIGINS) as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribe("/front/ping", "/status")
             with Viewer(daemon.address, headers={"Origin": "https://look.example"}) as looker:

@@ -51,7 +51,7 @@ class Handshake(unittest.TestCase):
         self.addCleanup(viewer.socket.close)
         return viewer
 
-    def test_takes_the_first_name_that_it_knows(self):
+    def test_the_first_known_protocol_name_is_used(self):
         for offered in (NAMES, NAMES[::-1], ("other", NAMES[1])):
             self.assertEqual(self.viewer(protocols=", ".join(offered)).protocol, next(n for n in offered if n in NAMES))
         self.assertIn("foxglove.sdk.v1", refusal(self.daemon.address, protocols="other").body)
@@ -78,14 +78,14 @@ class Handshake(unittest.TestCase):
                     viewer.socket.close()
         self.assertIn('control: {view_origins: ["https://evil.example"]}', self.daemon.log())
 
-    def test_other_requests_stay_as_they_were(self):
+    def test_other_upgrades_get_the_help_text(self):
         refused = refusal(self.daemon.address, headers={"Upgrade": "h2c", "Accept": "*/*"})
         self.assertEqual(refused.status, 200)
         self.assertIn("curl", refused.body)
 
 
 class Token(unittest.TestCase):
-    def test_every_viewer_shows_it(self):
+    def test_every_viewer_must_send_the_token(self):
         daemon = Sonard(control=ORIGINS + ", token_file: token")
         token = pathlib.Path(daemon.folder.name) / "token"
         token.write_text("0123456789abcdef\n", encoding="utf-8")
@@ -104,7 +104,7 @@ class Token(unittest.TestCase):
 
 
 class Channels(unittest.TestCase):
-    def test_all_decode_and_the_picture_is_what_the_driver_got(self):
+    def test_all_channels_decode_and_the_picture_is_the_one_that_the_driver_got(self):
         with Sonard(trajectory="orbit", arguments=["--clock", "stepped"]) as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted()
             topics = {channel["topic"] for channel in viewer.channels.values()}
@@ -151,7 +151,7 @@ class Channels(unittest.TestCase):
                 last = ns, message
         return seen, last
 
-    def test_geometry_comes_before_the_picture_and_frames_hang_together(self):
+    def test_geometry_comes_before_the_picture_and_frames_have_their_parents(self):
         with Sonard(arguments=["--clock", "stepped"]) as daemon, Viewer(daemon.address) as viewer, Client(daemon.address) as client:
             viewer.greeted().subscribe("/front/image", "/front/geometry", "/tf", "/scene")
             client.send(fire_message())
@@ -198,7 +198,7 @@ class Channels(unittest.TestCase):
             self.assertLessEqual(set(stamps["/front/ping"][:20]), set(stamps["/front/cloud"]))
 
     def test_fast_lines_come_without_loss(self):
-        """A sonar with 100 lines per second loses none by limits; a busy computer may lose some because queues are full."""
+        """A sonar with 100 lines per second loses none to limits; a busy computer may lose some because queues are full."""
         with Sonard(profile="ping1d") as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted().subscribed("/front/ping", "/front/cloud")
             with subprocess.Popen([SONARCTL, "listen", daemon.address, "--make", "ping1d", "--range", "1", "--rate", "100"],
@@ -295,7 +295,7 @@ class Limits(unittest.TestCase):
             viewers = json.loads(daemon.get("/api/v1/status"))["viewers"]
             self.assertGreaterEqual(int(viewers[0]["dropped"]["/front/image"]), int(count[1]))
 
-    def test_a_stop_closes_connections_as_going_away(self):
+    def test_a_stop_closes_connections_with_the_code_for_going_away(self):
         with Sonard() as daemon, Viewer(daemon.address) as viewer:
             viewer.greeted()
             self.assertEqual(daemon.stop()[0], 0)
@@ -345,7 +345,7 @@ class LookingChangesNothing(unittest.TestCase):
         self.assertEqual(self.run_with(8), alone)
         self.assertEqual(self.run_with(8, reads=False), alone)
 
-    def test_ten_that_never_read_cost_no_ping_and_little_memory(self):
+    def test_ten_viewers_that_never_read_cost_no_ping_and_little_memory(self):
         viewers, picture_kb = 10, 1024
         with Sonard(more=f"limits: {{viewers: {viewers}}}") as daemon:
             driver = Reader(daemon.address)  # also reads while viewers connect

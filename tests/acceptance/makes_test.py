@@ -63,7 +63,7 @@ def steady(value):
 
 
 class Observed:
-    """Tests one make, with a run of the daemon for each command."""
+    """Observes one make, with a run of the daemon for each command."""
 
     def __init__(self, profile):
         self.profile, self.seen = profile, {}
@@ -126,7 +126,7 @@ class Recordings(unittest.TestCase):
     def ctl(self, *arguments):
         return run(SONARCTL, *arguments, patience_s=300)
 
-    def test_every_make_is_recorded_and_seen_again(self):
+    def test_every_make_is_recorded_viewed_and_replayed(self):
         for profile, (port, *settings) in MAKES.items():
             with self.subTest(profile=profile), Sonard(scene="l-targets.yaml", profile=profile, arguments=CHEAP) as daemon:
                 folder = pathlib.Path(daemon.folder.name)

@@ -1,4 +1,4 @@
-"""An autopilot sends poses by MAVLink while it drives a sonar along a square. The picture must show the point targets at the
+"""An autopilot sends poses over MAVLink while it drives a sonar along a square. The picture must show the point targets at the
 positions that follow from the true poses.
 
 The vehicle is mavlink_frames.py, written from the message definitions; pings are read by the Python client, and the moment of
@@ -28,7 +28,7 @@ RANGE_M, FIELD_DEG = 8.0, 50  # targets farther to the side are left out
 RING_M, TARGETS = 4.5, 10  # around the middle of the square
 OLDEST_POSE_S, UNDER_WAY_S = 0.05, 0.02  # for the pose at a ping: its greatest age, and the least time since it was sent
 MOST_STALLED, MOST_STALLED_BUSY = 0.05, 0.5  # fractions of the echoes; the second if the computer delays the vehicle as well
-ENOUGH, MOST_LAPS = 30, 10  # pings
+ENOUGH, MOST_LAPS = 30, 10  # pings that suffice, and laps of the square at most
 GOLDEN = ROOT / "tests/protocol/mavlink/golden/frames.txt"
 
 
@@ -63,8 +63,8 @@ class Path:
 
 
 class Vehicle(threading.Thread):
-    """Sends attitudes and, 7 ms later, positions, 50 times a second, along the path; remembers the time at which each was
-    sent."""
+    """Sends attitudes and, 7 ms later, positions, 50 times a second, along the path; stores the time at which each pose was
+    complete."""
 
     def __init__(self, address, port):
         super().__init__(daemon=True)
@@ -157,7 +157,7 @@ def found_near(ping, place):
     image = {(r, b): int(ping.samples[r, b]) for r in rows for b in beams}
     top = max(image, key=image.get)
     bright = [(v * v, r, b) for (r, b), v in image.items() if abs(r - top[0]) <= 3 and abs(b - top[1]) <= 4 and v > image[top] / 3]
-    weight = sum(w for w, _, _ in bright) or 1  # nothing is there
+    weight = sum(w for w, _, _ in bright) or 1  # 1 if nothing is there
     return sum(w * r for w, r, _ in bright) / weight, sum(w * b for w, _, b in bright) / weight, image[top]
 
 
@@ -169,7 +169,7 @@ class Mavlink(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             ring = pathlib.Path(folder) / "ring.yaml"
             ring.write_text(scene(), encoding="utf-8")
-            # Without motion during a ping, so that one pose determines all positions.
+            # The engine omits motion during a ping, so that one pose determines all positions.
             with Sonard(scene=ring, pose=f"{{frame: ENU_FLU, xyz_m: [0, 0, {-DEPTH_M}]}}",
                         more="engine: {noise: off, motion: off}", poses=", mavlink: 'udpin:ADDRESS:14551'") as daemon:
                 vehicle, pings, fired_at = self.drive(daemon)
@@ -239,9 +239,9 @@ class Mavlink(unittest.TestCase):
         most = MOST_STALLED if vehicle.was_in_time() else MOST_STALLED_BUSY
         self.assertLessEqual(len(stalled), most * len(seen), stalled)
         self.assertGreaterEqual(len(judged), 20)
-        self.assertEqual(headings, {0, 1, 2, 3}, "every side of the square")
+        self.assertEqual(headings, {0, 1, 2, 3}, "pings came from every side of the square")
 
-    def test_a_listener_for_everybody_is_refused(self):
+    def test_a_listener_for_other_computers_needs_allow_from(self):
         with tempfile.TemporaryDirectory() as folder:
             config = pathlib.Path(folder) / "sonard.yaml"
             config.write_text("world: {scene: demo.yaml}\nvehicles: [{name: rov}]\n"

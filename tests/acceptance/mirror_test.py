@@ -121,7 +121,7 @@ class Rolled(unittest.TestCase):
             with Client(daemon.address) as client:
                 return client.ping_made_with(fire_message(version=2, flags=VERBATIM_GAIN, gain=20.0, salinity=SALINITY, **settings))
 
-    def test_a_list_swings_what_lies_below_to_the_low_side(self):
+    def test_a_roll_moves_targets_below_to_the_low_side(self):
         """With the bow 13 degrees down, `below` is 12 degrees under the axis. If starboard is down, it moves to starboard; if
         port is down, to port."""
         bearing_deg = math.degrees(math.asin(math.sin(math.radians(12)) * math.sin(math.radians(20))))
@@ -133,7 +133,7 @@ class Rolled(unittest.TestCase):
                 self.assertAlmostEqual(found[0], BELOW[0], delta=0.12)
                 self.assertAlmostEqual(found[1], math.copysign(bearing_deg, roll_deg), delta=1)
 
-    def test_a_starboard_list_lifts_port_targets_out_of_the_fan(self):
+    def test_a_roll_to_starboard_moves_port_targets_out_of_the_fan(self):
         """With a roll of 90 degrees, left and right become up and down. A and C leave the fan of 12 degrees, so the picture loses
         its L."""
         ping = self.ping((90, 0, 0))

@@ -1,5 +1,5 @@
-"""A second reader of the Oculus stream, typed by hand from the sources of docs/protocols/oculus.md. Shares nothing with the C++
-code."""
+"""A second reader of the Oculus stream, written by hand from the sources of docs/protocols/oculus.md. It shares nothing with the
+C++ code."""
 import contextlib
 import functools
 import math
@@ -53,7 +53,7 @@ class Ping:
 
     @functools.cached_property
     def _rows(self):
-        """For each row, a tuple of its gain (empty if rows have none), and its samples. Computed when first used: it is slow."""
+        """Returns for each row a tuple of its gain (empty if rows have none), and its samples. Slow, so done at the first use."""
         rows, at, width = [], 0, self.sample_bytes
         for _ in range(self.rows):
             gain = ()
@@ -156,7 +156,7 @@ def reading(client):
 
 
 def expected_bearings(beams, half_aperture_deg):
-    """Returns bearings by the law of the capture: equal steps of the sine, truncated to hundredths of a degree."""
+    """Returns bearings like those of captured pings: equal steps of the sine, truncated to hundredths of a degree."""
     top = math.sin(math.radians(half_aperture_deg))
     values = [math.degrees(math.asin(top * (2 * i / (beams - 1) - 1))) for i in range(beams)]
     return [int(100 * v + math.copysign(1e-6, v)) for v in values]

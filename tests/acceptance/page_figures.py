@@ -95,7 +95,7 @@ def delays(page, clicks):
 
 
 def keep_clicks(found, bounds_ms, where):
-    """Records the times. Those of scripts are a separate item, because the page does not cause a slow frame of the browser."""
+    """Records the times. Times of scripts are a separate item, because the page does not cause a slow frame of the browser."""
     for times, (item, bound_ms) in zip(found, bounds_ms.items()):
         p50, p95 = part(times, 0.5), part(times, 0.95)
         kept(item, f"p50 {p50:.0f} ms, p95 {p95:.0f} ms of {len(times)}", f"p95 < {bound_ms} ms", p95 < bound_ms, where)
@@ -156,7 +156,7 @@ class Long(unittest.TestCase):
         self.browser = self.enterContext(Browser())
         self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
 
-    def test_memory_stays(self):
+    def test_memory_does_not_grow(self):
         with Sonard(mount=MOUNT, trajectory="orbit") as daemon, Driver(daemon.address):
             page = self.browser.open(url_of(daemon))
             shown(page)

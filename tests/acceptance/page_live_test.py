@@ -1,7 +1,7 @@
-"""Tests the page of the live view in a real browser, with sonard and a driver. Skipped without browser or page.
+"""Tests the page of the live view in a real browser, with sonard and a driver. It is skipped without browser or page.
 
-SONARD_SHOTS names a folder for pictures; without it there are only those of tests that fail. SONARD_SHOT_HZ sets the rate of
-pings for them, for slow computers.
+SONARD_SHOTS names a folder for pictures; without it only pictures of failed tests are kept. SONARD_SHOT_HZ sets the ping
+rate for the pictures, for slow computers.
 """
 import collections
 import json
@@ -32,7 +32,7 @@ SEEN_AT = """requestAnimationFrame(function look() {
   else requestAnimationFrame(look);
 })"""
 
-# The requests of the page, with their times, and true if its picture was painted then.
+# The requests of the page, each with its time; `painted` is true if the page had painted a ping by then.
 SENT = """window.sent = []; WebSocket.prototype.send = ((old) => function (data) {
   if (typeof data === 'string') window.sent.push({ at: performance.now(), painted: /\\d/.test(document.querySelector('#ping-number').textContent), word: JSON.parse(data) });
   return old.call(this, data);
@@ -61,11 +61,11 @@ class Driver(threading.Thread):
             try:
                 with OculusClient(self.address) as sonar:
                     sonar.fire(**self.settings)
-                    self.take(sonar)
+                    self.store_pings(sonar)
             except OSError:
                 self.over.wait(0.2)
 
-    def take(self, sonar):
+    def store_pings(self, sonar):
         due = time.monotonic()
         while not self.over.is_set():
             try:
@@ -187,7 +187,7 @@ class Live(PageChecks, unittest.TestCase):
         self.assertAlmostEqual(hz, 7, delta=0.6)
 
     def test_the_page_outlives_the_daemon(self):
-        """The picture is back within 10 s of a restart; a busy machine may take longer."""
+        """The picture usually returns within 10 s of a restart; the limit of 200 s is for busy machines."""
         with Sonard(mount=MOUNT, trajectory="orbit") as daemon, Driver(daemon.address):
             page = self.open(daemon, query="?test=300")
             shown(page)
@@ -261,7 +261,7 @@ class Live(PageChecks, unittest.TestCase):
             self.assertNotIn("A fault acts", announced, "the finding already names the fault")
             page.click("#findings button.link")
             page.wait("!document.querySelector('.fault-card')")
-            self.assertNotIn("A fault acts", page.text("#findings"), "although the daemon looks only every 2 s")
+            self.assertNotIn("A fault acts", page.text("#findings"), "the page does not wait for the daemon's next check")
             ask(daemon, "sonar", {"rate_hz": 0})
             page.wait("document.body.dataset.situation === 'standby'")
             page.click("#notice-button")
@@ -349,7 +349,7 @@ class Live(PageChecks, unittest.TestCase):
                     page.close()
 
     def test_axe_finds_nothing_serious(self):
-        """Tests the page as it opens, and after use: with a fault, a refused setting, a held picture, the help."""
+        """Tests the page as it opens, and after use: with a fault, a refused setting, a frozen picture and the help."""
         axe = self.axe()
         with Sonard(mount=MOUNT, trajectory="orbit", arguments=["--faults"]) as daemon, Driver(daemon.address):
             for theme in ("dark", "light"):

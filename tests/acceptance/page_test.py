@@ -1,5 +1,5 @@
-"""Tests the page of the live view in a real browser, with a scripted daemon (view/mock_daemon.py). Skipped without browser or
-page.
+"""Tests the page of the live view in a real browser, with a scripted daemon (view/mock_daemon.py). It is skipped without browser
+or page.
 
 Pictures of the states are kept in the folder that SONARD_SHOTS names; without it, only pictures of failed tests are kept, beside
 the build.
@@ -35,8 +35,8 @@ STATES = {  # the mock's state -> the page's name of the state, the text that th
 }
 
 
-# Lines that connections receive (each one letter, all with the same time) -> the expected log. A daemon sends its last 100 lines
-# again.
+# Connections as DAEMON:LINES (a line is one letter, all have the same time) -> the expected log. A daemon repeats its last 100
+# lines in each connection.
 LOGS_OF_CONNECTIONS = (
     ("1:abab", "abab"),
     ("1:abc 1:abcd", "abcd"),
@@ -75,7 +75,7 @@ BRIGHTEST = """(() => {
   return Math.max(...copy.getImageData(0, 0, 300, 300).data.filter((_, i) => i % 4 === 0));
 })()"""
 
-# Lists the canvases on which other tasks than animation frames draw.
+# Lists drawing calls outside animation frames, and the canvases that are drawn inside them.
 DRAWN_OUTSIDE = """window.outside = [], window.inside = new Set();
 {
   let framed = 0;
@@ -111,7 +111,7 @@ class Page(MockedPage, unittest.TestCase):
                     self.compare(self.drawn(page, map_name), self.reference(self.raw[name], map_name, width))
             page.close()
 
-    def test_fan_without_a_graphics_processor_is_true(self):
+    def test_fan_without_a_graphics_processor_is_nearly_equal(self):
         """Without a graphics processor the page draws whole samples, so the edges of echoes may differ by one sample."""
         for name in self.pings:
             self.mock.pings = [self.pings[name]]
@@ -180,13 +180,13 @@ class Page(MockedPage, unittest.TestCase):
         page.click("#clear-faults")
         page.wait("!document.querySelector('.fault-card')")
 
-    def test_faults_say_what_they_do_wait_for_and_cannot(self):
+    def test_buttons_of_faults_show_effects_conditions_and_obstacles(self):
         page = self.open()
         page.wait("document.querySelector('[data-trouble=lease_renewal] small')?.innerText")
         self.assertEqual(page.text("[data-trouble=lease_renewal] small"),
                          "The address is withdrawn and returns. Cannot act here: the sonar needs two network namespaces: sonarctl lab.")
         self.assertTrue(page.run("document.querySelector('[data-trouble=lease_renewal]').disabled"))
-        self.assertEqual(page.run("[...document.querySelectorAll('#troubles button')].at(-1).dataset.trouble"), "lease_renewal", "those that can act come first")
+        self.assertEqual(page.run("[...document.querySelectorAll('#troubles button')].at(-1).dataset.trouble"), "lease_renewal", "faults that can act come first")
         self.assertIn("Lasts 21 s.", page.text("[data-trouble=power_cycle]"))
         self.assertIn("Does not put back the settings that it changed.", page.text("[data-trouble=second_operator]"))
         self.assertIn("Begins with a ping.", page.text("[data-trouble=bad_connector]"))
@@ -195,7 +195,7 @@ class Page(MockedPage, unittest.TestCase):
         page.click("#clear-faults")
         page.wait("!document.querySelector('.fault-card')")
 
-    def test_why_a_fault_cannot_act_can_be_read(self):
+    def test_the_reason_why_a_fault_cannot_act_is_legible(self):
         for theme in ("dark", "light"):
             with self.subTest(theme=theme):
                 page = self.open(theme=theme)
@@ -264,7 +264,7 @@ class Page(MockedPage, unittest.TestCase):
         shown(page)
         self.assertTrue(page.run("document.querySelector('#fan').offsetWidth"))
         page.wait("document.querySelector('#badges').innerText.includes('no scene')")
-        self.assertGreater(page.run("document.querySelector('#fan-pane').offsetWidth"), 700, "the picture has the room of the scene")
+        self.assertGreater(page.run("document.querySelector('#fan-pane').offsetWidth"), 700, "the picture also uses the space of the scene")
         self.picture(page, "no-webgl")
         page.press("0")
         page.wait("document.querySelector('#no-scene').offsetWidth > 0")
@@ -286,7 +286,7 @@ class Page(MockedPage, unittest.TestCase):
         self.assert_quiet(page, self.url)
 
     def test_canvases_are_drawn_in_animation_frames_alone(self):
-        """After another task that draws, the browser may wait for the graphics, and clicks would wait too."""
+        """If another task draws, the browser may wait for the graphics processor, and clicks would wait too."""
         page = self.open(script=DRAWN_OUTSIDE)
         shown(page)
         for key in "tffc+g":
@@ -343,7 +343,7 @@ class Page(MockedPage, unittest.TestCase):
         page.press(" ")
         self.patiently(lambda: self.mock.set_calls)
         time.sleep(0.5)
-        self.assertEqual(self.mock.set_calls, [("/rov/trajectory/paused", True)], "once")
+        self.assertEqual(self.mock.set_calls, [("/rov/trajectory/paused", True)], "the space key acts once")
         page.run("document.querySelector('#setting-rows input').focus()")
         page.press("c")
         page.press("?")

@@ -55,7 +55,7 @@ class Host:
             datagram = self.udp.recv(4096)
             self.datagrams.append(datagram)
             frames = read(datagram)
-            assert len(frames) == 1, "one frame a datagram"
+            assert len(frames) == 1, "one frame per datagram"
             if frames[0][0] == wanted:
                 return frames[0][1], time.monotonic() - start
 
@@ -137,7 +137,7 @@ class Ping360Link(unittest.TestCase):
         still, _ = host.ask(transducer(200, transmit=0), 2300)
         self.assertEqual(struct.unpack("<H", still[12:14])[0], 0)
 
-    def test_a_scan_has_every_angle_in_order_and_ends_with_the_motor(self):
+    def test_a_scan_has_every_angle_in_order_and_ends_when_the_motor_is_off(self):
         host = Host(self.daemon.address, PING360)
         host.send(scan(0, 399))
         angles = [struct.unpack("<H", host.next(2301)[0][2:4])[0] for _ in range(60)]
@@ -167,7 +167,7 @@ class Ping360Link(unittest.TestCase):
             top = max(brightest[range_m], key=brightest[range_m].get)
             self.assertAlmostEqual(top * 0.9, bearing_deg, delta=1.5)
 
-    def test_the_host_of_the_last_request_has_the_dialogue(self):
+    def test_the_host_of_the_last_request_gets_the_pings(self):
         one, other = Host(self.daemon.address, PING360), Host(self.daemon.address, PING360)
         one.send(scan(0, 399))
         one.next(2301)
@@ -197,7 +197,7 @@ class SurveyorLink(unittest.TestCase):
         self.assertEqual(len(payload), 100 + 8 * count)
         return [struct.unpack_from("<ff", payload, 100 + 8 * i) for i in range(count)]
 
-    def test_points_come_by_tcp_and_by_udp_and_are_recorded(self):
+    def test_points_come_over_tcp_and_over_udp_and_are_recorded(self):
         control = ("--control", f"{self.daemon.address}:14770")
         with socket.create_connection((self.daemon.address, SURVEYOR)) as tcp:
             tcp.sendall(general(4) + settings(1))
@@ -211,7 +211,7 @@ class SurveyorLink(unittest.TestCase):
                 received += some
             run(SONARCTL, "recording", "stop", *control)
             tcp.sendall(settings(0))
-        self.assertIn(frame(14)[:6], received[:40], "it asks for the time")
+        self.assertIn(frame(14)[:6], received[:40], "the sonar requests the time")
         recorded = read((pathlib.Path(self.folder.name) / "run.svlog").read_bytes())
         self.assertEqual(recorded[0][0], 10)
         self.assertLessEqual({504, 3011, 3012}, {number for number, _ in recorded})
@@ -248,7 +248,7 @@ class OmniscanLink(unittest.TestCase):
         powers = struct.unpack_from(f"<{count}H", payload, 52)
         return struct.unpack_from("<I", payload)[0], [lowest + v / 65535 * (highest - lowest) for v in powers]
 
-    def test_profiles_come_by_udp_and_tcp_and_their_recording_is_served_again(self):
+    def test_profiles_come_over_udp_and_tcp_and_their_recording_is_served_again(self):
         with tempfile.TemporaryDirectory() as folder:
             with Sonard(profile="omniscan-450", mount=SIDE, more=f"recording: {{folder: {folder}}}") as daemon:
                 control = ("--control", f"{daemon.address}:14770")
@@ -259,7 +259,7 @@ class OmniscanLink(unittest.TestCase):
                 self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 5)))
                 _, powers = self.profile(host.ask(general(2198), 2198)[0])
                 self.assertEqual(len(powers), 600)
-                self.assertGreater(max(powers) - min(powers), 20, "a bed and water")
+                self.assertGreater(max(powers) - min(powers), 20, "the bed is much louder than the water")
                 host.send(side_scan(0))
                 with self.connected_once_free(daemon.address) as tcp:
                     tcp.sendall(side_scan(1, results=200))
@@ -337,7 +337,7 @@ class Ping1DLink(unittest.TestCase):
         self.assertEqual(struct.unpack_from("<II", profile, 12), (500, 4000))
         host.send(frame(1003, b"\1"))
 
-    def test_a_stream_comes_by_tcp(self):
+    def test_a_stream_comes_over_tcp(self):
         listener = run(SONARCTL, "listen", f"{self.daemon.address}:{PING1D}", "--pings", 5, "--wait", 60)
         self.assertEqual(listener.returncode, 0, listener.stderr)
         self.assertEqual(len(re.findall(r"distance \d\.\d{3} m, confidence \d+ %", listener.stdout)), 5, listener.stdout)

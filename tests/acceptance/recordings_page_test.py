@@ -1,6 +1,6 @@
-"""Tests recordings on the page: of every demo, by sonard and by `sonard replay`, with a separate time line for each viewer.
+"""Tests recordings of every demo, played by sonard and by `sonard replay`, and on the page.
 
-The page's part is skipped without browser or page.
+The tests of the page are skipped without browser or page.
 """
 import os
 import pathlib
@@ -29,7 +29,7 @@ def is_message(topic):
 
 
 def record(maker, pings):
-    """Records the running demo while a driver is connected, with the requests that the page sends; returns the file's path."""
+    """Records the running demo with sonarctl while a driver is connected; returns the file's path."""
     with subprocess.Popen([SONARCTL, "listen", f"{SONAR}:{DEMOS[maker][2]}", "--wait", "100", "--quiet"], stdout=subprocess.DEVNULL,
                           stderr=subprocess.DEVNULL) as driver:
         name = f"{maker}.mcap"
@@ -96,7 +96,7 @@ class Recordings(PageChecks, unittest.TestCase):
                     path = record(maker, pings + 10)
                     with Viewer(HTTP, path=f"/?recording={path.name}") as viewer:
                         self.look(viewer, kind, product)
-                # On a slow machine doctor and listen may take the whole recording, which ends a replay without --loop.
+                # On a slow machine doctor and listen may last longer than the recording, whose end ends a replay without --loop.
                 with Replay(path, "--loop") as replay, Viewer(HTTP) as viewer:
                     self.look(viewer, kind, product)
                     self.assertIn("open      http://127.0.0.1:8088", replay.text())
@@ -106,13 +106,13 @@ class Recordings(PageChecks, unittest.TestCase):
                         said = run(SONARCTL, "doctor").stdout
                         self.assertIn(f"returns ok: replays {path.name}", said)
                         self.assertNotIn("simulation", said, "a recording has its own rate")
-                        self.assertNotIn("control stream", said, "and no control stream")
+                        self.assertNotIn("control stream", said, "a recording has no control stream")
                     if maker not in ("blueview", "ping360", "micron", "norbit"):
                         done = run(SONARCTL, "listen", f"{replay.address}:{port}", "--wait", "100", "--quiet", "--pings", 2)
-                        self.assertIn("pings 2", done.stdout, "the driver is served beside it: " + done.stderr)
+                        self.assertIn("pings 2", done.stdout, "a driver is served beside the viewer: " + done.stderr)
 
     def test_a_recorded_refusal_of_another_request_stops_no_host(self):
-        """A host that does not know the product at the port may send a request for the other one first. Then the recording
+        """A host that does not know the product at the port may send a request for another product first. Then the recording
         contains the refusal."""
         with demo("s500"):
             self.assertEqual(run(SONARCTL, "record", "--mcap", "run.mcap", "--wait", 100, "--pings", 20).returncode, 0)
@@ -129,7 +129,7 @@ class Recordings(PageChecks, unittest.TestCase):
         topics = {topic for topic, _, _ in mcap_checker.check(pathlib.Path("run.mcap").read_bytes()).messages}
         self.assertLessEqual({"/front/image", "/front/pose"}, topics)
 
-    def test_only_files_of_the_folder(self):
+    def test_only_files_of_the_folder_are_played(self):
         pathlib.Path("sonard-recordings").mkdir()
         pathlib.Path("sonard-recordings/broken.mcap").write_bytes(b"nothing")
         pathlib.Path("secret.mcap").write_bytes(b"nothing")

@@ -115,18 +115,18 @@ class Reload(unittest.TestCase):
 
             self.config(daemon).write_text(text.replace("vehicles:", "vehicals:"), encoding="utf-8")
             self.hang_up(daemon, "the configuration stays as it was")
-            told = 'did you mean "vehicles"?' in daemon.log()
+            explained = 'did you mean "vehicles"?' in daemon.log()
             still = self.look(watcher)
             kept = abs(still - 5.7) <= 0.2 and watcher.wrong(daemon) == 0
-            record("reload-error", f"{'told why' if told else 'NOT told why'}; same scene, {watcher.wrong(daemon, across - 1)} of "
-                   f"{len(watcher.ids) - across} pings lost", "the old configuration stays, 0 lost", told and kept, COMMAND)
-            self.assertTrue(told, daemon.log())
+            record("reload-error", f"{'explained' if explained else 'NOT explained'}; same scene, {watcher.wrong(daemon, across - 1)} of "
+                   f"{len(watcher.ids) - across} pings lost", "the old configuration stays, 0 lost", explained and kept, COMMAND)
+            self.assertTrue(explained, daemon.log())
             self.assertAlmostEqual(still, 5.7, delta=0.2)
             self.assertEqual(watcher.wrong(daemon), 0, watcher.ids)
             code, _ = daemon.stop()
             self.assertEqual(code, 0, daemon.log())
 
-    def test_pings_go_on_when_a_mesh_cannot_be_imported(self):
+    def test_pings_continue_when_a_mesh_cannot_be_imported(self):
         """Each of these files once ended the daemon, when it imported meshes itself."""
         daemon = Sonard(pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")
         folder = pathlib.Path(daemon.folder.name)

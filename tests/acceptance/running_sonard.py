@@ -45,7 +45,7 @@ def eventually(true, patience_s=120):
     end = time.monotonic() + patience_s
     while not (value := true()):
         if time.monotonic() > end:
-            raise AssertionError(f"not so within {patience_s} s")
+            raise AssertionError(f"not true within {patience_s} s")
         time.sleep(0.02)
     return value
 
@@ -74,7 +74,7 @@ class Sonard(Daemon):
         self.trajectory = f", trajectory: {trajectory}" if trajectory else ""
         self.control = control  # further keys of that section, such as ", token_file: token"
         self.http = http  # empty: port 8088 of the address
-        self.poses = poses  # as control
+        self.poses = poses  # further keys of that section
         self.more = more
 
     def write_config(self):

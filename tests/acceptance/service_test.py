@@ -80,7 +80,7 @@ class Unit(unittest.TestCase):
                "python3 tests/acceptance/service_test.py")
         self.assertLessEqual(exposure, MOST_EXPOSURE, result.stdout)
 
-    def test_mistakes_are_not_tried_again_and_a_hangup_reloads(self):
+    def test_mistakes_cause_no_restart_and_a_hangup_reloads(self):
         there = settings()
         self.assertEqual(there["RestartPreventExitStatus"], ["64 65 66 78"])
         self.assertEqual((there["Type"], there["ExecReload"]), (["notify"], ["kill -HUP $MAINPID"]))
@@ -89,7 +89,7 @@ class Unit(unittest.TestCase):
     @NEEDS_SYSTEMD
     @unittest.skipIf(shutil.which("strace") is None, "strace is not here")
     def test_sonard_makes_no_system_call_that_the_unit_refuses(self):
-        """Twenty pings of the demo with a client, counted by strace."""
+        """Traces a rendered picture, and a daemon that serves three pings to a client, with strace."""
         if "SONAR_SANITIZE:STRING=\n" not in (BUILD / "CMakeCache.txt").read_text(encoding="utf-8"):
             self.skipTest("sanitizers make calls of their own")
         allowed = set()
@@ -121,14 +121,14 @@ class Unit(unittest.TestCase):
         with subprocess.Popen(["strace", "-f", "-qq", "-o", str(calls), str(SONARD), "run", str(config), "--exit-after-pings", "3"],
                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
             listened = run(SONARCTL, "listen", address, "--pings", "3", "--wait", "300", "--seconds", "300", "--quiet", patience_s=660)
-            if listened.returncode != 0:  # it waits for pings that are not read
+            if listened.returncode != 0:  # sonard still waits for a reader of its pings
                 subprocess.run(["pkill", "-P", str(process.pid)], check=False)
             process.stderr.read()
         self.assertEqual((process.returncode, listened.returncode), (0, 0), listened.stderr)
         return calls.read_text(encoding="utf-8", errors="replace")
 
     def test_memory_that_is_written_is_never_executed(self):
-        """Sets MemoryDenyWriteExecute= by the switch of the kernel; Embree and all other code must work with it."""
+        """Sets MemoryDenyWriteExecute= with the switch of the kernel; Embree and all other code must work with it."""
         libc = ctypes.CDLL(None, use_errno=True)
         if not self.refuses_memory(libc):
             self.skipTest("this kernel has no PR_SET_MDWE")

@@ -10,12 +10,12 @@ import sys
 
 # Folders of protocol/ that are makes of sonar.
 MAKE_FOLDERS = ("aris", "blueview", "dvl", "m3", "micron", "norbit", "oculus", "ping", "waterlinked")
-# Files that a make of sonar may include beside its own folder.
+# Files that a make of sonar may include besides its own folder.
 DEVICE = ["core/base/", "core/image/sonar_picture.hpp", "core/sonar/", "core/text/", "protocol/awaited_ping.hpp", "protocol/dialogue.hpp",
           "protocol/held_settings.hpp", "protocol/host.hpp", "protocol/limits.hpp",
           "protocol/message_fields.hpp", "protocol/recorded/", "protocol/serial_line.hpp",
           "protocol/line_pictures.hpp", "protocol/vendor.hpp", "protocol/wire/"]
-# Folder -> prefixes of our own files it may include. The longest matching folder counts.
+# Folder -> prefixes of our own files that it may include. The longest matching folder counts.
 FLOORS = {
     "core/base": ["core/base/"],
     "core/image": ["core/base/", "core/image/"],
@@ -50,11 +50,11 @@ FLOORS = {
     "clients/bvtsdk": ["clients/bvtsdk/", "protocol/blueview/link.hpp"],  # loaded into foreign processes: only constants are shared
     "tests": [""],
 }
-# Below these, folders include each other in one direction only; so do components (a header and the sources of its name).
+# In these folders, includes between folders go in one direction only, and so between components (header and source of one name).
 ONE_DIRECTION = r"daemon/|protocol/|core/|clients/|cuda/"
 # The list of makes includes all makes, and nothing includes the list.
 LISTS = {"protocol/makes.cpp"}
-# Headers that go to other people's include folders include each other by name alone.
+# Headers that are installed for other programs include each other without a folder.
 INSTALLED = r"clients/bvtsdk/(abi\d|codes)/include/"
 # Header of a dependency -> the only files that may include it (tests may include anything).
 DEPENDENCIES = {
@@ -102,7 +102,7 @@ FORBIDDEN = [
     ("global random", r"core/", None, r"\bstd::(mt19937|random_device|default_random_engine)|\bs?rand\s*\(", "random numbers are counter-based, core/base/random.hpp"),
     ("locale", r"core/|protocol/|daemon/|clients/", None, r"\b(set|use|new)locale\s*\(|\bstd::locale\s*(::global|[({])|\.imbue\s*\((?!\s*std::locale::classic\(\))",
      "printf, strtod and streams would read and write numbers as the user's language does: 1,5 for 1.5"),
-    ("test namespace", r"tests/", None, r"\bnamespace\s+(\w+::)*testing\b(?!_)", "it hides GoogleTest's from files compiled together: name it tests"),
+    ("test namespace", r"tests/", None, r"\bnamespace\s+(\w+::)*testing\b(?!_)", "it hides GoogleTest's namespace from files compiled together: name it tests"),
     ("answers", r"(core|protocol/(?!control/)|daemon|clients|cuda)/.*\.hpp$", None, r'#\s*include\s*"protocol/control/answers\.hpp"',
      "protoc's classes take long to compile: headers name them only, and requests are structs"),
     ("quiet grep", r"", None, r"\| *gr" + r"ep -\w*q", "it ends before its input does, and under pipefail the pipe then fails: test \"$(command)\" instead"),
@@ -132,17 +132,17 @@ NAME_MAKES = {
 }
 CODE = {".hpp", ".cpp", ".cu", ".cuh", ".h", ".cc", ".inl"}
 TEXT = CODE | {".py", ".sh", ".md", ".yaml", ".yml", ".json", ".txt", ".cmake", ".proto", ".lua", ".service", ".js", ".css", ".html", ""}
-# A page of ours, and what of it is cited: docs/acoustics.md, section 8; docs/protocols/oculus.md, 5.1; docs/architecture.md, "Errors".
+# A page of ours, and the cited part of it: docs/acoustics.md, section 8; docs/protocols/oculus.md, 5.1; docs/architecture.md, "Errors".
 PAGE = re.compile(r"""(?<![\w/.:*>-])(?P<page>(?:\.{1,2}/)*\w[\w./-]*\.md)\b
                       (?:,?\ section\ (?P<section>\d+(?:\.\d+)*)|,?\ (?P<number>\d+(?:\.\d+)*)|,\ "(?P<title>[^"\n]+)")?""", re.X)
 # Programs that only the build runs.
 BUILD_TOOLS = r"clients/web/print_colour_maps\.cpp|clients/bvtsdk/core/make_colour_maps\.cpp"
 LONGEST_FILE = 400  # lines; tests may be longer
-# A comment is a sentence, or a noun phrase that names the thing: these beginnings make fragments, and these words are for
+# A comment is a sentence, or a noun phrase that names the thing. These beginnings make fragments, and these words are for
 # persons.
 FRAGMENT = re.compile(r"[ \t]*//+<?[ \t]*([Oo]f|What|Nothing:)(?=[\s,])")
 PERSONS = re.compile(r"\b(to" + r"ld|no" + r"body|some" + r"body|who" + r"ever|ow" + r"ed|new" + r"comers?|turned aw" + r"ay)\b", re.I)
-# Idioms with a plain word: "this many", "call it", "the reason if not", "always", "successive", "via", "only C++17".
+# Idioms that have a plain word: "this many", "call it", "the reason if not", "always", "successive", "via", "only C++17".
 IDIOMS = re.compile(r"\b(so ma" + r"ny|to be cal" + r"led|(?:or|else) why n" + r"ot|for ev" + r"er|back to ba" + r"ck|and the li" + r"ke|by way o" + r"f"
                     r"|C\+\+17-cle" + r"an)\b", re.I)
 # "is no frame" for "is not a frame", "goes on" for "continues".
@@ -224,7 +224,7 @@ def component_of(name):
 
 
 def circle_violations(includes, part_of, parts):
-    """`includes`: (file, line, header). Returns every include that closes a circle of `parts`: part_of() of files."""
+    """Yields a message for every include (file, line, header) that closes a circle; `parts` is the word for its members."""
     below = {}
     for name, _, header in includes:
         below.setdefault(part_of(name), set()).add(part_of(header))
@@ -276,11 +276,11 @@ def make_violations(name, code):
         yield line_of(code, found.start()), (f'make: "{found.group()}"; only the make\'s folder and protocol/makes.cpp name a make: '
                                              "ask protocol::Make (protocol/host.hpp)")
     if not found and name in NAME_MAKES:
-        yield 1, "make: names none any more: take it out of NAME_MAKES"
+        yield 1, "make: does not name one any longer: take it out of NAME_MAKES"
 
 
 def program_violations(name, code):
-    """Checks that every program makes room for its stacks: one with a small limit otherwise ends by a signal, without a message."""
+    """Checks that every program makes room for its stacks. With a small limit it would otherwise be killed, without a message."""
     found = re.search(r"\bint main\(", code)
     if found and re.match(ONE_DIRECTION, name) and not re.match(BUILD_TOOLS, name) and "make_room_for_stacks()" not in code:
         yield line_of(code, found.start()), "program: main() does not call make_room_for_stacks() (core/base/program_start.hpp)"

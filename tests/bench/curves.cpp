@@ -104,7 +104,7 @@ ScenePointer bed_of(const Scene& scene, double spacing_m, double size_m, double 
   return made;
 }
 
-/// Rounds of `count` sonars, 2 m apart, that take turns over one scene; its figures are those of one ping.
+/// Measures rounds of `count` sonars, 2 m apart, that take turns over one scene. Returns the figures of one ping.
 json sonars(int count, const ScenePointer& scene, const BenchScene& where, const BenchOptions& options) {
   const BenchCase c = *find_case("P3a");
   Bench bench(scene, 1, options);

@@ -21,7 +21,7 @@ using nlohmann::json;
 constexpr std::chrono::seconds patience{20};
 constexpr double warm_up_s = 1, measured_s = 3;  // upper limits
 
-/// The times at which each ping of an engine got its pose and was computed, by the clock of the daemon.
+/// The times at which each ping of an engine got its pose and was computed, on the clock of the daemon.
 class Course {
  public:
   void add(Time fired, Time computed) {
@@ -41,7 +41,7 @@ class Course {
   std::vector<std::pair<Time, Time>> pings_;
 };
 
-/// An engine that writes its pings to a Course.
+/// An engine that stores the times of its pings in a Course.
 class Watched final : public PingEngine {
  public:
   Watched(std::unique_ptr<PingEngine> engine, Course& course, const Clock& clock)

@@ -32,14 +32,14 @@ Result<nlohmann::json> find_device_rates(const ScenePointer& scene, const BenchS
 /// Measures how the time of a ping grows with rays, rows, triangles, beams and sonars.
 nlohmann::json find_curves(const ScenePointer& scene, const BenchScene& where, const BenchOptions& options);
 
-/// P0: the demo of every product through its socket, at the rate that a usual driver requests; that of each make's demo also at
+/// P0: the demo of every product through its socket, at the rate that a usual driver requests. Each make's demo also runs at
 /// its highest rate. Measures the time from a ping's pose to its last byte at the driver, the processor time of the daemon, and
 /// skipped ticks.
 Result<nlohmann::json> find_demos(const BenchOptions& options);
 /// P5: time from sending a pose and a trigger to the last received byte, for a whole daemon on loopback.
 Result<nlohmann::json> find_latency(const ScenePointer& scene, const BenchOptions& options);
-/// P14: time from sending a changed setting to the first ping with it, over a grid of settings. `holds`: no setting needs much
-/// more processor time than a warm ping.
+/// P14: time from sending a changed setting to the first ping with it, over a grid of settings. Sets `holds` to whether first
+/// pings need little more processor time than warm ones.
 Result<nlohmann::json> find_first_pings(const ScenePointer& scene, const BenchOptions& options, bool& holds);
 /// P8: a whole daemon with clients that receive every ping: dropped pings, and the processor time of sending.
 Result<nlohmann::json> find_cost_of_clients(const ScenePointer& scene, int clients, double seconds, const BenchOptions& options);

@@ -1,5 +1,5 @@
-// sonard_bench: times whole pings, from pose to framed bytes, case by case and stage by stage, and the other figures of
-// docs/benchmarks.md, as a table and as JSON. The figures depend on the machine, so the output names its processor.
+// sonard_bench times whole pings, from pose to framed bytes, and their stages, and measures the other figures of
+// docs/benchmarks.md. It prints a table and can write JSON. Figures depend on the machine, so the output names its processor.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
@@ -25,7 +25,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* other_cases[] = {"P0", "P3e", "P5",  "P6",  "P7",  "P8",
-                                       "P9", "P10", "P12", "P13", "P14", "P15"};  // beside bench_cases()
+                                       "P9", "P10", "P12", "P13", "P14", "P15"};  // in addition to bench_cases()
 constexpr int ratios_missed = 1;
 
 template <class Items>
@@ -65,7 +65,7 @@ BenchOptions options_for(const BenchCase& c, const BenchOptions& options) {
   const std::string why = cuda::why_not_on_device(Pinger(c, options).request(0, {}));
   if (why.empty()) return own;
   own.engine.device = EngineDevice::cpu;
-  std::printf("%-4s by the CPU: %s are not for the device\n", c.name.c_str(), why.c_str());
+  std::printf("%-4s on the CPU: the device does not compute %s\n", c.name.c_str(), why.c_str());
   return own;
 }
 
@@ -165,7 +165,7 @@ Result<bool> find_the_rest(const BenchScene& where, const ScenePointer& scene, c
 Result<void> find_device(BenchOptions& options) {
   if (options.engine.device == EngineDevice::cpu) {
     if (!options.cases.empty() && wanted(options.cases, "P10"))
-      return failure(ErrorKind::usage, "case P10 is of a device: add --engine cuda");
+      return failure(ErrorKind::usage, "case P10 needs a device: add --engine cuda");
     return {};
   }
   const auto machine = cuda::open_cuda_machine();
@@ -212,12 +212,11 @@ int parse_and_run(int argc, char** argv) {
   BenchOptions options;
   EngineOptionsGiven model;
   CLI::App cli{
-      "Times whole pings, stage by stage, warm: the cells of the scene are made already. The first ping, which makes them, is\n"
-      "the figure \"cold\" of every case; P3e jumps. P0, P5, P8, P13 and P14 run a daemon on loopback. P6 compares the hot loops "
-      "with\n"
-      "the plain ways of doing the same, P14 the first ping after a change of settings with a warm one: exit code 1 when a "
-      "ratio\n"
-      "is missed. P15 compares pings with and without side lobes.",
+      "Times whole pings and their stages. Pings are warm: the cells of the scene exist already. The first ping, which makes\n"
+      "them, is the figure \"cold\" of every case; P3e measures jumps. P0, P5, P8, P13 and P14 run a daemon on loopback. P6\n"
+      "compares the hot loops with plain implementations, and P14 the first ping after a change of settings with a warm\n"
+      "ping;\n"
+      "the exit code is 1 if a ratio is missed. P15 compares pings with and without side lobes.",
       "sonard_bench"};
   cli.footer("examples:\n  sonard_bench --case P1 --case P3d --threads 1 --threads 2 --json out.json\n  sonard_bench --case P6");
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -230,15 +229,15 @@ int parse_and_run(int argc, char** argv) {
   cli.add_option("--give", options.given_parts,
                  "give scene and sonar what this part of the model needs, where they lack it (may repeat; default none)")
       ->check(text::one_of(parts_to_give()));
-  cli.add_option("--frequency-sum", options.frequency_sum, "of the modes paper and raster: by a transform, or term by term")
+  cli.add_option("--frequency-sum", options.frequency_sum,
+                 "sums of the modes paper and raster: with a transform, or term by term")
       ->check(text::one_of({"fast", "direct"}))
       ->capture_default_str();
   cli.add_option("--scenes-dir", options.scene_folder, "folder to look for the scene files in first; else the shipped ones");
   cli.add_option("--json", options.json_file, "also write the figures to this file");
-  cli.add_option(
-         "--reference-ms", options.reference_ms,
-         "milliseconds a frame of the public reference CUDA code on this device, for the ratio of P10 (default: the 36 that "
-         "were published for another device)")
+  cli.add_option("--reference-ms", options.reference_ms,
+                 "milliseconds a frame of the public reference CUDA code on this device, for the ratio P11 (default: the 36 that "
+                 "were published for another device)")
       ->check(CLI::PositiveNumber);
   add_device_option(cli, model);
   add_model_options(cli, model);

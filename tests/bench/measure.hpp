@@ -19,7 +19,7 @@ namespace sonar::bench {
 double now_s();           // on the steady clock
 double processor_s();     // processor time of all threads of this process
 double this_thread_s();   // processor time of the calling thread
-std::string processor();  // its name, and the number of processors
+std::string processor();  // name and number of the processors
 
 /// Minimum, median, percentiles and maximum of times.
 struct Times {
@@ -39,7 +39,7 @@ struct BenchOptions {
   std::uint64_t seed = 1;
   std::string scene_folder;
   std::string json_file;
-  double reference_ms = 0;  // time of P11: a frame of the public reference code on this device; 0 = not measured
+  double reference_ms = 0;  // for P11: time of a frame of the public reference code on this device; 0 = not measured
 };
 
 /// An engine with its thread pool.

@@ -1,5 +1,5 @@
-// Ratios of the hot loops' times to those of plain implementations (P6): both run in one process, on one thread, alternating,
-// so that other load changes the ratio little. Best of several runs each.
+// Ratios of the times of plain implementations to those of the hot loops (P6). Both run in one process, on one thread, in turn,
+// so that other load changes the ratio little. Each time is the best of several runs.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Measures the latency and the cost of clients of a whole daemon, which runs in a thread of this process as `sonard run` would;
-// the clients use the Oculus protocol over loopback.
+// Measures the latency of a whole daemon and the cost of its clients. The daemon runs in a thread of this process as `sonard run`
+// would; the clients use the protocols of Oculus and BlueView over loopback.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -79,7 +79,7 @@ class Client {
     ::setsockopt(socket_.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   }
   void fire(const oculus::FireRequest& fire) { asio::write(socket_, asio::buffer(oculus::make_fire(fire))); }
-  /// Returns when the last byte of the next ping, or of the next that echoes `fire`, was received; 0 = the stream has ended.
+  /// Returns when the last byte of the next ping, or of the next that echoes `fire`, was received; 0 = end or time limit.
   double next_ping(const oculus::FireRequest* fire = nullptr) {
     for (;;) {
       while (auto message = decoder_.next())
@@ -135,7 +135,7 @@ Result<json> find_latency(const ScenePointer& scene, const BenchOptions& options
     const double end = client.next_ping();
     if (end == 0) return tl::make_unexpected(broken("sent no ping within 20 s"));
     if (k >= warm_up) latency_ms.push_back(1e3 * (end - begin));
-    std::this_thread::sleep_for(std::chrono::milliseconds(25));  // the ping rate a device allows
+    std::this_thread::sleep_for(std::chrono::milliseconds(25));  // the period of the highest ping rate
   }
   client.close();
   const Times times(latency_ms);
@@ -189,7 +189,7 @@ Result<json> find_first_pings(const ScenePointer& scene, const BenchOptions& opt
   if (!service) return tl::make_unexpected(service.error());
   asio::io_context io;
   Client client(io, data_of());
-  constexpr double allowed_median = 3, allowed_slowest = 5;  // 3.9 and 3 before tables of shared noise were cheap
+  constexpr double allowed_median = 3, allowed_slowest = 5;  // they were 3.9 and 3 before tables of shared noise were cheap
   constexpr int warm_pings = 3;
   std::vector<double> first_ms, late_ms, first_cpu_ms, warm_cpu_ms;
   double warm_ms = 0;
@@ -264,7 +264,7 @@ Result<json> find_cost_of_clients(const ScenePointer& scene, int clients, double
   for (std::thread& reader : readers) reader.join();
   const DeviceFigures f = (*service)->figures();
   const std::uint64_t slow = f.dropped_by[static_cast<std::size_t>(DropReason::slow)];
-  std::printf("P8   %d clients: %.1f pings/s each, %llu dropped, %llu ticks skipped; the sender takes %.1f %% of a processor\n",
+  std::printf("P8   %d clients: %.1f pings/s each, %llu dropped, %llu ticks skipped; the sender uses %.1f %% of a processor\n",
               clients, rate_hz, static_cast<unsigned long long>(slow), static_cast<unsigned long long>(f.skipped_ticks),
               100 * share);
   std::fflush(stdout);

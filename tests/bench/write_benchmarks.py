@@ -32,7 +32,7 @@ GOALS = {
 }
 # Thread ms of the prototype's stages for P1 (2 processors with AVX-512), from which the goal was derived.
 FLOOR = {"trace": 2.9 + 0.44, "cull": 0.09, "scatter": 1.9, "synthesize": 1.4, "noise": 0.17, "form beams": 0.42, "receive": 0.2}
-NAME = "benchmarks"  # of both pages
+NAME = "benchmarks"  # the file name of both pages
 PEER = "## Beside a peer"  # a chapter that is written by hand
 # Reasons for the cost of a ping, by the quantity that grows.
 KNEES = {

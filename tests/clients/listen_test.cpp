@@ -1,4 +1,4 @@
-// The commands with a small made-up device and a pose listener, on loopback and free ports.
+// Tests the commands with a small made-up device and a pose listener, on loopback and free ports.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -114,7 +114,7 @@ TEST(Listen, AcceptsAGoodDeviceAndDrawsAPing) {
   std::filesystem::remove(options.record);
 }
 
-TEST(Listen, TellsThatTheRecordingCannotBeWritten) {
+TEST(Listen, ReportsThatTheRecordingCannotBeWritten) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP();
   FakeDevice device(5, [](std::uint32_t i, const oculus::FireSettings& echo) { return ping_bytes(i + 1, echo); });
   ListenOptions options = quiet(device.endpoint(), 5);
@@ -125,7 +125,7 @@ TEST(Listen, TellsThatTheRecordingCannotBeWritten) {
   EXPECT_EQ(done.error().kind, ErrorKind::io);
 }
 
-TEST(Listen, AcceptsAnEchoThatTakesOnePing) {
+TEST(Listen, AcceptsAnEchoThatIsOnePingLate) {
   FakeDevice device(4, [](std::uint32_t i, oculus::FireSettings echo) {
     if (i == 0) echo.range = 7;
     return ping_bytes(i + 1, echo);

@@ -1,4 +1,4 @@
-// sonarctl as an observer, with a made-up sonard: a control stream, and a port for observers.
+// Tests sonarctl as an observer of a made-up sonard, which has a control stream and a port for observers.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -166,7 +166,7 @@ void send_a_ping(const Socket& client) {
   drain(client);
 }
 
-/// Runs listen, a client if the sonar has a free slot, which connects again. Returns the last attempt's end, and the output.
+/// Runs `listen`, which is a client if the sonar has a free slot, and connects again. Returns the result, and the error output.
 std::pair<Result<void>, std::string> listen_beside_a_driver(const Server& sonar, const Control& control) {
   ListenOptions options;
   options.source = observing(control);

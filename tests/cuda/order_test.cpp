@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Device{"Piecewise", []() -> MachinePointer { return std::make_unique<PiecewiseMachine>(); }}),
     [](const auto& of) { return std::string(of.param.name); });
 
-// The test would detect a source of a copy that is reused too early, and a missing order of lanes.
+// Checks that this machine detects a source of a copy that is reused too early, and a missing order of lanes.
 TEST(DeferringDevice, DoesAllWorkAsLateAsTheOrderAllows) {
   DeferringMachine machine;
   auto* host = static_cast<int*>(machine.allocate_host(sizeof(int)));

@@ -31,7 +31,7 @@ std::shared_ptr<const SonarModel> with_wide_beams(FrequencyMode mode, Waveform::
   return model_of(mode, shape, false);
 }
 
-/// Returns all variants that the device computes, tones in the time domain included. Only one of them has ghosts, because the
+/// Returns all variants that the device computes, tones in the time domain included. Only two of them have ghosts, because the
 /// CPU computes these slowly.
 std::vector<std::pair<std::string, PingRequest>> on_device_turns() {
   auto all = turns();
@@ -56,7 +56,7 @@ std::vector<std::pair<std::string, PingRequest>> on_device_turns() {
   return all;
 }
 
-TEST(DeviceEngine, DoesEveryPartOfTheModelAsTheCpuDoes) {
+TEST(DeviceEngine, ComputesEveryPartOfTheModelLikeTheCpu) {
   SKIP_WITHOUT_A_MACHINE();
   BothEngines both(basin());
   std::size_t compared = 0;
@@ -100,7 +100,7 @@ TEST(DeviceEngine, SumsPulsesInTheSpectrumAsTheCpuDoes) {
     }
   ASSERT_EQ(requests.size(), 14u);
   EXPECT_TRUE(both.said.empty()) << both.said[0];
-  // In one batch with pings that need no transform.
+  // A batch may also have pings that need no transform.
   requests.push_back(high());
   requests.back().switches.multipath = false;
   std::swap(requests.back(), requests[2]);
@@ -129,7 +129,7 @@ TEST(DeviceEngine, MakesTheSameBytesInBatchesOfOneAndThree) {
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// A repeated launch may be a captured graph; a timed launch never is. A batch may end because memory is full, and cells may
+// A repeated launch may replay a captured graph; a timed launch never does. A batch may end because memory is full, and cells may
 // be sent again.
 TEST(DeviceEngine, MakesTheSameBytesForEveryKindOfLaunch) {
   SKIP_WITHOUT_A_MACHINE();
@@ -198,7 +198,7 @@ TEST(DeviceEngine, ComputesPingsOfTheBenchmarkAsTheCpuDoes) {
   maker.add(height_field(-1, 12, -10, 10, 0.1, rough_relief(0.1, 30)), -25, {0, 0, -2});
   maker.add(sphere(0.5, 4), -15, {5, 0.7, -1.5});
   maker.add_body(box({0.4, 0.3, 0.3}), -15, {{4, -1, -1.4}, quat_from_rpy({0.1, 0.2, 0.7})});
-  // More objects than the marks of 1 / x distinguish. The last object, close before the sphere, has the same mark as the
+  // There are more objects than marks of 1 / x. The last object, closely in front of the sphere, has the same mark as the
   // sphere.
   for (int i = 3; i < 65; ++i) maker.add(wall(0.1, 0.1), -10, {-2.0 - i, 0, 0});
   maker.add(wall(0.3, 0.3), -20, {4.48, 0.7, -1.5});

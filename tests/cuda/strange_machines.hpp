@@ -64,7 +64,7 @@ class DeferringMachine final : public PassingMachine {
     queue(lane, [this, earlier, until = at(earlier).begun + at(earlier).waiting.size()] { catch_up(earlier, until); });
   }
   void wait(int lane) override { catch_up(lane, at(lane).begun + at(lane).waiting.size()); }
-  void release(void* device) override {  // as cudaFree, which waits for all work
+  void release(void* device) override {  // like cudaFree, which waits for all work
     for (int lane = 0; lane < lanes; ++lane) wait(lane);
     inner_->release(device);
   }
@@ -105,11 +105,11 @@ class DeferringMachine final : public PassingMachine {
       ++at(lane).begun;
       work.what();
     }
-    if (std::exchange(early_release_, false)) throw std::logic_error("memory of a copy was given back before the copy");
+    if (std::exchange(early_release_, false)) throw std::logic_error("memory of a copy was released before the copy");
   }
   std::array<Lane, lanes> lanes_;
   std::map<std::byte*, std::size_t> host_bytes_;
-  bool early_release_ = false;  // releases memory that a copy still needs
+  bool early_release_ = false;  // true: memory that a copy still needs was released
 };
 
 /// Distributes the indices of a step to four threads. The thread sanitizer then detects two threads that write to one position,

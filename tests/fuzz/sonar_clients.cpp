@@ -172,7 +172,7 @@ void SonarClients::fire() {
   perform(sonar_.on_ping({.ping = ping, .seconds = 0.01}, now_));
 }
 
-/// Sets the next piece of the message that is being written; false if there is none.
+/// Gives the client the next piece of its message. Returns false if there is none, or when `bytes` are used up.
 bool SonarClients::write_piece(Client& client, std::size_t& bytes) {
   if (!client.writing) {
     client.writing = sonar_.next_message(client.id, now_);

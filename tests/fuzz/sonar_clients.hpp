@@ -32,10 +32,10 @@ class SonarClients {
   explicit SonarClients(SonarConfig sonar);
 
   void connect(std::size_t place, Role role = Role::client);
-  void receive(std::size_t place, protocol::BytesView bytes);  // the sonar gets these bytes of the client
+  void receive(std::size_t place, protocol::BytesView bytes);  // the sonar gets these bytes from the client
   void tick(std::size_t place);                      // advances to the next tick of the client, which may be later than now
   void wait(std::chrono::nanoseconds time);          // events that become due in this time are handled, up to a bound
-  void fire();                                       // the engine has finished a ping
+  void fire();                                       // advances to the next ping, which the engine finishes
   void write(std::size_t place, std::size_t bytes);  // the client reads this number of bytes
   void finish(std::size_t place);                    // ends the connection, as after a silence of the client
   void disconnect(std::size_t place);

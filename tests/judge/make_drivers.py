@@ -85,7 +85,7 @@ def micron(address, port):
         sonar.until(b"@")
         size = int(sonar.take(4), 16) + 1
         frame = sonar.take(size)
-        if frame[5] == 4:  # mtAlive: the head sends no lines; bit 7 of its state: it has parameters
+        if frame[5] == 4:  # mtAlive: the head sends no lines; bit 7 of the state is set if it has parameters
             if not frame[8 + 7] & 0x80:
                 send(19, head)
             send(25, bytes(4))
@@ -95,8 +95,8 @@ def micron(address, port):
 
 
 def ping_family(sonar, requests, data, number_at, front, item=1):
-    """Sends requests and reads the messages of kind `data`: a number at `number_at`, and after `front` bytes items that can be
-    mirrored."""
+    """Sends requests and reads the messages of kind `data`. These have a number at `number_at`, and after `front` bytes
+    items that can be mirrored."""
     for kind, payload in requests:
         body = b"BR" + struct.pack("<HHBB", len(payload), kind, 0, 0) + payload
         sonar.send(body + struct.pack("<H", sum(body) & 0xFFFF))

@@ -53,7 +53,7 @@ class PingReader {
   bool ended = false, was_reset = false;
   Steady::time_point last_at{};
   std::chrono::duration<double> longest_gap{0};
-  bool cut() const { return filled_ > 0; }  // the stream ended within a message
+  bool cut() const { return filled_ > 0; }  // a part of a message is left
 
  private:
   void take_message(std::size_t size);

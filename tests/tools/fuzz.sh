@@ -58,7 +58,7 @@ one() {
   fi
   printf '%-20s %s\n' "$name" "$result" >"build/fuzz/$name.result"
   printf '%s-- [%s] %s\n   %s\n' "$ending" "$2" "$name" "$result"
-  # The page compares with the promised bounds, not with the values requested here.
+  # The table compares with the promised bounds, not with the values requested here.
   python3 tests/reliability/record.py "fuzz-$name" "$tried$([ $status -eq 0 ] || echo ', with a fault')" "$words" \
     "$([ $status -eq 0 ] && [ "$tried" -ge "$promised" ] && echo yes || echo no)" "tests/tools/fuzz.sh $name"
   return $verdict

@@ -33,7 +33,7 @@ fi
 commands() {
   python3 - "$1/compile_commands.json" "$share" "$commit" <<'PYTHON'
 import json, re, sys
-files = {entry["file"]: entry for entry in json.load(open(sys.argv[1]))}  # once each, though tests share some
+files = {entry["file"]: entry for entry in json.load(open(sys.argv[1]))}  # each file once, though tests share some
 share, commit = int(sys.argv[2]), int(sys.argv[3])
 for number, (file, entry) in enumerate(sorted(files.items())):
     if number % share == commit % share and not re.search(r"cmake_pch\.hxx\.cxx$|\.pb\.cc$|_proto\.dir/", file):

@@ -11,7 +11,7 @@ product_packages=(
 build_packages=("${product_packages[@]}" libeigen3-dev libgtest-dev libgmock-dev)
 
 # Sanitized programs and fuzzers are compiled with the system's clang (14 on Debian 12, 19 on Debian 13) and linked with lld.
-# clang needs half to two thirds of g++'s time, and lld a quarter of the linking time. So a second compiler also reads the tree.
+# clang needs half to two thirds of g++'s time, and lld a quarter of the linking time, and two compilers check the code.
 clang_packages=(clang libclang-rt-dev lld)
 
 # Packages for the page of the live view; without them the daemon is built without the page.
@@ -55,8 +55,8 @@ end_aside() {
   return $status
 }
 
-# need_packages NAME...: installs missing packages with apt, with a message. It lists packages that the archives lack and installs
-# the rest.
+# need_packages NAME...: installs missing packages with apt, with a message. If the archives lack some, it installs the rest,
+# lists the lacking ones and fails.
 need_packages() {
   if ! command -v dpkg-query >/dev/null; then
     echo "not a Debian-like system: it must have the equivalents of these packages: $*"
@@ -102,8 +102,8 @@ forget_figures() {
   rm -f "$SONARD_RELIABILITY"/*.json
 }
 
-# build_jobs: prints the number of parallel compilers: one per processor, but no more than fit into memory (a large file needs 1.2
-# GB).
+# build_jobs: prints the number of parallel compilers. It is one per processor, but no more than fit into memory (a large file
+# needs 1.2 GB).
 build_jobs() {
   local processors memory_kb by_memory
   processors=$(nproc 2>/dev/null || echo 2)

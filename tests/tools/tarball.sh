@@ -58,8 +58,8 @@ done
 cat >"$stage/README" <<TEXT
 sonard $version for Linux on $(uname -m): bin/sonard and bin/sonarctl run from here, wherever this folder is.
 
-It needs glibc 2.35 and libstdc++ of GCC 12, or newer: Debian 12, Ubuntu 22.04. Built without FFTW: measured and exact pulses and
-the paper mode are refused; without the farm and GeoTIFF. Packages for Debian have all three.
+It needs glibc 2.35 and libstdc++ of GCC 12, or newer: Debian 12, Ubuntu 22.04. Built without FFTW, the farm and GeoTIFF, so
+measured and exact pulses and the paper mode are refused. Packages for Debian have all three.
 
 Documents: share/doc/sonard. Licence: share/doc/sonard/copyright; of the libraries inside: share/doc/sonard/licences, where
 "common" has the texts that Debian keeps in /usr/share/common-licenses.

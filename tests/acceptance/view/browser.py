@@ -155,7 +155,7 @@ class Page:
             if value:
                 return value
             time.sleep(0.1)
-        raise AssertionError(f"not so within {patience_s} s: {expression}")
+        raise AssertionError(f"not true within {patience_s} s: {expression}")
 
     def text(self, selector):
         return self.run(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''")
@@ -173,7 +173,7 @@ class Page:
             self.answer(each)
 
     def click(self, selector):
-        """Waits for the element: a message of the daemon may add or replace it."""
+        """Clicks by script. It first waits for the element, because a message of the daemon may add or replace it."""
         self.wait(f"!!document.querySelector({json.dumps(selector)})")
         self.run(f"document.querySelector({json.dumps(selector)}).click()")
 

@@ -1,5 +1,4 @@
-"""A daemon for the page's tests: serves the built page and speaks the live view's socket with made-up data. Standard library
-only.
+"""A daemon for the page's tests: serves the built page and the live view's socket with made-up data. Standard library only.
 
     mock = MockDaemon(page_folder, pings);  mock.start();  mock.state("standby")
 
@@ -67,7 +66,7 @@ class MockDaemon:
             "/water/salinity_psu": 30.0, "/water/ph": 8.0, "/water/sound_speed_mps": 0.0, "/rov/trajectory/paused": False,
             "/rov/trajectory/position_s": 41.6, "/rov/trajectory/speed": 1.0, "/faults/armed": True, "/faults/clear_all": False,
             **{f"/faults/{name}": 0.0 for name in TROUBLES}}
-        self.faults = {}  # trouble -> end, time.time()
+        self.faults = {}  # trouble -> its end, in time.time()
         self.name = ""
         self.state("fine")
         self.set_calls = []
@@ -194,7 +193,7 @@ class MockDaemon:
     def serve(self, request):
         path = request.path.partition("?")[0]
         self.requests.append(request.path)
-        request.rfile.read(int(request.headers.get("Content-Length", 0)))  # unread bytes would be taken as the connection's next request
+        request.rfile.read(int(request.headers.get("Content-Length", 0)))  # unread bytes would be read as the connection's next request
         if "upgrade" in request.headers.get("Connection", "").lower():
             return self.serve_socket(request)
         if path == "/api/v1/view_ticket":

@@ -133,7 +133,7 @@ class PageChecks:
     def compare(self, drawn, reference, most_mean=0.5, most_p99=2, most_above=0.001):
         (width, height, ours), (_, other_height, theirs) = drawn, reference
         self.assertEqual(width, reference[0])
-        self.assertLessEqual(abs(height - other_height), 1)  # bearings have 32 bits here, 64 there: the last row may be one more
+        self.assertLessEqual(abs(height - other_height), 1)  # the page computes bearings with 32 bits, sonarctl with 64
         height = min(height, other_height)
         ours, theirs = ours[:3 * width * height], theirs[:3 * width * height]
         mean, p99, above = difference(ours, theirs)

@@ -1,4 +1,4 @@
-// Images: the place of an echo, their size, and the effects of their settings.
+// Tests images: the position of an echo, the size, and the effects of settings.
 #include "clients/bvtsdk/core/imaging.hpp"
 
 #include <gtest/gtest.h>
@@ -70,7 +70,7 @@ TEST(XyImage, HasTheSizesOfItsDefinition) {
   EXPECT_EQ(image.height, 400);
   EXPECT_EQ(image.width, 2 * static_cast<int>(std::ceil(11 * std::sqrt(0.5) / (shown_m / 400))));
   EXPECT_NEAR(image.range_resolution_m, shown_m / 400, 1e-8);
-  EXPECT_EQ(image.origin_row, 400 + 27);  // 0.707 m of 25.7 mm
+  EXPECT_EQ(image.origin_row, 400 + 27);  // 0.707 m in pixels of 25.7 mm
   EXPECT_EQ(image.origin_col, image.width / 2);
   EXPECT_EQ(image.bearing_resolution_deg, 0);
   EXPECT_EQ(image.fov_min_deg, -45);
@@ -80,7 +80,7 @@ TEST(XyImage, HasTheSizesOfItsDefinition) {
 TEST(XyImage, PutsPixelsWhereTheVendorsLibraryPutThem) {
   // A public table of every pixel's range and bearing, from a 45 degree head with a requested range of 2 to 15 m and 640 x 480,
   // follows x = (col - 197) 0.026401 m, y = (550 - row) 0.026401 m in 394 x 480. It lacks the ping's sector and stop range; here
-  // they are those from which these numbers follow.
+  // they have the values from which these numbers follow.
   PolarPing ping = make_ping(256, 500, 2, 0.02508f, [](int, int) { return 100; });
   ping.fov_min_deg = -20.95f;
   ping.fov_max_deg = 20.95f;
@@ -219,7 +219,7 @@ TEST(RThetaImage, IsThePingItselfAtItsOwnSize) {
       ASSERT_EQ(image.pixels[static_cast<std::size_t>(row * 16 + col)], 1000 * col + (249 - row)) << row << " " << col;
 }
 
-TEST(RThetaImage, TakesOtherWidths) {
+TEST(RThetaImage, AcceptsOtherWidths) {
   const PolarPing ping = make_ping(16, 250, 2, 0.04f, [](int j, int) { return 1000 * j; });
   ImageSettings settings;
   settings.r_theta_width = 32;
@@ -314,7 +314,7 @@ TEST(Image, IsMadeOfPingsWithASingleBeamOrBin) {
     }
 }
 
-TEST(Imager, GivesTheSameImageFromARememberedTable) {
+TEST(Imager, MakesTheSameImageFromAStoredTable) {
   Imager imager;
   MagImage first, again;
   const PolarPing ping = make_ping_with_target(4, 5), other = make_ping_with_target(6, 5, 60000, 256);

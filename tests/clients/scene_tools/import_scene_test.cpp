@@ -97,11 +97,11 @@ TEST_F(ImportScene, ModelsIncludeTheirNeighbours) {
   ASSERT_TRUE(done) << done.error().text;
   EXPECT_EQ(done->shapes, 2u);
   EXPECT_EQ(scene()->objects.size(), 2u);
-  // A file of the model itself, whose folder has another name.
+  // This file belongs to the model itself, whose folder has another name.
   write("models/clone/meshes/own.stl", triangle);
   const auto renamed = run(holding("crate", mesh("model://crate/meshes/own.stl")), "models/clone/model.sdf");
   EXPECT_TRUE(renamed) << renamed.error().text;
-  // A model that is named like the one on Fuel that it includes.
+  // This model has the name of the Fuel model that it includes.
   const auto same = run(holding("block", "<include><uri>https://fuel.gazebosim.org/1.0/me/models/block</uri></include>"),
                         "models/block/model.sdf");
   ASSERT_FALSE(same);
@@ -194,7 +194,7 @@ TEST_F(ImportScene, FuelModelsAreFoundInTheCachesOfGazebo) {
   EXPECT_THAT(error(third), HasSubstr("hmoyen/models/Sand Bed/3'"));
 }
 
-TEST_F(ImportScene, FuelModelsAreFoundInFoldersThatARepositoryNamesInItsWay) {
+TEST_F(ImportScene, FuelModelsAreFoundInFoldersWithAnotherSpelling) {
   const Environment home("HOME", "/nonexistent"), none("GZ_FUEL_CACHE_PATH", ""), nor("IGN_FUEL_CACHE_PATH", "");
   const std::string fuel = "https://fuel.gazebosim.org/1.0/hmoyen/models/";
   write("dave/models/sunken_vase/model.sdf",
@@ -209,7 +209,7 @@ TEST_F(ImportScene, FuelModelsAreFoundInFoldersThatARepositoryNamesInItsWay) {
   EXPECT_THAT(done->left_out, ElementsAre());
   options.model_folders.clear();
   EXPECT_THAT(error(sdf("<include><uri>" + fuel + "Sunken Vase</uri></include>")), HasSubstr("were not found"));
-  // Beside the world, in a folder of models.
+  // The folder models beside the world is searched too.
   write("models/sunken_vase/model.sdf", "<sdf version='1.9'><model name='vase'>" + link("l") + "</model></sdf>");
   EXPECT_EQ(error(sdf("<include><uri>" + fuel + "Sunken Vase</uri></include>")), "no error");
 }
@@ -226,7 +226,7 @@ TEST_F(ImportScene, AnEmptySceneIsAnErrorThatSaysWhatIsMissing) {
   EXPECT_FALSE(std::filesystem::exists(options.out));
 }
 
-TEST_F(ImportScene, MeshesAreNamedByRelativePathsAndUnevenOnesConverted) {
+TEST_F(ImportScene, MeshPathsAreRelativeAndUnevenScalesAreConverted) {
   write("pkg/meshes/a.stl", triangle);
   write("pkg/urdf/r.urdf", "");
   options.out = files.path("pkg/scenes/out.yaml");
@@ -299,7 +299,7 @@ TEST_F(ImportScene, FilesThatASceneCannotReadAreLeftOut) {
   EXPECT_EQ(error(sdf(model("a", mesh("gone.stl")) + model("d", link("l")))), "no error");
 }
 
-TEST_F(ImportScene, ColladaFilesBringTheirUnit) {
+TEST_F(ImportScene, TheUnitOfAColladaFileIsUsed) {
   write("cm.dae", R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis></asset>
 <library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="9">0 0 0 200 0 0 0 100 0</float_array>
@@ -349,7 +349,7 @@ TEST_F(ImportScene, TheBrightestPixelOfAHeightmapHasItsHeight) {
   EXPECT_NEAR(described->objects[0].in_world.size_m().z, 4, 1e-4) << text();
 }
 
-TEST_F(ImportScene, MaterialsByArgumentByNameAndByGuess) {
+TEST_F(ImportScene, MaterialsComeFromArgumentsNamesOrTheDefault) {
   const std::string world = sdf(model("sand_bed", link("l")) + model("m", link("l")) + model("ship", model("hull", link("l"))) +
                                 model("p",
                                       "<link name='l'><visual name='v'><geometry><plane><size>5 5</size></plane></geometry>"
@@ -432,7 +432,7 @@ TEST_F(ImportScene, MissingMeshesOfFuelComeWithTheCommandThatFetchesTheirModel) 
           ::testing::EndsWith("plugin \"p\"")));
 }
 
-TEST_F(ImportScene, MovingModelsAreBodiesWhereTheModelStands) {
+TEST_F(ImportScene, MovingModelsBecomeBodiesAtTheirPoses) {
   options.moving = {"rov"};
   options.offset_m = {0, 0, -5};
   const auto done =
@@ -448,7 +448,7 @@ TEST_F(ImportScene, MovingModelsAreBodiesWhereTheModelStands) {
   EXPECT_THAT(error(sdf(model("rov", link("l")))), HasSubstr("--moving rof: no model of that name; did you mean \"rov\"?"));
 }
 
-TEST_F(ImportScene, AFileThatIsThereIsNotReplacedUnasked) {
+TEST_F(ImportScene, AnExistingFileIsReplacedOnlyWithOverwrite) {
   options.overwrite = false;
   EXPECT_EQ(error(sdf(model("m", link("l")))), "no error");
   EXPECT_THAT(error(sdf(model("m", link("l")))), HasSubstr("--overwrite"));

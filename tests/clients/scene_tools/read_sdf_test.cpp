@@ -24,7 +24,7 @@ TEST(ReadSdf, PosesOfModelLinkAndVisualCompose) {
   const auto world =
       r.read(sdf(model("m", std::string("<pose>10 0 0 0 0 1.5707963267948966</pose>") +
                                 link("l", "<pose>1 0 0 0 0 1.5707963267948966</pose>", "<pose>1 0 0 0 0 0</pose>"))));
-  // The link lies 1 m along the model's x, which points along the world's y; its own x then points along the world's -x.
+  // The link lies 1 m along the model's x, which points along the world's y. The link's x points along the world's -x.
   expect_near(where(world), {9, 1, 0});
   EXPECT_EQ(world->shapes[0].link, "l");
   EXPECT_EQ(world->models.at(0).path, "m");
@@ -86,7 +86,7 @@ TEST(ReadSdf, PlacementFramesPutAnotherPointOfTheModelAtItsPose) {
   expect_near(where(world, 1), {0, 0, 2});
 }
 
-TEST(ReadSdf, IncludesTakeTheirNamePoseAndStaticFromTheIncluder) {
+TEST(ReadSdf, AnIncludeMayReplaceNamePoseAndStatic) {
   Reading r;
   r.files["model://crate"] = std::string("<sdf version='1.6'><model name='crate'><pose>9 9 9 0 0 0</pose><static>true</static>") +
                              link("l") + "</model></sdf>";
@@ -122,7 +122,7 @@ TEST(ReadSdf, FramesOfModelsThatAreMergedInMergedModelsAreKnown) {
   expect_near(where(world, 1), {4, 2, 1});
 }
 
-TEST(ReadSdf, TwoModelsOfOneNameStandWhereEachIsPut) {
+TEST(ReadSdf, TwoModelsWithTheSameNameHaveTheirOwnPoses) {
   Reading r;
   const auto world = r.read(sdf(model("m", std::string("<pose>1 0 0 0 0 0</pose>") + link("l")) +
                                 model("m", std::string("<pose>2 0 0 0 0 0</pose>") + link("l"))));
@@ -130,7 +130,7 @@ TEST(ReadSdf, TwoModelsOfOneNameStandWhereEachIsPut) {
   EXPECT_EQ(where(world, 1).x, 2);
 }
 
-TEST(ReadSdf, EveryShapeIsUnderstood) {
+TEST(ReadSdf, EveryShapeIsRead) {
   Reading r;
   const auto part = [](const std::string& geometry) {
     return std::string("<visual name='v'><geometry>") + geometry + "</geometry></visual>";
@@ -211,7 +211,7 @@ TEST(ReadSdf, UnsupportedElementsAreNamedOnceWithTheirLine) {
                           "w.sdf:5: geometry polyline: scenes have no such shape", "model:/cam:2: sensor \"eye\""));
 }
 
-TEST(ReadSdf, ThePlaceOfAWorldIsGivenAsAKey) {
+TEST(ReadSdf, TheOriginOfAWorldIsReportedAsAConfigurationKey) {
   Reading r;
   ASSERT_TRUE(
       r.read(sdf("<spherical_coordinates><latitude_deg>56.71</latitude_deg><longitude_deg>-3.5</longitude_deg>"
@@ -260,7 +260,7 @@ TEST(ReadSdf, MissingModelsAreNamedOnceEachWithTheCommandThatFetchesThem) {
                                                  "w.sdf:5: include of model://gone: not found"));
 }
 
-TEST(ReadSdf, AddressesOfWebPagesAreNotGivenToTheCommand) {
+TEST(ReadSdf, TheCommandHasAddressesOfTheServerAndNotOfWebPages) {
   Reading r;
   for (const char* page : {"app.gazebosim.org", "app.ignitionrobotics.org"})
     EXPECT_THAT(r.error(sdf("<include><uri>https://" + std::string(page) + "/Cole/fuel/models/Ocean Rock 03</uri></include>")),
