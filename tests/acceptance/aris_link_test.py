@@ -47,7 +47,7 @@ class ArisLink(unittest.TestCase):
         self.addCleanup(link.close)
         return link
 
-    def test_beacons_say_whether_it_is_free(self):
+    def test_beacons_say_whether_the_sonar_is_free(self):
         beacons = Beacons(self.daemon.address)
         self.addCleanup(beacons.close)
         self.assertTrue(beacons.until_state(0, 30))
@@ -57,7 +57,7 @@ class ArisLink(unittest.TestCase):
         self.assertEqual((beacon[1], beacon[2], beacon[4]), ([7001], [1], [0]))
         self.assertNotIn(9, beacon)
         early = any(self.is_early(beacons) for _ in range(20))  # a busy computer delays some
-        self.assertTrue(early, "at once, not with the next beacon, a second later")
+        self.assertTrue(early, "the state changes at once, not with the next beacon a second later")
 
     def is_early(self, beacons):
         """Connects after a beacon with the state free. Returns whether one with the state busy comes before the next was due."""
@@ -82,7 +82,7 @@ class ArisLink(unittest.TestCase):
                 self.assertEqual(frames[0].u32(488), 7001)
                 self.assertEqual(frames[0].u32(680), 1)
 
-    def test_targets_are_where_they_are(self):
+    def test_targets_have_their_ranges_and_bearings(self):
         with self.controller() as link:
             link.set(1, gain=0.0)
             frame = link.frame()
@@ -100,7 +100,7 @@ class ArisLink(unittest.TestCase):
             speeds = [link.frame().f32(464) for _ in range(4)]
         self.assertAlmostEqual(speeds[-1] / salt, 1 / 1.029, delta=0.003)
 
-    def test_cookies_tell_what_became_of_settings(self):
+    def test_cookies_report_which_settings_apply(self):
         with self.controller() as link:
             link.set(1)
             link.frame()
@@ -113,7 +113,7 @@ class ArisLink(unittest.TestCase):
             self.assertEqual((frame.u32(684), frame.u32(444), frame.samples), (4, 16, 200))
 
     @unittest.skipUnless(shutil.which("protoc"), "protoc is not installed")
-    def test_the_proto_file_describes_them(self):
+    def test_the_proto_file_describes_the_messages(self):
         def decoded(kind, data):
             done = subprocess.run(["protoc", f"--decode=sonar.aris.{kind}", f"--proto_path={ROOT / 'protocol/aris'}", "aris.proto"],
                                   input=data, capture_output=True, check=False)
@@ -148,7 +148,7 @@ class ArisLink(unittest.TestCase):
             self.assertGreater(first.frame().index, before)
             self.assertEqual(first.incomplete, 0)
 
-    def test_the_stream_stops_when_told_and_with_the_connection(self):
+    def test_the_stream_stops_on_request(self):
         with self.controller() as link:
             link.set(1)
             link.frame()
@@ -168,7 +168,7 @@ class ArisLink(unittest.TestCase):
 
 
 class EveryMode(unittest.TestCase):
-    def test_targets_are_where_they_are(self):
+    def test_targets_have_their_ranges_and_bearings(self):
         for profile, modes in (("aris-1200", (1,)), ("aris-1800", (1, 3)), ("aris-3000", (6,))):
             with Sonard(scene="l-targets.yaml", profile=profile, pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}") as daemon:
                 with Controller(daemon.address) as link:
@@ -246,7 +246,7 @@ class Tools(unittest.TestCase):
                     self.assertEqual(done.returncode, 64, done.stderr)
                     self.assertIn(f"sonarctl: {why}", done.stderr)
 
-    def test_faults_on_purpose(self):
+    def test_injected_faults(self):
         with Sonard(scene="l-targets.yaml", profile="aris-3000", arguments=("--faults",)) as daemon:
             control = ("--control", f"{daemon.address}:14770")
             with Controller(daemon.address) as link:
@@ -261,7 +261,7 @@ class Tools(unittest.TestCase):
             run(SONARCTL, "fault", "add", "G01", "--pings", "1000", *control)
             start = time.monotonic()
             self.assertNotEqual(daemon.ctl("listen", "--seconds", 3).returncode, 0)
-            self.assertLess(time.monotonic() - start, 30, "frames that lack parts do not prolong it")
+            self.assertLess(time.monotonic() - start, 30, "frames that lack parts do not prolong the command")
             refused = run(SONARCTL, "fault", "add", "S01", *control)
             self.assertIn("sends pings by datagrams alone", refused.stderr)
 

@@ -26,7 +26,7 @@ def pose_at(t):
 
 class Clocks(unittest.TestCase):
     def driven(self, clock, drive, pause_s=0.0):
-        """Returns the depths stated in PINGS pings, and the digest of the stream; drive(control, n) causes ping n."""
+        """Returns PINGS pings, and the digest of the stream; drive(control, n) causes ping n."""
         with Sonard(arguments=["--clock", clock, "--digest", "--exit-after-pings", PINGS]) as daemon:
             with Client(daemon.address) as client:
                 client.send(fire_message(version=2, rate_hz=RATE_HZ, range_=5))
@@ -56,7 +56,7 @@ class Clocks(unittest.TestCase):
         for n, ping in enumerate(pings):
             self.assertAlmostEqual(ping.pressure - pings[0].pressure, per_m * n / RATE_HZ, delta=1e-4, msg=f"ping {n}")
 
-    def test_lockstep_by_http(self):
+    def test_lockstep_over_http(self):
         def drive(control, n):
             control.send_pose(**pose_at(n / RATE_HZ))
             try:
@@ -70,7 +70,7 @@ class Clocks(unittest.TestCase):
         self.expect_dive(pings)
         self.assertEqual(self.driven("lockstep", drive, pause_s=0.02)[1], digest)
 
-    def test_follow_by_http(self):
+    def test_follow_over_http(self):
         def drive(control, n):
             try:
                 control.send_pose(**pose_at(n / RATE_HZ), timestamp=1763 + n / RATE_HZ)
@@ -108,7 +108,7 @@ class Clocks(unittest.TestCase):
             self.assertIn("only with clock: lockstep", result.stderr)
 
     def test_a_step_ends_with_its_connection(self):
-        """The client of a long step disconnects; then time stops again. Tested for every way to request a step."""
+        """The client of a long step disconnects; then time stops again. This is tested for every way to request a step."""
         def by_http(daemon, _where):
             asking = socket.create_connection((daemon.address, 8088))
             body = b'{"dt_s": 3000}'

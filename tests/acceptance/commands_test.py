@@ -118,7 +118,7 @@ class Mistakes(unittest.TestCase):
         for command in ([SONARD, "run", ""], [SONARD, ""], [SONARCTL, "listen", ""]):
             self.expect(run(*command), 64, "it is empty: write a value, or leave it out")
 
-    def test_names_that_move_the_cursor_are_shown_harmless(self):
+    def test_names_that_would_move_the_cursor_are_escaped(self):
         for command in ([SONARD, "check", "\x1b[2J"], [SONARD, "\x1b[2J"], [SONARCTL, "scene", "check", "\x1b[2J"], [SONARCTL, "listen", "\x1b[2J"]):
             result = run(*command)
             self.assertIn("\\x1b[2J", result.stderr)
@@ -170,7 +170,7 @@ class Mistakes(unittest.TestCase):
     def test_a_good_configuration_is_0(self):
         self.expect(check(GOOD), 0)
 
-    def test_a_good_configuration_lists_what_drivers_find_where(self):
+    def test_check_lists_the_addresses_for_drivers(self):
         for profile, lines in (("oculus-m1200d", ["sonar front, Oculus M1200d", "  tcp        127.0.0.2:52100            settings, pings; waits for the driver",
                                                   "  status     127.255.255.255:52102      address, state; sent without a request"]),
                                ("norbit-wbms", ["  tcp        127.0.0.2:2211             water column; waits for the driver"])):
@@ -180,7 +180,7 @@ class Mistakes(unittest.TestCase):
     def test_a_mistyped_key_is_78_and_the_nearest_one_is_named(self):
         self.expect(check(GOOD.replace("bind_ip", "bind_op")), 78, "test.yaml:3:", "bind_op", 'did you mean "bind_ip"')
 
-    def test_an_unknown_profile_and_a_missing_scene_say_so(self):
+    def test_an_unknown_profile_and_a_missing_scene_are_reported(self):
         self.expect(check(GOOD.replace("m1200d", "m1200")), 78, "oculus-m1200d")
         self.expect(check(GOOD.replace("demo.yaml", "demi.yaml")), 78, "test.yaml:1:", "world.scene", "no such file")
 
@@ -205,7 +205,7 @@ class Mistakes(unittest.TestCase):
         self.expect(run(SONARCTL, "view", "--png", "x.png", "--from-raw", BUILD / "none.raw"), 66, "none.raw")
         self.expect(run(SONARCTL, "listen", "127.0.0.9", "--wait", "0.1"), 69, "Is sonard running there?")
 
-    def test_what_the_machine_lacks_is_named(self):
+    def test_limits_of_the_machine_are_named(self):
         def short_of(limit):
             return run("bash", "-c", f"{limit}; exec {SONARD} run --demo")
 
@@ -226,7 +226,7 @@ class Mistakes(unittest.TestCase):
                                     (SONARCTL, "scene", "check", "demo.yaml")):
                 self.expect(run("bash", "-c", f"ulimit -s {kib}; exec \"$@\"", "-", program, *words), 69,
                             f"the stack is limited to {kib} KiB, and at least 1024 are needed; raise the limit (ulimit -s")
-        for limit in ("ulimit -S -s 64", "ulimit -s 1024"):  # the first may be raised
+        for limit in ("ulimit -S -s 64", "ulimit -s 1024"):  # sonarctl may raise the first one
             result = run("bash", "-c", f"{limit}; exec {SONARCTL} scene check {ROOT}/scenes/demo.yaml")
             self.assertEqual((result.returncode, result.stderr), (0, ""), limit)
         if os.geteuid() != 0:  # the superuser has no such limit
@@ -239,7 +239,7 @@ class Mistakes(unittest.TestCase):
                 result = run(SONARCTL, *command, "--token-file", pathlib.Path(folder) / "token", patience_s=60)
                 self.expect(result, 66, "cannot read a token from")
 
-    def test_an_address_of_another_machine_is_69_with_the_way_out(self):
+    def test_an_address_of_another_machine_is_69_with_the_remedy(self):
         self.expect(run(SONARD, "run", "--demo", "--bind", "192.0.2.7"), 69, "192.0.2.7", "--bind")
 
 
@@ -268,7 +268,7 @@ class Interrupted(unittest.TestCase):
                 self.ends_soon(process)
                 self.assertGreater(process.returncode, 0)  # no signal ended it
 
-    def test_the_first_signal_ends_the_wait_for_one_that_is_gone(self):
+    def test_the_first_signal_ends_the_wait_for_a_sonar_that_is_gone(self):
         with Sonard() as daemon:
             process = self.started("listen", daemon.address, "--wait", "60")
             eventually(lambda: re.search(r"^sonard_pings_sent_total\S* [1-9]", daemon.get("/metrics"), re.M))

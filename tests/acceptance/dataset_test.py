@@ -66,7 +66,7 @@ class Dataset(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stderr
 
-    def test_killed_it_loses_nothing_and_repeats_nothing(self):
+    def test_a_killed_run_loses_nothing_and_repeats_nothing(self):
         self.job.write_text(small_job(12, 2), encoding="utf-8")
         self.make("whole")
         out = self.path / "killed"
@@ -91,7 +91,7 @@ class Dataset(unittest.TestCase):
         self.assertIn(f"{unreadable}: is a folder, not a regular file", refused.stderr)
         self.assertEqual(refused.returncode, 66)
 
-    def test_interrupted_it_says_so_and_goes_on_with_the_same_pings(self):
+    def test_an_interrupted_run_reports_it_and_continues_with_the_same_pings(self):
         self.job.write_text(small_job(24, 24), encoding="utf-8")
         out = self.path / "interrupted"
         process = subprocess.Popen([str(SONARD), "dataset", str(self.job), "--out", str(out), "--threads", "1"],
@@ -110,7 +110,7 @@ class Dataset(unittest.TestCase):
         self.assertEqual((out / "shard-000000.tar").read_bytes(), (self.path / "whole/shard-000000.tar").read_bytes())
         self.assertEqual(sorted(p.name for p in out.iterdir()), sorted(p.name for p in (self.path / "whole").iterdir()))
 
-    def test_exports_stand_beside_the_shards(self):
+    def test_exports_are_written_beside_the_shards(self):
         self.job.write_text(small_job(6, 3), encoding="utf-8")
         result = run(SONARD, "dataset", self.job, "--out", self.path / "set", "--export", "coco", "--split-by", "bed_sed")
         self.assertEqual((result.returncode, 'did you mean "bed_seed"' in result.stderr), (64, True), result.stderr)
@@ -183,7 +183,7 @@ class Dataset(unittest.TestCase):
         result = run(SONARD, "render", self.job, "--out", self.path / "x")
         self.assertEqual((result.returncode, "sonard dataset" in result.stderr), (78, True), result.stderr)
 
-    def test_the_shipped_jobs_draw_and_ping(self):
+    def test_the_shipped_jobs_make_pings(self):
         for job in sorted((ROOT / "scenes/datasets").glob("*.yaml")):
             with self.subTest(job=job.name):
                 self.job.write_text(re.sub(r"pings: \d+, shard: \d+", "pings: 2, shard: 2", job.read_text(encoding="utf-8")), encoding="utf-8")
@@ -203,7 +203,7 @@ class Dataset(unittest.TestCase):
         self.assertEqual(set(json.loads((out / "000001_labels.json").read_text())), {"layout", "annotations"})
 
     @unittest.skipIf(np is None, "needs NumPy and Pillow")
-    def test_the_loader_of_the_manual_reads_what_a_tiny_detector_learns(self):
+    def test_the_loader_of_the_manual_reads_labels_that_a_small_detector_learns(self):
         """Only a smoke test of the labels: they agree with the picture better than chance."""
         self.job.write_text(small_job(16, 8).replace("dataset: {", "dataset: {fan: true, "), encoding="utf-8")
         self.make("set", "--quiet")

@@ -1,4 +1,4 @@
-"""Tests the distances that an autopilot gets from an altimeter by MAVLink. A controller requests the distances to hold its
+"""Tests the distances that an autopilot gets from an altimeter over MAVLink. A controller requests the distances to hold its
 altitude."""
 import pathlib
 import re
@@ -115,7 +115,7 @@ class DepthHold(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertGreater(done.stdout.count("distance"), 25, done.stdout)
         self.assertRegex(status, r"mavlink +udpout:127.0.0.1:14552  rov  3\d distances sent, 0 dropped\n")
-        self.assertNotIn("no poses yet", status, "the example sends them otherwise")
+        self.assertNotIn("no poses yet", status, "the example sends poses over another link")
 
     def test_each_ping_is_a_message_with_the_time_of_the_scene(self):
         autopilot = Autopilot()
@@ -139,7 +139,7 @@ class DepthHold(unittest.TestCase):
             control.step(1)
             self.assertEqual(len(list(autopilot.arrived())), 10)
 
-    def test_a_vehicle_asks_for_distances(self):
+    def test_a_vehicle_requests_distances(self):
         autopilot = Autopilot()
         with tempfile.TemporaryDirectory() as folder, sonard(autopilot.port, folder, "false") as daemon:
             control = Control(daemon.address)

@@ -45,7 +45,7 @@ class Determinism(unittest.TestCase):
     def test_one_two_and_four_threads_serve_the_same_bytes(self):
         runs = {threads: run(threads) for threads in (1, 2, 4)}
         received, said, pings = runs[1]
-        self.assertEqual(received, said, "the digest is of what arrives")
+        self.assertEqual(received, said, "the digest is that of the received bytes")
         self.assertEqual(pings, PINGS)
         self.assertEqual(runs[2], runs[1])
         self.assertEqual(runs[4], runs[1])
@@ -72,8 +72,8 @@ def read_all(link, to):
 
 
 class SuiteRun:
-    """Runs the example and compares the bytes of its three ports and its link, and sonard's recordings. Status datagrams and
-    MAVLink's heartbeats depend on the wall clock and are not compared."""
+    """Runs the example and stores the bytes of its three ports, the distances of its link, and sonard's recordings. Status
+    datagrams and MAVLink's heartbeats depend on the wall clock and are not stored."""
 
     PORTS = {"front": (("127.0.0.2", 52100), fire_message(version=2, rate_hz=10, range_=5)),
              "dvl": (("127.0.0.3", 16171), b'{"command":"get_config"}'),

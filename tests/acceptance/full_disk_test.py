@@ -1,5 +1,5 @@
 """Tests data sets, their exports and the farm on a full disk, a small tmpfs. The command names the file and the remedy, and ends
-with 74. A half-written file does not count as finished. With more room the same command completes the same bytes."""
+with exit code 74. A half-written file does not count as finished. With more room the same command completes the same bytes."""
 import os
 import pathlib
 import re

@@ -68,7 +68,7 @@ class Layout:
     def __init__(self, name):
         self.name = name
         self.id, base, extensions = (MESSAGES | SENT)[name]
-        self.base = sorted((Field(f) for f in base.split(", ")), key=lambda f: -f.size)  # stable
+        self.base = sorted((Field(f) for f in base.split(", ")), key=lambda f: -f.size)  # the sort is stable
         self.extensions = [Field(f) for f in extensions.split(", ")] if extensions else []
         seed = name.encode() + b" "
         for field in self.base:
@@ -123,8 +123,8 @@ def read_frames(datagram):
 
 
 def golden_lines():
-    """Every field has a different value that a float represents exactly; the last one of the payload is 0 in every second
-    frame."""
+    """Yields golden lines. Every field has a different value that a float represents exactly; the last field of the payload is 0
+    in every second message."""
     for number, name in enumerate(MESSAGES):
         for version in (1, 2):
             layout = LAYOUTS[name]

@@ -1,6 +1,6 @@
 """Checks an MCAP file as strictly as the format's description allows: every CRC, length, offset, index and count.
 
-Written from the description (mcap.dev), shares nothing with the C++ code. Used by recording_test; alone: mcap_checker.py FILE...
+It is written from the description (mcap.dev) and shares nothing with the C++ code. usage: mcap_checker.py FILE...
 """
 import json
 import struct
@@ -74,7 +74,7 @@ def channel_of(content):
     f = Fields(content)
     found = (f.u(2), f.u(2), f.text(), f.text(), tuple(f.pairs(Fields.text, Fields.text)))
     f.end()
-    expect(len(dict(found[4])) == len(found[4]), "a key of the metadata stands twice")
+    expect(len(dict(found[4])) == len(found[4]), "a key of the metadata appears twice")
     return found
 
 
@@ -90,7 +90,7 @@ class Checked:
         self._check_summary()
 
     def read(self, topic):
-        """Returns the messages of a topic, decoded from JSON, or from protobuf by the schema in the file. Protobuf omits fields
+        """Returns the messages of a topic, decoded from JSON, or from protobuf with the schema in the file. Protobuf omits fields
         that are 0 or empty."""
         _, schema, _, encoding, _ = next(channel for channel in self.channels.values() if channel[2] == topic)
         _, name, _, described = self.schemas[schema]
@@ -130,7 +130,7 @@ class Checked:
             elif opcode == CHUNK:
                 pending = self._check_chunk(at, content)
             elif opcode == MESSAGE_INDEX:
-                expect(pending, "a message index behind no chunk")
+                expect(pending, "a message index without a chunk before it")
                 self._check_index(pending, at, content)
             elif opcode == DATA_END:
                 expect(int.from_bytes(content, "little") == zlib.crc32(self.data[:at]), "CRC of the data")

@@ -1,4 +1,4 @@
-"""A vehicle that dives through the tank on a trajectory, in stepped time: used by the tests of reproducibility and of whole
+"""A vehicle that dives through the tank on a trajectory, in stepped time, for the tests of reproducibility and of whole
 missions. The trajectory is a file in the run's folder; all bytes that a client received are kept."""
 import hashlib
 import math

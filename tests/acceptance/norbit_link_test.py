@@ -1,4 +1,4 @@
-"""Tests an emulated Norbit with a driver: commands, bathymetry and water column over TCP, decoded by hand-typed offsets
+"""Tests an emulated Norbit with a driver: commands, bathymetry and water column over TCP, decoded with hand-typed offsets
 (docs/protocols/norbit.md)."""
 import math
 import pathlib
@@ -65,7 +65,7 @@ class Driver:
 
 
 class Link(unittest.TestCase):
-    def test_commands_start_pings_and_port_is_port(self):
+    def test_commands_start_pings_and_bearings_are_not_mirrored(self):
         with Sonard(scene="l-targets.yaml", profile="norbit-fls", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}") as daemon, \
                 Driver(daemon.address) as driver:
             self.assertEqual(driver.greeting, b"Sonar is ready to accept commands\r\n")
@@ -92,7 +92,7 @@ class Link(unittest.TestCase):
             self.assertIn("unchanged", driver.say("set_range 0 1000"))
             eventually(lambda: "set_range is refused" in daemon.log())
 
-    def test_sonarctl_leaves_the_settings_of_the_last_driver(self):
+    def test_sonarctl_restores_the_settings_of_the_last_driver(self):
         with Sonard(profile="norbit-wbms") as daemon, tempfile.TemporaryDirectory() as folder:
             at, control = f"{daemon.address}:{BATHYMETRY}", ("--control", f"{daemon.address}:14770")
             wanted = ("set_power 0", "set_range 0 7", "set_rate 3", "set_gain 11")
@@ -105,7 +105,7 @@ class Link(unittest.TestCase):
                 with Driver(daemon.address) as driver:
                     self.assertEqual([driver.say(f"{name.split()[0]}\r\n") for name in wanted], settings, command[0])
 
-    def test_sonarctl_leaves_what_another_driver_has_set_since(self):
+    def test_sonarctl_keeps_settings_that_another_driver_has_changed_since(self):
         with Sonard(profile="norbit-wbms") as daemon:
             with Driver(daemon.address) as driver:
                 before = [driver.say(f"{command}\r\n") for command in ("set_rate 3", "set_gain 11")]

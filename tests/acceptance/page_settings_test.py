@@ -1,5 +1,5 @@
 """Tests the settings of the sonar on the page of the live view, in a real browser with a scripted daemon (view/mock_daemon.py).
-Skipped without browser or page.
+They are skipped without browser or page.
 """
 import pathlib
 import sys
@@ -32,7 +32,7 @@ class Settings(MockedPage, unittest.TestCase):
         page.wait("document.querySelector('[name=\"/front/range_m\"]').value === '7.5'")
         self.mock.parameters["/front/range_m"] = 10.0
 
-    def test_settings_take_keys(self):
+    def test_settings_accept_keys(self):
         page = self.open()
         field = "document.querySelector('[name=\"/front/%s\"]')"
         page.wait(field % "range_m" + "?.value === '10'")
@@ -51,14 +51,14 @@ class Settings(MockedPage, unittest.TestCase):
         before = page.run("document.activeElement.value")
         page.press("3")
         page.press("Escape")
-        self.assertEqual(page.run((field % "rate_hz") + ".value"), before, "Escape gives it up")
+        self.assertEqual(page.run((field % "rate_hz") + ".value"), before, "Escape restores the value")
         self.assertEqual(page.run("document.activeElement === document.body"), True)
         page.press("f")
-        self.assertEqual(page.text("#freeze"), "Go on", "the page's own keys again")
+        self.assertEqual(page.text("#freeze"), "Go on", "the page's own keys work again")
         self.assertEqual(self.mock.set_calls, [])
         self.mock.parameters["/front/range_m"] = 10.0
 
-    def test_settings_are_two_presses_away(self):
+    def test_settings_can_be_reached_with_few_keys(self):
         """The panels can be reached by a key, and by a link for users of Tab; on phones they are in another tab."""
         for width, way in ((1440, ("r",)), (1440, ("Tab", "Tab", "Enter")), (390, ("r",))):
             with self.subTest(width=width, way=way):

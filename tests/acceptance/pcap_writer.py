@@ -1,4 +1,4 @@
-"""Writes capture files: a conversation wrapped in IPv4, TCP and UDP headers that are made here. Used by dissector_test."""
+"""Writes capture files: a conversation wrapped in IPv4, TCP and UDP headers that are made here. Tests of dissectors use them."""
 import socket
 import struct
 

@@ -1,4 +1,4 @@
-"""Checks by statistics of the samples (`sonarctl stats`) that the demo's picture resembles that of a real sonar.
+"""Checks with statistics of the samples (`sonarctl stats`) that the demo's picture resembles that of a real sonar.
 
 The picture is that of the demo's first pose, with 256 beams as in the captured pings of a real M1200d. In these pings adjacent
 beams have a correlation of 0.80, and adjacent rows 0.58. The near field is quiet, with a mean of 8, and noise rises towards
@@ -78,7 +78,7 @@ class Picture(unittest.TestCase):
                     # With gamma 127, 0.4 is 16 dB: noise of the level of the captured pings is visible in a shadow at 5 m.
                     self.assertLess(figures["shadow"]["ratio"], 0.4, figures["shadow"])
 
-    def test_samples_use_their_range_without_burning_out(self):
+    def test_samples_use_their_range_without_saturation(self):
         self.assertLess(self.figures["window"]["saturated_share"], 0.01)
         self.assertGreater(self.figures["window"]["mean"], 10, "sand must be visible")
 

@@ -28,14 +28,14 @@ def split(stream):
     found = []
     while stream:
         magic, _, _, _, _, payload, _ = HEADER.unpack_from(stream)
-        assert magic == 0x4F53 and len(stream) >= 16 + payload, "a message"
+        assert magic == 0x4F53 and len(stream) >= 16 + payload, "the stream is not a message"
         found.append(stream[:16 + payload])
         stream = stream[16 + payload:]
     return found
 
 
 def oculus_log_messages(data):
-    """Returns the messages of type 10 of an .oculus file, by the table of docs/recording.md."""
+    """Returns the messages of type 10 of an .oculus file, read as the table of docs/recording.md says."""
     assert struct.unpack_from("<II6s", data) == (0x11223344, 48, b"Oculus")
     at, found = 48, []
     while at < len(data):
@@ -320,7 +320,7 @@ class OneIntoAnother(Files):
             self.assertEqual(replay.process.wait(60), 0)
             self.assertIn("within a message: only", replay.text())
 
-    def test_replay_ends_by_signals(self):
+    def test_a_signal_ends_a_replay(self):
         self.path("raw").write_bytes(self.made())
         for with_driver in (False, True):
             with Replay(self.path("raw"), "--loop") as replay:
@@ -333,7 +333,7 @@ class OneIntoAnother(Files):
                     self.assertEqual(replay.process.wait(30), 0, replay.text())
                 self.assertIn("served ", replay.text())
 
-    def test_a_full_disk_ends_it_with_one_sentence(self):
+    def test_a_full_disk_ends_a_conversion_with_one_sentence(self):
         def small_disk():
             resource.setrlimit(resource.RLIMIT_FSIZE, (1_500_000, 1_500_000))
 
@@ -418,7 +418,7 @@ class OneIntoAnother(Files):
 
 
 class Checker(unittest.TestCase):
-    def test_the_checker_finds_every_wrong_byte(self):
+    def test_the_checker_finds_wrong_bytes(self):
         for name in ("conversation", "with_truth"):
             sound = (SEEDS / f"mcap/{name}.mcap").read_bytes()
             mcap_checker.check(sound)

@@ -22,7 +22,7 @@ sonars: [{{name: front, profile: oculus-m1200d, bind_ip: 127.0.0.2}}]
 
 
 def read_npy(path):
-    """Returns shape, type and numbers of an array, by the format's description."""
+    """Returns shape, type and numbers of an array, read as the format's description says."""
     data = path.read_bytes()
     assert data[:8] == b"\x93NUMPY\x01\x00", data[:8]
     (length,) = struct.unpack_from("<H", data, 8)
@@ -314,7 +314,7 @@ class Render(unittest.TestCase):
         self.expect(self.render(config=empty), 78, "empty.yaml", "scene")
         self.assertNotIn('""', self.render(config=empty).stderr)
 
-    def test_of_several_bodies_the_vehicles_own(self):
+    def test_of_several_bodies_the_vehicles_own_poses_are_used(self):
         poses = self.path / "both.csv"
         poses.write_text("# frame: ENU_FLU\nbody,t,x,y,z\nboat,0,9,0,0\nrov,0,0.25,0,0\n", encoding="utf-8")
         self.expect(self.render("--poses", poses, "--format", "raw"), 0, "1 of 1")
@@ -352,7 +352,7 @@ class Render(unittest.TestCase):
         self.assertGreaterEqual(float(re.search(r"([\d.]+) %", result.stdout).group(1)), 99)
         self.expect(run(SONARD, "render", self.config, "--report", "coverage"), 65, "plane")
 
-    def test_every_sonar_fills_a_bed_wholly(self):
+    def test_every_sonar_fills_a_bed_completely(self):
         result = run(SONARD, "render", "--report", "coverage", patience_s=600)
         self.assertEqual(result.returncode, 0, result.stderr)
         shares = re.findall(r"^(\S+ .*\S) +\d+ +[\d.]+ +\d+ +\d+ +([\d.]+) %", result.stdout, re.M)

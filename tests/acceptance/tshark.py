@@ -1,4 +1,4 @@
-"""Runs tshark with the Oculus dissector and reads its output. Used by dissector_test."""
+"""Runs tshark with the Oculus dissector and reads its output."""
 import os
 import shutil
 import subprocess
@@ -15,7 +15,7 @@ DERIVED_PARTS = ("oculus.fire.flags.", "oculus.fire.extFlags.", "oculus.status.s
 
 
 def tshark(*arguments, dissector=DISSECTOR):
-    """Returns stdout; any error message of Lua or tshark fails. Ignores the user's preferences and plug-ins."""
+    """Returns the standard output; fails after an error message of Lua or tshark. Ignores the user's preferences and plug-ins."""
     with tempfile.TemporaryDirectory() as empty:
         done = subprocess.run(["tshark", *[str(a) for a in arguments], "-n", "-X", f"lua_script:{dissector}"],
                               env=os.environ | {"HOME": empty, "XDG_CONFIG_HOME": empty, "TZ": "UTC"}, stdin=subprocess.DEVNULL,
@@ -36,7 +36,7 @@ def why_not():
         probe.write('print("Lua runs")\n')
         probe.flush()
         if "Lua runs" not in tshark("-v", dissector=probe.name):
-            return "this tshark runs no Lua scripts: built without Lua, or told to refuse them to root in its init.lua"
+            return "this tshark runs no Lua scripts: built without Lua, or set to refuse them to root in its init.lua"
     return None
 
 

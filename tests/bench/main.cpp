@@ -214,8 +214,7 @@ int parse_and_run(int argc, char** argv) {
   CLI::App cli{
       "Times whole pings and their stages. Pings are warm: the cells of the scene exist already. The first ping, which makes\n"
       "them, is the figure \"cold\" of every case; P3e measures jumps. P0, P5, P8, P13 and P14 run a daemon on loopback. P6\n"
-      "compares the hot loops with plain implementations, and P14 the first ping after a change of settings with a warm\n"
-      "ping;\n"
+      "compares the hot loops with plain implementations, and P14 the first ping after a change of settings with a warm one;\n"
       "the exit code is 1 if a ratio is missed. P15 compares pings with and without side lobes.",
       "sonard_bench"};
   cli.footer("examples:\n  sonard_bench --case P1 --case P3d --threads 1 --threads 2 --json out.json\n  sonard_bench --case P6");
@@ -229,8 +228,7 @@ int parse_and_run(int argc, char** argv) {
   cli.add_option("--give", options.given_parts,
                  "give scene and sonar what this part of the model needs, where they lack it (may repeat; default none)")
       ->check(text::one_of(parts_to_give()));
-  cli.add_option("--frequency-sum", options.frequency_sum,
-                 "sums of the modes paper and raster: with a transform, or term by term")
+  cli.add_option("--frequency-sum", options.frequency_sum, "sums of the modes paper and raster: by transform, or term by term")
       ->check(text::one_of({"fast", "direct"}))
       ->capture_default_str();
   cli.add_option("--scenes-dir", options.scene_folder, "folder to look for the scene files in first; else the shipped ones");

@@ -1,5 +1,5 @@
-// The commands listen, view and stats with a small made-up BlueView head, written from docs/protocols/blueview-link.md: they find
-// the head, request every ping, and draw each sample at its place.
+// Tests listen, view and stats with a small made-up BlueView head, written from docs/protocols/blueview-link.md. The commands
+// find the head, request every ping, and draw each sample at its position.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -159,7 +159,7 @@ TEST(BlueViewCommands, ListenFindsTheHeadAndRequestsEachPing) {
   EXPECT_THAT(text, HasSubstr("pings 5\n"));
   for (const char* not_judged : {"missing ids", "identity errors", "echoed"})
     EXPECT_THAT(text, testing::Not(HasSubstr(not_judged))) << "figures that are not judged are not printed";
-  EXPECT_EQ(head.pings, 5) << "no more than requested";
+  EXPECT_EQ(head.pings, 5) << "no more pings than requested";
   EXPECT_EQ(head.settings, 0) << "no settings were requested";
 }
 
@@ -176,7 +176,7 @@ TEST(BlueViewCommands, NoFileIsWrittenThatCouldNotBeRead) {
   EXPECT_FALSE(std::filesystem::exists(options.record));
 }
 
-TEST(BlueViewCommands, SamplesAreDrawnWhereTheyAre) {
+TEST(BlueViewCommands, SamplesHaveTheirRangeAndBearing) {
   FakeHead head;
   const auto ping = fetch_ping(anything_there(), 0);
   ASSERT_TRUE(ping) << ping.error().text;

@@ -1,4 +1,4 @@
-// The device's rays have the same hits as Embree's: on relief, through rotated bodies, along edges and past silhouettes.
+// Tests that the device's rays have the same hits as Embree's: on relief and rotated bodies, along edges and past silhouettes.
 #include <gtest/gtest.h>
 
 #include <cmath>

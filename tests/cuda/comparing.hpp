@@ -16,7 +16,7 @@
 
 namespace sonar::test {
 
-/// The machine of these tests' engine: host loops or, in programs compiled for it, the device.
+/// Returns the machine of these tests' engine: host loops or, in programs compiled for it, the device.
 #ifdef SONAR_TEST_ON_DEVICE
 inline Result<std::unique_ptr<cuda::Machine>> test_machine() {
   setenv("SONARD_CUDA_MODULE", SONAR_TEST_ON_DEVICE,

@@ -14,10 +14,10 @@ namespace sonar::test {
 
 class FailingMachine final : public cuda::Machine {
  public:
-  /// If set, transforms fail with this reason.
+  /// If set, the device has no transforms, for this reason.
   std::string no_transforms;
-  /// Memory of the device [bytes]. A request that exceeds the rest causes DeviceMemoryFull. `tells_bytes`: free bytes that it
-  /// reports at the start.
+  /// Memory of the device [bytes]. A request that exceeds the rest causes DeviceMemoryFull. `tells_bytes` are the free
+  /// bytes that the device reports.
   std::size_t room_bytes = std::numeric_limits<std::size_t>::max(), tells_bytes = room_bytes;
   /// Simulates an error of the program instead of a lost device: only the call `last` throws std::logic_error.
   bool has_fault = false;

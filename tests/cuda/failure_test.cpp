@@ -1,4 +1,4 @@
-// A device that fails, at every possible call. No ping is lost, or the engine reports that it cannot continue.
+// Tests a device that fails, at every possible call. No ping is lost, or the engine reports that it cannot continue.
 #include "tests/cuda/failing_machine.hpp"
 
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
-// Input of the HTTP port: requests in a stream, and their routing. The first byte is the length of the pieces, the second byte
-// the policy; the rest is the stream. The requests do not depend on the pieces. No request is accepted without its Host, and
-// without the token only /healthz and the files of the page are.
+// Fuzzes the HTTP port: requests in a stream, and their routing. The first byte gives the length of the pieces, the second byte
+// whether a token is needed; the rest is the stream. The requests must not depend on the pieces. An accepted request has an
+// allowed Host, or is HTTP/1.0. Without the token only /healthz and the files of the page are accepted.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -36,7 +36,7 @@ Taken take(std::span<const std::byte> stream, std::size_t piece) {
   return taken;
 }
 
-/// A socket is opened only to a client that sends a secret or has an allowed Origin.
+/// Checks that a socket is opened only to a client that sends a secret or has an allowed Origin.
 void check_door(const HttpRequest& request, const SocketAction& asked, const HttpPolicy& policy) {
   ControlConfig config;
   config.hosts = {"sonar.example"};

@@ -44,7 +44,7 @@ void check(const MeshFile& request, const Result<LoadedMesh>& made) {
   fuzz::check(made->centred, made->centred.mesh.triangles.size() + made->centred.left_out);
 }
 
-/// Returns the name for a file with this beginning; null if no format has it.
+/// Returns a file name for bytes with this beginning; null if no format has this beginning.
 const char* name_of(std::string_view text) {
   if (text.starts_with("ply")) return "m.ply";
   if (text.starts_with("glTF")) return "m.glb";

@@ -124,7 +124,7 @@ class BesideADriver(unittest.TestCase):
             link.set(1)
 
             def next_frame():
-                link.command(PING)  # the sonar ends a connection that says nothing for 10 s
+                link.command(PING)  # the sonar ends a connection that is silent for 10 s
                 return link.frame()
             return next_frame
 

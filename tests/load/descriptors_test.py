@@ -50,10 +50,10 @@ def visit(endpoint):
     return visitor
 
 
-def is_sent_away(endpoint):
+def is_refused(endpoint):
     """Returns true if the daemon sends a FIN and no byte."""
-    with visit(endpoint) as newcomer:
-        return newcomer.recv(1) == b""
+    with visit(endpoint) as visitor:
+        return visitor.recv(1) == b""
 
 
 class Descriptors(unittest.TestCase):
@@ -72,10 +72,10 @@ class Descriptors(unittest.TestCase):
                 time.sleep(0.05)
             visitors += [visit(poses) for _ in range(60)]
             before, end = neighbour.pings, time.monotonic() + LASTS_S
-            sent_away = 0
-            while time.monotonic() < end or sent_away < 3 or (neighbour.pings == before and time.monotonic() < end + 60):
-                self.assertTrue(is_sent_away(data))
-                sent_away += 1
+            refused = 0
+            while time.monotonic() < end or refused < 3 or (neighbour.pings == before and time.monotonic() < end + 60):
+                self.assertTrue(is_refused(data))
+                refused += 1
                 time.sleep(0.05)
             self.assertGreater(neighbour.pings, before, f"the stream stopped: {neighbour.fault}")
             log = daemon.log()
@@ -92,16 +92,16 @@ class Descriptors(unittest.TestCase):
                 self.assertNotEqual(later.socket.recv(1), b"")
             code, _ = daemon.stop()
             self.assertEqual(code, 0, daemon.log())
-        return neighbour.pings, sent_away
+        return neighbour.pings, refused
 
     def test_the_last_descriptors_are_reserved(self):
         pings, _ = self.flood(spare=24, limit=64)
         self.assertGreater(pings, 0)
 
     def test_drivers_are_served_without_a_free_descriptor(self):
-        pings, sent_away = self.flood(spare=0, limit=52)
+        pings, refused = self.flood(spare=0, limit=52)
         if not QUICK:
-            record("descriptors", f"0 of {pings}, {sent_away} newcomers sent away", "0", True,
+            record("descriptors", f"0 of {pings}, {refused} connections refused", "0", True,
                    "SONARD_BUILD=build/release python3 tests/load/descriptors_test.py")
 
     @staticmethod
@@ -115,7 +115,7 @@ class Descriptors(unittest.TestCase):
             except (EOFError, OSError):
                 return False
 
-    def test_idle_strangers_keep_no_driver_out(self):
+    def test_idle_connections_keep_no_driver_out(self):
         with Sonard(profile=PROFILE) as daemon:
             resource.prlimit(daemon.process.pid, resource.RLIMIT_NOFILE, (64, 64))
             strangers = [visit((daemon.address, port)) for port in (14770, 8088, 14771) for _ in range(33)]

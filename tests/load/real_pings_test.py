@@ -1,4 +1,4 @@
-"""40 Hz of 512 beams, simulated by the shipped program: on a machine of any speed, every tick is a ping or is counted as skipped,
+"""The shipped program simulates 40 Hz of 512 beams. On a machine of any speed, every tick is a ping or is counted as skipped,
 and every ping is sent or is counted as dropped. --quick takes 5 s instead of 60 s."""
 import pathlib
 import re
@@ -72,7 +72,7 @@ def scheduling(process):
 
 
 class Threads(unittest.TestCase):
-    def test_all_threads_except_the_io_thread_are_nice(self):
+    def test_all_threads_except_the_io_thread_have_lower_priority(self):
         with Sonard(trajectory="orbit", more="engine: {threads: 4}") as daemon, Client(daemon.address) as client:
             client.send(fire_message())
             next_ping(client)

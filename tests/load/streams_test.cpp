@@ -1,4 +1,4 @@
-// Many streams at once, and streams beside clients that misbehave: every loss is counted, and no message is damaged.
+// Tests many streams at once, and streams beside clients that misbehave. Every loss is counted, and no message is damaged.
 #include <arpa/inet.h>
 #include <sys/socket.h>
 #include <unistd.h>

@@ -13,7 +13,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BY_HAND = pathlib.Path(__file__).resolve().parent / "by_hand"
-FUZZ_BOUNDS = {  # as tests/tools/fuzz.sh
+FUZZ_BOUNDS = {  # as in tests/tools/fuzz.sh
     "mesh_file": "5,000: the importer takes a hundred times as long",
     "conversations": "50,000: each is minutes of a sonar's time",
 }
@@ -37,7 +37,7 @@ ITEMS = {
         ("descriptors", "all file descriptors used up: pings lost by a running stream", "0"),
         ("strangers", "one client that sends without end, the worst of 14 kinds: pings of a driver that requests 40 Hz", "at least 38 Hz"),
         ("closed-floods", "32 floods of poses have closed: time until an honest sender steers", "within 1 s"),
-        ("viewers", "8 viewers of every channel beside a driver at 10 Hz, 60 s: pings it lost", "0"),
+        ("viewers", "8 viewers of every channel beside a driver at 10 Hz, 60 s: pings lost by the driver", "0"),
         ("faults-beside", "a fault every second at another client, 60 s: pings lost by the driver", "0"),
         ("faults-journal", "the same: entries of the journal in its file", "every one"),
         ("datagrams", "hosts of the Ping family, ARIS and Sonar 3D-15 by UDP, 10 s each: pings", "served + dropped, one in progress at the end"),

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the pictures of README.md and docs/live-view.md again, with sonard itself. Needs chromium and python3-pil, and an idle computer:
+"""Makes the pictures of README.md and docs/live-view.md again. Needs chromium, python3-pil and an idle computer:
 the page shows rates and latency.
 
 usage: build/release/tests/own_network/in_own_network tests/tools/pictures.py [--out FOLDER] [NAME...]

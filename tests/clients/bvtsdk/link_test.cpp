@@ -1,4 +1,4 @@
-// The link with a small made-up sonar that misbehaves on command: on loopback, on a free port, with time limits.
+// Tests the link with a small made-up sonar that misbehaves on command, on loopback and a free port, with time limits.
 #include "clients/bvtsdk/core/link.hpp"
 
 #include <arpa/inet.h>
@@ -37,7 +37,7 @@ SonarDescription some_sonar() {
 class Peer {
  public:
   explicit Peer(int fd) : socket_(fd) {}
-  /// Returns the next frame; it skips keep-alive frames unless they are requested. Type 0: the host has disconnected.
+  /// Returns the next frame; it skips keep-alive frames unless they are requested. Type 0 = the host has left.
   FrameHeader next(Bytes& payload, bool keep_alives = false) {
     for (;;) {
       FrameHeader header;
@@ -117,7 +117,7 @@ class FakeSonar {
   std::thread thread_;
 };
 
-TEST(Link, GreetsAndLearnsWhatTheSonarIs) {
+TEST(Link, GreetsAndReceivesTheDescription) {
   FakeSonar fake([](Peer& peer) {
     Bytes payload;
     const FrameHeader hello = peer.next(payload);
@@ -348,7 +348,7 @@ TEST(LinkOpen, ASonarThatClosesOrIsSilentIsNotReached) {
   EXPECT_EQ(silent.open(link, {200ms, 10s, 50ms, 20s}), connection_timed_out);
 }
 
-TEST(LinkOpen, StrangersAndOtherVersionsAreNamed) {
+TEST(LinkOpen, OtherServicesAndVersionsHaveTheirCodes) {
   std::unique_ptr<Link> link;
   FakeSonar stranger([](Peer& peer) {
     peer.send_raw(Bytes(64, 'H'));
@@ -380,7 +380,7 @@ TEST(Description, HeadsAreNamedFromZeroOrOneUnlessStrict) {
   EXPECT_EQ(sonar.head(1), &sonar.heads[1]);
 }
 
-TEST(Description, IsReadBackAndNothingShorterIs) {
+TEST(Description, IsReadBackOnlyIfWhole) {
   const SonarDescription sonar = some_sonar();
   Bytes bytes = encode_description(sonar);
   const auto back = decode_description(bytes);

@@ -1,4 +1,4 @@
-// 3.x, C calls and the class RangeData, C++98: finds the sonar, pings it, records; then the same sonar object plays the file.
+// A C++98 program for 3.x, with C calls and the class RangeData. It finds, pings and records a sonar, then plays the file.
 // usage: c3_discovery_then_file ADDRESS COLORMAPS RECORDING
 #include <string.h>
 #include <unistd.h>
