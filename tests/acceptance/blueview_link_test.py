@@ -40,7 +40,7 @@ class BlueViewLink(unittest.TestCase):
             self.assertEqual((head["id"], head["beams"], head["centre_hz"]), (0, 512, 900000))
             self.assertAlmostEqual(head["fov"][1], 45, places=3)
 
-    def test_targets_are_where_they_are(self):
+    def test_targets_have_their_ranges_and_bearings(self):
         with self.host() as host:
             host.set_integer(SOUND_SPEED, 1490)
             host.set_numbers(RANGE, 1, 9)
@@ -60,7 +60,7 @@ class BlueViewLink(unittest.TestCase):
         self.assertAlmostEqual(ping.start, 5, places=3)
         self.assertAlmostEqual(brightest(ping, 5, 8.5, -12, -4)[0], C[0], delta=0.15)
 
-    def test_gain_raises_the_samples_and_a_silent_transmitter_hears_noise(self):
+    def test_gain_raises_the_samples_and_without_transmission_only_noise_remains(self):
         with self.host() as host:
             host.set_numbers(RANGE, 1, 9)
             host.set_numbers(GAIN, -20)
@@ -77,7 +77,7 @@ class BlueViewLink(unittest.TestCase):
             host.set_integer(TRANSMIT, 1)
             host.set_numbers(GAIN, 0)
 
-    def test_settings_are_the_sonars_and_refusals_are_numbered(self):
+    def test_hosts_share_the_settings_and_refusals_have_numbers(self):
         with self.host() as one, self.host() as two:
             self.assertEqual(one.set_numbers(RANGE, 0, 500), (0, 100))
             two_sees = struct.unpack("<Bff", two.ask(3, struct.pack("<iH", 0, RANGE)))
@@ -87,7 +87,7 @@ class BlueViewLink(unittest.TestCase):
             self.assertEqual(refused.exception.code, 2010)
             one.set_numbers(RANGE, 2, 10)
 
-    def test_a_subscriber_gets_pings_without_asking(self):
+    def test_a_subscriber_gets_pings_without_requests(self):
         with self.host() as host:
             host.set_numbers(RANGE, 1, 9)
             host.ask(SUBSCRIBE, struct.pack("<iI", 0, 100))

@@ -1,4 +1,4 @@
-"""Checks the container file by our own rules, and with hadolint if it is installed. Does not build the image."""
+"""Checks the container file with our own rules, and with hadolint if it is installed. Does not build the image."""
 import fnmatch
 import json
 import pathlib

@@ -22,7 +22,7 @@ class Driver:
     def __init__(self, address):
         self.link = socket.create_connection((address, PORT), PATIENCE_S)
         self.lines = self.link.makefile("rb")
-        self.velocities = 0  # received reports
+        self.velocities = 0  # number of received velocity reports
 
     def close(self):
         self.lines.close()
@@ -106,7 +106,7 @@ class Velocity(unittest.TestCase):
         reports = [self.driver.velocity() for _ in range(20)]
         for report in reports:
             self.assertAlmostEqual(report["vx"], 0, delta=0.03)
-            self.assertAlmostEqual(report["vy"], ORBIT_MPS, delta=0.04)  # 1475 m/s are 1 % less than sound has in this water
+            self.assertAlmostEqual(report["vy"], ORBIT_MPS, delta=0.04)  # 1475 m/s is 1 % below the speed of sound in this water
             self.assertAlmostEqual(report["vz"], 0, delta=0.02)
             self.assertAlmostEqual(report["altitude"], 2, delta=1.2)  # ripples, relief and bodies of the harbour
             self.assertTrue(0 < report["fom"] < 0.05, report["fom"])

@@ -129,7 +129,7 @@ class Farm(unittest.TestCase):
         record("farm-kill", "12 of 12, of 3 workers", "all, byte for byte those of one process", True, "python3 tests/acceptance/farm_test.py")
         self.assertIn("0 submitted, 0 in the queue already, 12 finished", self.submit(job)[0])
         (made / "shard-000003.tar").unlink()
-        self.assertIn("1 submitted", self.submit(job)[0])  # although the server has just seen its id
+        self.assertIn("1 submitted", self.submit(job)[0])  # although the server has just received its id
         self.wait_for(self.worker(None, "--until-empty"))
         self.assertIn("as they were written", self.farm("collect", made))
 
@@ -142,7 +142,7 @@ class Farm(unittest.TestCase):
         self.assertRegex(self.farm("collect", made, code=65), "1 of 6 shards are missing: shard-000003.tar")
         self.assertEqual(self.logs().count("no draw of 2 meets"), 4)
 
-    def test_files_travel_to_a_worker_with_a_folder_of_its_own(self):
+    def test_files_are_sent_to_a_worker_with_a_folder_of_its_own(self):
         _, made = self.submit(self.small_job())
         own = self.path / "own"
         self.wait_for(self.worker(own, "--until-empty"))
@@ -183,7 +183,7 @@ class Farm(unittest.TestCase):
         self.wait_for(worker)
         self.assertIn("0 running, 1 queued", self.status())
 
-    def test_numbers_that_are_no_shards_are_removed_from_the_queue(self):
+    def test_numbers_that_are_not_shards_are_removed_from_the_queue(self):
         with socket.create_connection(("127.0.0.1", PORT), timeout=60) as nats:
             lines = nats.makefile("rb")
             nats.sendall(b'CONNECT {"verbose":false}\r\nSUB farm.work.> 1\r\nPING\r\n')
@@ -203,7 +203,7 @@ class Farm(unittest.TestCase):
         self.assertIn("6 done, 0 running, 0 queued, 0 dead", self.status())
         record("farm-strays", "3 of 3 refused, 6 shards", "refused by name, no file made", True, "python3 tests/acceptance/farm_test.py")
 
-    def test_what_is_wrong_is_said(self):
+    def test_mistakes_are_reported(self):
         job = self.small_job()
         outside = self.path / "outside.obj"
         outside.write_text(TETRAHEDRON)

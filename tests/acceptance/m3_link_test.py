@@ -1,4 +1,4 @@
-"""Tests an emulated M3 with a driver: packets of complex samples over TCP, decoded by hand-typed offsets
+"""Tests an emulated M3 with a driver: packets of complex samples over TCP, decoded with hand-typed offsets
 (docs/protocols/m3.md)."""
 import cmath
 import math
@@ -84,7 +84,7 @@ def sonar(x_m=0.0, options="", arguments=()):
 
 
 class Stream(unittest.TestCase):
-    def test_port_is_port_and_ranges_are_right(self):
+    def test_bearings_are_not_mirrored_and_ranges_are_right(self):
         with sonar() as daemon, Driver(daemon.address) as driver:
             packet = driver.next()
             for (range_m, bearing_deg), window in ((A, (3, 5, 14, 60)), (B, (3, 5, -60, -4)), (C, (6, 8, -60, 60))):
@@ -108,7 +108,7 @@ class Stream(unittest.TestCase):
             with sonar(x_m, arguments=QUIET) as daemon, Driver(daemon.address) as driver:
                 first, second = driver.next(), driver.next()
                 _, beam, sample = max(first.levels(3, 5, 14, 60))
-                self.assertAlmostEqual(cmath.phase(second.at(beam, sample) / first.at(beam, sample)), 0, delta=0.02, msg="it lies still")
+                self.assertAlmostEqual(cmath.phase(second.at(beam, sample) / first.at(beam, sample)), 0, delta=0.02, msg="the target is at rest")
                 seen.append((beam, sample, first))
         (beam, sample, before), (_, _, after) = seen
         turned = cmath.phase(after.at(beam, sample) / before.at(beam, sample))

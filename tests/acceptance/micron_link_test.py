@@ -47,7 +47,7 @@ class Line:
 
 
 class Driver:
-    """read(n) and write(bytes) of a stream."""
+    """A driver that uses read(n) and write(bytes) of a stream."""
 
     def __init__(self, read, write):
         self.read_some, self.write, self.waiting, self.whole = read, write, b"", []
@@ -105,7 +105,7 @@ class MicronLink(unittest.TestCase):
             self.assertAlmostEqual(seen_m, range_m, delta=0.1)
             self.assertAlmostEqual(best.degrees, degrees, delta=2)
 
-    def test_left_is_left_over_tcp(self):
+    def test_bearings_are_not_mirrored_over_tcp(self):
         with sonar() as daemon, Link(daemon.address) as driver:
             self.assertIn(driver.next(ALIVE)[-1] & 0xC2, (0x42,), "centred, no parameters")
             driver.write(frame(23))

@@ -45,7 +45,7 @@ class WholeMission(unittest.TestCase):
             self.assertEqual((first.code, first.taken), (0, PINGS))
             log = first.recorded("mission.oculus")
             same = self.received_again(log, first)
-            self.assertTrue(kept("mission-replay", f"{PINGS} pings, {log.stat().st_size / 1e6:.0f} MB: {'the same' if same else 'others'}",
+            self.assertTrue(kept("mission-replay", f"{PINGS} pings, {log.stat().st_size / 1e6:.0f} MB: {'the same' if same else 'different'}",
                                  "byte for byte the same", same))
         with Mission(SECONDS, PINGS) as second:
             second.fly(keep=False)
@@ -74,7 +74,7 @@ def spent_by_children_s():
 
 class LongTrajectory(unittest.TestCase):
     def test_an_hour_at_100_hz_is_read_within_a_second(self):
-        """The second is processor time of the whole `sonard check`; the record states whether it was met, the test allows 5 s."""
+        """The limit is processor time of the whole `sonard check`. The record states whether it was met; the test allows 5 s."""
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             with open(folder / "hour.csv", "w", encoding="utf-8") as out:

@@ -1,5 +1,5 @@
-"""The results of `cpack -G DEB` and `cmake --install`: the right files in the right places, and a sonard that runs from any
-folder."""
+"""Tests the results of `cpack -G DEB` and `cmake --install`: the right files in the right places, and a sonard that runs from
+any folder."""
 import gzip
 import os
 import pathlib
@@ -43,7 +43,7 @@ def why_not():
     if "SONAR_SANITIZE:STRING=\n" not in cache:
         return "an instrumented build is not for packages"
     if not (BUILD / "bvt4/lib/libbvtsdk.so").exists() or not (BUILD / "package/sonard.8.gz").exists():
-        return f"{BUILD} is not built whole"
+        return f"{BUILD} is not built completely"
     return None
 
 
@@ -58,13 +58,13 @@ def files_below(folder):
 
 
 class Installed:
-    """Checks that both ways of installation must pass; `self.root` contains usr or usr/local."""
+    """Checks for both ways of installation; `self.root` contains usr or usr/local."""
     prefix = "usr"
 
     def program(self, name):
         return self.root / self.prefix / "bin" / name
 
-    def test_the_programs_run_and_say_their_version(self):
+    def test_the_programs_run_and_print_their_version(self):
         result = run(self.program("sonard"), "--version")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stdout, r"^sonard \d+\.\d+\.\d+")
@@ -82,7 +82,7 @@ class Installed:
             first = looked.strip().replace(" and ", ", ").split(", ")[1]
             self.assertEqual(pathlib.Path(first).resolve(), (self.root / self.prefix / "share/sonard/scenes").resolve(), error)
 
-    def test_every_link_of_the_pages_leads_to_what_is_installed(self):
+    def test_every_link_of_the_pages_leads_to_an_installed_file(self):
         self.assertTrue((self.root / DOCUMENTS / "docs/control.md").is_file())
         for root in self.roots.values():
             self.assertEqual(check_links.dead_links(root, installed=True), [])
@@ -161,7 +161,7 @@ class Package(Installed, unittest.TestCase):
             dpkg("--purge", *self.packages)
             self.assertEqual(installed() - before, set())
 
-    def test_the_control_file_says_who_what_and_on_what_it_depends(self):
+    def test_the_control_file_has_maintainer_description_and_dependencies(self):
         for name, package in self.packages.items():
             control = fields(package)
             self.assertEqual(control["Package"], name)
@@ -173,14 +173,14 @@ class Package(Installed, unittest.TestCase):
         self.assertEqual(fields(self.packages["sonard"])["Recommends"], "python3", "sonarctl judge and lab are Python programs")
         self.assertNotIn("embree", fields(self.packages["sonard-bvtsdk"])["Depends"])
 
-    def test_the_licence_of_the_binaries_is_told(self):
+    def test_the_copyright_file_has_the_licence_of_the_binaries(self):
         text = (self.root / "usr/share/doc/sonard/copyright").read_text(encoding="utf-8")
         linked = run("readelf", "-d", self.program("sonard")).stdout if shutil.which("readelf") else ""
         self.assertIn("Apache-2.0", text)
         if "fftw" in linked:
             self.assertRegex(text, r"Files: usr/bin/\*\nCopyright:.*\nLicense: GPL-3\+")
 
-    def test_the_manual_pages_are_pages(self):
+    def test_the_manual_pages_can_be_displayed(self):
         for page in ("man8/sonard.8.gz", "man1/sonarctl.1.gz", "man5/sonard.yaml.5.gz"):
             text = gzip.decompress((self.root / "usr/share/man" / page).read_bytes()).decode()
             self.assertTrue(text.startswith(".Dd "), page)

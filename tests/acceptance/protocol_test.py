@@ -39,8 +39,8 @@ class Served(unittest.TestCase):
                     self.expect_bearings(ping, 30 if mode == 2 else 65)
 
     def expect_bearings(self, ping, half_aperture_deg):
-        """Compares with the law of the capture. Values very close to a whole hundredth of a degree may be truncated to the
-        neighbouring one."""
+        """Compares with the bearings of captured pings. Values very close to a whole hundredth of a degree may be truncated to
+        the neighbouring one."""
         differences = [abs(a - b) for a, b in zip(ping.bearings, expected_bearings(ping.beams, half_aperture_deg))]
         self.assertLessEqual(max(differences), 1)
         self.assertLessEqual(sum(differences), ping.beams // 100)
@@ -73,7 +73,7 @@ class Served(unittest.TestCase):
             client.send(fire_message(range_=3.0))
             self.assertEqual(client.ping().range, 3.0)
 
-    def test_the_second_client_is_turned_away_without_a_byte(self):
+    def test_the_second_client_is_refused_without_a_byte(self):
         with Client(self.daemon.address) as first:
             first.ping_made_with(fire_message())
             with Client(self.daemon.address) as second, self.assertRaises((EOFError, ConnectionResetError)):
@@ -111,7 +111,7 @@ class Capture(unittest.TestCase):
 class TheReaderOfTheLogEnds(unittest.TestCase):
     """sonard 2>&1 | head: the log is lost, the service continues."""
 
-    def test_clients_are_served_all_the_same(self):
+    def test_clients_are_still_served(self):
         configured = Sonard("tank-rod.yaml", pose="{frame: ENU_FLU, xyz_m: [0, 0, -3]}")
         configured.address = "127.0.0.9"
         self.addCleanup(configured.folder.cleanup)

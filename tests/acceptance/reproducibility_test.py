@@ -25,11 +25,11 @@ class Reproducibility(unittest.TestCase):
         self.assertEqual(mission.code, 0)
         self.assertEqual(mission.taken, PINGS)
         self.assertEqual(mission.digests[client], self.plain.digests[1])
-        self.assertEqual(mission.sha256, self.plain.sha256, "the digest is of what arrives")
+        self.assertEqual(mission.sha256, self.plain.sha256, "the digest is that of the received bytes")
 
     def test_every_run_with_any_number_of_threads_is_the_same(self):
         self.assertEqual(self.plain.digests, {1: self.plain.sha256})
-        self.assertEqual(len({hashlib.sha256(str(p.image).encode()).digest() for p in self.plain.pictures()}), PINGS, "things move")
+        self.assertEqual(len({hashlib.sha256(str(p.image).encode()).digest() for p in self.plain.pictures()}), PINGS, "the pictures differ")
         for threads in (1, 2, 4):
             with self.subTest(threads=threads), Mission(SECONDS, PINGS, "--threads", threads) as mission:
                 self.expect_the_same(mission.fly(keep=False))
@@ -76,7 +76,7 @@ class Reproducibility(unittest.TestCase):
             for topic, _, data in mcap_checker.check(mission.recorded("run.mcap").read_bytes()).messages:
                 again.setdefault(topic, []).append(data)
             self.assertEqual(again.pop("/front/status")[0][:16], by_topic.pop("/front/status")[0][:16])  # each run has its address
-            self.assertEqual(again, by_topic, "the file too is the same")
+            self.assertEqual(again, by_topic, "the files are the same")
             mcap_checker.check(mission.recorded("rest.mcap").read_bytes())
 
     def expect_true_places(self, recording):
@@ -91,7 +91,7 @@ class Reproducibility(unittest.TestCase):
                 self.assertEqual({axis: found["rotation"].get(axis, 0) for axis in "xyzw"}, place["orientation"])
             self.assertEqual(pose["pose"], {"position": frames[2 * number]["translation"], "orientation": frames[2 * number]["rotation"]})
 
-    def test_killed_in_the_middle_and_started_again(self):
+    def test_a_killed_run_can_be_started_again(self):
         def kill():
             deadline = time.monotonic() + 60
             while killed.recorded("run.oculus").stat().st_size < 100_000 and time.monotonic() < deadline:

@@ -140,7 +140,7 @@ class Steering(unittest.TestCase):
         self.assertIn("no sonard answers on the control stream", result.stderr)
 
 
-    def test_a_port_of_something_else_is_noticed_soon(self):
+    def test_a_port_of_another_service_is_reported_soon(self):
         with socket.create_server((self.daemon.address, 0)) as silent:
             # The port of JSON lines, which ends a connection with other content; and a program that sends nothing.
             for port, what in ((14771, "closes the connection"), (silent.getsockname()[1], "no greeting within 2 s")):
@@ -153,7 +153,7 @@ class Steering(unittest.TestCase):
 
 
 class Secrets(unittest.TestCase):
-    def test_a_token_opens(self):
+    def test_a_token_gives_access(self):
         with tempfile.TemporaryDirectory() as folder:
             token = pathlib.Path(folder) / "token"
             token.write_text("0123456789abcdef01234567\n", encoding="utf-8")

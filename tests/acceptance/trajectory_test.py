@@ -100,7 +100,7 @@ class Steered(unittest.TestCase):
             self.assertLess(time.monotonic(), deadline, self.daemon.log())
             time.sleep(0.02)
 
-    def test_trajectories_are_steered_by_requests_and_over_a_reload(self):
+    def test_trajectories_are_steered_by_requests_and_kept_by_a_reload(self):
         with daemon_with("dive.tum", dive(), "{file: dive.tum, loop: true, speed: 0.001}") as self.daemon:
             vehicle = self.plays()
             self.assertEqual(vehicle["source"], "trajectory dive.tum")
@@ -113,7 +113,7 @@ class Steered(unittest.TestCase):
             self.assertEqual(vehicle["trajectory"]["position_s"], 2.5)
             self.assertAlmostEqual(vehicle["position"]["z"], -depth_m(2.5), places=5)
             self.reload(1)
-            self.assertEqual(self.plays()["trajectory"], vehicle["trajectory"], "an untouched trajectory plays on as it did")
+            self.assertEqual(self.plays()["trajectory"], vehicle["trajectory"], "an untouched trajectory continues unchanged")
 
             code, text = self.ask("/api/v1/set_trajectory", {"position_s": 5})
             self.assertEqual(code, 400, text)

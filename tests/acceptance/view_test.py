@@ -109,9 +109,9 @@ class View(unittest.TestCase):
                     result = self.daemon.ctl(command[0], *command[1:], *control)
                     self.assertEqual(result.returncode, 0, (command, result.stdout, result.stderr))
                     self.assertIn(f"sonarctl: connected to {self.daemon.address}:", result.stderr)
-                turned_away = self.daemon.ctl("view", "--png", png, "--control", f"{self.daemon.address}:1")
-                self.assertEqual(turned_away.returncode, 74, turned_away.stderr)
-                self.assertIn("connecting as an observer failed too: ", turned_away.stderr)
+                refused = self.daemon.ctl("view", "--png", png, "--control", f"{self.daemon.address}:1")
+                self.assertEqual(refused.returncode, 74, refused.stderr)
+                self.assertIn("connecting as an observer failed too: ", refused.stderr)
                 status = run(SONARCTL, "status", *control).stdout
                 self.assertRegex(status, r"clients +1 now, \d+ since")
                 self.assertIn("  3 m  ", status)

@@ -27,7 +27,7 @@ def why_not():
 
 
 def sonar(scene="l-targets.yaml", **options):
-    """Returns a configuration file with these options of the sonar."""
+    """Returns a daemon whose sonar has these options."""
     daemon = Sonard(scene=scene, profile="waterlinked-3d15", pose="{frame: ENU_FLU, xyz_m: [0, 0, 0]}")
     if options:
         daemon.profile += "\n    options: {" + ", ".join(f'{k}: "{v}"' for k, v in options.items()) + "}"
@@ -143,7 +143,7 @@ class Images(unittest.TestCase):
             self.assertEqual(self.ask(daemon, "/udp", b" " * (2 << 20))[0], 413)
             self.assertEqual(self.ask(daemon, "/udp", {"mode": "multicast"})[0], 204)
             received = [udp.recvfrom(65507) for _ in range(8)]
-            self.assertEqual({sender[0] for _, sender in received}, {daemon.address}, "the address of the HTTP API")
+            self.assertEqual({sender[0] for _, sender in received}, {daemon.address}, "the sender has the address of the HTTP API")
             images = [Image(datagram) for datagram, _ in received]
             for ranges, strengths in zip(images[::2], images[1::2]):
                 self.assertEqual((ranges.kind, strengths.kind), ("RangeImage", "BitmapImageGreyscale8"))
@@ -165,7 +165,7 @@ class Images(unittest.TestCase):
             images = [Image(udp.recv(65507)) for _ in range(30)][-9:]
             self.assertEqual({i.kind for i in images}, {"RangeImage", "BitmapImageGreyscale8", "ImuBatch"})
             batch = next(i for i in images if i.kind == "ImuBatch")
-            self.assertEqual(batch.fields[2][0] % 5, 0, "5 for each 50 ms")
+            self.assertEqual(batch.fields[2][0] % 5, 0, "5 samples per 50 ms")
             self.assertEqual(struct.unpack("<3f", batch.fields[4][0][:12])[2], struct.unpack("<f", struct.pack("<f", -9.81))[0])
             self.assertEqual(next(i for i in images if i.kind == "RangeImage").fields[4], [20])
 

@@ -30,7 +30,7 @@ void fill_with_noise(Floats& values) {
   }
 }
 
-/// Applies the coupling to a whole record, window by window; `kept`: the beams of the last window.
+/// Returns the time of the coupling of a whole record, window by window; `kept` receives the beams of the last window.
 double form_beams_ms(const ColumnSignals& columns, const PingPlan& plan, const BeamWeights& beam_weights,
                      const simd::Kernels& kernels, BeamSignals& kept) {
   BeamScratch scratch;

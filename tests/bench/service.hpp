@@ -48,7 +48,7 @@ class Service {
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
   }
   App& app() { return app_; }
-  /// Figures of the first sonar, after stop().
+  /// Returns the figures of the first sonar. Call it after stop().
   DeviceFigures figures() const { return app_.devices().front().figures(); }
 
  private:

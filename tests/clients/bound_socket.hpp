@@ -30,7 +30,7 @@ inline Socket bound_socket(const std::string& address, int type, std::uint16_t p
   return socket;
 }
 
-/// Calls `serve` for each connection in turn, in a thread, until it is destroyed. Port 0 means any free port.
+/// Calls `serve` for each connection in turn, in a thread, until the server is destroyed. Port 0 means any free port.
 class SocketServer {
  public:
   using Serve = std::function<void(const Socket&)>;

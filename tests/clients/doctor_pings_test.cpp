@@ -1,4 +1,4 @@
-// The findings of doctor on connections to a sonar, and on the pings that doctor and drivers get: facts in, lines out.
+// Tests the findings of doctor on connections to a sonar, and on the pings that doctor and drivers get. Input is facts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,7 +53,7 @@ TEST(Doctor, NamesAnAddressThatListens) {
   expect(line(facts, "ping"), Level::fail, "does not answer", "a firewall on this computer may drop tcp 52100");
 }
 
-TEST(Doctor, NamesWhoElseHasThePort) {
+TEST(Doctor, NamesAnotherProgramAtThePort) {
   Facts facts = healthy();
   SonarFacts& sonar = facts.sonars[0];
   sonar.stream = {};
@@ -134,7 +134,7 @@ TEST(Doctor, ReportsTheRateThatComputingAllows) {
   sonar.stream.computing_ms = 555, sonar.stream.rate_hz = 9.1;
   EXPECT_THAT(line(facts, "rate").text, Not(HasSubstr("at most here"))) << "the measured rate is higher";
 
-  // A sonar with another client, by the statistics of the daemon.
+  // For a sonar with another client, doctor uses the statistics of the daemon.
   sonar.stream = {};
   sonar.clients = {"127.0.0.1:41022"};
   v1::SonarStatus& reported = report(facts);
@@ -180,7 +180,7 @@ Facts healthy_head() {
   return facts;
 }
 
-TEST(Doctor, LooksAtAHeadAsItsHostsDo) {
+TEST(Doctor, ExaminesAHeadLikeItsHosts) {
   Facts facts = healthy_head();
   facts.sonars[0].stream.rate_hz = 14.9;
   EXPECT_EQ(text_from(run_checks(facts)),

@@ -1,4 +1,4 @@
-// The findings of doctor on computers, networks, daemons and search, without a network: facts in, lines out.
+// Tests the findings of doctor on computers, networks, daemons and search, from given facts, without a network.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -170,7 +170,7 @@ TEST(Doctor, PrintsNotesInsteadOfAPassedCheck) {
   EXPECT_FALSE(any_failed(run_checks(facts)));
 }
 
-TEST(Doctor, LooksAtPosesHttpAndClocks) {
+TEST(Doctor, ChecksPosesHttpAndClocks) {
   Facts facts = healthy();
   v1::DaemonStatus& status = daemon_in(facts);
   status.mutable_vehicles(0)->set_source("json 127.0.0.1");
@@ -228,7 +228,7 @@ TEST(Doctor, ChecksThePortsOfTheSonarsThatAreThere) {
   expect(line(facts, "ports"), Level::warn, "port 62312 lies", "ip_local_reserved_ports=62312");
 }
 
-TEST(Doctor, SpeaksJson) {
+TEST(Doctor, PrintsJson) {
   Facts facts = healthy();
   facts.kernel_ports.reserved = "";
   const std::string json = json_from(run_checks(facts));

@@ -1,4 +1,4 @@
-// Facts of a sonar and a daemon where all is well, to be changed, and the findings of doctor on them.
+// Facts of a sonar and a daemon without faults, which tests change, and the findings of doctor on them.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -46,7 +46,7 @@ inline v1::DaemonStatus& daemon_in(Facts& facts) {
   facts.control.status = copy;
   return *copy;
 }
-/// Makes the daemon report the first sonar, to be changed.
+/// Lets the daemon report the first sonar, and returns the report, to be changed.
 inline v1::SonarStatus& report(Facts& facts) {
   const auto reported = std::make_shared<v1::SonarStatus>(facts.control.status->sonars(0));
   facts.sonars[0].reported = reported;

@@ -1,5 +1,5 @@
-// The interface to the CUDA module on every machine: without the module, with an invalid one, without a device and with a
-// device.
+// Tests the interface to the CUDA module on every machine: without the module, with an invalid one, without a device and with
+// a device.
 #include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Compares the device engine with the shipped CPU engine, which uses Embree. The engines round rays differently in the last bit.
+// Compares the device engine with the shipped CPU engine, which uses Embree. Rays are rounded differently in the last bit.
 // At the edge of a shadow a cell may therefore be visible for only one of them. The test limits the number of such cells.
 #include <gtest/gtest.h>
 

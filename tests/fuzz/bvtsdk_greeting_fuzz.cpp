@@ -1,5 +1,5 @@
-// A sonar's answer to the greeting of the BlueView libraries: the header of a frame, and the description in it. If the first byte
-// is odd, the input is a frame, otherwise only the description. An accepted input is encoded to the same bytes.
+// Fuzzes a sonar's answer to the greeting of the BlueView libraries: the header of a frame, and the description in it. If the
+// first byte is odd, the input is a frame, otherwise only the description. An accepted input is encoded to the same bytes.
 #include "clients/bvtsdk/core/description.hpp"
 #include "clients/bvtsdk/core/frame.hpp"
 #include "tests/fuzz/byte_script.hpp"

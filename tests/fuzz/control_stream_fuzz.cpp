@@ -1,4 +1,4 @@
-// The control stream: lengths, requests, and their contents. The first byte is the length of the pieces; the rest is the stream.
+// Fuzzes the control stream. The first byte gives the length of the pieces; the rest is the stream, with lengths and requests.
 // Checks that the messages do not depend on the pieces, that accepted ones are usable, and that every request gets an answer.
 #include <algorithm>
 #include <cmath>

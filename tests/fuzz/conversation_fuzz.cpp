@@ -1,4 +1,4 @@
-// Whole conversations in virtual time, with Oculus and BlueView: clients connect, send requests, read slowly and disconnect, in
+// Fuzzes conversations with Oculus and BlueView in virtual time. Clients connect, send requests, read slowly and disconnect, in
 // the order of a script of bytes. The first byte selects make, product and options, the second byte the outbox and the rules for
 // clients. Commands follow: a letter and its arguments.
 #include "protocol/blueview/frames.hpp"

@@ -1,5 +1,5 @@
-// Bytes of a driver to the sonars of every make; each sonar gets each input at every port. No input may crash a sonar, cause an
-// answer that is much longer than the input, or lead to settings that no ping can have.
+// Fuzzes the bytes of a driver to the sonars of every make. Each sonar gets each input at every port. No input may crash a sonar,
+// cause an answer that is much longer than the input, or lead to settings that no ping can have.
 #include <algorithm>
 #include <cmath>
 #include <string>

@@ -1,5 +1,6 @@
-// Bytes of a client to a DVL, in two pieces. No input may crash its dialogue, lead to settings that no ping can have, or cause an
-// answer that is much longer than the input. The same bytes are also used as a line of the device, and as the pixels of a ping.
+// Fuzzes the bytes of a client to a DVL, in two pieces. No input may crash the dialogue, lead to settings that no ping can have,
+// or cause an answer that is much longer than the input. The same bytes are also used as a line of the device, and as the pixels
+// of a ping.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

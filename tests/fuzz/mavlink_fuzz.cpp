@@ -1,5 +1,5 @@
-// Datagrams of MAVLink, one after another over one link. The first byte selects the settings; then follow a length in two bytes
-// and a datagram, repeatedly. Frames of known messages that are otherwise valid get the right checksum, because hardly any
+// Fuzzes datagrams of MAVLink, one after another over one link. The first byte selects the settings. Then a length of two bytes
+// and a datagram follow repeatedly. Frames of known messages that are otherwise valid get the right checksum, because hardly any
 // mutation would pass this check. All results are usable, for any input.
 #include <cmath>
 

@@ -1,6 +1,6 @@
-// The validation of imported meshes. A script of bytes makes corners; some are not numbers, are far away, are equal or are in a
-// line. If the first byte is odd, they are corners of polygons of any size, which are first cut into triangles. The result is a
-// valid mesh, or a sentence.
+// Fuzzes the validation of imported meshes. A script of bytes makes corners; some are not numbers, are far away, are equal or are
+// in a line. If the first byte is odd, they are corners of polygons of any size, which are first cut into triangles. The result
+// is a valid mesh, or a sentence.
 #include <vector>
 
 #include "core/scene/files/mesh_steps.hpp"

@@ -1,6 +1,6 @@
-// PNG images as heights. First byte p: the rest is the file. P: its checksums are corrected first, so that the code after the
-// checks is reached. Other values: single bytes give width, height, depth, colour and interlacing; the scan lines follow, and
-// this program packs them.
+// Fuzzes PNG images as heights. If the first byte is p, the rest is the file; if it is P, the file's checksums are corrected
+// first, so that the code after the checks is reached. Otherwise single bytes give width, height, depth, colour and interlacing;
+// the scan lines follow, and this program packs them.
 #include <zlib.h>
 
 #include <cmath>

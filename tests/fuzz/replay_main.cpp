@@ -54,18 +54,18 @@ void add_seeds(const std::filesystem::path& path, std::vector<Input>& seeds) {
 
 // ---- report of the input that ended the program
 
-char last_words[64];
-std::size_t last_words_size = 0;
+char last_report[64];
+std::size_t last_report_size = 0;
 
 void announce(const char* what, std::uint32_t number) {
-  const int n = std::snprintf(last_words, sizeof last_words, "\nit was %s %u\n", what, number);
-  last_words_size = static_cast<std::size_t>(std::max(0, n));
+  const int n = std::snprintf(last_report, sizeof last_report, "\nit was %s %u\n", what, number);
+  last_report_size = static_cast<std::size_t>(std::max(0, n));
 }
-void say_last_words() {
-  if (write(STDERR_FILENO, last_words, last_words_size) < 0) _exit(70);
+void print_last_report() {
+  if (write(STDERR_FILENO, last_report, last_report_size) < 0) _exit(70);
 }
 void on_signal(int number) {
-  say_last_words();
+  print_last_report();
   signal(number, SIG_DFL);
   raise(number);
 }
@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
     }
   }
 #if defined(SONARD_DEATH_CALLBACK)
-  __sanitizer_set_death_callback(say_last_words);
+  __sanitizer_set_death_callback(print_last_report);
 #else
   for (const int number : {SIGSEGV, SIGFPE, SIGBUS, SIGILL}) signal(number, on_signal);
 #endif

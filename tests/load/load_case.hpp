@@ -22,7 +22,7 @@ inline constexpr bool memory_is_ours = !test::is_sanitized;  // a sanitizer keep
 
 using text::format;
 
-/// Prints the figure and, in the full length, keeps it for the table of reliability.
+/// Prints the figure and, in a full run, keeps it for the table of reliability.
 inline void keep(const std::string& item, const std::string& figure, const std::string& bound, bool passed) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   std::printf("  %-18s %s (%s)\n", item.c_str(), figure.c_str(), bound.c_str());

@@ -1,5 +1,5 @@
-// A whole daemon in a thread of this process, with premade pings and the requested number of sonars, each on its own address. Its
-// header does not include Asio, so that the tests compile quickly.
+// A whole daemon in a thread of this process, with premade pings and the requested number of sonars, each on its own address.
+// This header does not include Asio, so that the tests compile quickly.
 #pragma once
 
 #include <memory>

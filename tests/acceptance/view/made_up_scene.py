@@ -5,7 +5,7 @@ import struct
 
 
 def glb(vertices, normals, triangles, colour):
-    """Writes one mesh; glTF is y-up, so (x, y, z) becomes (x, z, -y)."""
+    """Returns one mesh as GLB; glTF is y-up, so (x, y, z) becomes (x, z, -y)."""
     def packed(rows):
         return b"".join(struct.pack("<3f", x, z, -y) for x, y, z in rows)
     positions, directions = packed(vertices), packed(normals)

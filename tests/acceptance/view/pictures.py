@@ -4,7 +4,7 @@ import zlib
 
 
 def read_png(data):
-    """Returns (width, height, RGB bytes) of a PNG with 8 bits a channel and no interlace."""
+    """Returns (width, height, RGB bytes) of a PNG with 8 bits per channel and no interlace."""
     at, body, head = 8, b"", None
     while at < len(data):
         size, kind = struct.unpack_from(">I4s", data, at)

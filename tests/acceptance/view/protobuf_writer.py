@@ -1,4 +1,4 @@
-"""Writes protobuf messages from dictionaries, by the descriptors that protoc makes from our .proto files. Standard library
+"""Writes protobuf messages from dictionaries, with the descriptors that protoc makes from our .proto files. Standard library
 only."""
 import pathlib
 import struct

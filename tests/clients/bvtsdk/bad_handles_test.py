@@ -48,7 +48,7 @@ class Call:
             inner = kind[:-1].strip()
             out = ctypes.c_void_p(0x55555555) if inner.endswith("*") else VALUES[inner](5)
             if name == "buffer":
-                return ctypes.byref(out)  # an element of a list: it is not changed
+                return ctypes.byref(out)  # an element of a list, which is not changed
         else:
             return VALUES[kind](32 if name == "buffer_size" else 1)
         self.outs.append(out)

@@ -1,4 +1,4 @@
-// Colours: the maps, their files, the mapping, pictures on disk.
+// Tests colour maps, their files, the mapping, and pictures on disk.
 #include "clients/bvtsdk/core/colour_maps.hpp"
 
 #include <gtest/gtest.h>
@@ -33,8 +33,8 @@ MagImage image_with(std::vector<std::uint16_t> pixels) {
   return image;
 }
 
-/// Returns a grey map, so that a mapped pixel shows its entry to a sixteenth.
-ColourMapper grey_mapper(PixelOrder order = PixelOrder::bgra) {
+/// Returns a mapper whose colours encode the number of the entry; entry_of() decodes it.
+ColourMapper numbering_mapper(PixelOrder order = PixelOrder::bgra) {
   ColourMap map;
   for (int i = 0; i < 4096; ++i) map.push_back({static_cast<std::uint8_t>(i / 16), 7, static_cast<std::uint8_t>(i % 16)});
   ColourMapper mapper(order);
@@ -102,7 +102,7 @@ TEST_F(ColourMaps, FollowTheirFormulas) {
 }
 
 TEST_F(ColourMaps, FilesThatAreNotMapsAreRefused) {
-  ColourMapper mapper = grey_mapper();
+  ColourMapper mapper = numbering_mapper();
   EXPECT_EQ(mapper.load(folder / "missing.cmap"), file_open);
   for (const std::size_t size : {0u, 12287u, 12289u}) {
     std::ofstream(folder / "odd.cmap", std::ios::binary) << std::string(size, 'x');
@@ -115,7 +115,7 @@ TEST_F(ColourMaps, FilesThatAreNotMapsAreRefused) {
 }
 
 TEST_F(ColourMaps, AreReadBetweenTheThresholds) {
-  ColourMapper mapper = grey_mapper();
+  ColourMapper mapper = numbering_mapper();
   EXPECT_EQ(entries(mapper, {0, 8, 16, 32768, 65535}), (std::vector<int>{0, 0, 1, 2048, 4095}));
   ASSERT_EQ(mapper.set_thresholds(30000, 10000), success);
   EXPECT_EQ(entries(mapper, {0, 10000, 20000, 30000, 65535}), (std::vector<int>{0, 0, 2048, 4095, 4095}));
@@ -131,7 +131,7 @@ TEST_F(ColourMaps, AreReadBetweenTheThresholds) {
 }
 
 TEST_F(ColourMaps, FindTheirTopThemselvesInAutoMode) {
-  ColourMapper mapper = grey_mapper();
+  ColourMapper mapper = numbering_mapper();
   mapper.set_auto_mode(true);
   EXPECT_EQ(mapper.set_thresholds(30000, 10000), bad_parameter);
   std::vector<std::uint16_t> pixels(3000, 0);  // pixels outside the sector have no effect

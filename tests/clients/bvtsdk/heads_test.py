@@ -1,5 +1,5 @@
-"""Sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library. Also the
-settings in their recordings, and the positions of ranges."""
+"""Tests sonars with two heads, with strict head numbers and strict ranges, and with packed pings, through the 4.x library. Also
+tests the settings in their recordings, and the number of ranges."""
 import ctypes
 import pathlib
 import tempfile
@@ -86,7 +86,7 @@ class Heads(unittest.TestCase):
         self.assertGreater(found, 3)
         self.assertLess(found, beams / 2)
 
-    def test_a_recording_tells_the_settings_of_its_pings(self):
+    def test_a_recording_has_the_settings_of_its_pings(self):
         sonar = self.sonar("blueview-p900-90", "compression: none")
         _, head = self.head(sonar, 0)
         folder = self.enterContext(tempfile.TemporaryDirectory())

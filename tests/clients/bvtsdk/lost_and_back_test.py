@@ -1,4 +1,4 @@
-"""A host whose daemon stops, starts again, or hangs: the error codes, and that opening the sonar again is sufficient."""
+"""Tests a host whose daemon stops, starts again, or hangs: the error codes, and that opening the sonar again is sufficient."""
 import ctypes
 import signal
 import time

@@ -1,4 +1,4 @@
-// Reads and writes payloads of PING_DATA.
+// Tests reading and writing payloads of PING_DATA.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -46,7 +46,7 @@ void expect_same(const PolarPing& a, const PolarPing& b) {
   EXPECT_EQ(a.nav.text, b.nav.text);
 }
 
-TEST(PolarPing, ComesBackAsItWas) {
+TEST(PolarPing, IsReadBackUnchanged) {
   for (const Packing packing : every_packing) {
     const auto back = decode_ping(encode_ping(some_ping(), packing));
     ASSERT_TRUE(back) << static_cast<int>(packing);
@@ -98,7 +98,7 @@ TEST(PolarPing, IsRefusedWhenCutAnywhere) {
   }
 }
 
-TEST(PolarPing, IsRefusedWithFieldsThatAreNone) {
+TEST(PolarPing, IsRefusedWithInvalidFields) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<std::function<void(PolarPing&)>> harms{
       [&](PolarPing& p) { p.start_m = nan; },

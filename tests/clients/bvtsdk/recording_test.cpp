@@ -31,7 +31,7 @@ struct Recording : testing::Test {
   Recording() { std::filesystem::create_directories(folder); }
   ~Recording() override { std::filesystem::remove_all(folder); }
 
-  /// Pings 0, 1, 2 of head 0, ping 3 of head 1, a position and a mark between them.
+  /// Writes pings 0, 1, 2 of head 0, ping 3 of head 1, and a position and a mark between them.
   static void fill(RecordingWriter& writer, const std::string& to) {
     ASSERT_EQ(writer.create(to, hello), success);
     ASSERT_EQ(writer.put_ping(0, ping_number(0), hello), success);
@@ -90,7 +90,7 @@ void expect_all(RecordingReader& reader) {
   EXPECT_EQ(mark.text, "a suspicious shape");
 }
 
-TEST_F(Recording, PlaysBackWhatWasPut) {
+TEST_F(Recording, PlaysBackWhatWasWritten) {
   RecordingWriter writer;
   fill(writer, path);
   EXPECT_EQ(writer.ping_count(0), 3);
@@ -199,7 +199,7 @@ TEST_F(Recording, OtherFilesAreRefused) {
   EXPECT_EQ(reader.ping_count(0), 0);
 }
 
-TEST_F(Recording, IsNotWrittenWhereItCannotBe) {
+TEST_F(Recording, ReportsThatItCannotBeWritten) {
   RecordingWriter writer;
   EXPECT_EQ(writer.put_ping(0, ping_number(0), hello), file_not_open);
   EXPECT_EQ(writer.put_event({}), file_not_open);

@@ -1,5 +1,5 @@
-// 4.x, C++ classes kept in globals: records what it pings, maps colours with thresholds, gamma and auto mode, plays the
-// recording. usage: cpp4_record_colours_playback ADDRESS COLORMAPS RECORDING
+// A program for 4.x with C++ classes in globals. It records pings, maps colours with thresholds, gamma and auto mode, and plays
+// the recording. usage: cpp4_record_colours_playback ADDRESS COLORMAPS RECORDING
 #include <cstring>
 #include <vector>
 
