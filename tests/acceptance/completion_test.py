@@ -39,7 +39,7 @@ class Completion(unittest.TestCase):
         self.assertEqual(complete("sonard", "--clock", "st"), ["stepped"])
         self.assertIn("render", complete("sonard", "re"))
 
-    def test_shells_can_read_them(self):
+    def test_shells_can_read_the_files(self):
         for program in ("sonarctl", "sonard"):
             self.assertEqual(run("bash", "-n", FOLDER / program).returncode, 0)
             if shutil.which("zsh"):

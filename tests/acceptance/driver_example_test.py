@@ -21,7 +21,7 @@ def run_example(test, **more):
 
 
 class DriverExample(unittest.TestCase):
-    def test_a_driver_that_ends_is_noticed_at_once_with_what_it_said(self):
+    def test_a_driver_that_ends_is_reported_at_once_with_its_output(self):
         begin = time.monotonic()
         run = run_example("test_driver.DriverTest.test_numbers_go_up",
                           DRIVER="sh -c 'echo starting; echo no such device >&2; exit 3'")

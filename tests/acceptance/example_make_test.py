@@ -51,7 +51,7 @@ class ExampleMake(unittest.TestCase):
                     lines = self.ctl("listen", f"{replay.address}:{PORT}", "--pings", 2, *PATIENCE)
                     self.assertIn("pings 2", lines)
 
-    def test_faults_change_its_pings(self):
+    def test_faults_change_the_pings_of_the_make(self):
         with Sonard(scene="l-targets.yaml", profile="example-64", arguments=[*CHEAP, "--faults"]) as daemon:
             control = ("--control", f"{daemon.address}:14770")
             self.ctl("fault", "add", "F01", "--with", "bytes=3", "--at", "ping=3", "--name", "junk", *control)

@@ -101,7 +101,7 @@ class Faults(unittest.TestCase):
         self.assertTrue(any(row.startswith("| L05 | silent-open | 1 | takes effect | takes effect |") for row in rows))
         self.assertTrue(any("needs two network namespaces" in row for row in rows))
 
-    def test_the_journal_tells_what_was_done(self):
+    def test_the_journal_lists_the_faults(self):
         follow = subprocess.Popen([str(SONARCTL), "fault", "journal", "--follow", "--json", "--control", f"{self.daemon.address}:14770"],
                                   stdout=subprocess.PIPE, text=True)
         self.does("add", "L05", "--name", "followed", "--seconds", "30")

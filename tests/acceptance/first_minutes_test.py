@@ -21,7 +21,7 @@ def words(line):
 
 
 class FirstMinutes(unittest.TestCase):
-    def test_the_readme_prints_what_comes_out(self):
+    def test_the_readme_prints_the_output_of_the_programs(self):
         run = subprocess.run([ROOT / "tests/tools/first_minutes.sh", BUILD.resolve()], stdin=subprocess.DEVNULL,
                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=280, check=False,
                              env={**os.environ, "LC_ALL": "C.UTF-8"})

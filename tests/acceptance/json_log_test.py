@@ -26,7 +26,7 @@ class JsonLog(unittest.TestCase):
         for start in ["config ", "scene ", "sonar ", "tcp ", "status ", "pose ", "control ", "seed ", "ready in ", "resident memory "]:
             self.assertTrue(any(m.startswith(start) for m in messages), f"{start}: {messages}")
 
-    def test_standard_output_holds_what_it_held(self):
+    def test_standard_output_is_the_same_with_both_formats(self):
         for arguments in [["--log-format", "json"], []]:
             with self.subTest(arguments=arguments), tempfile.TemporaryDirectory() as folder:
                 config, log, address = pathlib.Path(folder) / "sonard.yaml", pathlib.Path(folder) / "log", "127.0.0.9"
@@ -65,7 +65,7 @@ control: {{stream: off, http: off}}
         self.assertIn("192.0.2.7", objects(self, result.stderr)[-1]["message"])
         self.assertEqual(run(SONARD, "run", missing).stderr[:8], "sonard: ")
 
-    def test_names_that_are_no_utf8_are_repaired(self):
+    def test_names_that_are_not_utf8_are_repaired(self):
         result = subprocess.run([str(SONARD), "run", b"no\xff.yaml", "--log-format", "json"], stdin=subprocess.DEVNULL,
                                 capture_output=True, timeout=60, check=False)
         self.assertEqual(result.returncode, 66)

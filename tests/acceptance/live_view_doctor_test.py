@@ -1,4 +1,4 @@
-"""The findings of the live view's doctor on drivers that get no pings."""
+"""Tests the findings of the live view's doctor on drivers that get no pings."""
 import contextlib
 import socket
 import time
@@ -10,7 +10,7 @@ from running_sonard import Sonard
 
 
 class Doctor(unittest.TestCase):
-    """Tests that the reason why a driver gets no pings is named within 5 s."""
+    """Tests that the reason why a driver gets no pings is named soon."""
 
     @contextlib.contextmanager
     def daemon_and_viewer(self, **options):

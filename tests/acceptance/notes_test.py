@@ -32,7 +32,7 @@ class Notes(unittest.TestCase):
                       "the sonar of boat is 5.0 m above the water's surface"):
             self.assertTrue(any(words in note for note in notes), (words, notes))
 
-    def test_doctor_reports_them_for_a_running_daemon(self):
+    def test_doctor_reports_the_notes_for_a_running_daemon(self):
         with Sonard(pose="{frame: NED_FRD, xyz_m: [0, 0, -4]}") as daemon:
             self.assertIn("the sonar of rov is 4.0 m above the water's surface (z = 0)", daemon.log())
             control = f"{daemon.address}:14770"

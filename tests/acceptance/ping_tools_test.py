@@ -42,7 +42,7 @@ class Tools(unittest.TestCase):
                 self.assertEqual(bool(re.search(r"the picture has \d+ of \d\d\d scan lines", viewed.stderr)), of_many, viewed.stderr)
 
 
-    def test_sonarctl_looks_on_beside_a_driver(self):
+    def test_sonarctl_observes_beside_a_driver(self):
         drivers = {"omniscan-450": (OMNISCAN, side_scan(1)), "s500": (S500, sound(100, 1308)), "surveyor-240": (SURVEYOR, settings(1)),
                    "ping1d": (PING1D, frame(1400, struct.pack("<H", 1300)))}
         for profile, (port, request) in drivers.items():

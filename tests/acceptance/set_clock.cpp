@@ -1,5 +1,5 @@
-// A library for LD_PRELOAD. It sets the computer's clock for one program, by the seconds in the file that SET_CLOCK names
-// (int64).
+// A library for LD_PRELOAD. It shifts the computer's clock for one program by the seconds in the file that SET_CLOCK names, an
+// int64.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/mman.h>

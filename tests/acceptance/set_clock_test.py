@@ -34,7 +34,7 @@ class SetClock(unittest.TestCase):
         with open(self.file, "r+b" if self.file.exists() else "wb") as file:
             file.write(struct.pack("<q", 3600 * hours))
 
-    def test_pings_continue_and_the_daemon_reports_it(self):
+    def test_pings_continue_and_the_daemon_reports_the_set_clock(self):
         with Sonard() as daemon, Client(daemon.address) as client:
             client.send(fire_message(rate_hz=10))
             client.ping()
@@ -75,7 +75,7 @@ class SetClock(unittest.TestCase):
                     poses.sendto(json.dumps(pose).encode(), (daemon.address, 14771))
                     eventually(lambda: abs(control.status()["vehicles"][0]["position"].get("x", 0) - hours) < 0.01, 30)
 
-    def test_doctor_reports_it(self):
+    def test_doctor_reports_the_set_clock(self):
         with Sonard() as daemon:
             for hours in HOURS:
                 self.set_clock(hours)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Programs made without each guard: check_hardening must report each, and nothing in a program with all guards."""
+"""Tests check_hardening on programs made without each guard: it must report each, and nothing in a program with all guards."""
 import subprocess
 import sys
 import tempfile

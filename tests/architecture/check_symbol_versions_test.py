@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""check_symbol_versions.py on samples of what objdump prints."""
+"""Tests check_symbol_versions.py on samples of the output of objdump."""
 import unittest
 
 from check_symbol_versions import newer

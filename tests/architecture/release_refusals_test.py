@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tests/tools/release.sh refuses a tree that differs from its commit."""
+"""Tests that tests/tools/release.sh refuses a tree that differs from its commit."""
 import os
 import pathlib
 import shutil

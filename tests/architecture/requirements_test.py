@@ -1,4 +1,4 @@
-"""The messages of CMake if something is missing or too old: core/requirements.cmake in a project that has nothing else."""
+"""Tests the messages of CMake if something is missing or too old, with core/requirements.cmake in an otherwise empty project."""
 import pathlib
 import subprocess
 import tempfile

@@ -26,7 +26,7 @@ BenchCase oculus(std::string name, std::string description, int mode, double ran
   return c;
 }
 
-/// The P900-90 at 10 m; the pulse is as long as a row.
+/// Returns settings of the P900-90 at 10 m; the pulse is as long as a row.
 PingSettings p900_90_preset() {
   constexpr double inch_m = 0.0254;
   constexpr int rows = 394;

@@ -23,7 +23,7 @@ double read_clock(clockid_t clock) {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-/// The case overrides the command line.
+/// Returns the configuration of a case, whose values override those of the command line.
 Config config_of(const BenchCase& c, const BenchOptions& options) {
   Config config;
   config.seed = options.seed;

@@ -1,4 +1,4 @@
-"""The pages of benchmarks agree with the results: verdicts, missing parts, and pictures that are valid XML."""
+"""Tests that the pages of benchmarks agree with the results: verdicts, missing parts, and pictures that are valid XML."""
 
 import re
 import unittest
@@ -40,7 +40,7 @@ class Page(unittest.TestCase):
         self.assertIn("50 %", tables, "1.9 ms of the prototype against 3.8")
         self.assertIn("| P1, 1 thread: P1 described | 100.0 | 333 times the paper's |", tables)
 
-    def test_rates_without_side_lobes_are_told(self):
+    def test_rates_without_side_lobes_are_marked(self):
         report = {"processor": "test", "results": [result("P1", 2, 80)]}
         self.assertNotIn("side lobes off", write_benchmarks.page(report))
         report["results"][0]["switches"] = {"side_lobes": False}
@@ -130,7 +130,7 @@ class Page(unittest.TestCase):
                       "| 8 | 2 | 160 | 18.0 | 24.0 | 0.75 |"):
             self.assertIn(words, tables)
 
-    def test_instruction_sets_stand_beside_each_other(self):
+    def test_instruction_sets_are_columns_of_one_table(self):
         sets = [{"processor": "test", "results": [dict(result("P1", 2, rate), engine=f"cpu, {name}, 2 threads, Embree")]}
                 for name, rate in (("avx2", 100), ("portable", 40))]
         chapter = write_benchmarks.instruction_sets(sets)

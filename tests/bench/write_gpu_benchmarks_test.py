@@ -1,4 +1,4 @@
-"""The page of the CUDA engine's benchmarks: its verdicts, and all steps that make it, with host loops as the device."""
+"""Tests the page of the CUDA engine's benchmarks: its verdicts, and all steps that make it, with host loops as the device."""
 import json
 import os
 import pathlib
@@ -41,13 +41,13 @@ class Page(unittest.TestCase):
                       "p99 4.00 ms", "**different bytes**", "1: relative L2 1e-3"):
             self.assertIn(words, page)
 
-    def test_a_ratio_that_was_not_measured_is_no_verdict(self):
+    def test_a_ratio_that_was_not_measured_gives_no_verdict(self):
         page = write_gpu_benchmarks.page(report({"ms": 36.0, "on_this_device": False, "ratio": 5000.0}), {"facts": {}})
         self.assertIn("P11 is not measured", page)
         self.assertNotIn("P11: ", page)
 
     @unittest.skipUnless("SONARD_BENCH" in os.environ, "SONARD_BENCH names the program")
-    def test_the_whole_way_with_host_loops(self):
+    def test_all_steps_with_host_loops(self):
         with tempfile.TemporaryDirectory() as folder:
             found, page = pathlib.Path(folder), pathlib.Path(folder) / "page"
             bench = [os.environ["SONARD_BENCH"], "--engine", "cuda", "--scene", "demo", "--pings", "2", "--threads", "1"]

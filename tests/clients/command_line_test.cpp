@@ -1,4 +1,4 @@
-// sonarctl suggests the nearest known word for an unknown command or option.
+// Tests that sonarctl suggests the nearest known word for an unknown command or option.
 #include "clients/sonarctl/command_line.hpp"
 
 #include <gmock/gmock.h>
@@ -37,7 +37,7 @@ std::string complaint(const std::vector<std::string>& words) {
   return {};
 }
 
-/// Replaces line breaks and columns by single spaces.
+/// Replaces line breaks and columns with single spaces.
 std::string unwrapped(const std::string& text) {
   std::string words;
   for (const char c : text)

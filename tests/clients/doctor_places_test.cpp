@@ -1,4 +1,4 @@
-// The findings of doctor about the address of a sonar and about its clients, without a network: facts in, lines out.
+// Tests the findings of doctor about the address of a sonar and about its clients, from given facts, without a network.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ using testing::HasSubstr;
 using testing::Not;
 using Outcome = StreamFacts::Outcome;
 
-/// Returns facts of one sonar that hosts reach by UDP, at a port of this computer.
+/// Returns facts of one sonar that hosts reach over UDP, at a port of this computer.
 Facts facts_by_udp(const std::string& host, Outcome outcome) {
   Facts facts;
   SonarFacts& sonar = facts.sonars.emplace_back();

@@ -1,4 +1,4 @@
-// Poses of Gazebo's models as lines for sonard, from stand-ins for Gazebo's messages. sonard's own reader reads the lines back.
+// Tests the lines with poses of Gazebo's models for sonard, from stand-ins for Gazebo's messages. sonard's reader reads them.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -83,7 +83,7 @@ TEST(GazeboBridge, FollowsSeveralModelsUnderSonardsNames) {
   EXPECT_EQ(control::parse_json_pose(lines[1])->pose.position_m.x, 4);
 }
 
-TEST(GazeboBridge, SendsATimeOnce) {
+TEST(GazeboBridge, SendsEachTimeOnce) {
   std::vector<FollowedModel> followed{parse_followed("rov").value()};
   EXPECT_THAT(lines_from(message_at(7), followed), SizeIs(1));
   EXPECT_THAT(lines_from(message_at(7), followed), IsEmpty()) << "paused";

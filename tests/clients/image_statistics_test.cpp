@@ -1,4 +1,4 @@
-// The figures that describe a picture, on made-up images with known figures and on a real device's pings.
+// Tests the figures that describe a picture, on made-up images with known figures and on a real device's pings.
 #include "clients/sonarctl/image_statistics.hpp"
 
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ float noise(std::size_t row, std::size_t beam) {
   return uniform_open(philox(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(beam), 0, 0, 7, 0).v[0]);
 }
 
-TEST(Correlation, IsNothingForIndependentSamplesAndHalfForSharedHalves) {
+TEST(Correlation, IsZeroForIndependentSamplesAndHalfForSharedHalves) {
   const PolarImage independent = image_of(200, 200, noise);
   EXPECT_NEAR(correlation(independent, whole(independent), 0, 1), 0, 0.03);
   const PolarImage shared = image_of(200, 200, [](std::size_t r, std::size_t b) { return noise(r, b) + noise(r, b + 1); });

@@ -1,4 +1,4 @@
-// Conclusions of `listen` from a stream: counts, gaps, rates and the verdict that decides its exit code.
+// Tests the conclusions of `listen` from a stream: counts, gaps, rates and the verdict that decides its exit code.
 #include "clients/sonarctl/ping_log.hpp"
 
 #include <gmock/gmock.h>
@@ -106,7 +106,7 @@ TEST(PingLog, ReportsTheRateInTheUnitOfTheMake) {
   EXPECT_THAT(text_from(log.summary(std::nullopt), false, "lines/s"), HasSubstr("rate 10.00 lines/s, interval p50 100.0 ms"));
 }
 
-TEST(Percentile, TakesTheNearestRank) {
+TEST(Percentile, UsesTheNearestRank) {
   EXPECT_EQ(percentile({}, 0.5), 0);
   EXPECT_EQ(percentile({3, 1, 2}, 0.5), 2);
   EXPECT_EQ(percentile({3, 1, 2}, 1), 3);

@@ -1,4 +1,4 @@
-// The look-up of a host name, with a stand-in that the test ends.
+// Tests the look-up of a host name, with a stand-in for the resolver that the test ends.
 #include "clients/sonarctl/net.hpp"
 
 #include <arpa/inet.h>

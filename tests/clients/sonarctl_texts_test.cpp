@@ -1,4 +1,4 @@
-// Texts of sonarctl that need no device: the abilities of the terminal, the line under a picture, a daemon's status.
+// Tests texts of sonarctl that need no device: the abilities of the terminal, the line under a picture, a daemon's status.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -58,7 +58,7 @@ TEST(ViewCaption, HasRateAndGaps) {
   EXPECT_THAT(unnumbered.text(), testing::EndsWith("  1.0 lines/s"));
 }
 
-TEST(StatusText, NamesEverything) {
+TEST(StatusText, HasAllFactsOfTheStatus) {
   const auto status = control::message_from<v1::DaemonStatus>(R"(
       version: "0.1.0" config: "a.yaml" scene: "demo:harbour" clock: "realtime" engine: "embree" seed: 1 uptime_s: 3725
       resident_mb: 120

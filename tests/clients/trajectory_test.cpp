@@ -1,4 +1,4 @@
-// Paths of `sonarctl pose`: places, directions and speeds at times where they are known.
+// Tests the paths of `sonarctl pose`: places, directions and speeds at times where they are known.
 #include "clients/sonarctl/pose.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ TEST(Circle, StartsEastLooksAtItsCentreAndTurnsAnticlockwise) {
   expect_near(ahead(on_circle(circle, 10).body_in_world), {0, -1, 0});
 }
 
-TEST(Circle, LooksAlongThePathEitherWayRound) {
+TEST(Circle, LooksAlongThePathInBothDirections) {
   for (const double period_s : {40.0, -40.0}) {
     const Circle circle{{0, 0, 0}, 4, period_s, 0, false};
     const double h = 1e-6;

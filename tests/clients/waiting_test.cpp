@@ -1,4 +1,4 @@
-// Lines in which sonarctl reports what it waits for, without a network and without real waits.
+// Tests the lines in which sonarctl reports what it waits for, without a network and without real waits.
 #include "clients/sonarctl/waiting.hpp"
 
 #include <gmock/gmock.h>

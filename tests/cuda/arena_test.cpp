@@ -1,4 +1,4 @@
-// Memory of a batch: each byte that is copied back was written or cleared before, also those between the pieces.
+// Tests the memory of a batch: each byte that is copied back was written or cleared before, also between the pieces.
 #include "cuda/arena.hpp"
 
 #include <gtest/gtest.h>

@@ -56,7 +56,7 @@ def main():
         for pattern, by in changes:
             text, count = re.subn(pattern, lambda _, by=by: by, text)
             if count != 1:
-                sys.exit(f"{name}: the place of {by[:40]!r} is not there once, but {count} times")
+                sys.exit(f"{name}: the place of {by[:40]!r} is there {count} times, not once")
         if text == there:
             continue
         if "--check" in sys.argv[2:]:

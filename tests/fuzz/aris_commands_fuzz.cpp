@@ -1,5 +1,5 @@
-// Bytes of a controller to an ARIS, in two pieces, and a part of a frame. No input may crash the dialogue, cause an answer, or
-// lead to settings that no ping can have.
+// Fuzzes the bytes of a controller to an ARIS, in two pieces, and a part of a frame. No input may crash the dialogue, cause an
+// answer, or lead to settings that no ping can have.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

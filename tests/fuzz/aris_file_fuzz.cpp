@@ -1,4 +1,4 @@
-// .aris files with any content: the reader returns their frames as datagrams of a bounded size.
+// Fuzzes .aris files: the reader returns their frames as datagrams of a bounded size.
 #include "protocol/aris/aris_file.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

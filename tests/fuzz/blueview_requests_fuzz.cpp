@@ -1,4 +1,4 @@
-// Bytes of a host over the BlueView link, in two pieces. No input may crash the dialogue or cause unlimited answers.
+// Fuzzes the bytes of a host over the BlueView link, in two pieces. No input may crash the dialogue or cause unlimited answers.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>

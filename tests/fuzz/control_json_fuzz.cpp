@@ -1,5 +1,6 @@
-// Control requests in JSON, as sent over HTTP. The first line is the operation, and after a colon the sonar or object; the rest
-// is the message. An accepted message is converted to protobuf and back. A refusal is one sentence of our own, not of protobuf.
+// Fuzzes control requests in JSON, as sent over HTTP. The first line is the operation, and after a colon the sonar or object; the
+// rest is the message. An accepted message is converted to protobuf and back. A refusal is one sentence of our own, not of
+// protobuf.
 #include <cmath>
 #include <string_view>
 

@@ -1,4 +1,4 @@
-// ESRI ASCII grids, and the file with WKT (well-known text) beside them.
+// Fuzzes ESRI ASCII grids, and the file with WKT (well-known text) beside them.
 #include "core/scene/files/height_values.hpp"
 #include "tests/fuzz/heights.hpp"
 

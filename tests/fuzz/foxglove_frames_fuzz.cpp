@@ -1,4 +1,4 @@
-// Binary messages that viewers send: an accepted message is encoded to the same bytes again.
+// Fuzzes binary messages that viewers send: an accepted message is encoded to the same bytes again.
 #include <algorithm>
 
 #include "protocol/foxglove/foxglove_frames.hpp"

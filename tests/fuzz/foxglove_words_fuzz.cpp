@@ -1,5 +1,5 @@
-// JSON that viewers send. Accepted values are within their limits, and a refusal is one sentence; both can be sent back as a
-// status.
+// Fuzzes JSON that viewers send. Accepted values are within their limits, and a refusal is one sentence; both can be sent back as
+// a status.
 #include <nlohmann/json.hpp>
 #include <string_view>
 

@@ -19,7 +19,7 @@ inline void check(const Mesh& mesh) {
   }
 }
 
-/// Grids up to a few thousand heights are converted to meshes, too.
+/// Checks a grid. Grids of up to a few thousand heights are also converted to meshes.
 inline void check(const HeightGrid& grid) {
   require(grid.x.size() >= 2 && grid.y.size() >= 2 && grid.z_m.size() == grid.x.size() * grid.y.size());
   require(2 * grid.z_m.size() <= max_mesh_triangles);

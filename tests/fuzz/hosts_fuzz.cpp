@@ -1,5 +1,5 @@
-// Bytes of a sonar to the hosts of every make; each host gets each input. A piece is a port, a length in two bytes, and bytes. At
-// a port of kind http a piece is the body of a reply.
+// Fuzzes the bytes of a sonar to the hosts of every make. Each host gets each input. A piece is a port, a length in two bytes,
+// and bytes. At a port of kind http a piece is the body of a reply.
 #include <algorithm>
 #include <cstdlib>
 #include <span>

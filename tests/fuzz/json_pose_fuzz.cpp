@@ -1,4 +1,4 @@
-// JSON lines with poses, in two pieces. Accepted poses are usable; a refusal gives the reason; lines beyond the limit are
+// Fuzzes JSON lines with poses, in two pieces. Accepted poses are usable; a refusal gives the reason; lines beyond the limit are
 // reported.
 #include <cmath>
 

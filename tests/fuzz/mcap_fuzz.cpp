@@ -1,4 +1,4 @@
-// MCAP files with any content: every message is read, and replay paces the sonar's messages by their times.
+// Fuzzes MCAP files: every message is read, and replay paces the sonar's messages by their times.
 #include "daemon/commands/replay/replay_pace.hpp"
 #include "protocol/recording/mcap/mcap_session.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"

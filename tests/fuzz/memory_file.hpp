@@ -1,4 +1,4 @@
-// A file in memory with a name, for readers that accept only names.
+// A file in memory with a path, for readers that accept only paths.
 #pragma once
 
 #include <sys/mman.h>

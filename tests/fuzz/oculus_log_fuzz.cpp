@@ -1,4 +1,4 @@
-// .oculus log files and raw dumps with any content. A compressed item may contain a message of the maximum size.
+// Fuzzes .oculus log files and raw dumps. A compressed item may contain a message of the maximum size.
 #include "protocol/oculus/messages.hpp"
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/oculus/oculus_log.hpp"

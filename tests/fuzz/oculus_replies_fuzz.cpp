@@ -1,5 +1,5 @@
-// Bytes of a device to our driver-side decoder. The first byte is the length of the pieces; the rest is the stream. The test
-// reads every sample, gain and bearing that a decoded ping states, so that a sanitizer detects missing bytes.
+// Fuzzes the bytes of a device to our driver-side decoder. The first byte gives the length of the pieces; the rest is the stream.
+// The test reads every sample, gain and bearing that a decoded ping states, so that a sanitizer detects missing bytes.
 #include <algorithm>
 #include <cstdlib>
 

@@ -1,4 +1,4 @@
-// Bytes of a client to a whole Dialogue. The first byte is the length of the pieces; the rest is the stream.
+// Fuzzes the bytes of a client to a whole Dialogue. The first byte gives the length of the pieces; the rest is the stream.
 // Fails if a setting exceeds the model's limits, or if the replies are much longer than the requests.
 #include <algorithm>
 #include <cmath>

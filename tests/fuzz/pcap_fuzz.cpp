@@ -1,4 +1,4 @@
-// Capture files with any content: pcap and pcapng, including the messages of a sonar in them.
+// Fuzzes capture files: pcap and pcapng, including the messages of a sonar in them.
 #include "protocol/recording/pcap/pcap.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

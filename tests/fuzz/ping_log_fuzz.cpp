@@ -1,4 +1,4 @@
-// Logs of the ping protocol with any content: the reader returns their frames unchanged.
+// Fuzzes logs of the ping protocol: the reader returns their frames unchanged.
 #include "protocol/ping/ping_log.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

@@ -1,4 +1,4 @@
-// Datagrams with poses, in protobuf. Accepted poses are usable, and the same after encoding and decoding.
+// Fuzzes datagrams with poses, in protobuf. Accepted poses are usable, and the same after encoding and decoding.
 #include <cmath>
 
 #include "protocol/control/control.hpp"

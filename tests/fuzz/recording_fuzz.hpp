@@ -19,7 +19,7 @@ struct ReadThrough {
   bool damaged = false;
   bool operator==(const ReadThrough&) const = default;
 };
-/// The reader may return at most `most_bytes`.
+/// Reads to the end; the reader may return at most `most_bytes`.
 inline ReadThrough read_through(recording::RecordingReader& reader, std::uint64_t most_bytes) {
   ReadThrough read;
   while (const auto message = reader.next()) {

@@ -1,4 +1,4 @@
-// Scene files with any text: the result is a scene or a sentence that starts with the file's name.
+// Fuzzes scene files: the result is a scene or a sentence that starts with the file's name.
 // Texts are short and use no other files.
 #include <cstddef>
 #include <cstdint>

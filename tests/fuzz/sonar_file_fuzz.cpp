@@ -1,4 +1,4 @@
-// .sonar files with any content: the reader returns whole packets, wherever the search for the next one begins.
+// Fuzzes .sonar files: the reader returns whole packets, wherever the search for the next one begins.
 #include "protocol/waterlinked/sonar_file.hpp"
 #include "tests/fuzz/recording_fuzz.hpp"
 

@@ -1,4 +1,4 @@
-// Trajectory files with any text: the result is valid trajectories or a sentence that starts with the file's name.
+// Fuzzes trajectory files: the result is valid trajectories or a sentence that starts with the file's name.
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
@@ -28,7 +28,7 @@ void check(const Trajectory& way) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   ReadOptions options;
-  options.format = static_cast<Format>(size % 7 < 5 ? 0 : size % 5);  // in most cases the file names it
+  options.format = static_cast<Format>(size % 7 < 5 ? 0 : size % 5);  // usually automatic
   if (size % 3 != 0) options.frame = size % 2 == 0 ? Frame::enu_flu : Frame::ned_frd;
   if (size % 4 == 0) options.rate_hz = 10;
   const std::string_view text = size == 0 ? std::string_view() : std::string_view(reinterpret_cast<const char*>(data), size);

@@ -1,5 +1,5 @@
-// Requests to a Sonar 3D-15 (a path, a line end and a body) and a packet of images. No input may crash it or lead to settings
-// that no ping can have.
+// Fuzzes requests to a Sonar 3D-15 (a path, a line end and a body) and a packet of images. No input may crash it or lead to
+// settings that no ping can have.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

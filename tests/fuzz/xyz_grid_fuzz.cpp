@@ -1,4 +1,4 @@
-// Files of points, a line each, that are read as a grid of heights.
+// Fuzzes files of points, one per line, that are read as a grid of heights.
 #include "tests/fuzz/heights.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,4 +1,4 @@
-// Each figure is written to one file with all data for the table; without the folder nothing is written.
+// Tests that each figure is written to one file with all data for the table; without the folder nothing is written.
 #include "tests/reliability/record.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-"""The generated page shows every item: measured, missed or not run; unknown and malformed records are faults."""
+"""Tests that the generated page shows every item as measured, missed or not run; unknown and malformed records are faults."""
 import json
 import os
 import pathlib

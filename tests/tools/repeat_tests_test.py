@@ -1,4 +1,4 @@
-"""repeat_tests.sh names a test that fails in 2 of 100 runs."""
+"""Tests that repeat_tests.sh names a test that fails in 2 of 100 runs."""
 import os
 import pathlib
 import subprocess

@@ -1,4 +1,4 @@
-"""A Python host that forgets restype and argtypes: ctypes then cuts every handle to a C int, and every call must still work."""
+"""Tests a Python host without restype and argtypes: ctypes then cuts every handle to a C int, and every call must still work."""
 import ctypes
 import unittest
 

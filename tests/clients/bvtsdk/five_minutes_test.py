@@ -1,4 +1,4 @@
-"""docs/bvtsdk.md, "BlueView in five minutes": the text of the banner, the first picture, and the program as printed there."""
+"""Tests docs/bvtsdk.md, "BlueView in five minutes": the banner's text, the first picture, and the program as printed there."""
 import pathlib
 import re
 import signal

@@ -1,4 +1,4 @@
-// Pings for the tests, computed by simple formulas.
+// Pings for the tests, computed with simple formulas.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,5 @@
-"""The library prefixes as the build of a driver uses them: headers in every language, the two-line detector that distinguishes 3.x
-and 4.x, every function in the library and no other symbol, no foreign libraries, the CMake package and pkg-config."""
+"""Tests the library prefixes as a driver's build uses them: headers in every language, the two-line detector that distinguishes
+3.x and 4.x, every function in the library and no other symbol, no foreign libraries, the CMake package and pkg-config."""
 import os
 import pathlib
 import re
@@ -45,7 +45,7 @@ class Package(unittest.TestCase):
                                       suffix=".c" if c else ".cpp")
                     self.assertEqual(done.returncode, 0, done.stderr)
 
-    def test_the_detector_tells_the_generations(self):
+    def test_the_detector_distinguishes_the_generations(self):
         lines = {3: "BVTSonar_GetTemperature(0);", 4: "float x; BVTSonar_GetTemperature(0, &x);"}
         for abi in (3, 4):
             for generation, line in lines.items():
@@ -92,7 +92,7 @@ class Package(unittest.TestCase):
     def test_3x_handles_are_one_type_and_have_the_names_of_the_later_3x(self):
         mixed = """#include <bvt_sdk.h>
             int main(void) {
-              BVTHead head = BVTSonar_Create();  /* kept in a variable of another kind, as void* once allowed */
+              BVTHead head = BVTSonar_Create();  /* kept in a variable of another type, as void* once allowed */
               BVTPing ping = 0;
               int code = BVTHead_GetPing(head, -1, &ping);
               BVTSonar_Destroy(head);
@@ -112,7 +112,7 @@ class Package(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertEqual(subprocess.run([pathlib.Path(self.folder.name) / "source.out"], check=False).returncode, code)
 
-    def test_cmake_and_pkg_config_find_them(self):
+    def test_cmake_and_pkg_config_find_the_prefixes(self):
         plain = {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
         for abi in (3, 4):
             moved = pathlib.Path(self.folder.name) / f"moved{abi}"

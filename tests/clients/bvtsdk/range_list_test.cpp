@@ -52,7 +52,7 @@ TEST(RangeList, NamesBearingsFromTheLeftEdge) {
   EXPECT_NEAR(list.range_resolution_m, 0.1, 1e-6);
 }
 
-TEST(RangeList, TakesTheStrongestOrTheNearest) {
+TEST(RangeList, SelectsTheStrongestOrTheNearest) {
   RangeListSettings settings;
   settings.threshold = 1000;
   EXPECT_NEAR(list_of(two_echoes(), settings).range_m[3], 1 + 50.5 * 0.1, 1e-4);
@@ -63,7 +63,7 @@ TEST(RangeList, TakesTheStrongestOrTheNearest) {
   EXPECT_EQ(nearest.valid_count(), 1);
 }
 
-TEST(RangeList, TakesOnlyWhatIsAboveTheThreshold) {
+TEST(RangeList, UsesOnlySamplesAboveTheThreshold) {
   RangeListSettings settings;
   settings.threshold = 39999;
   EXPECT_EQ(list_of(two_echoes(), settings).valid_count(), 1);

@@ -1,4 +1,4 @@
-"""The call-sequence programs of programs/, one after the other, against a live daemon with the L targets in front of it."""
+"""Runs the call-sequence programs of programs/, one after the other, against a live daemon with the L targets in front of it."""
 import pathlib
 import tempfile
 import unittest

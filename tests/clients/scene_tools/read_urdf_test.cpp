@@ -19,7 +19,7 @@ std::string joint(const std::string& name, const std::string& parent, const std:
          "'/>" + origin + "</joint>\n";
 }
 
-TEST(ReadUrdf, LinksHangOnTheirJointsAtZero) {
+TEST(ReadUrdf, LinksArePlacedByTheirJointsAtZero) {
   Reading r;
   const auto world =
       r.read(robot(joint("b", "upper", "hand", "<origin xyz='1 0 0'/>", "continuous") + part("base") +

@@ -1,4 +1,4 @@
-// Worlds read from text, with a library of made-up files instead of a disk. Used by the tests of the importer's readers.
+// Reads worlds from text, with a library of made-up files instead of a disk, for the tests of the importer's readers.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -58,7 +58,7 @@ TEST(WriteScene, MovingModelsCarryTheirParts) {
   EXPECT_THAT(carried, Not(HasSubstr("standing still")));
 }
 
-TEST(WriteScene, AnglesComeBackAsTheyWere) {
+TEST(WriteScene, WrittenAnglesGiveTheSameRotation) {
   for (const double pitch : {0.0, 0.3, -1.2, pi / 2, -pi / 2, pi / 2 - 1e-7})
     for (const double roll : {0.0, 2.0, -3.1})
       for (const double yaw : {0.0, 1.0, -2.5}) {

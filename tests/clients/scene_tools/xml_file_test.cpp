@@ -5,7 +5,7 @@
 namespace sonar::scene_tools {
 namespace {
 
-TEST(XmlFile, ElementsKnowTheirLinesAndAbsentOnesAreEmpty) {
+TEST(XmlFile, ElementsHaveTheirLinesAndAbsentOnesAreEmpty) {
   const auto file = parse_xml("<a>\n  <b c=' d '> text\n</b></a>", "x.sdf", "x");
   ASSERT_TRUE(file);
   EXPECT_EQ((*file)->elements, 2u);
@@ -20,7 +20,7 @@ TEST(XmlFile, ElementsKnowTheirLinesAndAbsentOnesAreEmpty) {
   EXPECT_TRUE(none.children().empty());
 }
 
-TEST(XmlFile, RefusesWhatIsTooLargeOrNoText) {
+TEST(XmlFile, RefusesFilesThatAreTooLargeOrNotText) {
   EXPECT_THAT(parse_xml(std::string(max_xml_bytes + 1, ' '), "x", "x").error().text, ::testing::HasSubstr("16 MiB"));
   EXPECT_THAT(parse_xml(std::string("<a>\0</a>", 8), "x", "x").error().text, ::testing::HasSubstr("not a text file"));
   EXPECT_THAT(parse_xml("<!-- nothing -->", "x", "x").error().text, ::testing::HasSubstr("x:1: "));

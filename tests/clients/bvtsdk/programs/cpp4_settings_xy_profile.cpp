@@ -1,4 +1,5 @@
-// 4.x, C++ classes: settings one by one, then ping, XY image, colours, range profile, over and over, as a ROS node does.
+// A program for 4.x with C++ classes. It changes settings one by one, then repeats ping, XY image, colours and range profile,
+// as a ROS node does.
 // usage: cpp4_settings_xy_profile ADDRESS COLORMAPS
 #include <chrono>
 #include <vector>

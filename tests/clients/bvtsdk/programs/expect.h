@@ -1,5 +1,5 @@
-/* What the call-sequence programs share: checks that end the program, and the targets of scenes/l-targets.yaml where they
- * must appear. Valid C99 and C++98, for both interfaces: BVT_ABI says which. */
+/* Shared by the call-sequence programs: checks that end the program, and the targets of scenes/l-targets.yaml where they
+ * must appear. Valid C99 and C++98, for both interfaces; BVT_ABI selects one. */
 #pragma once
 
 #include <bvt_sdk.h>
@@ -32,13 +32,13 @@
     }                                                                                            \
   } while (0)
 
-/* Nearest points of the spheres, m and degrees clockwise from ahead, and a sector that holds this one alone. */
+/* The nearest point of a sphere, m and degrees clockwise from ahead, and a sector that contains only this sphere. */
 typedef struct {
   double range_m, bearing_deg, from_deg, to_deg;
 } Target;
 static const Target targets[3] = {{3.9, -20, -30, -14}, {3.9, 10, 2, 20}, {6.9, -8, -12, -4}};
 
-/* Best so far of a search in the sectors of the targets. */
+/* The strongest sample found so far in the sector of a target. */
 typedef struct {
   double strength, range_m, bearing_deg;
 } Found;
@@ -77,7 +77,7 @@ static inline void expect_targets_in_image(const char* where, BVTMagImage image)
   EXPECT_OK(BVTMagImage_GetBits(image, &bits));
 #endif
   EXPECT(height > 0 && width > 0 && bits);
-  EXPECT(height * width <= 1000000); /* drivers keep four bytes a pixel on their stack */
+  EXPECT(height * width <= 1000000); /* drivers keep four bytes per pixel on their stack */
   for (row = 0; row < height; ++row)
     for (col = 0; col < width; ++col) {
       const double strength = bits[(size_t)row * (size_t)width + (size_t)col];
@@ -85,7 +85,7 @@ static inline void expect_targets_in_image(const char* where, BVTMagImage image)
       look(found, strength, BVTMagImage_GetPixelRange(image, row, col), BVTMagImage_GetPixelRelativeBearing(image, row, col));
 #else
       double range_m, bearing_deg;
-      if (strength < 2000) continue; /* spares most of two calls a pixel */
+      if (strength < 2000) continue; /* avoids two calls for most pixels */
       EXPECT_OK(BVTMagImage_GetPixelRange(image, row, col, &range_m));
       EXPECT_OK(BVTMagImage_GetPixelRelativeBearing(image, row, col, &bearing_deg));
       look(found, strength, range_m, bearing_deg);
