@@ -1,4 +1,4 @@
-// Settings overrides of the control protocol: they have the same effect as the request of a vendor's client.
+// Tests the settings overrides of the control protocol: they must have the same effect as the request of a vendor's client.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,8 +45,8 @@ TEST(Overrides, AreRefusedWithThePermittedRangeOfEachProduct) {
     for (const auto& model : vendor->models()) {
       SCOPED_TRACE(model->profile);
       const protocol::DeviceState device = device_of(model->profile);
-      const auto why = [&](const protocol::SettingsOverride& asked) {
-        const auto change = vendor->apply_override(asked, device);
+      const auto why = [&](const protocol::SettingsOverride& requested) {
+        const auto change = vendor->apply_override(requested, device);
         return change ? std::string() : change.error().text;
       };
       std::smatch found;
@@ -138,13 +138,13 @@ TEST(OculusOverride, EqualsTheFireMessageOfADriver) {
 
   const auto change = oculus().apply_override(set().range(7.5).rate(14).gain(30), device);
   ASSERT_TRUE(change) << change.error().text;
-  const oculus::FireRequest asked = oculus::fire_of(change->vendor_settings.get());
-  EXPECT_EQ(asked.settings.range, 7.5);
-  EXPECT_EQ(asked.settings.ping_rate, oculus::PingRate::hz15) << "the nearest rate of the table";
-  EXPECT_EQ(asked.settings.gain_percent, 30);
-  EXPECT_EQ(asked.settings.gamma, 99) << "unset fields stay";
-  EXPECT_EQ(asked.settings.sound_speed_mps, 1488);
-  EXPECT_TRUE(asked.settings.flags & oculus::flag::network_trigger);
+  const oculus::FireRequest requested = oculus::fire_of(change->vendor_settings.get());
+  EXPECT_EQ(requested.settings.range, 7.5);
+  EXPECT_EQ(requested.settings.ping_rate, oculus::PingRate::hz15) << "the nearest rate of the table";
+  EXPECT_EQ(requested.settings.gain_percent, 30);
+  EXPECT_EQ(requested.settings.gamma, 99) << "unset fields stay";
+  EXPECT_EQ(requested.settings.sound_speed_mps, 1488);
+  EXPECT_TRUE(requested.settings.flags & oculus::flag::network_trigger);
   EXPECT_EQ(change->settings.range_m, 7.5);
   EXPECT_FLOAT_EQ(change->settings.rate_hz, 15);
   EXPECT_TRUE(change->settings.triggered);
@@ -193,8 +193,8 @@ TEST(OculusOverride, SampleBitsAndRowGainsAreFlags) {
 
 TEST(OculusOverride, SettingsBeyondTheProductAreRefusedWithThePermittedOnes) {
   const protocol::DeviceState device = oculus_device();
-  const auto why = [&](const protocol::SettingsOverride& asked) {
-    const auto change = oculus().apply_override(asked, device);
+  const auto why = [&](const protocol::SettingsOverride& requested) {
+    const auto change = oculus().apply_override(requested, device);
     return change ? "" : change.error().text;
   };
   EXPECT_THAT(why(set().range(11)), HasSubstr("0.1 to 10 m"));
@@ -223,8 +223,8 @@ TEST(BlueViewOverride, EqualsTheSettingsOfAHost) {
 
 TEST(BlueViewOverride, SettingsBeyondTheProductAreRefusedWithThePermittedOnes) {
   const protocol::DeviceState device = blueview::test::device();
-  const auto why = [&](const protocol::SettingsOverride& asked) {
-    const auto change = blueview::vendor().apply_override(asked, device);
+  const auto why = [&](const protocol::SettingsOverride& requested) {
+    const auto change = blueview::vendor().apply_override(requested, device);
     return change ? "" : change.error().text;
   };
   EXPECT_THAT(why(set().range(1000)), HasSubstr("not 1000 m (stop_range)"));

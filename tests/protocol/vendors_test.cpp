@@ -1,4 +1,4 @@
-// The list of vendors: profiles by name, checks of options, and errors that suggest the nearest valid name.
+// Tests the list of vendors: profiles by name, checks of options, and errors that suggest the nearest valid name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ TEST(Profiles, AreFoundByName) {
   EXPECT_EQ(profile->model->part_number, 1042);
 }
 
-TEST(Profiles, MistakesNameTheNearest) {
+TEST(Profiles, ErrorsNameTheNearest) {
   const auto profile = protocol::find_profile("oculus-m1200");
   ASSERT_FALSE(profile.has_value());
   EXPECT_EQ(profile.error().kind, ErrorKind::config);
@@ -107,7 +107,7 @@ TEST(Options, WholeNumbersHaveNoFraction) {
   EXPECT_THAT(whole, testing::UnorderedElementsAre("device_type", "header_bytes", "datagram_bytes"));
 }
 
-/// A number beyond its limits is refused; no nearer one is used in its place.
+/// A number beyond its limits is refused, not replaced with the nearest limit.
 TEST(Options, EveryNumberHasLimits) {
   int numbers = 0;
   for (const protocol::Vendor* vendor : protocol::vendors()) {
@@ -139,7 +139,7 @@ TEST(Options, NumbersMustBeNumbers) {
   }
 }
 
-// The case P1 of the benchmarks.
+// The preset is the case P1 of the benchmarks.
 TEST(BlueView, PresetIsTheBenchmarksCase) {
   const auto& model = *blueview::models().front();
   const FrequencyMode& mode = model.modes.front();

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares with a real device: three captured pings of an M1200d beside renderings of the same scene, in a table and a picture.
+"""Compares three captured pings of a real M1200d with renderings of a similar scene, in a table and a picture.
 
 Statistics need only the standard library, the picture needs matplotlib. Writes capture.png into --out-dir and prints the chapter.
 The captures stay where they are: tests and this script read them from the folder that SONARD_CAPTURES names.
@@ -184,8 +184,8 @@ def sector_mean(image, first, last, beams):
 
 
 def beam_statistics(pings):
-    """Returns the differences between beams, and what stays equal from ping to ping."""
-    one, two = pings[-1], pings[-2]  # the profile is fitted to the others
+    """Returns name -> value: differences between beams, shares that change from ping to ping, and the leak by rows."""
+    one, two = pings[-1], pings[-2]  # the profile is fitted to all pings but the last
     edges, middle = {*range(24), *range(232, 256)}, range(100, 156)
     out = {f"{name}, edges over middle": sector_mean(one, *at, edges) / sector_mean(one, *at, middle)
            for name, at in (("near floor", (20, 61)), ("far noise", NOISE))}
@@ -202,7 +202,7 @@ def beam_statistics(pings):
 
 def statistics(pings):
     """Returns name -> value, in the order of the table."""
-    one, two = pings[-1], pings[-2]  # the profile is fitted to the others
+    one, two = pings[-1], pings[-2]  # the profile is fitted to all pings but the last
     ordered = sorted(one)
     out = {f"percentile {p}": percentile(ordered, p) for p in (1, 5, 25, 50, 75, 95, 99)}
     out["mean"] = mean(one)
@@ -227,7 +227,7 @@ def statistics(pings):
 
 
 def off_by(real, ours):
-    """Returns name -> relative deviation of ours, of a correlation or skewness re SMALLEST_CORRELATION at least."""
+    """Returns name -> relative deviation of ours; for a correlation or skewness relative to at least SMALLEST_CORRELATION."""
     out = {}
     for name, value in real.items():
         scale = max(abs(value), SMALLEST_CORRELATION) if "apart" in name or "skewness" in name else abs(value)

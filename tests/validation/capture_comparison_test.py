@@ -15,7 +15,7 @@ def picture(seed, amid=60):
 
 
 class Statistics(unittest.TestCase):
-    def test_white_noise_has_its_statistics(self):
+    def test_white_noise_has_the_expected_statistics(self):
         figures = comparison.statistics([picture(1), picture(2)])
         self.assertAlmostEqual(figures["percentile 50"], 60, delta=1)
         self.assertAlmostEqual(figures["mean"], 59.5, delta=0.3)

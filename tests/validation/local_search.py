@@ -6,12 +6,12 @@ import page
 from runs import db
 from texts import table
 
-DENSE_ROWS = 20000  # rays per column; with more rays the fan does not change here
+DENSE_ROWS = 20000  # rays per column; more rays do not change the result
 FAN_DEG, TILT_DEG, HEIGHT_M = 20.0, 14.3239, 2.0
 
 
 def elevation_of_bed(ping):
-    """Returns the angle of the level bed in each bin of flat beams [rad]; NaN in bins without bed."""
+    """Returns the elevation of the level bed in each bin of flat beams [rad]; NaN in bins without bed."""
     tilt = np.radians(TILT_DEG)
     r, azimuth = np.meshgrid(ping.range, ping.azimuth, indexing="ij")
     # In the sonar's axes the bed is at x sin(tilt) - z cos(tilt) = h. Therefore a cos(phi) - b sin(phi) = h / r.
@@ -22,7 +22,7 @@ def elevation_of_bed(ping):
 
 
 def share_of_limit(sonard, *arguments):
-    """Compares a mode with itself at many rays: number of bins, percentage of them within 1 dB, largest difference."""
+    """Compares a mode with itself at many rays. Returns the number of bins, the share within 1 dB, and the worst difference."""
     some, = sonard.expected("flat-sand", *arguments)
     mode = arguments[arguments.index("--mode") + 1]
     limit, = sonard.expected("flat-sand", "--mode", mode, "--fixed-fan", DENSE_ROWS)

@@ -8,7 +8,7 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[1] / "oracles" / "oracle_table
 
 
 def chapter(folder, partial=False):
-    """Returns the table of a test run, or None without one. Refuses an incomplete run; with `partial`, only notes it there."""
+    """Returns the table of a test run, or None without one. Refuses an incomplete run; with `partial`, the chapter states it."""
     if folder is None or not any(pathlib.Path(folder).glob("*.jsonl")):
         return None
     done = subprocess.run([sys.executable, str(SCRIPT), str(folder), "--markdown"], capture_output=True, text=True, check=False)

@@ -11,7 +11,7 @@ LARGEST_PICTURE = 150_000  # bytes
 
 
 def save(figure, path):
-    """Makes a PNG of few colours, because speckle does not compress otherwise."""
+    """Saves a PNG with few colours, because speckle compresses badly otherwise."""
     from PIL import Image
 
     figure.savefig(path, dpi=100, bbox_inches="tight", metadata={"Software": None})

@@ -1,4 +1,4 @@
-"""Measures the cost of each part of the model: only this part is on and off, in the format for 20 pings/s."""
+"""Measures the cost of each part of the model: the part alone is switched on and off, in the format for 20 pings/s."""
 
 import os
 

@@ -29,7 +29,7 @@ def too_dark(level_db, reference_db):
 
 
 def dark_floor(ping, reference, plate_m):
-    """Returns the share of the floor's bins that lie more than 6 dB below the default's level, both re their own mean."""
+    """Returns the share of the floor's bins that lie more than 6 dB below the default's level, each relative to its own mean."""
     rows, beams = floor_of(ping, plate_m)
     nearest = [reference.beam_at(a) for a in ping.azimuth[beams]]
     ours, theirs = ping.power[rows][:, beams], reference.power[rows][:, nearest]
@@ -37,8 +37,8 @@ def dark_floor(ping, reference, plate_m):
 
 
 def predicted(rows, is_raster, range_m):
-    """Predicts the share straight ahead. Each row meets the flat floor at height / sin(depression) and makes one pulse there,
-    with the power of its patch. The reference has enough rows for a whole floor."""
+    """Predicts the share of dark floor straight ahead. Each row meets the flat floor at height / sin(depression) and makes one
+    pulse there, with the power of its patch. The reference has enough rows for a whole floor."""
     def level_db(count):
         half = np.radians(HALF_FAN_DEG)
         top = np.tan(half) if is_raster else half

@@ -1,4 +1,4 @@
-"""Runs the program for the validation page: pings by `sonard render`, times by `sonard_bench`. It contains no acoustics."""
+"""Runs the program for the validation page: pings with `sonard render`, times with `sonard_bench`. It contains no acoustics."""
 
 import json
 import pathlib
@@ -72,7 +72,7 @@ class Sonard:
             shutil.rmtree(folder)
 
     def expected(self, scene, *arguments, text=None):
-        """Returns the pings' mean power, not one draw of speckle; without noise."""
+        """Returns the pings with mean power instead of one draw of speckle, and without noise."""
         return list(self.pings_of(scene, "--expected-power", "--noise", "off", *arguments, text=text))
 
     def coverage(self, scene, *arguments):

@@ -24,7 +24,7 @@ def first_number(cell):
 
 
 def share_of_tolerance(expected, measured, tolerance):
-    """Returns how much of its tolerance a measurement uses, from cells of the oracles' table: over 1 is out, 0 is exact."""
+    """Returns how much of its tolerance a measurement uses, from cells of the oracles' table: 0 is exact, above 1 is out."""
     limit, value = first_number(expected), first_number(measured)
     if math.isnan(value):
         return math.inf
@@ -32,11 +32,11 @@ def share_of_tolerance(expected, measured, tolerance):
         off = abs(value - limit)
         allowed = 0 if tolerance == "exact" else first_number(tolerance)
         return off / allowed if allowed else (math.inf if off else 0)
-    if expected.startswith("at least"):  # for shares: the part that is missing to the whole
+    if expected.startswith("at least"):  # for shares: compares the parts that are missing from the whole
         whole = 100 if "%" in expected else 1
         missing = whole - value
         return missing / (whole - limit) if whole > limit else (math.inf if missing > 0 else 0)
-    return max(0, value / limit) if limit > 0 else limit / value  # below
+    return max(0, value / limit) if limit > 0 else limit / value  # "below"
 
 
 def times_of(what):
@@ -45,7 +45,7 @@ def times_of(what):
 
 
 def oracle_rows(text):
-    """Returns a row for each group (its measurement closest to the tolerance), the measurements, and those out of tolerance."""
+    """Returns a row per group (its measurement closest to the tolerance), and how many measurements and rows out of tolerance."""
     (_, records), = tables_of(text)
     measured = [r for r in records if r[5] in ("yes", "NO")]
     rows = []

@@ -9,8 +9,8 @@ from texts import table, with_seeds, with_step
 PINGS = 100
 READINGS = ["HF, rod lying square (calibration)", "HF, rod upright", "LF, rod lying, yawed 15 degrees", "LF, rod upright, tilted across",
             "LF, rod upright, tilted away"]
-# An integration of the model's eq. (5) and (6) that was made independently of this program: peak of LF minus peak of HF in 2.5
-# mm bins, without absorption, and the HF reading to which each belongs.
+# From an integration of the model's eq. (5) and (6) that was made independently of this program: LF reading -> its HF reading,
+# and the peak of LF minus that of HF, in 2.5 mm bins without absorption.
 PREDICTED_PEAK_DB = {2: (0, 0.5), 3: (1, 1.2), 4: (1, -6.1)}
 PREDICTED_TOTAL_DB = [-24.06, -21.86, -22.11, -18.98, -19.13]
 ROD_M, WALL_M = (0.40, 0.70), (1.35, 1.75)
@@ -18,7 +18,7 @@ FRONT_M, MU_DB = 0.5, -10
 
 
 def along_centre(pings):
-    """Returns the mean power of the beam straight ahead, over pings of one kind."""
+    """Returns the last of these pings of one kind, and the mean power of their beams straight ahead."""
     total = 0
     for count, ping in enumerate(pings, 1):
         total = total + ping.power[:, ping.beam_at()]

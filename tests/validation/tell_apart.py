@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Tells captured pings of an M1200d from those of like-the-capture.yaml by the texture of small patches.
+"""Distinguishes captured pings of an M1200d from renderings of like-the-capture.yaml by the texture of small patches.
 The closer the accuracy is to one half, the more alike are the pictures.
 
 usage: tell_apart.py --program SONARD [--captures FOLDER]
-A random forest sees patches of 32 rows x 32 beams, half of them captured. It is judged on what it has not seen: a ping (trained on
-the other two) or a sector of the fan (trained on the other seven). Texture features do not change when a patch gets brighter; with
-"all" the forest sees brightness too. The control is the same test between two seeds of sonard. "Another bed" is a scene in which
-nothing is placed or set after the recording. Needs python3-sklearn.
+A random forest classifies patches of 32 rows x 32 beams, half of them captured. The tested patches are from a ping (training uses
+the other two) or a sector of the fan (training uses the other seven). Texture features do not depend on the brightness; "all features"
+do. The control is the same test between two seeds of sonard. "Another bed" is the scene with another seed of relief,
+without drifting objects, and with the product's own pulse and noise. Needs python3-sklearn.
 """
 import argparse
 import os
@@ -22,7 +22,7 @@ RESAMPLES = 1000
 SEEDS = 101, 202  # seeds of the speckle; the second is for the control
 BANDS = (0, 32), (32, 160), (160, 288), (288, 448), (448, 672)  # rows: leak, near floor, before the bed, bed, beyond it
 NEAR_FLOOR = BANDS[1]
-FITTED = "type: point", "pulse_width_m:", "noise_width:"  # what drifts, and settings that replace the product's
+FITTED = "type: point", "pulse_width_m:", "noise_width:"  # drifting objects, settings that replace the product's
 
 
 def missing():
@@ -115,7 +115,7 @@ def patches(pings):
     return np.array(table), np.array(places), names
 
 
-LEVELS = 4  # number of last features, those of level_features
+LEVELS = 4  # number of features from level_features, which are the last ones
 
 
 def forest(seed=1):
@@ -125,7 +125,7 @@ def forest(seed=1):
 
 
 def told_apart(ours, theirs, unseen):
-    """Returns right or wrong for each patch. `unseen`: column of the places that training leaves out, 0 ping or 2 sector."""
+    """Returns whether each patch is classified correctly. Training leaves out a ping (`unseen` 0) or a sector (`unseen` 2)."""
     import numpy as np
 
     features = np.vstack([ours[0], theirs[0]])
@@ -139,7 +139,7 @@ def told_apart(ours, theirs, unseen):
 
 
 def interval(right, places):
-    """Returns the mean and its 95 % interval, by bootstrap over the patches' places: the pings of one place are alike."""
+    """Returns the mean and its 95 % interval, by bootstrap over the patches' places, because the pings of one place are alike."""
     import numpy as np
 
     keys = np.unique(places[:, 1:], axis=0, return_inverse=True)[1].ravel()
@@ -165,7 +165,7 @@ def of_rows(patch_set, first, last):
 
 
 def best_features(ours, theirs, names, count=5):
-    """Returns the features that separate best alone: accuracy of the best threshold on each, over all patches."""
+    """Returns the features that separate best alone: (accuracy of the best threshold over all patches, name, two medians)."""
     import numpy as np
 
     truth = np.concatenate([np.zeros(len(ours[0])), np.ones(len(theirs[0]))])

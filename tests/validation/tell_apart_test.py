@@ -1,4 +1,4 @@
-"""Tests the classifier of captured and simulated pings with made-up pictures: it separates only different ones."""
+"""Tests the classifier of captured and simulated pings with made-up pictures: it distinguishes only different ones."""
 import os
 import random
 import unittest
@@ -15,7 +15,7 @@ except ImportError:
 
 
 def pings(seed, smooth=False, rows=slice(None)):
-    """Returns three pictures of noise. In the rows `smooth`, a sample is the mean of two rows."""
+    """Returns three pictures of noise. If `smooth`, each sample in `rows` is the mean of two rows."""
     draw = numpy.random.default_rng(seed)
     out = []
     for _ in range(comparison.PINGS):
@@ -36,7 +36,7 @@ class Skipping(unittest.TestCase):
 
 
 class Scenes(unittest.TestCase):
-    def test_another_bed_has_nothing_of_the_fit(self):
+    def test_another_bed_has_no_fitted_lines(self):
         fitted, another = tell_apart.scene_like_the_recording(), tell_apart.scene_of_another_bed()
         for mark in tell_apart.FITTED:
             self.assertIn(mark, fitted)
@@ -84,7 +84,7 @@ class Classifier(unittest.TestCase):
         self.assertTrue(all(share > 0.9 for *_, share in told), told)
         self.assertTrue(all(share < 0.8 for *_, share in alike), alike)
 
-    def test_features_of_the_near_floor_are_of_its_rows_alone(self):
+    def test_features_of_the_near_floor_use_only_its_rows(self):
         near = slice(*tell_apart.NEAR_FLOOR)
         ours, theirs = (tell_apart.patches(p) for p in (pings(1, smooth=True, rows=near), pings(2)))
         rows = [tell_apart.of_rows(one, *tell_apart.NEAR_FLOOR) for one in (ours, theirs)]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The texts behind docs/validation.md and its tables, and that their render files can be rendered. Needs no matplotlib and no numpy."""
+"""Tests the texts of docs/validation.md and its tables, and that their render files are valid. Needs no matplotlib or numpy."""
 
 import contextlib
 import functools
@@ -31,7 +31,7 @@ SWEPT = "name: a\nsweep:   # two\n  mode: [2, 1]  # one, two\n  yaw: [0, 15]\n\n
 
 
 class Texts(unittest.TestCase):
-    def test_a_sweep_with_seeds_does_every_step_with_every_seed(self):
+    def test_a_sweep_with_seeds_repeats_every_step_with_every_seed(self):
         text = with_seeds(SWEPT, 3)
         self.assertIn("  mode: [2, 2, 2, 1, 1, 1]\n", text)
         self.assertIn("  yaw: [0, 0, 0, 15, 15, 15]\n", text)
@@ -68,7 +68,7 @@ class Oracles(unittest.TestCase):
         self.assertIsNone(oracles.chapter(None))
         self.assertIsNone(oracles.chapter(self.folder.name))
 
-    def test_part_of_a_run_is_refused_unless_asked_for(self):
+    def test_an_incomplete_run_is_refused_unless_partial_is_given(self):
         self.record([9, 46])
         with self.assertRaisesRegex(RuntimeError, "2 of 46"):
             oracles.chapter(self.folder.name)
@@ -139,7 +139,7 @@ class Summary(unittest.TestCase):
         return {"oracles": table(oracle_table.HEAD, rows)}
 
     def test_the_page_of_the_tree_has_every_chapter(self):
-        """The page has the summary's lines and headings; its values come from the run that wrote it."""
+        """Compares headings and title; the page's values come from the run that wrote it."""
         def names(page):
             return [line for line in page.splitlines() if line.startswith("#")]
 
@@ -147,7 +147,7 @@ class Summary(unittest.TestCase):
         self.assertEqual(names(page), names(summary.page_of(self.chapters())))
         self.assertTrue(page.startswith(summary.TITLE))
         self.assertNotIn("Out of tolerance", page)
-        self.assertLess(len(page.split()), 840, "it is one page")
+        self.assertLess(len(page.split()), 840, "longer than one page")
 
     def test_tables_and_summary_are_written_and_read_again(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -162,11 +162,11 @@ class Summary(unittest.TestCase):
             self.assertEqual(page.read_text(encoding="utf-8"), summary.page_of(read))
             self.assertEqual((page.with_suffix("") / summary.PICTURE_FILE).read_bytes(), b"picture")
 
-    def test_the_near_floor_has_its_aim(self):
+    def test_the_summary_has_the_aim_for_the_near_floor(self):
         self.assertIn("| the same, near floor only | guessing | 72.4 % (most by: samples of neighbouring beams) | "
                       "aim: at most 65 % |", summary.page_of(self.chapters()))
 
-    def test_without_a_chapter_the_summary_stays(self):
+    def test_without_a_chapter_the_summary_is_kept(self):
         with tempfile.TemporaryDirectory() as folder:
             page = pathlib.Path(folder, validate.PAGE.name)
             page.write_text("before", encoding="utf-8")
@@ -263,7 +263,7 @@ class RenderFiles(unittest.TestCase):
             self.assertEqual(result["rays"], 8 * 512)
             self.assertGreater(result["thread_ms"]["synthesize"], 0)
 
-    def test_the_benchmark_takes_the_switches_and_gives_what_is_missing(self):
+    def test_the_benchmark_uses_the_switches_and_adds_missing_parts(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder, "bench.json")
             done = subprocess.run([SONARD_BENCH, "--case", "P3c", "--scene", "demo", "--pings", "1", "--specular", "off", "--give",
@@ -274,7 +274,7 @@ class RenderFiles(unittest.TestCase):
             self.assertFalse(result["switches"]["specular"])
             self.assertTrue(result["switches"]["multipath"])
             self.assertTrue(result["switches"]["noise"])
-            self.assertEqual(result["parts_had"], ["texture", "leak"])  # of their own
+            self.assertEqual(result["parts_had"], ["texture", "leak"])  # those of scene and sonar
 
 
 if __name__ == "__main__":

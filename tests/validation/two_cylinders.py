@@ -26,7 +26,7 @@ def peak_near(ping, range_m):
 
 
 def floor_gaps(ping, reference):
-    """Returns the share of bins with tank floor that lie more than 6 dB below the default's level, each re its own mean."""
+    """Returns the share of tank floor bins that lie more than 6 dB below the default's level, both relative to their means."""
     r = ping.range
     rows = (r > 4.75) & (r < 5.15)  # the comparison modes' fan covers no shorter ranges
     wide = (np.abs(np.degrees(ping.azimuth)) > 8) & (np.abs(np.degrees(ping.azimuth)) < 25)
@@ -37,8 +37,8 @@ def floor_gaps(ping, reference):
 
 
 def likeness(a, b):
-    """Compares two pictures where either's expected power is within 40 dB of its brightest (30 log r). Subtracts their median
-    difference; returns the share of these bins within 3 dB of each other, and the median distance."""
+    """Compares two pictures in the bins where one has expected power (plus 30 log r) within 40 dB of its maximum. Subtracts their
+    median difference; returns the share of these bins within 3 dB of each other, and the median distance."""
     levels = [db(p.power) + 30 * np.log10(p.range)[:, None] for p in (a, b)]
     seen = (levels[0] > levels[0].max() - 40) | (levels[1] > levels[1].max() - 40)
     off = (levels[0] - levels[1])[seen]

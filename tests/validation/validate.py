@@ -3,7 +3,7 @@
 
 usage: validate.py --program SONARD [--oracles FOLDER] [--partial] [--tables FOLDER] [--page FILE] [--only CHAPTER ...]
        validate.py --summary [--tables FOLDER] [--page FILE]
-  --oracles   records of a test run (build/release/oracles after ./test.sh); without them the tables keep their chapter
+  --oracles   records of a test run (build/release/oracles after ./test.sh); without them the tables keep the old chapter
   --partial   accept records in which oracles are missing or out of tolerance; the chapter states it
   --tables    folder for the tables and their pictures (build/validation)
   --page      the summary, written when the tables have every chapter of it; its picture goes into the folder `validation` beside it
@@ -113,7 +113,7 @@ def make(options):
     tables.parent.mkdir(parents=True, exist_ok=True)
     before = chapters_of(tables.read_text(encoding="utf-8")) if tables.is_file() else {}
     sonard = Sonard(options.program.resolve())
-    # These arguments are refused before the slow work begins.
+    # Wrong arguments are refused before the slow work begins.
     table_of_oracles = oracles.chapter(options.oracles, options.partial) if not options.only or "oracles" in options.only else None
     makers = makers_of(sonard, tables.parent, table_of_oracles)
     unknown = set(options.only or []) - set(makers)

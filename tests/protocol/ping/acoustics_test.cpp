@@ -1,5 +1,5 @@
-// Pings of a Ping360, an Omniscan, a Surveyor, a Ping1D and an S500 with bodies at known positions, computed with the engine and
-// compared with closed forms.
+// Tests pings of a Ping360, an Omniscan, a Surveyor, a Ping1D and an S500 with bodies at known positions, computed with the
+// engine and compared with closed forms.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -24,7 +24,7 @@ struct Scanner {
   explicit Scanner(std::shared_ptr<const Scene> scene, double speed_mps = 1500, protocol::OptionValues options = {})
       : state(device("ping360", options)) {
     state.water.sound_speed_mps = speed_mps;
-    const PingSettings s = ping360::ping_settings(ping360::settings_of(asked), state);
+    const PingSettings s = ping360::ping_settings(ping360::settings_of(transducer), state);
     sounding = std::make_unique<Sounding>(scene, state.model->modes[0], s);
     sounding->request.water = state.water;
   }
@@ -45,7 +45,7 @@ struct Scanner {
     return best;
   }
 
-  Transducer asked{1, 0, 0, 10, 88, 750, 1200, 1, 0};  // 1.65 mm per sample at 1500 m/s
+  Transducer transducer{1, 0, 0, 10, 88, 750, 1200, 1, 0};  // 1.65 mm per sample at 1500 m/s
   protocol::DeviceState state;
   std::unique_ptr<Sounding> sounding;
 };
@@ -85,7 +85,7 @@ TEST(Ping360Acoustics, ABallIsBrightestAtItsRange) {
 
 TEST(Ping360Acoustics, AStepOfGainIsSixDecibels) {
   Scanner low(wall_at(1.5)), high(wall_at(1.5));
-  Transducer louder = low.asked;
+  Transducer louder = low.transducer;
   louder.gain = 1;
   high.sounding->request.settings.gain_db = ping360::ping_settings(ping360::settings_of(louder), high.state).gain_db;
   const auto a = low.at(0), b = high.at(0);
@@ -124,7 +124,7 @@ struct SideScan {
 
 double loudest(const std::vector<double>& db) { return *std::max_element(db.begin(), db.end()); }
 
-TEST(OmniscanAcoustics, LeftIsLeft) {
+TEST(OmniscanAcoustics, PortAndStarboardAreNotSwapped) {
   SideScan side(ball_at({0, -4, -2}));
   const double starboard = loudest(side.ping(0, -pi / 2)), port = loudest(side.ping(0, pi / 2));
   EXPECT_GT(starboard, port + 40);
@@ -211,7 +211,7 @@ std::shared_ptr<const Scene> bed(double slope, double altitude_m = 5, double str
       .make();
 }
 
-TEST(SurveyorAcoustics, AFlatBottomIsFlat) {
+TEST(SurveyorAcoustics, AFlatBottomIsMeasuredFlat) {
   Sounder sounder(bed(0));
   for (std::uint32_t number = 1; number <= 20; ++number) {
     const Points points = points_in(sounder.ping(number)[2]);
@@ -222,7 +222,7 @@ TEST(SurveyorAcoustics, AFlatBottomIsFlat) {
   }
 }
 
-// The tolerance of 0.02 times the altitude is 4 of the 400 steps to twice the altitude, some pulses.
+// The tolerance of 0.02 times the altitude is 4 steps (400 steps reach twice the altitude), a few pulses long.
 TEST(SurveyorAcoustics, BedsHaveAPointInEachDirection) {
   for (const double altitude_m : {2.0, 12.0})
     for (const double slope_deg : {0.0, 10.0, -20.0})
@@ -249,7 +249,7 @@ TEST(SurveyorAcoustics, ASmallTargetIsOnePoint) {
   }
 }
 
-TEST(SurveyorAcoustics, ASlopeIsASlope) {
+TEST(SurveyorAcoustics, ASlopeIsMeasured) {
   Sounder sounder(bed(std::tan(rad_from_deg(10))));
   for (std::uint32_t number = 1; number <= 5; ++number)
     EXPECT_NEAR(deg_from_rad(std::atan(slope_of(points_in(sounder.ping(number)[2])))), 10, 0.5);
@@ -321,7 +321,7 @@ TEST(Ping1DAcoustics, ATiltedBeamMeasuresToTheNearestGround) {
   for (const double pitch_deg : {0.0, 5.0, 10.0, 15.0, 20.0, 30.0}) {
     Altimeter altimeter(bed(0));
     const ping1d::Echo echo = altimeter.echo(0, rad_from_deg(pitch_deg));
-    EXPECT_NEAR(echo.range_m, 5, 0.1) << pitch_deg;  // its beam is wide enough for an echo of the ground straight below
+    EXPECT_NEAR(echo.range_m, 5, 0.1) << pitch_deg;  // the beam is wide enough for an echo of the ground straight below
   }
 }
 
@@ -335,7 +335,7 @@ TEST(Ping1DAcoustics, AWallAheadIsMeasuredByABeamThatLooksAhead) {
   EXPECT_NEAR(altimeter.echo(0, -pi / 2).range_m, 3, 0.06);
 }
 
-TEST(Ping1DAcoustics, OpenWaterHasNoDistanceToTrust) {
+TEST(Ping1DAcoustics, OpenWaterGivesLowConfidence) {
   Altimeter altimeter(SceneMaker().add_point({0, 0, 50}, -40).make());
   altimeter.settings.parameters = {.range = {0, 20000}, .gain = 6, .mode_auto = 0};
   altimeter.sounding->request.settings = ping1d::ping_settings(altimeter.settings);

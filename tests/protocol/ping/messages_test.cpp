@@ -1,4 +1,4 @@
-// Frames of the ping protocol: published bytes, and arbitrary bytes that are split anywhere.
+// Tests frames of the ping protocol: published bytes, and arbitrary bytes that are split anywhere.
 #include <gmock/gmock.h>
 
 #include <random>
@@ -53,8 +53,8 @@ TEST(PingFrames, AnyBytesSplitAnywhereLeaveTheNextFrameReadable) {
       static constexpr unsigned char likely[] = {0x42, 0x52, 0x00, 0x06, 0xff};
       b = std::byte{draw() % 2 == 0 ? likely[draw() % 5] : static_cast<unsigned char>(draw())};
     }
-    // After a false start the device may wait for as many bytes as the longest request has, so the valid request is repeated
-    // after these.
+    // After a false start the device may wait for as many bytes as the longest request has, so that many zeros come before the
+    // valid request.
     bytes.insert(bytes.end(), longest_request + header_size + sum_size, std::byte{});
     bytes.insert(bytes.end(), good.begin(), good.end());
     Framer framer;

@@ -1,4 +1,4 @@
-// A host's conversation with an emulated Omniscan 450, without a socket: its session, its profile, refusals.
+// Tests a host's conversation with an emulated Omniscan 450, without a socket: sessions, profiles, refusals.
 #include <gmock/gmock.h>
 
 #include <limits>
@@ -13,7 +13,7 @@ using namespace tests;
 
 Bytes pings(OsPingParams p = {.enable = 1}) { return framed_message(Id::os_ping_params, 0, p); }
 
-TEST(Omniscan, ASessionStartsAndEndsByEnable) {
+TEST(Omniscan, TheEnableFieldStartsAndEndsTheSession) {
   Talk talk("omniscan-450");
   talk.say(general(Id::device_information));
   ASSERT_EQ(talk.take().size(), 1u);

@@ -1,5 +1,5 @@
-// A host's conversation with an emulated Ping1D, without a socket: settings, measurements, streams, refusals, the detector and
-// the automatic mode.
+// Tests a host's conversation with an emulated Ping1D, without a socket: settings, measurements, streams, refusals, the detector
+// and the automatic mode.
 #include <gmock/gmock.h>
 
 #include "protocol/ping/ping1d.hpp"
@@ -45,7 +45,7 @@ Ping profile_with(const Parameters& parameters, int row, int peak, int rows = 8,
   return ping;
 }
 
-TEST(Ping1D, AnswersByTheBytesOfTheDefinitions) {
+TEST(Ping1D, AnswersHaveTheBytesOfTheDefinitions) {
   Talk talk("ping1d");
   talk.say(hex("42 52 02 00 06 00 00 00 05 00 a1 00"));  // protocol_version, as in the example of the definitions
   talk.say(hex("42 52 00 00 b9 04 00 00 51 01"));  // 1209 is not the number of a message; that of the speed of sound is 1203
@@ -87,7 +87,7 @@ TEST(Ping1D, SettingsAreReadBack) {
   EXPECT_EQ(value_in<std::uint8_t>(talk.take().back()), 43);
 }
 
-TEST(Ping1D, AMeasurementThatIsRequestedIsTheNextOne) {
+TEST(Ping1D, ARequestIsAnsweredWithTheNextMeasurement) {
   Talk talk("ping1d");
   EXPECT_EQ(talk.dialogue->next_tick(), Time::max()) << "the device sends nothing without a request";
   talk.say(general(Id::ping1d_distance));
@@ -272,12 +272,12 @@ TEST(Ping1D, TheEchoIsDetectedOnce) {
     return std::tuple(message_in<Profile>(frame).distance_mm, talk.vendor.distance_in(ping)->range_m,
                       next ? next->settings.range_m : 0);
   };
-  const auto looked_for_now = said();
+  const auto detected_now = said();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(said(), looked_for_now) << "look_at() has stored the echo before the samples were lost";
+  EXPECT_EQ(said(), detected_now) << "look_at() has stored the echo before the samples were lost";
   look_at(ping);
-  EXPECT_NE(said(), looked_for_now);
+  EXPECT_NE(said(), detected_now);
 }
 
 TEST(Ping1D, AProfileHasTheSettingsOfThePing) {

@@ -1,4 +1,4 @@
-// A host's conversation with an emulated Ping360, without a socket: turn times, scans, echoes, refusals, discovery.
+// Tests a host's conversation with an emulated Ping360, without a socket: turn times, scans, echoes, refusals, discovery.
 #include <gmock/gmock.h>
 
 #include <variant>
@@ -166,7 +166,7 @@ TEST(Ping360, RefusesWrongRequestsWithTheirMessageId) {
   EXPECT_THAT(text_in(talk.take().front()), HasSubstr("number_of_samples 1201 is not in 200..1200"));
 }
 
-TEST(Ping360, ADatagramHasOneAnswerAndDevicesHaveNone) {
+TEST(Ping360, ADatagramGetsOneAnswerAndMessagesOfDevicesGetNone) {
   Talk talk("ping360");
   Bytes flood = general(Id::protocol_version);
   for (int i = 0; i < 300; ++i)
@@ -257,9 +257,9 @@ TEST(Ping360, AScanLosesNoPingThatIsLate) {
   talk.aim = second;
   talk.deliver(5.1);
   talk.run_to(5.2);
-  const auto heard = angles(talk.take());
-  ASSERT_GE(heard.size(), 3u);
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(heard[static_cast<std::size_t>(i)], i);
+  const auto received = angles(talk.take());
+  ASSERT_GE(received.size(), 3u);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(received[static_cast<std::size_t>(i)], i);
 }
 
 TEST(Ping360, IsFoundByOneDatagram) {
@@ -281,7 +281,7 @@ TEST(Ping360, IsFoundByOneDatagram) {
   EXPECT_TRUE(ask("SetSS1IP 192.168.002.999").events.empty());
 }
 
-TEST(Ping360, SamplesAreTakenInTimeWithTheTrueSpeedOfSound) {
+TEST(Ping360, RangesFollowFromSampleTimesAndTheTrueSpeedOfSound) {
   for (const double speed : {1450.0, 1500.0}) {
     protocol::DeviceState d = device("ping360");
     d.water.sound_speed_mps = speed;

@@ -60,7 +60,7 @@ M message_in(const Frame& frame) {
   return message;
 }
 
-/// A conversation with a device, whose events are applied as the daemon does. Pings take no time.
+/// A conversation with a device, whose events are applied as the daemon applies them. By default, pings take no time.
 struct Talk {
   explicit Talk(const std::string& profile, std::size_t port = 0, const protocol::OptionValues& options = {})
       : vendor(*protocol::find_profile(profile)->vendor), state(device(profile, options)) {
@@ -82,7 +82,7 @@ struct Talk {
       }
     }
   }
-  /// Runs all ticks until this time [s]; returns the time of the last tick.
+  /// Runs all ticks until this time [s]; returns the time of the last tick, or -1 if there was none.
   double run_to(double at, double ping_takes = 0) {
     double last = -1;
     while (dialogue->next_tick() <= at_s(at)) {

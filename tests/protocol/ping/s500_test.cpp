@@ -1,5 +1,5 @@
-// A host's conversation with an emulated S500, without a socket: single pings, streams, refusals, distances over several pings,
-// and the automatic range and gain.
+// Tests a host's conversation with an emulated S500, without a socket: single pings, streams, refusals, distances over several
+// pings, and the automatic range and gain.
 #include <gmock/gmock.h>
 
 #include <variant>
@@ -130,12 +130,12 @@ TEST(S500, TheEchoIsDetectedOnce) {
     const auto next = settings_from(talk.vendor.after_ping(ping, talk.state)->vendor_settings.get());
     return std::tuple(message_in<Profile6>(frame).depth_m, talk.vendor.distance_in(ping)->range_m, next.earlier.back().range_m);
   };
-  const auto looked_for_now = said();
+  const auto detected_now = said();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(said(), looked_for_now) << "look_at() has stored the echo before the samples were lost";
+  EXPECT_EQ(said(), detected_now) << "look_at() has stored the echo before the samples were lost";
   look_at(ping);
-  EXPECT_NE(said(), looked_for_now);
+  EXPECT_NE(said(), detected_now);
 }
 
 TEST(S500, AProfileHasTheSettingsOfThePing) {
@@ -220,7 +220,7 @@ TEST(S500, TheAutomaticRangeCountsFromTheSonar) {
   EXPECT_EQ(next(10000, 10000, 400, 5), 10000u) << "13.9 m is at 70 % of 20 m";
   EXPECT_EQ(next(10000, 10000, 900, 5), 21500u) << "18.8 m is at 60 % of 31.5 m";
   EXPECT_EQ(next(20000, 40000, 20, 5), 15000u) << "20.8 m is at 60 % of 35 m";
-  EXPECT_EQ(next(10000, 10000, 400, -100), 30000u) << "without an echo 40 m follow 20 m";
+  EXPECT_EQ(next(10000, 10000, 400, -100), 30000u) << "without an echo, an end at 20 m becomes one at 40 m";
   EXPECT_EQ(next(100000, 42000, 400, -100), 1000u) << "after the farthest end comes the shortest range";
   Settings now;
   now.parameters = requested(now.parameters, {.start_mm = 10000, .length_mm = 0});
@@ -229,7 +229,7 @@ TEST(S500, TheAutomaticRangeCountsFromTheSonar) {
   EXPECT_EQ(after(profile_with(before, 100, 5), now).parameters.reach.length_mm, 5000u) << "the ping has another start";
 }
 
-/// The host of both products at port 51200 does not know which one answers.
+/// Both products use port 51200, so the host must detect which one answers.
 TEST(PowerHost, SendsTheRequestOfTheProductThatAnswers) {
   const auto sent = [](const protocol::HostActions& actions) {
     std::vector<Bytes> all;

@@ -1,4 +1,4 @@
-// A host's conversation with an emulated Surveyor 240, without a socket: its session, its clock, refusals.
+// Tests a host's conversation with an emulated Surveyor 240, without a socket: sessions, the clock, refusals.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -101,7 +101,7 @@ TEST(Surveyor, TheDeviceRequestsTheTimeAfterEnable) {
   EXPECT_EQ(other.take().size(), 1u) << "after 10 s the device requests the time even if no pings are enabled";
 }
 
-TEST(Surveyor, TheAnswerToARequestForTheTimeRequestIsThatRequest) {
+TEST(Surveyor, AGeneralRequestForTheTimeRequestIsAnsweredWithIt) {
   Talk talk("surveyor-240");
   talk.say(general(Id::utc_request), 3);
   talk.run_to(3);

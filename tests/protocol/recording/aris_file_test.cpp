@@ -1,4 +1,4 @@
-// .aris files. The test reads their fields at the offsets of the vendor.
+// Tests .aris files by reading their fields at the vendor's offsets.
 #include <cstdlib>
 #include <cstring>
 
@@ -71,7 +71,7 @@ Bytes three_frames() {
   return file;
 }
 
-/// The read messages, and the reader's error.
+/// The frames that were read, and the reported damage.
 struct ReadBack {
   std::vector<aris::DecodedFrame> frames;
   std::string damage;

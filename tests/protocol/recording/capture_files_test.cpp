@@ -1,4 +1,4 @@
-// Captures as other programs write them: every link type; lost, repeated and reordered segments; both byte orders;
+// Tests captures as other programs write them: every link type; lost, repeated and reordered segments; both byte orders;
 // pcapng.
 #include "protocol/ping/messages.hpp"
 #include "protocol/recording/pcap/packets.hpp"
@@ -82,11 +82,11 @@ std::vector<Bytes> raw_frames(const std::vector<Sent>& sent) {
   return frames;
 }
 
-struct Told {
+struct ReadBack {
   Bytes stream;
   std::string damage;
 };
-Told read(const Bytes& file) {
+ReadBack read(const Bytes& file) {
   auto opened = open_bytes(file);
   if (!opened) return {{}, opened.error().text};
   const Bytes stream = device_stream(read_all(*opened->reader));
@@ -114,9 +114,9 @@ TEST(CaptureFiles, EveryLinkTypeIsRead) {
   for (const auto& [type, front] : links) {
     std::vector<Bytes> frames;
     for (const Bytes& packet : raw_frames(two_pings())) frames.push_back(front + packet);
-    const Told told = read(pcap_of(frames, type));
-    EXPECT_EQ(told.stream, both_pings) << type;
-    EXPECT_EQ(told.damage, "");
+    const ReadBack result = read(pcap_of(frames, type));
+    EXPECT_EQ(result.stream, both_pings) << type;
+    EXPECT_EQ(result.damage, "");
   }
   EXPECT_THAT(read(pcap_of(raw_frames(two_pings()), 147)).damage, HasSubstr("packets of link type 147 are not read"));
 }
@@ -142,9 +142,9 @@ TEST(CaptureFiles, RetransmittedAndReorderedSegmentsAreRead) {
   Sent longer = sent[0];  // begins before the known bytes and ends after them
   longer.payload = longer.payload + two_pings()[1].payload;
   sent.insert(sent.begin() + 1, longer);
-  const Told told = read(pcap_of(raw_frames(sent), 101));
-  EXPECT_EQ(told.stream, both_pings);
-  EXPECT_EQ(told.damage, "");
+  const ReadBack result = read(pcap_of(raw_frames(sent), 101));
+  EXPECT_EQ(result.stream, both_pings);
+  EXPECT_EQ(result.damage, "");
 }
 
 TEST(CaptureFiles, SequenceNumbersWrap) { EXPECT_EQ(read(pcap_of(raw_frames(two_pings(0xFFFFFF00u)), 101)).stream, both_pings); }
@@ -152,17 +152,17 @@ TEST(CaptureFiles, SequenceNumbersWrap) { EXPECT_EQ(read(pcap_of(raw_frames(two_
 TEST(CaptureFiles, ALostSegmentLosesOnlyItsMessage) {
   std::vector<Sent> sent = two_pings();
   sent.erase(sent.begin() + 3);
-  const Told told = read(pcap_of(raw_frames(sent), 101));
-  EXPECT_EQ(told.stream, ping_message(2));
-  EXPECT_THAT(told.damage, HasSubstr("the capture lacks 100 bytes of the connection with 10.0.0.2:40000"));
+  const ReadBack result = read(pcap_of(raw_frames(sent), 101));
+  EXPECT_EQ(result.stream, ping_message(2));
+  EXPECT_THAT(result.damage, HasSubstr("the capture lacks 100 bytes of the connection with 10.0.0.2:40000"));
 }
 
 TEST(CaptureFiles, SegmentsCutByTheSnapLengthAreLost) {
   std::vector<Bytes> frames = raw_frames(two_pings());
   frames[1].resize(60);
-  const Told told = read(pcap_of(frames, 101));
-  EXPECT_EQ(told.stream, ping_message(2));
-  EXPECT_THAT(told.damage, HasSubstr("the capture lacks 80 bytes"));
+  const ReadBack result = read(pcap_of(frames, 101));
+  EXPECT_EQ(result.stream, ping_message(2));
+  EXPECT_THAT(result.damage, HasSubstr("the capture lacks 80 bytes"));
 }
 
 TEST(CaptureFiles, ACaptureMayBeginInTheMiddle) {
@@ -170,20 +170,20 @@ TEST(CaptureFiles, ACaptureMayBeginInTheMiddle) {
   sent.erase(sent.begin(), sent.begin() + 2);
   const std::vector<Bytes> frames = raw_frames(sent);
   // The sonar is found although its first packet is not the start of a message.
-  const Told told = read(pcap_of(frames, 101));
-  EXPECT_EQ(told.stream, ping_message(2));
-  EXPECT_THAT(told.damage, HasSubstr("begins within a message"));
+  const ReadBack result = read(pcap_of(frames, 101));
+  EXPECT_EQ(result.stream, ping_message(2));
+  EXPECT_THAT(result.damage, HasSubstr("begins within a message"));
 }
 
-TEST(CaptureFiles, ClientsMayFollowEachOther) {
+TEST(CaptureFiles, ConnectionsMayFollowEachOther) {
   std::vector<Sent> sent{{{}, 99, true, tcp_flag::syn | tcp_flag::ack}};
   for (const Sent& each : two_pings(100)) sent.push_back(each);
   sent.push_back({{}, 5000, true, tcp_flag::syn | tcp_flag::ack});  // a new connection with the same ports
   sent.push_back({ping_message(3), 5001});
   sent.push_back({{}, 5001 + static_cast<std::uint32_t>(ping_message(3).size()), true, tcp_flag::fin | tcp_flag::ack});
-  const Told told = read(pcap_of(raw_frames(sent), 101));
-  EXPECT_EQ(told.stream, both_pings + ping_message(3));
-  EXPECT_EQ(told.damage, "");
+  const ReadBack result = read(pcap_of(raw_frames(sent), 101));
+  EXPECT_EQ(result.stream, both_pings + ping_message(3));
+  EXPECT_EQ(result.damage, "");
 }
 
 TEST(CaptureFiles, TheSonarIsRecognisedByItsPortOrItsMessages) {
@@ -230,7 +230,7 @@ Bytes udp_packet(const Bytes& payload, std::uint16_t from, std::uint16_t to, std
          payload;
 }
 
-TEST(CaptureFiles, BothEndsOfDatagramsAtOneAddress) {
+TEST(CaptureFiles, BothEndsOfDatagramsAtOneAddressAreDistinguished) {
   const std::pair<std::uint16_t, ping::Id> sonars[] = {
       {12345, ping::Id::device_data}, {62312, ping::Id::yz_point_data}, {51200, ping::Id::os_mono_profile}};
   for (const auto& [port, id] : sonars) {
@@ -253,9 +253,9 @@ TEST(CaptureFiles, BothEndsOfDatagramsAtOneAddress) {
 
 TEST(CaptureFiles, DatagramsInFragmentsAreCounted) {
   const Bytes half(600);
-  const std::uint32_t more = 0x2000, behind = 75;
+  const std::uint32_t more = 0x2000, second_part = 75;
   const std::vector<Bytes> frames{udp_packet(half, 12345, host_port_number, more),
-                                  udp_packet(half, 12345, host_port_number, behind),
+                                  udp_packet(half, 12345, host_port_number, second_part),
                                   udp_packet(half, 12345, host_port_number, more)};
   EXPECT_THAT(read(pcap_of(frames, 101)).damage, HasSubstr("; 2 datagrams are in IP fragments, which are not read"));
 }
@@ -264,18 +264,18 @@ TEST(CaptureFiles, ErrorsHaveTheOffset) {
   Bytes huge = pcap_of(raw_frames(two_pings()), 101);
   const std::size_t last = huge.size() - ping_message(2).size() - 40 - 8;
   huge[last + 3] = std::byte{0x7F};
-  const Told told = read(huge);
-  EXPECT_EQ(told.stream, ping_message(1));
-  EXPECT_THAT(told.damage, HasSubstr("the packet at byte " + std::to_string(last - 8) + " would have "));
+  const ReadBack result = read(huge);
+  EXPECT_EQ(result.stream, ping_message(1));
+  EXPECT_THAT(result.damage, HasSubstr("the packet at byte " + std::to_string(last - 8) + " would have "));
 }
 
 TEST(CaptureFiles, ZerosAreNoPackets) {
   Bytes file = pcap_of(raw_frames(two_pings()), 101);
   const std::size_t whole = file.size();
   file.resize(whole + 100);
-  const Told told = read(file);
-  EXPECT_EQ(told.stream, both_pings);
-  EXPECT_THAT(told.damage, HasSubstr("the packet at byte " + std::to_string(whole) + " has a length of 0 bytes on the wire"));
+  const ReadBack result = read(file);
+  EXPECT_EQ(result.stream, both_pings);
+  EXPECT_THAT(result.damage, HasSubstr("the packet at byte " + std::to_string(whole) + " has a length of 0 bytes on the wire"));
 }
 
 Bytes block(std::uint32_t type, Bytes body) {
@@ -312,10 +312,10 @@ TEST(CaptureFiles, PcapngIsRead) {
   const auto place = std::search(damaged.begin(), damaged.end(), first.begin(), first.end());
   ASSERT_NE(place, damaged.end());
   *place = std::byte{9};
-  const Told told = read(damaged);
-  EXPECT_EQ(told.stream, ping_message(2)) << "only the message of the damaged packet is lost";
-  EXPECT_THAT(told.damage, HasSubstr("begins within a message"));
-  EXPECT_THAT(told.damage, HasSubstr("; 1 more such place"));
+  const ReadBack result = read(damaged);
+  EXPECT_EQ(result.stream, ping_message(2)) << "only the message of the damaged packet is lost";
+  EXPECT_THAT(result.damage, HasSubstr("begins within a message"));
+  EXPECT_THAT(result.damage, HasSubstr("; 1 more such place"));
   for (std::size_t size = 12; size < file.size(); size += 7)
     static_cast<void>(read({file.begin(), file.begin() + static_cast<std::ptrdiff_t>(size)}));
 }
@@ -338,14 +338,14 @@ TEST(CaptureFiles, ConnectionsShareTheLimitOfWaitingBytes) {
     for (const Bytes& part : {numbers(wire::Endian::little, {{4, 1000}, {4, 0}, {4, size}, {4, size}}), frame})
       file.insert(file.end(), part.begin(), part.end());
   }
-  const std::string told = read(file).damage;
+  const std::string result = read(file).damage;
   const std::string before = "before packet ";
-  const std::size_t at = told.find(before);
-  ASSERT_NE(at, std::string::npos) << told;
-  const std::size_t packet = std::stoul(told.substr(at + before.size()));
-  EXPECT_GT(packet, 900u) << told;
-  EXPECT_LT(packet, 1100u) << "the first connection is given up long before the end: " << told;
-  EXPECT_THAT(told, HasSubstr("; 19 more such places"));
+  const std::size_t at = result.find(before);
+  ASSERT_NE(at, std::string::npos) << result;
+  const std::size_t packet = std::stoul(result.substr(at + before.size()));
+  EXPECT_GT(packet, 900u) << result;
+  EXPECT_LT(packet, 1100u) << "the first connection is given up long before the end: " << result;
+  EXPECT_THAT(result, HasSubstr("; 19 more such places"));
 }
 
 TEST(TcpStream, BytesThatWaitTooLongAreReturnedWithTheirGap) {

@@ -1,5 +1,5 @@
-// MCAP: properties of chunks that reading back does not check, and the messages for viewers. tests/acceptance/mcap_checker.py,
-// which was written from the format's description alone, checks whole files.
+// Tests MCAP files: properties of chunks that reading back does not check, and the messages for viewers.
+// tests/acceptance/mcap_checker.py, which was written from the format's description alone, checks whole files.
 #include <nlohmann/json.hpp>
 
 #include "protocol/foxglove/foxglove_messages.hpp"
@@ -40,7 +40,7 @@ Bytes session(const std::vector<RecordedMessage>& messages, bool closed = true) 
 
 TEST(Crc32, KnownAnswer) { EXPECT_EQ(crc32(bytes_of("123456789")), 0xCBF43926u); }
 
-/// Returns the messages by topic. Checks that those of each topic are numbered from 0, and that the channel names their schema.
+/// Returns the messages by topic. Checks that those of each topic are numbered from 0, and the encoding of their schema.
 std::map<std::string, std::vector<mcap::Message>> by_topic(const Bytes& file) {
   auto reader = mcap::Reader::open(source_from("a file", file));
   std::map<std::string, std::vector<mcap::Message>> found;
@@ -141,7 +141,7 @@ TEST(Mcap, MessagesWithoutSamplesGetTheImageOfThePing) {
   EXPECT_EQ(read_all(**messages).size(), 1u);
 }
 
-TEST(Mcap, ClientsSendAsTheMakeDoes) {
+TEST(Mcap, RequestsOfClientsHaveTheCarrierOfTheMake) {
   for (const auto& [name, by] : {std::pair{"oculus", Carrier::stream}, std::pair{"ping360", Carrier::datagram}}) {
     Bytes file;
     McapSession writer(sink_into(file), "front", *protocol::find_make(name));
@@ -279,7 +279,7 @@ TEST(Mcap, CompressionIsRefusedWithAReason) {
 
 TEST(Mcap, ImpossibleTimesBecomeZero) {
   constexpr std::uint64_t top = std::uint64_t{1} << 63;
-  for (const auto& [told, expected] :
+  for (const auto& [stored, expected] :
        std::initializer_list<std::pair<std::uint64_t, std::int64_t>>{{0, 0},
                                                                      {4'000'000'000'000'000'000u, 4'000'000'000'000'000'000},
                                                                      {4'000'000'000'000'000'001u, 0},
@@ -287,8 +287,8 @@ TEST(Mcap, ImpossibleTimesBecomeZero) {
                                                                      {top, 0},
                                                                      {~std::uint64_t{0}, 0}}) {
     Bytes bytes;
-    mcap::RecordWriter(bytes).number(told);
-    EXPECT_EQ(mcap::RecordReader(bytes).time(), Time(std::chrono::nanoseconds(expected))) << told;
+    mcap::RecordWriter(bytes).number(stored);
+    EXPECT_EQ(mcap::RecordReader(bytes).time(), Time(std::chrono::nanoseconds(expected))) << stored;
   }
 }
 

@@ -1,4 +1,4 @@
-// .oculus log files, compared byte by byte with those of other programs.
+// Tests .oculus log files: their bytes, and files as other programs write them.
 #include <zlib.h>
 
 #include "protocol/recorded/byte_source.hpp"

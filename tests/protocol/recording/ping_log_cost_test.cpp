@@ -44,7 +44,7 @@ TEST(PingLogCost, TheWorkForFalseStartsIsProportionalToTheFile) {
   std::vector<std::uint64_t> costs;
   for (const std::size_t starts : {std::size_t{1} << 15, std::size_t{1} << 17}) {
     Bytes file = short_log();
-    const std::size_t behind = file.size();
+    const std::size_t first_start = file.size();
     for (std::size_t i = 0; i < starts; ++i)
       for (const int b : {0x42, 0x52, 0xff, 0xff}) file.push_back(static_cast<std::byte>(b));
     const Bytes last = ping::framed_message(ping::Id::water_stats, 0, ping::WaterStats{12, 1.5f});
@@ -55,7 +55,7 @@ TEST(PingLogCost, TheWorkForFalseStartsIsProportionalToTheFile) {
     while (reader->next()) ++messages;
     costs.push_back(allocated_bytes - before);
     EXPECT_EQ(messages, 2u);
-    EXPECT_EQ(reader->damage()->text, "f: bytes " + std::to_string(behind) + " to " +
+    EXPECT_EQ(reader->damage()->text, "f: bytes " + std::to_string(first_start) + " to " +
                                           std::to_string(file.size() - last.size() - 1) + " are not a whole frame");
   }
   EXPECT_LT(costs[1], 5 * costs[0]);

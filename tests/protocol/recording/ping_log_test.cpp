@@ -1,4 +1,4 @@
-// .svlog files: a JSON text, then frames as they were sent.
+// Tests .svlog files, which have a JSON text and then frames as they were sent.
 #include <gmock/gmock.h>
 
 #include "protocol/ping/messages.hpp"
@@ -112,7 +112,7 @@ TEST(PingLog, ErrorsOfDamagedFilesHaveTheOffset) {
   read = read_back(file);
   EXPECT_EQ(read.messages.size(), 5u);
   EXPECT_EQ(read.damage, bytes(text + 64, text + 109));
-  file[text + 2] = std::byte{0xFF};  // a length beyond the end hides nothing
+  file[text + 2] = std::byte{0xFF};  // a length beyond the end does not hide later frames
   file[text + 3] = std::byte{0xFF};
   EXPECT_EQ(read_back(file).damage, bytes(text, text + 45) + "; 1 more such place");
   EXPECT_THAT(read_back(Bytes(3, std::byte{'B'})).damage, ::testing::HasSubstr("is not a recording"));

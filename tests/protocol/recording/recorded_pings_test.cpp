@@ -1,4 +1,4 @@
-// decode_next() passes the messages and the times of a recording to a host.
+// Tests that decode_next() passes the messages and the times of a recording to a host.
 #include "protocol/recording/recording.hpp"
 
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@ using std::chrono::milliseconds;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-/// Every message is a ping, whose number is its size. The first tick is due 100 ms after the first message and gives ping 0.
+/// Decodes every message as a ping numbered with its size. The first tick is 100 ms after the first message and gives ping 0.
 class CountingHost final : public protocol::Host {
  public:
   protocol::HostActions on_open(std::span<const std::uint16_t>, Time) override { return {}; }
@@ -64,9 +64,9 @@ TEST(DecodeNext, TimePassesWithMessagesOfClients) {
   make.ports = ports;
   CountingHost host;
   const RecordedMessage first{Time(milliseconds(1000)), Origin::device, Carrier::stream, Bytes(5)};
-  const RecordedMessage asked{Time(milliseconds(1200)), Origin::client, Carrier::stream, Bytes(5)};
+  const RecordedMessage request{Time(milliseconds(1200)), Origin::client, Carrier::stream, Bytes(5)};
   EXPECT_EQ(decode_next(host, make, &first).size(), 1u);
-  EXPECT_EQ(decode_next(host, make, &asked).size(), 1u) << "only the ping of the tick";
+  EXPECT_EQ(decode_next(host, make, &request).size(), 1u) << "only the ping of the tick";
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Rules of every format: written messages can be read again, also from a part of the file, and a full disk does not damage
-// messages that were written before.
+// Tests the rules of every format: written messages can be read again, also from a part of the file, and a full disk does not
+// damage messages that were written before.
 #include "tests/protocol/recording/recording_testing.hpp"
 #include "tests/small_disk.hpp"
 
@@ -63,7 +63,7 @@ TEST_P(EveryFormat, ReturnsTheCompleteMessagesOfATruncatedFile) {
   EXPECT_GE(most + 1, written.size());
 }
 
-TEST_P(EveryFormat, SurvivesAnyByteBeingWrong) {
+TEST_P(EveryFormat, SurvivesAnyWrongByte) {
   const std::vector<RecordedMessage> messages{{start, Origin::device, Carrier::stream, dummy_message()},
                                               {after_ms(10), Origin::device, Carrier::stream, dummy_message()}};
   const Bytes whole = recorded(GetParam(), messages);
@@ -89,7 +89,7 @@ TEST_P(EveryFormat, AFullDiskKeepsTheWrittenMessages) {
     const auto writer = writer_for(GetParam(), std::move(*sink));
     for (std::uint32_t i = 0; i < 400 && !error; ++i) {
       RecordedMessage message{after_ms(100 * static_cast<int>(i)), Origin::device, Carrier::stream, ping_message(i, 256, 100)};
-      if (Result<void> told = writer->write(message); !told) error = told.error();
+      if (Result<void> done = writer->write(message); !done) error = done.error();
       written.push_back(std::move(message));
     }
     ASSERT_TRUE(error);
@@ -232,7 +232,7 @@ TEST(Recording, EachRunOfJunkIsReportedOnce) {
   }
 }
 
-/// A file that becomes shorter, or a disk that fails, while it is read.
+/// Imitates a file that becomes shorter, or a disk that fails, during reading.
 class ShrunkenSource final : public Source {
  public:
   ShrunkenSource(std::unique_ptr<Source> whole, std::uint64_t readable) : whole_(std::move(whole)), readable_(readable) {}

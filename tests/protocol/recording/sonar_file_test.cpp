@@ -1,4 +1,4 @@
-// .sonar files: their packets and times, and the reports of damage.
+// Tests .sonar files: their packets and times, and the reports of damage.
 #include <cstdlib>
 
 #include "protocol/recording/recording.hpp"

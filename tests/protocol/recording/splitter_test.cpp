@@ -1,4 +1,4 @@
-// For any split of the stream the splitter drops only bytes of broken messages.
+// Tests that for any split of the stream the splitter drops only bytes of broken messages.
 #include "protocol/oculus/oculus.hpp"
 #include "protocol/ping/messages.hpp"
 #include "tests/protocol/recording/recording_testing.hpp"

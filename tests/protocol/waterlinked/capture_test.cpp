@@ -1,4 +1,4 @@
-// A recording of a real unit, which is stored outside the repository: 12 packets are read, and our encoder writes the same
+// Reads the 12 packets of a real unit's recording, which is stored outside the repository. Our encoder must write the same
 // content.
 #include <cstdlib>
 #include <filesystem>

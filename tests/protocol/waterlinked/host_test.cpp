@@ -1,4 +1,4 @@
-// The images of a Sonar 3D-15 that its host draws, and their figures.
+// Tests the images of a Sonar 3D-15 that its host draws, and their figures.
 #include "protocol/waterlinked/waterlinked.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// The HTTP API of a Sonar 3D-15: every path, refusals, older releases, and the effect of settings.
+// Tests the HTTP API of a Sonar 3D-15: every path, refusals, older releases, and the effect of settings.
 #include "tests/protocol/waterlinked/waterlinked_testing.hpp"
 
 namespace sonar::waterlinked::tests {
@@ -124,7 +124,7 @@ TEST(WaterLinkedHttp, SendsOnlyWithAcousticsOnAndAReceiver) {
                   5);
 }
 
-TEST(WaterLinkedHttp, SpeedOfSoundIsOfTheWaterOrAsPosted) {
+TEST(WaterLinkedHttp, SpeedOfSoundIsThatOfTheWaterOrThePostedOne) {
   Unit unit;
   EXPECT_NEAR(static_cast<double>(unit.settings.device_sound_speed_mps), true_sound_speed_mps(unit.device.water, 0), 0.1);
   unit.post("/acoustics/salinity", "\"fresh\"");

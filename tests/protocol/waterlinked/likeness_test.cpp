@@ -229,7 +229,7 @@ TEST(WaterLinkedLikeness, WithoutTheFiltersStatisticsDiffer) {
   EXPECT_GT(image.alike_between_blocks(), 0.5);
 }
 
-TEST(WaterLinkedLikeness, NoFilterDropsAThinPoleAnywhere) {
+TEST(WaterLinkedLikeness, FiltersKeepAThinPoleAtAnyPosition) {
   const tests::Unit unit;
   const Settings settings = settings_from(unit.device.settings.get(), unit.device);
   PingSettings ping = ping_settings(settings, unit.device);
@@ -246,9 +246,9 @@ TEST(WaterLinkedLikeness, NoFilterDropsAThinPoleAnywhere) {
     int least = rows * columns, most = 0;  // pixels with a return
     for (int n = 0; n < 8; ++n) {          // positions within a cell of the beam grid
       const Ping& shot = sounding.ping_from({0, n * 0.006, n * 0.011}, {0, 0, 0});
-      int heard = 0;
-      for (std::size_t i = 0; i < static_cast<std::size_t>(rows * columns); ++i) heard += range_pixel(shot, i).range != 0;
-      least = std::min(least, heard), most = std::max(most, heard);
+      int returned = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(rows * columns); ++i) returned += range_pixel(shot, i).range != 0;
+      least = std::min(least, returned), most = std::max(most, returned);
     }
     EXPECT_GT(least, least_pixels) << gain_db << " dB";
     if (gain_db != first_gain_db) {

@@ -1,4 +1,4 @@
-// Reads back the datagrams of a shot.
+// Tests the datagrams of a shot by reading them.
 #include <cmath>
 
 #include "protocol/waterlinked/messages.hpp"
@@ -7,7 +7,7 @@
 namespace sonar::waterlinked::tests {
 namespace {
 
-/// Pixel i has range i and strength 30 + i.
+/// Returns a ping in which pixel i has range i and strength 30 + i.
 Ping ping_of(const Unit& unit) {
   Ping ping;
   ping.request.model = unit.device.model;

@@ -1,4 +1,4 @@
-// A device for tests, and the requests to it.
+// A Sonar 3D-15 for tests, and requests to it.
 #pragma once
 
 #include <gmock/gmock.h>
