@@ -4,9 +4,9 @@ The closer the accuracy is to one half, the more alike are the pictures.
 
 usage: tell_apart.py --program SONARD [--captures FOLDER]
 A random forest classifies patches of 32 rows x 32 beams, half of them captured. The tested patches are from a ping (training uses
-the other two) or a sector of the fan (training uses the other seven). Texture features do not depend on the brightness; "all features"
-do. The control is the same test between two seeds of sonard. "Another bed" is the scene with another seed of relief,
-without drifting objects, and with the product's own pulse and noise. Needs python3-sklearn.
+the other two) or a sector of the fan (training uses the other seven). Texture features do not depend on the brightness;
+"all features" do. The control is the same test between two seeds of sonard. "Another bed" is the scene with another seed of
+relief, without drifting objects, and with the product's own pulse and noise. Needs python3-sklearn.
 """
 import argparse
 import os

@@ -167,7 +167,7 @@ TEST(M3Settings, FollowTheGainLawAndTheWater) {
 TEST(M3Settings, AreRefusedIfTheProductLacksThem) {
   const auto refusal = [](const protocol::SettingsOverride& wanted) {
     const auto change = apply_override(wanted, device());
-    return change ? "taken" : change.error().text;
+    return change ? "accepted" : change.error().text;
   };
   EXPECT_THAT(refusal({.range_m = 151, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = {}}), HasSubstr("1 to 150 m"));
   EXPECT_THAT(refusal({.range_m = {}, .rate_hz = 41, .gain_percent = {}, .mode = {}, .beams = {}}),
@@ -175,7 +175,7 @@ TEST(M3Settings, AreRefusedIfTheProductLacksThem) {
   EXPECT_THAT(refusal({.range_m = {}, .rate_hz = {}, .gain_percent = 101, .mode = {}, .beams = {}}), HasSubstr("0 to 100"));
   EXPECT_THAT(refusal({.range_m = {}, .rate_hz = {}, .gain_percent = {}, .mode = 1, .beams = {}}), HasSubstr("one mode"));
   EXPECT_THAT(refusal({.range_m = {}, .rate_hz = {}, .gain_percent = {}, .mode = {}, .beams = 64}), HasSubstr("128 beams"));
-  EXPECT_EQ(refusal({.range_m = 150, .rate_hz = 0, .gain_percent = 0, .mode = 0, .beams = 128}), "taken");
+  EXPECT_EQ(refusal({.range_m = 150, .rate_hz = 0, .gain_percent = 0, .mode = 0, .beams = 128}), "accepted");
 }
 
 /// A packet of 3 beams of 2 samples, typed by hand (docs/protocols/m3.md).

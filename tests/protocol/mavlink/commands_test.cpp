@@ -1,4 +1,4 @@
-// MAV_CMD_INJECT_FAILURE: the addresses that are accepted, the handler's input, and the answer's bytes.
+// Tests MAV_CMD_INJECT_FAILURE: the addresses that are accepted, the handler's input, and the answer's bytes.
 #include <limits>
 #include <tuple>
 
@@ -19,9 +19,9 @@ CommandLong failure(float unit, float type, float instance) {
 
 struct MavlinkCommands : ::testing::Test {
   MavResult answer = MavResult::accepted;
-  std::vector<std::tuple<std::uint32_t, FailureType, std::uint32_t>> asked;
+  std::vector<std::tuple<std::uint32_t, FailureType, std::uint32_t>> requested;
   MavlinkPoses poses{{}, [this](std::uint32_t unit, FailureType type, std::uint32_t instance) {
-                       asked.emplace_back(unit, type, instance);
+                       requested.emplace_back(unit, type, instance);
                        return answer;
                      }};
   Sender ground{{255, 190, 0}};
@@ -45,13 +45,13 @@ TEST_F(MavlinkCommands, TheAnswerIsAnAckToTheSender) {
   const std::uint16_t crc = checksum(bytes({143}), checksum(BytesView(expected).subspan(1)));
   EXPECT_EQ(replies.front()[20], static_cast<std::byte>(crc & 0xFF));
   EXPECT_EQ(replies.front()[21], static_cast<std::byte>(crc >> 8));
-  EXPECT_THAT(asked, ElementsAre(std::tuple(7u, FailureType::stuck, 3u)));
+  EXPECT_THAT(requested, ElementsAre(std::tuple(7u, FailureType::stuck, 3u)));
 }
 
 TEST_F(MavlinkCommands, EveryTypeIsPassedOn) {
   for (int type = 0; type <= 7; ++type) {
     EXPECT_EQ(result_of(failure(7, static_cast<float>(type), 0)), 0);
-    EXPECT_EQ(asked.back(), std::tuple(7u, static_cast<FailureType>(type), 0u));
+    EXPECT_EQ(requested.back(), std::tuple(7u, static_cast<FailureType>(type), 0u));
   }
   EXPECT_EQ(static_cast<int>(FailureType::intermittent), 7);
 }
@@ -61,7 +61,7 @@ TEST_F(MavlinkCommands, InvalidParametersAreDenied) {
   for (const CommandLong& bad : {failure(nan, 1, 0), failure(-1, 1, 0), failure(0.5f, 1, 0), failure(7, 8, 0), failure(7, nan, 0),
                                  failure(7, 1, -2), failure(7, 1, 1e9f)})
     EXPECT_EQ(result_of(bad), 2);
-  EXPECT_THAT(asked, IsEmpty());
+  EXPECT_THAT(requested, IsEmpty());
 }
 
 TEST_F(MavlinkCommands, CommandsForOthersAreIgnoredLikeUnknownMessages) {
@@ -76,7 +76,7 @@ TEST_F(MavlinkCommands, CommandsForOthersAreIgnoredLikeUnknownMessages) {
     EXPECT_THAT(reaction.refusals, IsEmpty());
     EXPECT_FALSE(reaction.from_vehicle);
   }
-  EXPECT_THAT(asked, IsEmpty());
+  EXPECT_THAT(requested, IsEmpty());
   EXPECT_FALSE(poses.system()) << "a ground station is no vehicle";
 }
 

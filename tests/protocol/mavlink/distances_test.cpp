@@ -1,4 +1,4 @@
-// DISTANCE_SENSOR: each field, the encoded bytes, and which distances a link sends.
+// Tests DISTANCE_SENSOR: each field, the encoded bytes, and which distances a link sends.
 #include "protocol/mavlink/distances.hpp"
 
 #include <limits>

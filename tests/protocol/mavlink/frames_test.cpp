@@ -1,5 +1,5 @@
-// Frames of both versions are found between other frames and other bytes; damaged frames are refused, and every length is
-// checked.
+// Tests that frames of both versions are found between other frames and other bytes, that damaged frames are refused, and that
+// every length is checked.
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {

@@ -1,5 +1,5 @@
-// An independent writer (tests/acceptance/mavlink_frames.py) made frames from the message definitions: we read every field
-// correctly and write the same bytes.
+// Tests with frames that an independent writer (tests/acceptance/mavlink_frames.py) made from the message definitions: we must
+// read every field correctly and write the same bytes.
 #include <cstdio>
 #include <fstream>
 #include <map>
@@ -11,7 +11,7 @@ namespace sonar::mavlink {
 namespace {
 
 /// Collects the values of each field, as the golden file prints them.
-struct Told : wire::Visitor<Told> {
+struct FieldValues : wire::Visitor<FieldValues> {
   std::map<std::string, std::string> values;
   template <class T>
   void scalar(std::string_view name, const T& value) {
@@ -43,12 +43,12 @@ std::vector<Golden> golden() {
 template <class M>
 void expect_read_and_written(const Golden& g, const Frame& frame) {
   const M message = message_in<M>(frame);
-  Told told;
+  FieldValues found;
   if (g.version == 2)
-    all_fields(told, message);
+    all_fields(found, message);
   else
-    fields(told, message);
-  EXPECT_EQ(told.values, g.values);
+    fields(found, message);
+  EXPECT_EQ(found.values, g.values);
   Sender same{{frame.system, frame.component, frame.sequence}};
   EXPECT_EQ(g.version == 2 ? same(message) : same.version_1(message), bytes_of_hex(g.hex));
 }

@@ -10,7 +10,7 @@
 namespace sonar::mavlink {
 namespace {
 
-/// Names, types and array lengths as message definitions spell them.
+/// Lists names, types and array lengths as message definitions spell them.
 struct Listed : wire::Visitor<Listed> {
   struct Row {
     std::string type, name;

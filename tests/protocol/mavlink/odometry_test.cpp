@@ -1,4 +1,4 @@
-// Messages that state the same pose in different frames give the same pose.
+// Tests that messages that state the same pose in different frames give the same pose.
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
 
 namespace sonar::mavlink {
@@ -33,7 +33,7 @@ void expect_the_vehicle(const control::PoseSample& s) {
   expect_near(*s.angular_velocity_radps, {0, -0.1, -0.2}, 1e-6);
 }
 
-TEST(MavlinkOdometry, EveryPairOfFramesMeansTheSameVehicle) {
+TEST(MavlinkOdometry, EveryPairOfFramesGivesTheSamePose) {
   const double quarter = pi / 2;
   const Vec3 moves_frd{1, -0.5f, 0}, turns_frd{0, 0.1f, 0.2f}, moves_flu{1, 0.5f, 0}, turns_flu{0, -0.1f, -0.2f};
   const auto sent = [](auto... parts) { return sample_of(raw_pose(with(parts...))); };

@@ -1,5 +1,5 @@
-// A position is paired with the attitude of the same moment. The attitude is interpolated or briefly extrapolated, or the
-// position waits for it, or it is missing.
+// Tests the pairing of a position with the attitude of the same moment: the attitude is interpolated or briefly extrapolated, or
+// the position waits for it, or it is missing.
 #include "protocol/mavlink/paired_poses.hpp"
 
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
@@ -40,7 +40,7 @@ TEST(MavlinkPairs, TheNewestAttitudeIsExtrapolatedForAShortTime) {
   EXPECT_EQ(all.at(999, at), Attitudes::Answer::never) << "before the first attitude";
 }
 
-TEST(MavlinkPairs, LateAttitudesChangeNothingAndEqualOnesReplace) {
+TEST(MavlinkPairs, LateAttitudesChangeNothingAndThoseOfAnEqualTimeReplace) {
   Attitudes all;
   all.put(turned(1000, 1.0));
   all.put(turned(900, 2.0));

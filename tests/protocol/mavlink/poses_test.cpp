@@ -1,4 +1,4 @@
-// The accepted senders and messages, the poses made from them, and the stamps of these poses.
+// Tests the accepted senders and messages, the poses made from them, and the stamps of these poses.
 #include <limits>
 #include <utility>
 

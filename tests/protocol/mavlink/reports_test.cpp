@@ -1,4 +1,4 @@
-// Heartbeats and requests to the autopilot, and notices to the user.
+// Tests heartbeats and requests to the autopilot, and notices to the user.
 #include <functional>
 
 #include "tests/protocol/mavlink/mavlink_testing.hpp"
@@ -192,7 +192,7 @@ TEST(MavlinkReports, MissingMessagesAreReportedLessAndLessOftenUntilTheyCome) {
   EXPECT_THAT(silent[0].second, HasSubstr("system 1 (ArduPilot) has sent nothing for 6 s: no poses"));
 }
 
-TEST(MavlinkReports, PosesThatEndWhileTheSystemSpeaksAreReported) {
+TEST(MavlinkReports, PosesThatEndWhileTheSystemSendsAreReported) {
   Sender v;
   MavlinkPoses poses({});
   poses.on_datagram(v(odometry(1, 0)), at_s(0));

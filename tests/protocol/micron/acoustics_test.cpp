@@ -1,4 +1,4 @@
-// Scan lines of a Micron with bodies at known positions, computed with the whole engine.
+// Tests scan lines of a Micron with bodies at known positions, computed with the whole engine.
 #include <algorithm>
 
 #include "tests/core/pipeline/scenes.hpp"
@@ -41,7 +41,7 @@ struct Scanner {
 
 std::shared_ptr<const Scene> ball_at(Vec3d at) { return SceneMaker().add(sphere(0.03, 4), -10, at).make(); }
 
-TEST(MicronAcoustics, LeftIsLeftAndRightIsRight) {
+TEST(MicronAcoustics, PortAndStarboardAreNotSwapped) {
   EXPECT_NEAR(Scanner(ball_at({0, -1.2, 0})).brightest_bearing(), 4800, 16) << "a ball to starboard";
   EXPECT_NEAR(Scanner(ball_at({0, 1.2, 0})).brightest_bearing(), 1600, 16) << "a ball to port";
   EXPECT_NEAR(Scanner(ball_at({1.2, 0, 0})).brightest_bearing(), 3200, 16);

@@ -1,5 +1,5 @@
-// A driver's conversation with an emulated Micron, without a socket: frames, alive messages, scans, ignored messages, and how the
-// host handles foreign bytes.
+// Tests a driver's conversation with an emulated Micron, without a socket: frames, alive messages, scans, ignored messages, and
+// how the host handles foreign bytes.
 #include <gmock/gmock.h>
 
 #include "core/base/geometry.hpp"

@@ -37,7 +37,7 @@ inline HeadCommand sector() {
 inline Bytes command(const HeadCommand& c) { return from_host(Id::head_command, wire::bytes_of(c)); }
 inline Bytes request() { return from_host(Id::send_data, Bytes(4)); }
 
-/// A conversation with a device, whose events are applied as the daemon does.
+/// A conversation with a device, whose events are applied as the daemon applies them.
 struct Talk {
   explicit Talk(const char* option = nullptr, const char* value = nullptr)
       : state(device(option != nullptr ? protocol::OptionValues{{option, value}} : protocol::OptionValues{})) {

@@ -1,4 +1,4 @@
-// Bathymetry of a Norbit over a known floor and a ball, computed with the whole engine.
+// Tests the bathymetry of a Norbit over a known floor and a ball, computed with the whole engine.
 #include <algorithm>
 #include <cmath>
 

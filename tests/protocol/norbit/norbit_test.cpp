@@ -1,4 +1,4 @@
-// The packets of an emulated Norbit, with offsets typed by hand, and its commands and refusals, without a socket.
+// Tests the packets of an emulated Norbit, with offsets typed by hand, and its commands and refusals, without a socket.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -111,7 +111,7 @@ TEST_F(Packets, TruncatedAndDamagedPacketsAreRefused) {
   }
 }
 
-TEST_F(Packets, FaultsFindTheirFields) {
+TEST_F(Packets, FieldsForFaultsAreFound) {
   Bytes both = bathymetry;
   both.insert(both.end(), column.begin(), column.end());
   EXPECT_EQ(locate(means::ping_id, bathymetry)->offset, 36u);
@@ -150,7 +150,7 @@ TEST_F(Packets, PixelsBelowZeroAreDark) {
 
 /// A host that gets packets from ports: 0 is the bathymetry, 1 is the water column.
 struct Hosts : Packets {
-  void hear(std::size_t port, std::uint32_t number, double at) {
+  void receive(std::size_t port, std::uint32_t number, double at) {
     const Bytes& like = port == 0 ? bathymetry : column;
     Bytes packet = like;
     const auto field = locate(means::ping_id, packet);
@@ -160,7 +160,7 @@ struct Hosts : Packets {
   }
   void note(const protocol::HostActions& actions) {
     for (const auto& action : actions) {
-      if (const auto* notice = std::get_if<protocol::Notice>(&action)) said += notice->text;
+      if (const auto* notice = std::get_if<protocol::Notice>(&action)) notices_text += notice->text;
       const auto* const seen = std::get_if<protocol::HostPing>(&action);
       if (seen == nullptr) continue;
       EXPECT_THAT(seen->errors, IsEmpty());
@@ -172,39 +172,39 @@ struct Hosts : Packets {
   std::string take() { return std::exchange(shown, {}); }
 
   std::unique_ptr<protocol::Host> host = *make_host({.as_it_is = true, .settings = {}});
-  std::string shown, said;  // numbers of shown pings, with "p" for points and "c" for a water column; notices
+  std::string shown, notices_text;  // numbers of shown pings, with "p" for points and "c" for a water column; notices
 };
 
 TEST_F(Hosts, ShowCompletePings) {
-  for (std::uint32_t number = 1; number <= 9; ++number) hear(0, number, 0.1 * number);
+  for (std::uint32_t number = 1; number <= 9; ++number) receive(0, number, 0.1 * number);
   EXPECT_EQ(take(), "") << "the host waits for the other connection";
-  hear(1, 1, 1);
+  receive(1, 1, 1);
   EXPECT_EQ(take(), "1pc ");
-  hear(1, 2, 1.8);
-  hear(1, 3, 2.6);
+  receive(1, 2, 1.8);
+  receive(1, 3, 2.6);
   EXPECT_EQ(take(), "2pc 3pc ");
-  hear(1, 10, 2.7);
+  receive(1, 10, 2.7);
   EXPECT_EQ(host->next_tick(), at_s(4.7)) << "only ping 10 waits: its water column shows that those of 4 to 9 were dropped";
-  hear(0, 10, 2.8);
+  receive(0, 10, 2.8);
   EXPECT_EQ(take(), "10pc ");
   EXPECT_EQ(host->counts()->missing_pings, 6u);
 }
 
 TEST_F(Hosts, KeepTheOrderOfPings) {
-  for (const std::uint32_t number : {1u, 2u, 3u, 4u}) hear(1, number, 0.1);
-  hear(0, 1, 0.2);
-  hear(0, 4, 0.2);
+  for (const std::uint32_t number : {1u, 2u, 3u, 4u}) receive(1, number, 0.1);
+  receive(0, 1, 0.2);
+  receive(0, 4, 0.2);
   EXPECT_EQ(take(), "1pc 4pc ");
-  hear(0, 5, 0.3);
-  hear(0, 7, 0.3);
-  hear(1, 5, 0.4);
-  hear(1, 6, 0.4);
-  hear(1, 7, 0.4);
+  receive(0, 5, 0.3);
+  receive(0, 7, 0.3);
+  receive(1, 5, 0.4);
+  receive(1, 6, 0.4);
+  receive(1, 7, 0.4);
   EXPECT_EQ(take(), "5pc 7pc ");
 }
 
 TEST_F(Hosts, WaitWhileBytesOfAPacketCome) {
-  hear(0, 7, 0);
+  receive(0, 7, 0);
   const std::size_t part = column.size() / 8;
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_EQ(take(), "");
@@ -216,52 +216,52 @@ TEST_F(Hosts, WaitWhileBytesOfAPacketCome) {
 }
 
 TEST_F(Hosts, ShowPingsOfOnePortIfTheOtherIsSilent) {
-  hear(0, 1, 0);
-  hear(1, 1, 0);
+  receive(0, 1, 0);
+  receive(1, 1, 0);
   take();
-  hear(0, 2, 10);
+  receive(0, 2, 10);
   ASSERT_EQ(host->next_tick(), at_s(12));
   note(host->on_tick(at_s(11.99)));
   EXPECT_EQ(take(), "");
   note(host->on_tick(at_s(12)));
   EXPECT_EQ(take(), "2p ");
   EXPECT_EQ(host->next_tick(), std::nullopt);
-  hear(1, 2, 13);
+  receive(1, 2, 13);
   EXPECT_EQ(take(), "") << "a ping is not shown twice";
-  EXPECT_EQ(said, "the water column of ping 2 came after the ping was shown");
-  hear(0, 3, 14);
-  hear(1, 3, 14);
+  EXPECT_EQ(notices_text, "the water column of ping 2 came after the ping was shown");
+  receive(0, 3, 14);
+  receive(1, 3, 14);
   EXPECT_EQ(take(), "3pc ");
 }
 
 TEST_F(Hosts, ShowPingsOfOnePortAtOnceWhenTheOtherHasSentNothing) {
-  hear(2, 1, 1);  // a recording stores the packets of all ports in one stream
-  hear(2, 2, 2);
+  receive(2, 1, 1);  // a recording stores the packets of all ports in one stream
+  receive(2, 2, 2);
   note(host->on_tick(at_s(2)));
   EXPECT_EQ(take(), "");
-  hear(2, 3, 3);
+  receive(2, 3, 3);
   note(host->on_tick(at_s(3)));
   EXPECT_EQ(take(), "1c 2c 3c ");
-  hear(2, 4, 4);
+  receive(2, 4, 4);
   note(host->on_tick(at_s(4)));
   EXPECT_EQ(take(), "4c ");
 }
 
 TEST_F(Hosts, WaitForBothPortsAfterAPause) {
-  hear(0, 1, 0);
-  hear(1, 1, 0);
-  hear(0, 2, 0.1);
+  receive(0, 1, 0);
+  receive(1, 1, 0);
+  receive(0, 2, 0.1);
   take();
-  hear(0, 3, 60);  // one port is read before the other
+  receive(0, 3, 60);  // one port is read before the other
   EXPECT_EQ(take(), "");
-  hear(1, 2, 60);
-  hear(1, 3, 60);
+  receive(1, 2, 60);
+  receive(1, 3, 60);
   note(host->on_tick(at_s(60)));
   EXPECT_EQ(take(), "2pc 3pc ");
 }
 
 TEST_F(Hosts, LimitWaitingMessages) {
-  for (std::uint32_t number = 1; number <= 1100; ++number) hear(0, number, 0.001 * number);
+  for (std::uint32_t number = 1; number <= 1100; ++number) receive(0, number, 0.001 * number);
   EXPECT_THAT(take(), StartsWith("1p 2p ")) << "the oldest pings are shown";
 }
 
@@ -367,12 +367,12 @@ TEST(Norbit, TheBottomIsDetectedOnce) {
     for (const Beam& beam : bathymetry->beams) samples.push_back(beam.sample);
     return samples;
   };
-  const auto looked_for_now = bottom();
+  const auto detected_now = bottom();
   look_at(ping);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(bottom(), looked_for_now) << "look_at() has stored the bottom before the samples were lost";
+  EXPECT_EQ(bottom(), detected_now) << "look_at() has stored the bottom before the samples were lost";
   look_at(ping);
-  EXPECT_NE(bottom(), looked_for_now);
+  EXPECT_NE(bottom(), detected_now);
 }
 
 TEST(Norbit, GridsFitTheirRange) {

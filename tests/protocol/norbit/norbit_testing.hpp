@@ -48,7 +48,7 @@ inline Ping ping_with(const Settings& settings, const protocol::DeviceState& sta
   return ping;
 }
 
-/// A conversation at one of the ports; the events of the device are applied as the daemon does.
+/// A conversation at one of the ports; the events of the device are applied as the daemon applies them.
 struct Talk {
   explicit Talk(std::uint16_t number = command_port) {
     for (const protocol::Port& port : vendor().ports())

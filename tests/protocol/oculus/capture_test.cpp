@@ -1,4 +1,4 @@
-// Real bytes: three pings of an M1200d in mode 2. They are stored outside the repository, in the folder that SONARD_CAPTURES
+// Tests with three real pings of an M1200d in mode 2. They are stored outside the repository, in the folder that SONARD_CAPTURES
 // names.
 #include <cstdlib>
 #include <filesystem>
@@ -11,7 +11,7 @@
 namespace sonar::oculus::tests {
 namespace {
 
-/// The capture lies in the folder itself or in oculus/ below it.
+/// Returns the capture, which lies in the folder itself or in oculus/ below it.
 std::optional<Bytes> captured() {
   const char* folder = std::getenv("SONARD_CAPTURES");
   if (folder == nullptr) return std::nullopt;

@@ -1,4 +1,4 @@
-// The driver-side decoder: each broken ping gives an error of its own, and none makes it read or allocate beyond the message.
+// Tests the driver-side decoder: each broken ping gives its own error, and none makes the decoder read beyond the message.
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
 namespace sonar::oculus::tests {

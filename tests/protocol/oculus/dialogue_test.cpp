@@ -1,4 +1,4 @@
-// One client's conversation: the messages of public clients in any pieces, with other bytes between them, and the replies.
+// Tests one client's conversation: the messages of public clients in any pieces, with other bytes between them, and the replies.
 #include "core/base/random.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
@@ -230,7 +230,7 @@ TEST(Dialogue, SummaryHasTheRequestedSettings) {
   EXPECT_THAT(summary(fire(2, 1, PingRate::hz10, 0x0D, 5, 50), 0, 0x200), HasSubstr("256 beams, 32 bits"));
 }
 
-TEST(Dialogue, ShortAndForeignMessagesAreNoticed) {
+TEST(Dialogue, ShortAndForeignMessagesCauseNotices) {
   Conversation talk;
   Bytes shorty = make_fire(fire(0, 1, PingRate::hz10, 0x49, 5, 50));
   overwrite(shorty, 10, hex("0A 00 00 00"));
@@ -276,7 +276,7 @@ TEST(Dialogue, BootTextIsSentAtOnceIfConfigured) {
   EXPECT_EQ(talk.dialogue->next_tick(), at(1));
 }
 
-bool greets_at(Conversation& talk, double when_s) {
+bool sends_boot_text_at(Conversation& talk, double when_s) {
   for (const Bytes& reply : talk.dialogue->on_tick(at(when_s), false).replies)
     if (std::holds_alternative<LogText>(decode_message(reply))) return true;
   return false;
@@ -285,19 +285,19 @@ bool greets_at(Conversation& talk, double when_s) {
 // A client may wait for the text before it fires; clients that do not wait must never receive it.
 TEST(Dialogue, BootTextIsSentOnceToASilentClient) {
   Conversation waits;
-  EXPECT_FALSE(greets_at(waits, 1)) << "the first message is a dummy";
+  EXPECT_FALSE(sends_boot_text_at(waits, 1)) << "the first message is a dummy";
   EXPECT_EQ(waits.dialogue->next_tick(), at(2));
-  EXPECT_TRUE(greets_at(waits, 2));
-  EXPECT_FALSE(greets_at(waits, 3)) << "the text is sent once";
+  EXPECT_TRUE(sends_boot_text_at(waits, 2));
+  EXPECT_FALSE(sends_boot_text_at(waits, 3)) << "the text is sent once";
 
   Conversation fires;
-  EXPECT_FALSE(greets_at(fires, 1));
+  EXPECT_FALSE(sends_boot_text_at(fires, 1));
   fires.say(make_fire(fire(0, 1, PingRate::standby, 0x49, 5, 50)), 1.2);
-  Conversation looks_on;
-  looks_on.dialogue->on_ping_queued(at(1.5));
+  Conversation observes;
+  observes.dialogue->on_ping_queued(at(1.5));
   Conversation is_off("boot_text", "off");
-  for (Conversation* talk : {&fires, &looks_on, &is_off})
-    for (int second = 2; second < 9; ++second) EXPECT_FALSE(greets_at(*talk, second));
+  for (Conversation* talk : {&fires, &observes, &is_off})
+    for (int second = 2; second < 9; ++second) EXPECT_FALSE(sends_boot_text_at(*talk, second));
 }
 
 TEST(Dialogue, FirstPingsAreAnOption) {
@@ -314,7 +314,7 @@ TEST(Dialogue, FirstPingsAreAnOption) {
   EXPECT_EQ(ping->head.fixed.header.version, 0) << "all clients can read version 0";
 }
 
-TEST(Dialogue, EverySplitMeansTheSame) {
+TEST(Dialogue, EverySplitGivesTheSameSettings) {
   const Bytes stream = joined({make_fire(fire(0, 1, PingRate::hz10, 0x49, 5, 50), 0, true), hex("30 30"),
                                make_fire(fire(2, 2, PingRate::hz40, 0xC9, 5, 50))});
   for (std::size_t i = 0; i <= stream.size(); ++i) {
@@ -345,9 +345,9 @@ TEST(Dialogue, EveryFlippedByteIsSurvived) {
       Bytes flipped = whole;
       flipped[i] ^= static_cast<std::byte>(flip);
       talk.say(flipped);
-      bool heard = false;  // a damaged length may skip up to the largest accepted payload
-      for (int tries = 0; tries < 60 && !heard; ++tries) heard = !events_of<ChangeSettings>(talk.say(whole)).empty();
-      EXPECT_TRUE(heard) << "byte " << i << " flip " << flip;
+      bool accepted = false;  // a damaged length may skip up to the largest accepted payload
+      for (int tries = 0; tries < 60 && !accepted; ++tries) accepted = !events_of<ChangeSettings>(talk.say(whole)).empty();
+      EXPECT_TRUE(accepted) << "byte " << i << " flip " << flip;
     }
   }
 }

@@ -1,4 +1,4 @@
-// docs/protocols/oculus.md describes every option of the code. The page of evidence lists every file with an assumption.
+// Tests that docs/protocols/oculus.md describes every option, and that the page of evidence lists every file with an assumption.
 #include <filesystem>
 #include <fstream>
 

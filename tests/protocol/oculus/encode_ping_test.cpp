@@ -1,4 +1,4 @@
-// Encoded pings: sizes, echo, version, environment, formats, bearings.
+// Tests encoded pings: sizes, echo, version, environment, formats, bearings.
 #include "protocol/oculus/models.hpp"
 #include "tests/protocol/oculus/oculus_testing.hpp"
 
@@ -126,13 +126,13 @@ TEST(EncodePing, Version2EchoesItsTail) {
 }
 
 TEST(EncodePing, VersionMirrorsTheRequest) {
-  const auto version = [](int asked, const char* option) {
+  const auto version = [](int requested, const char* option) {
     const DecodedPing ping =
-        answer(device("oculus-m1200d", {{"reply_version", option}}), fire(asked, 1, PingRate::hz10, 0x49, 5, 50));
+        answer(device("oculus-m1200d", {{"reply_version", option}}), fire(requested, 1, PingRate::hz10, 0x49, 5, 50));
     EXPECT_THAT(ping.violations, IsEmpty());
     return int{ping.head.fixed.header.version};
   };
-  for (const int asked : {0, 1, 2}) EXPECT_EQ(version(asked, "mirror"), asked);
+  for (const int requested : {0, 1, 2}) EXPECT_EQ(version(requested, "mirror"), requested);
   EXPECT_EQ(version(9, "mirror"), 2);
   EXPECT_EQ(version(0, "2"), 2);
   EXPECT_EQ(version(2, "0"), 0);

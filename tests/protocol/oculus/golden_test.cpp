@@ -1,5 +1,5 @@
-// Golden pairs: name.bin decodes to name.json and name.json encodes to name.bin. The pairs are written by golden/make_golden.py,
-// which shares nothing with the code under test.
+// Tests the golden pairs: name.bin decodes to name.json and name.json encodes to name.bin. The pairs are written by
+// golden/make_golden.py, which shares nothing with the code under test.
 #include <fstream>
 #include <nlohmann/json.hpp>
 

@@ -93,7 +93,7 @@ TEST(Messages, StatusByHand) {
   EXPECT_THAT(status_violations(*status, beacon.size()), ::testing::IsEmpty());
 }
 
-TEST(Messages, StatusIsReadByHand) {
+TEST(Messages, HandTypedStatusIsRead) {
   const auto status = decode_status(joined({status_bytes, hex("00 00 00 00 00 00 F4 3F")}));
   ASSERT_TRUE(status.has_value());
   EXPECT_EQ(status->device_id, 7001u);

@@ -1,4 +1,4 @@
-// Compares the product table with the figures of public drivers, which were typed a second time.
+// Compares the product table with the figures of public drivers, which were typed a second time here.
 #include <set>
 
 #include "protocol/oculus/models.hpp"

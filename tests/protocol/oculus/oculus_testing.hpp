@@ -91,8 +91,8 @@ inline FireRequest fire(int version, int mode, PingRate rate, int flags, double 
   return request;
 }
 
-/// The bearings follow the formula of the product. The samples depend on row and beam: code = (row * 7 + beam) modulo 251 in the
-/// lowest byte.
+/// Returns a ping with the bearings of the product's formula. The samples depend on row and beam: the lowest byte is (row * 7 +
+/// beam) modulo 251.
 inline Ping made_up_ping(const protocol::DeviceState& state, const PingSettings& settings, std::uint32_t number = 1) {
   Ping ping;
   ping.request.model = state.model;

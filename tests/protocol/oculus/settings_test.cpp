@@ -1,4 +1,4 @@
-// The rules that convert a fire message to PingSettings: rows, rates, gain, gamma, limits, sound speed, sample formats.
+// Tests the rules that convert a fire message to PingSettings: rows, rates, gain, gamma, limits, sound speed, sample formats.
 #include "protocol/oculus/settings.hpp"
 
 #include <limits>
@@ -19,9 +19,9 @@ PingSettings settings_of(const FireRequest& request, const protocol::DeviceState
 
 // The captured ping has, for 2.0 m at 1490.658551265436 m/s, 703 rows of 2.8421889710794315 mm.
 TEST(RowGrid, IsTheCapturedOne) {
-  const RowGrid law = row_grid(2.0, 1490.658551265436);
-  EXPECT_EQ(law.count, 703);
-  EXPECT_DOUBLE_EQ(law.spacing_m, 0.0028421889710794315);
+  const RowGrid grid = row_grid(2.0, 1490.658551265436);
+  EXPECT_EQ(grid.count, 703);
+  EXPECT_DOUBLE_EQ(grid.spacing_m, 0.0028421889710794315);
 }
 
 // For the captured request, the spacing in the packet is equal to the captured one in every bit.
@@ -36,20 +36,20 @@ TEST(RowGrid, SpacingDoublesUntilTheRowsFit) {
   EXPECT_EQ(row_grid(30, 1500).count, 655);  // 2^4
   const double base = 1500 / (2 * row_rate_hz);
   for (double range = 0.1; range < 200; range *= 1.07) {
-    const RowGrid law = row_grid(range, 1500);
-    const double doublings = std::log2(law.spacing_m / base);
+    const RowGrid grid = row_grid(range, 1500);
+    const double doublings = std::log2(grid.spacing_m / base);
     EXPECT_NEAR(doublings, std::round(doublings), 1e-9);
-    EXPECT_LE(law.count, 720) << range;
+    EXPECT_LE(grid.count, 720) << range;
     if (doublings > 0.5) {
-      EXPECT_GT(range / (law.spacing_m / 2), 720) << range << ": a finer spacing would fit";
+      EXPECT_GT(range / (grid.spacing_m / 2), 720) << range << ": a finer spacing would fit";
     }
-    EXPECT_LE(std::abs(range - law.count * law.spacing_m), law.spacing_m) << "the rows end within one row of the range";
+    EXPECT_LE(std::abs(range - grid.count * grid.spacing_m), grid.spacing_m) << "the rows end within one row of the range";
   }
 }
 
 TEST(RowGrid, HasAtLeastOneRow) { EXPECT_EQ(row_grid(0.001, 1500).count, 1); }
 
-TEST(Laws, RatesAreTheTables) {
+TEST(Laws, RatesAreThoseOfTheTable) {
   EXPECT_EQ(table_rate_hz(PingRate{0}), 10);
   EXPECT_EQ(table_rate_hz(PingRate{1}), 15);
   EXPECT_EQ(table_rate_hz(PingRate{2}), 40);
@@ -255,7 +255,7 @@ TEST(Settle, RecordedPulseHasCellsAsWideAsTheUsualOne) {
   }
 }
 
-TEST(Settle, NativePulseStaysAffordableAtLongRange) {
+TEST(Settle, NativePulseHasAtMost32SamplesPerRow) {
   const FireRequest request = fire(0, 1, PingRate::hz10, 0x49, 200, 50);
   const PingSettings native = settings_of(request, device("oculus-m370s", {{"pulse", "native"}}));
   EXPECT_EQ(native.samples_per_row, 32);
@@ -275,7 +275,7 @@ TEST(Settle, RowOriginIsAnOption) {
   EXPECT_EQ(settings_of(request, device("oculus-m1200d", {{"row_origin", "far_edge"}})).row_centre, 1);
 }
 
-TEST(Settle, TheEndsOfRowRatesAreUsable) {
+TEST(Settle, TheLowestAndHighestRowRatesAreUsable) {
   for (const char* rate : {"1e4", "1e7"}) {
     const PingSettings s = settings_of(fire(0, 2, PingRate::hz10, 0x49, 2, 50), device("oculus-m1200d", {{"row_rate_hz", rate}}));
     EXPECT_TRUE(s.range_bin_m > 0 && s.range_bin_m < 1) << rate;

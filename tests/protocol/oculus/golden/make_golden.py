@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the golden pairs of this folder: name.bin, laid out by hand with struct, and name.json, the same values by the
+"""Writes the golden pairs of this folder: name.bin, laid out by hand with struct, and name.json, the same values with the
 vendor's names. It is deliberately independent of the C++ code: it was written from the published layouts."""
 import json
 import pathlib
