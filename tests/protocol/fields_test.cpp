@@ -1,4 +1,4 @@
-// Vendor::field() finds each field by its meaning: the value at that place of an encoded message is right.
+// Tests that Vendor::field() finds each field by its meaning: an encoded message must have the right value at that place.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -1,4 +1,4 @@
-// For each make, the bytes of the device are stored in files of every kind; the host reads the same pings from these files.
+// Tests for each make that its host reads the same pings from the device's bytes in files of every kind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// The host of each make with the device of the same make, in memory and virtual time. Settings have effect and pings arrive for
-// any split of the bytes. Cut or foreign bytes cause neither a ping nor a crash.
+// Tests the host of each make with the device of the same make, in memory and virtual time. Settings must have effect and pings
+// must arrive for any split of the bytes. Cut or foreign bytes must cause neither a ping nor a crash.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -168,7 +168,7 @@ TEST_P(Hosts, ShowAnEchoToPortAtPort) {
   EXPECT_EQ(starboard, 0u);
 }
 
-TEST_P(Hosts, ReadTheSameHoweverAStreamIsSplit) {
+TEST_P(Hosts, ReadTheSamePingsHoweverAStreamIsSplit) {
   const auto pings_of = [](std::size_t piece) {
     Talk talk(GetParam(), all_that_is_known(GetParam(), range_m), piece, model_of(GetParam()));
     talk.run(sonar::test::is_sanitized && !GetParam().scans ? 3 : 6);  // single bytes take long under sanitizers
@@ -267,7 +267,7 @@ TEST_P(Hosts, RequestSlowPingsForRatesBelowTheLowestOnTheWire) {
   }
 }
 
-/// A sonar that keeps settings, as another driver has left it with a range of 7 m; then a host opens that wants 3 m.
+/// A sonar that keeps settings. Another driver has left a range of 7 m; then a host opens that sets 3 m.
 class KeptSettings {
  public:
   /// `held_after`: number of messages of the sonar that arrive at once; later ones arrive with talk.release().
@@ -316,7 +316,7 @@ TEST_P(Hosts, LeaveSettingsAsTheyFoundThemEvenIfNoAnswerHasArrivedYet) {
   EXPECT_GT(changed, 3u);
 }
 
-TEST_P(Hosts, KeepWhatAnotherDriverHasSetSince) {
+TEST_P(Hosts, KeepLaterSettingsOfAnotherDriver) {
   if (!keeps_settings(GetParam())) return;
   KeptSettings sonar(GetParam());
   sonar.talk.run(30);
@@ -331,7 +331,7 @@ TEST_P(Hosts, KeepWhatAnotherDriverHasSetSince) {
   EXPECT_EQ(sonar.talk.settings.range_m, anothers_m);
 }
 
-TEST_P(Hosts, PutBackTheFirstSettingsAfterALostConnection) {
+TEST_P(Hosts, RestoreTheFirstSettingsAfterALostConnection) {
   if (!keeps_settings(GetParam())) return;
   for (const std::size_t held_after : {SIZE_MAX, std::size_t{5}, std::size_t{0}}) {
     KeptSettings sonar(GetParam(), held_after);
@@ -439,7 +439,7 @@ TEST(Makes, RefuseARateAboveThatOfTheSonar) {
 }
 
 TEST(Makes, ReportTheGainOfTheNearestStep) {
-  for (const auto& [name, told] :
+  for (const auto& [name, expected] :
        {std::pair("ping1d", "gain 33 % (step 2 of 6), not 40 %"), std::pair("s500", "gain 38 % (step 5 of 13), not 40 %"),
         std::pair("omniscan450", "gain 43 % (step 3 of 7), not 40 %"),
         std::pair("ping360", "gain 50 % (step 1 of 2), not 40 %")}) {
@@ -448,7 +448,7 @@ TEST(Makes, ReportTheGainOfTheNearestStep) {
     Talk talk(*find_make(name), wanted);
     talk.run(30);
     ASSERT_FALSE(talk.pings.empty()) << name;
-    EXPECT_THAT(talk.pings.back().limited, testing::ElementsAre(told)) << name;
+    EXPECT_THAT(talk.pings.back().limited, testing::ElementsAre(expected)) << name;
     wanted.settings.gain_percent = 100;
     Talk exact(*find_make(name), wanted);
     exact.run(30);

@@ -43,7 +43,7 @@ inline Wanted all_that_is_known(const Make& make, double range_m) {
   return wanted;
 }
 
-/// Each byte is 7 more than the previous one, modulo 251. Blocks are copied, because single bytes take long without optimisation.
+/// Makes each byte 7 more than the previous, modulo 251. Blocks are copied, because single bytes take long without optimisation.
 inline void fill_with_pattern(std::vector<std::byte>& samples) {
   std::array<std::byte, 251> period;
   for (std::size_t i = 0; i < period.size(); ++i) period[i] = static_cast<std::byte>(i * 7 % period.size());

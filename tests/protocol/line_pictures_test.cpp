@@ -1,4 +1,4 @@
-// Pictures of sonars that send single lines.
+// Tests pictures of sonars that send single lines.
 #include "protocol/line_pictures.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
-// A recording of a real ARIS 1200 with a telephoto lens, stored outside the repository: our description of the header
-// reads it, and our formulas give its window and its beams.
+// Tests with a recording of a real ARIS 1200 with a telephoto lens, stored outside the repository: our description of the header
+// must read it, its settings must be valid, and our formula must give its window.
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>

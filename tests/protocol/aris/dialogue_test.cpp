@@ -1,4 +1,4 @@
-// A controller's conversation with an emulated ARIS, without a socket.
+// Tests a controller's conversation with an emulated ARIS, without a socket.
 #include <gmock/gmock.h>
 
 #include <deque>

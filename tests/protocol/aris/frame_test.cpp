@@ -1,4 +1,4 @@
-// Frames: the order of the channels, header fields at the vendor's offsets, and frames assembled from their datagrams.
+// Tests frames: the order of the channels, header fields at the vendor's offsets, and frames assembled from their datagrams.
 #include <cstring>
 #include <numeric>
 

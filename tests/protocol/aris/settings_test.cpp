@@ -1,4 +1,4 @@
-// Valid settings, the values derived from them, and the position of a sample.
+// Tests valid settings, the values derived from them, and the position of a sample.
 #include <gmock/gmock.h>
 
 #include "tests/protocol/aris/aris_testing.hpp"
@@ -101,7 +101,7 @@ TEST(ArisSettings, CookiesNameAppliedConstrainedAndInvalidSettings) {
   EXPECT_EQ(s.acoustics.pulse_us, 16u);
 }
 
-TEST(ArisSettings, SamplesLieWhereDelayPeriodAndSoundSpeedPutThem) {
+TEST(ArisSettings, RangesOfSamplesFollowFromDelayPeriodAndSoundSpeed) {
   auto state = tests::device();
   state.water = {9, 0, 8, 0};
   Settings s = initial_settings(state);

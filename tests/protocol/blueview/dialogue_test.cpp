@@ -13,13 +13,13 @@ using protocol::Reaction;
 using protocol::RequestPing;
 using test::at_s;
 
-/// One host on a device that applies requests, as the daemon does.
+/// One host, and a device that applies requests as the daemon applies them.
 struct Host {
   explicit Host(protocol::DeviceState& d) : device(d), dialogue(make_dialogue(d, at_s(0))) {}
-  Reaction say(const wire::Bytes& bytes, double s = 0) { return heed(dialogue->on_bytes(bytes, at_s(s))); }
-  Reaction tick(double s) { return heed(dialogue->on_tick(at_s(s), ping_pending)); }
+  Reaction say(const wire::Bytes& bytes, double s = 0) { return apply_changes(dialogue->on_bytes(bytes, at_s(s))); }
+  Reaction tick(double s) { return apply_changes(dialogue->on_tick(at_s(s), ping_pending)); }
   protocol::Delivery ready(double s = 0) { return dialogue->on_ping(device.settings.get(), 1000, at_s(s)); }
-  Reaction heed(Reaction r) {
+  Reaction apply_changes(Reaction r) {
     for (const auto& event : r.events)
       if (const auto* change = std::get_if<ChangeSettings>(&event)) device.settings = change->vendor_settings;
     return r;
@@ -28,7 +28,7 @@ struct Host {
   bool ping_pending = false;
   std::unique_ptr<protocol::Dialogue> dialogue;
 };
-int pings_asked(const Reaction& r) {
+int pings_requested(const Reaction& r) {
   return static_cast<int>(
       std::count_if(r.events.begin(), r.events.end(), [](const auto& e) { return std::holds_alternative<RequestPing>(e); }));
 }
@@ -110,8 +110,8 @@ TEST(BlueViewDialogue, APingGoesOnceToHostsThatRequestedIt) {
   auto device = test::device();
   Host one(device), two(device), quiet(device);
   for (Host* h : {&one, &two, &quiet}) h->say(test::hello());
-  EXPECT_EQ(pings_asked(one.say(test::ping(11))), 1);
-  EXPECT_EQ(pings_asked(two.say(test::ping(22))), 1);
+  EXPECT_EQ(pings_requested(one.say(test::ping(11))), 1);
+  EXPECT_EQ(pings_requested(two.say(test::ping(22))), 1);
   one.say(test::ping(12));
   const auto first = one.ready(), second = two.ready();
   ASSERT_EQ(first.prefixes.size(), 2u);
@@ -160,17 +160,17 @@ TEST(BlueViewDialogue, ASubscriptionWaitsForAPendingSinglePingOfAnotherHead) {
   two.say(test::two_numbers(FrameType::subscribe, 4, 1, 200));
   one.say(test::ping(1, 0));
   two.ping_pending = true;
-  EXPECT_EQ(pings_asked(two.tick(0.2)), 0);
+  EXPECT_EQ(pings_requested(two.tick(0.2)), 0);
   two.ping_pending = false;
-  EXPECT_EQ(pings_asked(two.tick(0.4)), 1);
+  EXPECT_EQ(pings_requested(two.tick(0.4)), 1);
 }
 
 TEST(BlueViewDialogue, HeadsMayBeNumberedFromZeroOrOne) {
   auto device = test::device();
   Host host(device);
   host.say(test::hello());
-  EXPECT_EQ(pings_asked(host.say(test::ping(1, 0))), 1);
-  EXPECT_EQ(pings_asked(host.say(test::ping(2, 1))), 1);
+  EXPECT_EQ(pings_requested(host.say(test::ping(1, 0))), 1);
+  EXPECT_EQ(pings_requested(host.say(test::ping(2, 1))), 1);
   EXPECT_EQ(test::error_code_of(test::reply_from(host.say(test::ping(3, 2)).replies.at(0))), 2010);
   auto strict = test::device("blueview-p900-90", {{"heads_base", "strict"}});
   Host other(strict);
@@ -196,14 +196,14 @@ TEST(BlueViewDialogue, SubscriptionsMakePingsWithoutRequests) {
   Host host(device);
   host.say(test::hello());
   host.say(test::two_numbers(FrameType::subscribe, 4, 0, 200), 1);
-  EXPECT_EQ(pings_asked(host.tick(1)), 1);
+  EXPECT_EQ(pings_requested(host.tick(1)), 1);
   const auto delivery = host.ready(1.05);
   ASSERT_EQ(delivery.prefixes.size(), 1u);
   EXPECT_EQ(id_of(delivery.prefixes[0]), 0u);
-  EXPECT_EQ(pings_asked(host.tick(1.1)), 0);
-  EXPECT_EQ(pings_asked(host.tick(1.2)), 1);
+  EXPECT_EQ(pings_requested(host.tick(1.1)), 0);
+  EXPECT_EQ(pings_requested(host.tick(1.2)), 1);
   host.say(test::two_numbers(FrameType::subscribe, 5, 0, 0), 1.3);
-  EXPECT_EQ(pings_asked(host.tick(1.5)), 0);
+  EXPECT_EQ(pings_requested(host.tick(1.5)), 0);
 }
 
 TEST(BlueViewDialogue, KeepAliveIsSentInSilence) {
@@ -217,7 +217,7 @@ TEST(BlueViewDialogue, KeepAliveIsSentInSilence) {
   EXPECT_EQ(blueview::make_dialogue(device, test::at_s(0))->longest_silence(), std::chrono::seconds(10));
 }
 
-TEST(BlueViewDialogue, GarbageEndsOnlyTheConversation) {
+TEST(BlueViewDialogue, GarbageGetsAtMostOneReply) {
   for (std::uint32_t seed = 1; seed < 200; ++seed) {
     auto device = test::device();
     Host host(device);

@@ -53,7 +53,7 @@ int sample(const wire::Bytes& body, int index) {
          std::to_integer<int>(body[static_cast<std::size_t>(2 * index + 1)]) << 8;
 }
 
-TEST(BlueViewPing, BeamsLieSideBySideFromTheStartRangeOn) {
+TEST(BlueViewPing, BeamsFollowEachOtherAndBeginAtTheStartRange) {
   const auto device = test::device();
   SonarSettings all = initial_sonar_settings(device);
   all.heads[0].start_m = 2;

@@ -44,7 +44,7 @@ TEST(BlueViewFrames, WrongLettersAndHugeLengthsEndTheStream) {
   EXPECT_NE(huge.broken().find("70001"), std::string::npos);
 }
 
-TEST(BlueViewFrames, ValuesComeBack) {
+TEST(BlueViewFrames, WrittenValuesAreReadBack) {
   for (const Value& value : {Value(std::int32_t{-5}), Value(2.5f), Value(std::string("front"))}) {
     wire::Bytes bytes;
     put_value(bytes, value);

@@ -9,7 +9,7 @@
 namespace sonar::blueview {
 namespace {
 
-TEST(HeadSettings, EverythingSetReadsBack) {
+TEST(HeadSettings, EverySetValueIsReadBack) {
   const auto device = test::device();
   SonarSettings all = initial_sonar_settings(device);
   const std::vector<std::pair<Key, Value>> values{{Key::sound_speed, std::int32_t{1490}},
@@ -115,7 +115,7 @@ TEST(HeadSettings, BecomePingSettings) {
   EXPECT_FLOAT_EQ(ping_settings(all, device).rate_hz, 15) << "the rate is limited to that of the product";
 }
 
-TEST(HeadSettings, NoSettingsAreTheInitialOnes) {
+TEST(HeadSettings, MissingSettingsCountAsTheInitialOnes) {
   const auto device = test::device();
   EXPECT_TRUE(settings_from(nullptr, device).equals(initial_sonar_settings(device)));
 }

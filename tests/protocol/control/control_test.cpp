@@ -1,4 +1,4 @@
-// Protobuf control messages: hand-assembled bytes, round trips, refusals, framing at every split.
+// Tests protobuf control messages: hand-assembled bytes, round trips, refusals, framing at every split.
 #include "protocol/control/control.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// JSON lines: ArduPilot's keys, texts of refusals, and lines that are split at any byte.
+// Tests JSON lines: ArduPilot's keys, texts of refusals, and lines that are split at any byte.
 #include "protocol/control/json_pose.hpp"
 
 #include <gmock/gmock.h>
@@ -131,12 +131,12 @@ TEST(LineParser, AfterAGapTheNextWholeLineIsReturned) {
     EXPECT_EQ(parser.next().value().text, "{\"c\":3}");
     EXPECT_FALSE(parser.next());
   }
-  LineParser swallows;
-  swallows.feed(bytes(std::string(5000, 'x')));
-  EXPECT_TRUE(swallows.next().value().too_long);
-  swallows.skip_gap();
-  swallows.feed(bytes("x\n{}\n"));
-  EXPECT_EQ(swallows.next().value().text, "{}");
+  LineParser skips;
+  skips.feed(bytes(std::string(5000, 'x')));
+  EXPECT_TRUE(skips.next().value().too_long);
+  skips.skip_gap();
+  skips.feed(bytes("x\n{}\n"));
+  EXPECT_EQ(skips.next().value().text, "{}");
 }
 
 TEST(LineParser, ARequestLineIsDetectedBeforeItsEnd) {

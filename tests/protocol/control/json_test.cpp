@@ -1,4 +1,4 @@
-// The messages as JSON: input is checked strictly, and output is valid JSON with the names of control.proto.
+// Tests the messages as JSON: input must be checked strictly, and output must be valid JSON with the names of control.proto.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

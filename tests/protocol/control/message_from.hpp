@@ -1,4 +1,4 @@
-// Messages of control.proto from protobuf's text format: `name: "front" range_m: 5`.
+// Makes messages of control.proto from protobuf's text format: `name: "front" range_m: 5`.
 #pragma once
 
 #include <google/protobuf/text_format.h>

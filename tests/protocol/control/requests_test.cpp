@@ -1,4 +1,4 @@
-// Every request of control.proto in both directions, hand-assembled bytes, refusals, truncations.
+// Tests every request of control.proto in both directions, hand-assembled bytes, refusals, truncations.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Answers and events in both directions; a client checks messages as strictly as the daemon.
+// Tests answers and events in both directions. A client must check messages as strictly as the daemon.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -67,7 +67,7 @@ TEST(ControlResponses, EveryCodeArrives) {
   }
 }
 
-TEST(ControlResponses, TextsThatAreNoUtf8AreRepairedNotLost) {
+TEST(ControlResponses, TextsThatAreNotUtf8AreRepaired) {
   testing::internal::CaptureStderr();
   const std::string broken = "caf\xe9 \xf0\x9f\x90\x9f \xed\xa0\x80";  // Latin-1, a fish, half a surrogate
   const auto got = decode_response(encode_response(response_of(1, StatusCode::failed, broken)));

@@ -1,4 +1,4 @@
-// The findings on drivers that doctor derives from the status of a daemon.
+// Tests the findings on drivers that doctor derives from the status of a daemon.
 #include "protocol/doctor/judge.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// The beams of a DVL over ground at known positions, computed with the whole engine.
+// Tests the beams of a DVL over ground at known positions, computed with the whole engine.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -80,7 +80,7 @@ TEST(DvlAcoustics, TheForwardBeamsReachTheGroundThatRisesAhead) {
   EXPECT_NEAR(m.altitude_m, 5, 0.1);
 }
 
-TEST(DvlAcoustics, StarboardIsStarboard) {
+TEST(DvlAcoustics, TheStarboardBeamsReachTheGroundThatRisesToStarboard) {
   Dvl dvl(SceneMaker().add(height_field(-20, 20, -20, 20, 0.5, [](double, double y) { return -5 - 0.3 * y; }), -25).make());
   const Measurement m = dvl.settled({});
   ASSERT_TRUE(m.is_valid);

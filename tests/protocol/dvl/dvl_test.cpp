@@ -93,13 +93,13 @@ TEST(DvlVelocity, IsMeasuredOnceForAllItsLines) {
       for (const Bytes& part : vendor().datagrams(port, ping, state)) all += text_of(part);
     return all + std::to_string(settings_from(vendor().after_ping(ping, state)->vendor_settings.get()).reckoning.velocity_mps.x);
   };
-  const std::string looked_for_now = said();
+  const std::string measured_now = said();
   look_at(ping);
-  EXPECT_EQ(said(), looked_for_now);
+  EXPECT_EQ(said(), measured_now);
   std::fill(ping.samples.begin(), ping.samples.end(), std::byte{0});
-  EXPECT_EQ(said(), looked_for_now);
+  EXPECT_EQ(said(), measured_now);
   look_at(ping);
-  EXPECT_NE(said(), looked_for_now);
+  EXPECT_NE(said(), measured_now);
 }
 
 TEST(DvlVelocity, AWrongSpeedOfSoundScalesTheVelocity) {
@@ -378,7 +378,7 @@ TEST(DvlCommands, VersionAndTimeAreAnswered) {
   EXPECT_EQ(client.ask(R"({"command":"set_time_manual","parameters":{"now":"2026-04-20T09:04:13Z"}})")["success"], false);
 }
 
-TEST(DvlSettings, AnOperatorSetsTheRangeAndStandbyAlone) {
+TEST(DvlSettings, AnOperatorCanSetOnlyRangeAndStandby) {
   const protocol::DeviceState state = device();
   protocol::SettingsOverride wanted;
   wanted.range_m = 10;

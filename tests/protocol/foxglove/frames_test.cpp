@@ -41,11 +41,11 @@ TEST(FoxgloveFrames, FramesForViewersHaveTheirBytes) {
 TEST(FoxgloveFrames, FramesOfViewersAreRead) {
   const auto call = frame_of_viewer(bytes_of("020500000009000000040000006a736f6e7b7d"));
   ASSERT_TRUE(call);
-  const auto& asked = std::get<ServiceCall>(*call);
-  EXPECT_EQ(asked.service, 5u);
-  EXPECT_EQ(asked.call, 9u);
-  EXPECT_EQ(asked.encoding, "json");
-  EXPECT_EQ(asked.payload, "{}");
+  const auto& requested = std::get<ServiceCall>(*call);
+  EXPECT_EQ(requested.service, 5u);
+  EXPECT_EQ(requested.call, 9u);
+  EXPECT_EQ(requested.encoding, "json");
+  EXPECT_EQ(requested.payload, "{}");
   const auto control = frame_of_viewer(bytes_of("03000000c03f01004d4466170000000700000061616161616161"));
   ASSERT_TRUE(control);
   const auto& playback = std::get<PlaybackControl>(*control);
@@ -59,7 +59,7 @@ TEST(FoxgloveFrames, FramesOfViewersAreRead) {
 TEST(FoxgloveFrames, ShortAndUnknownFramesAreRefused) {
   const auto refusal = [](std::string_view hex) {
     const auto read = frame_of_viewer(bytes_of(hex));
-    return read ? std::string("taken") : read.error().text;
+    return read ? std::string("accepted") : read.error().text;
   };
   EXPECT_THAT(refusal(""), HasSubstr("opcode"));
   EXPECT_THAT(refusal("0205000000"), HasSubstr("call"));

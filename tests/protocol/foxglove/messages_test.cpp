@@ -1,4 +1,4 @@
-// Every message is read back with only the descriptors that viewers receive.
+// Tests that every message can be read back with only the descriptors that viewers receive.
 #include "protocol/foxglove/foxglove_messages.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// JSON messages: those of the protocol's examples, and messages of viewers that are refused.
+// Tests JSON messages: those of the protocol's examples, and messages of viewers that are refused.
 #include "protocol/foxglove/foxglove_words.hpp"
 
 #include <gmock/gmock.h>
@@ -77,7 +77,7 @@ TEST(FoxgloveWords, StrayFieldsAreNamed) {
 TEST(FoxgloveWords, WrongMessagesAreRefused) {
   const auto refusal = [](std::string_view text) {
     const auto word = word_of_viewer(text);
-    return word ? std::string("taken") : word.error().text;
+    return word ? std::string("accepted") : word.error().text;
   };
   EXPECT_THAT(refusal("{"), HasSubstr("not a JSON object"));
   EXPECT_THAT(refusal("[1]"), HasSubstr("not a JSON object"));
