@@ -9,7 +9,7 @@
 
 namespace sonar::test {
 
-/// True if the system enforces a limit of addresses. Sanitizers need terabytes of addresses, and an emulated processor
+/// Returns true if the system enforces a limit of addresses. Sanitizers need terabytes of addresses, and an emulated processor
 /// (tests/tools/arm64.sh) ignores the limit.
 inline bool memory_is_limited() {
   rlimit before{}, now{};

@@ -1,5 +1,5 @@
-// The host and the emulated sonar of every make talk in virtual time, during every kind of fault that affects such a sonar: the
-// host accepts any bytes, and pings arrive again after the fault.
+// Tests the host and the emulated sonar of every make in virtual time, during every kind of fault that affects such a sonar: the
+// host must accept any bytes, and pings must arrive again after the fault.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// The driver's side of the protocol, and the functions for recordings.
+// The driver's side of the Example's protocol, and the functions for recordings.
 #include <algorithm>
 #include <cmath>
 

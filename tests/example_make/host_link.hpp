@@ -60,7 +60,7 @@ inline std::shared_ptr<const Ping> computed(PingRequest request) {
 /// A sonar and a driver that connects again when it loses the connection or gets no ping.
 class Link {
  public:
-  /// `rate` sets the ping rate in Hz, if drivers or `sonarctl set sonar` can set it; without it the rate is the usual one.
+  /// `rate_hz` sets the ping rate, if drivers or `sonarctl set sonar` can set it; without `rate_hz` the rate is the usual one.
   explicit Link(const Make& make, std::optional<double> rate_hz = {})
       : make_(make),
         world_(pose_rules(config_), vehicles_of(config_), {}, start),

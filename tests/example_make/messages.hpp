@@ -45,7 +45,7 @@ constexpr void fields(auto& visit, wire::Like<Settings> auto& m) {
   visit("gain_percent", m.gain_percent);
 }
 
-/// It is followed by a bearing to port in 1e-4 rad for each beam (16 bits), and a sample for each row and beam (8 bits).
+/// After it come a bearing to port in 1e-4 rad for each beam (16 bits), and a sample for each row and beam (8 bits).
 struct PingHead {
   std::uint32_t number = 0;
   std::uint64_t fired_us = 0;

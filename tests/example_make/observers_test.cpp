@@ -1,4 +1,4 @@
-// An observer of any make gets every ping that a client requests, although it requests nothing.
+// Tests that an observer of any make gets every ping that a client requests, although the observer requests nothing.
 #include <gtest/gtest.h>
 
 #include "daemon/config/products.hpp"
@@ -13,7 +13,7 @@ class Observers : public testing::TestWithParam<protocol::Make> {};
 INSTANTIATE_TEST_SUITE_P(OfEveryMake, Observers, testing::ValuesIn(protocol::makes().begin(), protocol::makes().end()),
                          [](const auto& of) { return std::string(of.param.name()); });
 
-TEST_P(Observers, GetWhatTheDriverGets) {
+TEST_P(Observers, GetEveryPingOfTheDriver) {
   if (default_max_observers(*GetParam().device) == 0) return;
   host_link::Link link(GetParam(), 5.0);
   ASSERT_TRUE(link.gets_ping_within(20s));

@@ -83,7 +83,7 @@ def read_records(folder):
 
 
 def badness(record):
-    """Returns how close a record is to the edge of its tolerance; over 1 is out. It selects the worst record of a row."""
+    """Returns how bad a record is: for `equal` the used share of the tolerance, for a bound the distance beyond it."""
     expected, measured = record["expected"], record["measured"]
     if math.isnan(measured):
         return math.inf
@@ -140,10 +140,10 @@ HEAD = ["#", "oracle", "expected", "measured", "tolerance", "holds"]
 
 def table_of(records):
     rows = rows_of(records)
-    told = {number for (number, _), _ in rows}
+    recorded = {number for (number, _), _ in rows}
     table = [(number or math.inf, cells_of(number, what, row)) for (number, what), row in rows]
     for number, reason in NOT_BUILT.items():
-        if number not in told:
+        if number not in recorded:
             table.append((number, [str(number), f"{ORACLES[number]}: {reason}", "", "", "", "not built"]))
     return [cells for _, cells in sorted(table, key=lambda item: item[0])]
 
@@ -165,10 +165,10 @@ def faults_of(records, partial):
         for r in records
         if not r["pass"]
     ]
-    told = {r["oracle"] for r in records}
-    faults += [f"unknown oracle number {n}" for n in sorted(told - set(ORACLES) - {NO_NUMBER})]
+    recorded = {r["oracle"] for r in records}
+    faults += [f"unknown oracle number {n}" for n in sorted(recorded - set(ORACLES) - {NO_NUMBER})]
     if not partial:
-        missing = [n for n in ORACLES if n not in told and n not in NOT_BUILT]
+        missing = [n for n in ORACLES if n not in recorded and n not in NOT_BUILT]
         faults += [f"oracle {n} ({ORACLES[n]}) has no figures: no test recorded it" for n in missing]
     return faults
 

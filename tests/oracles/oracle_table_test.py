@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The summary table: a row has its worst figure, failed and missing oracles are faults, those not built are named."""
+"""Tests the summary table: a row has its worst figure, failed and missing oracles are faults, those not built are named."""
 
 import json
 import os
@@ -45,7 +45,7 @@ class OracleTableTest(unittest.TestCase):
         self.assertEqual(len(oracle_table.faults_of(whole + [record(3, measured=1, passed=False)], partial=False)), 1)
         self.assertEqual(len(oracle_table.faults_of(whole + [record(47)], partial=True)), 1)
 
-    def test_rows_are_in_order_with_the_truths_beyond_the_table_last(self):
+    def test_rows_are_in_order_with_the_checks_beyond_the_table_last(self):
         table = oracle_table.table_of([record(0, "thin pole"), record(21), record(3)])
         self.assertEqual([row[0] for row in table], ["3", "13", "20", "21", "+"])
 

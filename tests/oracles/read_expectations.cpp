@@ -69,7 +69,7 @@ Result<std::vector<Expectation>> read_expectations(const std::string& text, cons
   const auto document = text::parse_yaml(*filled, source, {.error_kind = ErrorKind::config});
   if (!document) return tl::make_unexpected(document.error());
   Map root = document->root();
-  root.entries();  // the other keys are parse_render_file()'s
+  root.entries();  // parse_render_file() reads the other keys
   std::vector<Expectation> all;
   for (const Node& node : root.required("expect").items(1, 100)) all.push_back(read_one(node));
   if (auto error = document->finish()) return tl::make_unexpected(*std::move(error));

@@ -1,4 +1,4 @@
-// The records of oracles: a figure out of tolerance fails the test, records can be read back, old records are removed.
+// Tests the records of oracles: a figure out of tolerance fails the test, records can be read back, old records are removed.
 #include "tests/oracles/record.hpp"
 
 #include <gtest/gtest-spi.h>

@@ -1,4 +1,4 @@
-// Linked into a GoogleTest program, it makes the program's tests run in a network of their own.
+// Makes the tests of a GoogleTest program, into which this file is linked, run in a network of their own.
 #include <gtest/gtest.h>
 
 #include "tests/own_network/own_network.hpp"

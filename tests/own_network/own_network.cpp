@@ -39,7 +39,7 @@ bool loopback_up() {
   return up;
 }
 
-/// A user namespace gives its first process every capability, and then no test of permissions would be refused.
+/// Drops all capabilities. A user namespace gives them to its first process, so that no permission would be refused in a test.
 bool drop_capabilities() {
   __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
   std::array<__user_cap_data_struct, 2> none{};
@@ -65,7 +65,7 @@ bool may_isolate() {
   return child > 0 && status == 0;
 }
 
-/// The lock is held until this process ends. If it becomes another program by exec, the lock is held until that program ends.
+/// Waits for the lock. The process holds it until it ends, also after it becomes another program by exec.
 void wait_for_turn() {
   const std::string path = std::filesystem::temp_directory_path() / "sonard-tests.lock";
   int fd = open(path.c_str(), O_RDONLY);  // it may belong to another user

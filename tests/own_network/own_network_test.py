@@ -62,11 +62,11 @@ print(os.getuid(), os.getgid(), *{CAPABILITIES})
             self.assertEqual(one.stdout.readline(), "here\n")
             with start(script, **shared) as other:
                 self.assertEqual(other.stderr.readline(), ONE_AT_A_TIME)
-                self.assertEqual(select.select([other.stdout], [], [], 0.2)[0], [], "it ran beside the first")
+                self.assertEqual(select.select([other.stdout], [], [], 0.2)[0], [], "the second ran beside the first")
                 self.assertEqual(one.communicate("first", timeout=60), ("first\n", ONE_AT_A_TIME))
                 self.assertEqual(other.communicate("second", timeout=60)[0], "here\nsecond\n")
 
-    def test_a_program_that_is_not_there_is_named(self):
+    def test_a_missing_program_is_named(self):
         done = subprocess.run([PROGRAM, "/nowhere/program"], capture_output=True, text=True, timeout=60, check=False)
         self.assertEqual((done.returncode, done.stderr), (69, "/nowhere/program: No such file or directory\n"))
 

@@ -1,4 +1,4 @@
-// The beacon of an Oculus: its start, its source address, and its data about the connected client.
+// Tests the beacon of an Oculus: its start, its source address, and its data about the connected client.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <netinet/in.h>
@@ -26,13 +26,13 @@ class Listener {
     port = ntohs(any.sin_port);
   }
   ~Listener() { ::close(fd_); }
-  struct Heard {
+  struct Received {
     oculus::StatusMessage status;
     std::size_t size = 0;
     std::string from;
     std::uint16_t from_port = 0;
   };
-  std::optional<Heard> next() {
+  std::optional<Received> next() {
     pollfd p{fd_, POLLIN, 0};
     if (poll(&p, 1, static_cast<int>(patience.count())) <= 0) return std::nullopt;
     std::vector<std::byte> buffer(2048);
@@ -44,7 +44,7 @@ class Listener {
     inet_ntop(AF_INET, &from.sin_addr, text, sizeof text);
     const auto status = oculus::decode_status(buffer);
     if (!status) return std::nullopt;
-    return Heard{*status, buffer.size(), text, ntohs(from.sin_port)};
+    return Received{*status, buffer.size(), text, ntohs(from.sin_port)};
   }
   std::uint16_t port = 0;
 
@@ -91,9 +91,9 @@ TEST(Status, AdvertisesTheConfiguredAddress) {
   DaemonSetup setup;
   setup.sonar_lines = "    advertise_ip: 127.9.9.9\n    status_to: ['127.0.0.1:" + std::to_string(listener.port) + "']\n";
   Daemon daemon(setup);
-  const auto heard = listener.next();
-  ASSERT_TRUE(heard);
-  EXPECT_EQ(text_of(protocol::Ipv4(heard->status.ip_address)), "127.9.9.9");
+  const auto received = listener.next();
+  ASSERT_TRUE(received);
+  EXPECT_EQ(text_of(protocol::Ipv4(received->status.ip_address)), "127.9.9.9");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A silent UDP host: when the daemon sends a probe to its computer, and when the host counts as disconnected.
+// Tests a silent UDP host: when the daemon sends a probe to its computer, and when the host counts as disconnected.
 #include "daemon/server/sonars/datagram_port.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Network actions that a sonar requests from its device: to close a port, reset a client, or stop reading from a client.
+// Tests network actions that a sonar requests from its device: closing a port, resetting a client, not reading from a client.
 #include "daemon/server/sonars/device.hpp"
 
 #include <gmock/gmock.h>
@@ -113,7 +113,7 @@ TEST_F(DeviceActions, ListenTriesAgainWhileAnotherProgramHasThePort) {
   EXPECT_TRUE(soon([&] { return device.sonar().connections().clients() == 1; }));
 }
 
-TEST_F(DeviceActions, StopWhileThePortIsClosed) {
+TEST_F(DeviceActions, AfterAStopAClosedPortStaysClosed) {
   device.perform({Listen{false}});
   device.stop();
   device.perform({Listen{true}});
@@ -121,7 +121,7 @@ TEST_F(DeviceActions, StopWhileThePortIsClosed) {
   EXPECT_TRUE(refuses(52100));
 }
 
-TEST_F(DeviceActions, RefuseByReset) {
+TEST_F(DeviceActions, RefuseCanResetTheConnection) {
   Client served(setup.address);
   ASSERT_TRUE(soon([&] { return device.sonar().connections().clients() == 1; }));
   Client waits(setup.address);

@@ -1,4 +1,4 @@
-// An exception in one conversation (a bug of sonard) is logged and ends only that conversation.
+// Tests that an exception in one conversation (a bug of sonard) is logged and ends only that conversation.
 #include <gmock/gmock.h>
 
 #include "daemon/server/poses/pose_server.hpp"

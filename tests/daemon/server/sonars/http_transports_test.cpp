@@ -1,4 +1,4 @@
-// HTTP resources of a made-up make of sonar, served end to end, and receivers of datagrams that clients set over HTTP.
+// Tests HTTP resources of a made-up make of sonar, end to end, and receivers of datagrams that clients set over HTTP.
 #include <gmock/gmock.h>
 
 #include <thread>

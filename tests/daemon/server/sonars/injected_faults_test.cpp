@@ -1,4 +1,4 @@
-// Injected faults over real sockets: the effects on a driver's computer of those kinds that act on connections and on the stream.
+// Tests injected faults over real sockets: how kinds that act on connections and on the stream affect a driver's computer.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -165,7 +165,7 @@ std::size_t threads() {
   return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator("/proc/self/task"), {}));
 }
 
-TEST_F(InjectedFaults, AThousandLeaveNothingOpen) {
+TEST_F(InjectedFaults, AThousandFaultsLeaveNothingOpen) {
   client.close();
   ASSERT_TRUE(eventually([&] { return daemon.status().sonars(0).clients_size() == 0; }));
   const std::size_t descriptors = open_descriptors(), running = threads();

@@ -5,7 +5,7 @@
 
 namespace sonar::testing_daemon {
 
-// Commands are lines of text, answered by "ok" or "no: WHY":
+// Commands are lines of text, answered with "ok" or "no: WHY":
 //   range METRES | receivers [ADDRESS:PORT ...] | ping | quit | quiet
 //   who, answered by the sonar's name and range
 //   silence SECONDS | listens SECONDS, which set the longest silence of this client; after `listens`, an answer of the client's

@@ -1,4 +1,4 @@
-// An observer gets the same pings as clients, and changes nothing else.
+// Tests that an observer gets the same pings as clients, and changes nothing else.
 #include <gmock/gmock.h>
 
 #include <list>

@@ -1,4 +1,4 @@
-// One client and one sonar over loopback: the conversation of a driver with its device.
+// Tests one client and one sonar over loopback: the conversation of a driver with its device.
 #include <gmock/gmock.h>
 
 #include "protocol/control/answers.hpp"
@@ -38,7 +38,7 @@ TEST(Serving, PingsAreValidAndConsecutiveAndEchoTheirRequest) {
   EXPECT_THAT(daemon.log_text(), HasSubstr("settings: mode 2, range 2 m"));
 }
 
-TEST(Serving, DummiesFlowUntilTheFirstFire) {
+TEST(Serving, DummiesAreSentUntilTheFirstFire) {
   DaemonSetup setup;
   setup.sonar_lines = "    options: {dummy_period_ms: 40}\n";
   Daemon daemon(setup);
@@ -188,7 +188,7 @@ TEST(Serving, GarbageIsSkippedAndLoggedFewTimes) {
   EXPECT_LE(lines, 30u + static_cast<std::size_t>((Steady::now() - begin) / std::chrono::seconds(1))) << "rate-limited";
 }
 
-TEST(Serving, TheEngineFailingEndsTheDaemonWithExitCode70) {
+TEST(Serving, AFailedEngineEndsTheDaemonWithExitCode70) {
   DaemonSetup setup;
   setup.engine_before = [](std::uint32_t ping) {
     if (ping == 3) throw std::runtime_error("out of coffee");

@@ -1,4 +1,4 @@
-// Messages that a fault changes: they are written in pieces, and the connection ends after exactly their bytes.
+// Tests messages that a fault changes: they must be written in pieces, and the connection must end after exactly their bytes.
 #include "daemon/server/sonars/session.hpp"
 
 #include <gmock/gmock.h>
@@ -102,7 +102,7 @@ TEST_F(SessionShapes, PiecesArriveWithPauses) {
   EXPECT_EQ(parent.written, 2);
 }
 
-TEST_F(SessionShapes, APauseOfOursIsNoStallOfTheClient) {
+TEST_F(SessionShapes, APauseOfAFaultIsNoStallOfTheClient) {
   start({shaped("ab", {{{1, milliseconds(1500)}}})}, milliseconds(200));
   EXPECT_THAT(texts_of(read_until_end_or(2)), ElementsAre("a", "b"));
   EXPECT_FALSE(client.ended);

@@ -1,4 +1,4 @@
-// Every kind of port except HTTP, served end to end for a made-up make of sonar: TCP streams, a beacon, datagrams with answers,
+// Tests every kind of port except HTTP, end to end with a made-up make of sonar: TCP streams, a beacon, datagrams with answers,
 // pings as datagrams to receivers and to a multicast group, and conversations across them.
 #include <gmock/gmock.h>
 
@@ -215,8 +215,9 @@ TEST(Transports, AMulticastGroupReceivesWithoutARequest) {
   if (!member.join(text::format_ipv4(group_ip), interface)) GTEST_SKIP() << "no multicast on the loopback interface here";
   UdpSocket sender(interface);
   if (!sender.sends_multicast_from(interface)) GTEST_SKIP() << "no multicast from the loopback interface here";
-  sender.send("heard", text::format_ipv4(group_ip), group_port);
-  if (member.next(milliseconds(1000)) != "heard") GTEST_SKIP() << "multicast does not come back from the loopback interface here";
+  sender.send("received", text::format_ipv4(group_ip), group_port);
+  if (member.next(milliseconds(1000)) != "received")
+    GTEST_SKIP() << "multicast does not come back from the loopback interface here";
 
   Daemon daemon(made_up());
   const std::string first = member.next();
@@ -287,13 +288,13 @@ TEST(Beacon, SendsItsDatagramsInOrder) {
   ASSERT_TRUE(beacon.open(sonar, port));
   beacon.start();
   const auto next = [&] {
-    std::string heard;
+    std::string received;
     eventually([&] {
       io.restart();
       io.run_for(milliseconds(1));
-      return !(heard = host.next(milliseconds(1))).empty();
+      return !(received = host.next(milliseconds(1))).empty();
     });
-    return heard;
+    return received;
   };
   for (const char* const expected : {"first 1", "second 1", "first 3", "second 3"}) EXPECT_EQ(next(), expected);
   beacon.stop();

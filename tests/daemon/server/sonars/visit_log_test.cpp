@@ -1,4 +1,4 @@
-// A client that reconnects endlessly gets only a few log lines, which count all of its connections.
+// Tests that a client that reconnects endlessly causes only a few log lines, which count all of its connections.
 #include "daemon/server/sonars/visit_log.hpp"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// The loop of a listener is restarted after an exception, unless the handler decides to end it.
+// Tests that the loop of a listener is restarted after an exception, unless the handler decides to end it.
 #include <gmock/gmock.h>
 
 #include <stdexcept>
@@ -14,7 +14,7 @@ using ::testing::ElementsAre;
 struct Loop {
   asio::io_context io;
   int runs = 0, faults = 0;
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   asio::awaitable<void> run() {
     ++runs;
     if (runs <= faults) throw std::runtime_error("fault " + std::to_string(runs));
@@ -24,8 +24,8 @@ struct Loop {
     sonar::keep_running(
         io.get_executor(), [this] { return run(); },
         [this, survived](const std::string& fault) {
-          told.push_back(fault);
-          return told.size() <= survived;
+          reported.push_back(fault);
+          return reported.size() <= survived;
         });
     io.run();
   }
@@ -36,7 +36,7 @@ TEST(KeepRunning, RestartsTheLoopAfterExceptionsUntilItEnds) {
   loop.faults = 2;
   loop.keep_running(5);
   EXPECT_EQ(loop.runs, 3);
-  EXPECT_THAT(loop.told, ElementsAre("fault 1", "fault 2"));
+  EXPECT_THAT(loop.reported, ElementsAre("fault 1", "fault 2"));
 }
 
 TEST(KeepRunning, EndsIfTheHandlerReturnsFalse) {

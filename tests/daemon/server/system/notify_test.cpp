@@ -1,5 +1,5 @@
-// Messages to a service manager, which a socket of the test replaces: sonard reports that it is ready, reloads and stops, and
-// sends signs of life only while the simulation thread makes progress.
+// Tests messages to a service manager, which a socket of the test replaces: sonard must report that it is ready, reloads and
+// stops, and send watchdog messages only while the simulation thread makes progress.
 #include "daemon/server/system/notify.hpp"
 
 #include <gmock/gmock.h>
@@ -45,7 +45,7 @@ class Manager {
     text.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
     return text;
   }
-  std::string next_but_life() {
+  std::string next_except_watchdog() {
     std::string text = next();
     while (text == "WATCHDOG=1") text = next();
     return text;
@@ -94,7 +94,7 @@ TEST(Notify, WatchdogMessagesComeWithoutClientsAndWhilePingsAreQuick) {
   ASSERT_TRUE(client.next_ping());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(manager.next(), "WATCHDOG=1");
   EXPECT_EQ(daemon.stop(), 0);
-  EXPECT_THAT(manager.next_but_life(), StartsWith("STOPPING=1"));
+  EXPECT_THAT(manager.next_except_watchdog(), StartsWith("STOPPING=1"));
 }
 
 TEST(Notify, APingThatDoesNotEndStopsTheWatchdogMessages) {
@@ -155,13 +155,13 @@ TEST(Notify, AMissingManagerIsReportedOnceAndHasNoEffect) {
 
 TEST(Notify, WrongSocketNamesAreRefused) {
   for (const std::string& name : {std::string("relative/path"), std::string(200, '/')}) {
-    std::string said;
+    std::string logged;
     asio::io_context io;
-    Log log({LogLevel::info, false, [&said](LogLevel, const std::string& line) { said += line; }});
+    Log log({LogLevel::info, false, [&logged](LogLevel, const std::string& line) { logged += line; }});
     Notify notify(
         io, {name, {}}, [] { return std::chrono::nanoseconds{0}; }, log);
     notify.ready("x");
-    EXPECT_THAT(said, HasSubstr("not the address of a local socket"));
+    EXPECT_THAT(logged, HasSubstr("not the address of a local socket"));
   }
 }
 

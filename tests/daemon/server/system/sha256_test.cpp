@@ -1,4 +1,4 @@
-// The FIPS 180-4 examples (NIST "SHA-256 example values"), and messages in pieces.
+// Tests with the FIPS 180-4 examples (NIST "SHA-256 example values"), and with messages in pieces.
 #include "daemon/server/system/sha256.hpp"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Which signals of a user or a terminal end the daemon gracefully, and which must not end it.
+// Tests which signals of a user or a terminal end the daemon gracefully, and which must not end it.
 #include <gmock/gmock.h>
 #include <unistd.h>
 

@@ -1,5 +1,5 @@
-// Time that other programs advance, with control requests (lockstep) or stamps of poses (follow). Answers come when the pings
-// have been sent.
+// Tests time that other programs advance, with control requests (lockstep) or stamps of poses (follow). Answers come when the
+// pings have been sent.
 #include <gmock/gmock.h>
 
 #include "protocol/control/answers.hpp"

@@ -1,5 +1,5 @@
-// Conversations in simulated time: timed messages are sent when they are due, between the pings, and silent hosts are detected in
-// wall time.
+// Tests conversations in simulated time: timed messages are sent when they are due, between the pings, and silent hosts are
+// detected in wall time.
 #include <gmock/gmock.h>
 
 #include <ctime>
@@ -126,7 +126,7 @@ TEST(SteppedTalk, TimeDoesNotPassForAHostWhosePingsWaitForAPose) {
   daemon.stop();
 }
 
-TEST(SteppedTalk, ASubscriptionTakesTheSonarFromNoClient) {
+TEST(SteppedTalk, OtherClientsGetPingsBesideASubscription) {
   DaemonSetup setup = head("stepped");
   setup.profile = "blueview-m900-2250-130";
   setup.sonar_lines = "    clients: {max: 2}\n";

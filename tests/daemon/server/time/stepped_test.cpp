@@ -1,4 +1,4 @@
-// Stepped time: pings follow one another as fast as the client reads, and every run gives the same bytes.
+// Tests stepped time: pings must follow one another as fast as the client reads, and every run must give the same bytes.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/server/loopback.hpp"

@@ -1,4 +1,4 @@
-// A recording is read for a viewer until the viewer disconnects.
+// Tests that a recording is read for a viewer until the viewer disconnects.
 #include "daemon/server/view/played_recording.hpp"
 
 #include <gtest/gtest.h>
