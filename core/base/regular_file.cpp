@@ -116,7 +116,8 @@ std::string why_not_written(const std::filesystem::path& file, int error) {
   if (error == ENOSPC || error == EDQUOT || error == EFBIG) return why + "; make room";
   if (error == EACCES || error == EPERM) return why + "; give this user the right to write there";
   if (error == EROFS) return why + "; choose a place that can be written";
-  if (error == ENOENT && !std::filesystem::exists(file.parent_path(), ec)) return why + "; make its folder first";
+  const std::filesystem::path folder = file.parent_path();
+  if (error == ENOENT && !folder.empty() && !std::filesystem::exists(folder, ec)) return why + "; make its folder first";
   return why;
 }
 

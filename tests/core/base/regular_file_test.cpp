@@ -82,6 +82,7 @@ TEST_F(RegularFile, AWriteErrorComesWithTheAdviceThatFitsIt) {
   EXPECT_EQ(why(EACCES), "Permission denied; give this user the right to write there");
   EXPECT_EQ(why(EROFS), "Read-only file system; choose a place that can be written");
   EXPECT_EQ(why_not_written(folder / "none" / "file", ENOENT), "No such file or directory; make its folder first");
+  EXPECT_EQ(why_not_written("file", ENOENT), "No such file or directory") << "the folder of a bare name is there";
   EXPECT_EQ(why(EIO), std::strerror(EIO));
 }
 
