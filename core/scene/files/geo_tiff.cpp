@@ -94,6 +94,11 @@ class GeoTiffReader {
     if (auto r = read_description(); !r) return tl::make_unexpected(r.error());
     const auto place = read_georeference();
     if (!place) return tl::make_unexpected(place.error());
+    if (!unknown_unit_.empty())
+      raw_.notes.push_back(
+          "the unit of its heights, " + text::printable(unknown_unit_) + ", is not known: " +
+          (raw_.system.height_unit_m == 1 ? "they are read as metres" : "that of its coordinate system is used") +
+          "; z_scale converts them");
     if (auto room = check_memory_for("its heights", memory_of_a_cell * picture_.columns * picture_.rows); !room)
       return tl::make_unexpected(room.error());
     raw_.z.assign(std::size_t{picture_.columns} * picture_.rows, std::numeric_limits<float>::quiet_NaN());
@@ -215,9 +220,7 @@ class GeoTiffReader {
     auto system = system_of_keys(keys, metadata.height_unit);
     if (!system) return tl::make_unexpected(system.error());
     raw_.system = *std::move(system);
-    if (!metadata.unit_name.empty() && !metadata.height_unit)
-      raw_.notes.push_back("the unit of its heights, " + text::printable(metadata.unit_name) +
-                           ", is not known: they are read as metres; z_scale converts them");
+    if (!metadata.height_unit) unknown_unit_ = metadata.unit_name;
 
     Georeference place;
     const auto scale = values_of<double>(tiff_, pixel_scale, TIFF_DOUBLE),
@@ -300,6 +303,7 @@ class GeoTiffReader {
   const HeightOptions& options_;
   Picture picture_;
   RawHeights raw_;
+  std::string unknown_unit_;  // name of the unit of the heights; empty if it is known or not stated
   HeightValues values_{std::nullopt};
 };
 

@@ -79,6 +79,11 @@ TEST_F(GeoTiff, HeightsInFeetBecomeMetres) {
   EXPECT_NEAR(unit("millimetre"), -0.001, 1e-6);
   EXPECT_NEAR(unit("fathoms"), -1.8288, 1e-6);
   EXPECT_NEAR(unit("cubits"), -1, 1e-6);
+  TiffFile in_feet = good().keys({{{1024, 1}, {4099, 9002}}});
+  in_feet.text(42112, R"(<GDALMetadata><Item name="UNITTYPE" sample="0" role="unittype">cubits</Item></GDALMetadata>)");
+  EXPECT_NEAR(first(in_feet), -0.3048, 1e-6);
+  EXPECT_THAT(read(in_feet)->notes,
+              ::testing::Contains(HasSubstr("cubits, is not known: that of its coordinate system is used")));
   const auto lengths = read(good().keys({{{1024, 1}, {3076, 9003}}}));
   ASSERT_TRUE(lengths);
   EXPECT_NEAR(lengths->z_m[3], -1, 1e-6);
