@@ -36,8 +36,9 @@ class GltfWalk final : public Json::json_sax_t {
   };
   std::map<std::string, Accessor> accessors;
   std::vector<std::string> required, used;  // extensions
-  std::size_t skins = 0, skins_with_matrices = 0;
-  bool is_morphed = false;  // a weight of a morph target, which moves vertices, is not 0
+  std::size_t skins = 0;
+  std::set<std::string> skins_with_matrices;  // their numbers
+  bool is_morphed = false;                    // a weight of a morph target, which moves vertices, is not 0
 
   bool null() override { return value({}); }
   bool boolean(bool) override { return value({}); }
@@ -95,7 +96,7 @@ class GltfWalk final : public Json::json_sax_t {
       if (levels_.size() == 6 && levels_[4].key == "attributes" && levels_[5].key.starts_with("WEIGHTS_"))
         p->weights.push_back(v);
     }
-    skins_with_matrices += is_at(3, "skins", "inverseBindMatrices");
+    if (is_at(3, "skins", "inverseBindMatrices") && !v.empty()) skins_with_matrices.insert(levels_[1].name());
     if (is_at(3, "nodes", "mesh")) mesh_of[levels_[1].name()] = v;
     if (levels_.size() == 2 && levels_[0].key == "extensionsRequired") required.push_back(v);
     if (levels_.size() == 2 && levels_[0].key == "extensionsUsed") used.push_back(v);
@@ -231,7 +232,7 @@ MeshFault check_gltf(std::string_view file, ListedFaces* faces, const std::funct
   if (MeshFault fault = unread_extension(walk)) return fault;
   if (faces) {
     *faces = faces_of(walk, graph, number, roots);
-    faces->needs_floats = has_whole_numbers(walk) || walk.skins > walk.skins_with_matrices;
+    faces->needs_floats = has_whole_numbers(walk) || walk.skins > walk.skins_with_matrices.size();
   }
   return std::nullopt;
 }

@@ -161,7 +161,7 @@ class Rewriter {
         if (primitive.contains("extensions") && primitive["extensions"].is_object() &&
             primitive["extensions"].contains("KHR_draco_mesh_compression"))
           return bad_gltf(
-              "has whole numbers that are compressed (KHR_draco_mesh_compression), which are not read; convert it: "
+              "has vertices that are compressed (KHR_draco_mesh_compression), which are not read; convert it: "
               "gltf-transform dequantize IN OUT.glb");
         for (const char* key : {"extensions", "extras", "targets"}) primitive.erase(key);
         Json kept = Json::object();
@@ -184,7 +184,7 @@ class Rewriter {
   Result<void> complete_skins() {
     if (!out_.contains("skins") || !out_["skins"].is_array()) return {};
     for (Json& skin : out_["skins"]) {
-      if (!skin.is_object() || skin.contains("inverseBindMatrices")) continue;
+      if (!skin.is_object() || number_in(skin, "inverseBindMatrices")) continue;
       const std::size_t joints = list_in(skin, "joints").size(), numbers = 16;
       align();
       const std::size_t at = data_.size();

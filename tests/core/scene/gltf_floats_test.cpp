@@ -178,6 +178,8 @@ TEST_F(GltfFloats, WeightsOfBonesAreRead) {
   expect_vertices(vertices("a.glb", triangle.glb()), {{5, 6, 7}, {6, 6, 7}, {5, 7, 7}});
   d["skins"][0].erase("inverseBindMatrices");  // the matrices are then unit matrices
   expect_vertices(vertices("a.glb", triangle.glb()), {{5, 6, 7}, {6, 6, 7}, {5, 7, 7}});
+  d["skins"][0]["inverseBindMatrices"] = nullptr;
+  expect_vertices(vertices("a.glb", triangle.glb()), {{5, 6, 7}, {6, 6, 7}, {5, 7, 7}});
   d["meshes"][0]["primitives"][0]["attributes"] = {{"POSITION", 0}};
   d["nodes"][0]["translation"] = {1, 2, 3};
   expect_vertices(vertices("a.glb", triangle.glb()), {{1, 2, 3}, {2, 2, 3}, {1, 3, 3}});
@@ -238,7 +240,7 @@ TEST_F(GltfFloats, DracoIsReadOrTheErrorNamesTheCommandToUnpack) {
     EXPECT_THAT(mesh.error().text, HasSubstr("(KHR_draco_mesh_compression); unpack it: gltf-transform copy IN OUT.glb"));
   }
   file["accessors"][1]["componentType"] = 5123;
-  EXPECT_THAT(refusal(file.dump()), HasSubstr("whole numbers that are compressed (KHR_draco_mesh_compression)"));
+  EXPECT_THAT(refusal(file.dump()), HasSubstr("vertices that are compressed (KHR_draco_mesh_compression)"));
 }
 
 /// The indices are after the positions in the same buffer, whose end is missing.
