@@ -359,8 +359,8 @@ Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::stri
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options) {
   const auto text = text_of(file);
   if (!text) return tl::make_unexpected(text.error());
-  if (const auto kind = text::unusable_kind(*text); !kind.empty())
-    return failure(ErrorKind::bad_data, file.string() + ": " + std::string(kind));
+  if (const auto kind = text::unusable_kind(*text, text::FileUse::poses); !kind.empty())
+    return failure(ErrorKind::bad_data, file.string() + ": " + kind);
   if (is_log(*text))
     return failure(
         ErrorKind::bad_data,

@@ -98,7 +98,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   const std::uintmax_t bytes = on_disk ? std::filesystem::file_size(request.file, error) : request.in_memory.size();
   if (error || bytes > max_mesh_bytes) return bad_mesh(request, "is larger than 2 GiB; simplify it");
   const std::string begin = on_disk ? read_regular(request.file, text::kind_bytes).value_or("") : std::string();
-  if (const auto kind = text::unusable_kind(begin); !kind.empty()) return bad_mesh(request, std::string(kind));
+  if (const auto kind = text::unusable_kind(begin, text::FileUse::mesh); !kind.empty()) return bad_mesh(request, kind);
   const std::string extension = mesh_extension(request.file);
   if (!is_mesh_extension(extension))
     return bad_mesh(request,

@@ -230,8 +230,8 @@ Shape ShapeReader::read_ground(std::string_view type, Map& keys) {
   begin_load_step("reading " + path.filename().string(), no_size ? 0 : bytes / 4);
   const auto is_usable = [&] {
     const auto begin = read_regular(path, text::kind_bytes);
-    const auto kind = text::unusable_kind(begin ? *begin : std::string_view());
-    if (!kind.empty()) file.fail(path.filename().string() + ": " + std::string(kind));
+    const auto kind = text::unusable_kind(begin ? *begin : std::string_view(), text::FileUse::height_map);
+    if (!kind.empty()) file.fail(path.filename().string() + ": " + kind);
     return kind.empty();
   };
   const auto add_notes = [&](const Result<HeightGrid>& grid) {
