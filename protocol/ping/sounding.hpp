@@ -11,9 +11,9 @@
 namespace sonar::ping {
 
 /// A ping is requested while results are requested (`once_`, `streamed_`); the daemon fires it when the interval is over. The
-/// next ping is requested only after this ping has arrived or two seconds have passed. `Settings`: as for StreamingConversation,
-/// and with `results`, for which a ping is fired. `Held` has the settings. results_of()
-/// returns the result in a message.
+/// next ping is requested only after this ping has arrived or two seconds have passed. `Settings` are those of a
+/// StreamingConversation, with `results`: the results for which a ping is fired. `Held` has the settings. results_of() returns
+/// the result in a message.
 template <class Settings, class Held, Settings (*settings_from)(const VendorSettings*), Results (*results_of)(Id)>
 class SoundingConversation : public StreamingConversation<Settings, settings_from> {
   using Base = StreamingConversation<Settings, settings_from>;
