@@ -61,10 +61,15 @@ class Verdicts(unittest.TestCase):
     def test_pings_sent_before_the_end_show_no_recovery(self):
         before = [(t, n) for t, n in TICKS if t < 4]
         self.assertEqual(self.words([(t + 1, n) for t, n in before], before)[1], "NEVER")
+        # The connection that the sonar closed still carries pings: a slow driver receives them after the fault's end.
+        closed = [(0.0, 4.0, "device FIN")]
+        self.assertEqual([self.words(connections=given)[1] for given in (closed, [(0.0, None, "")])], ["NEVER", "NONE NEEDED"])
 
     def test_an_outage_has_its_length(self):
         kept = [(t, n) for t, n in TICKS if not 2 <= t < 4.5]
-        found = verdict(observed(kept, kept, connections=[(0.0, 4.0, "device FIN"), (4.4, None, "")]))
+        wire_pings = [one._replace(connection=1 if one.mono < 4 else 2) for one in true(*kept)]
+        connections = [(0.0, 4.0, "device FIN"), (4.4, None, "")]
+        found = verdict(observed(kept, true_pings=wire_pings, delivered=wire_pings, connections=connections))
         self.assertEqual(found.words(), ("CLEAN", "0.5 s"))
         kept = [(t, n) for t, n in TICKS if t < 2] + [(t + 5, n + 50) for t, n in TICKS]
         found = verdict(observed(kept, kept, watched_until=12.0))

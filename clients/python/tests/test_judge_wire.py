@@ -1,5 +1,8 @@
 """The judge's reading of packets: connections, datagrams, captures."""
+import os
+import socket
 import struct
+import time
 import unittest
 import unittest.mock as mock
 
@@ -61,6 +64,22 @@ class Packets(unittest.TestCase):
         lines = wire.hex_around(bytes(range(256)), 100)
         self.assertEqual([line[0] for line in lines].count(">"), 1)
         self.assertIn("00000060", next(line for line in lines if line[0] == ">"))
+
+
+class Times(unittest.TestCase):
+    @unittest.skipIf(os.geteuid(), "reading packets needs root")
+    def test_packets_that_are_read_late_have_the_time_of_their_sending(self):
+        capture = wire.Capture("lo", "127.0.0.2", 52199, Make((), datagrams=Whole))
+        before = time.monotonic()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as driver:
+            driver.sendto(b"x", ("127.0.0.2", 52199))
+        sent = time.monotonic()
+        time.sleep(0.5)
+        capture.start()
+        capture.catch_up(60)
+        capture.stop()
+        (fire,) = capture.connections[0].fires
+        self.assertTrue(before - 0.1 < fire < sent + 0.1, (before, fire, sent))
 
 
 class Streams(unittest.TestCase):

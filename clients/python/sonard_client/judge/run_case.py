@@ -21,7 +21,7 @@ from .driver import Driver, expand
 from .makes import make_of
 from .outcome import result_of
 from .scene import Journal, Scene, StatusWire, mono
-from .verdicts import BACK_PINGS, Observation, back_at, judge
+from .verdicts import BACK_PINGS, Observation, back_at, judge, sent_later
 from .wire import Capture, DatagramFlow, Seen
 
 NOMINAL_PINGS, NOMINAL_S = 20, 20.0  # without a fault, a working driver gets this many pings in this time
@@ -206,7 +206,7 @@ def _case(scene: Scene, case: Case) -> Dict[str, Any]:
         if driver.exited is None and scene.ping_times():
             return {"ran": False, "why": f"the fault did not begin: {_last_line(scene.sonard.log())}"}
         return {"ran": False, "why": "the driver received no pings before the fault", "text": explanation(scene)}
-    scene.wait(lambda: _is_back(scene, ended), case.limit + max(0.0, ended - time.monotonic()))
+    scene.wait(lambda: _is_back(scene, began, ended), case.limit + max(0.0, ended - time.monotonic()))
     watched_until = time.monotonic()
     seen = _observe(scene, case, began, ended, watched_until)
     verdict = judge(seen, case.must, case.should, case.notice)
@@ -219,13 +219,21 @@ def _case(scene: Scene, case: Case) -> Dict[str, Any]:
     return result_of(scene, case, seen, verdict)
 
 
-def _is_back(scene: Scene, ended: float) -> bool:
+def _is_back(scene: Scene, began: float, ended: float) -> bool:
     now = time.monotonic()
     if now < ended:
         return False
     times = scene.ping_times()
+    if scene.tapped and scene.capture and scene.reads_pings:
+        times = sent_later(scene.good(), scene.capture.seen(), _connections(scene), began, ended)
     back = back_at(times, ended)
     return back is not None and now - [t for t in times if t >= back][BACK_PINGS - 1] >= _SETTLE_S
+
+
+def _connections(scene: Scene) -> List[Tuple[float, Optional[float], str]]:
+    if scene.capture:
+        return [(c.opened, c.ended, c.ended_by) for c in scene.capture.connections]
+    return list(scene.status.connections)
 
 
 def _apply(scene: Scene, case: Case) -> None:
@@ -293,9 +301,6 @@ def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until
     if scene.capture:
         scene.capture.catch_up()  # otherwise a ping whose packets have not been read yet would count as false
     exited = scene.driver.exited
-    connections: List[Tuple[float, Optional[float], str]] = list(scene.status.connections)
-    if scene.capture:
-        connections = [(c.opened, c.ended, c.ended_by) for c in scene.capture.connections]
     seen: List[Seen] = scene.capture.seen() if scene.capture else []
     delivered: List[Seen] = scene.capture.delivered() if scene.capture else []
     if scene.capture and case.needs_lab:  # the capture may see datagrams that the laboratory drops
@@ -304,7 +309,7 @@ def _observe(scene: Scene, case: Case, began: float, ended: float, watched_until
     return Observation(
         began=began, ended=ended, watched_until=watched_until, tapped=scene.tapped, published=published,
         true_pings=seen, delivered=delivered,
-        wire_times=[] if scene.reads_pings else list(scene.status.ping_times), connections=connections,
+        wire_times=[] if scene.reads_pings else list(scene.status.ping_times), connections=_connections(scene),
         touched=touched_pings(scene.journal.records, seen, scene.make is None or scene.make.numbered),
         log_times=[t for t in [scene.driver.first_line_after(began)] if t is not None],
         state_times=[s.mono for s in scene.driver.states], log_lines_s=scene.driver.lines_per_s(began),

@@ -126,7 +126,8 @@ def judge(seen: Observation, must: Mapping[str, float], should: Mapping[str, Opt
         list(seen.published), [], [])
     times = [p.mono for p in good] if seen.tapped else list(seen.wire_times) or [s.mono for s in seen.delivered]
     lost = _judge_data(verdict, seen, good, stale, false)
-    _judge_recovery(verdict, seen, times, _sent_later(seen, good) if seen.tapped and seen.truth_known else times)
+    _judge_recovery(verdict, seen, times, sent_later(good, seen.true_pings, seen.connections, seen.began, seen.ended)
+                    if seen.tapped and seen.truth_known else times)
 
     alive = verdict.recovery != "CRASH"
     back = verdict.recovery in ("NONE NEEDED", "BACK")
@@ -186,10 +187,13 @@ def _judge_data(verdict: Verdict, seen: Observation, good: Sequence[Published], 
     return lost
 
 
-def _sent_later(seen: Observation, good: Sequence[Published]) -> List[float]:
-    """Returns the times at which pings were published that the sonar sent after the fault. A slow driver still publishes earlier
-    ones then, which shows no recovery."""
-    later = {(number, crc) for s in seen.true_pings if s.mono >= seen.ended for crc in s.ping.crcs for number in (None, s.ping.number)}
+def sent_later(good: Sequence[Published], true_pings: Sequence[Seen], connections: Sequence[Tuple[float, Optional[float], str]],
+               began: float, ended: float) -> List[float]:
+    """Returns the times at which pings were published that the sonar sent after the fault [began, ended]. A slow driver still
+    publishes earlier ones then, and a connection that the sonar closed still carries earlier ones; both show no recovery."""
+    closed = {number for number, (opened, _, by) in enumerate(connections, 1) if opened <= began and by.startswith("device")}
+    later = {(number, crc) for s in true_pings if s.mono >= ended and s.connection not in closed
+             for crc in s.ping.crcs for number in (None, s.ping.number)}
     return [p.mono for p in good if (p.number, p.crc) in later]
 
 

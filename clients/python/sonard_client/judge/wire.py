@@ -10,11 +10,12 @@ import socket
 import struct
 import threading
 import time
-from typing import Callable, Collection, Deque, Dict, List, NamedTuple, Optional, Tuple
+from typing import Callable, Collection, Deque, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from .truth import Make, Reader, TruePing
 
 _ALL_PROTOCOLS, _OUTGOING = 0x0003, 4
+_TIMESTAMP_NS = 35        # SO_TIMESTAMPNS
 _FIN, _SYN, _RST, _PSH, _ACK = 1, 2, 4, 8, 16
 _STREAM_KEPT = 48 << 20   # bytes of a connection kept for the hex view
 _BEFORE, _AFTER = 512 << 10, 1280 << 10  # bytes of packets kept before and after the start of the fault
@@ -112,6 +113,16 @@ class DatagramFlow(Connection):
         self.acked = self.sent
 
 
+def sent_at(more: Sequence[Tuple[int, int, bytes]]) -> int:
+    """Returns the kernel's time stamp [ns, UTC] of a packet, so that a busy computer, which reads it late, changes no time. Without a
+    stamp it is the present time."""
+    for level, kind, data in more:
+        if (level, kind, len(data)) == (socket.SOL_SOCKET, _TIMESTAMP_NS, 16):
+            seconds, ns = struct.unpack("qq", data)
+            return int(seconds * 1_000_000_000 + ns)
+    return time.time_ns()
+
+
 class Capture(threading.Thread):
     """Captures packets from start() to stop(). It needs CAP_NET_RAW, which a process has in its own network namespace.
 
@@ -140,6 +151,7 @@ class Capture(threading.Thread):
             self._socket.setsockopt(socket.SOL_SOCKET, 33, 64 << 20)  # SO_RCVBUFFORCE
         except OSError:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 16 << 20)
+        self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMP_NS, 1)
         self._socket.bind((interface, _ALL_PROTOCOLS))
         self._socket.settimeout(0.1)
 
@@ -148,7 +160,7 @@ class Capture(threading.Thread):
             if not select.select([self._socket], [], [], 0)[0]:
                 self._idle_at = time.monotonic()
             try:
-                packet, source = self._socket.recvfrom(1 << 17)
+                packet, more, _, source = self._socket.recvmsg(1 << 17, socket.CMSG_SPACE(16))
             except socket.timeout:
                 continue
             except OSError as error:
@@ -158,7 +170,8 @@ class Capture(threading.Thread):
             if self._lo and source[2] == _OUTGOING:  # loopback delivers every packet twice
                 continue
             with self._lock:
-                self._packet(time.monotonic(), time.time_ns(), packet)
+                utc_ns = sent_at(more)
+                self._packet(time.monotonic() - (time.time_ns() - utc_ns) / 1e9, utc_ns, packet)
 
     def stop(self) -> None:
         time.sleep(0.15)  # for the packets in flight
