@@ -147,6 +147,18 @@ bool is_word(const std::string& text) { return text.find_first_of("./") == std::
 
 }  // namespace
 
+Plan plan_for(const motion::TrajectoryFile& f, std::shared_ptr<const motion::Trajectory> trajectory, const std::string& name) {
+  Plan plan{.trajectory = std::move(trajectory), .file = name, .origin = f.origin};
+  for (const auto& one : f.bodies)
+    if (one.trajectory == plan.trajectory) plan.largest_angle = one.largest_angle;
+  plan.about = text::format("%s: %s, %s, %zu poses, %.3f s", name.c_str(), std::string(name_of(f.format)).c_str(),
+                            std::string(name_of(f.frame)).c_str(), plan.trajectory->size(), seconds(plan.trajectory->duration()));
+  if (f.unit != "seconds" || f.unit_by_steps) plan.about += ", stamps in " + std::string(f.unit);
+  if (f.unit_by_steps) plan.about += " by their steps (a first line with names would define it: t_s x y z qx qy qz qw)";
+  if (f.replaced > 0) plan.about += ", " + text::counted(f.replaced, "pose") + " replaced by the next of the same stamp";
+  return plan;
+}
+
 TrajectoryKeys::TrajectoryKeys(text::Map& map)
     : file(map.optional("file")),
       format(map.optional("format")),
@@ -191,17 +203,7 @@ Plan TrajectoryFiles::plan_of(const Node& file, const Named& named, const std::s
     file.fail(trajectory.error().text);
     return plan;
   }
-  plan.trajectory = *trajectory;
-  for (const auto& one : f.bodies)
-    if (one.trajectory == *trajectory) plan.largest_angle = one.largest_angle;
-  plan.origin = f.origin;
-  plan.file = file.text(1024);
-  plan.about = text::format("%s: %s, %s, %zu poses, %.3f s", plan.file.c_str(), std::string(name_of(f.format)).c_str(),
-                            std::string(name_of(f.frame)).c_str(), (*trajectory)->size(), seconds((*trajectory)->duration()));
-  if (f.unit != "seconds" || f.unit_by_steps) plan.about += ", stamps in " + std::string(f.unit);
-  if (f.unit_by_steps) plan.about += " by their steps (a first line with names would define it: t_s x y z qx qy qz qw)";
-  if (f.replaced > 0) plan.about += ", " + text::counted(f.replaced, "pose") + " replaced by the next of the same stamp";
-  return plan;
+  return plan_for(f, *trajectory, file.text(1024));
 }
 
 /// Reads a text: with a dot or slash it is a file name, else it must be one of the words.

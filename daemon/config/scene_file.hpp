@@ -52,6 +52,10 @@ struct TrajectoryKeys {
   text::Node file, format, frame, rate_hz, body;
 };
 
+/// Returns a plan that plays one of the file's trajectories from its start. `name`: the file, as the user wrote it.
+motion::Plan plan_for(const motion::TrajectoryFile& file, std::shared_ptr<const motion::Trajectory> trajectory,
+                      const std::string& name);
+
 /// Reads each file once, even if several bodies use it.
 class TrajectoryFiles {
  public:

@@ -190,6 +190,17 @@ class Render(unittest.TestCase):
         about = json.loads((self.out / "render.json").read_text(encoding="utf-8"))
         self.assertEqual(["sonard: " + note for note in about["notes"]], result.stderr.splitlines())
 
+    def test_doubtful_attitudes_are_reported(self):
+        """As `sonard check` does for trajectories of a configuration."""
+        poses = self.path / "poses.tum"
+        for attitude, note in (("1 0 0 0", "turn rov over, but would not if w were at the other end"), ("0 0 0 1", None)):
+            poses.write_text(f"# frame: ENU_FLU\n0 0 0 -1 {attitude}\n0.1 0 0 -1 {attitude}\n", encoding="utf-8")
+            result = self.render("--poses", poses, "--quiet", "--format", "raw", out=self.path / f"turned-{note is None}")
+            self.expect(result, 0, *[note] * (note is not None))
+            notes = json.loads((self.path / f"turned-{note is None}/render.json").read_text(encoding="utf-8")).get("notes", [])
+            self.assertEqual(["sonard: " + n for n in notes], result.stderr.splitlines())
+            self.assertEqual(len(notes), note is not None, notes)
+
     def test_snapshots_do_not_smear(self):
         """Poses too far apart for a vehicle: the sonar is at rest in each ping, with one note, also in render.json."""
         snapshots = self.path / "snapshots.csv"

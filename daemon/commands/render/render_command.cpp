@@ -17,6 +17,7 @@
 #include "daemon/commands/render/render_job.hpp"
 #include "daemon/commands/render/render_pings.hpp"
 #include "daemon/config/products.hpp"
+#include "daemon/emulator/world/plausibility.hpp"
 #include "daemon/server/engine/start_engine.hpp"
 
 namespace sonar::render {
@@ -99,6 +100,9 @@ Result<RenderInput> input_of(const RenderCommand& command) {
     for (const std::string& note : {note_of_range(job), job.poses_note})
       if (!note.empty()) once.insert(note);
     for (std::string& note : notes_of_config(job.config)) once.insert(std::move(note));
+    if (const motion::Plan& plan = job.vehicle().plan)
+      for (const Note& note : notes_on_attitudes(carriers_of(job.config).at(job.sonar().vehicle), plan))
+        once.insert(text_of(note));
   }
   input->notes.insert(input->notes.end(), once.begin(), once.end());
   bool is_noted = false;

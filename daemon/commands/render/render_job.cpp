@@ -11,6 +11,7 @@
 #include "core/sonar/range_image.hpp"
 #include "core/text/decimal.hpp"
 #include "core/text/format.hpp"
+#include "daemon/config/scene_file.hpp"
 #include "daemon/emulator/sonar/ping_request.hpp"
 #include "daemon/emulator/world/world_parts.hpp"
 
@@ -288,9 +289,7 @@ Result<void> follow(RenderJob& job, const motion::TrajectoryFile& file, const st
   if (file.replaced > 0)
     job.poses_note = name + ": " + text::counted(file.replaced, "pose") + " replaced by the next of the same stamp";
   // The poses of the file replace the initial pose and the trajectory of the vehicle.
-  job.vehicle() = {.name = job.vehicle().name,
-                   .initial_pose = {},
-                   .plan = {.trajectory = *std::move(trajectory), .file = name, .origin = file.origin}};
+  job.vehicle() = {.name = job.vehicle().name, .initial_pose = {}, .plan = plan_for(file, *std::move(trajectory), name)};
   return {};
 }
 

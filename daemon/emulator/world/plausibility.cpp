@@ -96,10 +96,10 @@ std::optional<Doubt> doubt_of_place(const Carrier& carrier, const Pose& vehicle_
                exchanged ? exchanged_cure : far_cure};
 }
 
-bool is_upside_down(Quatd q) { return upright(q) <= turned_over; }
+bool is_upside_down(const Pose& p) { return upright(p.orientation) <= turned_over; }
 
 std::optional<Doubt> doubt_of_attitude(const std::string& body, Quatd q) {
-  if (!is_upside_down(q)) return std::nullopt;
+  if (upright(q) > turned_over) return std::nullopt;
   const double from_upright_rad = std::acos(std::clamp(upright(q), -1.0, 1.0));
   return Doubt{body + format(" is upside down, %.0f deg from upright", deg_from_rad(from_upright_rad)), turned_cure};
 }
@@ -114,10 +114,7 @@ bool is_upright_in_another_order(Quatd q) {
 /// True if w can be at the wrong end, which is not possible in CSV (columns have names) and KITTI (poses are matrices). `about`
 /// begins with the format.
 bool has_nameless_quaternions(const motion::Plan& plan) {
-  const auto is = [&](motion::Format format) {
-    return plan.about.starts_with((plan.file + ": ").append(name_of(format)).append(","));
-  };
-  return is(motion::Format::tum) || is(motion::Format::euroc);
+  return plan.about.starts_with(plan.file + ": tum,") || plan.about.starts_with(plan.file + ": euroc,");
 }
 
 /// True if the poses are implausibly tilted, but upright with the numbers in another order.
@@ -307,13 +304,9 @@ std::vector<Note> notes_on_angles(const std::string& vehicle, const ImplausibleA
   return {{vehicle, "the attitude of " + vehicle + format(" has an angle of %.4g rad", largest.rad), angle_cure}};
 }
 
-std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around) {
+std::vector<Note> notes_on_attitudes(const Carrier& carrier, const motion::Plan& plan) {
   const std::vector<Pose> poses = some_poses_of(plan);
-  const auto is_misplaced = [&](const Pose& p) { return doubtful_place(carrier, p, around).has_value(); };
-  const auto is_turned = [](const Pose& p) { return is_upside_down(p.orientation); };
   std::vector<Note> notes;
-  add(notes, carrier.vehicle,
-      doubt_of_all(poses, plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
   if (plan.largest_angle.rad > 0) {
     add(notes, carrier.vehicle, Doubt{plan.file + format(" has an angle of %.4g rad", plan.largest_angle.rad), degrees_cure});
     // Further notes would be consequences of a roll or pitch in degrees. A heading in degrees turns nothing over.
@@ -328,8 +321,17 @@ std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan
         Doubt{"the quaternions of " + plan.file + " turn " + carrier.vehicle + " over, but would not if w were at the other end",
               order_cure});
   else
-    add(notes, carrier.vehicle,
-        doubt_of_all(poses, plan, is_turned, [&](const Pose& p) { return doubt_of_attitude(carrier.vehicle, p.orientation); }));
+    add(notes, carrier.vehicle, doubt_of_all(poses, plan, is_upside_down, [&](const Pose& p) {
+          return doubt_of_attitude(carrier.vehicle, p.orientation);
+        }));
+  return notes;
+}
+
+std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around) {
+  const auto is_misplaced = [&](const Pose& p) { return doubtful_place(carrier, p, around).has_value(); };
+  std::vector<Note> notes = notes_on_attitudes(carrier, plan);
+  add(notes, carrier.vehicle,
+      doubt_of_all(some_poses_of(plan), plan, is_misplaced, [&](const Pose& p) { return doubt_of_place(carrier, p, around); }));
   return notes;
 }
 
@@ -338,8 +340,6 @@ std::vector<Note> notes_on(const Config& config, const Scene& scene, const Surro
   add(notes, notes_on_plans(config, around));
   return notes;
 }
-
-// ---- in a running daemon
 
 std::vector<Note> Plausibility::unreported(const std::vector<Note>& notes) {
   std::vector<Note> fresh;

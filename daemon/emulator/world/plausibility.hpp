@@ -59,8 +59,10 @@ std::vector<Note> notes_on_origin(const Surroundings& around);
 std::vector<Note> notes_on_pose(const Carrier& carrier, const Pose& vehicle_in_world, const Surroundings& around);
 /// Returns notes on angles. `largest`: the largest implausible angle of the vehicle's newest pose.
 std::vector<Note> notes_on_angles(const std::string& vehicle, const ImplausibleAngle& largest);
-/// Returns notes on about 10,000 poses at most, evenly spread. A carrier without mounts is a moving object, whose position is not
-/// checked.
+/// Returns notes on the attitudes of about 10,000 poses at most, evenly spread: degrees for radians, quaternions in another
+/// order, upside down.
+std::vector<Note> notes_on_attitudes(const Carrier& carrier, const motion::Plan& plan);
+/// Returns these notes, and those on positions. A carrier without mounts is a moving object, whose position is not checked.
 std::vector<Note> notes_on_trajectory(const Carrier& carrier, const motion::Plan& plan, const Surroundings& around);
 
 /// Returns all notes that need no pose.
