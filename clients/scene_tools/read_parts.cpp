@@ -270,6 +270,10 @@ class UrdfReader {
     std::vector<std::string> ready;
     for (const std::string& link : links_)
       if (!joint_of_.contains(link)) in_world_[link] = Pose{}, ready.push_back(link);
+    if (ready.size() > 1)
+      return findings_.fail(root_.place(),
+                            "links \"" + plain(ready[0]) + "\" and \"" + plain(ready[1]) +
+                                "\" are the children of no joint, but a robot has one root; attach one with a joint");
     while (!ready.empty()) {
       const std::string link = ready.back();
       ready.pop_back();

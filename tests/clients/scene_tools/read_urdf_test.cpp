@@ -53,6 +53,8 @@ TEST(ReadUrdf, MistakesAreReportedWithFileAndLine) {
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "b", "a"))), HasSubstr("form a circle"));
   EXPECT_THAT(r.error(robot(part("a") + part("b") + joint("j", "a", "b") + joint("k", "a", "b"))),
               HasSubstr("is the child of two joints"));
+  EXPECT_THAT(r.error(robot(part("a") + part("b") + part("c") + joint("j", "a", "b"))),
+              ::testing::StartsWith("w.sdf:1: links \"a\" and \"c\" are the children of no joint, but a robot has one root"));
   EXPECT_THAT(r.error(robot(part("a") + part("a"))), HasSubstr("used twice"));
   EXPECT_THAT(r.error(robot(part("a", "", "<sphere/>"))), HasSubstr("sphere radius: 1 number is needed here, not 0"));
   EXPECT_THAT(r.error(robot(part("a", "<origin xyz='1 2'/>"))), HasSubstr("origin xyz: 3 numbers are needed here, not 2"));
