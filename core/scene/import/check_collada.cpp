@@ -192,7 +192,11 @@ MeshFault check_collada(std::string_view file, ListedFaces* faces) {
     }
   }
   if (MeshFault fault = nodes.fault()) return fault;
-  if (faces && nodes.library.contains(nodes.scene)) {
+  if (nodes.scene.empty())
+    return "shows no scene (no <instance_visual_scene url=\"#...\"/> in <scene>), or is cut short; export it with its scene";
+  if (!nodes.library.contains(nodes.scene))
+    return "shows the scene \"" + std::string(nodes.scene.substr(0, 64)) + "\", which is not in the file; export it again";
+  if (faces) {
     std::multimap<std::size_t, std::string_view> surfaces(nodes.surfaces.begin(), nodes.surfaces.end());
     std::vector<std::string_view> shown;
     for (const std::size_t node : nodes.graph.shown({nodes.library.at(nodes.scene)}))

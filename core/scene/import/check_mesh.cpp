@@ -68,13 +68,13 @@ PlyHead ply_head_of(std::string_view file) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);
-    std::string word, second, third;
-    words >> word >> second >> third;
-    if (word == "format") head.is_text = second == "ascii";
+    std::string word, second, third, fourth;
+    words >> word >> second >> third >> fourth;
+    if (word == "format") head.is_text = second == "ascii", head.is_big_endian = second == "binary_big_endian";
     if (word == "element") head.elements.push_back({second.substr(0, 32), count_from(third), {}});
     if (word == "property" && !head.elements.empty()) {
       const bool is_list = second == "list";
-      head.elements.back().properties.push_back({is_list, bytes_of(is_list ? third : second)});
+      head.elements.back().properties.push_back({is_list, bytes_of(is_list ? third : second), is_list ? bytes_of(fourth) : 0});
     }
   }
   return head;

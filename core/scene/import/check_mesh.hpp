@@ -18,7 +18,8 @@ constexpr std::size_t ply_head_bytes = 64 << 10;  // limit of a header
 
 struct PlyProperty {
   bool is_list = false;
-  std::uint64_t bytes = 0;  // size in a binary file; for a list: the size of its count
+  std::uint64_t bytes = 0;       // size in a binary file; for a list: the size of its count
+  std::uint64_t item_bytes = 0;  // of a list: the size of an item
 };
 struct PlyElement {
   std::string name;
@@ -27,7 +28,7 @@ struct PlyElement {
 };
 struct PlyHead {
   std::size_t bytes = 0;  // size with its last line end; 0: the header is incomplete, and the other members are empty
-  bool is_text = false;
+  bool is_text = false, is_big_endian = false;
   std::vector<PlyElement> elements;
 
   /// Number of faces that the header counts.
@@ -62,9 +63,9 @@ MeshFault glb_fault(std::string_view file);
 /// The fault of a glTF or GLB file for which the importer finds no reader.
 std::string unknown_gltf(std::string_view file);
 
-/// Find incomplete records in the complete text of a file. The importer would omit or misread such records. Binary files are
-/// not checked, because the importer rejects them if they are cut short.
-MeshFault check_ply_text(std::string_view file);
+/// Find incomplete records in a complete file. The importer would omit or misread such records. Binary STL files are not
+/// checked here.
+MeshFault check_ply_records(std::string_view file);
 MeshFault check_stl_text(std::string_view file);
 MeshFault check_obj(std::string_view file);
 

@@ -79,16 +79,43 @@ bool is_end_of_solid(std::string_view word, std::string_view& line) {
   return true;
 }
 
+std::string place_in(const PlyElement& element, std::uint64_t k) {
+  return element.name + " " + std::to_string(k + 1) + " of " + std::to_string(element.count);
+}
+
+/// Finds the first record that ends after the file.
+MeshFault check_binary_ply(std::string_view file, const PlyHead& head) {
+  std::string_view rest = file.substr(head.bytes);
+  const auto skip = [&](std::uint64_t count, std::uint64_t bytes) {
+    if (bytes > 0 && count > rest.size() / bytes) return false;
+    rest.remove_prefix(count * bytes);
+    return true;
+  };
+  const auto skip_property = [&](const PlyProperty& p) {
+    std::uint64_t items = 0;
+    for (std::uint64_t b = 0; p.is_list && b < std::min<std::uint64_t>(p.bytes, rest.size()); ++b)
+      items |= std::uint64_t{static_cast<unsigned char>(rest[b])} << 8 * (head.is_big_endian ? p.bytes - 1 - b : b);
+    return skip(1, p.bytes) && skip(items, p.item_bytes);
+  };
+  for (const PlyElement& element : head.elements) {
+    const auto& all = element.properties;
+    for (std::uint64_t k = 0; k < element.count && !all.empty(); ++k)
+      if (!std::all_of(all.begin(), all.end(), skip_property))
+        return "ends within " + place_in(element, k) + ", which its header counts" + std::string(cut_short);
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
-MeshFault check_ply_text(std::string_view file) {
+MeshFault check_ply_records(std::string_view file) {
   const PlyHead head = ply_head_of(file);
-  if (!head.is_text) return std::nullopt;
+  if (!head.is_text) return check_binary_ply(file, head);
   const std::string_view lines_before = file.substr(0, head.bytes);
   Lines lines(file.substr(head.bytes), static_cast<std::uint64_t>(std::count(lines_before.begin(), lines_before.end(), '\n')));
   for (const PlyElement& element : head.elements)
     for (std::uint64_t k = 0; k < element.count && !element.properties.empty(); ++k) {
-      const std::string which = element.name + " " + std::to_string(k + 1) + " of " + std::to_string(element.count);
+      const std::string which = place_in(element, k);
       bool there = lines.next();
       // The importer skips one blank line, and reads further ones as records.
       if (there && lines.line().empty() && !lines.ends_with_return()) there = lines.next();

@@ -174,12 +174,10 @@ Result<MeshFault> check_text(const MeshFile& request, const std::string& extensi
     if (auto head = read(ply_head_bytes); !head) return tl::make_unexpected(head.error());
     std::error_code error;
     if (request.in_memory.empty()) bytes = std::filesystem::file_size(request.file, error);
-    const PlyHead head = ply_head_of(text);
-    if (auto fault = check_ply(head, bytes)) return fault;
-    if (!head.is_text) return MeshFault();
+    if (auto fault = check_ply(ply_head_of(text), bytes)) return fault;
   }
   if (auto all = read(max_mesh_bytes); !all) return tl::make_unexpected(all.error());
-  return extension == ".ply"   ? check_ply_text(text)
+  return extension == ".ply"   ? check_ply_records(text)
          : extension == ".obj" ? check_obj(text)
          : extension == ".stl" ? check_stl_text(text)
          : extension == ".dae" ? check_collada(text, &faces)

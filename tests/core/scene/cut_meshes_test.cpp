@@ -1,10 +1,14 @@
-// Text meshes that are cut short or have damaged records are refused with the place of the fault. Whatever remains without a
+// Meshes that are cut short, and texts with damaged records, are refused with the place of the fault. What remains without a
 // fault has all faces.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <chrono>
+#include <cstdint>
+#include <vector>
 
 #include "core/scene/files/load_mesh.hpp"
 #include "core/scene/import/check_mesh.hpp"
@@ -45,9 +49,42 @@ class CutMeshes : public ::testing::Test {
 };
 
 TEST(CutMeshTexts, EveryCutOfAPlyIsFoundUpToItsLastRecord) {
-  ASSERT_EQ(check_ply_text(ply), std::nullopt);
-  for (std::size_t n = ply_head.size(); n < ply.size() - 2; ++n) EXPECT_TRUE(check_ply_text(ply.substr(0, n))) << n;
-  EXPECT_FALSE(check_ply_text(ply.substr(0, ply.size() - 1))) << "the last line end may be missing";
+  ASSERT_EQ(check_ply_records(ply), std::nullopt);
+  for (std::size_t n = ply_head.size(); n < ply.size() - 2; ++n) EXPECT_TRUE(check_ply_records(ply.substr(0, n))) << n;
+  EXPECT_FALSE(check_ply_records(ply.substr(0, ply.size() - 1))) << "the last line end may be missing";
+}
+
+/// Appends the number's bytes, in this machine's order or reversed.
+template <class T>
+void append(std::string& bytes, T number, bool is_reversed) {
+  auto as_bytes = std::bit_cast<std::array<char, sizeof number>>(number);
+  if (is_reversed) std::reverse(as_bytes.begin(), as_bytes.end());
+  bytes.append(as_bytes.data(), as_bytes.size());
+}
+
+TEST_F(CutMeshes, EveryCutOfABinaryPlyIsFound) {
+  for (const bool is_big : {false, true}) {
+    std::string bytes = std::string("ply\nformat binary_") + (is_big ? "big" : "little") +
+                        "_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty double z\n"
+                        "element face 2\nproperty uchar red\nproperty list ushort int vertex_indices\nend_header\n";
+    const std::size_t head = bytes.size();
+    for (const float corner : {0.F, 1.F, 2.F, 3.F}) {
+      append(bytes, corner, is_big);
+      append(bytes, corner * corner, is_big);
+      append(bytes, 1.0, is_big);
+    }
+    for (const std::vector<int>& face : {std::vector<int>{0, 1, 2}, {0, 1, 2, 3}}) {
+      bytes += "r";
+      append(bytes, static_cast<std::uint16_t>(face.size()), is_big);
+      for (const int corner : face) append(bytes, corner, is_big);
+    }
+    EXPECT_EQ(check_ply_records(bytes), std::nullopt);
+    EXPECT_EQ(loaded("whole.ply", bytes), "3 triangles");
+    for (std::size_t n = head; n < bytes.size(); ++n) EXPECT_TRUE(check_ply_records(bytes.substr(0, n))) << n;
+    EXPECT_THAT(check_ply_records(bytes.substr(0, head + 20)).value_or(""), HasSubstr("ends within vertex 2 of 4"));
+    EXPECT_THAT(loaded("cut.ply", bytes.substr(0, bytes.size() - 1)),
+                HasSubstr("ends within face 2 of 2, which its header counts; it is cut short or damaged, export it again"));
+  }
 }
 
 TEST_F(CutMeshes, EveryCheckReadsTheSameHeaderOfAPly) {
@@ -62,7 +99,7 @@ TEST_F(CutMeshes, EveryCheckReadsTheSameHeaderOfAPly) {
     ASSERT_EQ(head.elements.size(), 3u);
     EXPECT_EQ(head.elements[1].properties.size(), 1u);
     EXPECT_EQ(check_ply(head, text.size()), std::nullopt);
-    EXPECT_EQ(check_ply_text(text), std::nullopt);
+    EXPECT_EQ(check_ply_records(text), std::nullopt);
     EXPECT_EQ(loaded("a.ply", text), "4 triangles");
   }
   // The importer, too, treats a carriage return within a comment as the end of the line.

@@ -93,7 +93,7 @@ inline std::vector<HostileMesh> hostile_meshes() {
       {"faces.ply", ply_header("binary_little_endian", "3", "1000000000") + three_vertices, huge},
       {"endless.ply", ply_header("ascii", "99999999999999999999", "1"), huge},
       {"list.ply", ply_header("binary_little_endian", "3", "1", "uint") + three_vertices + "\xff\xff\xff\x7f" + indices,
-       "MiB of memory"},
+       "ends within face 1 of 1"},
       {"text-list.ply", ply_header("ascii", "3", "1", "uint") + "0 0 0\n1 0 0\n0 1 0\n2147483647 0 1 2\n",
        "face 1 of 1 (line 13) has 4 of 2147483648 values"},
       {"absolute.gltf", gltf_with_buffer("/etc/passwd"), "names the file /etc/passwd, an absolute path"},

@@ -152,6 +152,10 @@ TEST_F(LoadMesh, TrianglesOutsideOfTheSceneOfAColladaAreCounted) {
   const LoadedMesh twice = good("c.dae", changed("<node>", "<node><instance_geometry url=\"#g\"/>"));
   EXPECT_EQ(twice.centred.mesh.triangles.size(), 8u);
   EXPECT_EQ(twice.lost + twice.hidden, 0u);
+  EXPECT_THAT(refusal("none.dae", changed("<instance_visual_scene url=\"#s\"/>", "")), HasSubstr("none.dae: shows no scene"));
+  EXPECT_THAT(refusal("other.dae", changed("url=\"#s\"", "url=\"#t\"")),
+              HasSubstr("shows the scene \"t\", which is not in the file"));
+  EXPECT_THAT(refusal("empty.dae", ""), HasSubstr("empty.dae: shows no scene"));
 }
 
 // Models of vehicles have this size: three of bluerov2_gz have more than 4 MiB.
