@@ -133,7 +133,7 @@ class Reload(unittest.TestCase):
         daemon.scene = folder / "reload.yaml"
         daemon.scene.write_text(SCENE.format(x=3), encoding="utf-8")
         scenes = {}
-        for mesh, words in (("loop.dae", "contains itself"), ("fan.gltf", "repeats its nodes"), ("list.ply", "of memory")):
+        for mesh, words in (("loop.dae", "contains itself"), ("fan.gltf", "repeats its nodes"), ("list.ply", "ends within face 1 of 1")):
             shutil.copy(ROOT / "tests/fuzz/corpus/mesh_file" / mesh, folder)
             scenes[folder / f"{mesh}.yaml"] = f"{mesh}: ", words
             (folder / f"{mesh}.yaml").write_text(MESH.format(mesh=mesh), encoding="utf-8")
