@@ -63,7 +63,7 @@ DEPENDENCIES = {
     r"yaml-cpp/": ["core/text/"],
     r"assimp/": ["core/scene/import/"],
     r"tinyxml2\.h": ["clients/scene_tools/xml_file.cpp"],
-    r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp", "core/image/raster.cpp"],
+    r"png\.h|pngconf\.h": ["core/scene/", "core/image/raster.cpp"],
     r"tiffio\.h": ["core/scene/files/geo_tiff.cpp", "core/scene/files/tiff_file.cpp"],
     r"zlib\.h": ["protocol/blueview/frames.cpp", "protocol/waterlinked/messages.cpp", "protocol/recorded/byte_source.cpp", "clients/bvtsdk/", "core/image/"],
     r"boost/": ["daemon/"],
