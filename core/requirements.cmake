@@ -36,7 +36,7 @@ endmacro()
 sonar_need(assimp 5.2 libassimp-dev)
 sonar_need(Boost 1.74 libboost-dev CONFIG)
 sonar_need(CLI11 2.1 libcli11-dev)
-find_package(embree 4 QUIET)  # embree matches only its own major version; 3.12 requires that the request has a version
+find_package(embree 4 QUIET)  # embree accepts only requests for its own major version; 3.12 accepts none without a version
 if(NOT embree_FOUND)
   sonar_need(embree 3.12 libembree-dev 3)
 endif()

@@ -24,12 +24,12 @@ struct FanScratch {
   std::vector<FanInterval> open, halves;
 };
 
-/// Traces columns [first, last) and draws them into the map, which must already have its shape. Returns the number of rays.
+/// Traces columns [first, last) and draws the hits into `seen`, whose size must already be set. Returns the number of rays.
 std::size_t trace_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,
                       FanScratch& scratch, DepthMap& seen);
 
-/// Columns of a packet of trace_fixed_fan. A ray on the edge of two triangles may hit either, depending on the other rays of its
-/// packet, so callers split columns only between packets.
+/// Number of columns in a packet of trace_fixed_fan. Which of two triangles a ray on their common edge hits may depend on the
+/// other rays of its packet, so callers split columns only between packets.
 inline constexpr int fixed_fan_columns = 4;
 /// Traces the plan's fixed fan for every column of [first, last), and appends to `hits`.
 void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScalars& scalars, int first, int last,

@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-/// Keeps the smaller range along the ray [m], so the order of the calls has no effect.
+/// Replaces `nearest` if this hit is nearer. Ranges are along the ray.
 void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
   if (nearest.object != BeamTruth::nothing && nearest.range_m <= range_m) return;
   nearest = {range_m, object};
@@ -18,7 +18,7 @@ void note(float range_m, std::uint32_t object, BeamTruth& nearest) {
 
 float truth_half_width_rad(const PingPlan& plan) {
   const BeamPattern& pattern = plan.mode.pattern;
-  // Without a pattern, the beam is as wide as the data sheet's width.
+  // Without a pattern, the data sheet's width is used.
   if (pattern.elevation_taper == Taper::unit) return pattern.elevation_width_rad / 2;
   // The |psi| [rad] at which D_v of eq. 34 has fallen to sqrt(1/2) in amplitude, -3 dB.
   return static_cast<float>(elevation_reach_rad(pattern, std::sqrt(0.5)));
@@ -48,7 +48,7 @@ std::vector<BeamTruth> truth_of_beams(const PingPlan& plan, std::span<const Beam
   std::vector<BeamTruth> truth;
   truth.reserve(plan.beam_sine.size());
   for (const double sine : plan.beam_sine) {
-    // The column whose u is nearest to the beam. The clamp corrects rounding at the last column.
+    // The column whose u is nearest to the beam. The clamp corrects rounding at the outermost columns.
     const long column = std::lround((plan.columns.first_sine - sine) / plan.columns.spacing);
     truth.push_back(by_column[static_cast<std::size_t>(std::clamp<long>(column, 0, plan.columns.count - 1))]);
   }

@@ -12,8 +12,9 @@
 namespace sonar {
 namespace {
 
-// Largest number of slices for the integral over psi in eq. 17. Every column processes all slices for its shadows.
-constexpr int most_slices = 256;
+// Least number of slices for the integral over psi in eq. 17, if the fan has so many bins; by rounding there may be twice as
+// many. Every column processes all slices for its shadows.
+constexpr int fewest_slices = 256;
 
 }  // namespace
 
@@ -30,7 +31,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
   // D_v of eq. 34. Without a pattern the factor is 1 in the whole fan.
   const bool has_pattern = plan.mode.pattern.elevation_taper != Taper::unit;
   const double aperture = has_pattern ? elevation_aperture_in_wavelengths(plan.mode.pattern) : 0;
-  const int bins_a_slice = std::max(1, fan.bins / most_slices);
+  const int bins_a_slice = std::max(1, fan.bins / fewest_slices);
   for (int from = 0; from < fan.bins; from += bins_a_slice) {
     const auto angle = [&](double bin) {
       return std::atan(static_cast<double>(tangent_of_bin(fan.axis, static_cast<float>(bin))));
@@ -45,7 +46,7 @@ Volume::Volume(const WaterColumn& water, const PingPlan& plan, const PingScalars
   // docs/acoustics.md, eq. 17: sigma = 10^(S_v / 10) Psi r^2 (c / 2) tau_eff. Its echo falls as r^-4.
   const double at_1_m = scalars.source_upa * scalars.source_upa * power_from_db(static_cast<double>(water.volume_db)) * 0.5 *
                         scalars.sound_speed_mps * plan.pulse_shape.energy_width_s();
-  // [uPa^2] for Psi = 1: source^2 times sigma of eq. 17, times e^{-4 a r} / r^4 for the way out and back.
+  // Power [uPa^2] for Psi = 1: source^2 times sigma of eq. 17, times e^{-4 a r} / r^4 for the way out and back.
   for (int n = 0; n < plan.samples; ++n) {
     const double r = (n + scalars.sample_offset) / scalars.samples_per_m;
     open_power_.push_back(at_1_m * std::pow(r * two_way_transmission(r, scalars.absorption_np_per_m), 2));
@@ -57,7 +58,7 @@ void Volume::find_blocked(const DepthMap& seen, int column, std::vector<double>&
   const float* map = seen.inverse_x.data() + static_cast<std::ptrdiff_t>(column - seen.first_column) * (seen.bins + 1);
   const double u = plan_.columns.sine(column);
   const double per_x = plan_.switches.conical ? 1 / std::sqrt(std::max(1 - u * u, 1e-12)) : 1;  // r / x = per_x / cos(psi)
-  // A slice of the fan ends at the surface that rays hit. From that sample on, its weight is subtracted.
+  // A slice of the fan ends at the surface that rays hit. From the sample of that surface on, the slice's weight is subtracted.
   for (const Slice& slice : slices_) {
     const auto inverse_x = static_cast<double>(map[slice.bin]);
     if (!(inverse_x > 0)) continue;

@@ -1,5 +1,5 @@
-// Reverberation of the water: particles scatter a little everywhere up to the first solid surface. It is added to the column
-// signals between synthesis and beamforming (docs/acoustics.md, section 3).
+// Reverberation of the water: particles scatter a little everywhere up to the first solid surface. The reverberation is added
+// to the column signals between synthesis and beamforming (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>
@@ -50,7 +50,7 @@ class Volume {
   const PingScalars& scalars_;
   std::vector<Slice> slices_;
   double open_fan_ = 0;             // sum of the weights
-  std::vector<double> open_power_;  // by sample, per weight, without the factor of the column [uPa^2]
+  std::vector<double> open_power_;  // for each sample: power per weight, without the column's width [uPa^2]
 };
 
 }  // namespace sonar

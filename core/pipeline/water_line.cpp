@@ -7,7 +7,7 @@ namespace {
 
 /// The height [m] by which the sonar rises until PingScalars::seen_at_s, the time at which the scene is computed.
 double rise_m(const PingRequest& r) {
-  // Vertical speed times half of the ping's duration, range / c.
+  // Vertical speed times range / c, which is half of the ping's duration.
   return std::max(0.0, r.sonar_moves.velocity_mps.z) * r.settings.range_m /
          static_cast<double>(r.settings.device_sound_speed_mps);
 }

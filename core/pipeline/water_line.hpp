@@ -1,4 +1,4 @@
-// Determines on which side of the sea surface a sonar is. Engines call it before they compute a ping. Then a sonar at the
+// Determines on which side of the sea surface a sonar is. Engines call in_water() before they compute a ping. Then a sonar at the
 // surface gets the same ping as one just below it, and a sonar in the air receives only noise.
 #pragma once
 
@@ -17,9 +17,9 @@ inline constexpr double least_depth_m = 1e-3;
 /// True if a sonar at this position is above the sea surface and receives only noise. False in scenes without a sea surface.
 bool is_in_air(const Pose& sonar_in_world, const Scene& scene);
 
-/// The requests to be computed: the given ones if they need no change, else changed copies in `changed`. In scenes with a sea
-/// surface the ping of a sonar above it is blank, a sonar at it is moved just below it, and no sonar leaves the water during
-/// its ping.
+/// Returns the requests to be computed: the given ones if they need no change, else changed copies in `changed`. In scenes with
+/// a sea surface the ping of a sonar above it is blank, a sonar at it is moved just below it, and a rising sonar is still below
+/// it at PingScalars::seen_at_s.
 std::span<const PingRequest> in_water(std::span<const PingRequest> requests, const Scene& scene,
                                       std::vector<PingRequest>& changed);
 

@@ -47,7 +47,7 @@ bool edges_match(const Mesh& mesh, const std::vector<Index>& joined) {
   return true;
 }
 
-/// The sign of the volumes that the connected parts enclose; 0 if they differ.
+/// The sign of the volumes that the connected parts enclose; 0 if the signs differ.
 int sign_of_volumes(const Mesh& mesh, std::vector<Index> root, Vec3d middle) {
   const auto find = [&](Index i) {
     while (root[i] != i) i = root[i] = root[root[i]];

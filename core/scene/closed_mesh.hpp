@@ -8,7 +8,7 @@ namespace sonar {
 
 struct Skin {
   int outward = 0;  // +1: closed, normals point outwards; -1: inwards; 0: open, or the outer side is unknown
-  Vec3d low, high;  // corners of the box around it, object axes [m]
+  Vec3d low, high;  // corners of the box around the mesh, object axes [m]
   double area_m2 = 0;
 };
 

@@ -23,8 +23,8 @@ namespace sonar::embree {
 // SONARD_EMBREE_ISA limits Embree to a lower instruction set than that of the processor, so that tests can run the code of
 // other machines.
 inline std::string device_settings(int threads) {
-  // No geometry is tessellated. Embree's cache for tessellation would take 128 MB of address space; if it is not available,
-  // Embree keeps a lock, and rtcReleaseDevice then never returns.
+  // No geometry is tessellated. Embree's cache for tessellation would take 128 MB of address space; if they are not
+  // available, Embree keeps a lock, and rtcReleaseDevice then never returns.
   std::string settings = "tessellation_cache_size=0,threads=" + std::to_string(threads);
   const char* isa = std::getenv("SONARD_EMBREE_ISA");
   if (isa == nullptr || *isa == '\0') return settings;

@@ -44,7 +44,7 @@ inline Extent extent_of(const Mesh& mesh) {
   return extent;
 }
 
-/// A mesh that is longer than this was probably not written in metres [m].
+/// A mesh longer than this [m] was probably not written in metres.
 inline constexpr double huge_mesh_m = 200;
 inline constexpr std::string_view huge_mesh_cure = "if the file is in centimetres or millimetres, set scale: 0.01 or 0.001";
 

@@ -40,7 +40,7 @@ class RayScene {
   void change(std::shared_ptr<const Scene> scene);
   const Scene& scene() const;
   Vec3d origin() const;  // world position to which float coordinates are relative
-  /// Moves the bodies. The thread that owns the scene calls it before it traces. It takes no time if no body has moved.
+  /// Moves the bodies. Call it on the thread that owns the scene, before tracing. It takes no time if no body has moved.
   void place(std::span<const Pose> bodies_in_world);
   /// Finds the first hits of the active lanes (bit i of `active`). Inactive lanes may have any values; their `object` becomes
   /// `miss`. An active ray without a hit keeps `far` and gets the normal 0. Several threads may call it between two calls of

@@ -52,7 +52,7 @@ struct Material {
   bool operator==(const Material&) const = default;
 };
 
-/// Triangles in object coordinates, two-sided, geometric normals. Objects that use the same file share them.
+/// Triangles in object coordinates, with two sides and geometric normals. Objects that use the same file share one mesh.
 struct Mesh {
   std::vector<Vec3> vertices;                           // [m]
   std::vector<std::array<std::uint32_t, 3>> triangles;  // indices into vertices, never degenerate

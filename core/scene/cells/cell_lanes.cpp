@@ -20,8 +20,8 @@ namespace {
 
 constexpr int across = 4;  // number of blocks along a tile, and of cells along a block
 
-/// The quarter of a cell in which the point of the cell lies, from the index of the cell along its 4 x 4 block. It has two
-/// binary digits. Each is flipped by random bits that depend on the digits before it (nested scrambling).
+/// The quarter of a cell in which the point of the cell lies, from the index of the cell along its 4 x 4 block. The two binary
+/// digits of the index are exchanged, and each is flipped by a random bit that the other digit selects (nested scrambling).
 constexpr double quarter_of(int along, unsigned scramble) {
   const auto bit = [&](int i) { return static_cast<int>(scramble >> i & 1u); };
   const int half = (along & 1) ^ bit(along >> 1);
@@ -64,7 +64,7 @@ inline float uniform(std::uint32_t bits) {
   return (static_cast<float>(static_cast<std::int32_t>(bits >> 9)) + 0.5f) * (1.0f / 8388608.0f);
 }
 
-/// -log x for a normal x in (0, 1): x = 2^e (1 + f) with |f| at most 0.41, and a polynomial in f (Cephes).
+/// -log x for x in (0, 1), not subnormal. x = 2^e (1 + f) with |f| at most 0.41, and a polynomial in f is used (Cephes).
 inline float minus_log(float x) {
   constexpr std::int32_t root_half = 0x3f3504f3;
   const std::int32_t above = std::bit_cast<std::int32_t>(x) - root_half;

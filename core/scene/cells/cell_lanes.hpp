@@ -52,27 +52,27 @@ struct Splines {
   alignas(64) std::int32_t first[3][block];
   alignas(64) float weight[3][3][block];
 };
-/// per_m: lattice points per metre. Returns true if all cells have the same lattice points.
+/// Computes the splines of a block. per_m: lattice points per metre. Returns true if all cells have the same lattice points.
 bool find_splines(const double* const (&place_m)[3], double per_m, Splines& to);
 
-/// Values at equal steps of a standard normal from -widest to widest, and the last value again.
+/// A function of a standard normal variable: values at equal steps from -widest to widest, and the last value again.
 struct NormalTable {
   const float* values;
   float widest, per_normal, last;  // per_normal: steps per unit; last: number of steps
 };
-/// Multiplies the roots of a block by the value at each cell's normal: the weighted sum of its 27 lattice points (x changes
-/// fastest).
+/// Multiplies `root` of each cell of a block by the table's value at the cell's normal variable. This variable is the weighted
+/// sum of those of its 27 lattice points (x changes fastest).
 void multiply_by_field(const Splines& splines, const float (&normals)[27][block], const NormalTable& table, double* root);
 
-/// Circular complex Gaussians with E|z|^2 = 1 from pairs of draws (Box-Muller, as complex_normal), multiplied by `root`. The
-/// error is about 2e-7 of their magnitude. n must be a multiple of `block`. Returns the largest |re| or |im|.
+/// Makes circular complex Gaussians with E|z|^2 = 1 from pairs of draws (Box-Muller, as complex_normal), multiplied by `root`.
+/// The error is about 2e-7 of their magnitude. n must be a multiple of `block`. Returns the largest |re| or |im|.
 float speckle(const std::uint32_t* a, const std::uint32_t* b, const double* root, int n, float* re, float* im);
 
 struct Extent {
   double low, high;
 };
-/// (place - middle) / unit as integers, rounded half away from zero and clamped to +-32767. n must be a multiple of `block`.
-/// Returns the least and largest place - middle.
+/// Stores (place - middle) / unit as integers, rounded half away from zero and clamped to +-32767. n must be a multiple of
+/// `block`. Returns the least and largest place - middle.
 Extent pack_places(const double* place, int n, double middle, double unit, std::int16_t* counts);
 void pack_weights(const float* weight, int n, float unit, std::int16_t* counts);
 

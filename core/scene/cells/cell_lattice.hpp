@@ -1,5 +1,5 @@
-// The geometry of surface cells: triangles projected along the dominant axis of their normals, the half-open test by which
-// every lattice point has exactly one owner, and the cubes of tiles.
+// The geometry of surface cells: triangles projected along the dominant axis of their normals, the half-open test that gives
+// every lattice point exactly one owner, and the cubes of tiles.
 #pragma once
 
 #include <bit>

@@ -35,14 +35,14 @@ struct CellView {
   std::span<const Pose> bodies_in_world;
   float min_range_m = 0, max_range_m = 0;
   float max_sine = 1;             // |y / r| of the outermost column
-  float max_elevation_rad = 1;    // half angle of the fan, measured from the array axis
+  float max_elevation_rad = 1;    // half angle of the fan about the array axis
   std::vector<CellLevel> levels;  // coarsest first
   // For fans with side lobes: half angle of the main part about the array axis, and the angle at which side lobes begin. In
   // side lobes, all cells of a cube have one level, at most `side_coarser` levels coarser than the coarsest of `levels`.
   float main_elevation_rad = 2, side_from_rad = 2;
   float side_area_per_range_m = 0;  // cell area divided by range at grazing incidence; larger at steep incidence
   int side_coarser = 0;
-  // Objects with few cells get finer cells, because without speckle the positions of cells would be visible.
+  // If true, objects with few cells get finer cells, because without speckle the positions of cells would be visible.
   bool exact_small = false;
   /// If set, it replaces the bounds of the fan. For a ball around a point in the sonar's axes it returns the distances at which
   /// the ball is visible; nullopt if it is not visible. Via mirrors, the distances are larger than the true distance.
@@ -51,8 +51,8 @@ struct CellView {
 
 class TextureField;
 
-/// Up to 16 x 16 cells (more if patches overlap) in a cube of the lattice, as int16 columns in one allocation. Positions are
-/// relative to the cube's centre. Padding cells have zero weight.
+/// Up to 16 x 16 cells (more where the surface folds back) in a cube of the lattice, as int16 columns in one allocation.
+/// Positions are relative to the cube's centre. Padding cells have zero weight.
 struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z
   Vec3d centre_m;                                     // object coordinates

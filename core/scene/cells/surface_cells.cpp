@@ -14,7 +14,7 @@ namespace {
 
 constexpr double fewest_cells = 3000;  // smallest number of cells for an object, with CellView::exact_small
 
-/// The level of tiles for side lobes. At each position, one cube contains all cells of this level.
+/// The ranges of tiles for side lobes: they do not fade, because at each position only one cube provides these cells.
 constexpr CellLevel at_all_ranges{.full_to_m = 1e9f, .fade_out_to_m = 1e9f};
 
 bool is_empty(const TileInView& t) { return t.tile->count == 0; }
@@ -151,7 +151,7 @@ SurfaceCells::~SurfaceCells() = default;
 void SurfaceCells::list(CellNode& node, bool of_side, const TileInView& seen, Found& found) {
   const bool built = of_side ? node.side_built : node.built;
   const Missing missing{&node, of_side};
-  // Lists a tile only once, even if two levels need it.
+  // Lists a missing tile only once, even if two levels need it.
   if (!built && (found.missing.empty() || found.missing.back() != missing)) found.missing.push_back(missing);
   if (!built || seen.tile->count > 0) found.in_view.push_back(seen);
 }
@@ -326,7 +326,7 @@ void SurfaceCells::in_views(std::span<const CellView> views, Parallel& pool, std
   pool.for_each(missing.empty() ? 0 : views.size(), [&](std::size_t v, int) { std::erase_if(found[v].tiles, is_empty); });
 }
 
-/// Drops the tiles that were not used for longest. If a dropped tile is built again, it is identical.
+/// Drops the least recently used tiles if the cache is too large. If a dropped tile is built again, it is identical.
 void SurfaceCells::keep_within_budget() {
   if (cached_bytes_ > cache_bytes_) forget_known();
   for (std::uint64_t age = 256; cached_bytes_ > cache_bytes_ && age > 0; age /= 4) {

@@ -50,8 +50,8 @@ struct CellFields {
 class SurfaceCells {
  public:
   SurfaceCells(std::shared_ptr<const Scene> scene, Seed seed, std::size_t cache_bytes, CellFields fields = {});
-  /// Replaces the scene. An object keeps its cells if an object with the same mesh and materials has the same index, even if
-  /// scenes alternate.
+  /// Replaces the scene. The cells of an object are kept if the new object at its index has the same mesh and materials, even
+  /// if scenes alternate.
   void change(std::shared_ptr<const Scene> scene);
   ~SurfaceCells();
   SurfaceCells(const SurfaceCells&) = delete;
@@ -75,8 +75,8 @@ class SurfaceCells {
   std::span<const Skin> skins() const { return skins_; }
   /// Number of the last view.
   std::uint64_t views() const { return now_; }
-  /// Keeps the tiles of this view and of later ones until the next call, so that other views can be requested meanwhile. 0 = no
-  /// tiles are kept.
+  /// Keeps the tiles of view number `view` and of later ones, so that other views can be requested meanwhile. 0 = no tiles are
+  /// kept.
   void keep_since(std::uint64_t view) { kept_since_ = view; }
   /// Size of the tiles and of the tree that contains them [bytes].
   std::size_t cached_bytes() const { return cached_bytes_; }
@@ -129,7 +129,7 @@ class SurfaceCells {
   CellFields fields_, there_{false, false};                             // requested fields; fields that at least one material has
   std::vector<std::unique_ptr<const TextureField>> textures_, grains_;  // per material, null = none
   std::size_t cache_bytes_ = 0, cached_bytes_ = 0, built_ = 0;
-  std::uint64_t now_ = 0, kept_since_ = 0;  // number of views; tiles of this view and later ones are kept, 0 = none
+  std::uint64_t now_ = 0, kept_since_ = 0;  // number of the last view; first view whose tiles are kept, 0 = none
   std::vector<std::unique_ptr<SurfacePatch>> patches_;
   std::unique_ptr<Known> known_;
   std::vector<Root> roots_;  // roots of all patches in order, then those of raise_roots(), level by level

@@ -13,7 +13,7 @@ constexpr int most_roots_along_an_axis = 16;
 constexpr double most_steep = 4;      // largest ratio of cell areas at steep and at grazing incidence
 constexpr int few_in_side_lobes = 2;  // in levels; an object has at least a sixteenth of fewest_cells in side lobes
 
-/// The finest level at which the cubes that cover the triangles are few enough.
+/// The finest level (at most `finest`) at which a row of 16 cubes is at least as long as the extent of the triangles.
 int root_level(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, int finest) {
   Vec3 lo = mesh.vertices[mesh.triangles[triangles.front()][0]], hi = lo;
   for (const std::uint32_t t : triangles)
@@ -129,7 +129,7 @@ int SurfacePatch::side_level(const TileAddress& address, Vec3d sonar_m, const Ce
   const double steep = range < most_steep * aside ? range / aside : most_steep;
   const double area = static_cast<double>(view.side_area_per_range_m) * steep * std::max(range - cube.radius() / 2, 0.0);
   const int finest = view.levels.back().level, coarsest_seen = view.levels.front().level - view.side_coarser;
-  // Cells of this level have at most that area: 2^-2 level <= area. The exponent of the area is exact.
+  // Cells of this level have at most that area: 2^(-2 level) <= area. The exponent of the area is exact.
   int exponent = 0;
   std::frexp(area, &exponent);
   const int by_area = area > 0 ? std::clamp((2 - exponent) >> 1, coarsest_seen, finest) : finest;

@@ -53,7 +53,7 @@ class SurfacePatch {
   bool negative_side = false;
   Texture texture, grain;  // those of the material; the tiles depend on them
   std::uint32_t texture_seed = 0;
-  int coarsest = 0;  // coarsest level that an object may have with exact_small
+  int coarsest = 0;  // coarsest level of the object's cells with exact_small
   std::shared_ptr<const Mesh> mesh;
   std::vector<std::unique_ptr<CellNode>> roots;
   std::size_t first_coarsest = 0;  // index of the first root with the coarsest level
@@ -79,7 +79,7 @@ class SurfacePatch {
   bool has_side_cells(const TileAddress& cube, Vec3d sonar_m, const CellView& view) const;
   /// Drops the tiles and keeps the cubes. Returns the number of bytes freed.
   std::size_t forget_tiles();
-  /// Drops all cubes below `node` that were last visited before `then`. Returns the number of bytes freed.
+  /// Drops the children of each cube, from `node` down, if all of them were last visited before `then`. Returns the bytes freed.
   static std::size_t forget_below(CellNode& node, std::uint64_t then);
 };
 

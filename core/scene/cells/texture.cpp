@@ -59,7 +59,7 @@ TextureField::TextureField(const Texture& texture, std::uint32_t texture_seed, S
   const double nu = static_cast<double>(texture.shape), log_gamma_nu = std::lgamma(nu);
   double mean = 0, weight = 0;
   std::vector<double> values;
-  // x = P^-1(nu, Phi(z)) / nu at uniform z, divided by the mean over the normal density.
+  // x = P^-1(nu, Phi(z)) / nu at equally spaced z, divided by the mean over the normal density.
   for (int i = 0; i <= quantiles; ++i) {
     const double normal = widest_normal * (2.0 * i / quantiles - 1), density = std::exp(-0.5 * normal * normal);
     values.push_back(gamma_at_normal(nu, log_gamma_nu, normal));
@@ -104,7 +104,8 @@ void TexturePatch::load_points(std::int32_t i, std::int32_t j, std::int32_t k) {
       for (int along = 0; along < 3; ++along) *to++ = normal_at(i + along, j + across, k + up);
 }
 
-// Weighted sum of 27 lattice normals. The squares of the weights add to 1, so the result is again a standard normal.
+// The table is read at the weighted sum of 27 lattice normals. The squares of the weights add to 1, so this sum is again a
+// standard normal.
 void TexturePatch::multiply(std::array<const double*, 3> place_m, int n, double* root) {
   constexpr int block = cell_lanes::block;
   const double per_m = 1 / field_.lattice_m();

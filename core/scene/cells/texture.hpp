@@ -1,5 +1,5 @@
 // Patches of stronger and weaker scattering, fixed to a surface: a continuous Gamma field of mean 1 over object coordinates
-// (docs/acoustics.md, section 3). build_tile multiplies the cells' speckle by its root, so the echoes become K-distributed.
+// (docs/acoustics.md, section 3). build_tile multiplies the cells' speckle by its square root, so that echoes are K-distributed.
 #pragma once
 
 #include <array>

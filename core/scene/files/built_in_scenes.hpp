@@ -14,7 +14,7 @@ constexpr bool is_built_in_scene(std::string_view name) {
   return std::find(built_in_scenes.begin(), built_in_scenes.end(), name) != built_in_scenes.end();
 }
 
-/// A scene, or a mesh that one of them names; `name` is relative to scenes/.
+/// A scene, or a mesh that one of the scenes uses; `name` is relative to scenes/.
 struct BuiltInFile {
   std::string_view name, contents;
 };

@@ -167,7 +167,7 @@ std::string without_blanks(std::string name) {
   return name;
 }
 
-/// Datums that agree with WGS 84 within 2 m. The names are those in names of systems, without blanks and underscores.
+/// Datums that agree with WGS 84 within 2 m. They are spelt as in names of systems, but without blanks and underscores.
 constexpr std::array<std::string_view, 16> modern_datums{"WGS84",    "WGS1984", "ETRS89",  "ETRS1989",   "NAD83",  "NAD1983",
                                                          "GDA94",    "GDA1994", "GDA2020", "SIRGAS2000", "SIRGAS", "RGF93",
                                                          "NZGD2000", "JGD2000", "JGD2011", "SWEREF99"};

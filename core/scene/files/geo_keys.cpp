@@ -39,7 +39,7 @@ constexpr std::uint16_t projected = 1, geographic = 2, geocentric = 3, user_defi
 constexpr std::uint16_t web_mercator = 3857, old_web_mercator = 3785, transverse_mercator = 1;
 constexpr std::uint16_t numbers_tag = 34736, texts_tag = 34737;
 
-/// Metres per unit; 1 for metres and for degrees.
+/// Metres per unit of this code; 1 without a code.
 Result<double> length_unit(std::optional<std::uint16_t> key) {
   switch (key.value_or(unit_metre)) {
     case unit_metre:
@@ -87,7 +87,7 @@ std::optional<double> prime_meridian_of_keys(const GeoKeys& keys, double unit_de
   return prime_meridian_of_epsg(code_of(keys, geographic_system).value_or(0));
 }
 
-/// The code of the unit of height systems that are not in metres, from the EPSG data set 10.0.
+/// The code of the unit of a height system that is not in metres; nullopt for others. From the EPSG data set 10.0.
 std::optional<std::uint16_t> unit_of_height_system(std::uint16_t system) {
   static const std::set<std::uint16_t> in_feet{5614, 6130, 6131, 6132, 8050, 8051, 8228},
       in_us_survey_feet{5702, 6358, 6359, 6360, 8052, 8053};
@@ -207,7 +207,7 @@ Result<CoordinateSystem> system_of_keys(const GeoKeys& keys, std::optional<std::
   if (cited) return system;
   const auto of_lengths = length_unit(model == projected ? keys.value_of(linear_units) : std::nullopt);
   if (!of_lengths) return tl::make_unexpected(of_lengths.error());
-  if (*of_lengths != 1) system.utm.reset();  // its parameters have that unit, too
+  if (*of_lengths != 1) system.utm.reset();  // the parameters of the projection have that unit, too
   system.unit_m = *of_lengths;
   return system;
 }

@@ -1,4 +1,4 @@
-// The keys of a GeoTIFF (OGC 19-008r4, annex B), which state the coordinate system of its cells. They are read without libtiff.
+// Decodes the keys of a GeoTIFF (OGC 19-008r4, annex B), which state the coordinate system of its cells, without libtiff.
 #pragma once
 
 #include <cstdint>

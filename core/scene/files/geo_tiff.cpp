@@ -144,7 +144,7 @@ class GeoTiffReader {
         });
   }
 
-  /// The six numbers of a world file beside the grid, relative to the middle of the first cell.
+  /// The position and steps in a world file beside the grid, which states the middle of the first cell.
   std::optional<Georeference> world_file() const {
     for (const char* extension : {".tfw", ".tifw", ".TFW", ".wld"}) {
       std::filesystem::path beside = file_;

@@ -26,8 +26,8 @@ bool are_arc_seconds(double cell) {
   return is_whole(cell * ninths_in_a_degree) && !is_whole(cell * 1e5);
 }
 
-/// True if the ground would be absurdly steep if coordinates were metres: read from degrees, a slope of 1 in 100 becomes 1000
-/// to 1. `height_m`: metres per unit of `raw.z`.
+/// True if the coordinates are probably degrees: read as metres, they make the ground absurdly steep (a slope of 1 in 100
+/// becomes 1000 to 1), or small cells have a size that is usual in degrees. `height_m`: metres per unit of `raw.z`.
 bool shows_degrees(const RawHeights& raw, double height_m) {
   const std::size_t columns = raw.x.size();
   const double cell = (raw.x.back() - raw.x.front()) / static_cast<double>(columns - 1);
@@ -91,7 +91,7 @@ void remove_zone_number(RawHeights& raw, UtmZone zone, std::vector<std::string>&
   notes.push_back(text::format("its eastings begin with %d, the number of their zone, which is removed", zone.number));
 }
 
-/// A note about a system whose latitudes and longitudes are unknown or only roughly known.
+/// Returns a note about a system whose latitudes and longitudes are unknown or only roughly known.
 std::string note_of_system(const CoordinateSystem& system) {
   const bool is_named = !same_letters(system.name, "unknown") && !same_letters(system.name, "unnamed");
   const std::string name = is_named ? text::printable(system.name) : "a system without a name";
@@ -111,8 +111,8 @@ void apply_scale(RawHeights& raw, std::vector<std::string>& notes) {
       text::format("its heights are %.9g times the stored values, plus %.9g, as the file says", raw.scale, raw.offset));
 }
 
-/// A note about a vertical system that counts downwards. The values decide, because many files have the system's name but
-/// heights.
+/// Adds a note about a vertical system that counts downwards. The values decide, because many files that name such a system
+/// contain heights.
 void note_depths(const RawHeights& raw, double z_scale, std::vector<std::string>& notes) {
   if (raw.system.depths.empty() || z_scale < 0) return;
   const auto positive = std::count_if(raw.z.begin(), raw.z.end(), [](float z) { return z > 0; }),
@@ -126,7 +126,7 @@ std::string place_text(const Geodetic& place) {
   return text::format("latitude %.6f, longitude %.6f", deg_from_rad(place.latitude_rad), deg_from_rad(place.longitude_rad));
 }
 
-/// Sets the origin from the scene or the configuration; without both, the middle of the grid.
+/// Sets the origin from the scene or the configuration; if neither has one, to the middle of the grid.
 void choose_origin(HeightGrid& grid, const HeightOptions& options, const Geodetic& middle) {
   grid.origin = options.origin ? options.origin : options.world_origin;
   if (grid.origin && !options.origin)
@@ -220,7 +220,7 @@ Result<void> set_origin_of_zone(HeightGrid& grid, const HeightOptions& options, 
   return {};
 }
 
-/// Adds a note if coordinates in metres of an unknown zone lie near the world's origin in the zone of this origin.
+/// Adds a note if coordinates in metres of an unknown zone, read in the zone of the world's origin, lie near this origin.
 void hint_at_zone(HeightGrid& grid, const Geodetic& world_origin) {
   constexpr double near_m = 50'000, least_northing_m = 10'000;
   const double x = 0.5 * (grid.x.front() + grid.x.back()), y = 0.5 * (grid.y.front() + grid.y.back());

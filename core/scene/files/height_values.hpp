@@ -34,7 +34,7 @@ class HeightValues {
   std::size_t fill_values_ = 0;
 };
 
-/// Coordinates and heights as a file describes them.
+/// The units and systems of coordinates and heights, as a file states them.
 struct CoordinateSystem {
   std::optional<bool> geographic = {};  // coordinates are angles
   double unit_deg = 1;                  // unit of coordinates that are angles
@@ -68,7 +68,8 @@ struct RawHeights {
   void turn_rows(std::size_t columns);
 };
 
-/// Removes undeclared fill values: usual ones that are far outside of all other heights. Notes them, and other far values.
+/// Removes undeclared fill values: usual ones that are far outside of all other heights. Adds notes about these and other far
+/// values.
 void take_out_fills(RawHeights& raw, std::vector<std::string>& notes);
 /// Removes fill values, converts units, notes holes, and sets the origin. Errors do not contain the file name.
 Result<HeightGrid> finish_heights(RawHeights raw, const HeightOptions& options);

@@ -20,7 +20,8 @@
 namespace sonar {
 namespace {
 
-/// The path of the importer, relative to the installed or built programs. With it, an unpacked or moved installation works.
+/// The path of the importer: the environment's, else one relative to this program (so that a moved installation works), else
+/// the installed one.
 std::filesystem::path importer() {
   if (const char* given = std::getenv("SONARD_IMPORT_MESH"); given && *given) return given;
   std::error_code error;
@@ -32,7 +33,7 @@ std::filesystem::path importer() {
   return SONARD_IMPORTER_INSTALLED;
 }
 
-/// The first line of the failed program's error output, such as that of the dynamic loader.
+/// The first line of the failed program's error output, such as a message of the dynamic loader, after ": ".
 std::string first_error_line(int descriptor) {
   std::array<char, 300> text{};
   const ssize_t n = ::pread(descriptor, text.data(), text.size() - 1, 0);
@@ -125,7 +126,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request) {
   }
   opened->reset();
   if (auto room = check_import_memory(request, bytes); !room) return tl::make_unexpected(room.error());
-  // Size of a triangle in PLY [bytes]; other formats need more.
+  // The greatest possible number of triangles: one takes 20 bytes in PLY, and more in other formats.
   begin_load_step("reading " + request.file.filename().string(), bytes / 20);
   return import_in_a_child(request);
 }

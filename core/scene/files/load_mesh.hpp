@@ -24,7 +24,7 @@ Result<LoadedMesh> load_mesh(const MeshFile& request);
 inline constexpr std::size_t bytes_of_stl_triangle = 50;
 
 struct BinaryStl {
-  std::uint64_t triangles = 0;     // number in its header
+  std::uint64_t triangles = 0;     // number in the file's header
   std::uint64_t bytes_behind = 0;  // bytes after the last triangle
 };
 

@@ -21,7 +21,7 @@ class MaterialTable {
   explicit MaterialTable(Scene& scene);
   /// Reads `materials: {name: {...}}`, which replace materials of the same name in the library.
   void read(text::Map materials);
-  /// Returns the index into Scene::materials. The first use of a material adds it there.
+  /// Returns the index into Scene::materials; nullopt for an unknown name. The first use of a material adds it there.
   std::optional<std::uint16_t> find(std::string_view name);
   /// Like find(), but reports an unknown name as an error at the node.
   std::uint16_t named(const text::Node& node);

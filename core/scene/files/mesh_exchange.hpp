@@ -20,10 +20,10 @@ enum class UpAxis { y, z };
 struct MeshFile {
   std::filesystem::path file;
   double scale = 1;              // file units to metres
-  std::optional<UpAxis> up{};    // axis of the file that is up; unset: y for glTF/GLB, its own tag for DAE, z otherwise
+  std::optional<UpAxis> up{};    // axis of the file that is up; unset: y for glTF/GLB, as the file states for DAE, else z
   std::string_view in_memory{};  // the contents of the file, if not read from disk; `file` then gives only name and format
   std::string part{};            // name of a node or mesh of the file (any name if it has only one part); empty: all parts
-  std::optional<std::filesystem::path> folder{};  // folder of the scene; a mesh may refer to files in it, and in its own folder
+  std::optional<std::filesystem::path> folder{};  // folder of the scene; a mesh may name files in it, and in the mesh's folder
 };
 
 struct LoadedMesh {
@@ -45,7 +45,7 @@ std::vector<std::string> arguments_of(const ImportRequest& request);
 /// Reads the request; nullopt if it comes from another version of the program.
 std::optional<ImportRequest> request_from(const std::vector<std::string>& arguments);
 
-/// False if the answer does not fit into the file. read_answer() returns only complete answers.
+/// Writes the answer; false if it does not fit into the file. read_answer() returns only complete answers.
 bool write_answer(int descriptor, const Result<LoadedMesh>& mesh);
 /// Writes an error. It allocates no memory, so a signal handler may call it.
 bool write_refusal(int descriptor, ErrorKind kind, std::string_view text);

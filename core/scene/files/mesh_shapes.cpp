@@ -1,4 +1,4 @@
-// Mesh files that a scene names: reads each of them once, and gives every part a material.
+// Reads each mesh file that a scene names once, and gives every part a material.
 #include <algorithm>
 #include <cstdio>
 

@@ -41,12 +41,12 @@ struct Span {
   float low = std::numeric_limits<float>::infinity(), high = -std::numeric_limits<float>::infinity();
 };
 
-/// "3 cells of -9999".
+/// Returns a text such as "3 cells of -9999".
 std::string cells_text(std::size_t count, float z) {
   return text::counted(count, "cell") + text::format(" of %.7g", static_cast<double>(z));
 }
 
-/// Notes a lowest or highest value that is far from all others, as undeclared fill values are.
+/// Adds a note about a lowest or highest value that is far from all others, as undeclared fill values are.
 void note_far_value(const RawHeights& raw, float sign, std::vector<std::string>& notes) {
   Span others;
   float end = others.low;  // the lowest of sign * z

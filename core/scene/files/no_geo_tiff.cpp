@@ -1,4 +1,4 @@
-// This file replaces geo_tiff.cpp if libtiff was not found.
+// This file replaces geo_tiff.cpp in builds without libtiff.
 #include "core/scene/shapes/terrain.hpp"
 
 namespace sonar {

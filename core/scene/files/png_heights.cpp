@@ -23,7 +23,7 @@ struct Picture {
 };
 
 void on_error(png_structp png, png_const_charp message) {
-  const bool is_short = std::strcmp(message, "Read Error") == 0;  // libpng's only word for it
+  const bool is_short = std::strcmp(message, "Read Error") == 0;  // libpng's only message for this
   static_cast<Picture*>(png_get_error_ptr(png))->error = is_short ? "it is cut short; fetch or export it again" : message;
   png_longjmp(png, 1);
 }

@@ -38,7 +38,7 @@ std::string shape_key(std::string_view type, std::uint16_t material, std::initia
   return key;
 }
 
-/// The usual extension of a grid whose format the first bytes of the file show; empty if the file is not a grid.
+/// The usual extension of the grid format that the first bytes of the file show; empty if the file is not a grid.
 std::string grid_by_content(const std::filesystem::path& file) {
   auto head = read_regular(file, 64);
   if (!head) return {};
@@ -65,7 +65,7 @@ Shape from_grid(const Result<HeightGrid>& grid, std::uint16_t material, const No
   if (!made) return at.fail(made.error().text), Shape{};
   Shape shape = with_material(std::move(made->mesh), material);
   shape.centre_m = made->centre_m;
-  if (centred && !grid->origin) shape.centre_m.x = shape.centre_m.y = 0;  // grids in degrees already have their origin
+  if (centred && !grid->origin) shape.centre_m.x = shape.centre_m.y = 0;  // a grid with an origin is already relative to it
   return shape;
 }
 

@@ -23,7 +23,7 @@ struct ShapeReader {
   std::filesystem::path folder;                   // paths in the scene are relative to it
   std::span<const BuiltInFile> in_memory = {};    // mesh files of a built-in scene, which are not read from disk
   ShapeCache* cache = nullptr;                    // shapes of earlier scenes
-  std::optional<Geodetic> world_origin = {};      // for grids with latitudes and longitudes
+  std::optional<Geodetic> world_origin = {};      // for grids in degrees or UTM
   std::map<std::string, LoadedMesh> meshes = {};  // mesh files already read, by path, scale and up
   std::set<std::string> noted = {};               // meshes whose lost triangles are already in the scene's notes
   std::map<std::string, Shape> files = {};        // meshes with materials; objects with equal keys share one

@@ -35,7 +35,7 @@ std::string name_of_compression(std::uint16_t code) {
 /// Sparse files do not contain blocks without data.
 bool is_left_out(TIFF* file, std::uint32_t block) { return TIFFGetStrileByteCount(file, block) == 0; }
 
-/// Unpacks whole strips: some writers pack a run of equal bytes across the end of a row.
+/// Unpacks whole strips, because some writers pack a run of equal bytes across the end of a row.
 Result<void> each_row_of_strips(TIFF* file, const Picture& picture, const TakeCells& take) {
   std::uint32_t height = 0;
   TIFFGetFieldDefaulted(file, TIFFTAG_ROWSPERSTRIP, &height);

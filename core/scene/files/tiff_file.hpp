@@ -33,7 +33,7 @@ std::optional<std::uint16_t> mask_of(tiff* file);
 
 struct Picture {
   std::uint32_t columns = 0, rows = 0;
-  std::uint16_t bits = 1, format = 1, samples = 1;  // format: unsigned integers
+  std::uint16_t bits = 1, format = 1, samples = 1;  // format 1: unsigned integers
   std::uint16_t bands = 1;                          // number of adjacent values of a cell; the first is the height
   std::optional<std::uint16_t> alpha;               // the band that is 0 for cells without data
   std::size_t value_bytes() const { return bits / 8u; }

@@ -110,7 +110,8 @@ std::vector<double> coordinates(const EvenAxis& axis) {
   return all;
 }
 
-/// The spacing follows from the whole length, because a single step is rounded if coordinates are large.
+/// Returns the index of the nearest coordinate. The spacing is computed from the whole length, because single steps are rounded
+/// if coordinates are large.
 std::size_t index_on(const std::vector<double>& axis, double v) {
   const double last = static_cast<double>(axis.size() - 1);
   return static_cast<std::size_t>(std::clamp(std::round((v - axis.front()) / (axis.back() - axis.front()) * last), 0.0, last));

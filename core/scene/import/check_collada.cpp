@@ -56,7 +56,7 @@ std::size_t end_of_tag(std::string_view text, std::size_t at) {
   return none;
 }
 
-/// The elements that contain nodes. Names are resolved as in the importer: in the library by id, else among all nodes by id or
+/// The nodes and scenes of a file. Names are resolved as in the importer: in the library by id, else among all nodes by id or
 /// name.
 struct Nodes {
   NodeGraph graph;

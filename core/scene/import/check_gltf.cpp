@@ -38,7 +38,7 @@ class GltfWalk final : public Json::json_sax_t {
   std::vector<std::string> required, used;  // extensions
   std::size_t skins = 0;
   std::set<std::string> skins_with_matrices;  // their numbers
-  bool is_morphed = false;                    // a weight of a morph target, which moves vertices, is not 0
+  bool is_morphed = false;                    // true if a morph target, which moves vertices, has a weight other than 0
 
   bool null() override { return value({}); }
   bool boolean(bool) override { return value({}); }
@@ -106,7 +106,7 @@ class GltfWalk final : public Json::json_sax_t {
     step();
     return !fault;
   }
-  /// The name of a buffer's file.
+  /// Checks the name of a buffer's file.
   void check_file(const std::string& uri) {
     constexpr std::size_t longest = 3 * PATH_MAX;  // a path whose bytes are all escaped with %
     if (uri.size() > longest)
@@ -139,7 +139,7 @@ class GltfWalk final : public Json::json_sax_t {
   std::vector<Level> levels_;
 };
 
-/// A whole number of four bytes; 0 beyond the end.
+/// A whole number of four bytes. Bytes beyond the end of the file count as 0.
 std::uint64_t number_at(std::string_view file, std::size_t at) {
   std::uint64_t v = 0;
   for (std::size_t k = 4; k-- > 0;) v = v << 8 | (at + k < file.size() ? static_cast<unsigned char>(file[at + k]) : 0u);

@@ -64,7 +64,7 @@ PlyHead ply_head_of(std::string_view file) {
   if (!small.starts_with("ply") || last == small.npos) return head;
   head.bytes = last + 1;
   std::string text = small.substr(0, head.bytes);
-  std::replace(text.begin(), text.end(), '\r', '\n');  // the importer, too, accepts either one as a line end
+  std::replace(text.begin(), text.end(), '\r', '\n');  // the importer, too, accepts both as line ends
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);

@@ -83,7 +83,7 @@ std::string place_in(const PlyElement& element, std::uint64_t k) {
   return element.name + " " + std::to_string(k + 1) + " of " + std::to_string(element.count);
 }
 
-/// Finds the first record that ends after the file.
+/// Finds the first record that ends beyond the end of the file.
 MeshFault check_binary_ply(std::string_view file, const PlyHead& head) {
   std::string_view rest = file.substr(head.bytes);
   const auto skip = [&](std::uint64_t count, std::uint64_t bytes) {

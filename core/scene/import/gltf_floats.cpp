@@ -45,7 +45,7 @@ Component component_of(std::int64_t type) {
   }
 }
 
-/// A number of a JSON object that must not be negative; nullopt if it is missing or something else.
+/// An unsigned number in a JSON object; nullopt if the value is missing or of another type.
 std::optional<std::uint64_t> number_in(const Json& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && found->is_number_unsigned() ? std::optional(found->get<std::uint64_t>()) : std::nullopt;
@@ -132,7 +132,8 @@ class Rewriter {
     return {};
   }
 
-  /// Views beyond the end of their buffer get a buffer that does not exist, so the importer rejects them if it needs them.
+  /// Moves all views to buffer 0. A view beyond the end of its buffer gets a buffer that does not exist, so the importer rejects
+  /// this view if it needs it.
   void take_views() {
     out_["bufferViews"] = list_in(in_, "bufferViews");
     for (Json& view : out_["bufferViews"]) {

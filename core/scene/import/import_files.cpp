@@ -148,7 +148,7 @@ class ObjCounter {
   ObjCounts counts_;
   std::vector<std::pair<std::uint64_t, std::uint64_t>> later_;  // faces, each with its highest vertex number
   std::uint64_t vertices_ = 0, face_ = 0, corners_ = 0, index_ = 0, furthest_ = 0;
-  std::size_t of_statement_ = 0;  // letters of the line that belong to the statement
+  std::size_t of_statement_ = 0;  // number of letters of "surf " that the line begins with
   bool is_negative_ = false, is_number_ = false, is_bad_ = false;
 };
 
@@ -160,8 +160,8 @@ ObjCounts counts_of(std::FILE* file) {
   return counter.end();
 }
 
-/// An OBJ file whose faces have only vertices. Bad faces become comments and, if requested, lines that begin objects, too:
-/// surfaces and materials do not depend on objects.
+/// An OBJ file whose faces have only vertices. Bad faces become comments. If requested, lines that begin objects also become
+/// comments, because surfaces and materials do not depend on objects.
 class ObjStream final : public Assimp::IOStream {
  public:
   ObjStream(OpenFile file, std::size_t size, bool without_objects, const std::vector<std::uint64_t>& bad_faces)
@@ -282,7 +282,7 @@ std::optional<std::string> ImportFiles::bytes_of(const std::string& file) {
   return bytes;
 }
 
-/// URIs of glTF have %20 for a blank. The name of the folder is not encoded.
+/// Decodes a URI of glTF, which has %20 for a blank. The name of the folder is not encoded.
 std::string ImportFiles::plain_name(const std::string& file) const {
   const std::string folder = folders_.empty() ? std::string() : folders_[0].string();
   return file.starts_with(folder) ? folder + without_percents(file.substr(folder.size())) : file;

@@ -1,5 +1,5 @@
-// The files that the importer may open: the mesh, and files that the mesh names, in its folder or the scene's. It opens only
-// regular files.
+// The files that the importer may open: the mesh, and files that the mesh names, in its folder or the scene's. Only regular
+// files are opened.
 #pragma once
 
 #include <assimp/DefaultIOSystem.h>
@@ -15,8 +15,8 @@ namespace sonar {
 
 class ImportFiles final : public Assimp::DefaultIOSystem {
  public:
-  /// `fault` is set if a file is rejected for a reason that its author must know. `opened` is called with the number of bytes
-  /// opened.
+  /// `fault` is set if a file is rejected for a reason that its author must know. `opened` is called with the number of
+  /// bytes of all files opened so far.
   ImportFiles(const MeshFile& request, std::optional<Error>& fault, std::function<void(std::uintmax_t)> opened);
 
   /// The path of the mesh, with links and dots in its folder resolved.

@@ -13,11 +13,11 @@ constexpr std::uint64_t import_memory_bytes = std::uint64_t{512} << 20, import_m
 /// the computer may be busy.
 constexpr std::uint64_t import_seconds = 30, import_seconds_of_a_million = 2;
 
-/// Call it once, before all other work. Errors are written to `descriptor`.
+/// Prepares the limits. Call it once, before all other work. Errors are written to `descriptor`.
 void begin_import_limits(const ImportRequest& request, int descriptor);
 /// Sets the limits for files of `bytes` bytes. Call it at least once before reading them.
 void limit_import(std::uintmax_t bytes);
-/// Lifts the limit of memory when the importer has finished. The code after it checks the memory that it needs.
+/// Lifts the limit of memory, when the importer has finished. Later code checks whether it has enough memory.
 void release_import_memory();
 
 }  // namespace sonar

@@ -41,8 +41,8 @@ std::uint64_t triangles_of_nodes(const aiNode& node, const std::vector<std::uint
   return triangles;
 }
 
-/// Keeps only the meshes that have this name or belong to nodes with this name; in a file with only one part, keeps this part.
-/// Without such a part, returns the names of the parts, for an error.
+/// Keeps only the meshes that have this name or belong to nodes with this name; the only part of a file is kept under any name.
+/// If no part is kept, returns the names of the parts, for an error; else an empty text.
 std::string keep_part(aiScene& scene, const std::string& wanted) {
   std::vector<aiNode*> holders;  // nodes that show meshes
   const auto walk = [&](const auto& self, aiNode& node, unsigned depth) -> void {
@@ -115,7 +115,7 @@ Result<std::string> text_of(const MeshFile& request, std::size_t most) {
   return read_regular(request.file, most);
 }
 
-/// The reason why the importer cannot read the file, if this check finds a better one than the importer.
+/// Returns why the importer cannot read the file: a better reason than the importer's if one is found, else `reason`.
 std::string better_reason(const MeshFile& request, const std::string& extension, std::string reason) {
   if (extension == ".stl") return reason + "; is it cut short? Export it again";
   if (extension != ".glb" && extension != ".gltf") return reason;
@@ -145,8 +145,8 @@ std::uint64_t triangles_listed(const MeshFile& request, const std::string& exten
   return imported + (listed > faces ? listed - faces : 0);  // a missing face has at least one triangle
 }
 
-/// True if the URI of a buffer names the mesh itself. Links to the mesh are not recognised: ImportFiles counts their size, as
-/// that of other files.
+/// True if the URI of a buffer names the mesh itself. Links to the mesh are not recognised, but ImportFiles counts their size,
+/// as that of other files.
 bool is_itself(const MeshFile& request, const std::string& uri) {
   const std::string own = request.file.filename().string();
   const auto names_it = [&](const std::string& name) {

@@ -63,7 +63,7 @@ Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
   return mesh;
 }
 
-// A straight part of a profile, divided so that facets are not needlessly long and thin.
+// Adds a straight part to a profile, divided so that facets are not needlessly long and thin.
 void add_straight(std::vector<ProfilePoint>& profile, ProfilePoint to) {
   const ProfilePoint from = profile.back();
   const int n = patches(std::hypot(to.radius - from.radius, to.z - from.z), 0.5);
@@ -72,7 +72,7 @@ void add_straight(std::vector<ProfilePoint>& profile, ProfilePoint to) {
     profile.push_back({from.radius + t * (to.radius - from.radius), from.z + t * (to.z - from.z)});
   }
 }
-// Arc of a sphere of radius r about z0 between two latitudes [rad], without its first point.
+// Adds the arc of a sphere of radius r about z0 between two latitudes [rad], without its first point.
 void add_arc(std::vector<ProfilePoint>& profile, double r, double z0, double from, double to, int steps) {
   for (int i = 1; i <= steps; ++i) {
     const double a = from + (to - from) * i / steps;

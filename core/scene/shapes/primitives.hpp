@@ -1,6 +1,6 @@
-// Makes triangle meshes of solids and sheets. Their chords stay within a millimetre of the true surface. In the object frame,
-// the axis of revolution is z and the centre is the origin. Normals point outward. Meshes are closed, except for sheets. The
-// material is 0.
+// Makes triangle meshes of solids and sheets. With segments_for() segments, chords stay within a millimetre of the true surface
+// up to a radius of 53 m. The axis of revolution is z and the centre is the origin of the object frame. Normals point outward.
+// Meshes are closed, except for sheets and cylinders without both caps. The material is 0.
 #pragma once
 
 #include <cstdint>

@@ -203,16 +203,16 @@ Axis make_axis(double size_m, double fine_m, double spacing_m) {
   return axis;
 }
 
-// Weight of a wave: 1 if it has at least six grid points, 0 if it has three or fewer.
+// Weight of a wave: 1 with at least six grid points per wavelength, 0 with three or fewer.
 double carried(double wavelength_m, double spacing_m) { return std::clamp(wavelength_m / spacing_m / 3 - 1, 0.0, 1.0); }
 
-// Profile of a ripple, -0.5..0.5: rounded troughs, sharper crests, mean zero to a few per cent.
+// Profile of a ripple, -0.39..0.5: rounded troughs, sharper crests, mean zero to a few per cent.
 double ripple_profile(double cycles) {
   const double c = std::cos(2 * pi * cycles);
   return 0.5 * (c + 0.25 * (c * c - 0.5)) / 1.125;
 }
 
-/// A note if even the finest part of the grid shows less than noted_share of the ripples' height.
+/// Returns a note if even the finest part of the grid shows less than noted_share of the ripples' height.
 std::vector<std::string> notes_on(const Ripples& r, double spacing_m) {
   const double share = carried(r.wavelength_m, spacing_m);
   if (share >= noted_share) return {};
