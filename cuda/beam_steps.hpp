@@ -66,7 +66,7 @@ SONAR_HD inline void add_pulses(const PingView& p, std::uint32_t j, std::int32_t
   }
 }
 
-/// Adds the noise that channels share at sample `n` of beam `j`.
+/// Adds the noise and leak that channels share at sample `n` of beam `j`.
 SONAR_HD inline void add_shared_noise(const PingView& p, std::uint32_t j, std::int32_t n, float& re, float& im) {
   if (p.shared_noise == nullptr || n >= p.shared_samples) return;
   const bool noise = p.has_noise != 0;

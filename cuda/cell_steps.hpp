@@ -138,7 +138,7 @@ SONAR_HD inline void scatter(const PingView& p, std::uint32_t i) {
   p.echoes[i] = scatter_cell(p, p.tiles[tile], static_cast<int>(i - p.tile_first_slot[tile]));
 }
 
-/// Counts the slots of a chunk in the same column: the slots before slot `i`, and all slots.
+/// Counts the echoes in the chunk and column of slot `i`: those before slot `i` (rank), and all of them (in_chunk).
 SONAR_HD inline void rank(const PingView& p, std::uint32_t i) {
   const std::int32_t column = p.echoes[i].column;
   if (column < 0) return;

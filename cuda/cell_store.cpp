@@ -89,7 +89,7 @@ bool CellStore::find(std::span<const TileInView> tiles, int lane, Arena& staging
   }
   if (missing() == 0) return true;
   const std::unique_lock lock(changing_);
-  for (std::size_t i = 0; i < tiles.size(); ++i)  // another ping may have sent them in between
+  for (std::size_t i = 0; i < tiles.size(); ++i)  // another ping may have sent tiles meanwhile
     if (const Held* h = cells[i] ? nullptr : held(*tiles[i].tile)) cells[i] = h->device;
   // An empty store accepts any ping, even beyond its budget.
   if (!tiles_.empty() && bytes() + missing() * sizeof(std::int16_t) > budget_bytes_) return false;
@@ -120,7 +120,7 @@ std::size_t CellStore::send_from(std::span<const TileInView> tiles, std::size_t 
     at += values(t);
   }
   machine_.upload(lane, device.device, host.host, more * sizeof(std::int16_t));
-  for (const std::size_t i : sent) {  // other pings may use them as soon as they are queued
+  for (const std::size_t i : sent) {  // other pings may use the tiles as soon as the copy is queued
     const CellTile& t = *tiles[i].tile;
     tiles_.put({t.data.get(), t.weights_hash, t.object, t.axis, t.level, t.count, t.centre_m, cells[i]});
   }

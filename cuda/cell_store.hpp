@@ -22,7 +22,7 @@ class CellStore {
   /// Finds the address on the device of each tile's cells, in the order of `tiles`. Copies of missing tiles are queued on
   /// `lane`; `staging` contains their bytes and must not change until they have been copied. Returns false if there is no room:
   /// call clear() when no unfinished ping needs the stored tiles, then call again. Several threads may call it at the same
-  /// time, each with its own `staging` or with one that has a lock.
+  /// time, also with the same `staging`.
   bool find(std::span<const TileInView> tiles, int lane, Arena& staging, std::vector<const std::int16_t*>& cells, Parallel& pool);
   void clear();
   void release();  // also frees the memory

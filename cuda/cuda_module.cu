@@ -33,7 +33,7 @@ struct Lane {
   cudaStream_t stream = nullptr;
   cudaEvent_t done = nullptr;
   GraphShelf<cudaGraphExec_t> graphs;
-  std::vector<Transform> transforms;  // last used first; lanes do not share them, because a plan runs one transform at a time
+  std::vector<Transform> transforms;  // most recent first; lanes do not share them, because a plan runs one transform at a time
   cudaEvent_t begin[timed_things] = {}, end[timed_things] = {};  // made when a launch is first timed
   bool timed[timed_things] = {};                                 // since the last call of step_seconds
   bool timing = false;                                           // the last launch was timed
@@ -136,7 +136,7 @@ int open(void** machine) {
     close(m);
     return error;
   }
-  // For measurements, this switches graphs off. A graph makes launches faster, but a launch that differs needs a new capture.
+  // For measurements, 0 switches graphs off. A graph makes launches faster, but a launch that differs needs a new capture.
   const char* graphs = std::getenv("SONARD_CUDA_GRAPHS");
   m->graphs_work = !graphs || std::strcmp(graphs, "0") != 0;
   *machine = m;
@@ -245,8 +245,8 @@ int transforms(char* name, std::size_t room) {
   return cufft().loaded() ? 1 : 0;
 }
 
-/// The lane's plan for this size, which becomes the last used one. A plan is made only once, because it allocates memory and
-/// may wait for the device.
+/// Finds or makes the lane's plan for this size, which becomes the most recently used one. A plan is kept, because making it
+/// allocates memory and may wait for the device.
 int transform_for(Opened& m, Lane& lane, int size, int rows, CufftLibrary::Handle* plan) {
   std::vector<Transform>& all = lane.transforms;
   std::size_t i = 0;

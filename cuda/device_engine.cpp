@@ -139,7 +139,7 @@ class DeviceEngine final : public PingEngine {
         if (is_open()) finish(rooms_[older]);
     });
     if (!failed_) return;
-    // After a failure the device is not used again, and one engine computes all pings of a call.
+    // After a failure the device is not used again, and the CPU computes all pings of the call, also those already finished.
     if (!device_options_.cpu_after_failure) throw EngineUnavailable(*failed_ + "; use --engine cpu or auto");
     for (auto it = begin; it != end; ++it) compute_by_cpu(*it);
   }
@@ -230,8 +230,8 @@ class DeviceEngine final : public PingEngine {
     if (!one_room_) which_ = 1 - which_;
   }
 
-  /// The next requests, from `first` on, that can be prepared together and fit in the room. The limits are their number and
-  /// memory; while the memory of a ping is not known, one.
+  /// Returns the next requests, from `first` on, that can be prepared together and whose number and memory fit in the room. As
+  /// long as the memory of a ping is not known, returns only one.
   std::vector<AskedPing> some_from(std::size_t first, const BatchRoom& room) {
     place(wanted_[first].request);
     std::vector<AskedPing> some{{&wanted_[first], plan_for(wanted_[first].request)}};
@@ -279,7 +279,7 @@ class DeviceEngine final : public PingEngine {
       std::rotate(plans_.begin(), it, it + 1);  // last used first
       return plans_.front();
     }
-    // Drops the least recently used plan. Batches in work have their own reference to it.
+    // Drops the least recently used plan. Running batches have their own reference to it.
     if (plans_.size() >= most_plans) plans_.pop_back();
     plans_.insert(plans_.begin(), std::make_shared<PlanTables>(*machine_, keeping_lane, request));
     return plans_.front();

@@ -19,7 +19,7 @@ struct DeviceEngineOptions {
   std::size_t cell_bytes = std::size_t{2} << 30;  // device memory for surface cells; a single ping may exceed it
   int batch = 0;                                  // pings that are launched together; 0 = the number of threads, but 8 to 32
   std::size_t work_bytes = std::size_t{1} << 30;  // device memory of a batch; if pings are large, a batch has fewer
-  bool cpu_after_failure = true;                  // false: run() throws EngineUnavailable if the device fails
+  bool cpu_after_failure = true;                  // false: run() and collect() throw EngineUnavailable if the device fails
   /// The engine calls it with a text for users when the CPU computes pings instead of the device (once for each reason), or when
   /// batches become smaller. May be empty.
   std::function<void(const std::string&)> say = {};

@@ -1,5 +1,5 @@
 // Structs in the device's memory. They are plain; the host fills them and the kernel bodies read them. They use only C++17 and
-// fixed-width members. Both sides are compiled from this file, and cuda_module.hpp checks that they agree.
+// fixed-width members. Both sides are compiled from this file, and cuda_machine.cpp checks that they agree.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ inline constexpr std::uint32_t sum_parts =
 inline constexpr std::uint32_t spread_parts = 32;   // number of threads that share the grid of one column
 inline constexpr std::uint32_t panels_at_once = 2;  // number of panels that one thread sums
 
-/// The boxes of both children, in one cache line. bvh_link explains the links.
+/// The boxes of both children, in one cache line. BvhLeaf explains the links.
 struct alignas(64) BvhNode {
   float low[2][3], high[2][3];
   std::int32_t link[2];

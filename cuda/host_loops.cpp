@@ -73,7 +73,7 @@ class HostLoops final : public Machine {
     const double begin = now_s();
     using spectral::Fft;
     const auto [at, made] = fft_.try_emplace({size, inverse}, size, inverse ? Fft::Direction::inverse : Fft::Direction::forward);
-    for (int row = 0; row < rows; ++row)  // an array of complex numbers may be read as an array of floats, and vice versa
+    for (int row = 0; row < rows; ++row)  // an array of complex numbers may be read as an array of doubles, and vice versa
       at->second.run(reinterpret_cast<spectral::Complex*>(values) + static_cast<std::ptrdiff_t>(row) * size);
     seconds_[static_cast<std::size_t>(lane)].transforms += now_s() - begin;
   }

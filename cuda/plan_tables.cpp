@@ -17,7 +17,7 @@ PlanTables::PlanTables(Machine& machine, int lane, const PingRequest& request)
       memory_(machine, Arena::Where::both, 1u << 20),
       noise_memory_(machine, Arena::Where::both, 0) {
   const PingPlan& p = plan_;
-  // Eq. 11: u and sqrt(1 - u^2) in float for the rays, which only determine shadows; u in double for the beams.
+  // Eq. 11: u and sqrt(1 - u^2) in float for the rays, which only determine shadows; u in double for the volume reverberation.
   std::vector<ColumnSine> sines;
   std::vector<double> u;
   for (int k = 0; k < p.columns.count; ++k) {

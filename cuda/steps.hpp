@@ -1,5 +1,5 @@
 // The steps of a ping: the number of indices of each step, and its body. Both the CUDA module and the host loops call run_step
-// for every index below step_size. A step begins when the previous step in Step has ended.
+// for every index below step_size. The steps run one after the other, in the order of Step.
 #pragma once
 
 #include "cuda/beam_steps.hpp"

@@ -17,7 +17,7 @@ struct RayHit {
   Vec3 normal;  // geometric, world axes, any length, either side
 };
 
-/// Values of a ray that the descent needs, computed once. If a component of the direction is exactly 0, it becomes a tiny
+/// Values of a ray that the descent needs, computed once. If a component of the direction is nearly 0, it becomes a tiny
 /// number, so that all quotients are defined.
 struct Descent {
   float from[3], per[3];
@@ -57,7 +57,7 @@ SONAR_HD inline void descend(const BvhNode* nodes, std::int32_t root, const Desc
     std::int32_t link;
     float at_m;
   };
-  Waiting stack[64];  // deepest_bvh
+  Waiting stack[64];  // equals deepest_bvh
   int waiting = 0;
   std::int32_t link = root;
   for (;;) {

@@ -12,8 +12,8 @@
 namespace sonar {
 namespace {
 
-// Least number of slices for the integral over psi in eq. 17, if the fan has so many bins; by rounding there may be twice as
-// many. Every column processes all slices for its shadows.
+// Least number of slices for the integral over psi in eq. 17, if the fan has enough bins; by rounding there may be almost twice
+// as many. Every column processes all slices for its shadows.
 constexpr int fewest_slices = 256;
 
 }  // namespace

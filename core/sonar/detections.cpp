@@ -129,7 +129,7 @@ std::optional<double> azimuth_of_peak(const Fan& fan, const Levels& level, int r
   return azimuth;
 }
 
-/// Peaks across the beams, the strongest first. Side lobes of the strongest peak of a row are omitted.
+/// Returns the peaks across the beams, the strongest first. Side lobes of the strongest peak of a row are omitted.
 std::vector<Peak> peaks_in(const Fan& fan, const Levels& level, const std::vector<double>& least_db) {
   std::vector<std::uint64_t> least;
   for (const double db : least_db) least.push_back(level.least_code(db));

@@ -15,8 +15,8 @@ struct Detection {
 
 /// Finds at most one point in each of `directions` equal parts of the sector, from port to starboard. Samples must be
 /// logarithmic. An echo is at least `above_db` above the median of its beam. In each row, peaks across beams (-3 dB width
-/// `beam_width_rad`) are candidates, and each part gets its strongest peak. A part without a peak that lies between parts with
-/// peaks gets the centroid of the echo in its own beams, if all of these beams have an echo. So a small target gives one point,
+/// `beam_width_rad`) are candidates, and each part gets its strongest peak. Parts without a peak that lie between two parts with
+/// peaks get the centroids of the echo in their own beams, if each of them has such an echo. So a small target gives one point,
 /// and a floor gives one point in each part.
 std::vector<Detection> detect_points(const Ping& ping, int directions, double above_db, double beam_width_rad);
 

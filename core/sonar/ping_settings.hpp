@@ -30,7 +30,7 @@ struct PingSettings {
   int beam_count = 512;
   int range_bin_count = 437;      // rows
   double range_m = 10;            // the far end of the picture, as the device rounds it
-  double range_start_m = 0;       // the near edge of row 0, below range_m; of a nearer echo, only the pulse's tail is visible
+  double range_start_m = 0;       // the near edge of row 0, below range_m; nearer echoes show only the tails of their pulses
   double range_bin_m = 0.0229;    // row spacing; packets carry it exactly
   double row_centre = 0.5;        // position of the samples in a row, see range_of_row: 0 near edge, 1 far edge
   float pulse_width_m = 0.0206f;  // -3 dB width in range, one way (docs/acoustics.md, section 4)

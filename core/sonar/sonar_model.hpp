@@ -71,8 +71,8 @@ struct SharedNoise {
   // ends.
   int group = 32;
   float sine = 0.56f;    // sine of the apparent direction at long range: half a wavelength / channel spacing
-  float full_m = 0.25f;  // at shorter ranges its power is proportional to the range
-  float steady = 0;      // fraction of its power that is the same in every ping and in phase in all channels
+  float full_m = 0.25f;  // at shorter ranges the power is proportional to the range
+  float steady = 0;      // fraction of the power that is the same in every ping and in phase in all channels
   float focus_rows = 0;  // number of rows from the centre of a row to the array's focus, which is farther
   float nearest_focus_m = 0;
 };

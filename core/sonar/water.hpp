@@ -1,6 +1,6 @@
 // Properties of the water: its sound speed and its absorption. The physics uses them, and so do emulated devices that compute
-// their assumed sound speed. Comments name formulae and sources. Oracles 27 to 29 in tests/core/sonar test them. The code is
-// C++17 and uses only the standard library.
+// their assumed sound speed. Comments name formulae and sources. Oracles 27 to 29 in tests/core/sonar test the formulae. The
+// code is C++17 and uses only the standard library.
 #pragma once
 
 namespace sonar {

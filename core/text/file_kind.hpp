@@ -1,5 +1,5 @@
-// Recognises files of unexpected kinds by their first bytes: archives, web pages and other results of failed downloads. With
-// it, readers of meshes, grids and trajectories name the kind of file in an error, instead of a wrong word in the file.
+// Recognises files of unexpected kinds by their first bytes: archives, web pages and other results of failed downloads. So
+// errors of the readers of meshes, grids and trajectories name the kind of file, instead of a wrong word in the file.
 #pragma once
 
 #include <string>

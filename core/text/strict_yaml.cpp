@@ -134,7 +134,7 @@ class TreeBuilder final : public YAML::EventHandler {
   std::vector<Level> stack_;
 };
 
-// yaml-cpp's scanner keeps a stack of open brackets. A file with nothing but brackets must not reach it.
+// Refuses control characters, text that is not UTF-8, and too many open brackets, of which yaml-cpp's scanner keeps a stack.
 std::optional<Refused> check_characters(std::string_view text) {
   int line = 1, column = 1;
   for (std::size_t i = 0; i < text.size(); ++i) {

@@ -1,5 +1,5 @@
-// Strict YAML: cursors over a parsed file that know the position of every value and reject unknown keys. Configuration files
-// and scenes are read through it. Only strict_yaml.cpp may include yaml-cpp.
+// Strict YAML: cursors over a parsed file that have the position of every value and reject unknown keys. Configuration files
+// and scenes are read with it. Only strict_yaml.cpp may include yaml-cpp.
 //
 //   auto document = text::parse_yaml_file(path, {.error_kind = ErrorKind::config});
 //   if (!document) return tl::make_unexpected(document.error());
@@ -60,7 +60,7 @@ class Node {
   /// Returns the text of a scalar. An empty text is an error unless it is allowed. `max_length` is in bytes.
   std::string text(std::size_t max_length = 4096, bool allow_empty = false) const;
   std::string text_or(std::string fallback, std::size_t max_length = 4096) const;
-  /// Reads a decimal number: no hexadecimal, no leading zeros (012), no digits grouped by _, no quotes.
+  /// Reads a decimal number: no hexadecimal, no leading zeros (012), no digits grouped with _, no quotes.
   double number(Range range = {}) const;
   double number_or(double fallback, Range range = {}) const;
   std::int64_t integer(std::int64_t min, std::int64_t max) const;
@@ -150,7 +150,7 @@ class Document {
 
   Map root() const;
   /// Returns a copy, not read yet, with each key and scalar changed by `change`, or the first error of `change`. The copy keeps
-  /// the positions. It is made faster than a changed text is parsed.
+  /// the positions. Making it takes less time than parsing a changed text.
   Result<Document> changed(const std::function<Result<std::string>(const std::string& text, int line)>& change) const;
   /// Returns the first error. Wrong values come first, and missing keys before unknown keys that do not resemble them.
   std::optional<Error> finish() const;

@@ -1,4 +1,4 @@
-// Node and Map: read values from the tree, and report errors in them.
+// YamlTree, Node, Map and Document: read values from the tree, and report errors in them.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -294,7 +294,7 @@ std::optional<Error> Document::error() const { return tree_->first_error; }
 
 namespace {
 
-// If an unknown key is near a missing key, the error about the unknown key explains more.
+// If an unknown key resembles a missing key, the error is about the unknown key, because it explains more.
 std::optional<Error> check_keys(const YamlTree& tree, const YamlNode& map) {
   std::vector<std::string_view> valid(map.requested.begin(), map.requested.end());
   std::vector<std::string_view> missing(map.missing.begin(), map.missing.end());

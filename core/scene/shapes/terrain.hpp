@@ -41,7 +41,7 @@ struct CentredMesh {
 /// Makes the mesh. Returns an error if no four neighbouring heights exist, or if the mesh would exceed max_mesh_triangles.
 Result<CentredMesh> mesh_from_grid(const HeightGrid& grid);
 
-/// Reads a grey PNG of 8 or 16 bits, which may be stored as colours. It covers size_x by size_y metres about the origin; the
+/// Reads a grey PNG of at most 16 bits, which may be stored as colours. It covers size_x by size_y metres about the origin; the
 /// first row of the image has the largest y. Black is low_m, white is high_m.
 Result<HeightGrid> read_png_heights(const std::filesystem::path& file, double size_x_m, double size_y_m, double low_m,
                                     double high_m);

@@ -15,7 +15,7 @@ constexpr double least_area_m2 = 0.05;
 constexpr double least_width_m = 0.1;        // least area divided by greatest extent; a mirror is many Fresnel zones wide
 constexpr double same_plane_m = 2e-4;        // an eighth of a wavelength at 1 MHz
 constexpr double same_normal = 1 - 1e-6;     // cosine of the largest angle between normals of one plane
-constexpr double most_gentle_border = 0.25;  // fraction of a face's border; a face with more is part of a curved surface
+constexpr double most_gentle_border = 0.25;  // fraction of the border at gentle bends; above it, the surface is curved
 
 using Triangles = std::vector<std::uint32_t>;
 

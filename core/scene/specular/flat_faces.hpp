@@ -29,7 +29,7 @@ struct FlatFaces {
   }
 };
 
-/// Finds faces of at least 0.05 m^2 that have no narrow parts. Facets of a round wall, whose neighbours meet at small angles,
+/// Finds faces of at least 0.05 m^2 that are not narrow strips. Facets of a round wall, whose neighbours meet at small angles,
 /// are excluded. Materials that reflect less than `least_reflection` are ignored.
 FlatFaces find_flat_faces(const Scene& scene, double least_reflection);
 

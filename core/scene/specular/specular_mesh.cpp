@@ -127,7 +127,7 @@ std::optional<SpecularMesh::Foot> SpecularMesh::foot_on(const Triangle& triangle
   return {};
 }
 
-// Principal directions and curvatures, from the tensor at the vertices. `weight` sums to one; `side` is -1 on the back.
+// Computes principal directions and curvatures from the tensors at the vertices. `weight` sums to one; `side` is -1 on the back.
 void SpecularMesh::bend_at(const Triangle& triangle, const std::array<double, 3>& weight, double side, SpecularPoint& p) const {
   double s[6] = {};
   for (std::size_t k = 0; k < 3; ++k)

@@ -27,8 +27,8 @@ struct SpecularPoint {
   std::array<double, 2> curvature{};  // 1/m, along the principal directions; positive if the surface curves away from the sonar
   double range_m = 0;                 // sonar to foot
 
-  // Extent of the surface from the foot along the principal directions (arc length) [m]; infinite if it only ends by curving
-  // away.
+  // Extent of the surface from the foot along the principal directions (arc length) [m]; infinite if the surface ends only where
+  // it curves away.
   std::array<double, 2> from{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   std::array<double, 2> to{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   std::vector<OutlineEdge> outline;  // closed, relative to the foot; empty = the rectangle of `from` and `to`
@@ -60,7 +60,7 @@ inline constexpr double farthest_edge_in_units = 10;
 inline constexpr double farthest_edge_in_ranges = 0.6;
 /// sqrt(lambda rho) / 2 along a direction. This is the unit of length of the Fresnel integral.
 double fresnel_unit_m(double wavelength_m, double range_m, double curvature_per_m);
-/// 1 + r / R. Its absolute value is at least 0.05 here, because ray theory is infinite at a focus.
+/// 1 + range * curvature. The absolute value is at least 0.05 here, because ray theory is infinite at a focus.
 double bending(double range_m, double curvature_per_m);
 
 }  // namespace sonar

@@ -15,7 +15,7 @@ double component(Vec3d v, int k) { return k == 0 ? v.x : k == 1 ? v.y : v.z; }
 
 bool is_audible(const SpecularPoint& p, const SpecularQuery& q) {
   if (p.range_m < nearest_m || p.range_m > q.max_range_m) return false;
-  // Outside the surface the echo comes from its edge. It falls with the distance in Fresnel units.
+  // If the foot is outside the surface, the echo comes from the edge, and falls with the distance in Fresnel units.
   double gap = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const double beside = std::max({p.from[k], -p.to[k], 0.0});
@@ -93,7 +93,7 @@ void box(const Primitive& shape, const SpecularQuery& q, std::vector<SpecularPoi
 void cylinder(const Primitive& shape, const SpecularQuery& q, std::vector<SpecularPoint>& out) {
   const double a = shape.radius_m, half = shape.size_m.z / 2;
   const double d = std::hypot(q.sonar_m.x, q.sonar_m.y);
-  // The nearest wall on the radius through the sonar. R1 is the radius, R2 infinite.
+  // The nearest wall on the radius through the sonar. R1 is the cylinder's radius, R2 is infinite.
   const Vec3d outward = d > 1e-12 ? Vec3d{q.sonar_m.x / d, q.sonar_m.y / d, 0} : Vec3d{1, 0, 0};
   const auto wall = [&](Vec3d at, Vec3d normal, double range_m, double curvature) {
     SpecularPoint p;
