@@ -1,6 +1,6 @@
 # Checks the build requirements first, so that one message names all that are missing or too old, and the packages to install.
-# The versions are those of Ubuntu 22.04, the oldest system on which the code was compiled. Folders that include this file find
-# the libraries again themselves.
+# The versions are those of Ubuntu 22.04, the oldest system on which the code was compiled. Folders that use a library search
+# for it again.
 set(found_wanting)
 set(wanted_packages)
 

@@ -112,7 +112,7 @@ class CufftLibrary {
 
 #endif
 
-/// The library. The first call loads it; it stays loaded.
+/// Returns the library. The first call loads it; it stays loaded.
 inline const CufftLibrary& cufft() {
   static const CufftLibrary library;
   return library;

@@ -30,7 +30,7 @@ bool are_alike(const PingRequest& a, const PingRequest& b) {
   return !a.switches.multipath && !b.switches.multipath && more <= 2 * less;
 }
 
-/// The options with budgets that fit on the device. The rest of its memory is for kernels, other programs and the scene.
+/// Reduces the budgets until they fit on the device. The rest of its memory is for kernels, other programs and the scene.
 DeviceEngineOptions fitted(DeviceEngineOptions options, std::size_t free_bytes) {
   options.cell_bytes = std::min(options.cell_bytes, free_bytes / 5 * 2);
   options.work_bytes = std::min(options.work_bytes, free_bytes / 5);

@@ -23,7 +23,7 @@ void grow(Box& box, const Box& by) {
     box.high[k] = std::max(box.high[k], by.high[k]);
   }
 }
-/// Half the area of a box; 0 for the empty one.
+/// Half the area of a box; 0 for no_box.
 float half_area(const Box& b) {
   const float x = b.high[0] - b.low[0], y = b.high[1] - b.low[1], z = b.high[2] - b.low[2];
   return x < 0 ? 0 : x * y + y * z + z * x;

@@ -62,7 +62,7 @@ class FlatScene {
   std::vector<FlatTriangle> triangles_;
 };
 
-/// A view with pointers into host memory, for tests and host loops.
+/// Makes a view with pointers into host memory, for tests and host loops.
 TracerView host_view(const FlatScene& scene, const BodyPlaces& places);
 
 }  // namespace sonar::cuda

@@ -53,7 +53,7 @@ class GraphShelf {
     Graph graph = nullptr;
     int seen = 0;
   };
-  /// The entry of this launch, which becomes the newest. `dropped` gets the graph of the entry that was replaced, or null.
+  /// Finds or adds the launch's entry, which becomes the newest. `dropped` gets the graph of the replaced entry, or null.
   Entry& look_up(const GraphKey& key, Graph& dropped) {
     dropped = nullptr;
     std::size_t i = 0;

@@ -230,7 +230,7 @@ bool PingPreparer::find_tiles(Making& m, const PingContext& context, int lane, W
   return true;
 }
 
-/// A tile in the device's layout.
+/// Converts a tile to the device's layout.
 TileView PingPreparer::view_of(const PreparedTile& prepared, const std::int16_t* cells, const float* law) {
   const simd::TileSeen& seen = prepared.seen;
   const CellTile& tile = *seen.tile;

@@ -66,7 +66,7 @@ struct AskedPing {
   std::shared_ptr<PlanTables> plan;
 };
 
-/// Scene and cells of an engine, and the state that it keeps between pings.
+/// Scene and cells of an engine on the device, and buffers that are kept between pings.
 class PingPreparer {
  public:
   PingPreparer(Machine& machine, std::shared_ptr<const Scene> scene, const RayScene& rays, const simd::Kernels& kernels,

@@ -69,7 +69,7 @@ SONAR_HD inline std::uint32_t step_size(Step step, const PingView& p) {
   return 0;
 }
 
-/// The body of a step. It is selected at compile time, so that each kernel contains only one body.
+/// Runs the body of a step, which is selected at compile time, so that each kernel contains only one body.
 template <Step step>
 SONAR_HD inline void run_step(const PingView& p, std::uint32_t i) {
   if constexpr (step == Step::clear) clear(p, i);

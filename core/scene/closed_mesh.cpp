@@ -13,7 +13,7 @@ namespace {
 
 using Index = std::uint32_t;
 
-/// For each vertex, the first vertex at the same position. Files repeat vertices if normals or colours differ.
+/// Finds, for each vertex, the first vertex at the same position. Files repeat vertices if normals or colours differ.
 std::vector<Index> joined_vertices(const Mesh& mesh) {
   std::vector<Index> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0u);

@@ -16,7 +16,7 @@ struct Skin {
 /// have the same sign. Vertices at the same position count as one. Time: about 0.3 us per triangle.
 Skin skin_of(const Mesh& mesh);
 
-/// True if a point (object axes) lies within a closed mesh, by its winding number. Time: about 30 ns per triangle.
+/// True if a point (object axes) lies within a closed mesh (winding-number test). Time: about 30 ns per triangle.
 bool encloses(const Mesh& mesh, Vec3d place);
 
 }  // namespace sonar

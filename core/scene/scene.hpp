@@ -113,7 +113,7 @@ struct WaterColumn {
 struct OtherSonar {
   std::string name;
   Vec3d position_m;     // in the world
-  float level_upa = 0;  // amplitude at 1 m in a channel in its direction; falls as 1 / r and with absorption
+  float level_upa = 0;  // amplitude at 1 m in a channel that points at it; falls as 1 / r and with absorption
   float rate_hz = 7;
   float pulse_s = 1e-4f;
   bool operator==(const OtherSonar&) const = default;

@@ -28,7 +28,7 @@ struct Waveform {
   std::vector<std::complex<float>> samples;
   double sample_rate_hz = 0;
   /// True: pulses are summed in the frequency domain (exact up to the band limit) instead of with a table of the pulse.
-  /// `measured` pulses always do so.
+  /// `measured` pulses are always summed in this way.
   bool exact = false;
 #if __cplusplus >= 202002L  // device code is C++17 and needs no comparison
   bool operator==(const Waveform&) const = default;

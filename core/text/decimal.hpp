@@ -1,4 +1,4 @@
-// Parses decimal numbers; the whole text must be a number. The strict YAML cursors, command lines and grid files use it.
+// Parses decimal numbers in YAML, on command lines and in grid files. The whole text must be a number.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// IPv4 addresses as dotted text and as 32-bit numbers. Recordings, the daemon's configuration and sonarctl use it.
+// IPv4 addresses as dotted text and as 32-bit numbers. Recordings, the daemon's configuration and sonarctl use them.
 #pragma once
 
 #include <array>

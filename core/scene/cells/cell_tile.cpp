@@ -181,7 +181,7 @@ float scale_to_one_magnitude(const CellList& cells) {
   return static_cast<float>(most);
 }
 
-/// FNV-1a over the words of the first block of weights.
+/// Computes the FNV-1a hash of the words of the first block of weights.
 std::uint64_t hash_of_weights(const CellTile& tile) {
   std::uint64_t hash = 0xCBF29CE484222325u;
   for (const CellTile::Column c : {CellTile::weight_re, CellTile::weight_im}) {

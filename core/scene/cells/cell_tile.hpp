@@ -51,7 +51,7 @@ struct CellView {
 
 class TextureField;
 
-/// Up to 16 x 16 cells (more where the surface folds back) in a cube of the lattice, as int16 columns in one allocation.
+/// Up to 16 x 16 cells (more where surfaces overlap) in a cube of the lattice, as int16 columns in one allocation.
 /// Positions are relative to the cube's centre. Padding cells have zero weight.
 struct CellTile {
   int object = 0, material = 0, axis = 0, level = 0;  // axis: dominant axis of the facet normals, 0 x, 1 y, 2 z

@@ -128,7 +128,7 @@ void SurfaceCells::plant(std::size_t o) {
   }
 }
 
-/// Drops parts of earlier scenes, beginning with the oldest, while they take too much memory.
+/// Drops parts of earlier scenes, beginning with the oldest, as long as they take too much memory.
 void SurfaceCells::forget_known() {
   std::size_t n = 0;
   const auto is_of_the_last = [&] {  // the patches of an object are added and dropped together

@@ -95,9 +95,9 @@ float TexturePatch::normal_at(std::int32_t i, std::int32_t j, std::int32_t k) {
 
 /// Loads the 27 points around a position if they have changed. Neighbouring cells mostly have the same points.
 void TexturePatch::load_points(std::int32_t i, std::int32_t j, std::int32_t k) {
-  if (i == near_i_ && j == near_j_ && k == near_k_ && stands_) return;
+  if (i == near_i_ && j == near_j_ && k == near_k_ && has_near_) return;
   near_i_ = i, near_j_ = j, near_k_ = k;
-  stands_ = true;
+  has_near_ = true;
   float* to = near_.data();
   for (int up = 0; up < 3; ++up)
     for (int across = 0; across < 3; ++across)

@@ -41,8 +41,8 @@ class TextureField {
 class TexturePatch {
  public:
   TexturePatch(const TextureField& field, int object);
-  /// Multiplies roots by the root of the field, which is a factor of amplitudes. place_m: x, y, z in object coordinates. n must
-  /// be a multiple of cell_lanes::block.
+  /// Multiplies amplitudes (`root`) by the square root of the field. place_m: x, y, z in object coordinates. n must be a multiple
+  /// of cell_lanes::block.
   void multiply(std::array<const double*, 3> place_m, int n, double* root);
   /// The root of the field at one point.
   float root_at(Vec3d place_m);
@@ -59,7 +59,7 @@ class TexturePatch {
 
   const TextureField& field_;
   int object_;
-  bool stands_ = false;
+  bool has_near_ = false;                              // true if near_ has been filled
   std::int32_t near_i_ = 0, near_j_ = 0, near_k_ = 0;  // the first of the points around the last position
   std::array<float, 27> near_{};                       // their normals; i changes fastest
   std::unique_ptr<Point[]> points_;                    // valid where is_known_

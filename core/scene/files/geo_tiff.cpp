@@ -35,7 +35,7 @@ enum : std::uint32_t {
   gdal_no_data = 42113,
 };
 
-/// The values of a tag that is unknown to the library; empty if the tag is missing or has another type.
+/// Reads the values of a tag that is unknown to the library; empty if the tag is missing or has another type.
 template <class T>
 std::vector<T> values_of(TIFF* tiff, std::uint32_t tag, TIFFDataType type) {
   const TIFFField* field = TIFFFindField(tiff, tag, TIFF_ANY);
@@ -57,7 +57,7 @@ struct Georeference {
   double x = 0, y = 0, step_x = 0, step_y = 0;
 };
 
-/// A floating-point number of 16 bits.
+/// Converts a floating-point number of 16 bits.
 double half_number(std::uint16_t bits) {
   const int exponent = bits >> 10 & 31, fraction = bits & 1023;
   const double size = exponent == 31  ? (fraction == 0 ? std::numeric_limits<double>::infinity() : NAN)
@@ -66,8 +66,8 @@ double half_number(std::uint16_t bits) {
   return (bits & 0x8000) != 0 ? -size : size;
 }
 
-/// A whole number of `bits` bits that may begin within a byte. The first bit is the most significant one in files of both byte
-/// orders. GDAL writes numbers of NBITS bits, and numbers of 24 bits, in this order.
+/// Reads a whole number of `bits` bits that may begin within a byte. The first bit is the most significant one in files of both
+/// byte orders. GDAL writes numbers of NBITS bits, and numbers of 24 bits, in this order.
 double packed_number(std::span<const std::byte> bytes, std::size_t first_bit, std::size_t bits) {
   std::uint32_t value = 0;
   for (std::size_t bit = first_bit; bit < first_bit + bits; ++bit)
@@ -267,7 +267,7 @@ class GeoTiffReader {
     return picture_.format == SAMPLEFORMAT_UINT && picture_.bits < 32 && picture_.bits % 16 != 0 && picture_.bits != 8;
   }
 
-  /// The value with this number in a row of a block.
+  /// Reads the value with this number in a row of a block.
   double value_at(std::span<const std::byte> row, std::size_t number) const {
     if (is_packed()) return packed_number(row, number * picture_.bits, picture_.bits);
     const std::byte* const at = row.data() + number * picture_.value_bytes();

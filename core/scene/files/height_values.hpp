@@ -14,7 +14,7 @@ namespace sonar {
 /// Parses a number of a grid file, which may have leading zeros ("007") or be nan.
 std::optional<double> height_number(std::string_view word);
 bool is_nan_word(std::string_view word);
-/// A word that is not a number, made printable for an error text.
+/// Makes a word that is not a number printable for an error text.
 std::string word_text(std::string_view word);
 /// The byte order mark that may precede the first word of a text in UTF-8.
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
@@ -88,7 +88,7 @@ std::optional<UtmZone> utm_of_epsg(std::uint32_t code);
 bool agrees_with_wgs84(std::uint32_t code);
 /// True for GRS 80 and the ellipsoid of WGS 84, which all datums since about 1980 have.
 bool is_modern_ellipsoid(double semi_major_m, double inverse_flattening);
-/// The zone with these parameters; the false easting may begin with the zone's number, as in 32500000.
+/// Returns the zone with these parameters, if any. The false easting may begin with the zone's number, as in 32500000.
 std::optional<UtmZone> utm_of_parameters(const TransverseMercator& by);
 
 }  // namespace sonar

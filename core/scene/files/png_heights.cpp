@@ -69,7 +69,7 @@ void read_rows(png_structp png, png_infop info, Picture& picture, std::vector<pn
   png_read_end(png, nullptr);
 }
 
-// libpng leaves the function by longjmp. Therefore all objects with a destructor must be in the caller.
+// libpng leaves the function with longjmp. Therefore all objects with a destructor must be in the caller.
 bool read_picture(std::FILE* file, Picture& picture, std::vector<png_byte>& row) {
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &picture, on_error, on_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;

@@ -28,7 +28,7 @@ Tiff open_tiff(const std::filesystem::path& file);
 /// libtiff's last error of this thread; "damaged" if it gave none.
 std::string last_tiff_error();
 
-/// The number of the picture that is the mask of the first one. Before and after the call, the file is at the first picture.
+/// Finds the number of the picture that masks the first one, if any. Before and after the call, the file is at the first picture.
 std::optional<std::uint16_t> mask_of(tiff* file);
 
 struct Picture {
@@ -40,7 +40,7 @@ struct Picture {
   std::size_t bytes_of(std::uint32_t cells) const { return (std::size_t{bits} * bands * cells + 7) / 8; }
 };
 
-/// The description of the file's current picture.
+/// Describes the file's current picture.
 Picture picture_at(tiff* file);
 /// Fails if the picture is compressed in a way that is not read, or in blocks that are too large.
 Result<void> check_blocks(tiff* file);

@@ -127,13 +127,13 @@ std::size_t split_names(std::string_view line, Line& words) {
 /// Positions of the words for east, north and height in a line.
 struct Order {
   std::size_t x = 0, y = 1, z = 2;
-  bool depth = false;  // true if the name of the column is depth
-  bool named = false;  // true if the name of the x column is easting
+  bool depth = false;        // true if the name of the column is depth
+  bool has_easting = false;  // true if the name of the x column is easting
   std::size_t last() const { return std::max({x, y, z}); }
   bool operator==(const Order&) const = default;
 };
 
-/// The order according to column names, such as "lat lon depth", "id,x,y,z" or "OBJECTID,POINT_X,POINT_Y,grid_code". With other
+/// Finds the order from column names, such as "lat lon depth", "id,x,y,z" or "OBJECTID,POINT_X,POINT_Y,grid_code". With other
 /// names, the first three columns are x, y and z.
 Order order_by(const Line& names, std::size_t count) {
   using Begins = std::initializer_list<std::string_view>;
@@ -155,7 +155,7 @@ Order order_by(const Line& names, std::size_t count) {
   const bool distinct = order.x != order.y && order.x != order.z && order.y != order.z && order.last() < count;
   if (!distinct) return {};
   order.depth = same_letters(names[order.z].substr(0, 1), "d");
-  order.named = same_letters(names[order.x].substr(0, 1), "e");
+  order.has_easting = same_letters(names[order.x].substr(0, 1), "e");
   return order;
 }
 
@@ -274,7 +274,7 @@ Result<HeightGrid> read_xyz_heights(const std::filesystem::path& file, const Hei
     raw.z[at] = p.z;
   }
   raw.fill_values = values.fill_values();
-  const bool exchanged = !order.named && (raw.system.name.empty() || raw.system.utm) && may_be_northing_first(raw.x, raw.y);
+  const bool exchanged = !order.has_easting && (raw.system.name.empty() || raw.system.utm) && may_be_northing_first(raw.x, raw.y);
   const bool positive = std::none_of(raw.z.begin(), raw.z.end(), [](float z) { return z < 0; });
   auto grid = finish_heights(std::move(raw), options);
   if (!grid) return bad(grid.error().text);

@@ -43,7 +43,7 @@ Element parse_element(std::string_view tag) {
   return element;
 }
 
-/// The end of the tag that begins at `at`: its ">" outside quotes.
+/// Finds the end of the tag that begins at `at`: its ">" outside quotes.
 std::size_t end_of_tag(std::string_view text, std::size_t at) {
   for (char quote = 0; at < text.size(); ++at) {
     const char c = text[at];

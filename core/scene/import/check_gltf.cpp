@@ -82,7 +82,7 @@ class GltfWalk final : public Json::json_sax_t {
     return levels_.size() == depth && levels_[0].key == top && !levels_[2].array && levels_[2].key == last;
   }
   void note_weight(double v) { is_morphed |= v != 0 && (is_at(4, "meshes", "weights") || is_at(4, "nodes", "weights")); }
-  /// The primitive that is being read.
+  /// Returns the primitive that is being read, or null.
   Primitive* primitive() {
     if (levels_.size() < 5 || levels_[0].key != "meshes" || levels_[2].key != "primitives" || !levels_[3].array) return nullptr;
     auto& all = primitives[levels_[1].name()];
@@ -139,7 +139,7 @@ class GltfWalk final : public Json::json_sax_t {
   std::vector<Level> levels_;
 };
 
-/// A whole number of four bytes. Bytes beyond the end of the file count as 0.
+/// Reads a whole number of four bytes. Bytes beyond the end of the file count as 0.
 std::uint64_t number_at(std::string_view file, std::size_t at) {
   std::uint64_t v = 0;
   for (std::size_t k = 4; k-- > 0;) v = v << 8 | (at + k < file.size() ? static_cast<unsigned char>(file[at + k]) : 0u);
@@ -189,7 +189,7 @@ bool has_whole_numbers(const GltfWalk& walk) {
   return false;
 }
 
-/// Numbers of triangles of a file of version 2.
+/// Counts the triangles of a file of version 2.
 ListedFaces faces_of(const GltfWalk& walk, const NodeGraph& graph, const std::map<std::string, std::size_t>& number,
                      const std::vector<std::size_t>& scenes) {
   std::map<std::string, std::uint64_t> triangles;

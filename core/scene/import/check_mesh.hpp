@@ -58,9 +58,9 @@ MeshFault check_collada(std::string_view file, ListedFaces* faces = nullptr);
 std::string_view json_of_gltf(std::string_view file);
 /// The binary chunk of a GLB file of version 2, up to the end of the file; empty if there is none.
 std::string_view binary_part_of_glb(std::string_view file);
-/// The fault in the container of a GLB file, version 2. The importer reports every such fault as an unknown format.
+/// Finds the fault in the container of a GLB file, version 2. The importer reports every such fault as an unknown format.
 MeshFault glb_fault(std::string_view file);
-/// The fault of a glTF or GLB file for which the importer finds no reader.
+/// Describes the fault of a glTF or GLB file for which the importer finds no reader.
 std::string unknown_gltf(std::string_view file);
 
 /// Find incomplete records in a complete file. The importer would omit or misread such records. Binary STL files are not
@@ -69,7 +69,7 @@ MeshFault check_ply_records(std::string_view file);
 MeshFault check_stl_text(std::string_view file);
 MeshFault check_obj(std::string_view file);
 
-/// Number of facets in a text STL file.
+/// Counts the facets in a text STL file.
 std::uint64_t facets_of_stl(std::string_view file);
 
 }  // namespace sonar

@@ -52,7 +52,7 @@ bool is_like_number(std::string_view word) {
 
 std::string at_line(const Lines& lines) { return " (line " + std::to_string(lines.number()) + ")"; }
 
-/// The fault of one record, a line with the values of all properties; empty if there is none.
+/// Describes the fault of one record, a line with the values of all properties; empty if there is none.
 std::string fault_of_record(std::string_view line, const PlyElement& element) {
   std::uint64_t values = 0, needed = element.properties.size();
   std::uint64_t in_list = 0;  // values of a list that are left

@@ -16,7 +16,7 @@ namespace sonar {
 /// Reads a file that the glTF file names; nullopt if it cannot be read.
 using ReadBeside = std::function<std::optional<std::string>(const std::string& name)>;
 
-/// A GLB file, version 2, with the nodes, meshes and skins of `file`, and with floating-point positions and weights of bones.
+/// Makes a GLB file, version 2, with the nodes, meshes and skins of `file`, and floating-point positions and weights of bones.
 /// It has no normals, colours, textures or animations, and only the names of materials. `file`: text or GLB, version 2.
 /// `most_bytes`: limit of the result's size; GLB files have sizes of 32 bits. Errors do not contain the file's name.
 Result<std::string> gltf_with_floats(std::string_view file, const ReadBeside& beside,

@@ -230,7 +230,7 @@ class PlainStream final : public Assimp::DefaultIOStream {
   PlainText text_;
 };
 
-/// The header of a PLY file, or all of a text STL file; binary STL files on disk are read elsewhere.
+/// Selects the header of a PLY file, or all of a text STL file; binary STL files on disk are read elsewhere.
 PlainText plain_text_of(const std::filesystem::path& file, std::uintmax_t bytes) {
   const std::string head = read_regular(file, ply_head_bytes).value_or("");
   if (mesh_extension(file) == ".ply") return {0, ply_head_of(head).bytes};

@@ -15,7 +15,7 @@ namespace sonar {
 
 class ImportFiles final : public Assimp::DefaultIOSystem {
  public:
-  /// `fault` is set if a file is rejected for a reason that its author must know. `opened` is called with the number of
+  /// `fault` is set if a file is rejected for a reason that the user must know. `opened` is called with the number of
   /// bytes of all files opened so far.
   ImportFiles(const MeshFile& request, std::optional<Error>& fault, std::function<void(std::uintmax_t)> opened);
 

@@ -109,7 +109,7 @@ void each_triangle(const aiScene& scene, const std::vector<std::vector<Vec3d>>& 
   for (unsigned c = 0; c < node.mNumChildren; ++c) each_triangle(scene, skins, *node.mChildren[c], here, depth + 1, take);
 }
 
-/// The text of a mesh, or its first `most` bytes.
+/// Reads the text of a mesh, or its first `most` bytes.
 Result<std::string> text_of(const MeshFile& request, std::size_t most) {
   if (!request.in_memory.empty()) return std::string(request.in_memory.substr(0, most));
   return read_regular(request.file, most);

@@ -13,7 +13,7 @@ struct Flat {
 };
 double turn(Flat a, Flat b, Flat c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
 
-// The polygon, projected along the axis nearest to its (Newell) normal. Its corners are counter-clockwise.
+// Projects the polygon along the axis nearest to its (Newell) normal. Its corners become counter-clockwise.
 std::vector<Flat> flattened(std::span<const Vec3d> p) {
   Vec3d n;
   for (std::size_t i = 0; i < p.size(); ++i) n = n + cross(p[i] - p[0], p[(i + 1) % p.size()] - p[0]);

@@ -14,19 +14,19 @@ int segments_for(double radius_m);
 
 /// Largest number of patches along an edge of a plane or box. Longer edges have larger patches.
 inline constexpr int most_patches = 400;
-/// A rectangle in the x-y plane, normals up, in patches of at most `patch_m`.
+/// Makes a rectangle in the x-y plane, with normals up, in patches of at most `patch_m`.
 Mesh make_plane(double length_x_m, double length_y_m, double patch_m = 1);
 Mesh make_box(Vec3d size_m, double patch_m = 1);
 Mesh make_sphere(double radius_m, int segments);
 enum class Caps { both, bottom, none };
 Mesh make_cylinder(double radius_m, double length_m, int segments, Caps caps = Caps::both);
-/// A cylinder with a half sphere at each end. `length_m` is the length of the straight part between them.
+/// Makes a cylinder with a half sphere at each end. `length_m` is the length of the straight part between them.
 Mesh make_capsule(double radius_m, double length_m, int segments);
-/// A cone with its base at z = -length/2. With a top radius above zero it is a frustum.
+/// Makes a cone with its base at z = -length/2, or a frustum if the top radius is above zero.
 Mesh make_cone(double base_radius_m, double top_radius_m, double length_m, int segments);
-/// A ring of `radius_m` (to the middle of the tube) in the x-y plane. `radius_m` must exceed `tube_radius_m`.
+/// Makes a ring of `radius_m` (to the middle of the tube) in the x-y plane. `radius_m` must exceed `tube_radius_m`.
 Mesh make_torus(double radius_m, double tube_radius_m, int segments);
-/// A boulder: an ellipsoid with the given semi-axes. Its bumps are `bumpiness` (0..0.5) of its size and are drawn from `seed`.
+/// Makes a boulder: an ellipsoid with these semi-axes. Its bumps are `bumpiness` (0..0.5) of its size and are drawn from `seed`.
 Mesh make_rock(Vec3d semi_axes_m, double bumpiness, std::uint32_t seed, int segments);
 
 }  // namespace sonar

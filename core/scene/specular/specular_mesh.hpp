@@ -53,7 +53,7 @@ class SpecularMesh {
   };
   /// The point of a triangle at which the interpolated normal passes through the sonar.
   struct Foot {
-    std::array<double, 3> weight{};  // weights of the vertices; one is negative outside the triangle
+    std::array<double, 3> weight{};  // weights of the vertices; outside the triangle, at least one is negative
     Vec3d normal;                    // on the side of the mesh's normals
     double height_m = 0;             // height of the sonar along the normal
   };

@@ -51,7 +51,7 @@ struct Face {
   double half_u = 0, half_v = 0;
 };
 
-/// The face's mirror point, if the sonar is on its side `toward` (+1 or -1 along axis k).
+/// Computes the face's mirror point, if the sonar is on its side `toward` (+1 or -1 along axis k).
 SpecularPoint of_face(const Face& f, double toward, const SpecularQuery& q) {
   const int u = (f.k + 1) % 3, v = (f.k + 2) % 3;
   SpecularPoint p;
