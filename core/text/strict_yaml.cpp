@@ -136,7 +136,8 @@ class TreeBuilder final : public YAML::EventHandler {
 
 // Refuses control characters, text that is not UTF-8, and too many open brackets, of which yaml-cpp's scanner keeps a stack.
 std::optional<Refused> check_characters(std::string_view text) {
-  int line = 1, column = 1;
+  constexpr int open_brackets_at_most = 256;
+  int line = 1, column = 1, open = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto c = static_cast<unsigned char>(text[i]);
     if ((c < 0x20 && c != '\n' && c != '\r' && c != '\t') || c == 0x7f) {
@@ -144,16 +145,13 @@ std::optional<Refused> check_characters(std::string_view text) {
     }
     const std::size_t length = utf8_length(text.substr(i));
     if (length == 0) return Refused{line, column, {}, "not UTF-8; save the file as UTF-8"};
+    if (c == '[' || c == '{') ++open;
+    if (c == ']' || c == '}') open = std::max(open - 1, 0);
+    if (open > open_brackets_at_most)
+      return Refused{line, column, {}, "more than 256 brackets ([ or {) are open here, also counted in comments and quotes"};
     i += length - 1;
     column += static_cast<int>(length);
     if (c == '\n') ++line, column = 1;
-  }
-  constexpr int open_brackets_at_most = 256;
-  int open = 0;
-  for (const char c : text) {
-    if (c == '[' || c == '{') ++open;
-    if (c == ']' || c == '}') open = std::max(open - 1, 0);
-    if (open > open_brackets_at_most) return Refused{line, column, {}, "too many open brackets"};
   }
   return std::nullopt;
 }
