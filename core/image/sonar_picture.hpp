@@ -68,11 +68,11 @@ struct SonarPicture {
   /// a column for each range, `row_spacing_m` apart, beginning at `start_m`.
   PolarImage image;
   double head_rad = 0;                 // sweep: direction of the head, positive to port
-  double elevation_rad = 0;            // range image: that of the highest row; the lowest has minus this. points: of the fan
+  double elevation_rad = 0;            // range image: elevation of the highest row, minus that of the lowest. points: of the fan
   std::vector<double> row_age_s = {};  // waterfall: time from the ping of each row to the newest; empty: not known
   std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
   enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: `image` is empty
-  std::optional<std::size_t> detections = {};  // number in the newest ping's messages; nullopt: these have only samples
+  std::optional<std::size_t> detections = {};  // number of them in the newest ping; nullopt: its messages have only samples
 
   bool is_polar() const { return kind == PictureKind::fan || kind == PictureKind::points || kind == PictureKind::sweep; }
   bool nothing_detected() const { return detections == std::size_t{0}; }

@@ -61,7 +61,7 @@ struct Moment {
 /// Poses in order of time, with velocities if the file has them. `times` count from the start of the file, which all its bodies
 /// share. The first pose of a body may be later than the start, and its last pose earlier than the end.
 struct Points {
-  std::vector<Ns> times;                        // times, not negative, in increasing order
+  std::vector<Ns> times;                        // not negative, in increasing order
   std::vector<Pose> poses;                      // one for each time
   std::vector<Vec3d> velocities_mps;            // world axes; one for each time, or none
   std::vector<Vec3d> angular_velocities_radps;  // body axes; one for each time, or none

@@ -164,7 +164,7 @@ class Reader {
       first.positions.push_back(position_m);
     }
     const int usual = columns_->power(), by_steps = first.stamps.empty() ? usual : unit_by_steps(first, usual);
-    columns_->guess_unit(words_);  // by the number of digits of the first stamp
+    columns_->guess_unit(words_);  // from the number of digits of the first stamp
     unit_by_steps_ = by_steps != usual && by_steps != columns_->power();
     if (unit_by_steps_) columns_->set_power(by_steps);
   }
@@ -211,7 +211,7 @@ class Reader {
     return Format::tum;
   }
 
-  /// EuRoC stamps are nanoseconds: whole numbers or, from some programs, numbers such as 1.4e+18.
+  /// True for a stamp in seconds. EuRoC stamps are in nanoseconds: whole numbers, from some programs numbers such as 1.4e+18.
   static bool has_seconds(std::string_view word) {
     constexpr std::int64_t least_ns = 100'000'000'000'000'000;  // in 1973
     return word.find('.') != word.npos && nanoseconds_of_nanoseconds(word).value_or(0) < least_ns;

@@ -1,5 +1,5 @@
-// Computes beams from hits as printed in Choi 2025 (Sensors 25(5):1516, "P25"): eq. (1)-(4) for each column, the beamforming of
-// the reference code, and an inverse transform. Second stage of core/paper. docs/acoustics.md, section 8, lists the differences
+// Traces rays, and computes beams from their hits as printed in Choi 2025 (Sensors 25(5):1516, "P25"): eq. (1)-(4) for each
+// column, the beamforming of the reference code, and an inverse transform. docs/acoustics.md, section 8, lists the differences
 // from the canonical model.
 #pragma once
 
@@ -21,8 +21,8 @@
 
 namespace sonar::paper {
 
-// The rays of the two comparison modes: every ray is a scatterer, as in Choi 2025 (Sensors 25(5):1516) and the older raster
-// method. First stage of core/paper; docs/acoustics.md, section 8.
+// The first stage traces the rays of the two comparison modes. Each ray that hits a surface is a scatterer, as in Choi 2025 and
+// in the older raster method (docs/acoustics.md, section 8).
 
 /// Default number of rays per column: the number in the paper's model, and the number of rows in its raster run.
 inline constexpr int default_rays = 300, default_raster_rows = 11;
@@ -44,7 +44,7 @@ struct PaperFan {
   double elevation_rad(int column, int row) const {
     return perspective ? std::asin(direction(column, row).z) : first_row + row * row_step;
   }
-  /// Solid angle of a ray [sr]. Fan: dtheta dphi, without cos(phi), as printed in eq. (2).
+  /// Solid angle of a ray [sr]. In a fan it is dtheta dphi, without cos(phi), as printed in eq. (2).
   double solid_angle_sr(int column, int row) const;
 };
 
@@ -57,7 +57,7 @@ struct PaperHit {
   int column = 0, row = 0;
   double range_m = 0;
   double elevation_rad = 0;
-  double cosine = 0;  // cosine of the angle of incidence, with the normal of the triangle
+  double cosine = 0;  // cosine of the angle between the ray and the normal of the triangle
   double solid_angle_sr = 0;
   std::uint32_t object = 0, triangle = 0;
 };
@@ -66,7 +66,7 @@ struct PaperHit {
 void trace_column(const RayScene& scene, const PaperFan& fan, const PingScalars& scalars, int column, float far_m,
                   std::vector<PaperHit>& hits);
 
-/// Method for the sum of eq. (1) over the scatterers: term by term, or with a non-uniform transform (relative error 1e-7).
+/// Method for the sum of eq. (1) over the scatterers: with a non-uniform transform (relative error 1e-7), or term by term.
 enum class FrequencySum { fast, direct };
 
 /// Eq. (2) without xi: mu cos^2(incidence) r^2 dOmega [m^2], the printed footprint. Lambert's law would have cos^1 here.

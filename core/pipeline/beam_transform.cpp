@@ -131,7 +131,7 @@ void BeamTransformTables::transform_weights(const std::vector<double>& of_distan
       rest %= part;
       step *= tables_.level[l].radix;
     }
-    // Four frequencies at once, because each sum waits for its last addition.
+    // Computes four sums at once, because each addition waits for the last one of the same sum.
     double sum[4] = {};
     int turn[4] = {};  // d * frequency, modulo size
     for (const double w : weight)

@@ -27,7 +27,7 @@ class LabelWork {
   /// `context`, `tiles` and `by_group` must live until finish().
   void begin(const PingContext& context, const std::vector<PreparedTile>& tiles,
              const std::vector<std::vector<std::uint32_t>>& by_group, int group_columns);
-  /// Stores the shadows in columns [first, last). `fan` has traced them. Any thread may call it, once for each column.
+  /// Stores the shadows in columns [first, last), whose rays are in `fan`. Any thread may call it, once for each column.
   void note_shadows(const FanScratch& fan, int first, int last);
   /// Prepares the group that begins at `group.first_column`. Any thread may call it, once for each group.
   void begin_group(const simd::GroupView& group);

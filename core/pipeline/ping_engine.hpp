@@ -105,7 +105,7 @@ class ChangingEngine : public PingEngine {
 std::unique_ptr<ChangingEngine> make_changing_engine(std::shared_ptr<const Scene> scene, Parallel& pool,
                                                      const EngineOptions& options = {});
 
-// Checks whether a request can be simulated. Every engine calls it before a ping.
+// Checks whether a request can be simulated. Every engine makes this check before a ping.
 
 /// Returns the reason, one sentence, why a request cannot be simulated; empty if it can be simulated.
 std::string why_invalid(const PingRequest& request);

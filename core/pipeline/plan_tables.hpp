@@ -124,7 +124,7 @@ class SharedNoiseTable {
   int samples_ = 0;
   std::size_t parts_ = 0, beams_ = 0, blocks_ = 0;
   std::vector<std::uint32_t> at_;  // [parts][beams][blocks]: number of the block in stored_, from 1; 0: none
-  std::vector<float> stored_;      // [received blocks][2][block_samples]
+  std::vector<float> stored_;      // [stored blocks][2][block_samples]
   std::vector<float> noise_upa_, steady_upa_, leak_upa_;
 };
 

@@ -160,7 +160,7 @@ class RangeImager {
     double power = 0, range_m = 0;  // [uPa^2]; metres as the device computes them
     double shown_m = 0;             // the range after the filters
   };
-  /// Calls f(pixel) for each neighbour of a pixel that has a return.
+  /// Calls f(neighbour) for each neighbour, in the same block of rows, that has a return.
   template <class F>
   void for_each_neighbour(const std::vector<Reported>& all, int column, int row, F f) const {
     for (int r = std::max(row - 1, 0); r <= std::min(row + 1, grid_.rows - 1); ++r) {
@@ -244,7 +244,7 @@ class RangeImager {
     return power > least_power() && strength(std::sqrt(power), range_m) >= static_cast<double>(wanted_.least_strength);
   }
 
-  /// The cell that is reported: with `nearest`, the first detected peak in the wanted ranges; otherwise the strongest cell there.
+  /// The reported cell: with `nearest`, the first detected peak in the wanted ranges if there is one; else the strongest cell.
   std::ptrdiff_t chosen(const Profile& profile) const {
     const std::ptrdiff_t from = std::max(profile.first(), first_wanted_), to = std::min(profile.last(), last_wanted_);
     if (from > to) return profile.first();

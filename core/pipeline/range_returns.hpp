@@ -45,7 +45,7 @@ constexpr double longest_return_half_m = 0.5;
 
 class RangeReturns {
  public:
-  /// `cell_m`: width of a range cell. Bodies must have been placed.
+  /// `cell_m`: width of a range cell. The bodies of `scene` must have been placed.
   RangeReturns(const RayScene& scene, const PingRequest& request, double cell_m);
 
   /// Traces all rays. The result does not depend on the number of threads.
@@ -80,8 +80,8 @@ class RangeReturns {
     int column = 0, row = 0;
     bool operator==(const Cell&) const = default;
   };
-  // Number of rays around the middle of a cell. They show which part of the cell is covered by an object that the middle ray
-  // misses.
+  // Number of rays around the middle of a cell. These rays show which part of the cell is covered by an object that the middle
+  // ray misses.
   static constexpr int rays_across = 2, rays_up = 2, rays_around = rays_across * rays_up,
                        cells_a_packet = RayPacket::size / rays_around;
   /// Number of rays across a cell in azimuth and in elevation. The rays are uniform over the cell.

@@ -62,7 +62,7 @@ PreparedTile prepare(const PingContext& context, const TileInView& t, const Rota
   seen.in_side_lobes = t.in_side_lobes;
   seen.from_tangent = t.in_side_lobes ? fan.axis.edge_tangent : 0;
   seen.to_tangent = t.in_side_lobes ? fan.tangent.back() : fan.axis.edge_tangent;
-  // In the side lobes, rays are sparse.
+  // In the side lobes rays are sparse, so the depth map is less accurate.
   seen.tolerance_share = t.in_side_lobes ? 0.1f : 0;
   seen.turned_away = turned_away;
   seen.mark = surface_mark(static_cast<std::uint32_t>(t.object));

@@ -22,8 +22,8 @@ constexpr double none_db = -150;
 /// m. The recording has no such noise at 1.75 m. Between 0.6 m and 1.75 m the recorded bed hides it.
 constexpr double margin = 3, fades_from = 2;
 
-/// A block of a part in a beam is omitted if its values are everywhere below this fraction of the channels' own noise (eq. 30),
-/// divided by the number of parts.
+/// A block of a part in a beam is omitted if its power is everywhere below this fraction, divided by the number of parts, of the
+/// power of the channels' own noise (eq. 30).
 constexpr double silent = 0.03;
 constexpr std::size_t block_samples = SharedNoiseTable::block_samples;
 

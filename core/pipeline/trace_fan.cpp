@@ -219,8 +219,8 @@ class FanTracer {
     refinement.run(trace);
   }
 
-  /// Slope of the map from this column to the next, along the plane n . p = o of the facet that was hit: of 1 / x = (n_x +
-  /// n_y u / (s cos psi) + n_z tan psi) / o with s^2 = 1 - u^2; for flat beams of 1 / h = (n_x s + n_y u + n_z tan psi) / o.
+  /// Slope of the map from this column to the next, along the plane n . p = o of the facet that was hit. There 1 / x = (n_x +
+  /// n_y u / (s cos psi) + n_z tan psi) / o, s^2 = 1 - u^2. For flat beams 1 / h = (n_x s + n_y u + n_z tan psi) / o.
   float per_column(const Sample& a, ColumnSine column) const {
     const SurfaceHit& hit = a.surface;
     if (hit.object == RayPacket::miss || hit.offset == 0) return 0;
@@ -271,7 +271,7 @@ class FanTracer {
   PacketFiller filler_;
   int first_, last_;
   FanScratch& s_;
-  float tolerance_m_ = 0, ahead_[3], port_[3];  // m; axes of the sonar in the world
+  float tolerance_m_ = 0, ahead_[3], port_[3];  // ahead_, port_: x and y axes of the sonar in the world
   std::vector<ColumnSine> columns_;
   std::vector<Elevation> base_;
 };
@@ -305,8 +305,8 @@ void trace_fixed_fan(const RayScene& scene, const PingPlan& plan, const PingScal
   // column.
   const int rays = plan.fixed_fan;
   const std::vector<ColumnSine> sines = column_sines(plan.columns, first, last);
-  // A packet is a tile of neighbouring columns and rays. Its rays visit more of the same boxes and triangles than those of one
-  // column do.
+  // A packet has the rays of a few neighbouring columns and elevations. They share more boxes and triangles than as many rays
+  // of one column.
   for (int from = first; from < last; from += fixed_fan_columns) {
     const int columns = std::min(fixed_fan_columns, last - from), at_once = RayPacket::size / columns;
     const std::size_t begin = hits.size();

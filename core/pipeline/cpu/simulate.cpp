@@ -64,7 +64,7 @@ const PingStatistics& Workspace::statistics() const { return buffers_->statistic
 
 namespace {
 
-constexpr int most_traced_columns = 48;  // number of columns whose rays are refined together
+constexpr int most_traced_columns = 48;  // largest number of columns whose rays are refined together
 constexpr std::size_t group_bytes =
     640 << 10;  // signals and depth maps of a worker, which stay in the second-level cache from rays to sums
 constexpr int least_groups_a_worker = 3;  // with at least this many, all workers end at about the same time
@@ -177,7 +177,7 @@ class PingSimulation {
 /// the order of the tiles.
 int PingSimulation::group_columns() const {
   const int traced = traced_columns();
-  // If a ping of another sonar is likely, groups are small, so that this ping can run between them.
+  // If a ping of another sonar is likely, groups are small, so that the other ping can run between two of them.
   const bool is_small = w_.between && w_.between->expected();
   if (is_small && !ray_is_scatterer()) return traced;
   const int bins = ray_is_scatterer() ? 0 : plan_.fan.bins;
@@ -226,7 +226,7 @@ void PingSimulation::find_echo_sources() {
   for (const TileInView& t : in_view) w_.statistics.cells += static_cast<std::size_t>(t.tile->count);
 }
 
-/// Computes echoes via flat mirrors, in separate columns.
+/// Computes echoes via flat mirrors, in column buffers of their own.
 void PingSimulation::find_multipath_echoes() {
   const MultipathCounts counts = simulate_multipath(context_, w_.multipath, points_);
   w_.statistics.rays += counts.rays;

@@ -143,7 +143,7 @@ CellView view_of(const PingPlan& plan, const PingScalars& s, std::span<const Pos
 }
 
 /// The work is divided into rounds. Batches of tiles become echoes, sorted by group of columns. Then the groups sum the echoes,
-/// batch by batch. So each sum has the order of the tiles, for any assignment of threads.
+/// batch by batch. So each sum has the order of the tiles, whichever thread runs a task.
 class Rounds {
  public:
   Rounds(MultipathWork& work, const PingPlan& plan, const simd::Kernels& kernels, Parallel& pool)
@@ -234,7 +234,7 @@ MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& wo
   std::vector<MultipathScatterer> scatterers;
   for (int worker = 0; worker < context.pool.threads(); ++worker)
     scatterers.emplace_back(context, image_paths, reach, correlation);
-  // The echoes are in separate columns, which are added before the transmitter's pattern and the noise.
+  // The echoes are in separate columns. add_multipath() adds these before the transmitter's pattern is applied.
   work.columns.shape(plan.columns.count, plan.samples, plan.taps);
   clear_columns(work.columns, 0, plan.columns.count);
   counts.echoes = Rounds(work, plan, context.kernels, context.pool).run(scatterers, tiles);

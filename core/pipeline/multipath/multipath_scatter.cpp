@@ -85,8 +85,8 @@ OneWayPattern::OneWayPattern(const BeamPattern& pattern)
 
 float OneWayPattern::operator()(float squared_sine) const {
   const float a = static_cast<float>(pi) * aperture_, x = a * a * squared_sine;  // x < 9: inside the first zero
-  // Horner's scheme in x = a^2: sum_n (-1)^n x^n / (2 n + 1)!.
-  float p = -1.0f / 1.307674368e12f;  // sin(a) / a, powers of x
+  // Horner's scheme: sum_n (-1)^n x^n / (2 n + 1)!.
+  float p = -1.0f / 1.307674368e12f;  // sin(y) / y in powers of x = y^2
   p = p * x + 1.0f / 6227020800.0f;
   p = p * x - 1.0f / 39916800.0f;
   p = p * x + 1.0f / 362880.0f;
@@ -184,7 +184,7 @@ void MultipathScatterer::scatter(const TileInView& tile, std::vector<Echoes>& by
 
 void MultipathScatterer::scatter_cell(const Cell& cell, const LawTable& law, const CellLevel& level,
                                       std::vector<Echoes>& by_group) {
-  const auto offset_of = [&cell](const TilePath& w, float& range_m) {  // range, and range minus that of the tile's centre
+  const auto offset_of = [&cell](const TilePath& w, float& range_m) {  // sets the range; returns it minus the tile centre's
     const float* q = w.from_sonar_object;
     // r^2 = r0^2 + e, with e from the cell's offset. This avoids a difference of large floats.
     const float e = cell.x * (2 * q[0] + cell.x) + cell.y * (2 * q[1] + cell.y) + cell.z * (2 * q[2] + cell.z);

@@ -73,7 +73,7 @@ class MultipathScatterer {
   struct Cell {
     float x, y, z;  // relative to the tile's centre [m]
     float normal[3];
-    std::complex<float> weight;  // xi * root of the area * source; in expected power only the root
+    std::complex<float> weight;  // xi * root of the area * source * sqrt(mu); in expected power without xi
   };
 
   TilePath look_at(const TileInView& tile, const Path& path) const;

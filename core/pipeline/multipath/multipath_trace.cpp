@@ -13,7 +13,7 @@ namespace {
 constexpr double fan_edge_two_way = 0.01;  // the square of 0.1 in the one-way pattern
 constexpr float lift_m = 1e-4f;            // distance from the mirror at which reflected rays start
 
-/// Traces sixteen rays via mirrors.
+/// Traces up to sixteen rays via mirrors.
 class ChainTracer {
  public:
   ChainTracer(const RayScene& scene, const PingScalars& scalars, const FlatFaces& faces, const std::vector<FlatMirror>& mirrors)
@@ -129,7 +129,7 @@ class ColumnsTracer {
     chain.forward = conical ? across * cosine : cosine;
     rays_.add(ray_in_sonar(conical, along, across, cosine, sine), far_m_);
   }
-  /// Follows the packet. Its lanes are the samples `index`.
+  /// Follows the packet. Lane i belongs to the sample index[i].
   void follow(const std::array<std::int32_t, RayPacket::size>& index) {
     std::uint32_t active = rays_.all();
     // Up to two bounces: stage s is the surface that is hit after s mirrors.

@@ -159,7 +159,7 @@ void Pulse::integrate() {
 
 std::complex<double> Pulse::correlation(double time_s) const {
   if (shape_ == Shape::gaussian) return noise_correlation(scale_hz_, time_s);
-  if (shape_ == Shape::cw) {  // a triangle, interpolated with a cubic spline
+  if (shape_ == Shape::cw) {  // the correlation of a triangle is a cubic spline
     const double x = std::fabs(time_s) * scale_hz_;
     return x < 1 ? 1 - 1.5 * x * x + 0.75 * x * x * x : x < 2 ? 0.25 * (2 - x) * (2 - x) * (2 - x) : 0.0;
   }
@@ -227,7 +227,7 @@ std::vector<float> make_pulse_rows(const Pulse& pulse, double sample_time_s, int
 
 std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s) {
   constexpr int longest = 160;
-  constexpr double gaussian_correlation_reach_bt = 6.1;  // it falls to 1e-8 there
+  constexpr double gaussian_correlation_reach_bt = 6.1;  // the correlation falls to 1e-8 there
   const double reach_s = pulse.shape() == Shape::gaussian ? gaussian_correlation_reach_bt * pulse.width_s() / (2 * half_power_bt)
                                                           : 2 * pulse.reach_s();
   const int wanted = static_cast<int>(std::min(std::max(std::ceil(reach_s / sample_time_s), 2.0), 1e6));
@@ -239,7 +239,7 @@ std::vector<float> make_noise_filter(const Pulse& pulse, double sample_time_s) {
     const double window = wanted > longest ? parzen(static_cast<double>(k) / (order + 1)) : 1.0;
     r[static_cast<std::size_t>(k)] = window * pulse.correlation(k * sample_time_s).real();
   }
-  r[0] += 1e-5;  // keeps the factorisation definite on fine grids; their spectrum falls to 0
+  r[0] += 1e-5;  // keeps the factorisation definite on fine grids, where the spectrum falls to 0
   // Bauer's method: the rows of the Cholesky factor of the long banded Toeplitz matrix tend to the minimum-phase factor.
   const int n = 12 * order + 64;
   std::vector<std::vector<double>> band(static_cast<std::size_t>(n), std::vector<double>(static_cast<std::size_t>(order) + 1));

@@ -44,7 +44,7 @@ struct TileSeen {
   const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine
   float area_amplitude;        // like `amplitude`, with the cell size instead of the speckle (expected power)
   float fade_in_from_m, fade_in_per_m, fade_out_to_m, fade_out_per_m;
-  // Absolute values of the tangents of its cells: those of the fan's main part, or of the side lobes, where cells are coarser.
+  // Cells scatter if |tangent| is in this interval: the fan's main part, or the side lobes, where cells are coarser.
   float from_tangent, to_tangent;
   bool in_side_lobes;
   float tolerance_share;  // fraction of the range, in addition to GroupView::depth_tolerance_m

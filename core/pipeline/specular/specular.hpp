@@ -41,7 +41,7 @@ std::array<double, 2> nearest_on_surface(const SpecularPoint& point);
 /// rough surfaces (smooth_below_kh) and for results below a hundredth.
 double coherent_reflection(const Material& material, double wavelength_m);
 
-/// Values that are kept between pings: all meshes with smooth materials, prepared when they are first in view.
+/// Finds specular echoes. The meshes of visible objects are prepared when they are first used, and kept between pings.
 class SpecularEchoes {
  public:
   /// Appends the specular echoes of the surfaces that rays find visible.
