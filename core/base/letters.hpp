@@ -32,7 +32,7 @@ constexpr std::string_view trimmed(std::string_view text, std::string_view blank
 
 // Measures UTF-8 characters.
 
-/// Returns the bytes of the character at the start of `rest`; 0 if it is not well-formed (Unicode 15, table 3-7).
+/// Returns the number of bytes of the character at the start of `rest`; 0 if it is not well-formed (Unicode 15, table 3-7).
 inline std::size_t utf8_length(std::string_view rest) {
   const auto at = [&](std::size_t i) { return i < rest.size() ? static_cast<unsigned char>(rest[i]) : 0u; };
   const auto follows = [&](std::size_t i, unsigned low = 0x80, unsigned high = 0xbf) { return at(i) >= low && at(i) <= high; };

@@ -22,8 +22,8 @@ Result<void> flush_standard_output();
 
 constexpr std::size_t usual_stack_bytes = std::size_t{8} << 20;  // the usual limit of systems
 
-/// Raises the limit of the main thread's stack to the usual size, as far as the hard limit permits, and that of new threads if
-/// it is below 1 MiB. Call it before threads start. Error: unavailable if the hard limit is too low.
+/// Raises the limit of the main thread's stack to the usual size, as far as the hard limit permits. New threads also get the
+/// usual size if theirs is below 1 MiB. Call it before threads start. Error: unavailable if the hard limit is too low.
 Result<void> make_room_for_stacks();
 
 }  // namespace sonar

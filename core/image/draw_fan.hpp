@@ -40,8 +40,8 @@ FanLayout fan_layout(const PolarImage& image, const FanStyle& style, Opens opens
 /// they span more than a circle.
 Result<Raster> draw_fan(const PolarImage& image, const FanStyle& style);
 
-/// Draws a series of pings like draw_fan, but three times as fast. It reuses the footprints of the pixels until the number of
-/// rows or beams, the bearings or the direction change. It needs 32 bytes per pixel.
+/// Draws a series of pings like draw_fan, but three times as fast. It reuses the footprints of the pixels until the ranges of
+/// the rows, the bearings of the beams or the direction change. It needs 32 bytes per pixel.
 class FanPainter {
  public:
   explicit FanPainter(FanStyle style) : style_(std::move(style)) {}

@@ -44,7 +44,7 @@ Result<void> write_whole_file(const std::filesystem::path& file, std::initialize
 /// Writes a PNG file with write_whole_file(), and makes its folder if needed.
 Result<void> write_png(const Raster& raster, const std::filesystem::path& file);
 
-// Writes 8-bit or 16-bit integers, such as samples and labels, as grey PNG files without a colour map.
+// Encodes 8-bit or 16-bit integers, such as samples and labels, as grey PNG files without a colour map.
 
 /// Encodes little-endian values, `bits` / 8 bytes each, [height][width]; 8 or 16 bits. Equal values give equal bytes.
 Result<std::vector<std::byte>> encode_gray_png(std::span<const std::byte> values, int width, int height, int bits);

@@ -30,7 +30,7 @@ std::string in_quotes(std::string_view word);
 
 class Columns {
  public:
-  /// Returns an error without the prefix "file:line: ", or nullopt.
+  /// Reads the header. Returns the error without the prefix "file:line: ", or nullopt.
   static std::optional<std::string> refuse_header(const Words& header, Columns& out);
   static Columns tum();
   /// `words`: 8 without velocity, 11 with velocity, 17 with velocity and the biases of an IMU, which are ignored.

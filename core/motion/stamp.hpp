@@ -29,8 +29,8 @@ struct FirstLines {
 };
 
 /// Returns the power N of the unit 10^N ns: 9, 6, 3 or 0. `usual` is the N of the file's format: 9 (seconds) or 0 (nanoseconds).
-/// The result is `usual`, unless lines would then be implausibly far apart in time, or the unit is seconds and the body would
-/// move slower than 5 mm/s. If the body rests, a file of ten or more lines is assumed to be a log, whose steps are short.
+/// The result is `usual`, unless nanoseconds would mean implausibly short steps, or seconds would mean steps above 4 s of a body
+/// slower than 5 mm/s. If the body rests, a file of ten or more lines is assumed to be a log, whose steps are short.
 int unit_by_steps(const FirstLines& lines, int usual);
 
 }  // namespace sonar::motion

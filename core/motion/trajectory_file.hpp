@@ -32,7 +32,7 @@ struct TrajectoryFile {
   struct Body {
     std::string name;  // empty if the file has no names
     std::shared_ptr<const Trajectory> trajectory;
-    ImplausibleAngle largest_angle = {};  // the angle of all poses, if the columns of angles are radians
+    ImplausibleAngle largest_angle = {};  // largest of all poses; found only if the columns of angles are radians
   };
   std::vector<Body> bodies;  // bodies in the order of the file; at least one
   Format format = Format::csv;

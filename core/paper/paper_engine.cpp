@@ -57,7 +57,7 @@ class ModeRouter final : public PingEngine {
   std::vector<Ping> run(std::span<const PingRequest> requests) override {
     std::vector<Ping> pings;
     pings.reserve(requests.size());
-    std::vector<PingStatistics> each;  // statistics of each run of successive canonical pings
+    std::vector<PingStatistics> each;  // statistics of each ping, in order
     while (!requests.empty()) {
       if (!is_canonical(requests.front())) {
         if (!comparison_) comparison_ = make_comparison_();
@@ -108,7 +108,7 @@ class ModeRouter final : public PingEngine {
   std::function<std::unique_ptr<ComparisonEngine>()> make_comparison_;
   std::unique_ptr<ComparisonEngine> comparison_;  // made for the first ping of its modes, because it has its own ray scene
   std::deque<bool> passed_on_;                    // for each submitted ping: true if it went to the canonical engine
-  std::vector<PingStatistics> each_;              // statistics of the last run
+  std::vector<PingStatistics> each_;              // statistics of each ping of the last run
   bool last_was_canonical_ = true;
 };
 

@@ -37,8 +37,8 @@ double elevation_pattern(const Prepared& prepared, double elevation_rad);
 bool add_echo(double range_m, double pattern, double cross_section_m2, ComplexNormal xi, const Prepared& prepared,
               const PingScalars& scalars, PaperEchoes& echoes);
 
-/// Makes echoes of the hits of one column by eq. (2) and eq. (1), without the sum. `mu`: by material. Hits outside the record
-/// are dropped, as in the reference code.
+/// Makes echoes of the hits of one column with eq. (2) and the terms of eq. (1), which are summed later. `mu`: by material. Hits
+/// outside the record are dropped, as in the reference code.
 void echoes_of(std::span<const PaperHit> hits, std::span<const double> mu, const Scene& scene, const Prepared& prepared,
                const PingScalars& scalars, const PingRequest& request, const simd::Kernels& kernels, PaperEchoes& echoes);
 

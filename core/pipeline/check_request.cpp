@@ -20,7 +20,7 @@ constexpr double sector_slack_rad = 1e-6;  // tolerance, because azimuths are do
 constexpr double widest_beam_rad = 1.5, narrowest_width_rad = 1e-4;
 constexpr float widest_level_db = 300;
 
-/// Checks the limits of pulses and buffers. No picture needs more, and the memory would not be sufficient.
+/// Checks the limits of pulses and buffers. No picture needs larger values, and they would take too much memory.
 std::string why_out_of_proportion(const FrequencyMode& mode, const PingSettings& s) {
   const double samples = static_cast<double>(s.range_bin_count) * s.samples_per_row;
   const double pulse = static_cast<double>(s.pulse_width_m) / (s.range_bin_m / s.samples_per_row);  // in samples

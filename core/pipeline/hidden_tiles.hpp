@@ -41,7 +41,7 @@ class FarthestSeen {
 
   static constexpr int columns_a_block = 4, bins_a_block = 16;
   int first_column_ = 0, end_column_ = 0, blocks_ = 0;  // blocks along the bins
-  std::vector<float> least_;                            // smallest 1 / x of each block, [columns][bins]
+  std::vector<float> least_;                            // smallest 1 / x, [blocks of columns][blocks of bins]
   std::vector<float> line_;
 };
 

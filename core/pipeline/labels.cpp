@@ -190,7 +190,7 @@ void LabelWork::add_cells(const simd::GroupView& group, Echoes& echoes) {
 void LabelWork::finish_group(const simd::GroupView& group, Echoes& scratch) {
   const auto g = static_cast<std::size_t>(group.first_column / group_columns_);
   Group& mine = groups_[g];
-  // The expected power of the cells, without speckle.
+  // Computes the expected power of the cells, with a depth map in which nothing hides them.
   simd::GroupView open = group;
   open.expected_power = true;
   open.inverse_depth = open.depth_slope = nothing_.data();

@@ -70,7 +70,7 @@ PingScalars make_scalars(const PingPlan& plan, const PingRequest& request, Vec3d
   if (s.doppler_m_per_mps != 0) s.max_range_m += std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
   s.moves = request.switches.motion && (length(s.twist.velocity_mps) > 0 || length(s.twist.angular_rate_radps) > 0);
   if (s.moves) s.seen_at_s = request.settings.range_m / static_cast<double>(request.settings.device_sound_speed_mps);
-  // A pulse reaches this far before the picture. The sonar moves between the scattering of the echo and seen_at_s.
+  // The pulse of a nearer echo ends before the picture. The sonar moves between the scattering of the echo and seen_at_s.
   s.min_range_m =
       (plan.sample_offset - plan.taps) / s.samples_per_m - std::abs(s.doppler_m_per_mps) * length(s.twist.velocity_mps);
   if (s.moves) s.min_range_m -= std::abs(s.seen_at_s - s.min_range_m / s.sound_speed_mps) * length(s.twist.velocity_mps);

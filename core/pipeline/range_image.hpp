@@ -10,7 +10,7 @@ namespace sonar {
 
 /// Computes the ping. `wanted` must belong to the request; RayScene::place() must have been called. The bytes do not depend on
 /// the number of threads. The function does not simulate motion while the sound travels, mirrors (specular echoes, multipath),
-/// texture, volume reverberation, and other sonars.
+/// texture, volume reverberation, or other sonars.
 Ping make_range_image(const RayScene& scene, const PingRequest& request, const RangeImageSettings& wanted, Parallel& pool);
 
 }  // namespace sonar

@@ -31,7 +31,7 @@ class SettingsCache {
   static constexpr std::size_t usual_bytes = std::size_t{64} << 20;
   explicit SettingsCache(std::size_t most_bytes = usual_bytes) : most_bytes_(most_bytes) {}
 
-  /// Returns the tables of a request, and makes them if needed. If there are too many tables, those that were not used for
+  /// Returns the tables of a request, and makes them if needed. If the tables become too large, those that have been unused for
   /// longest are dropped. The result is valid until the next call.
   PreparedSettings& prepared_for(const PingRequest& request, const Scene& scene, Parallel& pool);
   /// Approximate size of all tables.

@@ -14,7 +14,7 @@ struct SpectralScratch {
   std::vector<spectral::Complex> sums, folded;
 };
 
-/// The period is the record plus the length of the pulse on both sides, so that pulses beyond one end do not appear at the
+/// The period is longer than the record by at least the length of a pulse, so that pulses beyond one end do not appear at the
 /// other end. The frequencies are the multiples of 1 / period in the pulse's band. The period is a whole number of samples, and
 /// the spectrum is folded to this number of values. Therefore the inverse transform gives the samples themselves. The error is
 /// that of FrequencySums at width 6, 1e-5.

@@ -14,9 +14,9 @@ namespace {
 // the covered part of a cell is known. `most_close_rays` limits the sum for all of these cells.
 constexpr double thin_share = 0.4;
 constexpr int probe_across = 12, most_across = 16, most_close_rays = 1 << 15;
-// If a net covers the view, only the usual rays are traced. Further rays are aimed at objects that these rays miss: at no more
-// than most_aimed_at objects in view, and only until most_aimed_cells are found. Otherwise many specks would use up the cells
-// that thin objects need.
+// If thin objects cover the view, as a net does, only the usual rays are traced. To find thin cells, rays are also aimed at
+// objects that the usual rays miss: at no more than most_aimed_at objects in view, and only until most_aimed_cells are found.
+// Otherwise many specks would use up the cells that thin objects need.
 constexpr std::size_t most_thin_cells = 512, most_probed_cells = 2048, most_aimed_at = 1024, most_aimed_cells = 128;
 
 }  // namespace

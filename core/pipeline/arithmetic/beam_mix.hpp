@@ -16,7 +16,7 @@ struct BeamMixView {
   const std::int32_t* reach;                    // [sets]: number of taps on either side that are not 0
   const float *own, *share;                     // [beams]: weight of the beam, and of each neighbour
   std::int32_t beams, sets, widest, step;       // widest: largest reach; step: distance of the mixed neighbours, in beams
-  float sets_per_rad, first_range_m, sample_m;  // first_range_m: of sample 0; sample_m: spacing
+  float sets_per_rad, first_range_m, sample_m;  // first_range_m: range of sample 0; sample_m: spacing of samples
 };
 
 /// The set of taps for this beam and sample; 0 = no change.

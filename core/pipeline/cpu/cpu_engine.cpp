@@ -12,8 +12,8 @@
 namespace sonar {
 namespace {
 
-/// Runs pings between the parts of another ping. Each ping has its own buffers. The scene and the cells are set before each
-/// ping.
+/// Runs pings between the parts of another ping, with buffers of their own. The poses of bodies and the cells are set before
+/// each ping.
 class CpuEngine final : public ChangingEngine, private Interruption {
  public:
   CpuEngine(std::shared_ptr<const Scene> scene, Parallel& pool, const EngineOptions& options)

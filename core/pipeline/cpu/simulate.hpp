@@ -20,7 +20,7 @@ class Workspace {
   explicit Workspace(double (*now_s)() = nullptr);  // now_s: a clock for the statistics
   ~Workspace();
 
-  /// Sets the interruption that is called between groups of columns; null = none. It must not be called during a ping.
+  /// Sets the interruption that is called between groups of columns; null = none. Do not call this function during a ping.
   void set_between(Interruption* between);
   const PingStatistics& statistics() const;  // statistics of the last ping
   /// Call it if the next ping has another scene.

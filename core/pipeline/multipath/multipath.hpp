@@ -24,7 +24,7 @@ struct MultipathCounts {
   std::size_t rays = 0, echoes = 0;
 };
 
-/// Computes `work.columns` (before the transmitter's pattern and noise) and appends the echoes of point targets via mirrors to
+/// Computes `work.columns` (without the transmitter's pattern and noise) and appends the echoes of point targets via mirrors to
 /// `points`. The function calls SurfaceCells::in_view(), so the results of earlier calls become invalid.
 MultipathCounts simulate_multipath(const PingContext& context, MultipathWork& work, std::vector<PointEcho>& points);
 
