@@ -8,7 +8,7 @@
 namespace sonar {
 namespace {
 
-// False northing of the southern hemisphere [m]; the northern hemisphere has none.
+// Scale on the middle meridian, and offsets of the coordinates [m]; false_northing_m applies only in the southern hemisphere.
 constexpr double scale = 0.9996, false_easting_m = 500'000, false_northing_m = 10'000'000;
 constexpr double n = earth_flattening / (2 - earth_flattening), n2 = n * n, n3 = n2 * n, n4 = n3 * n;
 constexpr double rectifying_m = earth_semi_major_m / (1 + n) * (1 + n2 / 4 + n4 / 64);

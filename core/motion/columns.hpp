@@ -25,7 +25,7 @@ struct Row {
   RollPitchYaw written = {};  // the angles if their columns are radians; else 0
 };
 
-/// A word of a file, made printable and short for an error text.
+/// Returns a word of a file in quotes, made printable and short for an error text.
 std::string in_quotes(std::string_view word);
 
 class Columns {

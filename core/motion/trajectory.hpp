@@ -1,4 +1,4 @@
-// Converts clock time to time in a trajectory, with start, speed, loop, pause and seek. It uses integer nanoseconds and
+// Playback converts clock time to time in a trajectory, with start, speed, loop, pause and seek. It uses integer nanoseconds and
 // millionths, so that a stepped run can be repeated exactly. daemon/emulator/world has one Playback for each body.
 #pragma once
 

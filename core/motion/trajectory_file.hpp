@@ -46,7 +46,7 @@ struct TrajectoryFile {
 };
 
 /// Reads a trajectory file. Comments in the file can state the frame, `# frame: NED_FRD`, and the position of 0, 0, 0 in degrees,
-/// `# origin: 47.6,-122.3`. Errors: "name:line: reason".
+/// `# origin: 47.6,-122.3`. Errors: "name:line: reason", or "name: reason" for the whole file.
 Result<TrajectoryFile> parse_trajectories(std::string_view text, const std::string& name, const ReadOptions& options);
 Result<TrajectoryFile> load_trajectories(const std::filesystem::path& file, const ReadOptions& options);
 /// Returns the trajectory of the body with this name, or of the only body if the name is empty. Errors list the names of the

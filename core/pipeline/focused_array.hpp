@@ -10,9 +10,9 @@
 namespace sonar {
 
 /// Computes the sums over channels of w_m (-1)^m e^{i 2 pi d / lambda}. Here d is the path from a point to channel m, minus the
-/// path from the point to the array's middle; focus() sets the range of the point; its sine is that of the beam. Each sum is over
-/// one part: a group of channels. Neighbouring groups overlap by half, and their w^2 add to 1 in every channel. The last part
-/// contains all channels with equal weights.
+/// path from the point to the array's middle. focus() sets the range of the point, and the point has the sine of the beam. Each
+/// sum is over one part, a group of channels. Neighbouring groups overlap by half, and their w^2 add to 1 in every channel. The
+/// last part contains all channels with equal weights.
 ///
 /// Half a group is short, so its sum hardly changes with the sine, except for the delay of its middle. Therefore the sum is
 /// computed at a few Chebyshev points of a segment of beams and interpolated. The error is 1e-5 of the largest value, like that

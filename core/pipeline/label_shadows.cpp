@@ -11,8 +11,8 @@ namespace {
 using Upwards = std::vector<const FanScratch::Sample*>;
 
 /// A straight line, 1 / x over the tangent, that approximates the surface hidden by the object at sample `of`. It connects the
-/// last sample below the object with the first one above it on the same surface. If there is none above, the line continues the
-/// lowest samples. If there is no line, low and high are equal.
+/// last sample below the object with the first one above it on the same surface. If there is none above, the line through the
+/// lowest samples is continued. If there is no line, low and high are equal.
 struct HiddenLine {
   std::size_t low = 0, high = 0;
   float tangent = 0, inverse_x = 0, slope = 0;

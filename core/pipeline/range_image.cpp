@@ -45,7 +45,7 @@ class Profile {
       im_[static_cast<std::size_t>(k)] += a * static_cast<double>(speckle.im);
     }
   }
-  /// Sums the steps to powers.
+  /// Computes the power of each cell.
   void finish() {
     double sum = 0;
     for (std::ptrdiff_t k = first_; k <= last_; ++k) {

@@ -57,7 +57,7 @@ bool RangeReturns::aim_at(std::uint32_t object, std::vector<std::uint8_t>& is_li
   return active != 0;
 }
 
-/// Cells in which rays hit a thin object. An object is thin if it is thin in most of its cells, or if the usual rays miss it.
+/// Lists the cells with hits of a thin object. An object is thin if it is so in most of its cells, or if the usual rays miss it.
 std::vector<RangeReturns::Cell> RangeReturns::thin_cells(std::vector<std::uint8_t>& is_thin) const {
   struct Found {
     Cell cell;

@@ -112,11 +112,11 @@ class PingSimulation {
         crosstalk_(plan_, request.switches),
         bodies_(request.bodies_in_world.empty() ? scene.scene().bodies_in_world : request.bodies_in_world),
         context_{scene, cells, bodies_, w_.laws, w_.turned_away, plan_, scalars_, kernels, pool},
-        heard_(columns_of(plan_, beams)) {
+        used_(columns_of(plan_, beams)) {
     // Buffers keep their memory from ping to ping; values of an earlier ping are never read.
     w_.columns.shape(plan_.columns.count, plan_.samples, plan_.taps);
     group_columns_ = group_columns();
-    for (const ColumnRange& range : heard_)
+    for (const ColumnRange& range : used_)
       for (int first = range.first; first < range.last; first += group_columns_)
         groups_.push_back({first, std::min(first + group_columns_, range.last)});
     w_.workers.resize(static_cast<std::size_t>(pool.threads()));
@@ -164,9 +164,9 @@ class PingSimulation {
   Crosstalk crosstalk_;
   std::span<const Pose> bodies_;
   const PingContext context_;
-  std::vector<ColumnRange> heard_,
-      groups_;             // heard_: columns that the beams use; groups_: parts of them that a worker computes at once
-  int group_columns_ = 0;  // most columns of a group
+  std::vector<ColumnRange> used_;    // columns that the beams use
+  std::vector<ColumnRange> groups_;  // parts of them that a worker computes at once
+  int group_columns_ = 0;            // most columns of a group
   std::vector<PointEcho> points_;
   std::vector<ReceivedPulse> other_sonars_;
   std::vector<float> shared_noise_;  // noise that the channels share in this ping
@@ -355,7 +355,7 @@ void PingSimulation::image_rows(int first, int last, Workspace::Buffers::PerWork
   const int per_row = plan_.settings.samples_per_row;
   // A window has whole rows, with at most 64 samples. Its beams stay in the cache until they are codes.
   mine.beams.shape(plan_.settings.beam_count, first * per_row, (last - first) * per_row);
-  form_beams(w_.columns, plan_.beam_weights, beams_, heard_, kernels_, mine.beam_scratch, mine.beams);
+  form_beams(w_.columns, plan_.beam_weights, beams_, used_, kernels_, mine.beam_scratch, mine.beams);
   // Points and the pulses of other sonars are added to the beams in their exact directions. Then the beams are mixed. The pulse
   // of another sonar does not come from the range of its rows, so it is not blurred.
   add_points(points_, plan_, mine.beams);

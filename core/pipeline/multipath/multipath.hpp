@@ -1,5 +1,5 @@
-// Multipath, off by default (Switches::multipath): computes all echoes via flat mirrors as column signals, which are added to
-// the direct echoes. It runs once for each ping, before the columns are simulated (docs/acoustics.md, section 3).
+// Multipath, off by default (Switches::multipath), computes echoes via flat mirrors: column signals for surfaces, and point
+// echoes for point targets. It runs once for each ping, before the columns are simulated (docs/acoustics.md, section 3).
 #pragma once
 
 #include <vector>

@@ -18,8 +18,8 @@ struct ImagePaths {
   BubbleLayer bubbles;
 };
 
-/// Lengths of a path on which a ball around a point is visible with a delay within the record. The point is in the axes of
-/// PingScalars::seen_from.
+/// Finds the lengths of a path at which a ball around a point is visible, with a delay within the record. The point is in the
+/// axes of PingScalars::seen_from.
 class PathReach {
  public:
   PathReach(const Path& path, const ImagePaths& image_paths, const PingPlan& plan, const PingScalars& scalars);

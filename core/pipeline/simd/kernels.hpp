@@ -38,7 +38,7 @@ struct TileSeen {
   float from_sonar[3];         // the same, sonar axes [m]
   float turn[9];               // object to sonar axes, row-major
   float range_m;               // range of the tile's centre
-  float sample_shift;          // delay of its echoes by the Doppler effect
+  float sample_shift;          // delay of its echoes by the Doppler effect [samples]
   float phase_turns;           // carrier phase of the tile centre, in [0, 1)
   float amplitude;             // product of weight_unit and all factors that are constant over the tile
   const float* law;            // root of the scattering strength over sqrt(1 - cosine), law_steps + 2 values; null = cosine

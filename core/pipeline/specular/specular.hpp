@@ -17,8 +17,8 @@ namespace sonar {
 // Computes how much of a mirror's echo reaches the sonar if the surface is finite and partly hidden: Fresnel integrals over the
 // visible part (docs/acoustics.md, section 3).
 
-/// Divides the extent into cells around the point that contributes most, to find hidden parts. The outermost cells reach to the
-/// edge.
+/// Divides the surface into cells around the point that contributes most, to find hidden parts. The outermost cells reach to the
+/// edge of the surface.
 struct SpecularWindow {
   static constexpr std::size_t cells = 16;
   std::array<std::array<double, cells + 1>, 2> edge{};  // along the principal directions [m]
