@@ -68,7 +68,7 @@ struct SonarPicture {
   /// a column for each range, `row_spacing_m` apart, beginning at `start_m`.
   PolarImage image;
   double head_rad = 0;                 // sweep: direction of the head, positive to port
-  double elevation_rad = 0;            // range image: elevation of the highest row, minus that of the lowest. points: of the fan
+  double elevation_rad = 0;            // elevation of a range image's top row (bottom row: its negative), or of the fan of points
   std::vector<double> row_age_s = {};  // waterfall: time from the ping of each row to the newest; empty: not known
   std::vector<std::pair<double, double>> points = {};             // points: azimuth, range
   enum class Column { none, sent, model } column = Column::none;  // points: content of `image`; none: `image` is empty

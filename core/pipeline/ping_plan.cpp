@@ -348,7 +348,7 @@ void set_gain(PingPlan& plan, float gain_db) {
 }
 
 bool serves(const PingPlan& plan, const PingRequest& r) {
-  PingSettings requested = r.settings;  // below, the values that affect no table are set to the plan's
+  PingSettings requested = r.settings;  // below, the values that are not compared are set to the plan's
   requested.rate_hz = plan.settings.rate_hz;
   requested.gain_db = plan.settings.gain_db;
   requested.gain_assist = plan.settings.gain_assist;

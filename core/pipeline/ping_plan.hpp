@@ -138,7 +138,7 @@ PingPlan make_plan(const FrequencyMode& mode, const PingSettings& settings, cons
 double device_wavelength_m(const FrequencyMode& mode, const PingSettings& settings);
 /// Changes only the client's gain, because the gain may differ in every ping.
 void set_gain(PingPlan& plan, float gain_db);
-/// True if the plan is valid for this request. Settings that affect no table, such as the gain, are not compared.
+/// True if the plan is valid for this request. The gain (see set_gain()) and settings that affect no table are not compared.
 bool serves(const PingPlan& plan, const PingRequest& request);
 
 // Functions that make parts of a plan.

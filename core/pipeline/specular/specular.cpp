@@ -316,8 +316,8 @@ void SpecularEchoes::candidates(const Object& object, PreparedMesh& mesh, const 
   }
   mirrors_.assign(reflection_.size(), false);
   for (const std::uint16_t m : mesh.materials) mirrors_[m] = reflection_[m] != 0;
-  // The set of reflecting materials depends on the frequency. Each set has its own surfaces, so that a ping does not use those
-  // of a ping at another frequency.
+  // The set of reflecting materials depends on the frequency. Each set has its own surfaces, so that a ping does not use the
+  // surfaces of a ping at another frequency.
   auto at = std::find_if(mesh.surfaces.begin(), mesh.surfaces.end(),
                          [this](const PreparedMesh::Surface& s) { return s.mirrors == mirrors_; });
   if (at == mesh.surfaces.end()) {
