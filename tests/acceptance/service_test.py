@@ -120,12 +120,18 @@ class Unit(unittest.TestCase):
                           f'poses: {{protobuf: "{address}:14770", json: "{address}:14771"}}\n', encoding="utf-8")
         with subprocess.Popen(["strace", "-f", "-qq", "-o", str(calls), str(SONARD), "run", str(config), "--exit-after-pings", "3"],
                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
-            listened = run(SONARCTL, "listen", address, "--pings", "3", "--wait", "300", "--seconds", "300", "--quiet", patience_s=660)
+            listened = run(SONARCTL, "listen", address, "--pings", "3", "--wait", "150", "--seconds", "150", "--quiet", patience_s=360)
             if listened.returncode != 0:  # sonard still waits for a reader of its pings
                 subprocess.run(["pkill", "-P", str(process.pid)], check=False)
-            process.stderr.read()
-        self.assertEqual((process.returncode, listened.returncode), (0, 0), listened.stderr)
-        return calls.read_text(encoding="utf-8", errors="replace")
+            try:
+                said = process.communicate(timeout=120)[1].decode(errors="replace")
+            except subprocess.TimeoutExpired:
+                subprocess.run(["pkill", "-KILL", "-P", str(process.pid)], check=False)
+                process.kill()
+                said = f"sonard did not end; {process.communicate()[1].decode(errors='replace')}"
+        traced = calls.read_text(encoding="utf-8", errors="replace")
+        self.assertEqual((process.returncode, listened.returncode), (0, 0), f"{listened.stderr}\n{said}\n{traced[-3000:]}")
+        return traced
 
     def test_memory_that_is_written_is_never_executed(self):
         """Sets MemoryDenyWriteExecute= with the switch of the kernel; Embree and all other code must work with it."""
